@@ -73,6 +73,8 @@ def in_batches(replicas: Sequence[T]) -> list[Sequence[T]]:
 
 def joined(replicas: Sequence[Footprints]) -> Footprints:
     """The footprints of several replicas together."""
+    if len(replicas) == 1:
+        return replicas[0]
     return Footprints(
         np.concatenate([one.point for one in replicas]),
         np.concatenate([one.weight for one in replicas]),
@@ -120,13 +122,10 @@ def find_footprints(field: TargetField, gauge: Gauge, hits: Hits | LocatedDents)
     contacts, radius, edge = dents.contacts, dents.radius, dents.edge
     on_face = edge < 0
     size = np.pi * radius**2
-    size_on_face = size[on_face]
-    points, weights = [], []
-    for point, contact in gauge.windows.pairs(contacts.select(on_face)):
-        points.append(point)
-        weights.append(size_on_face[contact] / gauge.area[point])
+    point, weight = gauge.windows.shares(contacts.select(on_face), size[on_face], gauge.area)
     band = gauge.band
     if band is not None and not on_face.all():
+        points, weights = [point], [weight]
         own = np.flatnonzero(~on_face)
         line = Places(contacts.place[own], np.zeros((len(own), 3)), field.creases.line[edge[own]])
         for row, contact in band.windows.pairs(line):
@@ -135,10 +134,11 @@ def find_footprints(field: TargetField, gauge: Gauge, hits: Hits | LocatedDents)
             row, half = row[covered], half[covered]
             points.append(band.point[row])
             weights.append(2.0 * np.sqrt(half) / band.length[row])
+        point, weight = np.concatenate(points), np.concatenate(weights)
     own = field.on_target[dents.triangle]
     return Footprints(
-        np.concatenate(points) if points else np.zeros(0, dtype=int),
-        np.concatenate(weights) if weights else np.zeros(0),
+        point,
+        weight,
         area=float(size[own].sum()),
         area_on_creases=float(size[own & ~on_face].sum()),
         squares=float((size[own] ** 2).sum()),

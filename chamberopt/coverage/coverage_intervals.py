@@ -41,6 +41,7 @@ from chamberopt.coverage.percentile import (
     P05_COVERAGE,
     P95_COVERAGE,
     P95_EXPOSURE,
+    DentSums,
     mean_exposure,
     quantile_estimate,
 )
@@ -85,7 +86,7 @@ def multiply_dents(batches: Sequence[Batch], points: int, ratios: Sequence[float
 
 def coverage_estimates(
     batches: Sequence[Batch],
-    points: int,
+    sums: DentSums,
     reachable: float,
     time_ratio: float,
     reachable_error: float = 0.0,
@@ -93,19 +94,19 @@ def coverage_estimates(
     """Estimate mean, deviation and percentiles of coverage and exposure, by Avrami's equation.
 
     Args:
-        points: number of windows.
+        sums: of the batches, over each window.
         reachable: share of the target that a ball can touch.
         time_ratio: treatment time over the simulated time of one replica.
         reachable_error: standard error of `reachable`, by the choice of points.
     """
-    products = multiply_dents(batches, points, [time_ratio, 2.0 * time_ratio])
+    products = multiply_dents(batches, len(sums.number), [time_ratio, 2.0 * time_ratio])
     mean, variance = mean_and_variance_estimates(products, reachable, reachable_error)
     return {
         "mean_coverage": mean,
         "std_coverage": root_of_variance(variance),
-        "exposure": mean_exposure(batches, points, reachable, time_ratio, reachable_error),
+        "exposure": mean_exposure(sums, reachable, time_ratio, reachable_error),
         **{
-            name: quantile_estimate(quantile, batches, points, reachable, time_ratio)
+            name: quantile_estimate(quantile, sums, reachable, time_ratio)
             for name, quantile in (
                 ("p05_coverage", P05_COVERAGE),
                 ("p95_coverage", P95_COVERAGE),

@@ -58,49 +58,44 @@ class DentSums(NamedTuple):
     Attributes:
         replicas: in each batch, shape (g,).
         share: sums of w over the dents in each window, shape (g, p).
+        number: dents of all batches in each window, shape (p,).
     """
 
     replicas: np.ndarray
     share: np.ndarray
+    number: np.ndarray
+
+    @property
+    def weight(self) -> float:
+        """Mean share of a window that a dent takes; infinite if there are no dents."""
+        count = float(self.number.sum())
+        return float(self.share.sum()) / count if count else math.inf
 
 
 def sum_dents(batches: Sequence[Batch], points: int) -> DentSums:
     """Add up the dents of each batch in each of so many windows."""
-    return DentSums(
-        np.array([one.replicas for one in batches]),
-        np.array(
-            [np.bincount(one.footprints.point, one.footprints.weight, points) for one in batches]
-        ),
-    )
+    from chamberopt.coverage.field.windows import add_shares
 
-
-def _weight_of_dents(batches: Sequence[Batch]) -> float:
-    """Mean share of a window that a dent takes; infinite if there are no dents."""
-    weights = [one.footprints.weight for one in batches]
-    count = sum(len(one) for one in weights)
-    return float(sum(one.sum() for one in weights)) / count if count else math.inf
+    share, number = np.zeros((len(batches), points)), np.zeros(points, dtype=np.int64)
+    for of_batch, one in zip(share, batches, strict=True):
+        add_shares(one.footprints.point, one.footprints.weight, of_batch, number)
+    return DentSums(np.array([one.replicas for one in batches]), share, number)
 
 
 def quantile_estimate(
-    quantile: Quantile,
-    batches_of_dents: Sequence[Batch],
-    points: int,
-    reachable: float,
-    time_ratio: float,
+    quantile: Quantile, sums: DentSums, reachable: float, time_ratio: float
 ) -> Estimate:
     """A percentile over the target; what is out of reach is bare.
 
     Args:
         quantile: such as P05_COVERAGE.
-        batches_of_dents: dents of each batch of replicas.
-        points: number of windows.
+        sums: of the dents of each batch of replicas.
         reachable: share of the target that a ball can touch.
         time_ratio: treatment time over the simulated time of one replica.
     """
-    batches, share = len(batches_of_dents), (quantile.level - (1.0 - reachable)) / reachable
+    batches, share = len(sums.replicas), (quantile.level - (1.0 - reachable)) / reachable
     if share <= 0.0:
         return Estimate(0.0, 0.0 if batches > 1 else math.inf, (0.0,) * batches)
-    sums, weight = sum_dents(batches_of_dents, points), _weight_of_dents(batches_of_dents)
 
     def roots_of(some: np.ndarray | slice) -> DensityRoots:
         return _density_roots(sums.share[some], sums.replicas[some], share)
@@ -130,9 +125,9 @@ def quantile_estimate(
     bias = abs(value - whole)
     if np.quantile(sums.share.sum(axis=0), share) == 0.0:
         # Where no dent has fallen it may be bare, or up to 3 dents were to be expected.
-        density = NOT_ONE * weight * time_ratio / float(sums.replicas.sum())
+        density = NOT_ONE * sums.weight * time_ratio / float(sums.replicas.sum())
         most = float(quantile.of_density(density))
-        bias = max(bias + value, most) if math.isfinite(weight) else math.inf
+        bias = max(bias + value, most) if math.isfinite(sums.weight) else math.inf
     found = estimate(
         value + deviations, 0.0, quantile.highest, bias=bias, shared=sampling_errors(of_some)
     )
@@ -145,24 +140,19 @@ def quantile_estimate(
 
 
 def mean_exposure(
-    batches: Sequence[Batch],
-    points: int,
-    reachable: float,
-    time_ratio: float,
-    reachable_error: float = 0.0,
+    sums: DentSums, reachable: float, time_ratio: float, reachable_error: float = 0.0
 ) -> Estimate:
     """The mean exposure M over the target, which has no bias: it is linear in the dents.
 
     Args:
-        batches, points, reachable, time_ratio: as for `quantile_estimate`.
+        sums, reachable, time_ratio: as for `quantile_estimate`.
         reachable_error: standard error of `reachable`, by the choice of points.
     """
-    sums = sum_dents(batches, points)
     total, replicas = sums.share.sum(axis=0), sums.replicas
     of_one_dent = float(exposure_from_density(reachable * time_ratio))  # as wide as its window
     whole = of_one_dent * float(total.mean()) / float(replicas.sum())
-    if not whole or len(batches) == 1:
-        return Estimate(whole, math.inf, (whole,) * len(batches))
+    if not whole or len(replicas) == 1:
+        return Estimate(whole, math.inf, (whole,) * len(replicas))
     rests = (total.mean() - sums.share.mean(axis=1)) / (replicas.sum() - replicas)
     of_some = np.array([some.mean() for some in sparse_points(total)]) / replicas.sum()
     shared = [*sampling_errors(of_one_dent * of_some), whole * reachable_error / reachable]
@@ -230,12 +220,7 @@ def _density_roots(shares: np.ndarray, replicas: np.ndarray, share: float) -> De
 
 
 def time_to_98(
-    p05: Estimate,
-    batches: Sequence[Batch],
-    points: int,
-    reachable: float,
-    time_ratio: float,
-    seconds: float,
+    p05: Estimate, sums: DentSums, reachable: float, time_ratio: float, seconds: float
 ) -> Estimate:
     """Time [s] until the 5th percentile of coverage is FULL_COVERAGE.
 
@@ -244,13 +229,13 @@ def time_to_98(
 
     Args:
         p05: 5th percentile of the coverage after the treatment.
-        batches, points, reachable, time_ratio: as for `quantile_estimate`.
+        sums, reachable, time_ratio: as for `quantile_estimate`.
         seconds: of the treatment.
     """
     part = 1.0
     while p05.value > NEARLY_FULL:
         part /= 4.0
-        p05 = quantile_estimate(P05_COVERAGE, batches, points, reachable, part * time_ratio)
+        p05 = quantile_estimate(P05_COVERAGE, sums, reachable, part * time_ratio)
     return time_to_98_estimate(p05, part * seconds)
 
 

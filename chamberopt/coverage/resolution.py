@@ -10,6 +10,7 @@ import numpy as np
 
 from chamberopt.coverage.coverage_from_impacts import Batch
 from chamberopt.coverage.field.target_field import Gauge
+from chamberopt.coverage.percentile import DentSums
 
 # Dents in a window for each unit of x that the mean and the standard deviation take, in all windows
 # but LEAST_RESOLVED of them, and dents in the median window for the figures of single places.
@@ -48,17 +49,17 @@ class Resolution:
 
 
 def find_resolution(
-    batches: Sequence[Batch], gauge: Gauge, time_ratio: float, time: float
+    batches: Sequence[Batch], sums: DentSums, gauge: Gauge, time_ratio: float, time: float
 ) -> Resolution:
     """Compare the dents in the windows with what the figures take.
 
     Args:
+        sums: of the batches, over each window.
         time_ratio: treatment time over the simulated time of one replica.
         time: simulated by each replica [s].
     """
     replicas = sum(one.replicas for one in batches)
-    points, prints = len(gauge.area), [one.footprints for one in batches]
-    dents = float(np.median(sum(np.bincount(one.point, minlength=points) for one in prints)))
+    prints, dents = [one.footprints for one in batches], float(np.median(sums.number))
     if not dents:
         return Resolution(0.0, DENTS_FOR_MEAN, DENTS_FOR_PLACES, replicas * time)
     # Area of dents that, all alike, would scatter as these do.

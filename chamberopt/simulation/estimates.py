@@ -43,7 +43,7 @@ from chamberopt.coverage.metrics import (
     highest_uniform_coverage,
 )
 from chamberopt.coverage.part_impacts import Hits, TargetImpacts
-from chamberopt.coverage.percentile import in_order, time_to_98
+from chamberopt.coverage.percentile import in_order, sum_dents, time_to_98
 from chamberopt.coverage.resolution import NOT_RESOLVED, Resolution, find_resolution
 from chamberopt.coverage.strength_intervals import strength_estimates
 from chamberopt.design.peening.calibration import calibrated_strip
@@ -167,15 +167,13 @@ def window_estimates(
     process = design.process
     time_ratio = process.treatment_time / process.recorded_time
     batches = batches_of(prints)
-    found = coverage_estimates(
-        batches, len(gauge.area), field.reachable, time_ratio, field.reachable_error
-    )
+    sums = sum_dents(batches, len(gauge.area))
+    found = coverage_estimates(batches, sums, field.reachable, time_ratio, field.reachable_error)
     found["time_to_98_s"] = time_to_98(
-        found["p05_coverage"], batches, len(gauge.area), field.reachable, time_ratio,
-        process.treatment_time,
-    )  # fmt: skip
+        found["p05_coverage"], sums, field.reachable, time_ratio, process.treatment_time
+    )
     found |= in_order(found["p05_coverage"], found["p95_coverage"], "{}_coverage")
-    return found, find_resolution(batches, gauge, time_ratio, process.recorded_time)
+    return found, find_resolution(batches, sums, gauge, time_ratio, process.recorded_time)
 
 
 def _all_resolved(found: Mapping[str, Estimate], resolution: Resolution) -> dict[str, Estimate]:

@@ -105,4 +105,6 @@ def find_band(
     feet = Places(foot[rows], np.zeros((len(rows), 3)), line)
     round_feet = Windows(feet, CREASE_LENGTH * windows.radius)
     length = round_feet.sums(pieces.places, pieces.length)
-    return CreaseBand(point[rows], height[rows], np.maximum(length, dent_radius), round_feet)
+    return CreaseBand(
+        point[rows].astype(np.int32), height[rows], np.maximum(length, dent_radius), round_feet
+    )

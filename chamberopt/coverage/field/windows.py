@@ -27,7 +27,8 @@ import numpy as np
 from sim_core import jit
 
 MAX_CELLS = 4e6  # of the grid in which the points near a contact are found
-PAIRS_AT_ONCE = 2_000_000  # bounds memory
+CELLS = 3  # across a window; 2 to 6 measured alike
+PAIRS_AT_ONCE = 500_000  # bounds memory, and stays in the processor's cache
 
 
 class Places(NamedTuple):
@@ -58,34 +59,40 @@ class Windows:
 
     def __init__(self, points: Places, radius: float) -> None:
         self.points, self.radius = points, radius
-        place = points.place
-        self._low = place.min(axis=0) if len(place) else np.zeros(3)
-        span = np.ptp(place, axis=0) if len(place) else np.zeros(3)
-        # Cells twice as wide as the radius: a window then lies in two cells along each axis.
-        self._edge = max(2.0 * radius, (float(np.prod(span + radius)) / MAX_CELLS) ** (1.0 / 3.0))
-        self._shape = (span / self._edge).astype(np.int64) + 1
-        cell = ((place - self._low) / self._edge).astype(np.int64)
-        number = (cell[:, 0] * self._shape[1] + cell[:, 1]) * self._shape[2] + cell[:, 2]
+        place, face = points.place, points.face
+        self._grid = grid = _grid_of_faces(place, face, radius)
+        cell = ((place - grid.low[face]) / grid.edge).astype(np.int64)
+        shape = grid.shape[face]
+        number = (cell[:, 0] * shape[:, 1] + cell[:, 1]) * shape[:, 2] + cell[:, 2]
+        number += grid.offset[face]
         self._order = np.argsort(number, kind="stable").astype(np.int32)
-        count = np.bincount(number, minlength=int(np.prod(self._shape)))
+        count = np.bincount(number, minlength=int(grid.offset[-1]))
         self._first = np.concatenate([[0], np.cumsum(count)]).astype(np.int32)
-        self._sorted = points.select(self._order)
-        self._has_points = np.zeros(int(points.face.max(initial=0)) + 1, dtype=bool)
-        self._has_points[points.face] = True  # by face
+        self._place = np.ascontiguousarray(place[self._order].T)
+        self._normal = np.ascontiguousarray(points.normal[self._order].T)
 
     def pairs(self, contacts: Places) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """Yield indices of points and of the contacts in their windows, some pairs at a time."""
-        point, contact = np.empty((2, PAIRS_AT_ONCE), dtype=np.int32)
-        done = 0
-        face = np.minimum(contacts.face, len(self._has_points) - 1)
-        rows = np.flatnonzero(self._has_points[face] & (face == contacts.face))
-        columns = [np.ascontiguousarray(column[rows]) for column in contacts]
-        while done < len(rows):
-            done, found = _find_pairs(
-                self._low, self._edge, self._shape, self._first, self._sorted, Places(*columns),
-                self.radius, done, point, contact,
-            )  # fmt: skip
-            yield self._order[point[:found]], rows[contact[:found]]
+        for point, contact, rows in self._found(contacts):
+            yield self._order[point], rows[contact]
+
+    def shares(
+        self, contacts: Places, size: np.ndarray, area: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Points, and the shares of their windows that sizes (k,) of the contacts take, (n,) each.
+
+        Args:
+            area: of the windows, (p,).
+        """
+        found = [
+            _divide(self._order, area, size[rows], point, contact)
+            for point, contact, rows in self._found(contacts)
+        ]
+        if len(found) == 1:
+            return found[0]
+        points, shares = zip(*found, strict=True) if found else ((), ())
+        none = np.zeros(0, dtype=np.int32)
+        return np.concatenate([none, *points]), np.concatenate([none, *shares])
 
     def sums(self, contacts: Places, values: np.ndarray) -> np.ndarray:
         """Sums over each window of values (k,) of the contacts, shape (p,)."""
@@ -94,56 +101,134 @@ class Windows:
             total += np.bincount(point, values[contact], len(total))
         return total
 
+    def _found(self, contacts: Places) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+        """Yield places of points in `_order`, and of contacts among the rows that come third."""
+        point, contact = np.empty((2, max(PAIRS_AT_ONCE, len(self._order))), dtype=np.int32)
+        done, grid = 0, self._grid
+        face = np.minimum(contacts.face, len(grid.shape) - 1)
+        rows = np.flatnonzero((face == contacts.face) & (grid.shape[face, 0] > 0))
+        columns = Places(*(np.ascontiguousarray(column[rows]) for column in contacts))
+        while done < len(rows):
+            done, found = _find_pairs(
+                grid, self._first, self._place, self._normal, columns, self.radius, done,
+                point, contact,
+            )  # fmt: skip
+            yield point[:found], contact[:found], rows
+
+
+class _Grid(NamedTuple):
+    """Cells in which the points near a contact are found: a grid of its own for each face.
+
+    Attributes:
+        edge: of a cell [m].
+        low: lowest corner of each face's grid [m], shape (f, 3).
+        shape: cells of it along each axis, shape (f, 3); 0 where the face has no points.
+        offset: number of its first cell, and last of all how many cells there are, (f + 1,).
+    """
+
+    edge: float
+    low: np.ndarray
+    shape: np.ndarray
+    offset: np.ndarray
+
+
+def _grid_of_faces(place: np.ndarray, face: np.ndarray, radius: float) -> _Grid:
+    """Cells for points (p, 3) [m] on faces (p,)."""
+    faces = int(face.max(initial=0)) + 1
+    low, high = np.full((faces, 3), np.inf), np.full((faces, 3), -np.inf)
+    np.minimum.at(low, face, place)
+    np.maximum.at(high, face, place)
+    some = np.isfinite(low[:, 0])
+    low[~some], high[~some] = 0.0, 0.0
+    # On a plane, 2 r / edge + 1 cells are looked through along each axis.
+    edge = 2.0 * radius / CELLS
+    while True:
+        shape = ((high - low) / edge).astype(np.int64) + 1
+        shape[~some] = 0
+        offset = np.concatenate([[0], np.cumsum(shape.prod(axis=1))])
+        if offset[-1] <= MAX_CELLS + some.sum():
+            return _Grid(edge, low, shape, offset)
+        edge *= 1.5
+
 
 @jit
-def _find_pairs(low, edge, shape, first, points, contacts, radius, begin, point, contact):  # type: ignore[no-untyped-def]
+def _find_pairs(grid, first, x, n_x, contacts, radius, begin, point, contact):  # type: ignore[no-untyped-def]
     """Write down all pairs until the arrays are full.
 
+    Nothing branches on whether a point is near: the processor could not foresee it.
+
     Args:
-        low, edge, shape, first: of the grid of cells; points first[c] to first[c + 1] are in c.
+        first: points first[c] to first[c + 1] are in cell c.
+        x, n_x: places and normals of the points, shape (3, p).
         begin: first contact to look at.
         point, contact: written.
 
     Returns:
         The first contact that is not done, and the number of pairs.
     """
-    found = 0
-    x, n_x, face_x = points
+    found, most = 0, len(point)
     y, n_y, face_y = contacts
+    edge, reach = grid.edge, radius * radius
     for j in range(begin, len(y)):
-        before = found
-        x0 = int(np.floor((y[j, 0] - low[0]) / edge - 0.5))
-        y0 = int(np.floor((y[j, 1] - low[1]) / edge - 0.5))
-        z0 = int(np.floor((y[j, 2] - low[2]) / edge - 0.5))
-        for ix in range(max(x0, 0), min(x0 + 2, shape[0])):
-            for iy in range(max(y0, 0), min(y0 + 2, shape[1])):
-                for iz in range(max(z0, 0), min(z0 + 2, shape[2])):
-                    cell = (ix * shape[1] + iy) * shape[2] + iz
-                    for i in range(first[cell], first[cell + 1]):
-                        if face_x[i] != face_y[j]:
-                            continue
-                        dx = y[j, 0] - x[i, 0]
-                        dy = y[j, 1] - x[i, 1]
-                        dz = y[j, 2] - x[i, 2]
-                        square = dx * dx + dy * dy + dz * dz
-                        if square >= radius * radius:
-                            continue
-                        a = -(dx * n_y[j, 0] + dy * n_y[j, 1] + dz * n_y[j, 2])
-                        b = dx * n_x[i, 0] + dy * n_x[i, 1] + dz * n_x[i, 2]
-                        if a * b > 0.0:
-                            cosine = (
-                                n_x[i, 0] * n_y[j, 0] + n_x[i, 1] * n_y[j, 1]
-                                + n_x[i, 2] * n_y[j, 2]
-                            )  # fmt: skip
-                            # not divided: the cosine may be -1
-                            if 2.0 * a * b >= (radius * radius - square) * (1.0 + cosine):
-                                continue
-                        if found == len(point):
-                            return j, before
-                        point[found] = i
-                        contact[found] = j
-                        found += 1
+        before, face = found, face_y[j]
+        low, shape = grid.low[face], grid.shape[face]
+        y0, y1, y2 = y[j, 0], y[j, 1], y[j, 2]
+        z_low = max(int(np.floor((y2 - radius - low[2]) / edge)), 0)
+        z_high = min(int(np.floor((y2 + radius - low[2]) / edge)) + 1, shape[2])
+        if z_low >= z_high:
+            continue
+        x_low = max(int(np.floor((y0 - radius - low[0]) / edge)), 0)
+        x_high = min(int(np.floor((y0 + radius - low[0]) / edge)) + 1, shape[0])
+        y_low = max(int(np.floor((y1 - radius - low[1]) / edge)), 0)
+        y_high = min(int(np.floor((y1 + radius - low[1]) / edge)) + 1, shape[1])
+        for ix in range(x_low, x_high):
+            for iy in range(y_low, y_high):
+                row = grid.offset[face] + (ix * shape[1] + iy) * shape[2]
+                start, end = first[row + z_low], first[row + z_high]
+                if found + end - start > most:
+                    return j, before
+                near = found
+                for i in range(start, end):
+                    dx, dy, dz = y0 - x[0, i], y1 - x[1, i], y2 - x[2, i]
+                    point[near] = i
+                    near += dx * dx + dy * dy + dz * dz < reach
+                for k in range(found, near):
+                    i = point[k]
+                    dx, dy, dz = y0 - x[0, i], y1 - x[1, i], y2 - x[2, i]
+                    square = dx * dx + dy * dy + dz * dz
+                    a = -(dx * n_y[j, 0] + dy * n_y[j, 1] + dz * n_y[j, 2])
+                    b = dx * n_x[0, i] + dy * n_x[1, i] + dz * n_x[2, i]
+                    cosine = n_x[0, i] * n_y[j, 0] + n_x[1, i] * n_y[j, 1] + n_x[2, i] * n_y[j, 2]
+                    # not divided: the cosine may be -1
+                    is_far = (a * b > 0.0) & (2.0 * a * b >= (reach - square) * (1.0 + cosine))
+                    point[found] = i
+                    contact[found] = j
+                    found += not is_far
     return len(y), found
+
+
+def _divide(
+    order: np.ndarray, area: np.ndarray, size: np.ndarray, place: np.ndarray, contact: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Points, and sizes over areas, of pairs as `_found` gives them."""
+    point, share = np.empty(len(place), dtype=np.int32), np.empty(len(place))
+    _write_shares(order, area, size, place, contact, point, share)
+    return point, share
+
+
+@jit
+def _write_shares(order, area, size, place, contact, point, share):  # type: ignore[no-untyped-def]
+    for pair in range(len(place)):
+        point[pair] = order[place[pair]]
+        share[pair] = size[contact[pair]] / area[point[pair]]
+
+
+@jit
+def add_shares(point, share, sums, numbers):  # type: ignore[no-untyped-def]
+    """Add the shares of pairs, and their numbers, to those of their points, (p,) each."""
+    for pair in range(len(point)):
+        sums[point[pair]] += share[pair]
+        numbers[point[pair]] += 1
 
 
 @jit

@@ -26,6 +26,7 @@ from chamberopt.coverage.field.target_field import (
     find_target_field,
 )
 from chamberopt.coverage.part_impacts import Hits
+from chamberopt.coverage.percentile import sum_dents
 from chamberopt.simulation.evaluate import evaluate, prepare_target
 from tests.helpers.synthetic import (
     chamber_round,
@@ -223,7 +224,9 @@ def test_windows_as_large_as_a_dent_show_the_dents_themselves() -> None:
     hits = plane_dents(rng, 900, 7.499e-3, diameter)
     field = field_of(PLANE, gauge_mm2=1e6 * np.pi / 4.0 * diameter**2)
     found = find_footprints(field, field.gauge, hits)
-    mean = coverage_estimates([Batch(1, found)], len(field.gauge.area), 1.0, 1.0)["mean_coverage"]
+    batches = [Batch(1, found)]
+    sums = sum_dents(batches, len(field.gauge.area))
+    mean = coverage_estimates(batches, sums, 1.0, 1.0)["mean_coverage"]
     share = in_a_disc(field.gauge.windows.points.place, hits).mean()
     assert 0.5 < share < 0.8
     assert mean.value == pytest.approx(share, abs=0.01)
@@ -236,8 +239,8 @@ def test_random_dents_cover_on_average_what_their_discs_cover(gauge_mm2: float) 
     field = field_of(PLANE, gauge_mm2)
     gauge = field.gauge
     treatments = [plane_dents(rng, rng.poisson(1200), 7.499e-3, diameter) for _ in range(16)]
-    prints = [find_footprints(field, gauge, hits) for hits in treatments]
-    found = coverage_estimates([Batch(1, one) for one in prints], len(gauge.area), 1.0, 1.0)
+    batches = [Batch(1, find_footprints(field, gauge, hits)) for hits in treatments]
+    found = coverage_estimates(batches, sum_dents(batches, len(gauge.area)), 1.0, 1.0)
     middles = gauge.windows.points.place
     inner = np.abs(middles[:, :2]).max(axis=1) < 7.2e-3
     shares = np.array([in_a_disc(middles[inner], hits).mean() for hits in treatments])

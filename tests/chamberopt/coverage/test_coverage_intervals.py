@@ -4,7 +4,7 @@ The surface is a plane of windows that do not overlap. Each window has its own x
 by their share of it, and dents that take random shares.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 import pytest
@@ -79,9 +79,21 @@ def groups_of(name: str, dents: float, groups: int) -> Iterator[dict[str, Estima
     rng, x = np.random.default_rng(1), FIELDS[name]
     for _ in range(groups):
         batches = poisson_batches(rng, x, dents)
-        found = coverage_estimates(batches, WINDOWS, 1.0, float(REPLICAS))
+        found = estimates_of(batches, 1.0, float(REPLICAS))
         found["time_to_98_s"] = time_to_98_estimate(found["p05_coverage"], TREATMENT)
         yield found
+
+
+def estimates_of(
+    batches: Sequence[Batch], reachable: float, time_ratio: float
+) -> dict[str, Estimate]:
+    return coverage_estimates(batches, sum_dents(batches, WINDOWS), reachable, time_ratio)
+
+
+def resolution_of(
+    batches: Sequence[Batch], gauge: Gauge, time_ratio: float, time: float
+) -> Resolution:
+    return find_resolution(batches, sum_dents(batches, WINDOWS), gauge, time_ratio, time)
 
 
 def plane_gauge(area: float = 1e-6) -> Gauge:
@@ -132,7 +144,7 @@ def test_few_replicas_give_the_same_percentile(replicas: int) -> None:
     wanted, values, held = true_figures(x)["p05_coverage"], [], 0
     for _ in range(20):
         batches = poisson_batches(rng, x, 60.0, replicas)
-        found = coverage_estimates(batches, WINDOWS, 1.0, float(replicas))["p05_coverage"]
+        found = estimates_of(batches, 1.0, float(replicas))["p05_coverage"]
         held += found.low <= wanted <= found.high
         values.append(found.value)
     assert held >= 17
@@ -148,10 +160,7 @@ def test_the_figures_do_not_depend_on_how_long_was_simulated() -> None:
         sums = [sum_dents(run, WINDOWS).share.sum(axis=0) for run in runs]
         plain[dents] = np.mean([-np.expm1(-one).mean() for one in sums])
         found[dents] = np.mean(
-            [
-                coverage_estimates(run, WINDOWS, 1.0, float(REPLICAS))["mean_coverage"].value
-                for run in runs
-            ]
+            [estimates_of(run, 1.0, float(REPLICAS))["mean_coverage"].value for run in runs]
         )
     assert plain[64.0] - plain[4.0] > 0.03
     assert abs(found[64.0] - found[4.0]) < 0.003
@@ -176,7 +185,7 @@ def test_what_is_out_of_reach_counts_as_bare_exactly() -> None:
     true = true_figures(np.concatenate([x, np.zeros(WINDOWS // 9)]))
     for dents in (5.0, 50.0):
         batches = poisson_batches(rng, x, dents)
-        found = coverage_estimates(batches, WINDOWS, 0.9, float(REPLICAS))
+        found = estimates_of(batches, 0.9, float(REPLICAS))
         for name in ("mean_coverage", "std_coverage"):
             gap = abs(found[name].value - true[name])
             assert gap < 2.0 * found[name].half_width + 2e-3, name
@@ -193,7 +202,7 @@ def test_what_is_out_of_reach_counts_as_bare_exactly() -> None:
 def test_up_to_5_percent_out_of_reach_move_the_percentile_down_the_rest() -> None:
     """With 2 % out of reach it is the quantile of 3/98 of the windows that can be reached."""
     rng, x = np.random.default_rng(4), FIELDS["ramp"]
-    found = coverage_estimates(poisson_batches(rng, x, 400.0), WINDOWS, 0.98, float(REPLICAS))
+    found = estimates_of(poisson_batches(rng, x, 400.0), 0.98, float(REPLICAS))
     wanted = -np.expm1(-np.quantile(x, 0.03 / 0.98))
     low = found["p05_coverage"]
     assert abs(low.value - wanted) < low.half_width + 0.01
@@ -201,11 +210,11 @@ def test_up_to_5_percent_out_of_reach_move_the_percentile_down_the_rest() -> Non
 
 def test_one_batch_has_no_interval() -> None:
     batches = poisson_batches(np.random.default_rng(5), FIELDS["ramp"], 50.0, replicas=1)
-    found = coverage_estimates(batches, WINDOWS, 1.0, 1.0)
+    found = estimates_of(batches, 1.0, 1.0)
     assert all(one.half_width == np.inf for one in found.values())
     assert all(np.isfinite(one.value) for one in found.values())
     assert time_to_98_estimate(found["p05_coverage"], TREATMENT).half_width == np.inf
-    bare = coverage_estimates(batches, WINDOWS, 0.9, 1.0)["p05_coverage"]
+    bare = estimates_of(batches, 0.9, 1.0)["p05_coverage"]
     assert (bare.value, bare.half_width) == (0.0, np.inf)
 
 
@@ -219,9 +228,9 @@ def test_a_handful_of_dents_gives_numbers_that_are_not_resolved(dents: int) -> N
         for i in range(3)
     ]
     batches = [Batch(1, one) for one in prints]
-    found = coverage_estimates(batches, WINDOWS, 1.0, 3.0)
+    found = estimates_of(batches, 1.0, 3.0)
     found["time_to_98_s"] = time_to_98_estimate(found["p05_coverage"], TREATMENT)
-    resolution = find_resolution(batches, plane_gauge(), 3.0, 1.0)
+    resolution = resolution_of(batches, plane_gauge(), 3.0, 1.0)
     assert not resolution.has_mean
     assert not resolution.has_places
     for name, one in found.items():
@@ -240,7 +249,7 @@ def test_what_is_needed_is_three_dents_for_each_unit_of_x() -> None:
         point, np.full(len(point), 0.01), 1e-8 * len(point), 0.0, 1e-16 * len(point)
     )
     batches = [Batch(1, print_)] * 4
-    found = find_resolution(batches, plane_gauge(), time_ratio=10.0, time=0.5)
+    found = resolution_of(batches, plane_gauge(), time_ratio=10.0, time=0.5)
     assert found.dents == 20.0
     assert found.simulated_time == 2.0
     # x = 20 · 0.01 · 10 / 4 = 0.5 at the treatment time; so 1.5 dents would do.
@@ -250,18 +259,18 @@ def test_what_is_needed_is_three_dents_for_each_unit_of_x() -> None:
     assert not found.has_places
     assert found.time_for(25.0) == pytest.approx(ENOUGH * 2.5)
     # In windows of four times the area there is four times as much of a unit.
-    wide = find_resolution(batches, plane_gauge(4e-6), time_ratio=10.0, time=0.5)
+    wide = resolution_of(batches, plane_gauge(4e-6), time_ratio=10.0, time=0.5)
     assert wide.needed_for_mean == pytest.approx(DENTS_FOR_MEAN * 0.5 / 4.0)
 
 
 def test_needs_grow_with_the_ratio_of_the_times_and_with_unequal_dents() -> None:
     rng = np.random.default_rng(6)
     [one] = poisson_batches(rng, FIELDS["even"], 20.0, replicas=1)
-    short = find_resolution([one], plane_gauge(), time_ratio=10.0, time=1.0)
-    long = find_resolution([one], plane_gauge(), time_ratio=40.0, time=1.0)
+    short = resolution_of([one], plane_gauge(), time_ratio=10.0, time=1.0)
+    long = resolution_of([one], plane_gauge(), time_ratio=40.0, time=1.0)
     assert long.needed_for_mean == pytest.approx(4.0 * short.needed_for_mean)
     same = one.footprints._replace(squares=one.footprints.area**2 / len(one.footprints.point))
-    equal = find_resolution([Batch(1, same)], plane_gauge(), time_ratio=10.0, time=1.0)
+    equal = resolution_of([Batch(1, same)], plane_gauge(), time_ratio=10.0, time=1.0)
     assert short.needed_for_mean == pytest.approx(1.25 * equal.needed_for_mean, rel=0.02)
 
 
@@ -356,11 +365,11 @@ def test_time_to_98_by_avrami() -> None:
 def test_the_time_does_not_depend_on_how_long_the_treatment_is() -> None:
     """After hours of peening the coverage is 1 to the last digit; the time is what it was."""
     batches = poisson_batches(np.random.default_rng(3), FIELDS["even"], 100.0)
-    found = []
+    sums, found = sum_dents(batches, WINDOWS), []
     for times_as_long in (1.0, 30.0, 1e5):
         ratio = times_as_long * REPLICAS
-        p05 = quantile_estimate(P05_COVERAGE, batches, WINDOWS, 1.0, ratio)
-        found.append(time_to_98(p05, batches, WINDOWS, 1.0, ratio, times_as_long * TREATMENT))
+        p05 = quantile_estimate(P05_COVERAGE, sums, 1.0, ratio)
+        found.append(time_to_98(p05, sums, 1.0, ratio, times_as_long * TREATMENT))
     first = found[0]
     assert p05.value == 1.0
     for one in found:
@@ -381,7 +390,7 @@ def test_batches_of_unequal_sizes_have_intervals_like_equal_ones() -> None:
     for count in (40, 60, 80):
         run = [Batch(len(part), joined(part)) for part in in_batches(replicas[:count])]
         assert len({one.replicas for one in run}) == (2 if count == 60 else 1)
-        found = coverage_estimates(run, WINDOWS, 1.0, 5.0)["mean_coverage"]
+        found = estimates_of(run, 1.0, 5.0)["mean_coverage"]
         assert abs(found.value + np.expm1(-1.0)) < 3.0 * found.half_width
         widths[count] = found.half_width * np.sqrt(count)
     assert widths[60] == pytest.approx(0.5 * (widths[40] + widths[80]), rel=0.35)
