@@ -74,12 +74,13 @@ class DentSums(NamedTuple):
 
 def sum_dents(batches: Sequence[Batch], points: int) -> DentSums:
     """Add up the dents of each batch in each of so many windows."""
-    from chamberopt.coverage.field.windows import add_shares
+    from chamberopt.coverage.field.windows import add_powers
 
-    share, number = np.zeros((len(batches), points)), np.zeros(points, dtype=np.int64)
-    for of_batch, one in zip(share, batches, strict=True):
-        add_shares(one.footprints.point, one.footprints.weight, of_batch, number)
-    return DentSums(np.array([one.replicas for one in batches]), share, number)
+    sums = np.zeros((len(batches), points, 3))
+    for of_batch, one in zip(sums, batches, strict=True):
+        add_powers(one.footprints.point, one.footprints.weight, of_batch)
+    number, share, _ = np.ascontiguousarray(np.moveaxis(sums, 2, 0))
+    return DentSums(np.array([one.replicas for one in batches]), share, number.sum(axis=0))
 
 
 def quantile_estimate(

@@ -62,6 +62,11 @@ def strip_dents(hits: Hits, density: float, strip: PartMaterial) -> tuple[np.nda
     return dent, np.divide(dent**2, ball, out=np.zeros(len(hits)), where=ball > 0.0)
 
 
+def area_of_dent(diameter: np.ndarray) -> np.ndarray:
+    """Area [m²] of dents of these diameters [m]."""
+    return np.asarray(np.pi / 4.0 * diameter**2)
+
+
 def levels(values: np.ndarray, highest: float) -> np.ndarray:
     """The level of each value, 0 to LEVELS - 1."""
     return np.minimum(LEVELS * values / max(highest, 1e-300), LEVELS - 1).astype(np.int64)
@@ -78,13 +83,12 @@ def strength_histogram(
         dent: their diameters [m], (k,).
         level: their levels, (k,).
     """
-    points = len(area)
-    sums = np.zeros(points * LEVELS)
-    size = np.pi / 4.0 * dent**2
-    for point, contact in windows.pairs(contacts):
-        at = point.astype(np.int64) * LEVELS + level[contact]
-        sums += np.bincount(at, size[contact], len(sums))
-    return sums.reshape(points, LEVELS) / area[:, None]
+    from chamberopt.coverage.field.windows import add_to_levels
+
+    sums, size = np.zeros((len(area), LEVELS)), area_of_dent(dent)
+    for pair in windows.pairs(contacts):
+        add_to_levels(*pair, size, level, sums)
+    return sums / area[:, None]
 
 
 def saturated_strength(histogram: np.ndarray, highest: float) -> tuple[np.ndarray, np.ndarray]:

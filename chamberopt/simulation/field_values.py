@@ -25,9 +25,9 @@ from chamberopt.coverage.field.surface_points import ball_fits, spread_within
 from chamberopt.coverage.field.target_field import Gauge, with_whole_part
 from chamberopt.coverage.strength import (
     LEVELS,
+    area_of_dent,
     levels,
     saturated_strength,
-    strength_histogram,
     strip_dents,
 )
 from chamberopt.design.peening.calibration import calibrated_strip
@@ -185,15 +185,14 @@ class PartField:
 
     def _dents(self, gauge: Gauge) -> dict[str, np.ndarray]:
         """Coverage and its interval, by the footprints of the dents."""
-        points = len(gauge.area)
-        share, squares, dents = np.zeros((3, points))
-        largest = 0.0
+        from chamberopt.coverage.field.windows import add_powers
+
+        sums, largest = np.zeros((len(gauge.area), 3)), 0.0
         for hits, located in zip(self._hits, self._located, strict=True):
             found = find_footprints(self.field, gauge, located)
-            share += np.bincount(found.point, found.weight, points)
-            squares += np.bincount(found.point, found.weight**2, points)
-            dents += np.bincount(found.point, minlength=points)
+            add_powers(found.point, found.weight, sums)
             largest = max(largest, float(hits.dent.max(initial=0.0)))
+        dents, share, squares = sums.T
         one_more = np.pi / 4.0 * largest**2 / gauge.area
         low, high = density_bounds(
             self._scale * share, self._scale**2 * squares, self._scale * one_more
@@ -206,9 +205,10 @@ class PartField:
 
     def _impacts(self, gauge: Gauge) -> dict[str, np.ndarray]:
         """Means and percentiles over the impacts in the windows, dents on creases included."""
-        points, windows = len(gauge.area), gauge.windows
+        from chamberopt.coverage.field.windows import add_columns, add_to_levels
+
+        points = len(gauge.area)
         shot, metal = self._design.shot, self._design.materials.part
-        sums = np.zeros((6, points))
         turned = [self.field.in_sector(hits) for hits in self._hits]
         fastest = max(float(hits.speed.max(initial=0.0)) for hits in turned)
         # Dents on a strip by their strength, and on the part by their size.
@@ -216,31 +216,25 @@ class PartField:
         on_strip = [strip_dents(hits, shot.density, strip) for hits in turned]
         strongest = max(float(one.max(initial=0.0)) for _, one in on_strip)
         widest = max(float(hits.dent.max(initial=0.0)) for hits in turned)
+        sums = np.zeros((points, 6))
         by_speed, by_strength, by_size = np.zeros((3, points, LEVELS))
         for hits, (strip_dent, strength) in zip(turned, on_strip, strict=True):
-            places = self.field.places_of(hits, np.arange(len(hits)))
-            ones = np.ones(len(hits))
-            is_dent = (hits.dent > 0.0).astype(float)
-            columns = (ones, hits.speed, hits.angle, hits.energy, hits.dent, is_dent)
-            level = levels(hits.speed, fastest)
-            for point, contact in windows.pairs(places):
-                for row, column in zip(sums, columns, strict=True):
-                    row += np.bincount(point, column[contact], points)
-                at = point.astype(np.int64) * LEVELS + level[contact]
-                by_speed += np.bincount(at, minlength=points * LEVELS).reshape(points, LEVELS)
-            for sizes, values, highest, histogram in (
-                (strip_dent, strength, strongest, by_strength),
-                (hits.dent, hits.dent, widest, by_size),
-            ):
-                dented = np.flatnonzero(values > 0.0)
-                histogram += strength_histogram(
-                    windows,
-                    gauge.area,
-                    places.select(dented),
-                    sizes[dented].astype(float),
-                    levels(values[dented], highest),
-                )
-        impacts, speed, angle, energy, dent, dents = sums
+            ones, is_dent = np.ones(len(hits)), hits.dent > 0.0
+            columns = np.stack(
+                [ones, hits.speed, hits.angle, hits.energy, hits.dent, is_dent], axis=1, dtype=float
+            )
+            histograms = (
+                (ones, levels(hits.speed, fastest), by_speed),
+                (area_of_dent(strip_dent), levels(strength, strongest), by_strength),
+                (area_of_dent(hits.dent.astype(float)), levels(hits.dent, widest), by_size),
+            )
+            for pair in gauge.windows.pairs(self.field.places_of(hits, np.arange(len(hits)))):
+                add_columns(*pair, columns, sums)
+                for histogram in histograms:
+                    add_to_levels(*pair, *histogram)
+        by_strength /= gauge.area[:, None]
+        by_size /= gauge.area[:, None]
+        impacts, speed, angle, energy, dent, dents = sums.T
         strength, time = saturated_strength(by_strength, strongest)
         found = {
             "impacts_per_mm2": self._scale * 1e-6 * _ratio(impacts, gauge.area),

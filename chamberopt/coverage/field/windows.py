@@ -224,11 +224,28 @@ def _write_shares(order, area, size, place, contact, point, share):  # type: ign
 
 
 @jit
-def add_shares(point, share, sums, numbers):  # type: ignore[no-untyped-def]
-    """Add the shares of pairs, and their numbers, to those of their points, (p,) each."""
+def add_powers(point, share, sums):  # type: ignore[no-untyped-def]
+    """Add 1, the share and its square of pairs to the sums (p, 3) of their points."""
     for pair in range(len(point)):
-        sums[point[pair]] += share[pair]
-        numbers[point[pair]] += 1
+        one, w = point[pair], share[pair]
+        sums[one, 0] += 1.0
+        sums[one, 1] += w
+        sums[one, 2] += w * w
+
+
+@jit
+def add_columns(point, contact, columns, sums):  # type: ignore[no-untyped-def]
+    """Add the columns (k, c) of the contacts of pairs to the sums (p, c) of their points."""
+    for pair in range(len(point)):
+        for column in range(columns.shape[1]):
+            sums[point[pair], column] += columns[contact[pair], column]
+
+
+@jit
+def add_to_levels(point, contact, size, level, histogram):  # type: ignore[no-untyped-def]
+    """Add the sizes (k,) of the contacts of pairs to their levels of a histogram (p, levels)."""
+    for pair in range(len(point)):
+        histogram[point[pair], level[contact[pair]]] += size[contact[pair]]
 
 
 @jit
