@@ -105,10 +105,9 @@ class LocatedDents(NamedTuple):
     edge: np.ndarray
 
 
-def locate_dents(field: TargetField, hits: Hits) -> LocatedDents:
-    """Find the face or the crease on which each dent lies."""
-    seen = (hits.dent > 0.0) & field.has_windows[hits.triangle]
-    dents = field.in_sector(hits.select(seen))
+def locate_dents(field: TargetField, in_sector: Hits) -> LocatedDents:
+    """Find the face or the crease on which each dent lies, of impacts where the windows are."""
+    dents = in_sector.select((in_sector.dent > 0.0) & field.has_windows[in_sector.triangle])
     contacts = field.places_of(dents, np.arange(len(dents)))
     edge = _crease_of_contacts(field, contacts.place, dents.triangle)
     return LocatedDents(contacts, dents.triangle, 0.5 * dents.dent.astype(float), edge)
@@ -118,7 +117,7 @@ def find_footprints(field: TargetField, gauge: Gauge, hits: Hits | LocatedDents)
     """The dents of one replica in windows of one size; dents off the target count nothing."""
     from chamberopt.coverage.field.windows import Places
 
-    dents = hits if isinstance(hits, LocatedDents) else locate_dents(field, hits)
+    dents = hits if isinstance(hits, LocatedDents) else locate_dents(field, field.in_sector(hits))
     contacts, radius, edge = dents.contacts, dents.radius, dents.edge
     on_face = edge < 0
     size = np.pi * radius**2

@@ -71,10 +71,11 @@ class SeenDents:
     def add(self, hits: Sequence[Hits]) -> None:
         """Look at the replicas that are new."""
         for one in hits[len(self.gauge) :]:
-            dents = locate_dents(self.field, one)
+            in_sector = self.field.in_sector(one)
+            dents = locate_dents(self.field, in_sector)
+            self.in_sector.append(in_sector)
             self.gauge.append(find_footprints(self.field, self.field.gauge, dents))
             self.wide.append(find_footprints(self.field, self.field.wide, dents))
-            self.in_sector.append(self.field.in_sector(one))
 
     @property
     def crease_share(self) -> float:

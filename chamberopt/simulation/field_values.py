@@ -55,7 +55,8 @@ class PartField:
         self.target = prepare_target(design, chamber, self._mesh)
         self.field = with_whole_part(self.target, chamber, self._mesh)
         self._hits = evaluation.hits
-        self._located = [locate_dents(self.field, hits) for hits in self._hits]
+        self._in_sector = [self.field.in_sector(hits) for hits in self._hits]
+        self._located = [locate_dents(self.field, hits) for hits in self._in_sector]
         self._simulated_time = evaluation.simulated_time
         # Treatment time over simulated time.
         self._scale = design.process.treatment_time / evaluation.simulated_time
@@ -209,16 +210,15 @@ class PartField:
 
         points = len(gauge.area)
         shot, metal = self._design.shot, self._design.materials.part
-        turned = [self.field.in_sector(hits) for hits in self._hits]
-        fastest = max(float(hits.speed.max(initial=0.0)) for hits in turned)
+        fastest = max(float(hits.speed.max(initial=0.0)) for hits in self._in_sector)
         # Dents on a strip by their strength, and on the part by their size.
         strip = calibrated_strip(shot, self._design.calibration)
-        on_strip = [strip_dents(hits, shot.density, strip) for hits in turned]
+        on_strip = [strip_dents(hits, shot.density, strip) for hits in self._in_sector]
         strongest = max(float(one.max(initial=0.0)) for _, one in on_strip)
-        widest = max(float(hits.dent.max(initial=0.0)) for hits in turned)
+        widest = max(float(hits.dent.max(initial=0.0)) for hits in self._in_sector)
         sums = np.zeros((points, 6))
         by_speed, by_strength, by_size = np.zeros((3, points, LEVELS))
-        for hits, (strip_dent, strength) in zip(turned, on_strip, strict=True):
+        for hits, (strip_dent, strength) in zip(self._in_sector, on_strip, strict=True):
             ones, is_dent = np.ones(len(hits)), hits.dent > 0.0
             columns = np.stack(
                 [ones, hits.speed, hits.angle, hits.energy, hits.dent, is_dent], axis=1, dtype=float
