@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -37,11 +38,15 @@ def complete_result(design: Design, chamber: Chamber, evaluation: Evaluation) ->
     """
     require_triangles(evaluation, len(chamber.part.triangles))
     seen = PartField(design, chamber, evaluation)
-    return CandidateResult(
-        design=design,
-        chamber=chamber,
-        evaluation=evaluation,
-        element_values=seen.element_values(),
-        display=seen.display(),
-        time_curve=coverage_against_time(design, seen.target, evaluation),
-    )
+    with ThreadPoolExecutor(2) as threads:  # compiled code, most of it, works beside other threads
+        element_values = threads.submit(seen.element_values)
+        display = threads.submit(seen.display)
+        time_curve = coverage_against_time(design, seen.target, evaluation)
+        return CandidateResult(
+            design=design,
+            chamber=chamber,
+            evaluation=evaluation,
+            element_values=element_values.result(),
+            display=display.result(),
+            time_curve=time_curve,
+        )
