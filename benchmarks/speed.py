@@ -64,6 +64,12 @@ class Version(NamedTuple):
     python: str
     folder: Path
 
+    def environment(self, cache: str | Path) -> dict[str, str]:
+        """As a user's: Python keeps its own compiled files, and ours are in that folder."""
+        setting = {**os.environ, "NUMBA_CACHE_DIR": str(self.folder / cache)}
+        setting.pop("PYTHONDONTWRITEBYTECODE", None)
+        return setting
+
     def spent(
         self, words: list[str], cache: str | Path, cores: set[int] | None = None
     ) -> dict[str, float]:
@@ -72,7 +78,7 @@ class Version(NamedTuple):
         Args:
             cores: that the command may use; None for all.
         """
-        setting = {**os.environ, "NUMBA_CACHE_DIR": str(self.folder / cache)}
+        setting = self.environment(cache)
         before, begin = _children(), time.perf_counter()
         pinned = ["taskset", "-c", ",".join(map(str, sorted(cores)))] if cores else []
         going = subprocess.Popen([*pinned, self.python, *words], cwd=self.root, env=setting,
@@ -91,8 +97,8 @@ class Version(NamedTuple):
 
     def printed(self, words: list[str]) -> Any:
         """The JSON that a benchmark of this version prints."""
-        setting = {**os.environ, "NUMBA_CACHE_DIR": str(self.folder / "cache")}
-        done = subprocess.run([self.python, *words], cwd=self.root, env=setting, text=True,
+        done = subprocess.run([self.python, *words], cwd=self.root,
+                              env=self.environment("cache"), text=True,
                               stdout=subprocess.PIPE, check=True)  # fmt: skip
         return json.loads(done.stdout)
 

@@ -20,8 +20,8 @@ from typing import NamedTuple
 import numpy as np
 
 from sim_core.errors import SceneError
-from sim_core.geometry.flat_faces import SurfaceTriangles, surface_triangles
-from sim_core.geometry.mesh import TriangleMesh, edge_partners
+from sim_core.geometry.flat_faces import SurfaceTriangles
+from sim_core.geometry.mesh import TriangleMesh, edge_partners, normals_towards_shot
 
 LEVEL = 1e-9  # cosine or sine that is rounding
 
@@ -55,7 +55,7 @@ def find_border(surface: SurfaceTriangles, radius: float) -> SonotrodeBorder:
     Raises:
         SceneError: where the amplitude is so large that a face would part from a wall.
     """
-    beside = _beside(surface)
+    beside = _beside(surface.mesh.triangles, surface.normals, surface.vibrating)
     reached = radius * (1.0 - beside.run) < surface.amplitude[beside.face]
     beside = _Beside(*(x[reached] for x in beside))
     face, run, rise = beside.face, beside.run, beside.rise
@@ -83,7 +83,8 @@ def largest_amplitude(mesh: TriangleMesh, tag: int, radius: float) -> tuple[floa
         Zero-to-peak amplitude [m], inf where every wall is upright; the place [m], shape (3,),
         that limits it; and how the wall rises there, in words.
     """
-    beside = _beside(surface_triangles(mesh, (tag,), (0.0,)))
+    normals, _ = normals_towards_shot(mesh.corners)
+    beside = _beside(mesh.triangles, normals, mesh.tags == tag)
     limit = _largest_amplitude(beside.run, beside.rise, radius)
     if not np.isfinite(limit).any():
         return float("inf"), mesh.middle, ""
@@ -94,11 +95,11 @@ def largest_amplitude(mesh: TriangleMesh, tag: int, radius: float) -> tuple[floa
     return float(limit[k]), ends.mean(axis=0), _leaning(angle)
 
 
-def _beside(surface: SurfaceTriangles) -> _Beside:
-    two, vibrating = edge_partners(surface.mesh.triangles), surface.vibrating
+def _beside(triangles: np.ndarray, normals: np.ndarray, vibrating: np.ndarray) -> _Beside:
+    two = edge_partners(triangles)
     edge = two[np.repeat(vibrating, 3) & ~vibrating[two // 3]]
     face = two[edge] // 3
-    one, other = surface.normals[face], surface.normals[edge // 3]
+    one, other = normals[face], normals[edge // 3]
     run = np.einsum("ij,ij->i", one, other)
     return _Beside(edge, face, run, np.linalg.norm(np.cross(one, other), axis=1))
 

@@ -60,7 +60,7 @@ def describe(design: Design, chamber: Chamber, reach: Reach | None = None) -> di
     accuracy = process.accuracy
     simulated = accuracy.replicas * (process.recorded_time + accuracy.warmup_time)
     return {
-        **first_facts(design, chamber, reach.mesh),
+        **with_clearance(first_facts(design, chamber), reach.mesh),
         **_zone_facts(reach, chamber),
         **_turn_facts(design, chamber.part),
         "materials": {name: law.in_words for name, law in design.materials},
@@ -77,8 +77,8 @@ def describe(design: Design, chamber: Chamber, reach: Reach | None = None) -> di
     }
 
 
-def first_facts(design: Design, chamber: Chamber, mesh: TriangleMesh) -> dict[str, Any]:
-    """The facts that are known before what the shot reaches; mesh is the chamber's."""
+def first_facts(design: Design, chamber: Chamber) -> dict[str, Any]:
+    """The facts that are known at once, with the chamber."""
     part, shot = chamber.part, design.shot
     exposed = chamber.exposed_area > 0.0
     box, low = np.ptp(part.vertices, axis=0), part.vertices.min(axis=0)
@@ -106,8 +106,6 @@ def first_facts(design: Design, chamber: Chamber, mesh: TriangleMesh) -> dict[st
             "shape": design.chamber.shape,
             "shape_volume_cm3": _rounded(shape_volume * 1e6),
             "free_volume_cm3": _rounded(chamber.volume * 1e6),
-            "closed": "yes",  # otherwise SceneError was raised above
-            "sonotrode_clearance_mm": _rounded(sonotrode_clearance(mesh) * 1e3),
             "part_triangles": int((chamber.tags == TAG_PART).sum()),
             "sonotrode_triangles": int(is_sonotrode(chamber.tags).sum()),
             "wall_triangles": int((chamber.tags == TAG_WALL).sum()),
@@ -124,6 +122,13 @@ def first_facts(design: Design, chamber: Chamber, mesh: TriangleMesh) -> dict[st
             "packing_fraction": _rounded(shot.volume / chamber.volume),
         },
     }
+
+
+def with_clearance(facts: dict[str, Any], mesh: TriangleMesh) -> dict[str, Any]:
+    """First facts with what a chamber's mesh, which is closed, tells of it."""
+    clearance = _rounded(sonotrode_clearance(mesh) * 1e3)
+    more = {"closed": "yes", "sonotrode_clearance_mm": clearance}
+    return {**facts, "chamber": facts["chamber"] | more}
 
 
 def notes(design: Design, chamber: Chamber) -> list[str]:

@@ -54,7 +54,7 @@ def check(
 
 def _check(file: Path, pilot: bool, screenshot: Path | None, json: bool, out: Path | None) -> None:
     from chamberopt.chamber.build import build_chamber
-    from chamberopt.chamber.checks.check import describe, shot_reach
+    from chamberopt.chamber.checks.check import describe, first_facts, shot_reach
     from chamberopt.common.files import write_text
     from chamberopt.common.progress import step
     from chamberopt.geometry.mesh_io.surface_error import SurfaceError
@@ -77,6 +77,9 @@ def _check(file: Path, pilot: bool, screenshot: Path | None, json: bool, out: Pa
             print_remarks([remark or f"picture in {screenshot}"])
             error.__notes__.clear()  # how to see it
         raise
+    first_lines = table_lines(first_facts(design, chamber))
+    if not json:
+        show(first_lines)  # the rest takes longer, above all the first time
     with step("finding what the shot reaches"):
         reach = shot_reach(design, chamber)
         facts = describe(design, chamber, reach)
@@ -94,10 +97,11 @@ def _check(file: Path, pilot: bool, screenshot: Path | None, json: bool, out: Pa
     if out is not None:
         facts["folder"] = str(out)
     if not json:
-        show([f"{file}: a usable {kind}", *table_lines(facts)])
+        show(line for line in table_lines(facts) if line not in first_lines)
     facts["effects"] = advise_effects(design, chamber) if pilot else groups(design, chamber)
     if not json:
         show(f"effect: {one['said']}" for one in facts["effects"])
+        show([f"{file}: a usable {kind}"])
     if out is not None:
         write_text(out / "check.json", json_format.dumps(facts, indent=2) + "\n")
         write_chamber(out, chamber)

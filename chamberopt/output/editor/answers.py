@@ -9,7 +9,14 @@ from typing import Any
 import numpy as np
 
 from chamberopt.chamber.build import build_chamber
-from chamberopt.chamber.checks.check import describe, first_facts, first_warnings, notes, shot_reach
+from chamberopt.chamber.checks.check import (
+    describe,
+    first_facts,
+    first_warnings,
+    notes,
+    shot_reach,
+    with_clearance,
+)
 from chamberopt.chamber.part import preview_part
 from chamberopt.chamber.reach.reach import reached_part_share
 from chamberopt.chamber.scene import chamber_mesh
@@ -63,7 +70,7 @@ def check_answers(design: Design) -> Iterator[bytes]:
     chamber = build_chamber(design)
     mesh = chamber_mesh(chamber)
     head: dict[str, Any] = {
-        "facts": first_facts(design, chamber, mesh),
+        "facts": with_clearance(first_facts(design, chamber), mesh),
         "notes": notes(design, chamber),
         "warnings": first_warnings(design, chamber, mesh),
     }
