@@ -20,6 +20,16 @@ from tests.helpers.scenes.layer import shaken_layer
 DRIVES = ((2.0, 0.27), (4.6, 0.27), (3.0, 0.44))  # Γ and f*
 
 
+def played(balls: int, gamma: float, f_star: float, cycles: int) -> tuple[int, float]:
+    """Collisions of so many cycles, and their CPU seconds."""
+    scene = shaken_layer(balls, gamma, f_star, cycles)
+    compile_simulator(scene.physics, balls)
+    run = Simulation(scene)
+    start = time.process_time()
+    run.play(scene.duration, record=False)
+    return int(run.state.counts[:3].sum()), time.process_time() - start
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--balls", type=int, default=9_600)
@@ -27,13 +37,7 @@ def main() -> None:
     options = parser.parse_args()
     print("Γ | f* | collisions a cycle | M collisions / CPU s | CPU s for 200 cycles")
     for gamma, f_star in DRIVES:
-        scene = shaken_layer(options.balls, gamma, f_star, options.cycles)
-        compile_simulator(scene.physics, options.balls)
-        run = Simulation(scene)
-        start = time.process_time()
-        run.play(scene.duration, record=False)
-        spent = time.process_time() - start
-        collisions = int(run.state.counts[:3].sum())
+        collisions, spent = played(options.balls, gamma, f_star, options.cycles)
         print(
             f"{gamma} | {f_star} | {collisions / options.cycles:.3g} | "
             f"{collisions / spent / 1e6:.2f} | {200 * spent / options.cycles:.0f}",

@@ -165,24 +165,45 @@ def studying(version: Version, turn: int) -> Iterator[tuple[str, float]]:
     yield "40 evaluations, one core / two", seconds[0] / seconds[1]
 
 
+def setting_up(version: Version, turn: int) -> Iterator[tuple[str, float]]:
+    """A scene on 100,000 triangles that were seen before."""
+    code = "print(__import__('benchmarks.growth').growth.triangles(100_000)['again_cpu_s'])"
+    yield "set-up on 100k triangles seen before, CPU s", version.printed(["-c", code])
+
+
+def layering(version: Version, turn: int) -> Iterator[tuple[str, float]]:
+    """A dense layer of 9,600 balls on a shaken floor."""
+    code = "print([*__import__('benchmarks.dense_layer').dense_layer.played(9_600, 2.0, 0.27, 3)])"
+    collisions, spent = version.printed(["-c", code])
+    yield "dense layer, M collisions / CPU s", 1e-6 * collisions / spent
+
+
 # Each with its rounds.
 ROWS: dict[str, tuple[Callable[[Version, int], Iterator[tuple[str, float]]], int]] = {
     "compile": (compiling, ROUNDS),
     "check": (checking, ROUNDS),
     "collisions": (colliding, ROUNDS),
+    "set-up": (setting_up, ROUNDS),
+    "layer": (layering, 1),
     "evaluation": (evaluating, ROUNDS),
     "study": (studying, 1),
     "quickstart": (quickstart, 1),
 }
 
 
+# What a version of before may not have yet.
+NEEDS = {"set-up": "benchmarks/growth.py", "layer": "benchmarks/dense_layer.py"}
+
+
 def measure(names: list[str], versions: dict[str, Version]) -> list[dict[str, Any]]:
-    """The median of every figure, a column for each version."""
+    """The median of every figure, a column for each version that has the benchmark."""
     found: dict[str, dict[str, list[float]]] = {}
     for name in names:
         row, rounds = ROWS[name]
         for turn in range(rounds):
             for label, version in versions.items():
+                if not (version.root / NEEDS.get(name, "")).exists():
+                    continue
                 for what, value in row(version, turn):
                     found.setdefault(what, {}).setdefault(label, []).append(value)
     return [
