@@ -5,7 +5,14 @@ import pytest
 import trimesh
 
 from chamberopt.coverage.field import windows as windows_module
-from chamberopt.coverage.field.windows import Places, Windows, multiply_products
+from chamberopt.coverage.field.windows import (
+    Places,
+    Windows,
+    add_columns,
+    add_powers,
+    add_to_levels,
+    multiply_products,
+)
 
 UP = np.array([0.0, 0.0, 1.0])
 
@@ -44,6 +51,43 @@ def test_pairs_come_in_pieces_that_bound_memory(monkeypatch: pytest.MonkeyPatch)
     windows = Windows(points, 3.0)
     assert found_pairs(windows, contacts) == whole
     assert len(list(windows.pairs(contacts))) > len(whole) // 150
+
+
+def test_a_coarse_grid_finds_the_same_pairs(monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = np.random.default_rng(8)
+    points, contacts = on_plane(rng, 100, faces=3), on_plane(rng, 100, faces=4)
+    fine = found_pairs(Windows(points, 0.5), contacts)
+    monkeypatch.setattr(windows_module, "MAX_CELLS", 10)
+    assert found_pairs(Windows(points, 0.5), contacts) == fine
+
+
+@pytest.mark.parametrize("at_once", [150, 100_000])
+def test_shares_are_sizes_over_areas_of_the_windows(
+    at_once: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(windows_module, "PAIRS_AT_ONCE", at_once)
+    rng = np.random.default_rng(9)
+    points, contacts = on_plane(rng, 100), on_plane(rng, 100)
+    size, area = rng.uniform(1.0, 2.0, 100), rng.uniform(3.0, 4.0, 100)
+    windows = Windows(points, 3.0)
+    point, share = windows.shares(contacts, size, area)
+    wanted = [(p, size[c] / area[p]) for p, c in found_pairs(windows, contacts)]
+    assert sorted(zip(point.tolist(), share.tolist(), strict=True)) == sorted(wanted)
+    none = windows.shares(contacts.select(slice(0, 0)), size[:0], area)
+    assert [len(one) for one in none] == [0, 0]
+
+
+def test_powers_levels_and_columns_are_added_to_their_points() -> None:
+    point, contact = np.array([1, 0, 1], dtype=np.int32), np.array([0, 1, 1], dtype=np.int32)
+    powers = np.zeros((2, 3))
+    add_powers(point, np.array([0.5, 2.0, 3.0]), powers)
+    assert powers.tolist() == [[1.0, 2.0, 4.0], [2.0, 3.5, 9.25]]
+    columns = np.zeros((2, 2))
+    add_columns(point, contact, np.array([[1.0, 10.0], [2.0, 20.0]]), columns)
+    assert columns.tolist() == [[2.0, 20.0], [3.0, 30.0]]
+    histogram = np.zeros((2, 3))
+    add_to_levels(point, contact, np.array([5.0, 7.0]), np.array([2, 0]), histogram)
+    assert histogram.tolist() == [[7.0, 0.0, 0.0], [7.0, 0.0, 5.0]]
 
 
 def test_contacts_outside_the_grid_of_the_points_are_in_their_windows_too() -> None:
