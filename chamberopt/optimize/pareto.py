@@ -67,7 +67,8 @@ def as_csv(result: StudyResult) -> str:
     for one in pareto_points(result):
         line = {"stage": one.stage, "on_front": one.on_front, "standing": one.feasibility}
         for name, goal in zip(result.study.objective.goals, one.goals, strict=True):
-            line |= {name: goal.value, f"{name}_pm": goal.half_width}
+            shown = (goal.in_words, "") if goal.in_words else (goal.value, goal.half_width)
+            line |= dict(zip((name, f"{name}_pm"), shown, strict=True))
         lines.append({**line, **one.parameters})
     return csv_text(lines)
 

@@ -154,6 +154,8 @@ def run_study(
     best = max(winners, key=lambda one: one.goals[0].value - one.lost_to_tolerances)
     is_gain = best is not start
     gain = paired_difference(best.goals[0], start.goals[0]) if is_gain else Estimate(0.0, 0.0)
+    if is_gain and (best.goals[0].in_words or start.goals[0].in_words):
+        gain = gain.not_known(NOT_KNOWN)
     model = candidates.objective_model
     noise = estimate(best.evaluation.objective.pseudovalues).half_width
     sensitivity = analyse_sensitivity(model, space, best.parameters, noise) if model else None
@@ -183,16 +185,12 @@ def fixed_target(study: Study) -> np.ndarray | None:
     """The target of all candidates, shape (m,) bool, if it is what the shot reaches; else None.
 
     It is found once, in the chamber of the start. Otherwise a search could shrink the area that it
-    has to cover. InputError if the study varies the target itself.
+    has to cover.
     """
     from chamberopt.chamber.build import build_chamber
 
     if not study.design.part.target.reachable:
         return None
-    for name in study.vary:
-        if name.startswith("part.target."):
-            text = "not supported; leave one of the two out"
-            raise InputError(f"vary: {name} with part.target.reachable: {text}")
     return build_chamber(study.design).part.target
 
 

@@ -6,6 +6,7 @@ of figures.
 
 from __future__ import annotations
 
+import math
 import time
 import warnings
 from collections.abc import Iterator
@@ -98,7 +99,9 @@ def plan_sweep(
             raise InputError(f"--seed: given {seed}, {text}")
         if grid < 2:
             raise InputError(f"--grid: given {grid}; give at least 2 values of each parameter")
-        _require_few(grid**dimensions, f"--grid: {grid} values of {dimensions} parameters")
+        counts = [min(grid, one.levels) if one.levels else grid for one in domain.axes]
+        what = f"--grid: {grid} values of {dimensions} parameters, as far as they have so many"
+        _require_few(math.prod(counts), what)
         axes = domain.snap(np.repeat(np.linspace(0.0, 1.0, grid)[:, None], dimensions, axis=1)).T
         each = [  # of few levels each once, and all choices
             np.unique(line) if axis.ordered else np.linspace(0.0, 1.0, axis.levels)

@@ -73,7 +73,10 @@ class RecordedTrials:
         return (
             len(trial.goals) == self._objectives
             and all(math.isfinite(goal.value) for goal in trial.goals)
+            and all(one.half_width >= 0.0 for one in (*trial.goals, *trial.metrics.values()))
             and trial.metrics.keys() == self._metrics
+            and (trial.replicas or 0) > 0
+            and trial.highest is None
         )
 
     def _mismatch(self, number: int, what: str) -> InputError:

@@ -33,6 +33,11 @@ class Limits(FileTable):
         if self.min is not None and self.max is not None and self.min > self.max:
             yield Problem("min", f"given {self.min:g}, above max = {self.max:g}")
 
+    def hold(self, value: float) -> bool:
+        """Whether an exact number is within them."""
+        low, high = self.min, self.max
+        return (low is None or low <= value) and (high is None or value <= high)
+
 
 def zone_constraints(design: Design) -> dict[str, Limits]:
     """The limits of a design's zones, as constraints on their metrics."""
@@ -145,7 +150,7 @@ def assess_feasibility(
                 continue
             is_violated = excess > figure.half_width
             feasibility = INFEASIBLE if is_violated or feasibility == INFEASIBLE else NOT_KNOWN
-            value = f"{name} {figure.value:.4g} ± {figure.half_width:.2g}"
+            value = f"{name} {figure.in_words or f'{figure.value:.4g} ± {figure.half_width:.2g}'}"
             reasons.append(f"{value} {'' if is_violated else 'may be '}{comparison}")
     return feasibility, "; ".join(reasons)
 

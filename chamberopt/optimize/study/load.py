@@ -40,13 +40,10 @@ def _study(path: Path, source: str, data: dict[str, Any]) -> Study:
         text = f"{given}; give the path of a design file, relative to this file: "
         problem = Problem("design", f'{text}design = "../designs/gear.toml"')
         raise InputError(toml_errors.format_problems([problem], path, source))
-    if isinstance(data.get("vary"), Mapping):
-        data = {**data, "vary": _flatten(data["vary"], is_table=_varies)}
-    if isinstance(data.get("constraints"), Mapping):
-        data = {**data, "constraints": _flatten(data["constraints"], is_table=_limits)}
-    objective = data.get("objective")
-    if isinstance(objective, Mapping) and isinstance(objective.get("sum"), Mapping):
-        data = {**data, "objective": {**objective, "sum": _flatten(objective["sum"])}}
+    try:
+        data = _with_dotted_names(data)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
     try:
         design = load_design(Path(os.path.normpath(path.parent / named)))
     except InputError as error:
@@ -54,6 +51,18 @@ def _study(path: Path, source: str, data: dict[str, Any]) -> Study:
         lines = [toml_errors.format_problems([problem], path, source), str(error)]
         raise InputError("\n".join([*lines, *_other_problems(data, path, source)])) from None
     return validate(Study, {**data, "design": design}, path, source)
+
+
+def _with_dotted_names(data: dict[str, Any]) -> dict[str, Any]:
+    """The tables whose keys are numbers of the design or metrics, with their whole names."""
+    if isinstance(data.get("vary"), Mapping):
+        data = {**data, "vary": _flatten(data["vary"], is_table=_varies)}
+    if isinstance(data.get("constraints"), Mapping):
+        data = {**data, "constraints": _flatten(data["constraints"], is_table=_limits)}
+    objective = data.get("objective")
+    if isinstance(objective, Mapping) and isinstance(objective.get("sum"), Mapping):
+        data = {**data, "objective": {**objective, "sum": _flatten(objective["sum"])}}
+    return data
 
 
 def _other_problems(data: Mapping[str, Any], path: Path, source: str) -> list[str]:
@@ -81,7 +90,11 @@ def _flatten(
     for name, value in table.items():
         is_prefix = isinstance(value, Mapping) and not is_table(value)
         inner = _flatten(value, f"{prefix}{name}.", is_table) if is_prefix else {}
-        flat |= inner if is_prefix else {prefix + name: value}
+        found = inner if is_prefix else {prefix + name: value}
+        if twice := flat.keys() & found.keys():
+            text = f"{min(twice)} is given twice, in quotes and without; leave one out"
+            raise InputError(text)
+        flat |= found
     return flat
 
 

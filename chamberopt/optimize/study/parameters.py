@@ -231,8 +231,8 @@ def vary_problems(design: Design, name: str, varied: Varied) -> list[Problem]:
         return [Problem(field, f"{text}; widen the bounds or change the design")]
     if values and start not in values:
         near = min(values, key=lambda one: abs(one - start))
-        text = f"the design starts at {start:g}, which is none of its values; change the design, "
-        return [Problem(field, f"{text}to {near:g} for example, or the values")]
+        text = f"the design starts at {start:.12g}, which is none of its values; change the design,"
+        return [Problem(field, f"{text} to {near:.12g} for example, or the values")]
     problems = []
     for bound in (low, high):
         try:
@@ -348,13 +348,16 @@ class ParameterSpace:
         snapped = self.domain.snap(point[None])
         there = self.domain.has(snapped)[0]
         for k, (name, share) in enumerate(zip(self.names, snapped[0], strict=True)):
-            place = float(self.values_on(k, np.array([share]))[0])
+            levels = self._levels[k]
             if not there[k]:
                 values[name] = NONE
             elif texts := self.varied[k].texts:
-                values[name] = texts[round(place)]
+                values[name] = texts[round(share * (len(levels) - 1))]
+            elif len(levels):  # looked up: between levels, 7 could be 6.999999999999999
+                values[name] = float(levels[round(share * (len(levels) - 1))])
             else:
-                values[name] = place if len(self._levels[k]) else self._rounded(k, place)
+                place = float(self.values_on(k, np.array([share]))[0])
+                values[name] = self._rounded(k, place)
         return values
 
     def design_at(self, point: np.ndarray) -> Design:

@@ -58,6 +58,9 @@ Algorithm = Literal[
 # fmt: on
 
 
+LEAST_WEIGHT = 1e-9  # of a sum, and one over the largest: squares of scores stay numbers
+
+
 class Objective(FileTable):
     """What is maximised: one objective by name, a weighted sum, or two at once."""
 
@@ -87,6 +90,10 @@ class Objective(FileTable):
             elif name not in names and not find_metric(name):
                 text = f"not an objective or a metric; {toml_errors.did_you_mean(name, names)}"
                 yield Problem(f"sum.{name}", text)
+        for name, weight in self.sum.items():
+            if weight and not LEAST_WEIGHT <= abs(weight) <= 1.0 / LEAST_WEIGHT:
+                text = f"given {weight:g}; give 0, or a size from {LEAST_WEIGHT:g} to "
+                yield Problem(f"sum.{name}", f"{text}{1.0 / LEAST_WEIGHT:g}")
         if self.sum and not any(self.sum.values()):
             yield Problem("sum", "all weights are 0; give one another value")
         if self.pareto and self.pareto[0] == self.pareto[1]:
@@ -258,8 +265,11 @@ class Study(FileTable):
     def _vary_problems(self, by_shape: Mapping[str, Design]) -> Iterator[Problem]:
         for name, varied in self.vary.items():
             yield from vary_problems(with_key(by_shape, name) or self.design, name, varied)
-            partly = not all(has_key(one, name) for one in by_shape.values())
-            if name in self.constraints and partly:
+            if name.startswith("part.target.") and self.design.part.target.reachable:
+                text = "not supported with part.target.reachable; leave one of the two out"
+                yield Problem(f"vary.{name}", text)
+        for name in self.constraints:
+            if not all(has_key(one, name) for one in by_shape.values()):
                 text = "only some of the shapes have it; not supported, leave it out"
                 yield Problem(f"constraints.{name}", text)
 
@@ -277,15 +287,15 @@ class Study(FileTable):
             for name, value in values.items():
                 low, high = bounds.get(name, (-math.inf, math.inf))
                 texts = self.vary[name].texts if name in self.vary else ()
-                if len(by_shape) > 1 and name in self.vary:
-                    base = by_shape.get(str(values.get(SHAPE)), self.design)
-                    if (value == NONE) == has_key(base, name):
-                        text = f"given {value!r}, but a {values.get(SHAPE)} "
-                        text += "has none" if value != NONE else "has it; give a value"
-                        yield Problem(f"begin_with.{k}.{name}", text)
-                        continue
-                    if value == NONE:
-                        continue
+                base = by_shape.get(str(values.get(SHAPE, self.design.chamber.shape)))
+                has_none = value == NONE and NONE not in texts
+                if base and name in self.vary and has_none == has_key(base, name) and name != SHAPE:
+                    text = f"given {value!r}, but a {base.chamber.shape} "
+                    text += "has it; give a value" if has_none else "has none"
+                    yield Problem(f"begin_with.{k}.{name}", text)
+                    continue
+                if has_none:
+                    continue
                 if texts or isinstance(value, str):
                     if value not in texts:
                         text = (
@@ -303,6 +313,10 @@ class Study(FileTable):
             yield Problem("optimizer.evaluations", text)
         for name, limits in self.constraints.items():
             yield from limit_problems(self.design, bounds, name, limits)
+            levels = self.vary[name].values(False) if name in self.vary else ()
+            if levels and not any(limits.hold(one) for one in levels):
+                text = "none of its values in [vary] is within; change the limits or the values"
+                yield Problem(f"constraints.{name}", text)
         if self.objective.over_tolerances == "worst" and not self.design.tolerances:
             text = 'given "worst", but the design has no [tolerances]; add them, or leave it out'
             yield Problem("objective.over_tolerances", text)

@@ -1,5 +1,6 @@
 """The Pareto front of two objectives, as an array and as a study finds it."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -55,6 +56,11 @@ def test_two_objectives_give_a_front(tmp_path: Path) -> None:
     assert [[float(x) for x in row[3:7]] for row in searched] == [
         [number for goal in goals for number in (goal.value, goal.half_width)] for goals in expected
     ]
+    unresolved = result.start.goals[0].not_known("not resolved")
+    start = replace(result.start, goals=(unresolved, result.start.goals[1]))
+    words = as_csv(replace(result, confirmed=(start, *result.confirmed[1:])))
+    assert "not resolved,," in words
+    assert "inf" not in words
     assert all(np.isfinite(goal.half_width) for goals in expected for goal in goals)
     pareto_picture(tmp_path / "pareto.png", result)
     assert (tmp_path / "pareto.png").stat().st_size > 10000

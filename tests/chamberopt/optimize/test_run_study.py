@@ -1,6 +1,7 @@
 """A study on functions with a known optimum must find it within its budget, even if interrupted."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ from chamberopt.common.errors import InputError
 from chamberopt.common.files import make_output_folder
 from chamberopt.common.parallel.executor import SerialExecutor, local_executor
 from chamberopt.coverage.metrics import metric_names
+from chamberopt.coverage.resolution import NOT_RESOLVED
 from chamberopt.design.load import load_design
 from chamberopt.optimize.evaluate_candidate import FAILURE_PENALTY
 from chamberopt.optimize.run_study import fixed_target, tolerance_notes
@@ -387,12 +389,24 @@ def test_every_candidate_has_the_target_that_the_start_can_reach(tmp_path: Path)
     assert fixed_target(study()) is None
     meshed = target.model_copy(update={"element_mm": 2.0})
     meshed = GEAR.model_copy(update={"part": GEAR.part.model_copy(update={"target": meshed})})
-    varied = Study(design=meshed, vary={"part.target.element_mm": (1.0, 3.0)})
-    with pytest.raises(
-        InputError,
-        match=r"vary: part\.target\.element_mm with part\.target\.reachable: not supported",
-    ):
-        fixed_target(varied)
+    with pytest.raises(ValueError, match=r"not supported with part\.target\.reachable"):
+        Study(design=meshed, vary={"part.target.element_mm": (1.0, 3.0)})
+
+
+def test_a_gain_over_what_is_not_resolved_is_not_known(tmp_path: Path) -> None:
+    """Better by the numbers, but the start's is none."""
+
+    def simulator(design, stream, replicas):
+        x = shares(design)
+        found = judged(hill(x) + 0.001 * np.arange(replicas or 8))
+        is_start = np.allclose(x, shares(GEAR))
+        words = found.objective.not_known(NOT_RESOLVED)
+        return replace(found, objective=words) if is_start else found
+
+    result = run(study(evaluations=8), tmp_path, simulator)
+    assert result.best is not result.start
+    assert result.gain.in_words == "not known"
+    assert not result.improved
 
 
 def test_a_cost_of_tolerances_is_only_said_where_a_model_knows_it() -> None:

@@ -117,6 +117,8 @@ def _result_lines(result: StudyResult) -> list[str]:
         limits = console.zone_lines(one.design, one.evaluation)
         lines += ["", title, *console.evaluation_lines(one.evaluation), *limits]
     verdict = "better than the start" if result.improved else "within the noise of the start"
+    if result.gain.in_words:
+        verdict = "the objective of the start or of the best design is not known"
     lines += ["", f"{console.estimate_line('gain', result.gain)}: {verdict}"]
     if result.sensitivity:
         lines += ["", *result.sensitivity.sentences(), ""]
@@ -125,6 +127,9 @@ def _result_lines(result: StudyResult) -> list[str]:
         lines += [f"the Pareto front of {names}: pareto.csv, pareto.png", ""]
     replicas, seconds = best.evaluation.replicas, study.design.process.recorded_time
     effort = console.replicas_text(study.at_search_accuracy(study.design))
+    few = study.optimizer.first_replicas
+    if any(one.stage == "search" and one.replicas == few for one in result.trials):
+        effort += f"; {few} where they showed that a candidate is worse"
     return [
         *lines,
         f"± 95 % intervals; start and best: {replicas} replicas of {seconds:g} s with seeds of "

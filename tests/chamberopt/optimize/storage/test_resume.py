@@ -239,6 +239,8 @@ class TestDamage:
             (3, ("{", ""), r"history\.jsonl:3: damaged row"),
             (3, ('"score"', '"scare"'), r"history\.jsonl:3: damaged row"),
             (2, ('"number": 1', '"number": 5'), r"history\.jsonl:2: damaged row"),
+            (2, ('"replicas": 4', '"replicas": 0'), r"history\.jsonl:2: damaged row"),
+            (2, ('"highest": null', '"highest": 0.3'), r"history\.jsonl:2: damaged row"),
             (
                 4,
                 ('"point": [0.', '"point": [0.9'),

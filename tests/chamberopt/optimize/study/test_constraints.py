@@ -42,6 +42,20 @@ def test_an_answer_keeps_its_limits_to_the_end_of_the_interval(
     assert (said, why) == ("infeasible", "mean_coverage 0.3 ± 0.1 < min 0.5")
 
 
+def test_limits_that_no_candidate_can_meet_are_refused_before_any_work() -> None:
+    steps = {"sonotrode.amplitude_um": {"low": 25, "high": 40, "step": 5}}
+    for limits, said in (
+        ({"sonotrode.amplitude_um": Limits(min=26.0, max=29.0)}, "none of its values in"),
+        ({"sonotrode.amplitude_um": Limits(min=41.0)}, "it is from 25 to 40 in every candidate"),
+    ):
+        with pytest.raises(ValueError, match=said):
+            Study(design=GEAR, vary=steps, constraints=limits)
+    shapes = {"chamber.shape": {"choose": ["cylinder", "prism"]}, "chamber.across_mm": (50, 70),
+              "chamber.sides": (4, 8)}  # fmt: skip
+    with pytest.raises(ValueError, match="only some of the shapes have it"):
+        Study(design=GEAR, vary=shapes, constraints={"chamber.diameter_mm": Limits(max=60.0)})
+
+
 def test_a_number_of_the_design_can_be_a_constraint(tmp_path: Path) -> None:
     limits = {"shot.mass_g": Limits(max=4.0)}  # the best is at 4.4
     result = run_bowl(

@@ -38,6 +38,35 @@ def test_values_are_those_of_the_file() -> None:
     np.testing.assert_allclose(space.values_on(2, np.array([0.0, 0.25, 1.0])), [1.5, 1.75, 4.0])
 
 
+@pytest.mark.parametrize("bounds", [(3, 8), (3, 13), (4, 9), (4, 14), (5, 10)])
+def test_a_level_is_itself_again_after_the_way_through_the_unit_cube(
+    bounds: tuple[int, int],
+) -> None:
+    """Interpolated, 7 sides of 4 to 9 were 6.999999999999999, and simulated as 6."""
+    space = ParameterSpace(PRISM, Study(design=PRISM, vary={"chamber.sides": bounds}).vary)
+    for sides in range(bounds[0], bounds[1] + 1):
+        point = space.point_of({"chamber.sides": float(sides)})
+        assert space.values_at(point) == {"chamber.sides": sides}
+        assert space.design_at(point).chamber.sides == sides
+
+
+@pytest.mark.parametrize("value", [2.381, 3.2, 3.969])
+def test_a_catalogue_size_is_as_it_is_sold(value: float) -> None:
+    sizes = sorted({1.5, 1.588, 2.0, 2.381, 2.5, 3.0, 3.2, 3.969, 4.0})
+    vary = Study(design=GEAR, vary={"shot.diameter_mm": {"choose": sizes}}).vary
+    space = ParameterSpace(GEAR, vary)
+    point = space.point_of({"shot.diameter_mm": value})
+    assert space.values_at(point) == {"shot.diameter_mm": value}
+
+
+def test_a_key_given_in_quotes_and_without_is_given_twice(tmp_path: Path) -> None:
+    file = tmp_path / "study.toml"
+    text = f'design = "{DESIGNS / "gear.toml"}"\n[vary]\nchamber.height_mm = [30, 50]\n'
+    file.write_text(f'{text}"chamber.height_mm" = [35, 50]\n', encoding="utf-8")
+    with pytest.raises(InputError, match=r"study\.toml: chamber\.height_mm is given twice"):
+        load_study(file)
+
+
 def test_a_study_is_read_back_as_it_was_written(tmp_path: Path) -> None:
     import tomli_w
 

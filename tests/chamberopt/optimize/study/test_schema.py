@@ -28,6 +28,7 @@ def test_a_weighted_sum_is_of_objectives_and_metrics(tmp_path: Path) -> None:
         ({"sum": {"shot_count": 1.0}, "name": "p05_coverage"}, "give one"),
         ({"pareto": ["minus_time_to_98_s", "minus_time_to_98_s"]}, "twice"),
         ({"sum": {"root.mean_coverage": 1.0}}, "no zone 'root'"),
+        ({"sum": {"mean_coverage": 1e300}}, "given 1e\\+300; give 0, or a size from 1e-09 to"),
     ):
         with pytest.raises(ValueError, match=said):
             Study(design=GEAR, vary=VARY, objective=wrong)
