@@ -126,18 +126,22 @@ class Candidates:
         searched = [trial for trial in self.trials if trial.stage == "search"]
         return observe(searched, self._study.all_constraints, weight)
 
-    def _model(self, weight: np.ndarray | None = None) -> SearchModel | None:
+    def _model(self, weight: np.ndarray, learns_bounds: bool = False) -> SearchModel | None:
         """A model of the whole search; None if there are too few points."""
         seen = self.observations(weight)
         scores = seen.scores[seen.simulated]
         if len(scores) < POINTS_PER_PARAMETER * len(self.start) or np.ptp(scores) == 0.0:
             return None
-        return SearchModel(self.space.domain, np.array(self._points), seen)
+        points = np.array(self._points)
+        return SearchModel(self.space.domain, points, seen, learns_bounds=learns_bounds)
 
     @cached_property
     def objective_model(self) -> SearchModel | None:
-        """A model of the first objective when the search has ended; None with too few points."""
-        return self._model(FIRST_OBJECTIVE)
+        """A model of the first objective when the search has ended, with all that bounds it.
+
+        None with too few points.
+        """
+        return self._model(FIRST_OBJECTIVE, learns_bounds=True)
 
     @property
     def _best_low(self) -> float:
@@ -214,9 +218,8 @@ class Candidates:
 
         has_two_objectives = len(self._study.objective.goals) > 1
         first = (np.arange(count) + 0.5) / count
-        models = [self.objective_model]
-        if has_two_objectives:
-            models = [self._model(weight) for weight in np.stack([first, 1.0 - first], axis=1)]
+        weights = np.stack([first, 1.0 - first], axis=1) if has_two_objectives else FIRST_OBJECTIVE
+        models = [self._model(weight) for weight in np.atleast_2d(weights)]
         seed = self._study.optimizer.seed
         recommended = [recommend_points(model, seed) for model in models if model is not None]
         scores = np.array([trial.score for trial in self.trials[: len(self._points)]])

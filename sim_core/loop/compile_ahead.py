@@ -1,9 +1,10 @@
 """Compile the simulator ahead of time, so that a program can say why its first start takes long."""
 
 import contextlib
+import gc
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -89,12 +90,26 @@ def compile_simulator(
         else mesh
     )
     usual = FURTHER_SET if any(CACHE_FOLDER.glob("compiled-*")) else FIRST_SET
-    with compilations_counted(lambda done: progress(done, max(usual, done + 1))):
+    with (
+        _few_collections(),
+        compilations_counted(lambda done: progress(done, max(usual, done + 1))),
+    ):
         simulate(Scene(room, shot, physics, duration=0.01))
     if CACHED:
         with contextlib.suppress(OSError):  # such as a full disk
             _marker(physics, balls, alike, cylinder).touch()
     return time.perf_counter() - start
+
+
+@contextlib.contextmanager
+def _few_collections() -> Iterator[None]:
+    """Have Python look for garbage rarely: what the compiler makes lasts, and looking took 7 %."""
+    before = gc.get_threshold()
+    gc.set_threshold(max(before[0], 100_000), 50, 1000)
+    try:
+        yield
+    finally:
+        gc.set_threshold(*before)
 
 
 def _with_a_turning_box(

@@ -63,10 +63,18 @@ class SearchModel:
     Args:
         points: all that began, shape (m, d); the first n are those of `seen`, the others run.
         length_factor: as of GaussianProcess.
+        learns_bounds: whether the model of the score learns the bounds of what was spared, for
+            pictures. A search does better where it does not: a cliff bends a smooth model, also on
+            the side that is good. It learns where candidates are spared, as where they fail.
     """
 
     def __init__(
-        self, domain: Domain, points: np.ndarray, seen: Observations, length_factor: float = 1.0
+        self,
+        domain: Domain,
+        points: np.ndarray,
+        seen: Observations,
+        length_factor: float = 1.0,
+        learns_bounds: bool = False,
     ) -> None:
         self.domain, count, there = domain, len(seen.scores), seen.simulated
         running = points[count:]
@@ -75,7 +83,7 @@ class SearchModel:
             at = points[:count][of]
             return GaussianProcess(at, values[of], variances[of], length_factor, running, domain)
 
-        known = there if seen.spared is None else there | seen.spared
+        known = there if seen.spared is None or not learns_bounds else there | seen.spared
         middle, top = float(np.median(seen.scores[there])), float(seen.scores[there].max())
         raised = middle - MAX_DEPTH * (top - middle)
         scores = np.maximum(seen.scores, raised)
