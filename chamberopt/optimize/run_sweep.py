@@ -100,8 +100,7 @@ def plan_sweep(
         if grid < 2:
             raise InputError(f"--grid: given {grid}; give at least 2 values of each parameter")
         counts = [min(grid, one.levels) if one.levels else grid for one in domain.axes]
-        what = f"--grid: {grid} values of {dimensions} parameters, as far as they have so many"
-        _require_few(math.prod(counts), what)
+        _require_few(math.prod(counts), f"--grid: {grid} values of {dimensions} parameters")
         axes = domain.snap(np.repeat(np.linspace(0.0, 1.0, grid)[:, None], dimensions, axis=1)).T
         each = [  # of few levels each once, and all choices
             np.unique(line) if axis.ordered else np.linspace(0.0, 1.0, axis.levels)
