@@ -71,6 +71,7 @@ def test_sobol_points_are_spread_and_their_seed_is_the_studys() -> None:
 def test_candidates_that_are_alike_are_simulated_once() -> None:
     vary = {"shot.diameter_mm": {"choose": [1.5, 2.0, 3.0]}}
     assert sorted(plan_sweep(study(vary), None, 8).points.ravel().tolist()) == [0.0, 0.5, 1.0]
+    assert plan_sweep(study(vary), 200_000, None).points.ravel().tolist() == [0.0, 0.5, 1.0]
 
 
 @pytest.mark.parametrize(
