@@ -126,9 +126,10 @@ def _result_lines(result: StudyResult) -> list[str]:
         names = " and ".join(study.objective.pareto)
         lines += [f"the Pareto front of {names}: pareto.csv, pareto.png", ""]
     replicas, seconds = best.evaluation.replicas, study.design.process.recorded_time
-    effort = console.replicas_text(study.at_search_accuracy(study.design))
-    few = study.optimizer.first_replicas
-    if any(one.stage == "search" and one.replicas == few for one in result.trials):
+    searched, few = study.at_search_accuracy(study.design), study.optimizer.first_replicas
+    effort = console.replicas_text(searched)
+    is_less = few < searched.process.accuracy.replicas
+    if is_less and any(one.stage == "search" and one.replicas == few for one in result.trials):
         effort += f"; {few} where they showed that a candidate is worse"
     return [
         *lines,
