@@ -3,11 +3,11 @@
 import math
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
-from pydantic import Field
+from pydantic import BeforeValidator, Field
 
-from chamberopt.common.toml_errors import Problem
+from chamberopt.common.toml_errors import CrossCheckError, Problem
 from chamberopt.common.toml_fields import (
     MeshFile,
     Names,
@@ -123,6 +123,40 @@ class TessellationTable(FileTable):
         return Tessellation(1e-3 * self.chord_mm, math.radians(self.angle_deg), side)
 
 
+class SmoothingTable(FileTable):
+    """How fine the facets of rounds become, and how far the surface may move."""
+
+    off: bool = Field(
+        default=False, description='{ off = true }: smoothing = "off", the facets of the file'
+    )
+    limit_deg: float = quantity(
+        1, 30, "degrees", "largest angle between facets: a tenth of the ball's radius wide", 6.0
+    )
+    narrow_mm: float = quantity(
+        0.001, 10, "mm", "width below which facets are not divided: a tenth of a ball's radius",
+        0.06,
+    )  # fmt: skip
+    tolerance_mm: float | None = quantity(
+        0, 10, "mm", "the farthest that the surface may move; absent: as far as its facets tell",
+        None,
+    )  # fmt: skip
+
+    @property
+    def limit(self) -> float:
+        """The largest angle between facets [rad]; infinite where they stay as they are."""
+        return math.inf if self.off else math.radians(self.limit_deg)
+
+
+def _accept_off(smoothing: Any) -> Any:
+    if isinstance(smoothing, (str, int, float, list)) and smoothing != "off":
+        allowed = '"off", or a table, e.g. { limit_deg = 4 }'
+        raise CrossCheckError([Problem("", f"given {smoothing!r}; allowed: {allowed}")])
+    return {"off": True} if smoothing == "off" else smoothing
+
+
+Smoothing = Annotated[SmoothingTable, BeforeValidator(_accept_off)]
+
+
 class PartTable(FileTable):
     """The part's mesh and its place in the chamber."""
 
@@ -132,6 +166,10 @@ class PartTable(FileTable):
     offset_mm: Shift = Field(default=(0.0, 0.0), description="sideways from the chamber axis")
     tessellation: TessellationTable | None = Field(
         default=None, description="how fine the triangles of a STEP file are"
+    )
+    smoothing: Smoothing = Field(
+        default_factory=SmoothingTable,
+        description='how rounds are divided of which the file has facets; "off": not at all',
     )
     target: Target = Field(default_factory=Target, description="which triangles must be covered")
 

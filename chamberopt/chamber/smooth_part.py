@@ -1,0 +1,182 @@
+"""The part's mesh with the rounds of its target divided, and what is known of its facets.
+
+A ball meets the surface that was drawn, of which the file has facets. What is divided are the
+rounds of target and zones, and what is near enough for a ball that touches them to touch it too.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from chamberopt.common.errors import InputError
+from chamberopt.geometry.mesh_io.part_mesh import PartMesh
+from chamberopt.geometry.mesh_io.self_intersection import crossing_pairs
+from chamberopt.geometry.smoothing.smooth import Surfaces, divide_rounds, find_surfaces, moves
+from chamberopt.geometry.triangles import areas, tetrahedron_volumes
+
+if TYPE_CHECKING:
+    from chamberopt.design.part import SmoothingTable
+    from chamberopt.geometry.smoothing.divide import Surface
+
+NEAR = 2e-3  # m from the target: as far as usual balls reach
+DIVIDED = 1e-9  # m: what has moved by less has not moved
+MOST = 0.9  # of the area
+MOST_TRIANGLES = 1.5e6  # of a part: more take too long to fly among
+
+
+@dataclass(frozen=True)
+class SmoothingFacts:
+    """What smoothing has done to a part, and which facets are left.
+
+    Attributes:
+        largest_move: of the surface [m].
+        moved_share: of the target's area, where the surface was moved.
+        volume_change: of the part, relative.
+        given_triangles: number of the file's triangles.
+        blunt_creases: number of edges that turn by no more than facets of rounds may, and are
+            creases all the same.
+        facet_turn: largest turn between the file's facets on rounds of the target, but for a tenth
+            of the area [rad].
+        coarse_turn: the same of the facets that are left coarser than was asked for; 0: of none.
+        coarse_share: share of the target's area on facets that are left coarser.
+        noisy_share: the part of it on rounds left because they are noise.
+        crossing_share: the part of it on rounds left because they would cross others.
+    """
+
+    largest_move: float
+    moved_share: float
+    volume_change: float
+    given_triangles: int
+    blunt_creases: int
+    facet_turn: float
+    coarse_turn: float
+    coarse_share: float
+    noisy_share: float
+    crossing_share: float
+
+
+class SmoothPart(NamedTuple):
+    """A part with divided rounds.
+
+    Attributes:
+        mesh: the part; its triangles have the numbers and groups of those they come from.
+        origin: the file's triangle from which each comes, shape (k,).
+        normals: of the surface at the corners, unit vectors, shape (k, 3, 3).
+        hollow: largest hollow curvature [1/m], shape (k,).
+        facts: what was done.
+    """
+
+    mesh: PartMesh
+    origin: np.ndarray
+    normals: np.ndarray
+    hollow: np.ndarray
+    facts: SmoothingFacts
+
+
+class Rule(NamedTuple):
+    """How some triangles (m,) of the file are smoothed."""
+
+    triangles: np.ndarray
+    table: SmoothingTable
+
+
+def smooth(mesh: PartMesh, target: np.ndarray, rules: list[Rule]) -> SmoothPart:
+    """Divide the rounds of a part.
+
+    Args:
+        target: marks the triangles to cover, shape (m,).
+        rules: for the target, and then for zones, which may lie on it. The first is for what is
+            near them all, too.
+    """
+    vertices, triangles, usual = mesh.vertices, mesh.triangles, rules[0].table
+    near = _near(vertices, triangles, np.any([one.triangles for one in rules], axis=0))
+    surfaces = find_surfaces(vertices, triangles, near, mesh.normals)
+    asked, wanted_turn, tolerance = (np.full(len(triangles), np.inf) for _ in range(3))
+    for own, table in [Rule(near, usual), *rules]:
+        asked[own], wanted_turn[own] = table.limit, math.radians(table.limit_deg)
+        tolerance[own] = math.inf if table.tolerance_mm is None else 1e-3 * table.tolerance_mm
+    if mesh.is_exact:
+        asked[:] = np.inf  # the triangles are of the surface itself, as fine as was asked for
+    surfaces = surfaces._replace(rise=np.minimum(surfaces.rise, tolerance))
+    finer, crossing = _divide_apart(mesh, surfaces, asked, 1e-3 * usual.narrow_mm)
+    moved = moves(vertices, triangles, finer)
+
+    area = areas(vertices, triangles)
+    of_target = np.where(target, area, 0.0) / area[target].sum()
+    coarse = target & (surfaces.turn > wanted_turn) & (not mesh.is_exact)
+    left = coarse & (np.isinf(asked) | surfaces.noisy | crossing)
+    before = tetrahedron_volumes(vertices, triangles).sum()
+    facts = SmoothingFacts(
+        largest_move=float(moved.max()),
+        moved_share=float(of_target[moved > DIVIDED].sum()),
+        volume_change=float(
+            tetrahedron_volumes(finer.vertices, finer.triangles).sum() / before - 1.0
+        ),
+        given_triangles=len(triangles),
+        blunt_creases=surfaces.blunt,
+        facet_turn=_usual_turn(surfaces.turn, area, target),
+        coarse_turn=_usual_turn(surfaces.turn, area, left),
+        coarse_share=float(of_target[left].sum()),
+        noisy_share=float(of_target[left & surfaces.noisy & np.isfinite(asked)].sum()),
+        crossing_share=float(of_target[left & crossing & np.isfinite(asked)].sum()),
+    )
+    parent = finer.parent
+    if len(parent) == len(triangles):
+        return SmoothPart(mesh, parent, finer.normals, surfaces.hollow, facts)
+    children = replace(
+        mesh,
+        vertices=finer.vertices,
+        triangles=finer.triangles.astype(np.int32),
+        numbering=mesh.numbering.select(parent),
+        groups={name: mask[parent] for name, mask in mesh.groups.items()},
+        normals=None,
+    )
+    return SmoothPart(children, parent, finer.normals, surfaces.hollow[parent], facts)
+
+
+def _divide_apart(
+    mesh: PartMesh, surfaces: Surfaces, limit: np.ndarray, narrow: float
+) -> tuple[Surface, np.ndarray]:
+    """Divide the rounds, but not those that would cross others; and mark these (m,)."""
+    crossing = np.zeros(len(mesh.triangles), dtype=bool)
+    while True:
+        stays = surfaces.noisy | crossing
+        finer = divide_rounds(
+            mesh.vertices, mesh.triangles, surfaces, np.where(stays, np.inf, limit), narrow
+        )
+        if len(finer.triangles) == len(mesh.triangles):
+            return finer, crossing
+        if len(finer.triangles) > MOST_TRIANGLES:
+            raise InputError(
+                f"part.smoothing: makes {len(finer.triangles):,} triangles of "
+                f"{len(mesh.triangles):,}; give a larger limit_deg or narrow_mm, or a smaller "
+                "part.target"
+            )
+        pairs = crossing_pairs(finer.vertices, finer.triangles)
+        if not pairs.size:
+            return finer, crossing
+        more = np.isin(surfaces.face, surfaces.face[finer.parent[pairs].ravel()]) & ~crossing
+        crossing |= more if more.any() else True
+
+
+def _near(vertices: np.ndarray, triangles: np.ndarray, chosen: np.ndarray) -> np.ndarray:
+    """Marks (m,) the chosen triangles, and those with a corner near one of theirs."""
+    from scipy.spatial import cKDTree
+
+    corners = np.unique(triangles[chosen])
+    away, _ = cKDTree(vertices[corners]).query(vertices, distance_upper_bound=NEAR)
+    return np.asarray(chosen | np.isfinite(away)[triangles].any(axis=1))
+
+
+def _usual_turn(turn: np.ndarray, area: np.ndarray, chosen: np.ndarray) -> float:
+    """The turn (m,) [rad] that is not exceeded on most of the chosen facets of rounds; or 0."""
+    rows = np.flatnonzero(chosen & (turn > 0.0))
+    if not len(rows):
+        return 0.0
+    rows = rows[np.argsort(turn[rows])]
+    upto = np.cumsum(area[rows])
+    return float(turn[rows][np.searchsorted(upto, MOST * upto[-1])])

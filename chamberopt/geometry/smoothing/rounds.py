@@ -1,0 +1,127 @@
+"""Edges of a part's surface: which of them divide a round into facets, and which are creases.
+
+An angle alone cannot tell: the facets of a coarse fillet turn by as much as the faces of a chamfer.
+A round shows by its neighbours: several facets beside each other turn the same way, with nearly the
+same curvature. An edge without such evidence is a crease.
+
+Facets are triangles that lie in one plane, such as the two halves of a quadrangle.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from chamberopt.geometry.triangles import (
+    area_vectors,
+    connected_pieces,
+    side_pairs,
+    sides_of,
+    unit_vectors,
+)
+
+# Edges that turn by more are no evidence of a round.
+CONVEX_SURE, HOLLOW_SURE = np.radians(40.0), np.radians(60.0)
+# Edges that turn by more are creases, whatever is beside them. Between the two an edge belongs to a
+# round if others show that there is one: the facets of a round turn by nearly the same angle, which
+# may lie on the limit.
+CONVEX_CREASE, HOLLOW_CREASE = np.radians(48.0), np.radians(66.0)
+LEVEL = np.radians(0.3)  # triangles that turn by less are one facet
+# Also those that turn by less than this share of the largest turn of either: halves of a
+# quadrangle that is not quite flat.
+OF_LARGEST = 0.3
+SMOOTH = np.radians(1.0)  # edges that turn by less need no evidence
+ALIKE = (
+    1.6  # factor of curvatures: beside a plane the first facet of a round has 3/4 of the others'
+)
+
+
+class Edges(NamedTuple):
+    """Edges of a closed surface.
+
+    Attributes:
+        sides: the two sides at each edge, 3 t + k for side k of triangle t, shape (e, 2).
+        turn: angle between the normals of both sides [rad], negative in a hollow, shape (e,).
+        length: [m], shape (e,).
+    """
+
+    sides: np.ndarray
+    turn: np.ndarray
+    length: np.ndarray
+
+    @property
+    def triangles(self) -> np.ndarray:
+        """The two triangles at each edge, shape (e, 2)."""
+        return np.asarray(self.sides // 3)
+
+
+def find_edges(vertices: np.ndarray, triangles: np.ndarray) -> Edges:
+    """The edges of a closed surface (n, 3) [m], (m, 3) with normals outward."""
+    sides = side_pairs(triangles)
+    normal = unit_vectors(area_vectors(vertices, triangles))
+    start, end = sides_of(triangles)[sides[:, 0]].T
+    along = vertices[end] - vertices[start]
+    length = np.linalg.norm(along, axis=1)
+    one, two = normal[sides.T // 3]
+    across = np.einsum("ij,ij->i", np.cross(one, two), unit_vectors(along))
+    return Edges(sides, np.arctan2(across, np.einsum("ij,ij->i", one, two)), length)
+
+
+def is_hard(edges: Edges) -> np.ndarray:
+    """Marks (e,) the edges that are creases whatever is beside them."""
+    return (edges.turn > CONVEX_CREASE) | (edges.turn < -HOLLOW_CREASE)
+
+
+def find_creases(edges: Edges, area: np.ndarray) -> np.ndarray:
+    """Marks (e,) the edges without evidence of a round.
+
+    Args:
+        area: of the triangles [m²], shape (m,).
+    """
+    size, hard, count = np.abs(edges.turn), is_hard(edges), len(area)
+    sure = (edges.turn < CONVEX_SURE) & (edges.turn > -HOLLOW_SURE)
+    one, two = edges.triangles.T
+    largest = np.zeros(count)
+    for triangle in (one, two):
+        np.maximum.at(largest, triangle[~hard], size[~hard])
+    level = ~hard & (size < np.maximum(LEVEL, OF_LARGEST * np.minimum(largest[one], largest[two])))
+    facets, facet = connected_pieces(one[level], two[level], count)
+    border = np.flatnonzero(~level & ~hard & (facet[one] != facet[two]))
+    evident = np.zeros(len(size), dtype=bool)
+    for bend in (1.0, -1.0):
+        same = border[bend * edges.turn[border] > LEVEL]
+        evident[same] = _is_in_round(
+            facet[edges.triangles[same]],
+            edges.length[same] * size[same],
+            sure[same],
+            np.bincount(facet, area, facets),
+        )
+    return hard | ~(level | evident | (size <= SMOOTH))
+
+
+def _is_in_round(
+    facet: np.ndarray, bend: np.ndarray, sure: np.ndarray, area: np.ndarray
+) -> np.ndarray:
+    """Whether edges that all turn the same way belong to a round, shape (k,).
+
+    Args:
+        facet: on both sides of each, shape (k, 2).
+        bend: length times turn of each, shape (k,).
+        sure: marks the edges that are evidence, shape (k,).
+        area: of the facets, shape (f,).
+    """
+    curvature = np.bincount(facet.T.ravel(), np.tile(bend, 2), len(area)) / np.maximum(area, 1e-30)
+    pairs = np.unique(np.sort(facet[sure], axis=1), axis=0)
+    is_inner = np.bincount(pairs.ravel(), minlength=len(area)) >= 2
+    alike = is_inner[pairs].all(axis=1) & _are_alike(curvature[pairs])
+    of_round = np.zeros(len(area), dtype=bool)
+    of_round[pairs[alike]] = True
+    beside = of_round[facet]
+    return np.where(sure, beside.any(axis=1), beside.all(axis=1) & _are_alike(curvature[facet]))
+
+
+def _are_alike(curvature: np.ndarray) -> np.ndarray:
+    """Whether the curvatures of pairs (k, 2) of facets are those of one round, shape (k,)."""
+    low, high = np.sort(curvature, axis=1).T
+    return np.asarray(high <= ALIKE * low)
