@@ -67,6 +67,35 @@ class Part:
     hollow: np.ndarray | None = None  # largest hollow curvature of that surface [1/m], (m,)
     smoothing: SmoothingFacts | None = None  # None where there is nothing to smooth
 
+    @property
+    def corner_normals(self) -> np.ndarray:
+        """Unit normals of the surface at the corners of its triangles, (m, 3, 3)."""
+        if self.normals is not None:
+            return self.normals
+        return np.repeat(unit_normals(self.vertices[self.triangles])[:, None], 3, axis=1)
+
+    @property
+    def corners_with_normals(self) -> np.ndarray:
+        """Corners [m] of its triangles and the unit normals of the surface there, (m, 3, 6)."""
+        return np.concatenate([self.vertices[self.triangles], self.corner_normals], axis=2)
+
+    def normals_in_cavity(
+        self, vertices: np.ndarray, triangles: np.ndarray, source: np.ndarray
+    ) -> np.ndarray:
+        """Unit normals into a cavity at the corners of its triangles, (k, 3, 3).
+
+        Args:
+            vertices: of the cavity [m], shape (n, 3).
+            triangles: normals out of the cavity, shape (k, 3).
+            source: part triangle on which each one lies, else -1, shape (k,).
+        """
+        corners = vertices[triangles]
+        normals = np.repeat(-unit_normals(corners)[:, None], 3, axis=1)
+        own = np.flatnonzero(source >= 0)
+        at = self.normals_at(np.repeat(source[own], 3), corners[own].reshape(-1, 3))
+        normals[own] = at.reshape(-1, 3, 3)
+        return normals
+
     def normals_at(self, triangle: np.ndarray, place: np.ndarray) -> np.ndarray:
         """Unit normals (p, 3) of the surface at places (p, 3) [m] on triangles (p,)."""
         corners = self.vertices[self.triangles[triangle]]

@@ -84,8 +84,9 @@ class PartField:
 
         part, gauge = self._chamber.part, self.field.setting.gauge
         mesh = display_mesh(
-            part.vertices, part.triangles, part.target, self.field.face, gauge, self.coverage
-        )
+            part.vertices, part.triangles, part.corner_normals, part.target, self.field.face,
+            gauge, self.coverage,
+        )  # fmt: skip
         return DisplayField(mesh, self.values(mesh.places, self._gauge_off_creases(mesh.places)))
 
     def _gauge_off_creases(self, places: Places) -> Gauge:
@@ -148,7 +149,8 @@ class PartField:
             MAX_POINTS,
         )
         owner = spread.triangle
-        values = self.values(Places(spread.place, spread.normal, self.field.face[owner]))
+        normal = part.normals_at(owner, spread.place)
+        values = self.values(Places(spread.place, normal, self.field.face[owner]))
         points = np.bincount(owner, minlength=count)
         means = {}
         for name, column in values.items():

@@ -143,7 +143,12 @@ def notes(design: Design, chamber: Chamber) -> list[str]:
 
 def shot_reach(design: Design, chamber: Chamber) -> Reach:
     """What the shot can reach, with a turning part as drawn; takes a second or two."""
-    return find_reach(chamber_mesh(chamber), min(design.shot.diameters), design.shot.diameter)
+    return find_reach(
+        chamber_mesh(chamber),
+        min(design.shot.diameters),
+        design.shot.diameter,
+        chamber.part.normals_in_cavity(chamber.vertices, chamber.triangles, chamber.source),
+    )
 
 
 def warnings(design: Design, chamber: Chamber, reach: Reach | None = None) -> list[str]:

@@ -213,7 +213,8 @@ def require_touchable_zones(chamber: Chamber, mesh: TriangleMesh, ball: float) -
     for name, zone in part.zones.items():
         area = np.where(zone, chamber.exposed_area, 0.0)
         spread = spread_points(part.vertices, part.triangles, area, POINTS_OF_ZONE)
-        if not ball_fits(mesh, spread.place, spread.normal, ball).any():
+        normal = part.normals_at(spread.triangle, spread.place)
+        if not ball_fits(mesh, spread.place, normal, ball).any():
             raise InputError(
                 f"zones: {name}: a ball of {2e3 * ball:g} mm touches nothing of it, so it has no "
                 "figures; leave the zone out, or use smaller balls"
@@ -236,7 +237,9 @@ def find_target_field(chamber: Chamber, mesh: TriangleMesh, setting: WindowSetti
     touched, fits = _touched(chamber, mesh, area, face, setting)
     symmetry = find_symmetry(chamber, mesh) if setting.symmetric else None
     longest = _longest_side(setting, float(area.sum()), MAX_PIECES)
-    surface = surface_pieces(corners[part.target], face[part.target], mesh, ball, longest)
+    surface = surface_pieces(
+        part.corners_with_normals[part.target], face[part.target], mesh, ball, longest
+    )
     return TargetField(
         setting=setting,
         face=face,
@@ -265,7 +268,7 @@ def with_whole_part(field: TargetField, chamber: Chamber, mesh: TriangleMesh) ->
         return field
     area = float(chamber.part.area[rest].sum())
     pieces = surface_pieces(
-        field.corners[rest], field.face[rest], mesh, 0.5 * field.setting.ball,
+        chamber.part.corners_with_normals[rest], field.face[rest], mesh, 0.5 * field.setting.ball,
         _longest_side(field.setting, area, MAX_PIECES_OFF_TARGET),
     )  # fmt: skip
     return replace(
@@ -289,5 +292,6 @@ def _touched(
 
     part = chamber.part
     spread = spread_points(part.vertices, part.triangles, area, POINTS_PER_CHOSEN * setting.points)
-    fits = ball_fits(mesh, spread.place, spread.normal, 0.5 * setting.ball)
+    normal = part.normals_at(spread.triangle, spread.place)
+    fits = ball_fits(mesh, spread.place, normal, 0.5 * setting.ball)
     return Places(spread.place[fits], spread.normal[fits], face[spread.triangle[fits]]), fits

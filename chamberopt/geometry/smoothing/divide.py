@@ -96,7 +96,7 @@ def _split_once(
         )
         facing = unit_vectors(area_vectors(finer.vertices, finer.triangles))
         turned = np.einsum("ki,kji->kj", facing, finer.normals).min(axis=1) < TURNED
-        is_split = (new.reshape(-1, 3) >= 0).any(axis=1)
+        is_split = np.asarray((new.reshape(-1, 3) >= 0).any(axis=1))
         bad = np.zeros(len(new) // 3, dtype=bool)
         bad[row[turned & is_split[row]]] = True
         if not bad.any():

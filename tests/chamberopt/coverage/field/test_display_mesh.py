@@ -22,8 +22,9 @@ def cube_mesh(coverage: Callable[[Places], np.ndarray], shown: int = 12) -> Disp
     cube = box([SIDE] * 3)
     drawn = np.arange(12) < shown
     face, _ = find_faces(cube.vertices, cube.faces, drawn)
+    normals = np.repeat(cube.face_normals[:, None], 3, axis=1)
     return display_mesh.display_mesh(
-        np.asarray(cube.vertices), np.asarray(cube.faces), drawn, face, GAUGE, coverage
+        np.asarray(cube.vertices), np.asarray(cube.faces), normals, drawn, face, GAUGE, coverage
     )
 
 
