@@ -17,14 +17,14 @@ ORDER = {
         "common geometry design chamber coverage simulation optimize output api cli __main__"
     ),
     "chamberopt/geometry": "triangles faces+solids+remesh slivers mesh_io smoothing",
-    "chamberopt/geometry/smoothing": "rounds normals divide smooth",
+    "chamberopt/geometry/smoothing": "rounds normals divide smooth part",
     "chamberopt/geometry/mesh_io": "surface_error native_reader+units+holes+self_intersection "
     "readers formats healing part_mesh",
     "chamberopt/design": (
         "table_base materials shapes effects+part+process+shot+sonotrode peening design load"
     ),
     "chamberopt/chamber": (
-        "target smooth_part deflector_meshes bores_and_deflectors reach part build dimensionless scene "
+        "target deflector_meshes bores_and_deflectors reach part build dimensionless scene "
         "analytic checks propose"
     ),
     "chamberopt/coverage": "dents part_impacts+metrics field coverage_from_impacts "

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from chamberopt.chamber.smooth_part import Rule, SmoothingFacts, smooth
 from chamberopt.chamber.target import chosen_triangles
 from chamberopt.common.errors import InputError
 from chamberopt.geometry.mesh_io.part_mesh import PartMesh, read_part_cached
 from chamberopt.geometry.remesh import remesh, triangle_quality
+from chamberopt.geometry.smoothing.part import SmoothingFacts, smooth
 from chamberopt.geometry.solids import snap_to_grid
 from chamberopt.geometry.triangles import (
     areas,
@@ -237,13 +237,13 @@ def _simulated(
 ) -> _Simulated:
     """A part of a file with its rounds divided, and in triangles of the size asked for."""
     chosen = _chosen(mesh, target, "part.target")
-    rules = [Rule(chosen, smoothing)] + [
-        Rule(_chosen(mesh, zone.target, f"zones.{k}.target"), zone.smoothing or smoothing)
+    rules = [
+        (zone.smoothing or smoothing).rule(_chosen(mesh, zone.target, f"zones.{k}.target"))
         for k, zone in enumerate(zones)
     ]
     found = _Simulated(mesh, np.arange(len(mesh.triangles)), None, None, None)
     if not is_wall:
-        found = _Simulated(*smooth(mesh, chosen, rules))
+        found = _Simulated(*smooth(mesh, smoothing.rule(chosen), rules))
     size = target.element
     return found if size is None else _remeshed(found, chosen[found.origin], size)
 

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Any
 
+import numpy as np
 from pydantic import BeforeValidator, Field
 
 from chamberopt.common.toml_errors import CrossCheckError, Problem
@@ -23,6 +24,7 @@ from chamberopt.common.toml_fields import (
 from chamberopt.design.table_base import FileTable
 from chamberopt.geometry.mesh_io.readers.step.tessellation import Tessellation
 from chamberopt.geometry.mesh_io.units import Unit
+from chamberopt.geometry.smoothing.part import Rule
 
 MAX_FACES = 500
 
@@ -141,10 +143,11 @@ class SmoothingTable(FileTable):
         None,
     )  # fmt: skip
 
-    @property
-    def limit(self) -> float:
-        """The largest angle between facets [rad]; infinite where they stay as they are."""
-        return math.inf if self.off else math.radians(self.limit_deg)
+    def rule(self, triangles: np.ndarray) -> Rule:
+        """The same for some triangles (m,) bool, in SI units."""
+        tolerance = math.inf if self.tolerance_mm is None else 1e-3 * self.tolerance_mm
+        turn = math.radians(self.limit_deg)
+        return Rule(triangles, self.off, turn, 1e-3 * self.narrow_mm, tolerance)
 
 
 def _accept_off(smoothing: Any) -> Any:

@@ -1,10 +1,10 @@
 """Finer triangles on the smooth surface: edges along which it bends are split, their middles moved.
 
 Each edge decides alone whether it is split, so triangles on both sides always meet at whole edges
-and a closed surface stays closed. The middle of a smooth edge lies on the arc through its ends that
-has their normals. The middle of a crease lies on the arc that has their tangents, the cross
-products of the normals of both sides. A piece of a plane therefore stays in its plane, its border
-included.
+and a closed surface stays closed. The middle of an edge lies on the arc through its ends that has
+their normals. The tangents of a crease are the cross products of the normals of both sides, and its
+normals are across them, in the plane in which it bends. A piece of a plane therefore stays in its
+plane, its border included.
 
 Notation
     p, n   ends of an edge [m] and the surface's unit normals there
@@ -12,10 +12,10 @@ Notation
     e      unit vector from end to end
     s      rise of the middle over the chord [m]
 
-    s = dp.dn / (4 + 2 |n0 + n1|)      along n0 + n1: exact on a circle
-    |dp| (t0 - t1) / (4 + 2 |t0 + t1|)   for a crease
-    n = n0 + n1 - 1.5 e (e . (n0 + n1))  in the middle, before it is made a unit vector: that of a
-                                         cubic with these ends and normals
+    s = dp.dn / (4 + 2 |n0 + n1|)        along n0 + n1: exact on a circle
+    n = n0 + n1 - 1.5 f (f . (n0 + n1))  in the middle, before it is made a unit vector: that of a
+                                         cubic with these ends and normals; f is e without what of
+                                         it runs along n0 x n1
 """
 
 from __future__ import annotations
@@ -28,6 +28,7 @@ from chamberopt.geometry.triangles import area_vectors, edge_keys, unit_vectors
 
 LEVELS = 6  # rounds of splitting; 90 degrees an edge at 6 degrees take four
 TURNED = 0.6  # cosine between a triangle and the normals at its corners: below, it is not made
+SLACK = 1.02  # what bends by the limit is not split, whichever way it is rounded
 WEAK = 0.02  # sine between the sides of a crease below which it has no tangent of its own
 LESS = 1.0 / 3.0  # rise of the middle of half an edge over that of the edge, with a margin over 1/4
 TIE = 1e-6  # relative difference of diagonals that counts as none
@@ -61,12 +62,13 @@ class Surface:
     rise: np.ndarray
 
 
-def divide(surface: Surface, limit: np.ndarray, narrow: float) -> Surface:
+def divide(surface: Surface, limit: np.ndarray, narrow: np.ndarray) -> Surface:
     """Split edges until none bends by more than the lower limit of the parents at both sides.
 
     Args:
         limit: of each triangle of the file [rad], shape (m,); infinite where none is divided.
-        narrow: distance across the bend [m] below which an edge is not split.
+        narrow: distance across the bend [m] below which an edge of such a triangle is not split,
+            shape (m,).
     """
     whole = np.zeros((len(surface.triangles), 3), dtype=bool)  # sides that must not be split
     for _ in range(LEVELS):
@@ -78,12 +80,15 @@ def divide(surface: Surface, limit: np.ndarray, narrow: float) -> Surface:
 
 
 def _split_once(
-    surface: Surface, limit: np.ndarray, narrow: float, whole: np.ndarray
+    surface: Surface, limit: np.ndarray, narrow: np.ndarray, whole: np.ndarray
 ) -> tuple[Surface, np.ndarray]:
     """One round of splitting; edges stay whole where a new triangle would be turned over."""
     sides = np.argsort(edge_keys(surface.triangles), kind="stable").reshape(-1, 2)
     place, normal, bend, width = _middles(surface, sides)
-    wanted = (width > narrow) & (bend > np.repeat(limit[surface.parent], 3)[sides].min(axis=1))
+    most, least = (
+        np.repeat(of_parent[surface.parent], 3)[sides].min(axis=1) for of_parent in (limit, narrow)
+    )
+    wanted = (bend > SLACK * most) & (width > least)
     wanted &= ~whole.ravel()[sides].any(axis=1)
     while True:
         new = np.full(3 * len(surface.triangles), -1)
@@ -126,27 +131,25 @@ def _middles(surface: Surface, sides: np.ndarray) -> tuple[np.ndarray, ...]:
     e = chord / np.maximum(length, 1e-30)[:, None]
 
     a, b = unit_vectors(n0.sum(axis=0)), unit_vectors(n1.sum(axis=0))
-    both = a + b
-    size = np.linalg.norm(both, axis=1)
-    rise = np.einsum("ei,ei->e", chord, b - a) / (4.0 + 2.0 * size)
-    move = rise[:, None] * both / np.maximum(size, 1e-30)[:, None]
-    bend = np.maximum(_angle(a, b), _lean(a, e) + _lean(b, e))
-    turned = np.linalg.norm(b - a, axis=1)
-    across = np.abs(np.einsum("ei,ei->e", chord, b - a)) / np.maximum(turned, 1e-30)
-    width = np.where(is_crease, length, across)
-
-    t0, t1 = (_tangent(of_end[0], of_end[1], e) for of_end in (n0, n1))
-    along = length[:, None] * (t0 - t1) / (4.0 + 2.0 * np.linalg.norm(t0 + t1, axis=1))[:, None]
-    turn = np.maximum(_angle(t0, t1), _angle(t0, e) + _angle(t1, e))
-    move, bend = np.where(is_crease[:, None], along, move), np.where(is_crease, turn, bend)
-
-    far = surface.rise[triangle].max(axis=0) / np.maximum(np.linalg.norm(move, axis=1), 1e-30)
-    normal = n0 + n1
-    normal = unit_vectors(
-        (normal - 1.5 * np.einsum("sei,ei->se", normal, e)[..., None] * e).reshape(-1, 3)
+    a, b = (
+        np.where(is_crease[:, None], of_curve, of_surface)
+        for of_curve, of_surface in zip(_curve_normals(n0, n1, e), (a, b), strict=True)
     )
-    place = 0.5 * (start + end) + np.minimum(far, 1.0)[:, None] * move
-    return place, normal.reshape(n0.shape), bend, width
+    both, change = a + b, b - a
+    size = np.linalg.norm(both, axis=1)
+    rise = np.einsum("ei,ei->e", chord, change) / (4.0 + 2.0 * size)
+    far = surface.rise[triangle].max(axis=0)
+    rise = np.clip(rise, -far, far)
+    place = 0.5 * (start + end) + rise[:, None] * unit_vectors(both)
+    bend = np.maximum(_angle(a, b), _lean(a, e) + _lean(b, e))
+    width = np.abs(np.einsum("ei,ei->e", chord, unit_vectors(change)))
+
+    # Only what of the chord lies across the bend: straight along a cylinder nothing bends.
+    axis = unit_vectors(np.cross(a, b))
+    f = unit_vectors(chord - np.einsum("ei,ei->e", chord, axis)[:, None] * axis)
+    normal = n0 + n1
+    normal = normal - 1.5 * np.einsum("sei,ei->se", normal, f)[..., None] * f
+    return place, unit_vectors(normal), bend, width
 
 
 def _angle(one: np.ndarray, two: np.ndarray) -> np.ndarray:
@@ -157,6 +160,20 @@ def _angle(one: np.ndarray, two: np.ndarray) -> np.ndarray:
 def _lean(normal: np.ndarray, e: np.ndarray) -> np.ndarray:
     """Angles [rad] by which normals (e, 3) lean along unit vectors."""
     return np.asarray(np.abs(np.arcsin(np.clip(np.einsum("ei,ei->e", normal, e), -1.0, 1.0))))
+
+
+def _curve_normals(n0: np.ndarray, n1: np.ndarray, e: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Normals of creases at their starts and ends, in the plane in which each curve bends.
+
+    Args:
+        n0, n1: normals of the surfaces on both sides at the starts and ends, shape (2, e, 3).
+        e: unit vectors from start to end, shape (e, 3).
+    """
+    t0, t1 = (_tangent(of_end[0], of_end[1], e) for of_end in (n0, n1))
+    first, last = np.cross(t0, e), np.cross(e, t1)  # of one direction where the curve is an arc
+    more = np.linalg.norm(first, axis=1) > np.linalg.norm(last, axis=1)
+    axis = unit_vectors(np.where(more[:, None], first, last))
+    return np.cross(t0, axis), np.cross(t1, axis)
 
 
 def _tangent(one: np.ndarray, two: np.ndarray, e: np.ndarray) -> np.ndarray:

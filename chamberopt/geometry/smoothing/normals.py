@@ -40,6 +40,7 @@ FIT, CREASE = 1.6, 0.1
 # square, and [rad] of the last step.
 STEPS, FLOOR, LAST = 25, 0.01, 1e-3
 FLAT = np.radians(0.5)  # phi below which a facet is a piece of a plane
+PLANE = 1e-4  # rad: facets that turn by less are in one plane, but for the rounding of a file
 # Angle defects by which a vertex is the apex of a cone: at once, or if it is so many times larger
 # than those around it.
 APEX, SMALL_APEX, OF_AROUND = 0.5, np.radians(3.0), 4.0
@@ -198,9 +199,14 @@ def hollow_curvature(facets: Facets, phi: np.ndarray) -> np.ndarray:
 
 
 def corner_normals(
-    facets: Facets, triangles: np.ndarray, edges: Edges, is_crease: np.ndarray, phi: np.ndarray,
+    facets: Facets,
+    vertices: np.ndarray,
+    triangles: np.ndarray,
+    edges: Edges,
+    is_crease: np.ndarray,
+    phi: np.ndarray,
     apex: np.ndarray,
-) -> np.ndarray:  # fmt: skip
+) -> np.ndarray:
     """Unit normals of the surface at the corners of the triangles, shape (m, 3, 3).
 
     Args:
@@ -229,10 +235,56 @@ def corner_normals(
     total = np.bincount(fan, np.where(flat, opening, 0.0), count)
     is_one = (total > 0.0) & (np.linalg.norm(planes, axis=1) > np.cos(FLAT) * total)
     mean[is_one] = plane[is_one]
+    mean = _even_along_lines(mean, vertices, triangles, edges, fan, ~is_crease)
     result = mean[fan]
     at_apex = apex[triangles].ravel()
     result[at_apex] = own[at_apex]
     return result.reshape(-1, 3, 3)
+
+
+def _even_along_lines(
+    normals: np.ndarray,
+    vertices: np.ndarray,
+    triangles: np.ndarray,
+    edges: Edges,
+    fan: np.ndarray,
+    is_smooth: np.ndarray,
+) -> np.ndarray:
+    """Normals (f, 3) of fans, the same along each line in which two plane facets meet.
+
+    Two plane facets of several triangles each are of a developable surface, whose normal does not
+    change along such a line. New vertices then lie in planes too, which are few faces for a ball.
+    """
+    one, two = edges.triangles.T
+    facet = plane_facets(edges, len(triangles))
+    pair = np.sort(np.column_stack([facet[one], facet[two]]), axis=1)
+    meets = np.flatnonzero(is_smooth & (pair[:, 0] != pair[:, 1]))
+    _, line, edges_of = np.unique(pair[meets], axis=0, return_inverse=True, return_counts=True)
+    meets = meets[edges_of[line.reshape(-1)] > 1]
+    side = edges.sides[meets, 0]
+    following = 3 * (side // 3) + (side % 3 + 1) % 3
+    count, line = connected_pieces(fan[side], fan[following], len(normals))
+    start, end = vertices[triangles.ravel()[side]], vertices[triangles.ravel()[following]]
+    along = unit_vectors(end - start)
+    of_edge = line[fan[side]]
+    first = np.zeros(count, dtype=np.int64)
+    first[of_edge[::-1]] = np.arange(len(of_edge))[::-1]
+    turned = np.abs(np.einsum("ei,ei->e", along, along[first[of_edge]])) < np.cos(PLANE)
+    straight = np.bincount(of_edge, minlength=count) > 0
+    straight[of_edge[turned]] = False
+    sums = np.column_stack([np.bincount(line, column, count) for column in normals.T])
+    lines = np.flatnonzero(straight)
+    direction = along[first[lines]]
+    mean = np.zeros((count, 3))
+    across = sums[lines] - np.einsum("li,li->l", sums[lines], direction)[:, None] * direction
+    mean[lines] = unit_vectors(across)
+    return np.where(straight[line][:, None], mean[line], normals)
+
+
+def plane_facets(edges: Edges, count: int) -> np.ndarray:
+    """The plane facet of each of so many triangles, shape (m,)."""
+    one, two = edges.triangles[np.abs(edges.turn) < PLANE].T
+    return connected_pieces(one, two, count)[1]
 
 
 def fans(triangles: np.ndarray, edges: Edges, joins: np.ndarray) -> np.ndarray:

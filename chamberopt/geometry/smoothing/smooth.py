@@ -25,6 +25,7 @@ from chamberopt.geometry.smoothing.normals import (
     hollow_curvature,
     measure_facets,
     phi_of_normals,
+    plane_facets,
 )
 from chamberopt.geometry.smoothing.rounds import SMOOTH, Edges, find_creases, find_edges, is_hard
 from chamberopt.geometry.triangles import connected_pieces, sides_of, unit_normals
@@ -96,7 +97,7 @@ def find_surfaces(
     on_crease = np.zeros(3 * len(triangles), dtype=bool)
     on_crease[edges.sides[is_crease]] = True
     if given is None:
-        given = corner_normals(facets, triangles, edges, is_crease, phi, apex)
+        given = corner_normals(facets, vertices, triangles, edges, is_crease, phi, apex)
         noisy = _noise(edges, lone, left, face, fitted, ends)[face] > NOISE
     else:
         noisy = np.zeros(len(triangles), dtype=bool)
@@ -118,14 +119,14 @@ def divide_rounds(
     triangles: np.ndarray,
     surfaces: Surfaces,
     limit: np.ndarray,
-    narrow: float,
+    narrow: np.ndarray,
 ) -> Surface:
     """Divide the triangles of rounds; the new vertices lie on the smooth surface.
 
     Args:
         limit: turn [rad] above which each triangle's edges are split, shape (m,); infinite where
             the triangle stays as it is.
-        narrow: width of facets [m] below which they are not divided.
+        narrow: width of facets [m] below which each triangle is not divided, shape (m,).
     """
     surface = Surface(
         vertices=vertices,
@@ -232,4 +233,8 @@ def _turns_and_rises(
     turn = np.zeros(3 * len(facets.area))
     turn[edges.sides[~is_crease]] = np.abs(edges.turn[~is_crease])[:, None]
     of_sides = turn.reshape(-1, 3)
-    return of_sides.max(axis=1), (of_sides * facets.height).max(axis=1) / 8.0
+    rise = (of_sides * facets.height).max(axis=1) / 8.0
+    facet = plane_facets(edges, len(rise))
+    of_facet = np.zeros(len(rise))
+    np.maximum.at(of_facet, facet, rise)
+    return of_sides.max(axis=1), of_facet[facet]

@@ -19,7 +19,6 @@ from chamberopt.geometry.smoothing.smooth import Surfaces, divide_rounds, find_s
 from chamberopt.geometry.triangles import areas, tetrahedron_volumes
 
 if TYPE_CHECKING:
-    from chamberopt.design.part import SmoothingTable
     from chamberopt.geometry.smoothing.divide import Surface
 
 NEAR = 2e-3  # m from the target: as far as usual balls reach
@@ -78,36 +77,47 @@ class SmoothPart(NamedTuple):
 
 
 class Rule(NamedTuple):
-    """How some triangles (m,) of the file are smoothed."""
+    """How some triangles of the file are smoothed.
+
+    Attributes:
+        triangles: marks them, shape (m,).
+        is_off: whether they stay as they are.
+        turn: largest angle between facets [rad].
+        narrow: width [m] below which facets are not divided.
+        tolerance: the farthest that the surface may move [m].
+    """
 
     triangles: np.ndarray
-    table: SmoothingTable
+    is_off: bool
+    turn: float
+    narrow: float
+    tolerance: float
 
 
-def smooth(mesh: PartMesh, target: np.ndarray, rules: list[Rule]) -> SmoothPart:
+def smooth(mesh: PartMesh, target: Rule, zones: list[Rule]) -> SmoothPart:
     """Divide the rounds of a part.
 
     Args:
-        target: marks the triangles to cover, shape (m,).
-        rules: for the target, and then for zones, which may lie on it. The first is for what is
-            near them all, too.
+        target: for the triangles to cover, and for what is near them and the zones.
+        zones: for surfaces that may lie on the target.
     """
-    vertices, triangles, usual = mesh.vertices, mesh.triangles, rules[0].table
-    near = _near(vertices, triangles, np.any([one.triangles for one in rules], axis=0))
+    vertices, triangles, on_target = mesh.vertices, mesh.triangles, target.triangles
+    near = _near(vertices, triangles, np.any([one.triangles for one in (target, *zones)], axis=0))
     surfaces = find_surfaces(vertices, triangles, near, mesh.normals)
-    asked, wanted_turn, tolerance = (np.full(len(triangles), np.inf) for _ in range(3))
-    for own, table in [Rule(near, usual), *rules]:
-        asked[own], wanted_turn[own] = table.limit, math.radians(table.limit_deg)
-        tolerance[own] = math.inf if table.tolerance_mm is None else 1e-3 * table.tolerance_mm
+    asked, turn, narrow, tolerance = (np.full(len(triangles), np.inf) for _ in range(4))
+    for rule in (target._replace(triangles=near), *zones):
+        own = rule.triangles
+        asked[own] = math.inf if rule.is_off else rule.turn
+        turn[own], narrow[own], tolerance[own] = rule.turn, rule.narrow, rule.tolerance
     if mesh.is_exact:
         asked[:] = np.inf  # the triangles are of the surface itself, as fine as was asked for
     surfaces = surfaces._replace(rise=np.minimum(surfaces.rise, tolerance))
-    finer, crossing = _divide_apart(mesh, surfaces, asked, 1e-3 * usual.narrow_mm)
+    finer, crossing = _divide_apart(mesh, surfaces, asked, narrow)
     moved = moves(vertices, triangles, finer)
 
     area = areas(vertices, triangles)
-    of_target = np.where(target, area, 0.0) / area[target].sum()
-    coarse = target & (surfaces.turn > wanted_turn) & (not mesh.is_exact)
+    of_target = np.where(on_target, area, 0.0) / area[on_target].sum()
+    coarse = on_target & (surfaces.turn > turn) & (not mesh.is_exact)
     left = coarse & (np.isinf(asked) | surfaces.noisy | crossing)
     before = tetrahedron_volumes(vertices, triangles).sum()
     facts = SmoothingFacts(
@@ -118,7 +128,7 @@ def smooth(mesh: PartMesh, target: np.ndarray, rules: list[Rule]) -> SmoothPart:
         ),
         given_triangles=len(triangles),
         blunt_creases=surfaces.blunt,
-        facet_turn=_usual_turn(surfaces.turn, area, target),
+        facet_turn=_usual_turn(surfaces.turn, area, on_target),
         coarse_turn=_usual_turn(surfaces.turn, area, left),
         coarse_share=float(of_target[left].sum()),
         noisy_share=float(of_target[left & surfaces.noisy & np.isfinite(asked)].sum()),
@@ -139,7 +149,7 @@ def smooth(mesh: PartMesh, target: np.ndarray, rules: list[Rule]) -> SmoothPart:
 
 
 def _divide_apart(
-    mesh: PartMesh, surfaces: Surfaces, limit: np.ndarray, narrow: float
+    mesh: PartMesh, surfaces: Surfaces, limit: np.ndarray, narrow: np.ndarray
 ) -> tuple[Surface, np.ndarray]:
     """Divide the rounds, but not those that would cross others; and mark these (m,)."""
     crossing = np.zeros(len(mesh.triangles), dtype=bool)
