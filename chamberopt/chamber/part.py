@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
 Axis = tuple[np.ndarray, np.ndarray]
 
+LEAST_MOVED = 1e-3  # share of the target's area that is worth a word
 MAX_ELEMENTS = 3e5  # makes a few minutes of meshing, and slow steps after it
 
 
@@ -142,7 +143,7 @@ def posed_part(design: Design) -> tuple[Part, list[str]]:
         unit=mesh.unit,
         names=tuple(mesh.groups),
         file=PartOfFile(
-            simulated=replace(mesh, groups={}, notes=()),
+            simulated=replace(mesh, groups={}, notes=(), normals=None),
             original=None if mesh is given else replace(given, groups={}, notes=(), normals=None),
             rotation=turn,
             shift=shift,
@@ -152,7 +153,21 @@ def posed_part(design: Design) -> tuple[Part, list[str]]:
         hollow=None if found.hollow is None else found.hollow.astype(np.float32),
         smoothing=found.facts,
     )
-    return part, list(mesh.notes)
+    return part, [*mesh.notes, *_smoothing_notes(part)]
+
+
+def _smoothing_notes(part: Part) -> list[str]:
+    """How far the rounds were moved to the surface behind their facets."""
+    facts = part.smoothing
+    if facts is None or facts.moved_share < LEAST_MOVED:
+        return []
+    return [
+        f"{part.name}: rounds of the target have facets that turn by up to "
+        f"{np.degrees(facts.facet_turn):.2g} degrees; {facts.moved_share:.0%} of the target was "
+        f"divided along the surface behind them, at most {1e3 * facts.largest_move:.2g} mm away "
+        f"({facts.given_triangles:,} triangles became {len(part.triangles):,}); "
+        'part.smoothing = "off" keeps the facets'
+    ]
 
 
 @dataclass(frozen=True)

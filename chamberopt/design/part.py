@@ -113,7 +113,7 @@ class TessellationTable(FileTable):
     chord_mm: float = quantity(
         1e-4, 10, "mm", "distance that triangles keep from the surface", 0.02
     )
-    angle_deg: float = quantity(1, 60, "degrees", "largest angle between neighbours", 8.0)
+    angle_deg: float = quantity(1, 60, "degrees", "largest angle between neighbours", 6.0)
     side_mm: float | None = quantity(
         0.01, 1000, "mm", "longest side; absent: a fortieth of the part's diagonal", None
     )

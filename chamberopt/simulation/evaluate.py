@@ -12,6 +12,7 @@ import numpy as np
 
 from chamberopt.chamber.analytic import cavity_note
 from chamberopt.chamber.checks.check import friction_notes
+from chamberopt.chamber.checks.facets import facet_warnings
 from chamberopt.chamber.scene import chamber_mesh
 from chamberopt.common.estimate import Estimate
 from chamberopt.common.parallel.executor import share
@@ -161,6 +162,7 @@ def evaluate(
             *((cavity_note(cavity),) if cavity else ()),
             *friction_notes(design),
             *reach_notes(seen.field.reachable),
+            *facet_warnings(chamber.part, min(design.shot.diameters), seen.field.reachable),
             *_symmetry_note(seen.field.alike),
             *_accuracy_note(stopped_by, len(done), value, wanted),
             *resolution_notes(found.resolution),
