@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from chamberopt.common.estimate import Estimate, estimate, jackknife
+from chamberopt.coverage.coverage_from_impacts import in_halves
 from chamberopt.coverage.coverage_intervals import root_of_variance
 from chamberopt.coverage.field.surface_points import sampling_errors, sparse_points
 from chamberopt.coverage.metrics import P05, P95
@@ -132,11 +133,9 @@ def level_histograms(
         dents_of: function of impacts that gives the diameter of each dent and its strength [m],
             (k,) each; 0 where there is none.
     """
-    from chamberopt.coverage.field.windows import Windows
-
     gauge = field.gauge
     rows = np.linspace(0, len(gauge.area) - 1, min(WINDOWS, len(gauge.area))).astype(int)
-    windows = Windows(gauge.windows.points.select(rows), gauge.windows.radius)
+    windows = gauge.windows.select(rows)
     area = gauge.area[rows]
     dents = [[dents_of(hits) for hits in batch] for batch in batches]
     highest = max(float(s.max(initial=0.0)) for batch in dents for _, s in batch)
@@ -144,8 +143,11 @@ def level_histograms(
     for number, (batch, of_batch) in enumerate(zip(batches, dents, strict=True)):
         for hits, (dent, s) in zip(batch, of_batch, strict=True):
             some = np.flatnonzero(s > 0.0)
+            places = field.places_of(hits, some)
+            contacts, rows, halves = in_halves(field, places, hits.triangle[some])
+            some = some[rows]
             parts[number] += strength_histogram(
-                windows, area, field.places_of(hits, some), dent[some], levels(s[some], highest)
+                windows, area, contacts, np.sqrt(halves) * dent[some], levels(s[some], highest)
             )
     return StrengthHistograms(parts, seconds * np.array([len(one) for one in batches]), highest)
 

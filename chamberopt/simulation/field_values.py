@@ -84,7 +84,7 @@ class PartField:
 
         part, gauge = self._chamber.part, self.field.setting.gauge
         mesh = display_mesh(
-            part.vertices, part.triangles, part.target, self.field.face, gauge, self.coverage
+            part.vertices, part.triangles, part.target, self.field.drawn_face, gauge, self.coverage
         )
         return DisplayField(mesh, self.values(mesh.places, self._gauge_off_creases(mesh.places)))
 

@@ -26,7 +26,7 @@ from chamberopt.coverage.field.crease_bands import (
     crease_pieces,
     find_band,
 )
-from chamberopt.coverage.field.smooth_faces import Creases, find_faces
+from chamberopt.coverage.field.smooth_faces import Creases, Faces, find_faces
 from chamberopt.coverage.field.surface_points import (
     ball_fits,
     sampling_errors,
@@ -83,7 +83,7 @@ class TargetField:
     """A part in its chamber, ready to be looked at through windows."""
 
     setting: WindowSetting
-    face: np.ndarray  # smooth face of each part triangle, (m,)
+    faces: Faces
     on_target: np.ndarray  # marks the part triangles of the target, (m,)
     corners: np.ndarray  # of the part triangles [m], (m, 3, 3)
     normals: np.ndarray  # unit vectors out of the part, (m, 3)
@@ -95,6 +95,16 @@ class TargetField:
     reachable: float  # share of the target's area that a ball can touch
     reachable_error: float  # its standard error, by the choice of points
     symmetry: Symmetry | None  # None where no two places are alike
+
+    @property
+    def face(self) -> np.ndarray:
+        """Smooth face of each part triangle by the finest division, (m,)."""
+        return self.faces.of_triangle
+
+    @property
+    def drawn_face(self) -> np.ndarray:
+        """Smooth face of each part triangle by the division of pictures, (m,)."""
+        return np.asarray(self.faces.joined[self.faces.middle][self.face])
 
     @property
     def alike(self) -> int:
@@ -117,21 +127,32 @@ class TargetField:
     @cached_property
     def gauge(self) -> Gauge:
         """Windows of the gauge round points of the target."""
-        return self.gauge_round(self.some_points(self.setting.points), self.radius)
+        return self._gauge_of(self.setting.points, self.radius)
 
     @cached_property
     def wide(self) -> Gauge:
         """Windows of twice the radius round points of the target."""
-        return self.gauge_round(
-            self.some_points(int(OF_WIDE * self.setting.points)), 2.0 * self.radius
-        )
+        return self._gauge_of(int(OF_WIDE * self.setting.points), 2.0 * self.radius)
 
-    def gauge_round(self, points: Places, radius: float) -> Gauge:
-        """Windows of a radius [m] round points of the part."""
+    def _gauge_of(self, count: int, radius: float) -> Gauge:
+        """Windows of a radius [m], each division as often as its angles, round so many points."""
+        points = self.some_points(count)
+        return self.gauge_round(points, radius, self.faces.divisions(len(points.place)))
+
+    def gauge_round(
+        self, points: Places, radius: float, division: np.ndarray | None = None
+    ) -> Gauge:
+        """Windows of a radius [m] round points of the part.
+
+        Args:
+            division: of the part into faces that each window sees; None for that of pictures.
+        """
         from chamberopt.coverage.field.window_areas import window_areas
         from chamberopt.coverage.field.windows import Windows
 
-        windows = Windows(self._points_in_sector(points), radius)
+        if division is None:
+            division = np.full(len(points.place), self.faces.middle)
+        windows = Windows(self._points_in_sector(points), radius, self.faces.joined, division)
         area = self.alike * window_areas(windows, self.surface)
         area[area == 0.0] = np.inf  # nothing can be touched there, so nothing covers it
         band = find_band(windows, self.creases, self.pieces, 0.5 * self.setting.largest_dent)
@@ -184,6 +205,10 @@ class TargetField:
             ]
         return after
 
+    def sharpness(self, edge: np.ndarray) -> np.ndarray:
+        """Share of the windows to which each of these creases is one, (k,)."""
+        return np.asarray(self.faces.shares @ (self.creases.line >= 0))[edge]
+
     def places_of(self, hits: Hits, rows: np.ndarray) -> Places:
         """The contacts of some impacts."""
         from chamberopt.coverage.field.windows import Places
@@ -230,7 +255,8 @@ def find_target_field(chamber: Chamber, mesh: TriangleMesh, setting: WindowSetti
 
     part, gauge = chamber.part, setting.gauge
     area = np.where(part.target, part.area, 0.0)
-    face, creases = find_faces(part.vertices, part.triangles, part.target)
+    faces, creases = find_faces(part.vertices, part.triangles, part.target)
+    face = faces.of_triangle
     radius, corners = float(np.sqrt(gauge / np.pi)), part.vertices[part.triangles]
     ball = 0.5 * setting.ball
     touched, fits = _touched(chamber, mesh, area, face, setting)
@@ -239,7 +265,7 @@ def find_target_field(chamber: Chamber, mesh: TriangleMesh, setting: WindowSetti
     surface = surface_pieces(corners[part.target], face[part.target], mesh, ball, longest)
     return TargetField(
         setting=setting,
-        face=face,
+        faces=faces,
         on_target=part.target,
         corners=corners,
         normals=unit_normals(corners),

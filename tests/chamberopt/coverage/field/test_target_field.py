@@ -97,7 +97,7 @@ def test_beside_a_hollow_corner_two_strips_are_out_of_reach(turn: float) -> None
     place = field.touched.place
     assert np.hypot(place[:, 0], place[:, 2]).min() >= dead - 1.1 * overlap
     # Smooth valleys are one face, sharp ones two.
-    assert len(set(field.touched.face)) == (1 if turn < 60.0 else 2)
+    assert len(set(field.drawn_face[valley])) == (1 if turn < 60.0 else 2)
 
 
 def test_windows_beside_what_is_out_of_reach_are_no_larger_than_what_they_hold() -> None:
@@ -137,7 +137,7 @@ def test_a_box_has_bands_along_its_edges_however_it_is_divided(splits: int) -> N
     rows = len(np.unique(band.point)) / len(field.gauge.area) * mesh.area
     assert rows == pytest.approx(strips, rel=0.06)
     assert band.height.max() < radius
-    assert len(set(field.pieces.places.face)) == 12
+    assert len(set(field.creases.line[0, field.pieces.edge])) == 12
     assert field.pieces.length.sum() == pytest.approx(0.12)
 
 
