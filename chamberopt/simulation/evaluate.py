@@ -160,7 +160,7 @@ def evaluate(
         notes=(
             *((cavity_note(cavity),) if cavity else ()),
             *friction_notes(design),
-            *reach_notes(seen.field.reachable),
+            *reach_notes(seen.field.reach),
             *_symmetry_note(seen.field.alike),
             *_accuracy_note(stopped_by, len(done), value, wanted),
             *resolution_notes(found.resolution),

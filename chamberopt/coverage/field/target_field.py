@@ -26,13 +26,9 @@ from chamberopt.coverage.field.crease_bands import (
     crease_pieces,
     find_band,
 )
+from chamberopt.coverage.field.reached import Reach, reach_from
 from chamberopt.coverage.field.smooth_faces import Creases, Faces, find_faces
-from chamberopt.coverage.field.surface_points import (
-    ball_fits,
-    sampling_errors,
-    sparse_points,
-    spread_points,
-)
+from chamberopt.coverage.field.surface_points import ball_fits, spread_points
 from chamberopt.coverage.field.symmetry import TOLERANCE, Symmetry, find_symmetry
 from chamberopt.geometry.triangles import areas, unit_normals
 
@@ -92,8 +88,7 @@ class TargetField:
     has_windows: np.ndarray  # marks the part triangles whose dents can be in a window, (m,)
     touched: Places  # points that a ball can touch, spread evenly over the target
     surface: SurfacePieces  # of the target, or of the whole part
-    reachable: float  # share of the target's area that a ball can touch
-    reachable_error: float  # its standard error, by the choice of points
+    reach: Reach  # share of the target's area that a ball can touch, and its error
     symmetry: Symmetry | None  # None where no two places are alike
 
     @property
@@ -105,6 +100,11 @@ class TargetField:
     def drawn_face(self) -> np.ndarray:
         """Smooth face of each part triangle by the division of pictures, (m,)."""
         return np.asarray(self.faces.joined[self.faces.middle][self.face])
+
+    @property
+    def reachable(self) -> float:
+        """Share of the target's area that a ball can touch."""
+        return self.reach.share
 
     @property
     def alike(self) -> int:
@@ -274,10 +274,7 @@ def find_target_field(chamber: Chamber, mesh: TriangleMesh, setting: WindowSetti
         has_windows=part.target | (creases.at_corner >= 0).any(axis=1),
         touched=touched,
         surface=surface,
-        reachable=float(fits.mean()),
-        reachable_error=math.hypot(
-            *sampling_errors(np.array([some.mean() for some in sparse_points(fits)]))
-        ),
+        reach=reach_from(fits),
         symmetry=symmetry,
     )
 
