@@ -106,6 +106,11 @@ class LocatedDents(NamedTuple):
     radius: np.ndarray
     edge: np.ndarray
 
+    def select(self, rows: slice) -> LocatedDents:
+        """The dents of these rows."""
+        columns = (self.triangle, self.radius, self.edge)
+        return LocatedDents(self.contacts.select(rows), *(one[rows] for one in columns))
+
 
 def locate_dents(field: TargetField, in_sector: Hits) -> LocatedDents:
     """Find the face or the crease on which each dent lies, of impacts where the windows are."""

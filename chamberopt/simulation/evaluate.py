@@ -22,8 +22,9 @@ from chamberopt.coverage.field.target_field import (
     TargetField,
     WindowSetting,
     find_target_field,
-    require_touchable_zones,
+    require_narrow_gauge,
     require_wide_gauge,
+    require_touchable_zones,
 )
 from chamberopt.coverage.metrics import parse_objective, require_metrics, require_target
 from chamberopt.simulation.estimates import (
@@ -103,6 +104,7 @@ def evaluate(
     setting = share(executor, ReplicaSetting(design, chamber, cavity or mesh))
     timings = {"simulate": 0.0, "coverage": 0.0}
     window = window_setting(design, chamber)
+    require_narrow_gauge(chamber, window)
     require_touchable_zones(chamber, mesh, 0.5 * window.ball)
     # The dents of a replica are looked at while others are simulated, so that no worker waits.
     beside = ThreadPoolExecutor(1)

@@ -40,6 +40,9 @@ if TYPE_CHECKING:
     from sim_core import TriangleMesh
 
 OF_WIDE = 0.125  # of the number of windows, for those of twice the radius, which overlap more
+# Area of all windows together [m²], or over the target's where that is more: of windows that are
+# nearly as wide as the target a few tell all.
+MOST_AREA, MOST_OVERLAP, FEWEST_WINDOWS = 0.2, 20.0, 200
 POINTS_OF_ZONE = 1000  # that are tested for a ball before any work
 POINTS_PER_CHOSEN = 2  # that are tested for a ball, for each that becomes the middle of a window
 MIN_WINDOWS = 2.0  # side by side on a target of which they show how even it is
@@ -116,13 +119,17 @@ class TargetField:
         """Radius of a window [m]."""
         return float(np.sqrt(self.setting.gauge / np.pi))
 
+    @cached_property
+    def target_area(self) -> float:
+        """Area of the target [m²]."""
+        corners = self.corners[self.on_target].reshape(-1, 3)
+        return float(areas(corners, np.arange(len(corners)).reshape(-1, 3)).sum())
+
     @property
     def is_one_window(self) -> bool:
         """Whether windows hold most of the target each, so that they tell nothing of evenness."""
-        corners = self.corners[self.on_target].reshape(-1, 3)
-        target = float(areas(corners, np.arange(len(corners)).reshape(-1, 3)).sum())
         of_window = float(np.median(self.gauge.area)) / self.alike
-        return self.reachable * target < MIN_WINDOWS * of_window
+        return self.reachable * self.target_area < MIN_WINDOWS * of_window
 
     @cached_property
     def gauge(self) -> Gauge:
@@ -136,7 +143,9 @@ class TargetField:
 
     def _gauge_of(self, count: int, radius: float) -> Gauge:
         """Windows of a radius [m], each division as often as its angles, round so many points."""
-        points = self.some_points(count)
+        gauge = math.pi * radius**2
+        most = max(MOST_AREA, MOST_OVERLAP * self.target_area) / gauge
+        points = self.some_points(min(count, max(int(most), FEWEST_WINDOWS)))
         return self.gauge_round(points, radius, self.faces.divisions(len(points.place)))
 
     def gauge_round(
@@ -226,6 +235,17 @@ def require_wide_gauge(chamber: Chamber, setting: WindowSetting) -> None:
         raise InputError(
             f"process.accuracy.gauge_mm2: given {1e6 * gauge:g}, too small for a target of "
             f"{1e6 * area:.4g} mm²; give at least {least:.2g}"
+        )
+
+
+def require_narrow_gauge(chamber: Chamber, setting: WindowSetting) -> None:
+    """Raise InputError if the windows are so wide that they show no differences in the target."""
+    area, gauge = float(chamber.part.area[chamber.part.target].sum()), setting.gauge
+    if gauge * MIN_WINDOWS > area:
+        raise InputError(
+            f"process.accuracy.gauge_mm2: given {1e6 * gauge:g}, so wide that a target of "
+            f"{1e6 * area:.4g} mm² has fewer than {MIN_WINDOWS:g} windows side by side; give at "
+            f"most {1e6 * area / MIN_WINDOWS:.4g}"
         )
 
 

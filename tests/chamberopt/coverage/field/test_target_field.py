@@ -12,6 +12,7 @@ from chamberopt.coverage.field.target_field import (
     TargetField,
     WindowSetting,
     find_target_field,
+    require_narrow_gauge,
     require_wide_gauge,
     with_whole_part,
 )
@@ -62,6 +63,22 @@ def test_a_gauge_too_small_for_the_target_is_refused_with_the_least_that_is_poss
     least = float(str(refused.value).rsplit(" ", 1)[-1])
     assert least == pytest.approx(PIECES_PER_WINDOW * 225.0 / target_field.MAX_PIECES, rel=0.05)
     assert "225 mm²" in str(refused.value)
+
+
+def test_a_gauge_as_wide_as_the_target_is_refused_with_the_most_that_is_possible() -> None:
+    chamber = plane_chamber()
+    require_narrow_gauge(chamber, setting(gauge_mm2=112.0))
+    for given in (113.0, 225.0, 1e6):
+        with pytest.raises(InputError, match=r"process\.accuracy\.gauge_mm2.*at most 112\.5"):
+            require_narrow_gauge(chamber, setting(gauge_mm2=given))
+
+
+def test_of_wide_windows_a_few_tell_all() -> None:
+    """The default of 20,000 would make pairs with all dents of the target, without bound."""
+    field = field_of(plane_chamber(), gauge_mm2=50.0)
+    assert len(field.gauge.area) == 4000
+    assert len(field.wide.area) == 1000
+    assert len(field_of(plane_chamber(), gauge_mm2=5.0).gauge.area) == 20_000
 
 
 def hollow_corner(turn: float) -> tuple[trimesh.Trimesh, np.ndarray]:
