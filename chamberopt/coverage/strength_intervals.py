@@ -22,7 +22,9 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from chamberopt.common.estimate import Estimate, estimate, jackknife
+from chamberopt.coverage.coverage_from_impacts import in_halves
 from chamberopt.coverage.coverage_intervals import root_of_variance
+from chamberopt.coverage.field.reached import Reach
 from chamberopt.coverage.field.surface_points import sampling_errors, sparse_points
 from chamberopt.coverage.metrics import P05, P95
 from chamberopt.coverage.percentile import in_order
@@ -106,7 +108,7 @@ def strength_estimates(
     )
     if found.highest == 0.0:
         return _without_dents(len(batches))
-    estimates = estimates_of(found, field.reachable)
+    estimates = estimates_of(found, field.reach)
     if field.is_one_window:
         evenness = estimates["intensity_uniformity"]
         estimates["intensity_uniformity"] = replace(evenness, half_width=math.inf)
@@ -132,11 +134,9 @@ def level_histograms(
         dents_of: function of impacts that gives the diameter of each dent and its strength [m],
             (k,) each; 0 where there is none.
     """
-    from chamberopt.coverage.field.windows import Windows
-
     gauge = field.gauge
     rows = np.linspace(0, len(gauge.area) - 1, min(WINDOWS, len(gauge.area))).astype(int)
-    windows = Windows(gauge.windows.points.select(rows), gauge.windows.radius)
+    windows = gauge.windows.select(rows)
     area = gauge.area[rows]
     dents = [[dents_of(hits) for hits in batch] for batch in batches]
     highest = max(float(s.max(initial=0.0)) for batch in dents for _, s in batch)
@@ -144,18 +144,18 @@ def level_histograms(
     for number, (batch, of_batch) in enumerate(zip(batches, dents, strict=True)):
         for hits, (dent, s) in zip(batch, of_batch, strict=True):
             some = np.flatnonzero(s > 0.0)
+            places = field.places_of(hits, some)
+            contacts, rows, halves = in_halves(field, places, hits.triangle[some])
+            some = some[rows]
             parts[number] += strength_histogram(
-                windows, area, field.places_of(hits, some), dent[some], levels(s[some], highest)
+                windows, area, contacts, np.sqrt(halves) * dent[some], levels(s[some], highest)
             )
     return StrengthHistograms(parts, seconds * np.array([len(one) for one in batches]), highest)
 
 
-def estimates_of(found: StrengthHistograms, reachable: float) -> dict[str, Estimate]:
-    """The estimates from histograms.
-
-    Args:
-        reachable: share of the target that shot can touch.
-    """
+def estimates_of(found: StrengthHistograms, reach: Reach) -> dict[str, Estimate]:
+    """The estimates from histograms."""
+    reachable = reach.share
     batches, total = len(found.parts), found.parts.sum(axis=0)
     whole = _saturated(found, np.arange(batches))
     if batches < MIN_BATCHES:
@@ -181,7 +181,7 @@ def estimates_of(found: StrengthHistograms, reachable: float) -> dict[str, Estim
                  for one in rests]  # fmt: skip
     estimates = {
         "intensity_uniformity": _uniformity_estimate(
-            spreads, spread_of_halves, np.array([everything, *variances]), whole, reachable
+            spreads, spread_of_halves, np.array([everything, *variances]), whole, reach
         )
     }
     plain = _figures(whole, float(spreads.mean()))
@@ -196,8 +196,8 @@ def estimates_of(found: StrengthHistograms, reachable: float) -> dict[str, Estim
     # Where counting seems to explain all of the variance, percentiles are drawn to the mean, which
     # hardly moves from batch to batch. There may be more variance, by its own interval; twice what
     # that makes held where once held in 83 % (benchmarks/strength_resolution.py).
-    reach = estimate(jackknife(np.array([everything, *variances]))).half_width
-    wider = _figures(whole, float(spreads.mean()) + reachable * reach)
+    spread_error = estimate(jackknife(np.array([everything, *variances]))).half_width
+    wider = _figures(whole, float(spreads.mean()) + reachable * spread_error)
     for name, value in plain.items():
         is_time = name == "saturation_time_s"
         step = value - float(np.mean([one[name] for one in of_half]))
@@ -277,7 +277,7 @@ def _uniformity_estimate(
     of_halves: np.ndarray,
     variances: np.ndarray,
     whole: Saturated,
-    reachable: float,
+    reach: Reach,
 ) -> Estimate:
     """The evenness over the whole target.
 
@@ -287,7 +287,9 @@ def _uniformity_estimate(
         of_halves: the same, not corrected, (SPLITS,).
         variances: relative variance of S from all batches and from all but each, (g + 1,).
     """
+    reachable = reach.share
     value = _uniformity(float(spreads.mean()), reachable)
+    by_reach = value - _uniformity(float(spreads.mean()), reachable - reach.error)
     # The bias falls more slowly than that; twice the step held where once held in 3 of 4 runs.
     # Steps of single pairs do not cancel where their mean is near 0 by chance.
     steps = [
@@ -301,7 +303,10 @@ def _uniformity_estimate(
     spread = root_of_variance(estimate(jackknife(variances), 0.0))
     deviations = np.array(spread.pseudovalues) - spread.value
     return estimate(
-        value - deviations, highest=1.0, bias=bias, shared=sampling_errors(np.array(of_some))
+        value - deviations,
+        highest=1.0,
+        bias=bias,
+        shared=[*sampling_errors(np.array(of_some)), by_reach],
     )
 
 

@@ -96,7 +96,7 @@ def window_areas(windows: Windows, pieces: SurfacePieces) -> np.ndarray:
     middle = pieces.corners.mean(axis=1)
     size = float(np.linalg.norm(pieces.corners - middle[:, None], axis=2).max(initial=0.0))
     kept = pieces.touched > 0.0
-    near = Windows(windows.points, windows.radius + size)
+    near = windows.with_radius(windows.radius + size)
     area = np.zeros(len(windows.points.place))
     columns = [np.ascontiguousarray(column[kept]) for column in pieces]
     places = Places(middle[kept], np.zeros((int(kept.sum()), 3)), pieces.face[kept])

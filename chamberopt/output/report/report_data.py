@@ -77,10 +77,10 @@ def report_contents(folder: str | Path) -> dict[str, Any]:
 def _change(after: Estimate, before: Estimate, result: Result, start: Result) -> Estimate:
     """The difference, from pairs of replicas where both ran on the same seeds."""
     if after == before:  # the start is the best: nothing that is shown of it is uncertain
-        return Estimate(0.0, 0.0).not_known("not known") if after.in_words else Estimate(0.0, 0.0)
+        return Estimate(0.0, 0.0) if after.has_number else Estimate(0.0, 0.0).not_known("not known")
     same_seeds = result.seeds == start.seeds
     change = (paired_difference if same_seeds else independent_difference)(after, before)
-    return change.not_known("not known") if after.in_words or before.in_words else change
+    return change if after.has_number and before.has_number else change.not_known("not known")
 
 
 def _question(result: Result, study: Mapping[str, Any] | None) -> dict[str, Any]:
