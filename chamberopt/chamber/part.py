@@ -130,8 +130,7 @@ def posed_part(design: Design) -> tuple[Part, list[str]]:
     }
     found = _simulated(given, table.target, table.smoothing, design.zones, _is_wall(design))
     mesh, origin = found.mesh, found.origin
-    # As the file has it: new corners on a round may reach a little further than its facets.
-    turn, shift = _pose(given, design)
+    turn, shift = _pose(given, mesh.vertices, design)
     vertices = snap_to_grid(mesh.vertices @ turn.T + shift)
     part = Part(
         vertices=vertices,
@@ -198,7 +197,7 @@ def preview_part(design: Design) -> PartPreview:
         one.name: _chosen(mesh, one.target, f"zones.{k}.target")
         for k, one in enumerate(design.zones)
     }
-    return PartPreview(mesh, *_pose(mesh, design), target, zones)
+    return PartPreview(mesh, *_pose(mesh, mesh.vertices, design), target, zones)
 
 
 def turning_axis(design: Design, part: Part) -> Axis | None:
@@ -323,14 +322,22 @@ def _find_origin(mesh: PartMesh, corners: np.ndarray, source: np.ndarray) -> np.
     return origin
 
 
-def _pose(mesh: PartMesh, design: Design) -> tuple[np.ndarray, np.ndarray]:
-    """From the part file's frame to the chamber's: rotation (3, 3), then shift (3,) [m]."""
+def _pose(
+    given: PartMesh, vertices: np.ndarray, design: Design
+) -> tuple[np.ndarray, np.ndarray]:
+    """From the part file's frame to the chamber's: rotation (3, 3), then shift (3,) [m].
+
+    Args:
+        given: the part as its file has it, whose middle comes onto the axis.
+        vertices: of the part as it is simulated [m], of which the lowest counts, (n, 3): those on a
+            round may reach a little further than its facets.
+    """
     setup, distance = design.chamber.setup(), design.chamber.sonotrode_distance
     if setup is not None:
         return setup.turn, setup.shift + np.array([0.0, 0.0, distance - setup.distance])
     turn = rotation_matrix(design.part.rotate_deg)
-    vertices = mesh.vertices @ turn.T
-    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    of_file = given.vertices @ turn.T
+    low, high = of_file.min(axis=0), of_file.max(axis=0)
     x, y = design.part.offset
-    foot = np.r_[(low[:2] + high[:2]) / 2.0, low[2]]
+    foot = np.r_[(low[:2] + high[:2]) / 2.0, (vertices @ turn.T)[:, 2].min()]
     return turn, np.array([x, y, distance]) - foot
