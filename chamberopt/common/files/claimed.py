@@ -20,14 +20,17 @@ from chamberopt.common.files.written import LOCK, is_leftover, remove_leftovers
 
 if sys.platform == "win32":
     import msvcrt
+
+    HELD = (errno.EACCES, errno.EDEADLK)  # how a lock tells that another process has it
 else:
     import fcntl
+
+    HELD = (errno.EWOULDBLOCK,)
 
 ANOTHER_FOLDER = "choose another folder (out, or --out)"
 # Bytes that must be free where a command begins to write: a result of a usual part takes a few MB,
 # and on a disk that is nearly full other programs fail too.
 LEAST_FREE = 20_000_000
-HELD = (errno.EACCES, errno.EAGAIN, errno.EDEADLK)  # by another process
 LOCKED_BYTE = 1 << 30  # after the holder's name: Windows lets nobody read what is locked
 
 
