@@ -12,6 +12,7 @@ from chamberopt.chamber import build
 from chamberopt.chamber.checks import check
 from chamberopt.cli import main
 from chamberopt.common.files import write_bytes
+from chamberopt.common.parallel import executor
 from chamberopt.optimize.run_study import ChamberSimulator
 from chamberopt.output import save_run
 from chamberopt.output.viewer import subprocess_drawing
@@ -56,6 +57,9 @@ def remember_all() -> None:
     os.fsync = lambda _: None  # the disk is slow, and no power cut is tested
     check.warnings = lambda *_: []
     save_run.convergence_picture = lambda path, _: write_bytes(path, b"a picture")
+    save_run.sweep_map = lambda path, _: [write_bytes(path, b"a picture")][1:]
+    # Worker processes would do all from the beginning.
+    executor.local_executor = lambda *_: executor.ThreadExecutor(1)
     compile_all()
 
 
@@ -65,7 +69,9 @@ def _remember(place: Any, name: str) -> None:
 
     def remembered(*given: Any, **named: Any) -> Any:
         key = tuple(
-            one.model_dump_json(exclude={"part": {"mesh"}}) if hasattr(one, "model_dump_json") else one
+            one.model_dump_json(exclude={"part": {"mesh"}})
+            if hasattr(one, "model_dump_json")
+            else one
             for one in given
             if hasattr(one, "model_dump_json") or isinstance(one, (str, int))
         )

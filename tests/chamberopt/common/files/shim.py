@@ -1,20 +1,29 @@
-"""Run a command with the system calls of the file layer counted, and one of them failing."""
+"""Run a command whose system calls are counted, with one failing, or whose files are listed."""
 
 from __future__ import annotations
 
-import builtins
 import fcntl
 import io
 import os
+import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 from chamberopt.cli import main
-from chamberopt.common.files import written
+from chamberopt.common.errors import InputError
+from chamberopt.common.files import opened, written
+from chamberopt.output.editor.edited_file import EditedFile
+from chamberopt.output.viewer import subprocess_drawing
 
 CALLS = ((os, "open"), (os, "write"), (os, "fsync"), (os, "replace"), (os, "mkdir"),
          (fcntl, "flock"))  # fmt: skip
+# Audit events, and how many of their arguments are names.
+EVENTS = {
+    "open": 1, "os.rename": 2, "os.remove": 1, "os.mkdir": 1, "os.rmdir": 1, "os.listdir": 1,
+    "os.scandir": 1, "os.chmod": 1, "os.truncate": 1, "os.link": 2, "os.symlink": 2,
+    "shutil.rmtree": 1, "tempfile.mkstemp": 1,
+}  # fmt: skip
 
 
 def run_failing(words: Sequence[str]) -> int:
@@ -34,16 +43,13 @@ def run_failing(words: Sequence[str]) -> int:
 
 def save() -> int:
     """Save a change of a design as the page does."""
-    from chamberopt.common.errors import InputError
-    from chamberopt.output.editor.edited_file import EditedFile
-
     try:
         EditedFile(Path("design.toml"), trusted=False).save({"chamber.height_mm": 31.0})
     except InputError as error:
-        builtins.print(error, file=os.sys.stderr)
+        print(error, file=sys.stderr)
         return 2
     except OSError as error:
-        builtins.print(f"{error.filename}: {error.strerror}", file=os.sys.stderr)
+        print(f"{error.filename}: {error.strerror}", file=sys.stderr)
         return 1
     return 0
 
@@ -64,10 +70,10 @@ class Counter:
                 counter.tick()
                 return super().write(content)
 
-        def opened(name: str, mode: str, opener: Callable[..., int]) -> io.BufferedRandom:
+        def open_file(name: str, mode: str, opener: Callable[..., int]) -> io.BufferedRandom:
             return io.BufferedRandom(File(name, mode.replace("b", ""), opener=opener))
 
-        written.open = opened  # type: ignore[attr-defined]
+        written.open = open_file  # type: ignore[attr-defined]
 
     def tick(self) -> None:
         self.count += 1
@@ -84,3 +90,38 @@ class Counter:
             return call(*given, **named)
 
         return counted
+
+
+def run_traced(words: Sequence[str]) -> int:
+    """Run a command, and print each name in this folder that it opens, makes, or removes.
+
+    A line is "traced: r NAME" for what is only read, and w for the rest.
+    """
+    opened.BY_DESCRIPTOR = False  # so that each event tells the whole name
+    here, seen = Path.cwd(), set()
+
+    def hook(event: str, given: tuple[Any, ...]) -> None:
+        for name in given[: EVENTS.get(event, 0)]:
+            if isinstance(name, (str, os.PathLike)):
+                path = Path(os.path.abspath(name))
+                writes = event != "open" or bool(given[2] & (os.O_RDWR | os.O_WRONLY | os.O_CREAT))
+                if path.is_relative_to(here) and path != here:
+                    seen.add(f"traced: {'rw'[writes]} {path.relative_to(here).as_posix()}")
+
+    sys.addaudithook(hook)
+    status = run_drawing(words)
+    print("\n" + "\n".join(sorted(seen)), flush=True)
+    return status
+
+
+def run_drawing(words: Sequence[str]) -> int:
+    """Run a command, or "save"; pictures of VTK are written, but have nothing on them."""
+
+    def drawn(job: dict[str, Any], picture: str | Path, *_: Any) -> None:
+        written.write_bytes(Path(picture), b"a picture")
+
+    subprocess_drawing.missing_opengl = lambda: None
+    for module in list(sys.modules.values()):
+        if vars(module).get("draw_in_subprocess"):
+            module.draw_in_subprocess = drawn  # type: ignore[attr-defined]
+    return save() if list(words) == ["save"] else main(words)

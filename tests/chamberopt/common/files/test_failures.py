@@ -7,7 +7,6 @@ import json
 import os
 import re
 import shutil
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -30,13 +29,6 @@ OUTPUTS = {
 DIFFERS = ("timings.jsonl", "history.csv")
 DATES = re.compile(rb'"(created|sha256|seconds|\w+\.csv)": [^\n]*|"timings_s": \{[^}]*\}|"files": \{[^}]*\}'
                    rb"|report made [-\d]*|/CreationDate \([^)]*\)")  # fmt: skip
-
-
-@pytest.fixture(scope="module")
-def server() -> Iterator[Server]:
-    with Server() as one:
-        one.warm_up(f"{HERE}.scene:remember_all")
-        yield one
 
 
 @pytest.fixture(scope="module")
@@ -65,7 +57,9 @@ def state(path: Path) -> dict[str, bytes]:
     }
 
 
-def every_failure(server: Server, scene: Path, place: Path, words: str, hows: list) -> None:
+def every_failure(
+    server: Server, scene: Path, place: Path, words: str, hows: list[tuple[int, str]]
+) -> None:
     """Fail each call of a command, and look at what it leaves."""
     output = OUTPUTS[words]
     shutil.copytree(scene, place / "undisturbed")
@@ -117,9 +111,8 @@ def test_of_each_call(words: str, server: Server, scene: Path, tmp_path: Path) -
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("how", ["once", "on"])
 @pytest.mark.parametrize("words", OUTPUTS)
-def test_of_each_call_in_each_way(
-    words: str, how: str, server: Server, scene: Path, tmp_path: Path
-) -> None:
-    every_failure(server, scene, tmp_path, words, [(error, how) for error in ERRORS])
+def test_of_each_call_in_each_way(words: str, server: Server, scene: Path, tmp_path: Path) -> None:
+    """With each error; and with a disk that stays full from there on."""
+    hows = [*((error, "once") for error in ERRORS), (errno.ENOSPC, "on")]
+    every_failure(server, scene, tmp_path, words, hows)
