@@ -7,7 +7,7 @@ import os
 from pathlib import Path
 from typing import Any
 
-from chamberopt.common.errors import InputError
+from chamberopt.common.errors import InputError, UnreadableError
 from chamberopt.common.files import open_plain
 from chamberopt.common.number_text import plain
 
@@ -33,7 +33,8 @@ def read_limited(path: Path, most: int, what: str, follow: bool = False) -> byte
         follow: links, which users may have among their own files.
     Raises:
         FileNotFoundError: for the caller to explain.
-        InputError: it is no plain file, such as a link or a pipe; too large; or not readable.
+        InputError: it is no plain file, such as a link or a pipe; or too large.
+        UnreadableError: the system does not read it.
     """
     try:
         with open_plain(path, follow) as file:
@@ -46,7 +47,7 @@ def read_limited(path: Path, most: int, what: str, follow: bool = False) -> byte
         raise
     except OSError as error:
         why = f"cannot be read: {error.strerror}"
-        raise InputError(f"{path}: {why}; check the path and its permissions") from None
+        raise UnreadableError(f"{path}: {why}; check the path and its permissions") from None
     except ValueError:  # a null character in the name
         raise InputError(f"{str(path)!r}: not a file name; check the path") from None
     require_size(path, len(content), most, what)

@@ -145,23 +145,24 @@ def whole_or_nothing(folder: Path) -> Iterator[None]:
     try:
         yield
     except BaseException:
-        with suppress(OSError):
-            _empty(folder, lambda name: not name.startswith(LOCK))
+        _empty(folder, lambda name: not name.startswith(LOCK))
         raise
 
 
 def remove_leftovers(folder: Path) -> None:
     """Remove the temporary files of commands that were killed, from a folder that is held."""
-    with suppress(OSError):
-        _empty(folder, lambda name: name.startswith(WRITING))
+    _empty(folder, lambda name: name.startswith(WRITING))
 
 
 def _empty(folder: Path, which: Callable[[str], bool]) -> None:
-    for one in [one for one in os.scandir(folder) if which(one.name)]:
-        if one.is_dir(follow_symlinks=False):
-            shutil.rmtree(one.path, ignore_errors=True)
-        else:
-            remove_file(Path(one.path))
+    """Remove what is in a folder, as far as that can be removed."""
+    with suppress(OSError), os.scandir(folder) as there:
+        for one in [one for one in there if which(one.name)]:
+            with suppress(OSError):
+                if one.is_dir(follow_symlinks=False):
+                    shutil.rmtree(one.path, ignore_errors=True)
+                else:
+                    remove_file(Path(one.path))
 
 
 def is_leftover(path: Path) -> bool:

@@ -30,8 +30,8 @@ def run_failing(words: Sequence[str]) -> int:
     """Run a command whose n-th call fails; the number of calls ends what it prints.
 
     Args:
-        words: n, or 0 for none; the error's number; "once", or "on" for this and all later calls;
-            then those of the command, or "save" for the page's Save.
+        words: n, or 0 for none; the error's number; "once", or "on" for this and later calls that
+            make something; then those of the command, or "save" for the page's Save.
     """
     number, error, how, *command = words
     counter = Counter(int(number), int(error), how == "on")
@@ -75,9 +75,11 @@ class Counter:
 
         written.open = open_file  # type: ignore[attr-defined]
 
-    def tick(self) -> None:
+    def tick(self, makes: bool = True) -> None:
+        """Count a call; a full disk goes on failing those that make something."""
         self.count += 1
-        if self.count == self._number or (self._stays and 0 < self._number <= self.count):
+        goes_on = self._stays and makes and 0 < self._number <= self.count
+        if self.count == self._number or goes_on:
             raise OSError(self._error, os.strerror(self._error))
 
     def _counted(self, call: Callable[..., Any]) -> Callable[..., Any]:
@@ -86,7 +88,8 @@ class Counter:
         def counted(*given: Any, **named: Any) -> Any:
             # Descriptors are those of the layer; other folders hold caches and fonts.
             if isinstance(given[0], int) or os.path.abspath(given[0]).startswith(here):
-                self.tick()
+                opens = call.__name__ == "open"
+                self.tick(not opens or bool(given[1] & os.O_CREAT))
             return call(*given, **named)
 
         return counted
