@@ -6,11 +6,12 @@ import os
 import shutil
 import subprocess
 import sys
-import tempfile
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+
+from chamberopt.common.files import private_folder, write_bytes
 
 TIMEOUT_S = 1800.0
 BEGIN = (
@@ -32,10 +33,10 @@ def converted(
     Raises:
         subprocess.TimeoutExpired: it took too long.
     """
-    with tempfile.TemporaryDirectory() as folder:
+    with private_folder() as folder:
         given, made = Path(folder) / source, Path(folder) / target
-        given.write_bytes(content)
-        command = [sys.executable, "-c", BEGIN + code, *map(str, (given, made, *arguments))]
+        write_bytes(given, content)
+        command = [sys.executable, "-P", "-c", BEGIN + code, *map(str, (given, made, *arguments))]
         watched, held = os.pipe()  # it is closed when this process ends, however it ends
         try:
             run = subprocess.run(

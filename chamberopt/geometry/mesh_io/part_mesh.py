@@ -214,7 +214,7 @@ def _read_content(path: Path) -> bytes:
     if path.is_dir():
         raise InputError(f"{path}: is a folder; give a mesh file")
     try:
-        content = read_limited(path, MAX_MESH_BYTES, "mesh file")
+        content = read_limited(path, MAX_MESH_BYTES, "mesh file", follow=True)
     except FileNotFoundError:
         remedy = "check part.mesh, which is relative to the design file's folder"
         raise InputError(f"{path}: no such mesh file; {remedy}") from None

@@ -13,10 +13,12 @@ wanted. Faces with four sides get grids, with cells longer where the face is str
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from chamberopt.common.npz_files import save_arrays
 from chamberopt.geometry.mesh_io.readers.step.grids import lay_grids
 
 SHORTEST_IN_CHORDS, SMALLEST_RADIUS_IN_CHORDS = 4.0, 3.0
@@ -66,7 +68,7 @@ def tessellate(source: str, target: str, chord: str, angle: str, side: str) -> N
             raise
         why = str(error).replace(f" file '{source}'", " it")[:160]
         arrays = {"fault": np.array(f"cannot be meshed ({why}); {REMEDY}")}
-    np.savez(target, allow_pickle=False, **arrays)
+    save_arrays(Path(target), **arrays)
 
 
 def _mesh(gmsh: Any, source: str, how: Tessellation) -> dict[str, np.ndarray]:
