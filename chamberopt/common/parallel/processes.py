@@ -22,6 +22,7 @@ from multiprocessing import get_context
 from typing import TYPE_CHECKING, Any
 
 from chamberopt.common.errors import WorkerLostError
+from chamberopt.common.parallel.lifetime import end_with_parent
 
 if TYPE_CHECKING:
     from multiprocessing.connection import Connection
@@ -130,7 +131,7 @@ class _Worker:
     def __init__(self) -> None:
         context = get_context("spawn")
         self._pipe, worker_end = context.Pipe()
-        # Daemon processes end with this program, even if it is killed.
+        # Daemon processes end with this program; `_serve` sees to it where it is killed.
         self.process = context.Process(target=_serve, args=(worker_end,), daemon=True)
         self.process.start()
         worker_end.close()
@@ -151,6 +152,7 @@ def _serve(pipe: Connection) -> None:
     """Run tasks in a worker process until the other end of the pipe closes."""
     # A terminal sends Ctrl-C to all of its processes. Only the main program reacts to it.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    end_with_parent()
     with suppress(EOFError, OSError):
         while True:
             pipe.send_bytes(_answer(pipe.recv_bytes()))

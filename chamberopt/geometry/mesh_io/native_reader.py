@@ -7,16 +7,17 @@ import shutil
 import subprocess
 import sys
 import tempfile
-import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from chamberopt.common.parallel.lifetime import end_with_stdin
+
 TIMEOUT_S = 1800.0
 BEGIN = (
     "import sys; from chamberopt.common.limits import limit_memory; limit_memory(); "
-    "from chamberopt.geometry.mesh_io.native_reader import end_with_parent; "
-    "end_with_parent(sys.argv[1]); "
+    "from chamberopt.geometry.mesh_io.native_reader import end_with_starter; "
+    "end_with_starter(sys.argv[1]); "
 )
 
 
@@ -47,15 +48,6 @@ def converted(
         yield made if run.returncode == 0 and made.is_file() else None
 
 
-def end_with_parent(source: str) -> None:
-    """End this process, and remove the folder of its file, when the one that started it has ended.
-
-    The other one holds the end of the pipe that this one has as its standard input.
-    """
-
-    def watch() -> None:
-        os.read(0, 1)
-        shutil.rmtree(Path(source).parent, ignore_errors=True)
-        os._exit(1)
-
-    threading.Thread(target=watch, daemon=True).start()
+def end_with_starter(source: str) -> None:
+    """End this process, and remove the folder of its file, with the one that started it."""
+    end_with_stdin(lambda: shutil.rmtree(Path(source).parent, ignore_errors=True))
