@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import re
 from concurrent.futures import BrokenExecutor
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from pydantic import ValidationError
 
+FORMULA = ("=", "+", "-", "@", "\t", "\r")  # the beginnings of one in spreadsheet programs
 # Characters that a terminal obeys instead of showing them, or that reverse the text.
 CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]")
 
@@ -41,6 +42,20 @@ def visible(text: str) -> str:
 def one_line(text: str) -> str:
     """The text as `visible` gives it, with line breaks as escapes too."""
     return visible(text).replace("\n", "\\n")
+
+
+def spreadsheet_cell(value: Any) -> Any:
+    """A value of a .csv file; a text that a spreadsheet would take for a formula is quoted.
+
+    Source: OWASP, "CSV Injection".
+    """
+    if not isinstance(value, str) or not value.startswith(FORMULA):
+        return value
+    try:
+        float(value)
+    except ValueError:
+        return f"'{value}"
+    return value
 
 
 def first_wrong_value(error: ValidationError) -> str:

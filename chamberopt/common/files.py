@@ -13,7 +13,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-from chamberopt.common.errors import InputError, OutputTakenError
+from chamberopt.common.errors import InputError, OutputTakenError, spreadsheet_cell
 
 LOCK, WRITING = ".lock", ".writing-"
 LEFTOVER_PREFIXES = (LOCK, WRITING)  # of files that a command that was killed may leave
@@ -187,8 +187,8 @@ def csv_text(rows: Sequence[Mapping[str, Any]]) -> str:
     text = io.StringIO()
     columns = dict.fromkeys(name for row in rows for name in row)
     table = csv.DictWriter(text, list(columns), lineterminator="\n")
-    table.writeheader()
-    table.writerows(rows)
+    table.writerow({name: spreadsheet_cell(name) for name in columns})
+    table.writerows({key: spreadsheet_cell(value) for key, value in row.items()} for row in rows)
     return text.getvalue()
 
 
