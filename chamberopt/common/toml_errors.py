@@ -1,7 +1,8 @@
 """Error messages for TOML files: file, line, field, the value given, what is allowed, a remedy.
 
 All problems of a file are reported at once, the first MOST_PROBLEMS of them in words. Messages
-are made from the pydantic models of the files: a field's bounds, unit and description are stated once, in its model.
+are made from the pydantic models of the files: a field's bounds, unit and description are stated
+once, in its model.
 """
 
 import difflib
