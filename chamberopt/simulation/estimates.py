@@ -26,10 +26,10 @@ from chamberopt.chamber.checks.gaps import MIN_MISSED_SHARE
 from chamberopt.common.estimate import Estimate, estimate, sum_of_shared
 from chamberopt.coverage.compression import compression_estimate
 from chamberopt.coverage.coverage_from_impacts import (
-    Footprints,
+    Prints,
     batches_of,
-    find_footprints,
     in_batches,
+    kept_footprints,
     locate_dents,
 )
 from chamberopt.coverage.coverage_intervals import coverage_estimates
@@ -59,8 +59,8 @@ class SeenDents:
     """The replicas so far: dents in windows of both sizes, and impacts in the windows' sector."""
 
     field: TargetField
-    gauge: list[Footprints]
-    wide: list[Footprints]
+    gauge: list[Prints]
+    wide: list[Prints]
     in_sector: list[Hits]
 
     @classmethod
@@ -74,8 +74,8 @@ class SeenDents:
             in_sector = self.field.in_sector(one)
             dents = locate_dents(self.field, in_sector)
             self.in_sector.append(in_sector)
-            self.gauge.append(find_footprints(self.field, self.field.gauge, dents))
-            self.wide.append(find_footprints(self.field, self.field.wide, dents))
+            self.gauge.append(kept_footprints(self.field, self.field.gauge, dents))
+            self.wide.append(kept_footprints(self.field, self.field.wide, dents))
 
     @property
     def crease_share(self) -> float:
@@ -162,7 +162,7 @@ def _calibrated(
 
 
 def window_estimates(
-    field: TargetField, gauge: Gauge, prints: list[Footprints], design: Design
+    field: TargetField, gauge: Gauge, prints: Sequence[Prints], design: Design
 ) -> tuple[dict[str, Estimate], Resolution]:
     """Metrics of coverage in windows of one size."""
     process = design.process

@@ -22,7 +22,7 @@ from chamberopt.common.errors import InputError
 from chamberopt.common.estimate import Estimate, estimate, paired_difference
 from chamberopt.common.parallel.executor import core_count
 from chamberopt.common.progress import step
-from chamberopt.coverage.coverage_from_impacts import Footprints, find_footprints
+from chamberopt.coverage.coverage_from_impacts import Prints, kept_footprints, locate_dents
 from chamberopt.coverage.field.target_field import TargetField
 from chamberopt.coverage.metrics import parse_objective
 from chamberopt.design.design import Design
@@ -86,7 +86,7 @@ class ConvergenceStudy:
 class TimedReplica(NamedTuple):
     """Dents of one replica, in windows, and CPU seconds."""
 
-    footprints: Footprints
+    footprints: Prints
     cpu_s: float
 
 
@@ -215,7 +215,8 @@ def simulate_timed(setting: ReplicaSetting, target: TargetField, number: int) ->
     """Simulate one replica; of its dents what coverage needs is kept, for hundreds of replicas."""
     begin = time.thread_time()
     replica = simulate_replica(setting, replica_seed(setting.design.process.seed, number))
-    found = find_footprints(target, target.gauge, replica.hits)
+    dents = locate_dents(target, target.in_sector(replica.hits))
+    found = kept_footprints(target, target.gauge, dents)
     return TimedReplica(found, time.thread_time() - begin)
 
 
