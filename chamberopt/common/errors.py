@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from pydantic import ValidationError
 
-FORMULA = ("=", "+", "-", "@", "\t", "\r")  # the beginnings of one in spreadsheet programs
+FORMULA = ("=", "+", "-", "@", "\t", "\n")  # the beginnings of one in spreadsheet programs
 # Characters that a terminal obeys instead of showing them, or that reverse the text.
 CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]")
 
@@ -47,15 +47,21 @@ def one_line(text: str) -> str:
 def spreadsheet_cell(value: Any) -> Any:
     """A value of a .csv file; a text that a spreadsheet would take for a formula is quoted.
 
+    A carriage return becomes a line feed: the csv module leaves it without quotes, and a
+    spreadsheet begins a row after it.
+
     Source: OWASP, "CSV Injection".
     """
-    if not isinstance(value, str) or not value.startswith(FORMULA):
+    if not isinstance(value, str):
         return value
+    text = value.replace("\r\n", "\n").replace("\r", "\n")
+    if not text.startswith(FORMULA):
+        return text
     try:
-        float(value)
+        float(text)
     except ValueError:
-        return f"'{value}"
-    return value
+        return f"'{text}"
+    return text
 
 
 def first_wrong_value(error: ValidationError) -> str:
