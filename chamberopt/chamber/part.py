@@ -322,9 +322,7 @@ def _find_origin(mesh: PartMesh, corners: np.ndarray, source: np.ndarray) -> np.
     return origin
 
 
-def _pose(
-    given: PartMesh, vertices: np.ndarray, design: Design
-) -> tuple[np.ndarray, np.ndarray]:
+def _pose(given: PartMesh, vertices: np.ndarray, design: Design) -> tuple[np.ndarray, np.ndarray]:
     """From the part file's frame to the chamber's: rotation (3, 3), then shift (3,) [m].
 
     Args:

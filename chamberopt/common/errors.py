@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import re
 from concurrent.futures import BrokenExecutor
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from pydantic import ValidationError
 
+FORMULA = ("=", "+", "-", "@", "\t", "\n")  # the beginnings of one in spreadsheet programs
 # Characters that a terminal obeys instead of showing them, or that reverse the text.
 CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]")
 
@@ -45,6 +46,26 @@ def visible(text: str) -> str:
 def one_line(text: str) -> str:
     """The text as `visible` gives it, with line breaks as escapes too."""
     return visible(text).replace("\n", "\\n")
+
+
+def spreadsheet_cell(value: Any) -> Any:
+    """A value of a .csv file; a text that a spreadsheet would take for a formula is quoted.
+
+    A carriage return becomes a line feed: the csv module leaves it without quotes, and a
+    spreadsheet begins a row after it.
+
+    Source: OWASP, "CSV Injection".
+    """
+    if not isinstance(value, str):
+        return value
+    text = value.replace("\r\n", "\n").replace("\r", "\n")
+    if not text.startswith(FORMULA):
+        return text
+    try:
+        float(text)
+    except ValueError:
+        return f"'{text}"
+    return text
 
 
 def first_wrong_value(error: ValidationError) -> str:

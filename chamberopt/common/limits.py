@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 from pathlib import Path
 from typing import Any
@@ -19,6 +20,7 @@ MAX_UNPACKED_BYTES = 1024 * MEBIBYTE  # of a compressed mesh
 MAX_READER_BYTES = 16384 * MEBIBYTE  # of memory, for a library that reads STEP or VTK
 # A result's compressed arrays unpack to some three times their size; more fills memory on purpose.
 MAX_SHRINKAGE, ANY_SHRINKAGE_BYTES = 100, 64 * MEBIBYTE
+MAX_CPU_S = 1e7  # four months, for a library that reads STEP or VTK
 MAX_NUMBER = 1e30  # either way, of any number in a result: squares and cubes of it are finite
 MAX_ELEMENTS = 20_000_000  # points, elements or triangles of a mesh
 MAX_COPIES = 10_000  # of bodies, where a file puts one in several places
@@ -63,6 +65,27 @@ def limit_memory() -> None:
     _, hard = resource.getrlimit(resource.RLIMIT_AS)
     most = MAX_READER_BYTES if hard == resource.RLIM_INFINITY else min(MAX_READER_BYTES, hard)
     resource.setrlimit(resource.RLIMIT_AS, (most, hard))
+
+
+def limit_cpu_time(seconds: float) -> None:
+    """End this process after so much computing time, where the system can do that, with no dump."""
+    try:
+        import resource
+    except ImportError:  # Windows
+        return
+    _, hard = resource.getrlimit(resource.RLIMIT_CPU)
+    most = math.ceil(min(seconds, MAX_CPU_S))
+    resource.setrlimit(resource.RLIMIT_CPU, (min(most, hard) if hard >= 0 else most, hard))
+    resource.setrlimit(resource.RLIMIT_CORE, (0, resource.getrlimit(resource.RLIMIT_CORE)[1]))
+
+
+def raise_cpu_time(seconds: float) -> None:
+    """Allow this process so much more computing time than `limit_cpu_time` did."""
+    try:
+        import resource
+    except ImportError:
+        return
+    limit_cpu_time(resource.getrlimit(resource.RLIMIT_CPU)[0] + seconds)
 
 
 def require_size(path: Path, size: int, most: int, what: str) -> None:

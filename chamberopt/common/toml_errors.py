@@ -1,7 +1,8 @@
 """Error messages for TOML files: file, line, field, the value given, what is allowed, a remedy.
 
-All problems of a file are reported at once. Messages are made from the pydantic models of the
-files: a field's bounds, unit and description are stated once, in its model.
+All problems of a file are reported at once, the first MOST_PROBLEMS of them in words. Messages
+are made from the pydantic models of the files: a field's bounds, unit and description are stated
+once, in its model.
 """
 
 import difflib
@@ -26,6 +27,8 @@ TYPE_NAMES = {
     bool: "true or false",
 }
 SIMILARITY = 0.6  # of two spellings, from 0 to 1 (difflib's ratio): below it a hint would mislead
+MOST_PROBLEMS = 10  # listed in a message
+MAX_NAME_TEXT = 200  # characters of a field's name that a message repeats
 MAX_CHOICES = 8  # listed in a message
 MAX_VALUE_TEXT = 60  # characters of a given value that a message repeats
 
@@ -68,36 +71,50 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
 
 
 def format_problems(problems: Iterable[Problem], path: Path | None = None, source: str = "") -> str:
-    """One line per problem, `file:line: field: text`; `source` is the file's text."""
+    """One line for each of the first problems, `file:line: field: text`, and how many follow.
+
+    Args:
+        source: the file's text.
+    """
     line_of = key_lines(source)
-    texts = []
-    for problem in problems:
+    texts, problems = [], list(problems)
+    for problem in problems[:MOST_PROBLEMS]:
         # The line of the field, or of the innermost table around it that the file has.
         steps = problem.field.split(".")
         names = (".".join(steps[:n]) for n in range(len(steps), 0, -1))
         line = next((line_of[name] for name in names if name in line_of), None)
         place = "" if path is None else f"{path}:{line}: " if line else f"{path}: "
-        texts.append(place + (f"{problem.field}: " if problem.field else "") + problem.text)
+        field = _shortened(problem.field, MAX_NAME_TEXT)
+        texts.append(place + (f"{field}: " if field else "") + problem.text)
+    if (more := len(problems) - MOST_PROBLEMS) > 0:
+        texts.append(f"and {more:,} more; put these right first")
     return "\n".join(texts)
 
 
 def explain_validation_error(error: ValidationError, model: type[BaseModel]) -> list[Problem]:
-    """Pydantic's errors as problems in the words of the file."""
-    problems: list[Problem] = []
-    details = error.errors()
+    """Pydantic's errors as problems in the words of the file.
+
+    Words take time, so that those beyond MOST_PROBLEMS have none: they are counted only.
+    """
+    problems: dict[Problem, None] = {}  # a union reports the same error for each alternative
+    details = error.errors(include_url=False)
     for detail in details:
         loc = detail["loc"]
-        inner = any(one["loc"] != loc and one["loc"][: len(loc)] == loc for one in details)
-        if detail["type"] == "too_short" and inner:
+        if len(problems) > MOST_PROBLEMS:
+            problems[Problem(_dotted(_without_alternative(loc)), "")] = None
+            continue
+        if detail["type"] == "too_short" and any(
+            one["loc"] != loc and one["loc"][: len(loc)] == loc for one in details
+        ):
             continue  # the list is only too short because its wrong items do not count
         cause = detail.get("ctx", {}).get("error")
         if isinstance(cause, CrossCheckError):
             place = _dotted(loc)
             inside = ((".".join(filter(None, (place, p.field))), p.text) for p in cause.problems)
-            problems += [Problem(*one) for one in inside]
+            problems |= dict.fromkeys(Problem(*one) for one in inside)
         else:
-            problems.append(_explain(detail, model))
-    return list(dict.fromkeys(problems))  # a union reports the same error for each alternative
+            problems[_explain(detail, model)] = None
+    return list(problems)
 
 
 def explain_missing_file(path: Path, what: str, pattern: str) -> str:
@@ -258,15 +275,21 @@ def _find_field(
 
 
 def _format_value(value: Any) -> str:
-    text = str(value).lower() if isinstance(value, bool) else repr(value)
-    return text if len(text) <= MAX_VALUE_TEXT else text[: MAX_VALUE_TEXT - 3] + "..."
+    return _shortened(str(value).lower() if isinstance(value, bool) else repr(value))
+
+
+def _shortened(text: str, most: int = MAX_VALUE_TEXT) -> str:
+    return text if len(text) <= most else text[: most - 3] + "..."
+
+
+def _without_alternative(loc: tuple[int | str, ...]) -> tuple[int | str, ...]:
+    """The place of a field, without the alternative of its union that pydantic tried."""
+    return loc[:-1] if loc[-1:] and loc[-1] in ALTERNATIVES else loc
 
 
 def _explain(detail: ErrorDetails, model: type[BaseModel]) -> Problem:
     """One of pydantic's errors in the words of the file."""
-    loc, kind, value = detail["loc"], detail["type"], detail["input"]
-    if loc[-1] in ALTERNATIVES:
-        loc = loc[:-1]
+    loc, kind, value = _without_alternative(detail["loc"]), detail["type"], detail["input"]
     name = _dotted(loc)
     table, field = _find_field(model, loc)
     if kind == "extra_forbidden":
@@ -277,6 +300,11 @@ def _explain(detail: ErrorDetails, model: type[BaseModel]) -> Problem:
         return Problem(name, f"given {_format_value(value)}: {detail['msg']}")
     if kind == "missing":
         return Problem(_dotted(loc[:-1]), f"too short; allowed: {describe_allowed(field)}")
+    if kind == "too_long" and isinstance(value, dict):
+        most = detail["ctx"]["max_length"]
+        return Problem(
+            name, f"has {len(value):,} names, at most {most} are allowed; leave some out"
+        )
     if kind in ("value_error", "assertion_error"):  # raised by a user's own shape
         return Problem(name, detail["msg"].partition(", ")[2])
     text = f"given {_format_value(value)}; allowed: {describe_allowed(field)}"

@@ -18,12 +18,13 @@ on both sides of it, which is exact across the crease.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 
+from chamberopt.common.parallel.memory import MEMORY
 from chamberopt.coverage.field.crease_bands import on_lines
 
 if TYPE_CHECKING:
@@ -37,14 +38,33 @@ ON_CREASE = 1e-6  # m: contacts nearer to a crease than this are on it
 MAX_BATCHES = 40  # of replicas; more would make the intervals no better
 
 
+class Prints(Protocol):
+    """Footprints of the dents of one or more replicas.
+
+    Attributes:
+        area: of all dents on the target [m²].
+        area_on_creases: of those on creases [m²].
+        squares: sum of the squares of their areas [m⁴].
+    """
+
+    @property
+    def area(self) -> float: ...
+    @property
+    def area_on_creases(self) -> float: ...
+    @property
+    def squares(self) -> float: ...
+
+    def pairs(self) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        """Yield points, and the shares of their windows that dents take, in order, (k,) each."""
+        ...
+
+
 class Footprints(NamedTuple):
     """Dents in windows: pairs of a point and the share of its window that a dent takes.
 
     Attributes:
         point, weight: of each pair, shape (k,).
-        area: of all dents on the target [m²].
-        area_on_creases: of those on creases [m²].
-        squares: sum of the squares of their areas [m⁴].
+        area, area_on_creases, squares: as of Prints.
     """
 
     point: np.ndarray
@@ -53,12 +73,43 @@ class Footprints(NamedTuple):
     area_on_creases: float
     squares: float
 
+    def pairs(self) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        yield self.point, self.weight
+
+
+class JoinedFootprints(NamedTuple):
+    """The footprints of several replicas, which are not copied."""
+
+    replicas: tuple[Prints, ...]
+    area: float
+    area_on_creases: float
+    squares: float
+
+    def pairs(self) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        for one in self.replicas:
+            yield from one.pairs()
+
+
+class FoundAgain(NamedTuple):
+    """Footprints of one replica that are found again whenever they are wanted.
+
+    A dent takes 80 bytes, and its pairs, 60 to 340 of them, 12 bytes each.
+    """
+
+    find: Callable[[], Footprints]
+    area: float
+    area_on_creases: float
+    squares: float
+
+    def pairs(self) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        yield from self.find().pairs()
+
 
 class Batch(NamedTuple):
     """Footprints of one or more replicas."""
 
     replicas: int
-    footprints: Footprints
+    footprints: Prints
 
 
 def coverage_from_dent_density(dent_density: np.ndarray) -> np.ndarray:
@@ -73,22 +124,32 @@ def in_batches(replicas: Sequence[T]) -> list[Sequence[T]]:
     return [replicas[a:b] for a, b in pairwise(ends)]
 
 
-def joined(replicas: Sequence[Footprints]) -> Footprints:
+def joined(replicas: Sequence[Prints]) -> Prints:
     """The footprints of several replicas together."""
     if len(replicas) == 1:
         return replicas[0]
-    return Footprints(
-        np.concatenate([one.point for one in replicas]),
-        np.concatenate([one.weight for one in replicas]),
+    return JoinedFootprints(
+        tuple(replicas),
         sum(one.area for one in replicas),
         sum(one.area_on_creases for one in replicas),
         sum(one.squares for one in replicas),
     )
 
 
-def batches_of(replicas: Sequence[Footprints]) -> list[Batch]:
+def batches_of(replicas: Sequence[Prints]) -> list[Batch]:
     """The footprints of replicas in batches."""
     return [Batch(len(part), joined(part)) for part in in_batches(replicas)]
+
+
+def kept_footprints(field: TargetField, gauge: Gauge, dents: LocatedDents) -> Prints:
+    """The footprints of one replica, kept as long as there is memory for them.
+
+    Otherwise they are found again when they are wanted, which gives the same ones.
+    """
+    found = find_footprints(field, gauge, dents)
+    if MEMORY.keeps(found.point, found.weight):
+        return found
+    return FoundAgain(lambda: find_footprints(field, gauge, dents), *found[2:])
 
 
 class LocatedDents(NamedTuple):

@@ -76,7 +76,8 @@ def multiply_dents(batches: Sequence[Batch], points: int, ratios: Sequence[float
     scales = np.concatenate([wanted / total, *(wanted / max(total - one, 1) for one in sizes)])
     products = np.ones((len(batches), points, len(scales)))
     for product, one in zip(products, batches, strict=True):
-        multiply_products(product, one.footprints.point, one.footprints.weight, scales)
+        for point, weight in one.footprints.pairs():
+            multiply_products(product, point, weight, scales)
     of_rest = np.empty((len(batches), count))
     for number, one_size in enumerate(sizes, start=1):
         part = products[:, :, number * count : (number + 1) * count]

@@ -80,7 +80,8 @@ def sum_dents(batches: Sequence[Batch], points: int) -> DentSums:
 
     sums = np.zeros((len(batches), points, 3))
     for of_batch, one in zip(sums, batches, strict=True):
-        add_powers(one.footprints.point, one.footprints.weight, of_batch)
+        for point, weight in one.footprints.pairs():
+            add_powers(point, weight, of_batch)
     number, share, _ = np.ascontiguousarray(np.moveaxis(sums, 2, 0))
     return DentSums(np.array([one.replicas for one in batches]), share, number.sum(axis=0))
 

@@ -37,7 +37,7 @@ from chamberopt.design.shapes.custom import RecordedShape, load_custom_shape
 from chamberopt.design.shapes.imported import IMPORTED, Imported
 from chamberopt.design.shot import ShotTable
 from chamberopt.design.sonotrode import FurtherSonotrode, Sonotrode
-from chamberopt.design.table_base import STRICT, FileTable
+from chamberopt.design.table_base import MAX_NAMES, STRICT, FileTable
 
 # Each further sonotrode has a tag below 255 and needs a cut through all walls that come before it.
 MAX_SONOTRODES = 50
@@ -68,6 +68,7 @@ class Design(FileTable):
     calibration: CalibrationField = None
     tolerances: dict[str, Tolerance] | None = Field(
         default=None,
+        max_length=MAX_NAMES,
         description="how far numbers of the design may lie off in production, by dotted name",
         json_schema_extra={"form": f"NAME = {TOLERANCE_FORM}"},
     )

@@ -33,6 +33,8 @@ STRICT = ConfigDict(
     frozen=True, extra="forbid", strict=True, allow_inf_nan=False, ignored_types=(SI, Metres)
 )
 
+MAX_NAMES = 500  # of numbers or metrics in one table: no design has as many
+
 
 class FileTable(BaseModel):
     """A frozen table without unknown keys, whose values are also checked against each other."""

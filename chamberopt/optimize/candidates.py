@@ -82,6 +82,7 @@ class Candidates:
         simulator: Simulator,
         progress: Progress | None = None,
         stop: Stop | None = None,
+        at_once: int | None = None,
     ) -> None:
         self._study, self._folder = study, folder
         self._progress, self._stop = progress, stop
@@ -92,7 +93,9 @@ class Candidates:
         self._points: list[np.ndarray] = []  # of the search, those that run included
         self._running: deque[_Running] = deque()
         self._confirmations: dict[int, Evaluation] = {}  # by number, until they are asked for
-        self._threads = ThreadPoolExecutor(study.optimizer.batch, "candidate")
+        # With fewer threads than a batch has candidates, some of them wait: figures are the same.
+        batch = study.optimizer.batch
+        self._threads = ThreadPoolExecutor(min(batch, at_once or batch), "candidate")
         self._last_end = 0.0  # of an evaluation, by the clock
 
     def __enter__(self) -> Self:

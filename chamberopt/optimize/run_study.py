@@ -104,6 +104,7 @@ def run_study(
     progress: Progress | None = None,
     simulator: Simulator | None = None,
     stop: Stop | None = None,
+    at_once: int | None = None,
 ) -> StudyResult:
     """Search for a better design within the budget, then confirm the best and the start.
 
@@ -119,6 +120,7 @@ def run_study(
         progress: called as progress(done, total, best) after each evaluation.
         simulator: replaces the simulation, e.g. in tests.
         stop: called before each evaluation; the study stops with KeyboardInterrupt if it is True.
+        at_once: evaluations for which there is memory, by default all of optimizer.batch.
     Raises:
         InputError: the start cannot be simulated, or no candidate meets the constraints.
         OSError: a trial cannot be written.
@@ -131,7 +133,7 @@ def run_study(
     if study.objective.pareto and settings.algorithm == "auto" and not settings.phases:
         settings = settings.model_copy(update={"phases": PARETO_PHASES})
     # The model's threads are limited during all evaluations: a limit is one of the whole process.
-    with one_thread(), Candidates(study, folder, simulator, progress, stop) as candidates:
+    with one_thread(), Candidates(study, folder, simulator, progress, stop, at_once) as candidates:
         search = candidates.begin, candidates.start, settings, candidates.observations
         space = candidates.space
         first = [space.domain.snap(space.point_of(one)[None])[0] for one in study.begin_with]

@@ -27,10 +27,10 @@ from chamberopt.common.estimate import Estimate, estimate, shared_half_width, su
 from chamberopt.common.number_text import share_in_words
 from chamberopt.coverage.compression import compression_estimate
 from chamberopt.coverage.coverage_from_impacts import (
-    Footprints,
+    Prints,
     batches_of,
-    find_footprints,
     in_batches,
+    kept_footprints,
     locate_dents,
 )
 from chamberopt.coverage.coverage_intervals import coverage_estimates
@@ -64,8 +64,8 @@ class SeenDents:
     """The replicas so far: dents in windows of both sizes, and impacts in the windows' sector."""
 
     field: TargetField
-    gauge: list[Footprints]
-    wide: list[Footprints]
+    gauge: list[Prints]
+    wide: list[Prints]
     in_sector: list[Hits]
 
     @classmethod
@@ -79,8 +79,8 @@ class SeenDents:
             in_sector = self.field.in_sector(one)
             dents = locate_dents(self.field, in_sector)
             self.in_sector.append(in_sector)
-            self.gauge.append(find_footprints(self.field, self.field.gauge, dents))
-            self.wide.append(find_footprints(self.field, self.field.wide, dents))
+            self.gauge.append(kept_footprints(self.field, self.field.gauge, dents))
+            self.wide.append(kept_footprints(self.field, self.field.wide, dents))
 
     @property
     def crease_share(self) -> float:
@@ -167,7 +167,7 @@ def _calibrated(
 
 
 def window_estimates(
-    field: TargetField, gauge: Gauge, prints: list[Footprints], design: Design
+    field: TargetField, gauge: Gauge, prints: Sequence[Prints], design: Design
 ) -> tuple[dict[str, Estimate], Resolution]:
     """Metrics of coverage in windows of one size."""
     process = design.process
@@ -185,7 +185,7 @@ def window_estimates(
     return found, find_resolution(batches, sums, gauge, time_ratio, process.recorded_time)
 
 
-def least_half_width(reach: Reach, prints: Sequence[Footprints]) -> float:
+def least_half_width(reach: Reach, prints: Sequence[Prints]) -> float:
     """Half-width than which no share of the target is known better.
 
     Points tell no better what is in reach, and dents, by the rule of three, what none of them hit.

@@ -100,6 +100,13 @@ def _result(number: int, future: Future[T]) -> T:
         raise WorkerLostError(f"replica {number}: {error}") from None
 
 
+def most_replicas(design: Design) -> int:
+    """The largest number of replicas that the design's accuracy may ask for."""
+    accuracy = design.process.accuracy
+    wanted = accuracy.objective_half_width is not None
+    return accuracy.max_replicas if wanted else accuracy.replicas
+
+
 def next_replica_count(done: int, half_width: float, wanted: float, maximum: int) -> int:
     """Number of replicas at which the interval is looked at again, predicted from its width.
 

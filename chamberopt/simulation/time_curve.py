@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from chamberopt.common.estimate import FIRST_OF_CALIBRATION, shared_half_width
-from chamberopt.coverage.coverage_from_impacts import batches_of, find_footprints
+from chamberopt.coverage.coverage_from_impacts import batches_of, kept_footprints, locate_dents
 from chamberopt.coverage.coverage_intervals import (
     Products,
     mean_and_variance_estimates,
@@ -51,7 +51,8 @@ def coverage_against_time(
     end = min(end, treatment * found.dents / found.needed_for_mean)
     times = sorted({*(end * np.arange(1, TIMES + 1) / TIMES).tolist(), min(treatment, end)})
     gauge = field.gauge_round(field.some_points(POINTS), field.radius)
-    prints = [find_footprints(field, gauge, hits) for hits in evaluation.hits]
+    located = [locate_dents(field, field.in_sector(hits)) for hits in evaluation.hits]
+    prints = [kept_footprints(field, gauge, dents) for dents in located]
     batches = batches_of(prints)
     ratios = [time / design.process.recorded_time for time in times]
     of_all, of_rest = multiply_dents(

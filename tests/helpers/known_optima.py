@@ -20,7 +20,9 @@ def bowl_shares(design) -> np.ndarray:
     return (np.array([design.value(name) for name in VARY]) - low) / (high - low)
 
 
-def run_bowl(folder: Path, simulator, optimizer: dict | None = None, design=GEAR, **tables):
+def run_bowl(
+    folder: Path, simulator, optimizer: dict | None = None, design=GEAR, at_once=None, **tables
+):
     settings = {
         "evaluations": 16,
         "confirm": 2,
@@ -34,6 +36,7 @@ def run_bowl(folder: Path, simulator, optimizer: dict | None = None, design=GEAR
         SerialExecutor(),
         None,
         simulator,
+        at_once=at_once,
     )
 
 

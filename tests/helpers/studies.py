@@ -10,10 +10,11 @@ from chamberopt.optimize.study import Study
 
 
 def run_in_folder(
-    study: Study, path: Path, executor=None, progress=None, simulator=None, stop=None
+    study: Study, path: Path, executor=None, progress=None, simulator=None, stop=None, at_once=None
 ) -> StudyResult:
     with open_study_folder(study, path) as folder:
-        return run_study(study, folder, executor or SerialExecutor(), progress, simulator, stop)
+        executor = executor or SerialExecutor()
+        return run_study(study, folder, executor, progress, simulator, stop, at_once)
 
 
 def sweep_in_folder(

@@ -127,7 +127,7 @@ def fault(outcome: Outcome, allowed: Sequence[int] = (0, 2)) -> str | None:
         return f"exit status {outcome.status}"
     if outcome.status and not outcome.errors.strip():
         return "refused without a message"
-    if len(outcome.errors) > 20_000:
+    if len(outcome.errors) > 20_000 or outcome.errors.count("\n") > 40:
         return "a message that nobody reads to its end"
     if CONTROL.intersection(text):
         return "a control character on the terminal"

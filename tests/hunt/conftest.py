@@ -1,5 +1,6 @@
 """The process that commands of the hunt are forked from."""
 
+import os
 from collections.abc import Iterator
 
 import pytest
@@ -9,5 +10,6 @@ from tests.hunt.command import Server
 
 @pytest.fixture(scope="module")
 def server() -> Iterator[Server]:
+    os.environ.setdefault("CHAMBEROPT_READER_S", "8")  # hunts wait for no damaged file to end
     with Server() as one:
         yield one

@@ -16,6 +16,7 @@ import trimesh
 from tests.chamberopt.geometry.mesh_io.test_formats import intact_files
 from tests.helpers.mesh_files import CORNERS, QUADS, SIDES, write_ascii_stl, write_stl
 
+ROOT = Path(__file__).parents[2]
 HUGE = (0, -1, 1, 10**9, 2**31 - 1, 2**32 - 1, 2**40, 10**12, 2**63 - 1, 2**64 - 1, 10**30)
 NUMBER = re.compile(rb"(?<![\w.])-?\d+(?:\.\d*)?(?:[eE][-+]?\d+)?")
 WORDS = (b"nan", b"inf", b"-inf", b"1e308", b"1e999", b"-0", b"0x10", b"\xff\xfe", b"'", b'"', b"")
@@ -90,6 +91,25 @@ def _altered_archive(rng: random.Random, whole: bytes) -> bytes:
             content = old.read(name)
             new.writestr(name, _altered(rng, content) if name.endswith("model") else content)
     return packed.getvalue()
+
+
+def write_damaged_step(rng: random.Random, folder: Path, base: Path) -> list[str]:
+    """Write a design whose part is a STEP file with odd numbers, and without some entities."""
+    lines = (ROOT / "designs/parts/fir_tree.step").read_text().splitlines(keepends=True)
+    for _ in range(rng.choice((1, 1, 2, 4))):
+        at = rng.randrange(len(lines))
+        numbers = list(re.finditer(r"-?\d+\.\d*(E-?\d+)?", lines[at]))
+        if numbers:
+            one = rng.choice(numbers)
+            word = rng.choice(("1.E12", "-1.E12", "0.", "1.E-12", "1.E300", "-1."))
+            lines[at] = lines[at][: one.start()] + word + lines[at][one.end() :]
+        elif lines[at].startswith("#"):
+            del lines[at]
+    (folder / "part.step").write_text("".join(lines))
+    design = (base / "design.toml").read_text().replace('"box.stl"', '"part.step"')
+    text = re.sub(r"(?ms)^\[part.target\].*?(?=^\[)", "", design).replace('unit = "mm"\n', "")
+    (folder / "design.toml").write_text(text)
+    return ["check", "design.toml"]
 
 
 def write_wrong_mesh(rng: random.Random, folder: Path, base: Path) -> list[str]:

@@ -7,6 +7,7 @@ refuses them is not the digest but what is known of a result's values.
 from __future__ import annotations
 
 import base64
+import csv
 import io
 import json
 import random
@@ -19,6 +20,7 @@ from typing import Any
 
 import numpy as np
 
+from chamberopt.common.errors import FORMULA
 from chamberopt.output.results.load import content_sha256
 from chamberopt.output.results.write import data_digests
 from tests.hunt.meshes import HUGE
@@ -38,6 +40,8 @@ SIMULATE_AGAIN = (
     ["dents", "{}", "d.png"], ["replay", "{}", "r.gif"], ["export", "{}", "--to", "impacts-csv"],
     ["export", "{}", "--to", "fields-abaqus"], ["export", "{}", "--to", "chamber-3mf"],
 )  # fmt: skip
+FORMULAS = ("=1+1", "=cmd|' /C calc'!A0", "+1+1", "-2+3", "@SUM(A1)", "\t=1", "\r=1", '="a"')
+NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?$|[-+]inf$")
 RESUME = ["run", "study.toml", "--out", "study"]
 
 
@@ -173,6 +177,39 @@ def _forge(rng: random.Random, folder: Path) -> None:
     if isinstance(data.get("files"), dict):
         data["files"] |= data_digests(folder)
     main.write_text(json.dumps({**data, "sha256": content_sha256(data)}))
+
+
+def write_formulas(rng: random.Random, folder: Path, base: Path) -> list[str]:
+    """Put formulas for spreadsheets into names and texts of a study's history, and export it."""
+    for name in ("study", "sweep"):
+        shutil.copytree(base / name, folder / name)
+    chosen = rng.choice(("study", "sweep"))
+    history = folder / chosen / "history.jsonl"
+    rows = [json.loads(line) for line in history.read_text().splitlines()]
+    for row in rows:
+        texts = [(table, key) for table, key in _values(row) if isinstance(table[key], str)]
+        for table, key in rng.sample(texts, min(len(texts), rng.randrange(1, 4))):
+            table[key] = rng.choice(FORMULAS)
+        if rng.random() < 0.5:
+            row["reason"] = rng.choice(FORMULAS)
+        if rng.random() < 0.3:
+            row["parameters"] = {rng.choice(FORMULAS): 1.0, **row["parameters"]}
+    history.write_text("".join(json.dumps(row) + "\n" for row in rows))
+    main = folder / chosen / "result.json"
+    data = json.loads(main.read_text())
+    data["files"] |= data_digests(folder / chosen)
+    main.write_text(json.dumps({**data, "sha256": content_sha256(data)}))
+    return ["export", chosen, "--to", "study-csv", "--out", "table.csv"]
+
+
+def formula_cells(folder: Path) -> list[str]:
+    """Cells of the tables in a folder that a spreadsheet would take for formulas."""
+    found = []
+    for path in folder.glob("*.csv"):
+        with path.open(newline="") as file:
+            cells = [cell for row in csv.reader(file) for cell in row]
+        found += [cell for cell in cells if cell.startswith(FORMULA) and not NUMBER.match(cell)]
+    return found
 
 
 def write_altered_results(rng: random.Random, folder: Path, base: Path) -> list[str]:

@@ -23,11 +23,16 @@ DRAW: dict[str, Callable[[random.Random, Path, Path], list[str]]] = {
     "mesh": meshes.write_wrong_mesh,
     "arguments": arguments.draw_arguments,
     "results": results.write_altered_results,
+    "formulas": results.write_formulas,
+    "many": toml_files.write_many_keys,
+    "step": meshes.write_damaged_step,
 }
-FEW = {"toml": 40, "mesh": 20, "arguments": 8, "results": 4}
+FEW = {"toml": 40, "mesh": 20, "arguments": 8, "results": 4, "formulas": 4, "many": 6, "step": 4}
 # Seeds whose commands end within seconds, for the program that a user starts.
-STARTED = {"toml": (0, 1, 2), "mesh": (1, 4, 10), "arguments": (1, 4, 7), "results": (3, 6, 8)}
-MANY = {"toml": 5_000, "mesh": 3_000, "arguments": 1_000, "results": 1_000}
+STARTED = {"toml": (0, 1, 2), "mesh": (1, 4, 10), "arguments": (1, 4, 7), "results": (3, 6, 8),
+           "formulas": (0,), "many": (0, 1), "step": (0,)}  # fmt: skip
+MANY = {"toml": 5_000, "mesh": 3_000, "arguments": 1_000, "results": 1_000, "formulas": 300,
+        "many": 300, "step": 500}  # fmt: skip
 CHUNK = 100
 LONG = [(kind, at) for kind, count in MANY.items() for at in range(0, count, CHUNK)]
 REPLACED = "report.html"  # a command replaces its own older page
@@ -56,7 +61,7 @@ def complaint(
     words = DRAW[kind](random.Random(f"{kind}{seed}"), folder, base)
     before = fingerprint(folder)
     outcome = server.run(folder, words)
-    after = fingerprint(folder)
+    after, formulas = fingerprint(folder), results.formula_cells(folder)
     shutil.rmtree(folder)
     why = fault(outcome)
     changed = [name for name in before if after.get(name) != before[name]]
@@ -64,6 +69,8 @@ def complaint(
         changed = [name for name in changed if not name.startswith("study/")]
     if not why and any(not name.endswith(REPLACED) for name in changed):
         why = f"it changed {changed}"
+    if not why and formulas:
+        why = f"its table has the formulas {formulas}"
     made = sorted(after.keys() - before.keys() - {"results"})  # made before it is looked into
     if not why and outcome.status and made:
         why = f"it was refused and left {made}"

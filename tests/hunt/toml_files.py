@@ -143,3 +143,29 @@ def write_wrong_files(rng: random.Random, folder: Path, base: Path) -> list[str]
     if opened == "study.toml" and rng.random() < 0.2:
         words = ["sweep", "--grid", "0"]  # refused after the study was read, or before
     return [*words, opened]
+
+
+def write_many_keys(rng: random.Random, folder: Path, base: Path) -> list[str]:
+    """Write a design and a study with thousands of wrong keys, names or rows in one place."""
+    count = rng.choice((20, 500, 5_000, 20_000))
+    for name in ("box.stl", "design.toml", "study.toml"):
+        shutil.copy(base / name, folder / name)
+    keys = "".join(f"k{k} = {rng.choice((1, 'true'))}\n" for k in range(count))
+    names = "".join(f'"shot.m{k}" = [1, 2]\n' for k in range(count))
+    rows = "".join(f"[[zones]]\nname = {k}\n" for k in range(count))
+    file, text = rng.choice(
+        (
+            ("design.toml", f"\n[tolerances]\n{names}"),
+            ("design.toml", f"\n{rows}"),
+            ("design.toml", f"\n{keys}"),
+            ("design.toml", f"\n{'k' * 10 * count} = 1\n"),
+            ("study.toml", f"\n{keys}"),
+            ("study.toml", f"\n[begin_with]\n{keys}"),
+        )
+    )
+    with (folder / file).open("a") as opened:
+        opened.write(text)
+    if rng.random() < 0.2:
+        study = (folder / "study.toml").read_text()
+        (folder / "study.toml").write_text(study.replace("[vary]\n", f"[vary]\n{names}"))
+    return ["check", rng.choice(("design.toml", "study.toml"))]

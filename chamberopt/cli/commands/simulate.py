@@ -37,10 +37,12 @@ def simulate(
     from chamberopt.chamber.build import build_chamber
     from chamberopt.common.parallel.executor import open_executor
     from chamberopt.common.progress import step
+    from chamberopt.coverage.field.memory import PROCESS, evaluation_bytes, how_many_fit
     from chamberopt.design.load import load_design
     from chamberopt.output.save_run import save_simulation
     from chamberopt.simulation.peening.calibration_errors import evaluate_calibrated
     from chamberopt.simulation.peening.tolerances import plan_tolerances, simulate_tolerances
+    from chamberopt.simulation.replicas import most_replicas
 
     candidate = load_design(design)
     if tolerances:
@@ -54,6 +56,7 @@ def simulate(
         with step("building the chamber"):
             chamber = build_chamber(candidate)
             cavity = analytic_cavity(candidate, chamber) if analytic else None
+            how_many_fit(1, evaluation_bytes(candidate, chamber, most_replicas(candidate)), PROCESS)
             warnings = console.print_warnings(candidate, chamber)
         candidate, advice = resolve_effects(candidate, chamber, executor)
         compile_with_message(candidate, chamber, cavity)

@@ -14,7 +14,7 @@ from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from chamberopt.common.errors import InputError
+from chamberopt.common.errors import InputError, spreadsheet_cell
 from chamberopt.common.files.opened import OpenFolder, require_plain, require_plain_folder
 
 LOCK, WRITING = ".lock", ".writing-"
@@ -180,6 +180,6 @@ def csv_text(rows: Sequence[Mapping[str, Any]]) -> str:
     text = io.StringIO()
     columns = dict.fromkeys(name for row in rows for name in row)
     table = csv.DictWriter(text, list(columns), lineterminator="\n")
-    table.writeheader()
-    table.writerows(rows)
+    table.writerow({name: spreadsheet_cell(name) for name in columns})
+    table.writerows({key: spreadsheet_cell(value) for key, value in row.items()} for row in rows)
     return text.getvalue()

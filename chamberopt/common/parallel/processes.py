@@ -22,6 +22,8 @@ from multiprocessing import get_context
 from typing import TYPE_CHECKING, Any
 
 from chamberopt.common.errors import WorkerLostError
+from chamberopt.common.parallel.lifetime import end_with_parent
+from chamberopt.common.parallel.memory import MEMORY
 
 if TYPE_CHECKING:
     from multiprocessing.connection import Connection
@@ -67,7 +69,7 @@ class ProcessExecutor(Executor):
         self._feeders = ThreadPoolExecutor(workers, thread_name_prefix="worker")
         self._of_thread = threading.local()
         self._workers: list[_Worker] = []
-        self._ended = False
+        self._ended, self._count = False, workers
 
     def share(self, value: Any) -> SharedFile:
         return SharedFile(value)
@@ -101,7 +103,7 @@ class ProcessExecutor(Executor):
                 break
             worker = getattr(self._of_thread, "worker", None)
             if worker is None:
-                worker = self._of_thread.worker = _Worker()
+                worker = self._of_thread.worker = _Worker(self._count)
                 self._workers.append(worker)
             try:
                 answer = worker.run(task)
@@ -127,11 +129,11 @@ class ProcessExecutor(Executor):
 class _Worker:
     """A process and the pipe to it."""
 
-    def __init__(self) -> None:
+    def __init__(self, count: int) -> None:
         context = get_context("spawn")
         self._pipe, worker_end = context.Pipe()
-        # Daemon processes end with this program, even if it is killed.
-        self.process = context.Process(target=_serve, args=(worker_end,), daemon=True)
+        # Daemon processes end with this program; `_serve` sees to it where it is killed.
+        self.process = context.Process(target=_serve, args=(worker_end, count), daemon=True)
         self.process.start()
         worker_end.close()
 
@@ -147,10 +149,12 @@ class _Worker:
         return self.process.exitcode
 
 
-def _serve(pipe: Connection) -> None:
-    """Run tasks in a worker process until the other end of the pipe closes."""
+def _serve(pipe: Connection, count: int) -> None:
+    """Run tasks in one of so many worker processes until the other end of the pipe closes."""
     # A terminal sends Ctrl-C to all of its processes. Only the main program reacts to it.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    end_with_parent()
+    MEMORY.processes = count
     with suppress(EOFError, OSError):
         while True:
             pipe.send_bytes(_answer(pipe.recv_bytes()))

@@ -21,7 +21,7 @@ from chamberopt.coverage.metrics import (
 )
 from chamberopt.design.design import SHAPE, Design
 from chamberopt.design.load import load_design
-from chamberopt.design.table_base import FileTable
+from chamberopt.design.table_base import MAX_NAMES, FileTable
 from chamberopt.optimize.study.constraints import Limits, limit_problems, zone_constraints
 from chamberopt.optimize.study.parameters import (
     NONE,
@@ -187,12 +187,14 @@ class Study(FileTable):
     design: Design = Field(description="design that the search starts from")
     vary: dict[str, Vary] = Field(
         min_length=1,
+        max_length=MAX_NAMES,
         description='e.g. "chamber.height_mm" = [35, 60]',
         json_schema_extra={"form": "[low, high], { low =, high =, step = } or { choose = [...] }"},
     )
     objective: Objective = Field(default_factory=Objective)
     constraints: dict[str, Limits] = Field(
         default_factory=dict,
+        max_length=MAX_NAMES,
         description="METRIC = { min =, max = }, or a number of the design in quotes",
     )
     optimizer: Optimizer = Field(default_factory=Optimizer)

@@ -48,7 +48,7 @@ class Acts:
     def close(self) -> None:
         self._checker.stop()
         if self._command is not None:
-            self._command.stop()
+            self._command.end()
 
     def read(self, _: Any) -> dict[str, Any]:
         """The file as it is now, for a page that begins or begins again."""

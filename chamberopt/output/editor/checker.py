@@ -11,6 +11,7 @@ from threading import Lock
 from typing import Any
 
 from chamberopt.common.errors import InputError
+from chamberopt.common.parallel.lifetime import end_with_parent
 
 STEP = 0.05  # s between looks at whether an answer is still wanted
 ENDED = "the check's process ended (killed from outside, or out of memory)"
@@ -130,6 +131,7 @@ def _serve(path: Path, text: str, pipe: Connection) -> None:
     from sim_core import SceneError
 
     signal(SIGINT, SIG_IGN)  # Ctrl-C ends the server, which ends this
+    end_with_parent()
     if hasattr(os, "nice"):
         os.nice(10)  # the page's own answers come first
     with suppress(InputError, SceneError):

@@ -42,6 +42,7 @@ NONSENSE = (
     OSError,
 )
 MOST_BYTES = 2_000_000  # of a question
+TOO_LONG = f"this question has more than {1e-6 * MOST_BYTES:g} MB; ask for less at a time"
 
 
 def make_app(acts: Acts, port: int) -> OnePerson:
@@ -52,9 +53,9 @@ def make_app(acts: Acts, port: int) -> OnePerson:
 
         async def answer(request: Request) -> Response:
             try:
-                if int(request.headers.get("content-length", 0)) > MOST_BYTES:
-                    raise InputError("this question is too long")
-                body = await request.body() if method == "POST" else b"{}"
+                body = await _body(request) if method == "POST" else b"{}"
+                if body is None:
+                    return JSONResponse({"error": TOO_LONG}, 413, {"Connection": "close"})
                 found = await run_in_threadpool(act, json.loads(body or b"{}"))
             except SupersededError:
                 return JSONResponse({"superseded": True})
@@ -91,6 +92,18 @@ def make_app(acts: Acts, port: int) -> OnePerson:
         Mount("/own", StaticFiles(directory=OWN)),
     ]
     return OnePerson(Starlette(routes=routes), port)
+
+
+async def _body(request: Request) -> bytes | None:
+    """The body of a request; None as soon as it is, or says that it will be, too long."""
+    if int(request.headers.get("content-length", 0)) > MOST_BYTES:
+        return None
+    body = bytearray()
+    async for part in request.stream():
+        body += part
+        if len(body) > MOST_BYTES:
+            return None
+    return bytes(body)
 
 
 def serve(path: Path, port: int, trusted: bool, tell: Callable[[str], None]) -> None:

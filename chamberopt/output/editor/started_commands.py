@@ -1,8 +1,13 @@
-"""Commands that the page starts: the same as those of the command line, in processes of theirs."""
+"""Commands that the page starts: the same as those of the command line, in processes of theirs.
+
+Each has a pipe from the server as its standard input, and ends when that is closed: with the
+server, however the server ends.
+"""
 
 from __future__ import annotations
 
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -11,7 +16,13 @@ from pathlib import Path
 from threading import Thread
 from typing import Any
 
+from chamberopt.common.parallel.lifetime import GRACE_S
+
 MOST_LINES = 200  # of a command's remarks that the page shows
+BEGIN = (
+    "import sys; from chamberopt.common.parallel.lifetime import interrupt_with_stdin; "
+    "interrupt_with_stdin(); from chamberopt.cli import main; sys.exit(main())"
+)
 
 
 class StartedCommand:
@@ -22,10 +33,10 @@ class StartedCommand:
         self._lines: list[str] = []
         self._steps: dict[str, dict[str, Any]] = {}
         self._process = subprocess.Popen(
-            [sys.executable, "-m", "chamberopt", *arguments, "--progress", "jsonl"],
+            [sys.executable, "-c", BEGIN, *arguments, "--progress", "jsonl"],
             cwd=folder,
             start_new_session=True,  # Ctrl-C is for the server, which tells it once
-            stdin=subprocess.DEVNULL,
+            stdin=subprocess.PIPE,  # it is closed when this process ends, however it ends
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             text=True,
@@ -50,7 +61,24 @@ class StartedCommand:
     def stop(self) -> None:
         """As Ctrl-C: what was done is kept where the command keeps it."""
         if self._process.poll() is None:
-            self._process.send_signal(signal.SIGINT)
+            if os.name == "posix":
+                self._process.send_signal(signal.SIGINT)
+            else:
+                self._close_pipe()
+
+    def end(self) -> None:
+        """End the command and all that it started, within seconds; what is on the disk stays."""
+        self._close_pipe()
+        try:
+            self._process.wait(2.0 * GRACE_S)
+        except subprocess.TimeoutExpired:
+            if os.name == "posix":
+                os.killpg(self._process.pid, signal.SIGKILL)
+            self._process.kill()
+
+    def _close_pipe(self) -> None:
+        if self._process.stdin is not None:
+            self._process.stdin.close()
 
     def _read(self) -> None:
         for line in self._process.stdout or ():

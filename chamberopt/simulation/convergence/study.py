@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -22,7 +22,8 @@ from chamberopt.common.errors import InputError
 from chamberopt.common.estimate import Estimate, estimate, paired_difference
 from chamberopt.common.parallel.executor import core_count
 from chamberopt.common.progress import step
-from chamberopt.coverage.coverage_from_impacts import Footprints, find_footprints
+from chamberopt.coverage.coverage_from_impacts import Prints, kept_footprints, locate_dents
+from chamberopt.coverage.field.memory import OF_POINT, PROCESS, evaluation_bytes, how_many_fit
 from chamberopt.coverage.field.target_field import TargetField
 from chamberopt.coverage.metrics import parse_objective
 from chamberopt.design.design import Design
@@ -39,7 +40,8 @@ if TYPE_CHECKING:
     from sim_core import TriangleMesh
 
 MIN_ROUNDS = 3  # a run needs three replicas for an interval
-MIN_REPLICAS, MAX_REPLICAS = 32, 1024  # of the reference: two batch sizes; a few hundred MB
+MIN_REPLICAS, MAX_REPLICAS = 32, 1024  # of the reference: two batch sizes
+LIKELY_REPLICAS = 256  # of all settings together, whose dents are kept
 MIN_BATCHES = 4  # of one size
 ZERO_ERROR = 1e-12  # of a share of area: rounding
 ZERO = Estimate(0.0, 0.0)
@@ -86,7 +88,7 @@ class ConvergenceStudy:
 class TimedReplica(NamedTuple):
     """Dents of one replica, in windows, and CPU seconds."""
 
-    footprints: Footprints
+    footprints: Prints
     cpu_s: float
 
 
@@ -166,6 +168,8 @@ def run_convergence_study(
                 first = next(iter(chambers.values()), None)
                 chamber = build_chamber(one, first and first[0].part.target)
                 chambers[one.chamber] = chamber, chamber_mesh(chamber)
+            if not replicas:
+                require_memory(designs.values(), chambers[one.chamber][0])
             setting = ReplicaSetting(one, *chambers[one.chamber])
             replicas[key] = Replicas(setting, prepare_target(one, *chambers[one.chamber]))
             prepare(one, replicas[key].setting.chamber)
@@ -196,6 +200,14 @@ def run_convergence_study(
     )
 
 
+def require_memory(designs: Collection[Design], chamber: Chamber) -> None:
+    """Raise InputError if the fields of all designs, and the reference's replicas, do not fit."""
+    reference = next(iter(designs))
+    points = sum(one.process.accuracy.points for one in designs)
+    each = evaluation_bytes(reference, chamber, LIKELY_REPLICAS)
+    how_many_fit(1, each, PROCESS + OF_POINT * points)
+
+
 def _add_replicas(designs: Sequence[Replicas], executor: Executor) -> float:
     """Simulate one more replica of each design for each time that it is listed; CPU seconds."""
     futures = []
@@ -215,7 +227,8 @@ def simulate_timed(setting: ReplicaSetting, target: TargetField, number: int) ->
     """Simulate one replica; of its dents what coverage needs is kept, for hundreds of replicas."""
     begin = time.thread_time()
     replica = simulate_replica(setting, replica_seed(setting.design.process.seed, number))
-    found = find_footprints(target, target.gauge, replica.hits)
+    dents = locate_dents(target, target.in_sector(replica.hits))
+    found = kept_footprints(target, target.gauge, dents)
     return TimedReplica(found, time.thread_time() - begin)
 
 

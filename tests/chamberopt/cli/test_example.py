@@ -1,8 +1,10 @@
 """Without a clone: a built wheel holds the shipped examples, and its commands work with them."""
 
 import os
+import shutil
 import subprocess
 import sys
+import tarfile
 import venv
 import zipfile
 from pathlib import Path
@@ -16,13 +18,51 @@ ROOT = Path(__file__).resolve().parents[3]
 NAMES = ("gear", "plate", "blade")
 
 
+PLANTED = (
+    "designs/.env", "designs/results/x/result.json", "designs/notes.txt", "designs/mine.toml",
+    "designs/parts/mine.stl", "designs/__pycache__/a.pyc", "studies/results/x", "studies/mine.toml",
+    "chamberopt/.env", "chamberopt/notes.txt", "chamberopt/output/results/x/result.json",
+    "sim_core/.env", ".env", "results/x/result.json", "docs/notes.txt",
+)  # fmt: skip
+
+
 @pytest.fixture(scope="module")
-def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("dist")
-    build = [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(folder)]
-    subprocess.run(build, cwd=ROOT, capture_output=True, check=True)
-    (file,) = folder.glob("*.whl")
+def packed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the wheel and the source archive of a checkout in which other files lie."""
+    checkout, folder = tmp_path_factory.mktemp("checkout"), tmp_path_factory.mktemp("dist")
+    for name in ("chamberopt", "sim_core", "designs", "studies"):
+        shutil.copytree(ROOT / name, checkout / name)
+    for one in ROOT.iterdir():
+        if one.is_file():
+            shutil.copy(one, checkout)
+    for name in PLANTED:
+        (checkout / name).parent.mkdir(parents=True, exist_ok=True)
+        (checkout / name).write_text("secret")
+    build = [sys.executable, "-m", "hatchling", "build", "-d", str(folder)]
+    subprocess.run(build, cwd=checkout, capture_output=True, check=True)
+    return folder
+
+
+@pytest.fixture
+def wheel(packed: Path) -> Path:
+    (file,) = packed.glob("*.whl")
     return file
+
+
+def test_nothing_that_lies_beside_the_files_is_packed(packed: Path, wheel: Path) -> None:
+    with zipfile.ZipFile(wheel) as archive:
+        held = {name.removeprefix("chamberopt/examples/") for name in archive.namelist()}
+    (source,) = packed.glob("*.tar.gz")
+    with tarfile.open(source) as archive:
+        held |= {name.partition("/")[2] for name in archive.getnames()}
+    assert held.isdisjoint(PLANTED)
+    assert not [name for name in held if "pycache" in name or name.endswith(".env")]
+    # The list in pyproject.toml has all that are tracked, and no others.
+    examples = {name for name in held if name.startswith(("designs/", "studies/"))}
+    git = ["git", "ls-files", "designs", "studies"]
+    tracked = subprocess.run(git, cwd=ROOT, capture_output=True, text=True, check=False).stdout
+    if tracked:  # in a clone
+        assert examples == set(tracked.split())
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -788,3 +788,27 @@ def test_a_wrong_number_in_a_list_is_one_problem(tmp_path: Path) -> None:
         load_design(tmp_path / "d.toml")
     assert len(str(error.value).splitlines()) == 1
     assert "chamber.profile_mm.1.1: given nan" in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "told"),
+    [
+        ("".join(f"k{i} = 1\n" for i in range(20_000)), "and 19,990 more; put these right first"),
+        (f"{'k' * 100_000} = 1", "kkk...: unknown key"),
+        (
+            "[tolerances]\n" + "".join(f'"shot.m{i}" = 1\n' for i in range(20_000)),
+            "tolerances: has 20,000 names, at most 500 are allowed",
+        ),
+    ],
+)
+def test_the_first_ten_of_many_problems_are_told(wrong: str, told: str, tmp_path: Path) -> None:
+    text = (ROOT / "designs" / "plate.toml").read_text()
+    text = text.replace("parts/", f"{(ROOT / 'designs' / 'parts').as_posix()}/")
+    path = tmp_path / "many.toml"
+    path.write_text(f"{text}\n{wrong}")
+    with pytest.raises(InputError) as found:
+        load_design(path)
+    message = str(found.value)
+    assert told in message
+    assert len(message.splitlines()) <= 11
+    assert len(message) < 5_000

@@ -58,7 +58,7 @@ def test_the_plainly_bad_get_few_replicas_and_close_calls_more(tmp_path: Path) -
 def test_a_batch_gives_the_same_trials_whichever_ends_first(tmp_path: Path) -> None:
     """Three at a time, delayed at random: proposals and replicas follow from the record alone."""
 
-    def run_with_delays(name: str, seed: int) -> tuple[bytes, int]:
+    def run_with_delays(name: str, seed: int, at_once: int | None = None) -> tuple[bytes, int]:
         delays, lock = np.random.default_rng(seed), threading.Lock()
         now, most = [0], [0]
 
@@ -78,12 +78,13 @@ def test_a_batch_gives_the_same_trials_whichever_ends_first(tmp_path: Path) -> N
             return made
 
         settings = {"batch": 3, "first_replicas": 4, "confirm_rounds": 3, "evaluations": 18}
-        run_bowl(tmp_path / name, simulator, settings)
+        run_bowl(tmp_path / name, simulator, settings, at_once=at_once)
         return (tmp_path / name / "history.jsonl").read_bytes(), most[0]
 
     first, at_a_time = run_with_delays("first", 1)
     assert at_a_time == 3
     assert run_with_delays("second", 2) == (first, 3)
+    assert run_with_delays("third", 3, at_once=1) == (first, 1)  # less memory: the others wait
 
 
 def test_reach_alone_spares_simulations_and_costs_no_evaluation(tmp_path: Path) -> None:

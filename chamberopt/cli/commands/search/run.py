@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
     from chamberopt.optimize.run_study import StudyResult
     from chamberopt.optimize.storage.study_folder import StudyFolder
+    from chamberopt.optimize.study import Study
 
 
 @app.command
@@ -90,12 +91,15 @@ def _search(
     study, advice = folder.with_effects_resolved(
         lambda design: resolve_effects(design, chamber, executor)
     )
+    at_once = _candidates_at_once(study, chamber)
     compile_with_message(study.design, chamber)
     if done := len(folder.recorded.trials):
         console.print_remarks([f"{folder.path}: resuming after {done} evaluations"])
     with step("evaluations", study.optimizer.evaluations) as progress:
         interrupt.wait_for_evaluation(how_to_resume)
-        result = run_study(study, folder, executor, progress, stop=lambda: interrupt.requested)
+        result = run_study(
+            study, folder, executor, progress, stop=lambda: interrupt.requested, at_once=at_once
+        )
     with step("writing and drawing"):
         best = result.best.design
         found = build_chamber(best, result.target)
@@ -103,6 +107,22 @@ def _search(
         console.print_remarks(save_study(folder.path, result, advice, warnings))
     notes = [*map(str, advice), *result.warnings, *result.notes, *chamber.notes]
     return result, [*notes, *result.best.evaluation.notes]
+
+
+def _candidates_at_once(study: Study, chamber: Chamber) -> int:
+    """How many candidates of a batch fit into memory; InputError if one does not."""
+    from chamberopt.coverage.field.memory import PROCESS, evaluation_bytes, how_many_fit
+    from chamberopt.simulation.replicas import most_replicas
+
+    settings = study.optimizer
+    replicas = settings.confirm_replicas * 2 ** (settings.confirm_rounds - 1)
+    replicas = max(replicas, most_replicas(study.design))
+    each = evaluation_bytes(study.design, chamber, replicas)
+    count = how_many_fit(settings.batch, each, PROCESS)
+    if count < settings.batch:
+        text = f"there is memory for {count} of the {settings.batch} candidates of optimizer.batch"
+        console.print_remarks([f"{text} at a time; the others wait, and figures stay the same"])
+    return count
 
 
 def _result_lines(result: StudyResult) -> list[str]:

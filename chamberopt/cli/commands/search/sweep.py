@@ -5,11 +5,16 @@ from __future__ import annotations
 from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from chamberopt.cli import console
 from chamberopt.cli.options import Cluster, Json, Resumable, Workers, app
 from chamberopt.cli.prepare import compile_with_message, resolve_effects
 from chamberopt.cli.resume import resume_command, resume_note, unfinished
+
+if TYPE_CHECKING:
+    from chamberopt.chamber.build import Chamber
+    from chamberopt.optimize.study import Study
 
 
 @app.command
@@ -66,6 +71,8 @@ def sweep(
             chamber = build_chamber(loaded.design)
         command = resume_command(study, folder.path, plan.as_json())
         workers_end.enter_context(resume_note(folder, command))
+        if cluster is None:
+            workers = _workers_that_fit(loaded, chamber, workers)
         executor = workers_end.enter_context(open_executor(workers, cluster, "processes"))
         loaded, advice = folder.with_effects_resolved(
             lambda design: resolve_effects(design, chamber, executor)
@@ -89,3 +96,19 @@ def sweep(
         notes.append(f"{len(failed)} candidates failed, the first because: {failed[0].reason}")
     notes.append(best_row_note(result))
     console.print_result([*lines, *console.note_lines(notes)], folder.path, json)
+
+
+def _workers_that_fit(study: Study, chamber: Chamber, wanted: int | None) -> int | None:
+    """How many of the wanted worker processes fit into memory; InputError if one does not."""
+    from chamberopt.common.parallel.executor import core_count
+    from chamberopt.coverage.field.memory import PROCESS, evaluation_bytes, how_many_fit
+    from chamberopt.simulation.replicas import most_replicas
+
+    design = study.at_search_accuracy(study.design)
+    each = PROCESS + evaluation_bytes(design, chamber, most_replicas(design))
+    asked = core_count() if wanted is None else wanted
+    count = how_many_fit(asked, each, PROCESS)
+    if count < asked:
+        text = f"there is memory for {count} of {asked} worker processes; figures stay the same"
+        console.print_remarks([text])
+    return count if count < asked else wanted

@@ -14,7 +14,7 @@ import numpy as np
 from chamberopt.common.errors import InputError
 from chamberopt.common.limits import MAX_ELEMENTS
 from chamberopt.common.npz_files import save_arrays
-from chamberopt.geometry.mesh_io.native_reader import converted
+from chamberopt.geometry.mesh_io.native_reader import NativeReader, converted
 from chamberopt.geometry.mesh_io.readers.elements import Block, ElementMesh, extract_surface
 from chamberopt.geometry.mesh_io.readers.raw_mesh import RawMesh
 
@@ -34,6 +34,7 @@ FIELD = "field "  # before the names of cell fields among the arrays
 
 
 UNPACK = "from chamberopt.geometry.mesh_io.readers.vtk import unpack; unpack(*sys.argv[1:])"
+READER = NativeReader("part.vtk", "part.npz", UNPACK, seconds_per_mb=10.0)
 
 
 def read_vtk(path: Path, content: bytes) -> RawMesh:
@@ -48,7 +49,7 @@ def read_vtk(path: Path, content: bytes) -> RawMesh:
         _require_counts(path, content)
     is_poly_data = holds == "POLYDATA"
     reader = ("vtkXML" if xml else "vtk") + ("PolyData" if is_poly_data else "UnstructuredGrid")
-    with converted(content, "part.vtk", "part.npz", UNPACK, f"{reader}Reader") as file:
+    with converted(READER, path, content, f"{reader}Reader") as file:
         if file is None:
             why = "cannot be read as VTK, it is damaged or truncated"
             raise InputError(f"{path}: {why}; export it again")

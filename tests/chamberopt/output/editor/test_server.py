@@ -1,9 +1,12 @@
 """The page's server: whom it answers, what it refuses, and that it says what `check` says."""
 
+import http.client
 import json
+import select
 import signal
 import subprocess
 import sys
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -116,6 +119,30 @@ def test_nonsense_is_refused(served: Served) -> None:
         answer = served._send("POST", "/shape", body, {"origin": served.origin})
         assert answer.status == 400
         assert b"not a question of this page" in answer.read()
+
+
+@pytest.mark.parametrize("is_chunked", [True, False])
+def test_a_long_question_is_refused_before_it_is_taken(served: Served, is_chunked: bool) -> None:
+    part, sent = bytes(100_000), 0
+    connection = http.client.HTTPConnection(served.host, timeout=60)
+    connection.putrequest("POST", "/shape", skip_host=True)
+    for name, text in (("host", served.host), ("origin", served.origin),
+                       ("cookie", served.cookie), ("x-chamberopt-key", served.key),
+                       ("transfer-encoding" if is_chunked else "content-length",
+                        "chunked" if is_chunked else str(100 * len(part)))):  # fmt: skip
+        connection.putheader(name, text)
+    connection.endheaders()
+    with suppress(ConnectionError):  # it is closed in the midst of this
+        for _ in range(100):
+            connection.send(b"%x\r\n%s\r\n" % (len(part), part) if is_chunked else part)
+            sent += len(part)
+            if select.select([connection.sock], [], [], 0.02)[0]:
+                break
+    answer = connection.getresponse()
+    assert answer.status == 413
+    assert "2 MB" in json.loads(answer.read())["error"]
+    assert sent < 4_000_000
+    assert served.ask("/read", {})["read"] == served.read
 
 
 def test_it_says_what_check_says_and_older_questions_are_dropped(served: Served) -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from chamberopt.common.errors import InputError
-from chamberopt.geometry.mesh_io.native_reader import converted
+from chamberopt.geometry.mesh_io.native_reader import NativeReader, converted
 from chamberopt.geometry.mesh_io.readers.raw_mesh import RawMesh
 from chamberopt.geometry.mesh_io.readers.step.entities import StepFace, read_solids, stated_unit
 from chamberopt.geometry.mesh_io.readers.step.tessellation import REMEDY, Tessellation
@@ -19,6 +19,7 @@ MESH = (
     "from chamberopt.geometry.mesh_io.readers.step.tessellation import tessellate; "
     "tessellate(*sys.argv[1:])"
 )
+READER = NativeReader("part.step", "part.npz", MESH, seconds_per_mb=60.0)
 NAMED_FACE = re.compile(r"(?:ADVANCED_FACE|FACE_SURFACE)\s*\(\s*'(?!'|NONE')")
 # Of a body's size: how far the middle of a face may be from that in the file's text.
 SAME_PLACE = 1e-4
@@ -33,7 +34,7 @@ def read_step(path: Path, content: bytes, how: Tessellation | None = None) -> Ra
         raise InputError(f"{path}: STEP needs the package gmsh: pip install 'chamberopt[cad]'")
     how = how or Tessellation()
     limits = 1e3 * how.chord, how.angle, 1e3 * how.side
-    with converted(content, "part.step", "part.npz", MESH, *limits) as file:
+    with converted(READER, path, content, *limits) as file:
         if file is None:
             raise InputError(f"{path}: ended its reader; {REMEDY}")
         with np.load(file) as loaded:

@@ -19,12 +19,14 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from chamberopt.common.npz_files import save_arrays
+from chamberopt.geometry.mesh_io.native_reader import allow_more
 from chamberopt.geometry.mesh_io.readers.step.grids import lay_grids
 
 SHORTEST_IN_CHORDS, SMALLEST_RADIUS_IN_CHORDS = 4.0, 3.0
 LONGEST_IN_DIAGONALS = 1.0 / 40.0  # of the part's box, where no longest side is given
 PRECISION = 1e-4  # of the number of sides along an edge
 MOST_TRIANGLES = 2e6  # which take minutes
+SECONDS_PER_TRIANGLE = 3e-4  # of computing time, at most: ten times what was measured
 SAMPLES = 9  # of a face's curvature, in each direction
 LIBRARIES = "on Debian: apt-get install libglu1-mesa libxcursor1 libxft2 libxinerama1"
 REMEDY = "the file is damaged, or holds no solid; export it again as AP214 or AP242"
@@ -92,8 +94,10 @@ def _mesh(gmsh: Any, source: str, how: Tessellation) -> dict[str, np.ndarray]:
     box = np.array([model.getBoundingBox(2, tag) for tag in faces]).reshape(-1, 2, 3)
     diagonal = np.linalg.norm(box[:, 1].max(axis=0) - box[:, 0].min(axis=0)) if faces else 0.0
     how = how._replace(side=how.side or LONGEST_IN_DIAGONALS * float(diagonal))
-    if fault := _too_fine(model, faces, how):
-        return {"fault": np.array(fault)}
+    triangles = _TriangleCount(model, faces)
+    if not triangles(how) <= MOST_TRIANGLES:
+        return {"fault": np.array(triangles.advice(how))}
+    allow_more(SECONDS_PER_TRIANGLE * triangles(how))
     lay_grids(model, faces, how.side_at)
 
     def size(_dim: int, _tag: int, _x: float, _y: float, _z: float, by_angle: float) -> float:
@@ -130,25 +134,29 @@ def _normals(model: Any, face: int, nodes: np.ndarray) -> np.ndarray:
     return np.asarray(normals[np.searchsorted(tags[first], nodes)].reshape(-1, 3, 3))
 
 
-def _too_fine(model: Any, faces: list[int], how: Tessellation) -> str:
-    """Why there would be too many triangles, with the smallest value that gives fewer; or ""."""
-    areas = np.array([model.occ.getMass(2, face) for face in faces])
-    radii = [_radii(model, face) for face in faces]
+class _TriangleCount:
+    """About how many triangles the faces of a model take, by how fine they are."""
 
-    def count(how: Tessellation) -> float:
-        """Of equilateral triangles of the wanted sides, about."""
-        each = [np.mean([how.side_at(one) ** -2.0 for one in own]) for own in radii]
-        return float(areas @ np.array(each)) * 4.0 / math.sqrt(3.0)
+    def __init__(self, model: Any, faces: list[int]) -> None:
+        self._areas = np.array([model.occ.getMass(2, face) for face in faces])
+        self._radii = [_radii(model, face) for face in faces]
 
-    if not faces or count(how) <= MOST_TRIANGLES:
-        return ""
-    is_side = count(how._replace(side=math.inf)) <= MOST_TRIANGLES
-    name = "side" if is_side else "chord"
-    text = f"about {1e-6 * count(how):.3g} million triangles, at most {1e-6 * MOST_TRIANGLES:g}"
-    value = getattr(how, name)
-    while count(how._replace(**{name: value})) > MOST_TRIANGLES:
-        value *= 1.05
-    return f"{text} are made; give part.tessellation.{name}_mm = {value:.2g} or more"
+    def __call__(self, how: Tessellation) -> float:
+        """Number of equilateral triangles of the wanted sides, about."""
+        each = [np.mean([how.side_at(one) ** -2.0 for one in own]) for own in self._radii]
+        return float(self._areas @ np.array(each)) * 4.0 / math.sqrt(3.0)
+
+    def advice(self, how: Tessellation) -> str:
+        """Why there would be too many triangles, with the smallest value that gives fewer."""
+        if not math.isfinite(self(how)):
+            return f"has a face of no finite area; {REMEDY}"
+        is_side = self(how._replace(side=math.inf)) <= MOST_TRIANGLES
+        name = "side" if is_side else "chord"
+        text = f"about {1e-6 * self(how):.3g} million triangles, at most {1e-6 * MOST_TRIANGLES:g}"
+        value = getattr(how, name)
+        while self(how._replace(**{name: value})) > MOST_TRIANGLES:
+            value *= 1.05
+        return f"{text} are made; give part.tessellation.{name}_mm = {value:.2g} or more"
 
 
 def _radii(model: Any, face: int) -> list[float]:

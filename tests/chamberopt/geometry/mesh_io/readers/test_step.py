@@ -1,6 +1,7 @@
 """STEP files: unit, names, colours, assemblies, how fine the triangles are, a missing library."""
 
 import math
+import os
 import subprocess
 import sys
 import time
@@ -12,9 +13,10 @@ import pytest
 
 from chamberopt.chamber.part import posed_part
 from chamberopt.common.errors import InputError
+from chamberopt.geometry.mesh_io.native_reader import LEAST_SECONDS
 from chamberopt.geometry.mesh_io.part_mesh import PartMesh, read_part
 from chamberopt.geometry.mesh_io.readers.step.entities import StepFace, _decoded, read_solids
-from chamberopt.geometry.mesh_io.readers.step.read_step import _face_names
+from chamberopt.geometry.mesh_io.readers.step.read_step import READER, _face_names
 from chamberopt.geometry.mesh_io.readers.step.tessellation import Tessellation
 from chamberopt.geometry.remesh import remesh, triangle_quality
 from chamberopt.geometry.solids import split_bodies, unite
@@ -193,15 +195,57 @@ def test_too_many_triangles_are_told_before_they_are_made(
 def test_the_mesher_ends_with_the_command(tmp_path: Path) -> None:
     """However that ends, and without its temporary folder."""
     read = (
-        "import tempfile; from chamberopt.geometry.mesh_io.native_reader import converted\n"
+        "import tempfile; from pathlib import Path\n"
+        "from chamberopt.geometry.mesh_io.native_reader import NativeReader, converted\n"
         f"tempfile.tempdir = {str(tmp_path)!r}\n"
         "wait = 'import time; open(sys.argv[2], \"w\"); time.sleep(60)'\n"
-        "with converted(b'x', 'a', 'b', wait): pass"
+        "with converted(NativeReader('a', 'b', wait, 1.0), Path('a'), b'x'): pass"
     )
     with subprocess.Popen([sys.executable, "-c", read]) as command:
         _wait_until(lambda: any(tmp_path.glob("*/b")))
         command.kill()
     _wait_until(lambda: not any(tmp_path.iterdir()))
+
+
+def damaged_fir_tree(folder: Path) -> Path:
+    """A fir tree that Gmsh never finishes: a direction of 1.E12, and a face less."""
+    text = EIGHT_PARTS["fir_tree"].write(folder).read_text()
+    for line, damaged in (
+        ("#1593 = DIRECTION('',(0.,0.,-1.));\n", "#1593 = DIRECTION('',(0.,1.E12,-1.));\n"),
+        ("#763 = ADVANCED_FACE('FIR_TREE',(#764),#791,.F.);\n", ""),
+    ):
+        assert text.count(line) == 1
+        text = text.replace(line, damaged)
+    return written(folder / "damaged.step", text)
+
+
+def test_a_file_that_never_ends_is_given_up(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("CHAMBEROPT_READER_S", "4")
+    with pytest.raises(InputError, match=r"damaged\.step: .*4 s of computing .*damaged.*READER_S"):
+        read_part(damaged_fir_tree(tmp_path))
+    monkeypatch.setenv("CHAMBEROPT_READER_S", "soon")
+    with pytest.raises(InputError, match="CHAMBEROPT_READER_S: given 'soon'; give seconds"):
+        read_part(EIGHT_PARTS["fir_tree"].write(tmp_path))
+
+
+@pytest.mark.long
+def test_a_file_that_never_ends_is_given_up_within_its_budget(tmp_path: Path) -> None:
+    began = time.process_time(), os.times().children_user
+    with pytest.raises(InputError, match=r"longer than a sound file of 0\.097 MB"):
+        read_part(damaged_fir_tree(tmp_path))
+    assert time.process_time() - began[0] + os.times().children_user - began[1] < 90.0
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", ["fir_tree", "helical_gear", "knee_tray", "stepped_shaft"])
+def test_a_sound_file_takes_a_tenth_of_its_budget(name: str, tmp_path: Path) -> None:
+    path = {**EIGHT_PARTS, **KEPT_ASIDE}[name].write(tmp_path)
+    before = os.times().children_user
+    read_part(path)
+    budget = LEAST_SECONDS + READER.seconds_per_mb * 1e-6 * path.stat().st_size
+    assert os.times().children_user - before < 0.1 * budget
 
 
 def _wait_until(is_so: Callable[[], bool]) -> None:

@@ -1,0 +1,92 @@
+"""Memory that this process may take, and what is left of it for what can be computed again."""
+
+from __future__ import annotations
+
+import math
+import os
+import threading
+import weakref
+from collections.abc import Iterator
+from contextlib import suppress
+from pathlib import Path
+
+import numpy as np
+
+OF_FREE = 0.5  # share of the free memory that is taken; other programs and surprises have the rest
+# Files of a container or a batch job, by the version of the kernel's groups: limit and use.
+GROUPS = Path("/sys/fs/cgroup")
+FILES = {
+    "": ("memory.max", "memory.current"),
+    "memory": ("memory.limit_in_bytes", "memory.usage_in_bytes"),
+}
+
+
+def free_memory() -> float:
+    """Bytes that programs can still take on this machine; infinite where it does not tell."""
+    return min(_free_of_machine(), *_free_of_groups(), math.inf)
+
+
+def _free_of_machine() -> float:
+    with suppress(OSError, LookupError, ValueError):
+        for line in Path("/proc/meminfo").read_text().splitlines():
+            if line.startswith("MemAvailable:"):
+                return 1024.0 * int(line.split()[1])
+    # macOS has no such file, and tells its memory alone; Windows tells neither.
+    with suppress(AttributeError, OSError, ValueError):
+        pages = os.sysconf("SC_PHYS_PAGES")
+        return float(pages * os.sysconf("SC_PAGE_SIZE"))
+    return math.inf
+
+
+def _free_of_groups() -> Iterator[float]:
+    """Bytes that are left of the limits of the groups that this process is in, and those above."""
+    with suppress(OSError, ValueError):
+        for line in Path("/proc/self/cgroup").read_text().splitlines():
+            _, kinds, name = line.split(":", 2)
+            kind = "memory" if "memory" in kinds.split(",") else kinds
+            if kind in FILES:
+                own = Path(name.strip("/"))
+                for group in (own, *own.parents):
+                    yield _free_of_group(GROUPS / kind / group, *FILES[kind])
+
+
+def _free_of_group(group: Path, limit: str, used: str) -> float:
+    """What is left of one limit; files that the kernel can drop count as free."""
+    with suppress(OSError, ValueError):
+        most, taken = int((group / limit).read_text()), int((group / used).read_text())
+        rows = (group / "memory.stat").read_text().splitlines()
+        droppable = sum(int(row.split()[1]) for row in rows if row.startswith("inactive_file "))
+        return float(max(0, most - taken + droppable))
+    return math.inf
+
+
+class MemoryBudget:
+    """Bytes of arrays that are kept although they could be computed again.
+
+    The budget is a share of what is free when the first array is kept. What is kept by worker
+    processes of one command is divided among them.
+    """
+
+    def __init__(self) -> None:
+        self._lock = threading.RLock()  # arrays may be freed in the midst of this
+        self._left: float | None = None
+        self.processes = 1
+
+    def keeps(self, *arrays: np.ndarray) -> bool:
+        """Whether there is room for arrays; they count until the first of them is freed."""
+        size = float(sum(one.nbytes for one in arrays))
+        with self._lock:
+            if self._left is None:
+                self._left = OF_FREE * free_memory() / self.processes
+            if size > self._left:
+                return False
+            self._left -= size
+        weakref.finalize(arrays[0], self._give_back, size).atexit = False
+        return True
+
+    def _give_back(self, size: float) -> None:
+        with self._lock:
+            self._left = (self._left or 0.0) + size
+
+
+MEMORY = MemoryBudget()

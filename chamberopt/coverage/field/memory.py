@@ -1,0 +1,70 @@
+"""Memory that an evaluation takes, estimated from its design before it begins.
+
+Pairs of dents and windows are not in it: they are kept only while there is room for them
+(common/parallel/memory.py). Bytes are measured ones, docs/trust.md; impacts are those of a gas of
+balls that are as fast as the sonotrode at its peak, n V A / 4 on an area A for n balls a volume,
+which is 0.7 to 2.1 times what was simulated.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from chamberopt.common.errors import InputError
+from chamberopt.common.parallel import memory
+from chamberopt.coverage.field.target_field import MAX_PIECES, PIECES_PER_WINDOW
+from chamberopt.geometry.triangles import areas
+
+if TYPE_CHECKING:
+    from chamberopt.chamber.build import Chamber
+    from chamberopt.design.load import Design
+
+PROCESS = 350e6  # bytes of a process that has loaded and compiled everything
+OF_POINT, OF_POINT_AT_WORK = 250.0, 550.0  # of each point of a field; while it is made
+OF_POINT_IN_BATCH = 110.0  # of each point and batch of replicas, while figures are estimated
+BATCHES = 40  # that replicas are divided into at most, MAX_BATCHES of coverage_from_impacts.py
+OF_PIECE = 120.0  # of the surface
+OF_TRIANGLE = 500.0  # of the chamber, with its search tree
+OF_IMPACT, OF_LOGGED = 150.0, 100.0  # that is kept of the part; of any surface, while it is run
+
+
+def evaluation_bytes(design: Design, chamber: Chamber, replicas: int) -> float:
+    """Bytes that one evaluation takes, beside those of its process."""
+    accuracy, target = design.process.accuracy, chamber.part.target
+    fields = 1 + len(design.zones)
+    of_points = OF_POINT * (fields - 1) + OF_POINT_AT_WORK
+    of_points += OF_POINT_IN_BATCH * min(replicas, BATCHES)
+    windows = float(chamber.part.area[target].sum()) / accuracy.gauge
+    on_area = design.shot.count / chamber.volume * design.sonotrode.peak_speed / 4.0
+    on_area *= design.process.recorded_time
+    walls = float(areas(chamber.vertices, chamber.triangles).sum())
+    return (
+        of_points * accuracy.points
+        + OF_PIECE * fields * min(PIECES_PER_WINDOW * windows, MAX_PIECES)
+        + OF_TRIANGLE * len(chamber.triangles)
+        + OF_IMPACT * on_area * float(chamber.exposed_area.sum()) * replicas
+        + OF_LOGGED * on_area * walls
+    )
+
+
+def how_many_fit(most: int, each: float, common: float = 0.0) -> int:
+    """How many of so many things fit into the memory that may be taken, one at least.
+
+    Args:
+        each: bytes of one of them.
+        common: bytes of what they have in common.
+
+    Raises:
+        InputError: not even one fits.
+    """
+    room = memory.OF_FREE * memory.free_memory()
+    if math.isinf(room):
+        return most
+    if common + each > room:
+        raise InputError(
+            f"process.accuracy.points: this takes about {1e-9 * (common + each):.2g} GB of memory, "
+            f"and {1e-9 * room:.2g} GB, half of what is free, may be taken; give fewer points, "
+            "shorter replicas (simulated_time_s) or a larger gauge_mm2, or end other programs"
+        )
+    return max(1, min(most, int((room - common) / each)))

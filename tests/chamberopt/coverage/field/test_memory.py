@@ -1,0 +1,105 @@
+"""The memory of an evaluation: foretold within a factor of 2, bounded, refused in time."""
+
+import tracemalloc
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from chamberopt.chamber.build import build_chamber
+from chamberopt.cli import main
+from chamberopt.common.parallel import memory
+from chamberopt.common.parallel.executor import SerialExecutor
+from chamberopt.common.parallel.memory import MEMORY, MemoryBudget
+from chamberopt.coverage.coverage_from_impacts import MAX_BATCHES
+from chamberopt.coverage.field.memory import BATCHES, evaluation_bytes, how_many_fit
+from chamberopt.design.design import Design
+from chamberopt.design.load import save_design
+from chamberopt.simulation.evaluate import ReplicaPlan, evaluate
+from tests.helpers.synthetic import plate_design
+
+GIGA = 1e9
+
+
+@pytest.fixture
+def no_room(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No memory for what can be computed again."""
+    monkeypatch.setattr(MEMORY, "_left", 0.0)
+
+
+def design_with(points: int, replicas: int) -> Design:
+    return plate_design(
+        process__accuracy__points=points,
+        process__accuracy__replicas=replicas,
+        process__accuracy__simulated_time_s=0.4,
+        process__accuracy__warmup_time_s=0.01,
+    )
+
+
+@pytest.mark.parametrize(("points", "replicas"), [(20_000, 8), (80_000, 8), (20_000, 50)])
+def test_what_an_evaluation_takes_is_foretold(points: int, replicas: int, no_room: None) -> None:
+    design = design_with(points, replicas)
+    chamber = build_chamber(design)
+    evaluate(design_with(1_000, 3), chamber, SerialExecutor())  # what is compiled is not measured
+    tracemalloc.start()
+    try:
+        evaluate(design, chamber, SerialExecutor())
+        taken = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert 0.5 < evaluation_bytes(design, chamber, replicas) / taken < 2.0
+
+
+def test_figures_are_the_same_where_pairs_are_found_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    design = design_with(2_000, 45)  # more replicas than batches
+    chamber, executor = build_chamber(design), SerialExecutor()
+    kept = evaluate(design, chamber, executor, plan=ReplicaPlan(45))
+    monkeypatch.setattr(MEMORY, "_left", 100_000.0)  # some are kept
+    again = evaluate(design, chamber, executor, plan=ReplicaPlan(45))
+    assert again.metrics == kept.metrics
+    assert again.metrics_of_wide == kept.metrics_of_wide
+    assert again.resolution == kept.resolution
+
+
+def test_what_is_freed_can_be_kept_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(memory, "free_memory", lambda: 4000.0)
+    budget = MemoryBudget()
+    one, two = np.zeros(150), np.zeros(150)
+    assert budget.keeps(one)
+    assert not budget.keeps(two)  # half of what is free
+    del one
+    assert budget.keeps(two)
+
+
+def test_of_what_is_free_half_is_taken(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(memory, "free_memory", lambda: 4.0 * GIGA)
+    assert how_many_fit(8, 0.5 * GIGA, 0.4 * GIGA) == 3
+    assert how_many_fit(2, 0.5 * GIGA, 0.4 * GIGA) == 2
+    monkeypatch.setattr(memory, "free_memory", lambda: float("inf"))  # a machine that does not tell
+    assert how_many_fit(8, 1e15) == 8
+
+
+def test_batches_are_those_of_the_figures() -> None:
+    assert BATCHES == MAX_BATCHES
+
+
+def test_this_machine_tells_what_is_free() -> None:
+    assert memory.free_memory() > 1e8
+
+
+@pytest.mark.parametrize("command", ["simulate", "accuracy", "run", "sweep"])
+def test_a_job_larger_than_the_machine_is_refused(
+    command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+) -> None:
+    save_design(design_with(1_000_000, 40), tmp_path / "large.toml")
+    (tmp_path / "study.toml").write_text(
+        'design = "large.toml"\n[vary]\n"shot.mass_g" = [2, 4]\n[optimizer]\nevaluations = 5\n'
+    )
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(memory, "free_memory", lambda: GIGA)
+    words = [command, "study.toml" if command in ("run", "sweep") else "large.toml", "--out", "new"]
+    assert main([*words, *(["--sobol", "2"] if command == "sweep" else [])]) == 2
+    message = capsys.readouterr().err
+    assert "process.accuracy.points: this takes about" in message
+    assert "0.5 GB, half of what is free" in message
+    assert not (tmp_path / "new").exists()
