@@ -232,7 +232,7 @@ def _chosen(mesh: PartMesh, wanted: Selection, field: str) -> np.ndarray:
 
 
 class _Simulated(NamedTuple):
-    """The part's mesh as it is simulated; the columns are those of SmoothPart."""
+    """The part's mesh as it is simulated; the other columns are those of SmoothPart."""
 
     mesh: PartMesh
     origin: np.ndarray
@@ -257,7 +257,8 @@ def _simulated(
     ]
     found = _Simulated(mesh, np.arange(len(mesh.triangles)), None, None, None)
     if not is_wall:
-        found = _Simulated(*smooth(mesh, smoothing.rule(chosen), rules))
+        made = smooth(mesh, smoothing.rule(chosen), rules)
+        found = _Simulated(made.of_part(mesh), made.origin, made.normals, made.hollow, made.facts)
     size = target.element
     return found if size is None else _remeshed(found, chosen[found.origin], size)
 

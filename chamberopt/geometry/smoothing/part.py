@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from chamberopt.common.errors import InputError
+from chamberopt.common.kept_records import kept, key_of
 from chamberopt.geometry.mesh_io.part_mesh import PartMesh
 from chamberopt.geometry.mesh_io.self_intersection import crossing_pairs
 from chamberopt.geometry.smoothing.smooth import Surfaces, divide_rounds, find_surfaces, moves
@@ -58,22 +59,38 @@ class SmoothingFacts:
     crossing_share: float
 
 
-class SmoothPart(NamedTuple):
+@dataclass(frozen=True)
+class SmoothPart:
     """A part with divided rounds.
 
     Attributes:
-        mesh: the part; its triangles have the numbers and groups of those they come from.
+        vertices: [m], shape (n, 3).
+        triangles: shape (k, 3).
         origin: the file's triangle from which each comes, shape (k,).
         normals: of the surface at the corners, unit vectors, shape (k, 3, 3).
         hollow: largest hollow curvature [1/m], shape (k,).
         facts: what was done.
     """
 
-    mesh: PartMesh
+    vertices: np.ndarray
+    triangles: np.ndarray
     origin: np.ndarray
     normals: np.ndarray
     hollow: np.ndarray
     facts: SmoothingFacts
+
+    def of_part(self, mesh: PartMesh) -> PartMesh:
+        """The divided mesh of a part; triangles keep the numbers and groups of the file's."""
+        if len(self.origin) == len(mesh.triangles):
+            return mesh
+        return replace(
+            mesh,
+            vertices=self.vertices,
+            triangles=self.triangles,
+            numbering=mesh.numbering.select(self.origin),
+            groups={name: mask[self.origin] for name, mask in mesh.groups.items()},
+            normals=None,
+        )
 
 
 class Rule(NamedTuple):
@@ -95,12 +112,19 @@ class Rule(NamedTuple):
 
 
 def smooth(mesh: PartMesh, target: Rule, zones: list[Rule]) -> SmoothPart:
-    """Divide the rounds of a part.
+    """Divide the rounds of a part, or take what an earlier command has made of it.
 
     Args:
         target: for the triangles to cover, and for what is near them and the zones.
         zones: for surfaces that may lie on the target.
     """
+    values = [one for rule in (target, *zones) for one in rule]
+    key = key_of([mesh.vertices, mesh.triangles, mesh.normals, mesh.is_exact, *values])
+    return kept(SmoothPart, [SmoothingFacts], key, lambda: _smooth(mesh, target, zones))
+
+
+def _smooth(mesh: PartMesh, target: Rule, zones: list[Rule]) -> SmoothPart:
+    """Divide the rounds of a part; arguments as for `smooth`."""
     vertices, triangles, on_target = mesh.vertices, mesh.triangles, target.triangles
     near = _near(vertices, triangles, np.any([one.triangles for one in (target, *zones)], axis=0))
     surfaces = find_surfaces(vertices, triangles, near, mesh.normals)
@@ -134,18 +158,14 @@ def smooth(mesh: PartMesh, target: Rule, zones: list[Rule]) -> SmoothPart:
         noisy_share=float(of_target[left & surfaces.noisy & np.isfinite(asked)].sum()),
         crossing_share=float(of_target[left & crossing & np.isfinite(asked)].sum()),
     )
-    parent = finer.parent
-    if len(parent) == len(triangles):
-        return SmoothPart(mesh, parent, finer.normals, surfaces.hollow, facts)
-    children = replace(
-        mesh,
+    return SmoothPart(
         vertices=finer.vertices,
         triangles=finer.triangles.astype(np.int32),
-        numbering=mesh.numbering.select(parent),
-        groups={name: mask[parent] for name, mask in mesh.groups.items()},
-        normals=None,
+        origin=finer.parent,
+        normals=finer.normals.astype(np.float32),
+        hollow=surfaces.hollow[finer.parent].astype(np.float32),
+        facts=facts,
     )
-    return SmoothPart(children, parent, finer.normals, surfaces.hollow[parent], facts)
 
 
 def _divide_apart(
