@@ -6,6 +6,8 @@ there. Links on the way to a folder, and links to files that a design names, are
 
 from __future__ import annotations
 
+import ctypes
+import errno
 import os
 import stat
 from contextlib import suppress
@@ -23,6 +25,7 @@ PLAIN = sum(
 NO_FOLLOW = getattr(os, "O_NOFOLLOW", 0)
 FOLDER = getattr(os, "O_PATH", os.O_RDONLY) | getattr(os, "O_DIRECTORY", 0)
 BY_DESCRIPTOR = os.open in os.supports_dir_fd and bool(NO_FOLLOW)
+SWAPS, SWAP = ("renameat2", "renameatx_np"), 2  # of Linux and macOS, which Python lacks
 JUNCTION = 0xA0000003  # tag of a folder of Windows that is a link to another
 RESULT, INPUTS = "result.json", "inputs.json"  # by which the program's own folders are known
 
@@ -140,6 +143,21 @@ class OpenFolder:
         """Give a file a new name, whose file it replaces."""
         at = {"src_dir_fd": self._file, "dst_dir_fd": self._file}
         os.replace(self._at(name), self._at(new), **at)
+
+    def swap(self, name: str, other: str) -> bool:
+        """Let two files have each other's name at once; False where the system cannot do that."""
+        if self._file is None:
+            return False
+        library = ctypes.CDLL(None, use_errno=True)
+        swap = next((getattr(library, one) for one in SWAPS if hasattr(library, one)), None)
+        if swap is None:
+            return False
+        if swap(self._file, os.fsencode(name), self._file, os.fsencode(other), SWAP) == 0:
+            return True
+        error = ctypes.get_errno()
+        if error in (errno.ENOSYS, errno.EINVAL, errno.ENOTSUP):  # such as network drives
+            return False
+        raise OSError(error, os.strerror(error))
 
     def remove(self, name: str) -> None:
         """Remove a name, if it is there; of a link not what it leads to."""

@@ -22,7 +22,7 @@ LEFTOVER_PREFIXES = (LOCK, WRITING)  # of files that a command that was killed m
 
 
 @contextmanager
-def new_file(path: Path, ready: Callable[[], None] = lambda: None) -> Iterator[BinaryIO]:
+def new_file(path: Path, look: Callable[[Path], None] | None = None) -> Iterator[BinaryIO]:
     """Open a temporary file beside `path`, which replaces it when the block ends without an error.
 
     The file is on the disk before it gets its name, so that neither a crash nor a power cut leaves
@@ -30,7 +30,7 @@ def new_file(path: Path, ready: Callable[[], None] = lambda: None) -> Iterator[B
     that need one, is in `name`: nobody can foresee it, and it has the suffix of `path`.
 
     Args:
-        ready: called before the file gets its name, which an error prevents.
+        look: called with a file that holds what is replaced; with an error, that stays in place.
     Raises:
         OSError: it cannot be written.
         InputError: at `path` is a link, a folder or another thing that is no plain file.
@@ -52,8 +52,7 @@ def new_file(path: Path, ready: Callable[[], None] = lambda: None) -> Iterator[B
                     written = folder.status(temporary)
                     if written is None or not os.path.samestat(written, os.fstat(opened)):
                         raise OSError(f"{temporary} was replaced while it was written")
-                ready()
-                folder.rename(temporary, path.name)
+                _put_in_place(folder, temporary, path, look)
             except BaseException:
                 with suppress(OSError):
                     folder.remove(temporary)
@@ -63,11 +62,28 @@ def new_file(path: Path, ready: Callable[[], None] = lambda: None) -> Iterator[B
         raise OSError(error.errno, error.strerror or str(error), str(path)) from error
 
 
-def write_bytes(
-    path: Path, content: bytes | memoryview, ready: Callable[[], None] = lambda: None
+def _put_in_place(
+    folder: OpenFolder, temporary: str, path: Path, look: Callable[[Path], None] | None
 ) -> None:
-    """Write a file, whole or not at all; `ready` as in new_file."""
-    with new_file(path, ready) as file:
+    """Give a file its name, with a look at what it replaces."""
+    if look is None or not folder.swap(temporary, path.name):
+        if look is not None:
+            look(path)
+        folder.rename(temporary, path.name)
+        return
+    try:
+        look(path.with_name(temporary))
+    except BaseException:
+        folder.swap(temporary, path.name)
+        raise
+    folder.remove(temporary)
+
+
+def write_bytes(
+    path: Path, content: bytes | memoryview, look: Callable[[Path], None] | None = None
+) -> None:
+    """Write a file, whole or not at all; `look` as in new_file."""
+    with new_file(path, look) as file:
         file.write(content)
 
 

@@ -5,21 +5,23 @@ from __future__ import annotations
 import hashlib
 import re
 import stat
+import time
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from chamberopt.common.errors import InputError
-from chamberopt.common.files import claim_file, write_bytes
-from chamberopt.common.limits import MAX_TEXT_BYTES, read_limited
+from chamberopt.common.files import claim_file, open_plain, write_bytes
+from chamberopt.common.limits import MAX_TEXT_BYTES
 from chamberopt.common.toml_fields import read_toml
 from chamberopt.design.design import Design, validate
 from chamberopt.design.shapes.base import is_custom
 
 # By dotted name, in the file's units; None takes a key out of the file.
 Changes = Mapping[str, Any]
-LONGEST_SAVE_S = 5.0  # of another page, which takes milliseconds
+LONGEST_SAVE_S = 5.0  # of another page, which takes a tenth of a second
+LATE_WRITE_S = 0.05  # from an editor's opening of the file to its writing, by far
 # What is changed beside the fields of the page: a target or zone, and what it chooses.
 PICKED = re.compile(
     r"(part\.target|zones\.\d+\.target)\.(surface|faces|direction|angle_deg|box_mm|radius_mm)"
@@ -97,13 +99,18 @@ class EditedFile:
         if not self.path.stat().st_mode & stat.S_IWUSR:
             raise InputError(f"{self.path.name}: is read-only; allow writing, or save a copy")
         with claim_file(self.path, wait=LONGEST_SAVE_S):
-            self._require_unchanged()
-            write_bytes(self.path, text.encode(), self._require_unchanged)
+            self._require_unchanged(self.path)
+            write_bytes(self.path, text.encode(), self._look_at_replaced)
 
-    def _require_unchanged(self) -> None:
-        """Raise InputError unless the file is what was read; just before it is replaced, too."""
+    def _look_at_replaced(self, path: Path) -> None:
+        """Raise InputError unless what was replaced is what was read, and stays so."""
+        time.sleep(LATE_WRITE_S)  # an editor that had opened it before may write to it now
+        self._require_unchanged(path)
+
+    def _require_unchanged(self, path: Path) -> None:
         try:
-            content = read_limited(self.path, MAX_TEXT_BYTES, "design file (.toml)")
+            with open_plain(path) as file:
+                content = file.read(MAX_TEXT_BYTES)
         except FileNotFoundError:
             content = b""
         if content.decode("utf-8-sig", errors="replace") != self.text:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.chamberopt.common.files.scene import RUN, SIMULATE, write_scene
+from tests.chamberopt.common.files.scene import SIMULATE
 from tests.hunt.command import Server, fault, fingerprint
 
 HERE = "tests.chamberopt.common.files"
@@ -45,20 +45,6 @@ SLOW = (
 OWN = ("box.stl", "design.toml", "study.toml")  # the user's own, which may be links
 RANDOM = re.compile(r"\.writing-[0-9a-f]{16}|(^|/)tmp\w{8}$")
 SECRET = "of somebody else"
-
-
-@pytest.fixture(scope="module")
-def scene(server: Server, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The tiny scene with two results, a finished study and one that has only begun."""
-    folder = tmp_path_factory.mktemp("scene")
-    write_scene(folder)
-    for words in (SIMULATE, "report result", "report result --sheet", RUN):
-        assert server.run(folder, words.split()).status == 0
-    (folder / "result").rename(folder / "given")
-    shutil.copytree(folder / "given", folder / "given2")
-    shutil.copytree(folder / "study", folder / "begun")
-    (folder / "begun" / "result.json").unlink()
-    return folder
 
 
 def plant(folder: Path, name: str, outside: Path, leads_nowhere: bool) -> None:
