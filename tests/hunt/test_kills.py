@@ -9,10 +9,12 @@ import json
 import os
 import shutil
 import signal
+import socket
 import subprocess
 import sys
 import time
 import zipfile
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +22,7 @@ import pytest
 
 from chamberopt.common.files import LEFTOVER_PREFIXES, write_text
 from chamberopt.design.load import save_design
+from tests.chamberopt.cli.test_interrupt import BEGIN
 from tests.helpers.synthetic import plate_design
 
 ROOT = Path(__file__).parents[2]
@@ -170,5 +173,99 @@ def test_killed_at_a_random_moment(name: str, place: Path) -> None:
 @pytest.mark.long
 @pytest.mark.skipif(not hasattr(os, "setsid"), reason="needs sessions of processes")
 @pytest.mark.parametrize("name", COMMANDS)
-def test_killed_at_twenty_random_moments(name: str, place: Path) -> None:
-    check(place, name, 20, seed=2)
+def test_killed_at_thirty_random_moments(name: str, place: Path) -> None:
+    check(place, name, 30, seed=2)
+
+
+def interrupt_and_check(place: Path, name: str, out: Path, seconds: float) -> int:
+    """Start a command and press Ctrl-C after some seconds in it; its exit status."""
+    going = subprocess.Popen(
+        [sys.executable, "-c", BEGIN, *COMMANDS[name], "--out", str(out)],
+        cwd=place,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    assert going.stdout is not None
+    assert going.stdout.readline() == "\n"
+    time.sleep(seconds)
+    os.killpg(going.pid, signal.SIGINT)  # as a terminal does
+    _, message = going.communicate(timeout=60)
+    assert "Traceback" not in message
+    assert going.returncode in (0, 130), message
+    assert going.returncode == 0 or "interrupted" in message or "stop" in message, message
+    until = time.monotonic() + 20.0
+    while alive(going.pid) and time.monotonic() < until:
+        time.sleep(0.1)
+    assert not alive(going.pid)
+    return going.returncode
+
+
+@pytest.mark.long
+@pytest.mark.skipif(not hasattr(os, "setsid"), reason="needs sessions of processes")
+def test_ctrl_c_at_fifty_random_moments(place: Path) -> None:
+    """Ten of each of five commands; nothing is torn, and at least most were interrupted."""
+    rng, ended = np.random.default_rng(3), []
+    for name in ("simulate", "run", "sweep", "compare", "accuracy"):
+        check(place, name, 0, seed=3)  # the undisturbed run
+        whole = files(place / "whole" / name)
+        for number in range(10):
+            out = place / f"interrupted-{number}" / name
+            seconds = rng.uniform(0.0, float((place / f"{name}.seconds").read_text()))
+            ended.append(interrupt_and_check(place, name, out, seconds))
+            for file, content in files(out).items():
+                assert not torn(file, content, whole[file]), file
+            shutil.rmtree(out.parent, ignore_errors=True)
+    print(f"{ended.count(130)} of {len(ended)} were interrupted")
+    assert ended.count(130) > 25
+
+
+@pytest.mark.long
+def test_the_page_is_ended_at_twenty_random_moments(tmp_path: Path) -> None:
+    """Of any signal, and any command that it started: nothing is left after seconds."""
+    pytest.importorskip("uvicorn", reason="extra `page` is not installed")
+    from tests.chamberopt.output.editor.test_started_commands import left_in, served_with_a_running
+
+    rng = np.random.default_rng(4)
+    for number in range(20):
+        name = str(rng.choice(["SIGTERM", "SIGHUP", "SIGKILL", "SIGINT"]))
+        command = str(rng.choice(["simulate", "run", "sweep"]))
+        folder = tmp_path / str(number)
+        folder.mkdir()
+        page = served_with_a_running(command, folder, is_awaited=False)
+        time.sleep(rng.uniform(0.0, 6.0))
+        page.process.send_signal(signal.Signals[name])
+        page.process.communicate(timeout=60)
+        left = left_in(folder)
+        assert not left, (name, command, left)
+
+
+@pytest.mark.long
+def test_the_page_takes_no_body_beyond_its_limit(tmp_path: Path) -> None:
+    """Bodies in chunks of any size, whole, cut off and malformed: the server goes on in bounds."""
+    pytest.importorskip("uvicorn", reason="extra `page` is not installed")
+    from tests.chamberopt.output.editor.conftest import Served
+
+    rng, page = np.random.default_rng(5), Served(tmp_path)
+    resident = Path(f"/proc/{page.process.pid}/statm")
+    before = int(resident.read_text().split()[1])
+    for _ in range(60):
+        address, port = page.host.split(":")
+        with socket.create_connection((address, int(port)), timeout=20.0) as connection:
+            names = {"host": page.host, "origin": page.origin, "cookie": page.cookie,
+                     "x-chamberopt-key": page.key, "transfer-encoding": "chunked"}  # fmt: skip
+            head = "".join(f"{name}: {text}\r\n" for name, text in names.items())
+            connection.sendall(f"POST /shape HTTP/1.1\r\n{head}\r\n".encode())
+            size = int(rng.choice([1, 100, 60_000, 1_000_000]))
+            claimed = size if rng.random() < 0.8 else int(rng.choice([0, 2**31, 2**63]))
+            with suppress(OSError):
+                for _ in range(min(20_000_000 // size, 2_000)):
+                    connection.sendall(b"%x\r\n%s\r\n" % (claimed, bytes(size)))
+    try:
+        assert page.ask("/read", {})["read"] == page.read
+        assert int(resident.read_text().split()[1]) - before < 50e6 / os.sysconf("SC_PAGE_SIZE")
+    finally:
+        page.process.kill()
+        page.process.communicate()

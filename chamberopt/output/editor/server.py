@@ -11,7 +11,7 @@ from pathlib import Path
 import uvicorn
 from starlette.applications import Starlette
 from starlette.concurrency import run_in_threadpool
-from starlette.requests import Request
+from starlette.requests import ClientDisconnect, Request
 from starlette.responses import FileResponse, JSONResponse, Response
 from starlette.routing import Mount, Route
 from starlette.staticfiles import StaticFiles
@@ -57,6 +57,8 @@ def make_app(acts: Acts, port: int) -> OnePerson:
                 if body is None:
                     return JSONResponse({"error": TOO_LONG}, 413, {"Connection": "close"})
                 found = await run_in_threadpool(act, json.loads(body or b"{}"))
+            except ClientDisconnect:  # nobody waits for an answer
+                return Response(status_code=400)
             except SupersededError:
                 return JSONResponse({"superseded": True})
             except (InputError, SceneError) as error:

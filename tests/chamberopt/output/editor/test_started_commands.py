@@ -29,8 +29,23 @@ def processes_in(folder: Path) -> dict[int, str]:
     return found
 
 
-def served_with_a_running(command: str, folder: Path) -> Served:
-    """A page whose server has started a command that takes minutes, with processes of its own."""
+def left_in(folder: Path) -> dict[int, str]:
+    """The processes that work in a folder after ten seconds; they are ended."""
+    until = time.monotonic() + 10.0
+    while processes_in(folder) and time.monotonic() < until:
+        time.sleep(0.1)
+    left = processes_in(folder)
+    for process in left:
+        os.kill(process, signal.SIGKILL)
+    return left
+
+
+def served_with_a_running(command: str, folder: Path, is_awaited: bool = True) -> Served:
+    """A page whose server has started a command that takes minutes, with processes of its own.
+
+    Args:
+        is_awaited: whether the command simulates already.
+    """
     page = Served(folder)
     for name in ("design.toml", "study.toml"):
         (folder / name).write_text(TIME.sub("2000", (folder / name).read_text()))
@@ -38,7 +53,9 @@ def served_with_a_running(command: str, folder: Path) -> Served:
     of = "design.toml" if command == "simulate" else "study.toml"
     page.ask("/start", {"command": command, "of": of, "points": 4})
     until = time.monotonic() + 120.0
-    while not any(step in page.get("/status").read().decode() for step in SIMULATING):
+    while is_awaited and not any(
+        step in page.get("/status").read().decode() for step in SIMULATING
+    ):
         assert time.monotonic() < until
         time.sleep(0.1)
     return page
@@ -54,10 +71,4 @@ def test_nothing_outlives_the_server(name: str, command: str, tmp_path: Path) ->
     assert any(command in line for line in processes_in(tmp_path).values())
     page.process.send_signal(signal.Signals[name])
     page.process.communicate(timeout=60)
-    until = time.monotonic() + 10.0
-    while processes_in(tmp_path) and time.monotonic() < until:
-        time.sleep(0.1)
-    left = processes_in(tmp_path)
-    for process in left:
-        os.kill(process, signal.SIGKILL)
-    assert not left
+    assert not left_in(tmp_path)
