@@ -144,12 +144,49 @@ def _middles(surface: Surface, sides: np.ndarray) -> tuple[np.ndarray, ...]:
     bend = np.maximum(_angle(a, b), _lean(a, e) + _lean(b, e))
     width = np.abs(np.einsum("ei,ei->e", chord, unit_vectors(change)))
 
-    # Only what of the chord lies across the bend: straight along a cylinder nothing bends.
-    axis = unit_vectors(np.cross(a, b))
-    f = unit_vectors(chord - np.einsum("ei,ei->e", chord, axis)[:, None] * axis)
     normal = n0 + n1
-    normal = normal - 1.5 * np.einsum("sei,ei->se", normal, f)[..., None] * f
+    f = _tilts(surface, sides, normal, e, is_crease)
+    normal = normal - 1.5 * np.einsum("sei,ei->se", normal, e)[..., None] * f
     return place, unit_vectors(normal), bend, width
+
+
+def _tilts(
+    surface: Surface, sides: np.ndarray, normal: np.ndarray, e: np.ndarray, is_crease: np.ndarray
+) -> np.ndarray:
+    """The directions f of edges on both sides, (2, e, 3).
+
+    Args:
+        normal: in the middle of the edges, of any length, shape (2, e, 3).
+        e: unit vectors along the edges, shape (e, 3).
+    """
+    triangle, k = np.divmod(sides.T, 3)
+    at = (k + np.array([[0], [1]])) % 3  # the corners at e's start; the second side runs against e
+    own, following, apex = (
+        surface.normals[triangle, corner] for corner in (at, (2 * k + 1 - at) % 3, (k + 2) % 3)
+    )
+    corners = surface.vertices[surface.triangles]
+    chord = corners[triangle, (2 * k + 1 - at) % 3] - corners[triangle, at]
+    away = corners[triangle, (k + 2) % 3] - corners[triangle, at]
+    length = np.maximum(np.linalg.norm(chord, axis=2), 1e-30)
+    m = unit_vectors(np.cross(unit_vectors(normal), e))
+
+    def components(vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Along e and along m, (2, e) each."""
+        return np.einsum("sei,ei->se", vectors, e), np.einsum("sei,sei->se", vectors, m)
+
+    along, height = components(away)
+    height = np.where(np.abs(height) > 1e-9 * length, height, np.inf)
+    of_e = (following - own) / length[..., None]
+    of_m = (apex - own - along[..., None] * of_e) / height[..., None]
+    ee, em = components(of_e)
+    mm = components(of_m)[1]
+    size = ee * ee + em * em + np.abs(ee * mm - em * em)
+    turned = em * (ee + mm)
+    size, turned = (
+        np.where(is_crease, one, one.sum(axis=0)) for one in (size, turned)
+    )
+    share = np.divide(turned, size, out=np.zeros_like(size), where=size > 0.0)
+    return e + share[..., None] * m
 
 
 def _angle(one: np.ndarray, two: np.ndarray) -> np.ndarray:
