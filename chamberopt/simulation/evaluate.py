@@ -23,8 +23,8 @@ from chamberopt.coverage.field.target_field import (
     WindowSetting,
     find_target_field,
     require_narrow_gauge,
-    require_wide_gauge,
     require_touchable_zones,
+    require_wide_gauge,
 )
 from chamberopt.coverage.metrics import parse_objective, require_metrics, require_target
 from chamberopt.simulation.estimates import (
