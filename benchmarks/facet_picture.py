@@ -87,11 +87,14 @@ def main(path: Path) -> None:
     draw(axes[0], section(vertices, triangles), f"the file's facets, {90 / FACETS:.0f}° each")
     draw(axes[1], section(finer.vertices, finer.triangles), "divided along the arc behind them")
     figure.text(
-        0.5, 0.02,
-        f"fillet of {RADIUS:g} mm (dashed), ball of {2 * BALL:g} mm; red: where a ball that lies across "
-        "two facets touches nothing\nDents of this ball are 0.12 to 0.2 mm wide: they cover narrow strips from both sides, and wide ones never.",
-        ha="center", fontsize=9,
-    )  # fmt: skip
+        0.5,
+        0.02,
+        f"fillet of {RADIUS:g} mm (dashed), ball of {2 * BALL:g} mm; red: where a ball that lies "
+        "across two facets touches nothing\nDents of this ball are 0.12 to 0.2 mm wide: from both "
+        "sides they cover narrow strips, and wide ones never.",
+        ha="center",
+        fontsize=9,
+    )
     figure.subplots_adjust(left=0.02, right=0.98, top=0.88, bottom=0.14)
     figure.savefig(path, dpi=110)
 
