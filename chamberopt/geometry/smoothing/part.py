@@ -15,9 +15,13 @@ import numpy as np
 from chamberopt.common.errors import InputError
 from chamberopt.common.kept_records import kept, key_of
 from chamberopt.geometry.mesh_io.part_mesh import PartMesh
+from chamberopt.geometry.mesh_io.readers.raw_mesh import number_by_position
 from chamberopt.geometry.mesh_io.self_intersection import crossing_pairs
+from chamberopt.geometry.smoothing.normals import plane_facets
+from chamberopt.geometry.smoothing.rounds import find_edges, is_hard
 from chamberopt.geometry.smoothing.smooth import Surfaces, divide_rounds, find_surfaces, moves
-from chamberopt.geometry.triangles import areas, tetrahedron_volumes
+from chamberopt.geometry.solids import simplify_planes
+from chamberopt.geometry.triangles import areas, tetrahedron_volumes, unit_normals
 
 if TYPE_CHECKING:
     from chamberopt.geometry.smoothing.divide import Surface
@@ -125,6 +129,74 @@ def smooth(mesh: PartMesh, target: Rule, zones: list[Rule]) -> SmoothPart:
 
 def _smooth(mesh: PartMesh, target: Rule, zones: list[Rule]) -> SmoothPart:
     """Divide the rounds of a part; arguments as for `smooth`."""
+    rules = [target, *zones]
+    if mesh.normals is None and _has_points_in_facets(mesh, rules):
+        plain, plain_rules = _without_points_in_planes(mesh, rules)
+        found = _divided(plain, plain_rules[0], plain_rules[1:])
+        if len(found.triangles) > len(plain.triangles):
+            return _on_file(found, plain, mesh)
+    return _divided(mesh, target, zones)
+
+
+def _has_points_in_facets(mesh: PartMesh, rules: list[Rule]) -> bool:
+    """Whether a facet of a round to be divided has vertices of the file inside.
+
+    They are on the facet, and not on the surface behind it.
+    """
+    edges = find_edges(mesh.vertices, mesh.triangles)
+    facet, size = plane_facets(edges, len(mesh.triangles)), np.abs(edges.turn)
+    limit = np.full(len(mesh.triangles), np.inf)
+    for rule in rules:
+        limit[rule.triangles] = math.inf if rule.is_off else rule.turn
+    bends = ~is_hard(edges) & (size > limit[edges.triangles].min(axis=1))
+    of_round = np.isin(facet, facet[edges.triangles[bends]])
+    # A vertex inside a facet has triangles of that facet alone around it.
+    low, high = np.full((2, len(mesh.vertices)), -1)
+    low[:] = len(mesh.triangles)
+    for corner in mesh.triangles.T:
+        np.minimum.at(low, corner, facet)
+        np.maximum.at(high, corner, facet)
+    inside = (low == high)[mesh.triangles].any(axis=1)
+    return bool((inside & of_round).any())
+
+
+def _without_points_in_planes(mesh: PartMesh, rules: list[Rule]) -> tuple[PartMesh, list[Rule]]:
+    """The part with as few triangles as its planes need, and its rules.
+
+    Borders of the rules' triangles stay where they are.
+    """
+    marks = np.stack([rule.triangles for rule in rules], axis=1)
+    kinds, label = np.unique(marks, axis=0, return_inverse=True)
+    vertices, triangles, label = simplify_planes(mesh.vertices, mesh.triangles, label.reshape(-1))
+    plain = replace(
+        mesh,
+        vertices=vertices,
+        triangles=triangles,
+        numbering=number_by_position(len(triangles)),
+        groups={},
+    )
+    return plain, [rule._replace(triangles=kinds[label, k]) for k, rule in enumerate(rules)]
+
+
+def _on_file(found: SmoothPart, plain: PartMesh, mesh: PartMesh) -> SmoothPart:
+    """A divided part whose origins are triangles of the file, not of its simplified mesh.
+
+    Each is the triangle that is closest to the middle of the new one, moved into its plane.
+    """
+    from sim_core import TriangleMesh, closest_points
+
+    corners = plain.vertices[plain.triangles[found.origin]]
+    normal, middle = unit_normals(corners), found.vertices[found.triangles].mean(axis=1)
+    height = np.einsum("ki,ki->k", middle - corners[:, 0], normal)
+    surface = TriangleMesh(mesh.vertices, mesh.triangles, np.zeros(len(mesh.triangles), np.uint8))
+    place = middle - height[:, None] * normal
+    origin = closest_points(surface, place, float(np.ptp(mesh.vertices))).triangle
+    facts = replace(found.facts, given_triangles=len(mesh.triangles))
+    return replace(found, origin=origin, facts=facts)
+
+
+def _divided(mesh: PartMesh, target: Rule, zones: list[Rule]) -> SmoothPart:
+    """Divide the rounds of a part whose vertices are all on its surface."""
     vertices, triangles, on_target = mesh.vertices, mesh.triangles, target.triangles
     near = _near(vertices, triangles, np.any([one.triangles for one in (target, *zones)], axis=0))
     surfaces = find_surfaces(vertices, triangles, near, mesh.normals)
