@@ -182,9 +182,7 @@ def _tilts(
     mm = components(of_m)[1]
     size = ee * ee + em * em + np.abs(ee * mm - em * em)
     turned = em * (ee + mm)
-    size, turned = (
-        np.where(is_crease, one, one.sum(axis=0)) for one in (size, turned)
-    )
+    size, turned = (np.where(is_crease, one, one.sum(axis=0)) for one in (size, turned))
     share = np.divide(turned, size, out=np.zeros_like(size), where=size > 0.0)
     return e + share[..., None] * m
 
