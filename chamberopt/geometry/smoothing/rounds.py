@@ -35,9 +35,9 @@ SMOOTH = np.radians(1.0)  # edges that turn by less need no evidence
 ALIKE = (
     1.6  # factor of curvatures: beside a plane the first facet of a round has 3/4 of the others'
 )
-# A round goes on beyond a facet: its other edges bend about an edge by this share of that edge's
-# own bend. Edges that turn by less than the angle need not tell: facets stay so coarse.
-GOES_ON, NO_MATTER = 0.45, np.radians(4.0)
+# A round goes on beyond a facet: its other edges bend about an edge too, by this share of that
+# edge's own bend if it turns by CONVEX_SURE, and by less, with the square, if it turns by less.
+GOES_ON = 0.5
 
 
 class Edges(NamedTuple):
@@ -142,7 +142,8 @@ def _is_in_round(facet: np.ndarray, edges: Edges, sure: np.ndarray, area: np.nda
     of_round[pairs[alike]] = True
     beside = of_round[facet]
     bends_beside = _bends_beside(facet, bend, edges.along, len(area))
-    goes_on = (bends_beside > GOES_ON * bend[:, None]) | (edges.turn < NO_MATTER)[:, None]
+    needed = GOES_ON * (edges.turn / CONVEX_SURE) ** 2 * bend
+    goes_on = bends_beside >= needed[:, None]
     alike = beside.all(axis=1) & _are_alike(curvature[facet])
     return (goes_on & beside).any(axis=1) & (sure | alike)
 
