@@ -29,7 +29,7 @@ from chamberopt.geometry.triangles import area_vectors, edge_keys, unit_vectors
 LEVELS = 6  # rounds of splitting; 90 degrees an edge at 6 degrees take four
 TURNED = 0.6  # cosine between a triangle and the normals at its corners: below, it is not made
 SLACK = 1.02  # what bends by the limit is not split, whichever way it is rounded
-WEAK = 0.02  # sine between the sides of a crease below which it has no tangent of its own
+WEAK = 0.1  # sine between the sides of a crease below which it has no tangent of its own
 LESS = 1.0 / 3.0  # rise of the middle of half an edge over that of the edge, with a margin over 1/4
 TIE = 1e-6  # relative difference of diagonals that counts as none
 

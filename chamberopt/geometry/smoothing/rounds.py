@@ -35,6 +35,9 @@ SMOOTH = np.radians(1.0)  # edges that turn by less need no evidence
 ALIKE = (
     1.6  # factor of curvatures: beside a plane the first facet of a round has 3/4 of the others'
 )
+# A round goes on beyond a facet: its other edges bend about an edge too, by this share of that
+# edge's own bend if it turns by CONVEX_SURE, and by less, with the square, if it turns by less.
+GOES_ON = 0.5
 
 
 class Edges(NamedTuple):
@@ -44,11 +47,13 @@ class Edges(NamedTuple):
         sides: the two sides at each edge, 3 t + k for side k of triangle t, shape (e, 2).
         turn: angle between the normals of both sides [rad], negative in a hollow, shape (e,).
         length: [m], shape (e,).
+        along: unit vector, shape (e, 3).
     """
 
     sides: np.ndarray
     turn: np.ndarray
     length: np.ndarray
+    along: np.ndarray
 
     @property
     def triangles(self) -> np.ndarray:
@@ -63,9 +68,10 @@ def find_edges(vertices: np.ndarray, triangles: np.ndarray) -> Edges:
     start, end = sides_of(triangles)[sides[:, 0]].T
     along = vertices[end] - vertices[start]
     length = np.linalg.norm(along, axis=1)
+    along = unit_vectors(along)
     one, two = normal[sides.T // 3]
-    across = np.einsum("ij,ij->i", np.cross(one, two), unit_vectors(along))
-    return Edges(sides, np.arctan2(across, np.einsum("ij,ij->i", one, two)), length)
+    across = np.einsum("ij,ij->i", np.cross(one, two), along)
+    return Edges(sides, np.arctan2(across, np.einsum("ij,ij->i", one, two)), length, along)
 
 
 def is_hard(edges: Edges) -> np.ndarray:
@@ -80,37 +86,54 @@ def find_creases(edges: Edges, area: np.ndarray) -> np.ndarray:
         area: of the triangles [m²], shape (m,).
     """
     size, hard, count = np.abs(edges.turn), is_hard(edges), len(area)
-    sure = (edges.turn < CONVEX_SURE) & (edges.turn > -HOLLOW_SURE)
     one, two = edges.triangles.T
     largest = np.zeros(count)
     for triangle in (one, two):
         np.maximum.at(largest, triangle[~hard], size[~hard])
-    level = ~hard & (size < np.maximum(LEVEL, OF_LARGEST * np.minimum(largest[one], largest[two])))
-    facets, facet = connected_pieces(one[level], two[level], count)
+    uneven = OF_LARGEST * np.minimum(largest[one], largest[two])
+    smooth = size <= SMOOTH
+    for level in (~hard & (size < LEVEL), ~hard & (size < np.maximum(LEVEL, uneven))):
+        smooth |= level | _has_evidence(edges, level, hard, area)
+    return hard | ~smooth
+
+
+def _has_evidence(
+    edges: Edges, level: np.ndarray, hard: np.ndarray, area: np.ndarray
+) -> np.ndarray:
+    """Marks (e,) the edges that belong to a round.
+
+    Args:
+        level: marks the edges within facets, shape (e,).
+        hard: marks the edges that belong to none, shape (e,).
+        area: of the triangles [m²], shape (m,).
+    """
+    size = np.abs(edges.turn)
+    sure = (edges.turn < CONVEX_SURE) & (edges.turn > -HOLLOW_SURE)
+    one, two = edges.triangles.T
+    facets, facet = connected_pieces(one[level], two[level], len(area))
     border = np.flatnonzero(~level & ~hard & (facet[one] != facet[two]))
     evident = np.zeros(len(size), dtype=bool)
     for bend in (1.0, -1.0):
         same = border[bend * edges.turn[border] > LEVEL]
         evident[same] = _is_in_round(
             facet[edges.triangles[same]],
-            edges.length[same] * size[same],
+            Edges(*(values[same] for values in edges._replace(turn=size))),
             sure[same],
             np.bincount(facet, area, facets),
         )
-    return hard | ~(level | evident | (size <= SMOOTH))
+    return evident
 
 
-def _is_in_round(
-    facet: np.ndarray, bend: np.ndarray, sure: np.ndarray, area: np.ndarray
-) -> np.ndarray:
+def _is_in_round(facet: np.ndarray, edges: Edges, sure: np.ndarray, area: np.ndarray) -> np.ndarray:
     """Whether edges that all turn the same way belong to a round, shape (k,).
 
     Args:
         facet: on both sides of each, shape (k, 2).
-        bend: length times turn of each, shape (k,).
+        edges: the same with turns made positive.
         sure: marks the edges that are evidence, shape (k,).
         area: of the facets, shape (f,).
     """
+    bend = edges.length * edges.turn
     curvature = np.bincount(facet.T.ravel(), np.tile(bend, 2), len(area)) / np.maximum(area, 1e-30)
     pairs = np.unique(np.sort(facet[sure], axis=1), axis=0)
     is_inner = np.bincount(pairs.ravel(), minlength=len(area)) >= 2
@@ -118,7 +141,24 @@ def _is_in_round(
     of_round = np.zeros(len(area), dtype=bool)
     of_round[pairs[alike]] = True
     beside = of_round[facet]
-    return np.where(sure, beside.any(axis=1), beside.all(axis=1) & _are_alike(curvature[facet]))
+    bends_beside = _bends_beside(facet, bend, edges.along, len(area))
+    needed = GOES_ON * (edges.turn / CONVEX_SURE) ** 2 * bend
+    goes_on = bends_beside >= needed[:, None]
+    alike = beside.all(axis=1) & _are_alike(curvature[facet])
+    return (goes_on & beside).any(axis=1) & (sure | alike)
+
+
+def _bends_beside(facet: np.ndarray, bend: np.ndarray, along: np.ndarray, count: int) -> np.ndarray:
+    """Bends about each edge of the other edges of the facets on both sides, (k, 2).
+
+    What bends about an axis across the edge does not count: the round of a shaft tells nothing of
+    the edge at its end.
+    """
+    tensor = np.einsum("k,ki,kj->kij", bend, along, along).reshape(-1, 9)
+    sums = np.stack(
+        [np.bincount(facet.T.ravel(), np.tile(one, 2), count) for one in tensor.T], axis=1
+    ).reshape(-1, 3, 3)
+    return np.einsum("kfij,ki,kj->kf", sums[facet], along, along) - bend[:, None]
 
 
 def _are_alike(curvature: np.ndarray) -> np.ndarray:

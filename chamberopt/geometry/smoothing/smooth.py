@@ -39,6 +39,7 @@ USUAL_LIMIT = np.radians(6.0)
 RISE = 2.0
 LEFT_OVER = 0.5  # share of an edge's turn that no round explains, above which it is a crease
 CREASE = np.radians(8.0)  # the least turn of such a crease
+EXPLAINED = 0.25  # share below which an edge without evidence is of the rounds beside it
 # Share of a round's turns that nothing explains, above which it is noise; the same of all turns.
 NOISE, NOISE_IN_ALL = 0.3, 0.2
 LINE = 12.0  # degrees: creases that turn by less and end freely are no line
@@ -93,7 +94,8 @@ def find_surfaces(
     left = edges.turn - phi.ravel()[edges.sides].sum(axis=1)
     of_round = fitted[edges.triangles].any(axis=1) & ~lone
     sharp = of_round & (size > CREASE) & (np.sign(edges.turn) * left > LEFT_OVER * size)
-    is_crease = lone | sharp
+    explained = lone & ~is_hard(edges) & (np.abs(left) < EXPLAINED * size)
+    is_crease = (lone & ~explained) | sharp
     on_crease = np.zeros(3 * len(triangles), dtype=bool)
     on_crease[edges.sides[is_crease]] = True
     if given is None:
