@@ -21,15 +21,15 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from chamberopt.common.estimate import Estimate, estimate, jackknife
+from chamberopt.common.estimate import ZERO_TOLERANCE, Estimate, estimate, jackknife
 from chamberopt.coverage.coverage_from_impacts import in_halves
-from chamberopt.coverage.coverage_intervals import root_of_variance
 from chamberopt.coverage.field.reached import Reach
 from chamberopt.coverage.field.surface_points import sampling_errors, sparse_points
 from chamberopt.coverage.metrics import P05, P95
 from chamberopt.coverage.percentile import in_order
 from chamberopt.coverage.strength import (
     LEVELS,
+    area_of_dent,
     dent_rates,
     levels,
     saturation_time,
@@ -50,6 +50,7 @@ SPLITS = 3  # into halves, and into quarters
 # Largest step of the mean from half of the dents to all, over the mean. Where it is larger, S comes
 # from dents too rare for the windows, and the mean grows too slowly for the step to tell how far.
 MAX_STEP = 0.055
+FEW_DENTS = 25.0  # in the median window, the fewest of which the evenness is shown
 MICROMETRES = 1e6
 
 
@@ -60,11 +61,13 @@ class StrengthHistograms(NamedTuple):
         parts: dented area over area, of each batch in each window, (g, p, LEVELS).
         seconds: simulated time of each batch [s], (g,).
         highest: strength at the upper end of the levels [m].
+        dents: of all batches in the median window, 0 where that is not known.
     """
 
     parts: np.ndarray
     seconds: np.ndarray
     highest: float
+    dents: float = 0.0
 
 
 class Saturated(NamedTuple):
@@ -150,7 +153,11 @@ def level_histograms(
             parts[number] += strength_histogram(
                 windows, area, contacts, np.sqrt(halves) * dent[some], levels(s[some], highest)
             )
-    return StrengthHistograms(parts, seconds * np.array([len(one) for one in batches]), highest)
+    sizes = [area_of_dent(dent[dent > 0.0]) for batch in dents for dent, _ in batch]
+    size = float(np.concatenate(sizes).mean()) if highest else 1.0
+    median = float(np.median(parts.sum(axis=(0, 2)) * area)) / size
+    seconds_of = seconds * np.array([len(one) for one in batches])
+    return StrengthHistograms(parts, seconds_of, highest, median)
 
 
 def estimates_of(found: StrengthHistograms, reach: Reach) -> dict[str, Estimate]:
@@ -181,7 +188,7 @@ def estimates_of(found: StrengthHistograms, reach: Reach) -> dict[str, Estimate]
                  for one in rests]  # fmt: skip
     estimates = {
         "intensity_uniformity": _uniformity_estimate(
-            spreads, spread_of_halves, np.array([everything, *variances]), whole, reach
+            spreads, spread_of_halves, np.array([everything, *variances]), whole, reach, found.dents
         )
     }
     plain = _figures(whole, float(spreads.mean()))
@@ -278,6 +285,7 @@ def _uniformity_estimate(
     variances: np.ndarray,
     whole: Saturated,
     reach: Reach,
+    dents: float,
 ) -> Estimate:
     """The evenness over the whole target.
 
@@ -286,28 +294,30 @@ def _uniformity_estimate(
             (SPLITS,).
         of_halves: the same, not corrected, (SPLITS,).
         variances: relative variance of S from all batches and from all but each, (g + 1,).
+        dents: in the median window.
     """
-    reachable = reach.share
-    value = _uniformity(float(spreads.mean()), reachable)
-    by_reach = value - _uniformity(float(spreads.mean()), reachable - reach.error)
-    # The bias falls more slowly than that; twice the step held where once held in 3 of 4 runs.
-    # Steps of single pairs do not cancel where their mean is near 0 by chance.
-    steps = [
-        _uniformity(corrected, reachable) - _uniformity(half, reachable)
-        for corrected, half in zip(spreads, of_halves, strict=True)
-    ]
-    bias = 2.0 * math.sqrt(float(np.mean(np.square(steps))))
-    of_some = [
-        _uniformity(_spread(some, some), reachable) for some in sparse_points(whole.strength)
-    ]
-    spread = root_of_variance(estimate(jackknife(variances), 0.0))
-    deviations = np.array(spread.pseudovalues) - spread.value
-    return estimate(
-        value - deviations,
-        highest=1.0,
-        bias=bias,
-        shared=[*sampling_errors(np.array(of_some)), by_reach],
-    )
+    reachable, spread = reach.share, float(spreads.mean())
+    value = _uniformity(spread, reachable)
+    of_some = np.array([_spread(some, some) for some in sparse_points(whole.strength)]) / reachable
+    by_reach = spread / reachable - spread / max(reachable - reach.error, ZERO_TOLERANCE)
+    found = estimate(jackknife(variances), shared=[*sampling_errors(of_some), by_reach])
+    # What is left of the bias falls faster than the steps: on a gear it was twice the step at 25
+    # dents in a window. Steps of single pairs do not cancel near 0 by chance.
+    few = 2.0 * math.sqrt(min(1.0, FEW_DENTS / dents)) if dents else 2.0
+    left = few * math.sqrt(float(np.mean(np.square(spreads - of_halves)))) / reachable
+    # By how much the choice of halves moves the variance, of 3 choices.
+    of_choice = 2.0 * float(spreads.std(ddof=1)) / reachable
+    known_to = math.hypot(found.half_width, left, of_choice)
+    # The root is steep at 0: the longer side of its interval serves for both.
+    variance, root = max(0.0, spread / reachable - 1.0), 1.0 - value
+    low, high = (math.sqrt(max(0.0, variance + side * known_to)) for side in (-1.0, 1.0))
+    half_width = max(root - low, high - root)
+    slope = half_width / known_to if known_to else 0.0
+    deviations = slope * (np.array(found.pseudovalues) - found.value)
+    shared = [-slope * one for one in found.shared]
+    uniformity = estimate(value - deviations, highest=1.0, shared=shared)
+    bias = max(0.0, half_width - uniformity.half_width)
+    return replace(uniformity, half_width=half_width, bias=bias)
 
 
 def _spread(one: np.ndarray, two: np.ndarray) -> float:
