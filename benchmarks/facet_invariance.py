@@ -50,7 +50,7 @@ IN_SMALL_CHAMBER = WHOLE | {
     "chamber.sonotrode_distance_mm": 8,
     "shot.mass_g": 3,
     "process.treatment_time_s": 60,
-    "process.accuracy.simulated_time_s": 0.8,
+    "process.accuracy.simulated_time_s": 4.0,
 }
 OFF = {"part.smoothing": "off"}
 Draw = Callable[[Path], None]  # writes an STL
