@@ -135,13 +135,8 @@ class Solid:
                 axis=2,
             )
             return _welded(grid.reshape(-1, 3), _grid(*grid.shape[:2], closed, True, rng))
-        levels = np.array([0.0, self.height])
-        grid = np.stack(
-            [np.c_[points, np.full(len(points), z)] for z in levels], axis=1
-        )  # (points, levels, 3)
-        triangles = _grid(*grid.shape[:2], True, False, rng)[:, ::-1]
-        flat = 2 * np.asarray(manifold3d.triangulate([points]), dtype=np.int64)
-        return _welded(grid.reshape(-1, 3), np.concatenate([triangles, flat[:, ::-1], flat + 1]))
+        levels = [np.c_[points, np.full(len(points), z)] for z in (0.0, self.height)]
+        return stacked(np.stack(levels, axis=1), rng)
 
     def irregular(self, step: float, size: float) -> Mesh:
         """A mesh by Gmsh, of facets that turn by a step [rad] on rounds and of a size elsewhere."""
@@ -212,6 +207,22 @@ class Solid:
     def _is_axis(self, piece: Piece) -> bool:
         ends = abs(piece.start[0]) + abs(piece.end[0])
         return self.height is None and not piece.turn and ends < 1e-12
+
+
+def stacked(rows: np.ndarray, rng: np.random.Generator | None = None) -> Mesh:
+    """The solid between closed outlines above one another.
+
+    Args:
+        rows: points of each outline, counter-clockwise from above, shape (points, outlines, 3).
+        rng: for diagonals either way.
+    """
+    triangles = _grid(*rows.shape[:2], True, False, rng)[:, ::-1]
+    last = rows.shape[1] - 1
+    low, high = (
+        rows.shape[1] * np.asarray(manifold3d.triangulate([rows[:, k, :2]]), dtype=np.int64) + k
+        for k in (0, last)
+    )
+    return _welded(rows.reshape(-1, 3), np.concatenate([triangles, low[:, ::-1], high]))
 
 
 def _left(vector: np.ndarray) -> np.ndarray:

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
     from chamberopt.geometry.smoothing.rounds import Edges
 
-FIT, CREASE = 2.5, 0.1
+FIT, CREASE = 2.5, 0.5
 # Of the reweighted least squares: the most steps, [rad] below which a residual counts by its
 # square, and [rad] of the last step.
 STEPS, FLOOR, LAST = 25, 0.01, 1e-3

@@ -28,8 +28,8 @@ CONVEX_SURE, HOLLOW_SURE = np.radians(40.0), np.radians(60.0)
 # may lie on the limit.
 CONVEX_CREASE, HOLLOW_CREASE = np.radians(48.0), np.radians(66.0)
 LEVEL = np.radians(0.3)  # triangles that turn by less are one facet
-# Also those that turn by less than this share of the largest turn of either: halves of a
-# quadrangle that is not quite flat.
+# Also those that turn by less than this share of the largest turn of either, and least of all sides
+# of one: halves of a quadrangle that is not quite flat.
 OF_LARGEST = 0.3
 SMOOTH = np.radians(1.0)  # edges that turn by less need no evidence
 ALIKE = (
@@ -90,9 +90,14 @@ def find_creases(edges: Edges, area: np.ndarray) -> np.ndarray:
     largest = np.zeros(count)
     for triangle in (one, two):
         np.maximum.at(largest, triangle[~hard], size[~hard])
-    uneven = OF_LARGEST * np.minimum(largest[one], largest[two])
+    least = np.full(count, np.inf)
+    for triangle in (one, two):
+        np.minimum.at(least, triangle, size)
+    flat = ~hard & (size < LEVEL)
+    nearly = ~hard & (size < OF_LARGEST * np.minimum(largest[one], largest[two]))
+    nearly &= (size <= least[one]) | (size <= least[two])
     smooth = size <= SMOOTH
-    for level in (~hard & (size < LEVEL), ~hard & (size < np.maximum(LEVEL, uneven))):
+    for level in (flat, flat | nearly):
         smooth |= level | _has_evidence(edges, level, hard, area)
     return hard | ~smooth
 
