@@ -23,7 +23,7 @@ PLAIN = sum(
     for name in ("O_NONBLOCK", "O_NOFOLLOW", "O_CLOEXEC", "O_BINARY", "O_NOINHERIT")
 )
 NO_FOLLOW = getattr(os, "O_NOFOLLOW", 0)
-FOLDER = getattr(os, "O_PATH", os.O_RDONLY) | getattr(os, "O_DIRECTORY", 0)
+FOLDER = os.O_RDONLY | getattr(os, "O_DIRECTORY", 0)
 BY_DESCRIPTOR = os.open in os.supports_dir_fd and bool(NO_FOLLOW)
 SWAPS, SWAP = ("renameat2", "renameatx_np"), 2  # of Linux and macOS, which Python lacks
 JUNCTION = 0xA0000003  # tag of a folder of Windows that is a link to another
@@ -169,12 +169,9 @@ class OpenFolder:
 
     def sync(self) -> None:
         """Write the names to the disk, so that they survive a power cut."""
-        with suppress(OSError):  # Windows cannot open folders
-            file = os.open(self._at("."), os.O_RDONLY, dir_fd=self._file)
-            try:
-                os.fsync(file)
-            finally:
-                os.close(file)
+        if self._file is not None:
+            with suppress(OSError):  # some file systems cannot
+                os.fsync(self._file)
 
     def _at(self, name: str) -> str | Path:
         return self.path / name if self._file is None else name

@@ -27,6 +27,7 @@ OUTPUTS = {
 }  # fmt: skip
 # What differs between two runs that nothing disturbed.
 DIFFERS = ("timings.jsonl", "history.csv")
+DATED = (".json", ".html", ".pdf")
 DATES = re.compile(
     rb'"(created|sha256|seconds|\w+\.csv)": [^\n]*|"(timings_s|files)": \{[^}]*\}'
     rb"|report made [-\d]*|/CreationDate \([^)]*\)"
@@ -53,7 +54,9 @@ def state(path: Path) -> dict[str, bytes]:
     """What a file, or each file in a folder, holds, but for dates and times."""
     files = [path] if path.is_file() else [one for one in sorted(path.rglob("*")) if one.is_file()]
     return {
-        one.relative_to(path.parent).as_posix(): DATES.sub(b"", one.read_bytes())
+        one.relative_to(path.parent).as_posix(): (
+            DATES.sub(b"", one.read_bytes()) if one.suffix in DATED else one.read_bytes()
+        )
         for one in files
         if one.name not in DIFFERS
     }

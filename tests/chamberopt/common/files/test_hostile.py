@@ -144,7 +144,7 @@ def test_it_stays_inside(case: str, server: Server, scene: Path, tmp_path: Path)
     outside.mkdir()
     change(folder, outside)
     before = fingerprint(outside)
-    ended = server.run(folder, words.split(), seconds=20)
+    ended = server.run(folder, words.split(), seconds=60)
     assert fault(ended) is None, ended
     assert ended.status == status, ended
     assert fingerprint(outside) == before
