@@ -24,6 +24,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from benchmarks.table import print_table, write_csv
 from chamberopt.coverage import strength_intervals
+from chamberopt.coverage.field.reached import Reach
 from chamberopt.coverage.strength import LEVELS, levels, saturated_strength
 from chamberopt.coverage.strength_intervals import MAX_STEP, StrengthHistograms, estimates_of
 
@@ -75,7 +76,7 @@ def known(kind: str, dents: int, highest: float, seed: int) -> dict[str, Any]:
     parts = np.zeros((BATCHES * WINDOWS, LEVELS))
     np.add.at(parts, (np.repeat(np.arange(len(counts)), counts), levels(s, highest)), AREA * s)
     histograms = parts.reshape(BATCHES, WINDOWS, LEVELS)
-    return estimates_of(StrengthHistograms(histograms, np.ones(BATCHES), highest), 1.0)
+    return estimates_of(StrengthHistograms(histograms, np.ones(BATCHES), highest), Reach(1.0))
 
 
 def main() -> None:

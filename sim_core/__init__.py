@@ -29,7 +29,7 @@ from sim_core.geometry.triangle_lookup import find_triangles
 from sim_core.loop.compile_ahead import compile_simulator, is_compiled
 from sim_core.loop.impact_log import CollisionLog, ImpactLog
 from sim_core.loop.simulate import Collisions, SimulationResult, simulate
-from sim_core.numerics.jit import jit
+from sim_core.numerics.jit import jit, user_cache
 from sim_core.scene.frames import Energies, Frames, energies
 from sim_core.scene.packing import pack_balls
 from sim_core.scene.physics import BallCollisions, Physics
@@ -80,4 +80,5 @@ __all__ = [
     "restitution_at",
     "simulate",
     "surface_effects",
+    "user_cache",
 ]

@@ -289,7 +289,9 @@ def _only_reachable(
     from sim_core import TriangleMesh
 
     ball = min(design.shot.diameters)
-    reach = find_reach(TriangleMesh(room.vertices, room.triangles, traced.tags), ball)
+    mesh = TriangleMesh(room.vertices, room.triangles, traced.tags)
+    normals = part.normals_in_cavity(room.vertices, room.triangles, traced.source)
+    reach = find_reach(mesh, ball, normals=normals)
     share = reached_part_share(reach, traced.source, len(part.triangles))
     target = part.target & (share > 0.5)
     if not target.any():

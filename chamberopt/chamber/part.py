@@ -4,25 +4,32 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
-from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from chamberopt.chamber.target import chosen_triangles
 from chamberopt.common.errors import InputError
 from chamberopt.geometry.mesh_io.part_mesh import PartMesh, read_part_cached
-from chamberopt.geometry.mesh_io.readers.step.tessellation import Tessellation
 from chamberopt.geometry.remesh import remesh, triangle_quality
+from chamberopt.geometry.smoothing.part import SmoothingFacts, smooth
 from chamberopt.geometry.solids import snap_to_grid
-from chamberopt.geometry.triangles import areas, rotation_matrix
+from chamberopt.geometry.triangles import (
+    areas,
+    interpolate,
+    rotation_matrix,
+    unit_normals,
+    unit_vectors,
+)
 
 if TYPE_CHECKING:
     from chamberopt.design.design import Design
-    from chamberopt.design.part import Selection, Target
+    from chamberopt.design.part import Selection, SmoothingTable, Target
+    from chamberopt.design.peening.zones import Zone
 
 Axis = tuple[np.ndarray, np.ndarray]
 
+LEAST_MOVED = 1e-3  # share of the target's area that is worth a word
 MAX_ELEMENTS = 3e5  # makes a few minutes of meshing, and slow steps after it
 
 
@@ -31,7 +38,7 @@ class PartOfFile:
     """What a result needs of the part's file once it has been read; without groups and notes."""
 
     simulated: PartMesh  # in the file's frame
-    original: PartMesh | None  # with the file's own triangles, if target.element_mm asks for others
+    original: PartMesh | None  # with the file's own triangles, if others are simulated
     rotation: np.ndarray  # from the file's frame to the chamber's, (3, 3), applied before the shift
     shift: np.ndarray  # [m], (3,)
 
@@ -40,8 +47,9 @@ class PartOfFile:
 class Part:
     """The part in the chamber's frame.
 
-    It has the user's own triangles in the file's order, unless target.element_mm asks for others.
-    It is closed, unless its file draws it as the piece that bounds the room of a whole set-up.
+    It has the user's own triangles in the file's order, but for rounds that are divided, and unless
+    target.element_mm asks for others. It is closed, unless its file draws it as the piece that
+    bounds the room of a whole set-up.
     """
 
     vertices: np.ndarray  # [m], (n, 3)
@@ -54,6 +62,47 @@ class Part:
     names: tuple[str, ...] = ()  # of the file's groups
     file: PartOfFile | None = None  # None only in parts that no file has
     zones: dict[str, np.ndarray] = field(default_factory=dict)  # triangles of each zone, (m,) bool
+    # Of the surface behind the triangles at their corners, unit vectors outward, (m, 3, 3) float32;
+    # None where it is the triangles.
+    normals: np.ndarray | None = None
+    hollow: np.ndarray | None = None  # largest hollow curvature of that surface [1/m], (m,)
+    smoothing: SmoothingFacts | None = None  # None where there is nothing to smooth
+
+    @property
+    def corner_normals(self) -> np.ndarray:
+        """Unit normals of the surface at the corners of its triangles, (m, 3, 3)."""
+        if self.normals is not None:
+            return self.normals
+        return np.repeat(unit_normals(self.vertices[self.triangles])[:, None], 3, axis=1)
+
+    @property
+    def corners_with_normals(self) -> np.ndarray:
+        """Corners [m] of its triangles and the unit normals of the surface there, (m, 3, 6)."""
+        return np.concatenate([self.vertices[self.triangles], self.corner_normals], axis=2)
+
+    def normals_in_cavity(
+        self, vertices: np.ndarray, triangles: np.ndarray, source: np.ndarray
+    ) -> np.ndarray:
+        """Unit normals into a cavity at the corners of its triangles, (k, 3, 3).
+
+        Args:
+            vertices: of the cavity [m], shape (n, 3).
+            triangles: normals out of the cavity, shape (k, 3).
+            source: part triangle on which each one lies, else -1, shape (k,).
+        """
+        corners = vertices[triangles]
+        normals = np.repeat(-unit_normals(corners)[:, None], 3, axis=1)
+        own = np.flatnonzero(source >= 0)
+        at = self.normals_at(np.repeat(source[own], 3), corners[own].reshape(-1, 3))
+        normals[own] = at.reshape(-1, 3, 3)
+        return normals
+
+    def normals_at(self, triangle: np.ndarray, place: np.ndarray) -> np.ndarray:
+        """Unit normals (p, 3) of the surface at places (p, 3) [m] on triangles (p,)."""
+        corners = self.vertices[self.triangles[triangle]]
+        if self.normals is None:
+            return unit_normals(corners)
+        return unit_vectors(interpolate(self.normals[triangle], corners, place))
 
     @property
     def elements(self) -> np.ndarray:
@@ -73,22 +122,51 @@ def posed_part(design: Design) -> tuple[Part, list[str]]:
     Raises:
         InputError: the file cannot be used, or the target is empty.
     """
-    mesh, target = _meshed_part(design)
-    turn, shift = _pose(mesh, design)
-    vertices = snap_to_grid(mesh.vertices @ turn.T + shift)
-    area = areas(vertices, mesh.triangles)
-    simulated = replace(mesh, groups={}, notes=())
-    is_remeshed = design.part.target.element is not None
-    original = replace(_part_of_file(design), groups={}, notes=()) if is_remeshed else None
-    file = PartOfFile(simulated, original, turn, shift)
-    of_file = mesh.sha256, mesh.unit, tuple(mesh.groups), file
+    given, table = _part_of_file(design), design.part
+    target = _chosen(given, table.target, "part.target")
     zones = {
-        zone.name: chosen_triangles(mesh, zone.target, f"zones.{k}.target")
+        zone.name: _chosen(given, zone.target, f"zones.{k}.target")
         for k, zone in enumerate(design.zones)
     }
-    name = design.part.mesh_path.name
-    part = Part(vertices, mesh.triangles, area, target, name, *of_file, zones)
-    return part, list(mesh.notes)
+    found = _simulated(given, table.target, table.smoothing, design.zones, _is_wall(design))
+    mesh, origin = found.mesh, found.origin
+    turn, shift = _pose(given, mesh.vertices, design)
+    vertices = snap_to_grid(mesh.vertices @ turn.T + shift)
+    part = Part(
+        vertices=vertices,
+        triangles=mesh.triangles,
+        area=areas(vertices, mesh.triangles),
+        target=target[origin],
+        name=table.mesh_path.name,
+        sha256=mesh.sha256,
+        unit=mesh.unit,
+        names=tuple(mesh.groups),
+        file=PartOfFile(
+            simulated=replace(mesh, groups={}, notes=(), normals=None),
+            original=None if mesh is given else replace(given, groups={}, notes=(), normals=None),
+            rotation=turn,
+            shift=shift,
+        ),
+        zones={name: zone[origin] for name, zone in zones.items()},
+        normals=None if found.normals is None else (found.normals @ turn.T).astype(np.float32),
+        hollow=None if found.hollow is None else found.hollow.astype(np.float32),
+        smoothing=found.facts,
+    )
+    return part, [*mesh.notes, *_smoothing_notes(part)]
+
+
+def _smoothing_notes(part: Part) -> list[str]:
+    """How far the rounds were moved to the surface behind their facets."""
+    facts = part.smoothing
+    if facts is None or facts.moved_share < LEAST_MOVED:
+        return []
+    return [
+        f"{part.name}: rounds of the target have facets that turn by up to "
+        f"{np.degrees(facts.facet_turn):.2g} degrees; {facts.moved_share:.0%} of the target was "
+        f"divided along the surface behind them, at most {1e3 * facts.largest_move:.2g} mm away "
+        f"({facts.given_triangles:,} triangles became {len(part.triangles):,}); "
+        'part.smoothing = "off" keeps the facets'
+    ]
 
 
 @dataclass(frozen=True)
@@ -113,19 +191,13 @@ def preview_part(design: Design) -> PartPreview:
     Raises:
         InputError: the file cannot be used, or target or zone are empty.
     """
-    mesh, part = _part_of_file(design), design.part
-    file = part.mesh_path, part.unit, part.limits
-
-    def chosen(wanted: Selection, field: str) -> np.ndarray:
-        if design.chamber.setup() is not None:
-            return chosen_triangles(mesh, wanted, field)
-        return _chosen(file, wanted, field, mesh.sha256)
-
-    target = chosen(part.target, "part.target")
+    mesh, table = _part_of_file(design), design.part
+    target = _chosen(mesh, table.target, "part.target")
     zones = {
-        one.name: chosen(one.target, f"zones.{k}.target") for k, one in enumerate(design.zones)
+        one.name: _chosen(mesh, one.target, f"zones.{k}.target")
+        for k, one in enumerate(design.zones)
     }
-    return PartPreview(mesh, *_pose(mesh, design), target, zones)
+    return PartPreview(mesh, *_pose(mesh, mesh.vertices, design), target, zones)
 
 
 def turning_axis(design: Design, part: Part) -> Axis | None:
@@ -148,29 +220,52 @@ def _part_of_file(design: Design) -> PartMesh:
     return read_part_cached(part.mesh_path, part.unit, part.limits)
 
 
-def _meshed_part(design: Design) -> tuple[PartMesh, np.ndarray]:
-    """The part with the triangles to simulate, and which of them are the target."""
-    part, mesh = design.part, _part_of_file(design)
-    if part.target.element is None:
-        return mesh, chosen_triangles(mesh, part.target)
-    file = part.mesh_path, part.unit, part.limits
-    return _remeshed(file, part.target, part.target.element, mesh.sha256)
+def _is_wall(design: Design) -> bool:
+    """Whether the part is drawn as a piece of the room's own surface, which cannot be divided."""
+    setup = design.chamber.setup()
+    return setup is not None and setup.room.source is not None
 
 
 @lru_cache(maxsize=16)
-def _chosen(
-    file: tuple[Path, str, Tessellation | None], wanted: Selection, field: str, _sha256: str
-) -> np.ndarray:
-    return chosen_triangles(read_part_cached(*file), wanted, field)
+def _chosen(mesh: PartMesh, wanted: Selection, field: str) -> np.ndarray:
+    return chosen_triangles(mesh, wanted, field)
+
+
+class _Simulated(NamedTuple):
+    """The part's mesh as it is simulated; the other columns are those of SmoothPart."""
+
+    mesh: PartMesh
+    origin: np.ndarray
+    normals: np.ndarray | None
+    hollow: np.ndarray | None
+    facts: SmoothingFacts | None
 
 
 @lru_cache(maxsize=4)
-def _remeshed(
-    file: tuple[Path, str, Tessellation | None], wanted: Target, size: float, _sha256: str
-) -> tuple[PartMesh, np.ndarray]:
-    """The part with its target in triangles with sides of about a size [m], and that target."""
-    mesh = read_part_cached(*file)
-    target = chosen_triangles(mesh, wanted)
+def _simulated(
+    mesh: PartMesh,
+    target: Target,
+    smoothing: SmoothingTable,
+    zones: tuple[Zone, ...],
+    is_wall: bool,
+) -> _Simulated:
+    """A part of a file with its rounds divided, and in triangles of the size asked for."""
+    chosen = _chosen(mesh, target, "part.target")
+    rules = [
+        (zone.smoothing or smoothing).rule(_chosen(mesh, zone.target, f"zones.{k}.target"))
+        for k, zone in enumerate(zones)
+    ]
+    found = _Simulated(mesh, np.arange(len(mesh.triangles)), None, None, None)
+    if not is_wall:
+        made = smooth(mesh, smoothing.rule(chosen), rules)
+        found = _Simulated(made.of_part(mesh), made.origin, made.normals, made.hollow, made.facts)
+    size = target.element
+    return found if size is None else _remeshed(found, chosen[found.origin], size)
+
+
+def _remeshed(found: _Simulated, target: np.ndarray, size: float) -> _Simulated:
+    """The part with its target (m,) in triangles with sides of about a size [m]."""
+    mesh = found.mesh
     area = float(areas(mesh.vertices, mesh.triangles)[target].sum())
     count = area / (np.sqrt(3.0) / 4.0 * size * size)
     if count > MAX_ELEMENTS:
@@ -200,7 +295,14 @@ def _remeshed(
         groups={name: mask[origin] for name, mask in mesh.groups.items()},
         notes=(*mesh.notes, note),
     )
-    return meshed, chosen
+    normals = found.normals
+    if normals is not None:
+        corners = np.repeat(mesh.vertices[mesh.triangles[origin]], 3, axis=0)
+        of_corners = np.repeat(normals[origin], 3, axis=0)
+        places = vertices[triangles].reshape(-1, 3)
+        normals = unit_vectors(interpolate(of_corners, corners, places)).reshape(-1, 3, 3)
+    hollow = None if found.hollow is None else found.hollow[origin]
+    return found._replace(mesh=meshed, origin=found.origin[origin], normals=normals, hollow=hollow)
 
 
 def _find_origin(mesh: PartMesh, corners: np.ndarray, source: np.ndarray) -> np.ndarray:
@@ -221,14 +323,20 @@ def _find_origin(mesh: PartMesh, corners: np.ndarray, source: np.ndarray) -> np.
     return origin
 
 
-def _pose(mesh: PartMesh, design: Design) -> tuple[np.ndarray, np.ndarray]:
-    """From the part file's frame to the chamber's: rotation (3, 3), then shift (3,) [m]."""
+def _pose(given: PartMesh, vertices: np.ndarray, design: Design) -> tuple[np.ndarray, np.ndarray]:
+    """From the part file's frame to the chamber's: rotation (3, 3), then shift (3,) [m].
+
+    Args:
+        given: the part as its file has it, whose middle comes onto the axis.
+        vertices: of the part as it is simulated [m], of which the lowest counts, (n, 3): those on a
+            round may reach a little further than its facets.
+    """
     setup, distance = design.chamber.setup(), design.chamber.sonotrode_distance
     if setup is not None:
         return setup.turn, setup.shift + np.array([0.0, 0.0, distance - setup.distance])
     turn = rotation_matrix(design.part.rotate_deg)
-    vertices = mesh.vertices @ turn.T
-    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    of_file = given.vertices @ turn.T
+    low, high = of_file.min(axis=0), of_file.max(axis=0)
     x, y = design.part.offset
-    foot = np.r_[(low[:2] + high[:2]) / 2.0, low[2]]
+    foot = np.r_[(low[:2] + high[:2]) / 2.0, (vertices @ turn.T)[:, 2].min()]
     return turn, np.array([x, y, distance]) - foot

@@ -9,6 +9,7 @@ Heavy packages (numba, trimesh, pyvista, sklearn) are imported inside the comman
 from __future__ import annotations
 
 import gc
+import os
 from collections.abc import Sequence
 
 from chamberopt.cli.interrupt import interruptible
@@ -20,6 +21,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command, which Ctrl-C ends from its first moment; return its exit status."""
     # What is imported and compiled stays: looking through it again and again took 7 % of the time.
     gc.set_threshold(100_000, 50, 1000)
+    # No process that is started here imports modules that lie in the folder where it is started.
+    os.environ["PYTHONSAFEPATH"] = "1"
     with interruptible():
         from chamberopt.cli.command_line import run_command
 

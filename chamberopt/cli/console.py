@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, ExitStack, contextmanager
 from itertools import count
 from pathlib import Path
-from shutil import rmtree
 from typing import TYPE_CHECKING, Any, TextIO, TypeVar
 
 from chamberopt.common.errors import visible
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from chamberopt.simulation.peening.tolerances import ToleranceResult
 
 T = TypeVar("T")
+RESULTS = Path("results")  # where results go without --out
 
 
 def results_folder(out: Path | None, name: str) -> AbstractContextManager[Path]:
@@ -36,14 +37,16 @@ def claimed_folder(
 ) -> Iterator[T]:
     """Claim --out or the first free folder with `claim`, which may accept more for --out."""
     from chamberopt.common.errors import OutputTakenError
-    from chamberopt.common.files import is_new_or_empty
+    from chamberopt.common.files import is_new_or_empty, require_plain_folder
 
     with ExitStack() as held:
         if out is not None:
             yield held.enter_context(claim(out))
             return
+        if os.path.lexists(RESULTS):
+            require_plain_folder(RESULTS, "give another folder (--out)")
         for number in count(1):
-            folder = Path("results", name if number == 1 else f"{name}-{number}")
+            folder = RESULTS / (name if number == 1 else f"{name}-{number}")
             if is_new_or_empty(folder):
                 try:
                     claimed = held.enter_context(claim(folder))
@@ -51,22 +54,6 @@ def claimed_folder(
                     continue
                 yield claimed
                 return
-
-
-@contextmanager
-def whole_or_nothing(folder: Path) -> Iterator[None]:
-    """Empty a folder, which was new or empty before, where the `with` block fails."""
-    from chamberopt.common.files import LEFTOVER_PREFIXES
-
-    try:
-        yield
-    except BaseException:
-        for one in folder.iterdir():
-            if one.is_dir():
-                rmtree(one, ignore_errors=True)
-            elif not one.name.startswith(LEFTOVER_PREFIXES):
-                one.unlink(missing_ok=True)
-        raise
 
 
 def show(lines: Iterable[str], to: TextIO | None = None) -> None:
@@ -104,7 +91,9 @@ def print_result(
 ) -> None:
     """Print the result and its folder on stdout: the lines, or the content of a JSON file."""
     if as_json:
-        values = json.loads((folder / file).read_text(encoding="utf-8"))
+        from chamberopt.common.limits import MAX_RESULT_BYTES, read_limited
+
+        values = json.loads(read_limited(folder / file, MAX_RESULT_BYTES, "file of a result"))
         print_json({**values, "folder": str(folder)})
     else:
         show([*lines, f"results in {folder}"])

@@ -47,6 +47,7 @@ def unfinished(study: Path, name: str) -> list[str]:
     Args:
         name: of the folder in results/ that the command would use.
     """
+    from chamberopt.common.limits import MAX_RESULT_BYTES, read_limited
     from chamberopt.optimize.storage.study_folder import INPUTS, is_finished, is_study_folder
 
     results, remarks = Path("results"), []
@@ -54,9 +55,9 @@ def unfinished(study: Path, name: str) -> list[str]:
         if not is_study_folder(folder) or is_finished(folder):
             continue
         try:
-            plan = json.loads((folder / INPUTS).read_text(encoding="utf-8"))["sweep"]
-            command = resume_command(study, folder, plan)
-        except (OSError, ValueError, LookupError, TypeError):  # damaged: `--out` will say so
+            inputs = read_limited(folder / INPUTS, MAX_RESULT_BYTES, "file of a study")
+            command = resume_command(study, folder, json.loads(inputs)["sweep"])
+        except (InputError, ValueError, LookupError, TypeError):  # damaged: `--out` will say so
             command = resume_command(study, folder)
         remarks.append(f"{folder}: not finished; to resume it: {command}")
     return remarks

@@ -22,6 +22,10 @@ class InputError(Exception):
     """
 
 
+class UnreadableError(InputError):
+    """A file cannot be read now, by no fault of the design or candidate that names it."""
+
+
 class OutputTakenError(InputError):
     """The place for a result holds something, or another process writes to it."""
 

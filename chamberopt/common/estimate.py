@@ -43,7 +43,9 @@ class Estimate:
     # Bound on the error that more replicas would not remove; included in half_width.
     bias: float = 0.0
     shared: tuple[float, ...] = field(default=(), repr=False)  # u_k; none left out are 0
-    in_words: str = ""  # what stands in the place of the number where there is none, such as never
+    # What stands in the place of the number: where there is none, such as never, and where its
+    # digits would say more than is known, such as more than 99.9 %.
+    in_words: str = ""
 
     @property
     def low(self) -> float:
@@ -52,6 +54,11 @@ class Estimate:
     @property
     def high(self) -> float:
         return self.value + self.half_width
+
+    @property
+    def has_number(self) -> bool:
+        """Whether the value is a number that can be compared, whatever words stand for it."""
+        return not self.in_words or 0.0 < self.half_width < math.inf
 
     @property
     def beyond_scatter(self) -> float:
@@ -86,6 +93,12 @@ class Estimate:
     def not_known(self, in_words: str) -> Estimate:
         """The same value without an interval, and the words that stand in its place."""
         return replace(self, half_width=math.inf, in_words=in_words)
+
+    def at_least_as_wide(self, half_width: float) -> Estimate:
+        """The estimate with an interval of at least that; an exact 0 stays exact."""
+        if self.value == self.half_width == 0.0:
+            return self
+        return replace(self, half_width=max(self.half_width, half_width))
 
     def times(self, factor: float) -> Estimate:
         """The estimate of so many times this figure; the factor is exact and above 0."""

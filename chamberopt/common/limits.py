@@ -5,11 +5,11 @@ from __future__ import annotations
 import json
 import math
 import os
-import stat
 from pathlib import Path
 from typing import Any
 
-from chamberopt.common.errors import InputError
+from chamberopt.common.errors import InputError, UnreadableError
+from chamberopt.common.files import open_plain
 from chamberopt.common.number_text import plain
 
 MEBIBYTE = 1 << 20
@@ -21,29 +21,27 @@ MAX_READER_BYTES = 16384 * MEBIBYTE  # of memory, for a library that reads STEP 
 # A result's compressed arrays unpack to some three times their size; more fills memory on purpose.
 MAX_SHRINKAGE, ANY_SHRINKAGE_BYTES = 100, 64 * MEBIBYTE
 MAX_CPU_S = 1e7  # four months, for a library that reads STEP or VTK
-READ_AT_ONCE = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
 MAX_NUMBER = 1e30  # either way, of any number in a result: squares and cubes of it are finite
 MAX_ELEMENTS = 20_000_000  # points, elements or triangles of a mesh
 MAX_COPIES = 10_000  # of bodies, where a file puts one in several places
 
 
-def read_limited(path: Path, most: int, what: str) -> bytes:
+def read_limited(path: Path, most: int, what: str, follow: bool = False) -> bytes:
     """The bytes of a file.
 
     Args:
         most: bytes that it may have.
         what: it is, such as "mesh file".
+        follow: links, which users may have among their own files.
     Raises:
         FileNotFoundError: for the caller to explain.
-        InputError: it is no plain file, such as a device or a pipe; too large; or not readable.
+        InputError: it is no plain file, such as a link or a pipe; or too large.
+        UnreadableError: the system does not read it.
     """
     try:
-        status = path.stat()
-        if not stat.S_ISREG(status.st_mode):  # a pipe would block, a device may never end
-            raise InputError(f"{path}: is not a plain file; give a {what}")
-        require_size(path, status.st_size, most, what)
-        # A file of /proc states no size, and may call itself plain and yet wait for more for ever.
-        with open(os.open(path, READ_AT_ONCE), "rb") as file:
+        with open_plain(path, follow) as file:
+            require_size(path, os.fstat(file.fileno()).st_size, most, what)
+            # A file of /proc states no size, and may wait for more for ever: it is not waited for.
             content = file.read(most + 1)
         if content is None:
             raise InputError(f"{path}: is not a plain file; give a {what}")
@@ -51,7 +49,7 @@ def read_limited(path: Path, most: int, what: str) -> bytes:
         raise
     except OSError as error:
         why = f"cannot be read: {error.strerror}"
-        raise InputError(f"{path}: {why}; check the path and its permissions") from None
+        raise UnreadableError(f"{path}: {why}; check the path and its permissions") from None
     except ValueError:  # a null character in the name
         raise InputError(f"{str(path)!r}: not a file name; check the path") from None
     require_size(path, len(content), most, what)

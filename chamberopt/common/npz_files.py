@@ -19,7 +19,7 @@ from typing import Any, TypeVar, get_args, get_origin, get_type_hints
 import numpy as np
 
 from chamberopt.common.errors import InputError
-from chamberopt.common.files import atomic_write
+from chamberopt.common.files import new_file, open_plain, write_bytes
 from chamberopt.common.limits import ANY_SHRINKAGE_BYTES, MAX_SHRINKAGE, require_text
 
 # What reading a damaged file can raise.
@@ -33,16 +33,24 @@ Record = TypeVar("Record")
 def read_arrays(path: Path, remedy: str) -> dict[str, np.ndarray]:
     """The arrays of an .npz file by their names; InputError if it is missing or damaged."""
     try:
-        with zipfile.ZipFile(path) as file:
-            unpacked = sum(one.file_size for one in file.infolist())
-        if unpacked > max(ANY_SHRINKAGE_BYTES, MAX_SHRINKAGE * path.stat().st_size):
-            raise ValueError(f"unpacks to {1e-6 * unpacked:,.0f} MB, which no result does")
-        with np.load(path, allow_pickle=False) as arrays:
-            return {name: arrays[name] for name in arrays.files}
+        with open_plain(path) as file:
+            with zipfile.ZipFile(file) as packed:
+                unpacked = sum(one.file_size for one in packed.infolist())
+            if unpacked > max(ANY_SHRINKAGE_BYTES, MAX_SHRINKAGE * file.seek(0, 2)):
+                raise ValueError(f"unpacks to {1e-6 * unpacked:,.0f} MB, which no result does")
+            file.seek(0)
+            with np.load(file, allow_pickle=False) as arrays:
+                return {name: arrays[name] for name in arrays.files}
     except FileNotFoundError:
         raise InputError(f"{path}: not there; {remedy}") from None
     except UNREADABLE as error:
         raise _unreadable(path, error, remedy) from None
+
+
+def save_arrays(path: Path, **arrays: Any) -> None:
+    """Write arrays by their names."""
+    with new_file(path) as file:
+        np.savez(file, **arrays)
 
 
 def save_record(path: Path, record: object) -> None:
@@ -51,8 +59,7 @@ def save_record(path: Path, record: object) -> None:
     tree = json.dumps(_to_tree(record, arrays)).encode()
     packed = io.BytesIO()  # in memory first, so that a full disk is one plain OSError
     np.savez_compressed(packed, tree=np.frombuffer(tree, dtype=np.uint8), **arrays)  # type: ignore[arg-type]
-    with atomic_write(path) as temporary:
-        temporary.write_bytes(packed.getbuffer())
+    write_bytes(path, packed.getbuffer())
 
 
 def load_record(path: Path, kind: type[Record], others: Sequence[type], remedy: str) -> Record:

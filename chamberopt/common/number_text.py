@@ -9,6 +9,9 @@ import math
 
 from chamberopt.common.estimate import ZERO_TOLERANCE, Estimate
 
+NEARLY_ALL = 1e-3  # shares that leave less are said in words
+MOST_NINES = 6
+
 
 def estimate_text(
     estimate: Estimate, factor: float = 1.0, unit: str = "", sign: bool = False
@@ -23,6 +26,18 @@ def estimate_text(
     if estimate.in_words:
         return estimate.in_words
     return with_interval(factor * estimate.value, abs(factor) * estimate.half_width, unit, sign)
+
+
+def share_in_words(share: Estimate) -> str:
+    """Such as "more than 99.9 %" for a share that is so near 1; "" for others.
+
+    As many nines as its interval leaves.
+    """
+    least = 1.0 - share.low
+    if not least < NEARLY_ALL:
+        return ""
+    nines = min(math.floor(-math.log10(max(least, 1e-300))), MOST_NINES)
+    return f"more than {100.0 * (1.0 - 10.0**-nines):.{nines - 2}f} %"
 
 
 def plain(value: float | str, digits: int = 4) -> str:

@@ -13,6 +13,7 @@ from pydantic.fields import FieldInfo
 
 from chamberopt.common import toml_errors
 from chamberopt.common.errors import InputError
+from chamberopt.common.files import is_of_the_program
 from chamberopt.common.limits import MAX_TEXT_BYTES, read_limited
 from chamberopt.common.toml_errors import CrossCheckError, Problem
 
@@ -124,7 +125,8 @@ def read_toml(
         hint = f"; files in it: {', '.join(inside[:8])}" if inside else ""
         raise InputError(f"{path}: is a folder; give a {kind} file (.toml){hint}")
     try:
-        content = read_limited(path, MAX_TEXT_BYTES, f"{kind} file (.toml)")
+        follow = not is_of_the_program(path.parent)
+        content = read_limited(path, MAX_TEXT_BYTES, f"{kind} file (.toml)", follow)
         source = content.decode("utf-8-sig")
     except FileNotFoundError:
         raise InputError(toml_errors.explain_missing_file(path, f"{kind} file", "*.toml")) from None

@@ -11,6 +11,7 @@ from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
 from pathlib import Path
 
+from chamberopt.common.files import read_file
 from chamberopt.common.parallel.executor import core_count
 
 SIMULATION_PACKAGES = ("chamberopt", "numpy", "scipy", "numba", "manifold3d")
@@ -65,5 +66,5 @@ def sources_digest() -> str:
         folder = Path(spec.origin).parent if spec and spec.origin else Path()
         for source in sorted(folder.rglob("*.py")):
             digest.update(f"{package}/{source.relative_to(folder).as_posix()}\0".encode())
-            digest.update(source.read_bytes())
+            digest.update(read_file(source, follow=True))
     return digest.hexdigest()[:16]

@@ -25,6 +25,7 @@ from typing import TYPE_CHECKING, NamedTuple, Protocol, TypeVar
 import numpy as np
 
 from chamberopt.common.parallel.memory import MEMORY
+from chamberopt.coverage.field.crease_bands import on_lines
 
 if TYPE_CHECKING:
     from chamberopt.coverage.field.target_field import Gauge, TargetField
@@ -166,47 +167,89 @@ class LocatedDents(NamedTuple):
     radius: np.ndarray
     edge: np.ndarray
 
+    def select(self, rows: slice) -> LocatedDents:
+        """The dents of these rows."""
+        columns = (self.triangle, self.radius, self.edge)
+        return LocatedDents(self.contacts.select(rows), *(one[rows] for one in columns))
+
 
 def locate_dents(field: TargetField, in_sector: Hits) -> LocatedDents:
     """Find the face or the crease on which each dent lies, of impacts where the windows are."""
     dents = in_sector.select((in_sector.dent > 0.0) & field.has_windows[in_sector.triangle])
     contacts = field.places_of(dents, np.arange(len(dents)))
-    edge = _crease_of_contacts(field, contacts.place, dents.triangle)
+    edge = crease_of_contacts(field, contacts.place, dents.triangle)
     return LocatedDents(contacts, dents.triangle, 0.5 * dents.dent.astype(float), edge)
 
 
 def find_footprints(field: TargetField, gauge: Gauge, hits: Hits | LocatedDents) -> Footprints:
     """The dents of one replica in windows of one size; dents off the target count nothing."""
-    from chamberopt.coverage.field.windows import Places
-
     dents = hits if isinstance(hits, LocatedDents) else locate_dents(field, field.in_sector(hits))
     contacts, radius, edge = dents.contacts, dents.radius, dents.edge
-    on_face = edge < 0
-    size = np.pi * radius**2
+    on_face, size = edge < 0, np.pi * radius**2
     point, weight = gauge.windows.shares(contacts.select(on_face), size[on_face], gauge.area)
-    band = gauge.band
-    if band is not None and not on_face.all():
-        points, weights = [point], [weight]
-        own = np.flatnonzero(~on_face)
-        line = Places(contacts.place[own], np.zeros((len(own), 3)), field.creases.line[edge[own]])
-        for row, contact in band.windows.pairs(line):
-            half = radius[own[contact]] ** 2 - band.height[row] ** 2
-            covered = half > 0.0
-            row, half = row[covered], half[covered]
-            points.append(band.point[row])
-            weights.append(2.0 * np.sqrt(half) / band.length[row])
+    if not on_face.all():
+        found = [(point, weight), *_on_soft_edges(field, gauge, dents)]
+        found += _on_creases(field, gauge, dents)
+        points, weights = zip(*found, strict=True)
         point, weight = np.concatenate(points), np.concatenate(weights)
     own = field.on_target[dents.triangle]
+    on_crease = own & ~on_face
     return Footprints(
         point,
         weight,
         area=float(size[own].sum()),
-        area_on_creases=float(size[own & ~on_face].sum()),
+        area_on_creases=float((size[on_crease] * field.sharpness(edge[on_crease])).sum()),
         squares=float((size[own] ** 2).sum()),
     )
 
 
-def _crease_of_contacts(field: TargetField, place: np.ndarray, triangle: np.ndarray) -> np.ndarray:
+Pairs = Iterator[tuple[np.ndarray, np.ndarray]]
+"""Points, and the shares of their windows that dents take."""
+
+
+def _on_creases(field: TargetField, gauge: Gauge, dents: LocatedDents) -> Pairs:
+    """Dents on edges that are creases to a window, in the bands beside them."""
+    band, own = gauge.band, np.flatnonzero(dents.edge >= 0)
+    if band is None:
+        return
+    lines, of_own = on_lines(field.creases, dents.contacts.place[own], dents.edge[own])
+    radius = dents.radius[own[of_own]]
+    for row, contact in band.windows.pairs(lines):
+        half = radius[contact] ** 2 - band.height[row] ** 2
+        row, half = row[half > 0.0], half[half > 0.0]
+        yield band.point[row], 2.0 * np.sqrt(half) / band.length[row]
+
+
+def _on_soft_edges(field: TargetField, gauge: Gauge, dents: LocatedDents) -> Pairs:
+    """Dents on edges that are creases to some windows, in those to which the surface goes on."""
+    line, windows = field.creases.line, gauge.windows
+    own = np.flatnonzero((dents.edge >= 0) & (line[-1, dents.edge] < 0))
+    for point, contact in windows.pairs(dents.contacts.select(own)):
+        goes_on = line[windows.division[point], dents.edge[own[contact]]] < 0
+        point, size = point[goes_on], np.pi * dents.radius[own[contact[goes_on]]] ** 2
+        yield point, size / gauge.area[point]
+
+
+def in_halves(
+    field: TargetField, contacts: Places, triangle: np.ndarray
+) -> tuple[Places, np.ndarray, np.ndarray]:
+    """Contacts on creases as two, on the faces of both sides, whichever of them was hit.
+
+    Args:
+        triangle: of the part, of each contact, (k,).
+
+    Returns:
+        The contacts, their rows before, and the share of its dent that each has.
+    """
+    edge = crease_of_contacts(field, contacts.place, triangle)
+    on = np.flatnonzero(edge >= 0)
+    rows = np.concatenate([np.arange(len(edge)), on])
+    doubled = contacts.select(rows)
+    doubled.face[on], doubled.face[len(edge) :] = field.creases.faces[edge[on]].T
+    return doubled, rows, np.where(edge >= 0, 0.5, 1.0)[rows]
+
+
+def crease_of_contacts(field: TargetField, place: np.ndarray, triangle: np.ndarray) -> np.ndarray:
     """The crease on which each contact lies, (k,); -1 for contacts on a smooth face."""
     creases = field.creases
     found = np.full(len(place), -1)
@@ -215,10 +258,6 @@ def _crease_of_contacts(field: TargetField, place: np.ndarray, triangle: np.ndar
     at, own = place[near], triangle[near]
     corners = field.corners[own]
     for side in range(3):
-        corner = creases.at_corner[own, side]
-        touches = (corner >= 0) & (np.linalg.norm(at - corners[:, side], axis=1) < ON_CREASE)
-        found[near[touches]] = corner[touches]
-    for side in range(3):
         crease = creases.of_triangle[own, side]
         start, along = corners[:, side], corners[:, (side + 1) % 3] - corners[:, side]
         away = np.linalg.norm(np.cross(at - start, along), axis=1) / np.maximum(
@@ -226,4 +265,9 @@ def _crease_of_contacts(field: TargetField, place: np.ndarray, triangle: np.ndar
         )
         touches = (crease >= 0) & (away < ON_CREASE)
         found[near[touches]] = crease[touches]
+    # A corner last: whichever triangle was hit, the sharpest of its creases counts.
+    for side in range(3):
+        corner = creases.at_corner[own, side]
+        touches = (corner >= 0) & (np.linalg.norm(at - corners[:, side], axis=1) < ON_CREASE)
+        found[near[touches]] = corner[touches]
     return found

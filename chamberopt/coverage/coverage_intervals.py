@@ -36,6 +36,7 @@ import numpy as np
 
 from chamberopt.common.estimate import Estimate, estimate, jackknife
 from chamberopt.coverage.coverage_from_impacts import Batch
+from chamberopt.coverage.field.reached import Reach
 from chamberopt.coverage.field.surface_points import sampling_errors, sparse_points
 from chamberopt.coverage.percentile import (
     P05_COVERAGE,
@@ -86,28 +87,22 @@ def multiply_dents(batches: Sequence[Batch], points: int, ratios: Sequence[float
 
 
 def coverage_estimates(
-    batches: Sequence[Batch],
-    sums: DentSums,
-    reachable: float,
-    time_ratio: float,
-    reachable_error: float = 0.0,
+    batches: Sequence[Batch], sums: DentSums, reach: Reach, time_ratio: float
 ) -> dict[str, Estimate]:
     """Estimate mean, deviation and percentiles of coverage and exposure, by Avrami's equation.
 
     Args:
         sums: of the batches, over each window.
-        reachable: share of the target that a ball can touch.
         time_ratio: treatment time over the simulated time of one replica.
-        reachable_error: standard error of `reachable`, by the choice of points.
     """
     products = multiply_dents(batches, len(sums.number), [time_ratio, 2.0 * time_ratio])
-    mean, variance = mean_and_variance_estimates(products, reachable, reachable_error)
+    mean, variance = mean_and_variance_estimates(products, reach)
     return {
         "mean_coverage": mean,
         "std_coverage": root_of_variance(variance),
-        "exposure": mean_exposure(sums, reachable, time_ratio, reachable_error),
+        "exposure": mean_exposure(sums, reach, time_ratio),
         **{
-            name: quantile_estimate(quantile, sums, reachable, time_ratio)
+            name: quantile_estimate(quantile, sums, reach, time_ratio)
             for name, quantile in (
                 ("p05_coverage", P05_COVERAGE),
                 ("p95_coverage", P95_COVERAGE),
@@ -117,21 +112,18 @@ def coverage_estimates(
     }
 
 
-def mean_and_variance_estimates(
-    products: Products, reachable: float, reachable_error: float
-) -> tuple[Estimate, Estimate]:
+def mean_and_variance_estimates(products: Products, reach: Reach) -> tuple[Estimate, Estimate]:
     """Mean and variance of coverage over the target.
 
     Args:
         products: of the time ratio and of twice that.
-        reachable, reachable_error: as for `coverage_estimates`.
     """
     of_all, of_rest = products
-    values = mean_and_variance(np.vstack([of_all.mean(axis=0), of_rest]), reachable)
+    values = mean_and_variance(np.vstack([of_all.mean(axis=0), of_rest]), reach.share)
     of_some = np.array([some.mean(axis=0) for some in sparse_points(of_all)])
-    some = mean_and_variance(of_some, reachable)
+    some = mean_and_variance(of_some, reach.share)
     # Both move with the reachable share too: by their differences from one standard error more.
-    more = mean_and_variance(of_all.mean(axis=0), reachable + reachable_error)
+    more = mean_and_variance(of_all.mean(axis=0), sum(reach))
     mean, variance = (
         estimate(
             jackknife(values[k]),

@@ -13,9 +13,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from chamberopt.common.errors import InputError
-from chamberopt.common.files import atomic_write
 from chamberopt.common.limits import MAX_NUMBER
-from chamberopt.common.npz_files import UNREADABLE, read_arrays
+from chamberopt.common.npz_files import UNREADABLE, read_arrays, save_arrays
 from chamberopt.coverage.dents import ball_diameters, dent_diameters, impact_angle_deg
 from chamberopt.geometry.triangles import closest_on_each
 
@@ -126,8 +125,7 @@ def save_hits(path: Path, hits: HitsByTriangle) -> None:
         for column in fields(Hits)
         if column.name != "triangle"
     }
-    with atomic_write(path) as temporary, temporary.open("wb") as file:
-        np.savez(file, first=hits.first, **columns)
+    save_arrays(path, first=hits.first, **columns)
 
 
 def load_hits(path: Path) -> HitsByTriangle:

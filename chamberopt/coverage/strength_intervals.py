@@ -21,13 +21,15 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from chamberopt.common.estimate import Estimate, estimate, jackknife
-from chamberopt.coverage.coverage_intervals import root_of_variance
+from chamberopt.common.estimate import ZERO_TOLERANCE, Estimate, estimate, jackknife
+from chamberopt.coverage.coverage_from_impacts import in_halves
+from chamberopt.coverage.field.reached import Reach
 from chamberopt.coverage.field.surface_points import sampling_errors, sparse_points
 from chamberopt.coverage.metrics import P05, P95
 from chamberopt.coverage.percentile import in_order
 from chamberopt.coverage.strength import (
     LEVELS,
+    area_of_dent,
     dent_rates,
     levels,
     saturation_time,
@@ -48,6 +50,7 @@ SPLITS = 3  # into halves, and into quarters
 # Largest step of the mean from half of the dents to all, over the mean. Where it is larger, S comes
 # from dents too rare for the windows, and the mean grows too slowly for the step to tell how far.
 MAX_STEP = 0.055
+FEW_DENTS = 25.0  # in the median window, the fewest of which the evenness is shown
 MICROMETRES = 1e6
 
 
@@ -58,11 +61,13 @@ class StrengthHistograms(NamedTuple):
         parts: dented area over area, of each batch in each window, (g, p, LEVELS).
         seconds: simulated time of each batch [s], (g,).
         highest: strength at the upper end of the levels [m].
+        dents: of all batches in the median window, 0 where that is not known.
     """
 
     parts: np.ndarray
     seconds: np.ndarray
     highest: float
+    dents: float = 0.0
 
 
 class Saturated(NamedTuple):
@@ -106,7 +111,7 @@ def strength_estimates(
     )
     if found.highest == 0.0:
         return _without_dents(len(batches))
-    estimates = estimates_of(found, field.reachable)
+    estimates = estimates_of(found, field.reach)
     if field.is_one_window:
         evenness = estimates["intensity_uniformity"]
         estimates["intensity_uniformity"] = replace(evenness, half_width=math.inf)
@@ -132,11 +137,9 @@ def level_histograms(
         dents_of: function of impacts that gives the diameter of each dent and its strength [m],
             (k,) each; 0 where there is none.
     """
-    from chamberopt.coverage.field.windows import Windows
-
     gauge = field.gauge
     rows = np.linspace(0, len(gauge.area) - 1, min(WINDOWS, len(gauge.area))).astype(int)
-    windows = Windows(gauge.windows.points.select(rows), gauge.windows.radius)
+    windows = gauge.windows.select(rows)
     area = gauge.area[rows]
     dents = [[dents_of(hits) for hits in batch] for batch in batches]
     highest = max(float(s.max(initial=0.0)) for batch in dents for _, s in batch)
@@ -144,18 +147,22 @@ def level_histograms(
     for number, (batch, of_batch) in enumerate(zip(batches, dents, strict=True)):
         for hits, (dent, s) in zip(batch, of_batch, strict=True):
             some = np.flatnonzero(s > 0.0)
+            places = field.places_of(hits, some)
+            contacts, rows, halves = in_halves(field, places, hits.triangle[some])
+            some = some[rows]
             parts[number] += strength_histogram(
-                windows, area, field.places_of(hits, some), dent[some], levels(s[some], highest)
+                windows, area, contacts, np.sqrt(halves) * dent[some], levels(s[some], highest)
             )
-    return StrengthHistograms(parts, seconds * np.array([len(one) for one in batches]), highest)
+    sizes = [area_of_dent(dent[dent > 0.0]) for batch in dents for dent, _ in batch]
+    size = float(np.concatenate(sizes).mean()) if highest else 1.0
+    median = float(np.median(parts.sum(axis=(0, 2)) * area)) / size
+    seconds_of = seconds * np.array([len(one) for one in batches])
+    return StrengthHistograms(parts, seconds_of, highest, median)
 
 
-def estimates_of(found: StrengthHistograms, reachable: float) -> dict[str, Estimate]:
-    """The estimates from histograms.
-
-    Args:
-        reachable: share of the target that shot can touch.
-    """
+def estimates_of(found: StrengthHistograms, reach: Reach) -> dict[str, Estimate]:
+    """The estimates from histograms."""
+    reachable = reach.share
     batches, total = len(found.parts), found.parts.sum(axis=0)
     whole = _saturated(found, np.arange(batches))
     if batches < MIN_BATCHES:
@@ -181,7 +188,7 @@ def estimates_of(found: StrengthHistograms, reachable: float) -> dict[str, Estim
                  for one in rests]  # fmt: skip
     estimates = {
         "intensity_uniformity": _uniformity_estimate(
-            spreads, spread_of_halves, np.array([everything, *variances]), whole, reachable
+            spreads, spread_of_halves, np.array([everything, *variances]), whole, reach, found.dents
         )
     }
     plain = _figures(whole, float(spreads.mean()))
@@ -196,8 +203,8 @@ def estimates_of(found: StrengthHistograms, reachable: float) -> dict[str, Estim
     # Where counting seems to explain all of the variance, percentiles are drawn to the mean, which
     # hardly moves from batch to batch. There may be more variance, by its own interval; twice what
     # that makes held where once held in 83 % (benchmarks/strength_resolution.py).
-    reach = estimate(jackknife(np.array([everything, *variances]))).half_width
-    wider = _figures(whole, float(spreads.mean()) + reachable * reach)
+    spread_error = estimate(jackknife(np.array([everything, *variances]))).half_width
+    wider = _figures(whole, float(spreads.mean()) + reachable * spread_error)
     for name, value in plain.items():
         is_time = name == "saturation_time_s"
         step = value - float(np.mean([one[name] for one in of_half]))
@@ -277,7 +284,8 @@ def _uniformity_estimate(
     of_halves: np.ndarray,
     variances: np.ndarray,
     whole: Saturated,
-    reachable: float,
+    reach: Reach,
+    dents: float,
 ) -> Estimate:
     """The evenness over the whole target.
 
@@ -286,23 +294,30 @@ def _uniformity_estimate(
             (SPLITS,).
         of_halves: the same, not corrected, (SPLITS,).
         variances: relative variance of S from all batches and from all but each, (g + 1,).
+        dents: in the median window.
     """
-    value = _uniformity(float(spreads.mean()), reachable)
-    # The bias falls more slowly than that; twice the step held where once held in 3 of 4 runs.
-    # Steps of single pairs do not cancel where their mean is near 0 by chance.
-    steps = [
-        _uniformity(corrected, reachable) - _uniformity(half, reachable)
-        for corrected, half in zip(spreads, of_halves, strict=True)
-    ]
-    bias = 2.0 * math.sqrt(float(np.mean(np.square(steps))))
-    of_some = [
-        _uniformity(_spread(some, some), reachable) for some in sparse_points(whole.strength)
-    ]
-    spread = root_of_variance(estimate(jackknife(variances), 0.0))
-    deviations = np.array(spread.pseudovalues) - spread.value
-    return estimate(
-        value - deviations, highest=1.0, bias=bias, shared=sampling_errors(np.array(of_some))
-    )
+    reachable, spread = reach.share, float(spreads.mean())
+    value = _uniformity(spread, reachable)
+    of_some = np.array([_spread(some, some) for some in sparse_points(whole.strength)]) / reachable
+    by_reach = spread / reachable - spread / max(reachable - reach.error, ZERO_TOLERANCE)
+    found = estimate(jackknife(variances), shared=[*sampling_errors(of_some), by_reach])
+    # What is left of the bias falls faster than the steps: on a gear it was twice the step at 25
+    # dents in a window. Steps of single pairs do not cancel near 0 by chance.
+    few = 2.0 * math.sqrt(min(1.0, FEW_DENTS / dents)) if dents else 2.0
+    left = few * math.sqrt(float(np.mean(np.square(spreads - of_halves)))) / reachable
+    # By how much the choice of halves moves the variance, of 3 choices.
+    of_choice = 2.0 * float(spreads.std(ddof=1)) / reachable
+    known_to = math.hypot(found.half_width, left, of_choice)
+    # The root is steep at 0: the longer side of its interval serves for both.
+    variance, root = max(0.0, spread / reachable - 1.0), 1.0 - value
+    low, high = (math.sqrt(max(0.0, variance + side * known_to)) for side in (-1.0, 1.0))
+    half_width = max(root - low, high - root)
+    slope = half_width / known_to if known_to else 0.0
+    deviations = slope * (np.array(found.pseudovalues) - found.value)
+    shared = [-slope * one for one in found.shared]
+    uniformity = estimate(value - deviations, highest=1.0, shared=shared)
+    bias = max(0.0, half_width - uniformity.half_width)
+    return replace(uniformity, half_width=half_width, bias=bias)
 
 
 def _spread(one: np.ndarray, two: np.ndarray) -> float:

@@ -3,11 +3,12 @@
 import math
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
-from pydantic import Field
+import numpy as np
+from pydantic import BeforeValidator, Field
 
-from chamberopt.common.toml_errors import Problem
+from chamberopt.common.toml_errors import CrossCheckError, Problem
 from chamberopt.common.toml_fields import (
     MeshFile,
     Names,
@@ -23,6 +24,7 @@ from chamberopt.common.toml_fields import (
 from chamberopt.design.table_base import FileTable
 from chamberopt.geometry.mesh_io.readers.step.tessellation import Tessellation
 from chamberopt.geometry.mesh_io.units import Unit
+from chamberopt.geometry.smoothing.part import Rule
 
 MAX_FACES = 500
 
@@ -111,7 +113,7 @@ class TessellationTable(FileTable):
     chord_mm: float = quantity(
         1e-4, 10, "mm", "distance that triangles keep from the surface", 0.02
     )
-    angle_deg: float = quantity(1, 60, "degrees", "largest angle between neighbours", 8.0)
+    angle_deg: float = quantity(1, 60, "degrees", "largest angle between neighbours", 6.0)
     side_mm: float | None = quantity(
         0.01, 1000, "mm", "longest side; absent: a fortieth of the part's diagonal", None
     )
@@ -123,6 +125,41 @@ class TessellationTable(FileTable):
         return Tessellation(1e-3 * self.chord_mm, math.radians(self.angle_deg), side)
 
 
+class SmoothingTable(FileTable):
+    """How fine the facets of rounds become, and how far the surface may move."""
+
+    off: bool = Field(
+        default=False, description='{ off = true }: smoothing = "off", the facets of the file'
+    )
+    limit_deg: float = quantity(
+        1, 30, "degrees", "largest angle between facets: a tenth of the ball's radius wide", 6.0
+    )
+    narrow_mm: float = quantity(
+        0.001, 10, "mm", "width below which facets are not divided: a tenth of a ball's radius",
+        0.06,
+    )  # fmt: skip
+    tolerance_mm: float | None = quantity(
+        0, 10, "mm", "the farthest that the surface may move; absent: as far as its facets tell",
+        None,
+    )  # fmt: skip
+
+    def rule(self, triangles: np.ndarray) -> Rule:
+        """The same for some triangles (m,) bool, in SI units."""
+        tolerance = math.inf if self.tolerance_mm is None else 1e-3 * self.tolerance_mm
+        turn = math.radians(self.limit_deg)
+        return Rule(triangles, self.off, turn, 1e-3 * self.narrow_mm, tolerance)
+
+
+def _accept_off(smoothing: Any) -> Any:
+    if isinstance(smoothing, (str, int, float, list)) and smoothing != "off":
+        allowed = '"off", or a table, e.g. { limit_deg = 4 }'
+        raise CrossCheckError([Problem("", f"given {smoothing!r}; allowed: {allowed}")])
+    return {"off": True} if smoothing == "off" else smoothing
+
+
+Smoothing = Annotated[SmoothingTable, BeforeValidator(_accept_off)]
+
+
 class PartTable(FileTable):
     """The part's mesh and its place in the chamber."""
 
@@ -132,6 +169,10 @@ class PartTable(FileTable):
     offset_mm: Shift = Field(default=(0.0, 0.0), description="sideways from the chamber axis")
     tessellation: TessellationTable | None = Field(
         default=None, description="how fine the triangles of a STEP file are"
+    )
+    smoothing: Smoothing = Field(
+        default_factory=SmoothingTable,
+        description='how rounds are divided of which the file has facets; "off": not at all',
     )
     target: Target = Field(default_factory=Target, description="which triangles must be covered")
 

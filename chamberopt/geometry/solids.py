@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
 # 1 nm: a thousandth of the finest surface roughness, yet 1e7 steps of a double at 100 mm.
 GRID_MM = 2.0**-20
+# What a vertex may be off its plane: the rounding of a file's numbers of 32 bits.
+PLANE_MM, PLANE_OF_SIZE = 1e-5, 3e-7
 # Relative. A boolean that went wrong is off by whole triangles, rounding by 1e-13.
 SAME_VOLUME = 1e-9
 
@@ -101,6 +103,36 @@ def make_solid(
         why = "the surface is inside out or encloses nothing"
         raise InputError(f"{name}: {why}; make its normals point outward")
     return solid
+
+
+def simplify_planes(
+    vertices: np.ndarray, triangles: np.ndarray, label: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """A closed surface without the vertices inside its planes and on their straight borders.
+
+    Args:
+        vertices: [m], shape (n, 3).
+        triangles: shape (m, 3).
+        label: of each triangle, from 0 on, shape (m,); borders between labels stay.
+
+    Returns:
+        Vertices [m], triangles (k, 3) and the label of each, shape (k,).
+    """
+    from manifold3d import Manifold, Mesh64
+
+    order = np.argsort(label, kind="stable")
+    ends = np.searchsorted(label[order], np.arange(int(label.max()) + 2))
+    first = int(Manifold.reserve_ids(len(ends) - 1))
+    mesh = Mesh64(
+        np.ascontiguousarray(_grid_mm(vertices)),
+        np.ascontiguousarray(triangles[order], dtype=np.uint64),
+        run_index=(3 * ends).astype(np.uint64),
+        run_original_id=(first + np.arange(len(ends) - 1)).astype(np.uint32),
+    )
+    far = max(PLANE_MM, PLANE_OF_SIZE * 1e3 * float(np.linalg.norm(np.ptp(vertices, axis=0))))
+    body = _checked(Manifold(mesh), "the part cannot be made a solid").simplify(far)
+    found = Solid(body, -1, "the part").surface()
+    return found.vertices, found.triangles, found.solid - first
 
 
 def split_bodies(vertices: np.ndarray, triangles: np.ndarray, name: str) -> tuple[list[Solid], int]:

@@ -141,6 +141,23 @@ def area_vectors(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     return 0.5 * np.cross(b - a, c - a)
 
 
+def interpolate(values: np.ndarray, corners: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """Values (p, 3, c) at the corners (p, 3, 3) of triangles, linear in between, at places (p, 3).
+
+    Places beside the plane of their triangle count as the nearest in it. A triangle without area
+    has the mean of its values.
+    """
+    a, b, c = corners.swapaxes(0, 1)
+    normal = np.cross(b - a, c - a)
+    square = np.einsum("ij,ij->i", normal, normal)
+    weights = np.full((len(corners), 3), 1.0 / 3.0)
+    some = square > 0.0
+    for k, (one, two) in enumerate(((b, c), (c, a), (a, b))):
+        piece = np.einsum("ij,ij->i", np.cross(two - one, places - one), normal)
+        weights[some, k] = piece[some] / square[some]
+    return np.einsum("pk,pkc->pc", weights, values)
+
+
 def unit_normals(corners: np.ndarray) -> np.ndarray:
     """Unit normals of triangles with corners (..., 3, 3), shape (..., 3); zero if without area."""
     first = corners[..., 0, :]

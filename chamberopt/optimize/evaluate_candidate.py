@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from chamberopt.common.errors import InputError, WorkerLostError
+from chamberopt.common.errors import InputError, UnreadableError, WorkerLostError
 from chamberopt.common.estimate import Estimate
 from chamberopt.coverage.metrics import find_metric, highest_objective, parse_objective
 from chamberopt.optimize.storage.trial_log import Trial
@@ -95,6 +95,7 @@ class CandidateEvaluator:
                 that is clearly below it gets only a few replicas.
         Raises:
             InputError or an error of sim_core: the start of a search cannot be simulated.
+            UnreadableError: a file that the design names cannot be read now.
         """
         from sim_core import SceneError, SimulationError
 
@@ -104,7 +105,7 @@ class CandidateEvaluator:
             if not all(math.isfinite(goal.value) for goal in goals):
                 raise InputError(f"its objective is {goals[0].value}, not a number to compare")
         except (InputError, SceneError, SimulationError) as error:
-            if is_start(number, stage):
+            if is_start(number, stage) or isinstance(error, UnreadableError):
                 raise
             return error if isinstance(error, InputError) else InputError(str(error))
         except Exception as error:
@@ -183,6 +184,8 @@ class CandidateEvaluator:
         try:
             design = self._study.at_search_accuracy(self.space.design_at(point))
             self._require_promise(design, best_low)
+        except UnreadableError:
+            raise
         except InputError:
             return False
         return True

@@ -156,7 +156,7 @@ def run_study(
     best = max(winners, key=lambda one: one.goals[0].value - one.lost_to_tolerances)
     is_gain = best is not start
     gain = paired_difference(best.goals[0], start.goals[0]) if is_gain else Estimate(0.0, 0.0)
-    if is_gain and (best.goals[0].in_words or start.goals[0].in_words):
+    if is_gain and not (best.goals[0].has_number and start.goals[0].has_number):
         gain = gain.not_known(NOT_KNOWN)
     model = candidates.objective_model
     noise = estimate(best.evaluation.objective.pseudovalues).half_width
@@ -242,10 +242,10 @@ class ChamberSimulator:
         return replace(evaluation, timings={"chamber": seconds, **evaluation.timings})
 
     def reachable(self, design: Design) -> float:
-        """Share of the target that the balls can touch, without any simulation."""
+        """The largest share of the target that the balls may touch, without any simulation."""
         one = self._candidate(design, "search")
         one.target = prepare_target(design, one.chamber, chamber_mesh(one.chamber))
-        return one.target.reachable
+        return one.target.reach.largest
 
     def _candidate(self, design: Design, stream: str) -> _Simulated:
         from chamberopt.chamber.build import build_chamber

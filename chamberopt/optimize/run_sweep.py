@@ -66,7 +66,7 @@ class SweepResult:
         One whose objective is not resolved counts only where there is no other.
         """
         feasible = [trial for trial in self.trials if trial.feasible]
-        resolved = [one for one in feasible if one.objective and not one.objective.in_words]
+        resolved = [one for one in feasible if one.objective and one.objective.has_number]
         return max(resolved or feasible, key=lambda one: one.score, default=None)
 
 

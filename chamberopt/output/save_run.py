@@ -8,11 +8,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from chamberopt.chamber.build import build_chamber
-from chamberopt.common.files import make_output_folder
+from chamberopt.common.files import make_output_folder, whole_or_nothing
 from chamberopt.output import viewer
 from chamberopt.output.plots.study import convergence_picture, pareto_picture, slices_picture
 from chamberopt.output.plots.sweep import sweep_map
-from chamberopt.output.results.load import summary
+from chamberopt.output.results.load import START, summary
 from chamberopt.output.results.write import write_result, write_simulation, write_study, write_sweep
 from chamberopt.simulation.complete_result import CandidateResult, complete_result
 
@@ -54,15 +54,10 @@ def save_simulation(
         Remarks for the user, such as why a picture was skipped.
     """
     folder = make_output_folder(folder)
-    try:
+    with whole_or_nothing(folder):  # without its result.json, what was written is of no use
         data = write_simulation(folder, complete_result(design, chamber, evaluation))
         more = {"tolerances": tolerances.as_json()} if tolerances else {}
         write_result(folder, data | more, advice, warned)
-    except OSError:  # a full disk: without its result.json, what was written is of no use
-        for one in folder.iterdir():
-            if one.is_file() and not one.name.startswith("."):
-                one.unlink()
-        raise
     return _draw_coverage([folder], [evaluation], [folder.resolve().name], folder / "coverage.png")
 
 
@@ -130,7 +125,7 @@ def _draw_diagrams(folder: Path, study_result: StudyResult) -> None:
 def _draw_start_and_best(folder: Path, study_result: StudyResult, threads: Executor) -> list[str]:
     """Draw the coverage of a study whose data is written; return remarks on skipped pictures."""
     start, best = study_result.start.evaluation, study_result.best.evaluation
-    folders, names = [folder / "start", folder], ["start", "best design"]
+    folders, names = [folder / START, folder], ["start", "best design"]
     pictures = [
         threads.submit(_draw_coverage, *one)
         for one in (

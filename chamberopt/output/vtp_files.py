@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from chamberopt.common.errors import InputError
-from chamberopt.common.files import atomic_write, write_bytes
+from chamberopt.common.files import new_file, write_bytes
 from chamberopt.output.vtp_reader import DamagedSurfaceError, read_arrays
 
 if TYPE_CHECKING:
@@ -126,10 +126,10 @@ def save_surface(path: Path, surface: Surface) -> None:
         writer.Write()
         write_bytes(path, writer.GetOutputString().encode())
         return
-    with atomic_write(path) as temporary:
-        size = 1024 * (surface.actual_memory_size + 1024)
-        temporary.write_bytes(bytes(size))
-        surface.save(temporary)
+    with new_file(path) as file:
+        file.write(bytes(1024 * (surface.actual_memory_size + 1024)))
+        file.flush()
+        surface.save(file.name)
 
 
 def write_stl(path: Path, vertices: np.ndarray, triangles: np.ndarray) -> None:

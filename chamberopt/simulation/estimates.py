@@ -23,7 +23,8 @@ import numpy as np
 
 from chamberopt.chamber.build import TARGET
 from chamberopt.chamber.checks.gaps import MIN_MISSED_SHARE
-from chamberopt.common.estimate import Estimate, estimate, sum_of_shared
+from chamberopt.common.estimate import Estimate, estimate, shared_half_width, sum_of_shared
+from chamberopt.common.number_text import share_in_words
 from chamberopt.coverage.compression import compression_estimate
 from chamberopt.coverage.coverage_from_impacts import (
     Prints,
@@ -33,6 +34,7 @@ from chamberopt.coverage.coverage_from_impacts import (
     locate_dents,
 )
 from chamberopt.coverage.coverage_intervals import coverage_estimates
+from chamberopt.coverage.field.reached import CERTAIN, RULE_OF_THREE, Reach
 from chamberopt.coverage.field.target_field import Gauge, TargetField
 from chamberopt.coverage.metrics import (
     METRICS,
@@ -52,6 +54,9 @@ if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
     from chamberopt.design.load import Design
     from chamberopt.design.peening.calibration import Calibration
+
+
+SHARES = frozenset({"mean_coverage", "std_coverage", "p05_coverage", "p95_coverage"})
 
 
 @dataclass
@@ -121,7 +126,7 @@ def estimate_zones(
         of_zone = {f"{zone}.{name}": one for name, one in found.metrics.items()}
         metrics |= {name: one for name, one in of_zone.items() if find_metric(name)}
         surface = f"zone {zone}"
-        notes += reach_notes(seen.field.reachable, surface)
+        notes += reach_notes(seen.field.reach, surface)
         notes += resolution_notes(found.resolution, surface)
         notes += strength_notes(found.metrics, found.resolution, surface)
         if seen.field.is_one_window:
@@ -169,12 +174,25 @@ def window_estimates(
     time_ratio = process.treatment_time / process.recorded_time
     batches = batches_of(prints)
     sums = sum_dents(batches, len(gauge.area))
-    found = coverage_estimates(batches, sums, field.reachable, time_ratio, field.reachable_error)
+    found = coverage_estimates(batches, sums, field.reach, time_ratio)
     found["time_to_98_s"] = time_to_98(
-        found["p05_coverage"], sums, field.reachable, time_ratio, process.treatment_time
+        found["p05_coverage"], sums, field.reach, time_ratio, process.treatment_time
     )
+    known_to = least_half_width(field.reach, prints)
+    for name in SHARES & found.keys():
+        found[name] = found[name].at_least_as_wide(known_to)
     found |= in_order(found["p05_coverage"], found["p95_coverage"], "{}_coverage")
     return found, find_resolution(batches, sums, gauge, time_ratio, process.recorded_time)
+
+
+def least_half_width(reach: Reach, prints: Sequence[Prints]) -> float:
+    """Half-width than which no share of the target is known better.
+
+    Points tell no better what is in reach, and dents, by the rule of three, what none of them hit.
+    """
+    area, squares = sum(one.area for one in prints), sum(one.squares for one in prints)
+    dents = area**2 / squares if squares else 0.0  # as many, all alike, would scatter as these do
+    return max(shared_half_width([reach.error]), RULE_OF_THREE / max(dents, RULE_OF_THREE))
 
 
 def _all_resolved(found: Mapping[str, Estimate], resolution: Resolution) -> dict[str, Estimate]:
@@ -183,6 +201,9 @@ def _all_resolved(found: Mapping[str, Estimate], resolution: Resolution) -> dict
     The mean takes many dents where nearly all is covered, and then the 5th percentile is known.
     """
     shown = {name: as_resolved(name, one, resolution) for name, one in found.items()}
+    for name in SHARES & shown.keys():
+        one = shown[name]
+        shown[name] = replace(one, in_words=one.in_words or share_in_words(one))
     mean, p05 = shown["mean_coverage"], shown["p05_coverage"]
     if mean.in_words == NOT_RESOLVED and 0.0 < p05.low < math.inf:
         least = 100.0 * (1.0 - P05) * p05.low
@@ -229,13 +250,19 @@ def _ratios(
     return estimates
 
 
-def reach_notes(reachable: float, surface: str = TARGET) -> tuple[str, ...]:
+def reach_notes(reach: Reach, surface: str = TARGET) -> tuple[str, ...]:
     """How high coverage can go where some of a surface is out of reach, and so has coverage 0."""
+    reachable, beyond = reach.share, reach.beyond(1.0 - P05)
     if reachable > 1.0 - MIN_MISSED_SHARE:
         return ()
     highest = highest_uniform_coverage(reachable)
     uniform = f" or a uniform_coverage above {highest:.2f}" if surface == TARGET else ""
-    bare = ", and its p05_coverage is 0" if reachable < 1.0 - P05 else ""
+    bare = ", and its p05_coverage is 0" if beyond <= -CERTAIN else ""
+    if abs(beyond) < CERTAIN:
+        bare = (
+            f"; whether its p05_coverage is 0 is not resolved, as the share in reach is known to "
+            f"± {shared_half_width([reach.error]):.1%} only: raise process.accuracy.points"
+        )
     return (
         f"{1.0 - reachable:.1%} of {surface} is out of reach of the balls and counts as bare: no "
         f"chamber with so much of it has a mean_coverage above {reachable:.2f}{uniform}{bare}",
@@ -289,7 +316,8 @@ def weighted_sum(objective: ObjectiveFunction, metrics: dict[str, Estimate]) -> 
     spread = estimate(np.sum(columns, axis=0), shared=sum_of_shared(terms))
     # Words of a single metric are true of it alone.
     words = next((metric.in_words for _, metric in terms if metric.in_words), "")
-    words = NOT_RESOLVED if words and len(terms) > 1 else words
+    if len(terms) > 1:
+        words = "" if all(metric.has_number for _, metric in terms) else NOT_RESOLVED
     bias = sum(abs(weight) * metric.bias for weight, metric in terms)
     # Biases, and by how much a steep interval is wider, may all go one way.
     more = sum(abs(weight) * metric.beyond_scatter for weight, metric in terms)

@@ -12,6 +12,7 @@ import numpy as np
 
 from chamberopt.chamber.analytic import cavity_note
 from chamberopt.chamber.checks.check import friction_notes
+from chamberopt.chamber.checks.facets import facet_warnings
 from chamberopt.chamber.scene import chamber_mesh
 from chamberopt.common.estimate import Estimate
 from chamberopt.common.parallel.executor import share
@@ -22,6 +23,7 @@ from chamberopt.coverage.field.target_field import (
     TargetField,
     WindowSetting,
     find_target_field,
+    require_narrow_gauge,
     require_touchable_zones,
     require_wide_gauge,
 )
@@ -103,6 +105,7 @@ def evaluate(
     setting = share(executor, ReplicaSetting(design, chamber, cavity or mesh))
     timings = {"simulate": 0.0, "coverage": 0.0}
     window = window_setting(design, chamber)
+    require_narrow_gauge(chamber, window)
     require_touchable_zones(chamber, mesh, 0.5 * window.ball)
     # The dents of a replica are looked at while others are simulated, so that no worker waits.
     beside = ThreadPoolExecutor(1)
@@ -160,7 +163,8 @@ def evaluate(
         notes=(
             *((cavity_note(cavity),) if cavity else ()),
             *friction_notes(design),
-            *reach_notes(seen.field.reachable),
+            *reach_notes(seen.field.reach),
+            *facet_warnings(chamber.part, min(design.shot.diameters), seen.field.reach.share),
             *_symmetry_note(seen.field.alike),
             *_accuracy_note(stopped_by, len(done), value, wanted),
             *resolution_notes(found.resolution),

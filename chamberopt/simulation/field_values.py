@@ -8,6 +8,7 @@ Notation
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -42,8 +43,15 @@ if TYPE_CHECKING:
 
 POINTS_PER_WINDOW = 4  # by which a triangle's own values are measured, one at least
 MAX_POINTS = 300_000
+MAX_PAIRS = 50_000_000  # of a window and a dent, at 12 bytes, that are held at once
 WIDEST = 0.5  # interval of a coverage that is worth a colour: about ± 25 %
 HIGH_SPEED = 0.9  # share of the impacts that are not faster than p90_normal_speed
+
+
+def _some_at_once(dents: int, windows: int) -> Iterator[slice]:
+    """Slices of so many dents whose pairs with windows fit into memory, however wide these are."""
+    step = max(1, MAX_PAIRS // max(windows, 1))
+    return (slice(first, first + step) for first in range(0, dents, step))
 
 
 class PartField:
@@ -84,8 +92,9 @@ class PartField:
 
         part, gauge = self._chamber.part, self.field.setting.gauge
         mesh = display_mesh(
-            part.vertices, part.triangles, part.target, self.field.face, gauge, self.coverage
-        )
+            part.vertices, part.triangles, part.corner_normals, part.target, self.field.drawn_face,
+            gauge, self.coverage,
+        )  # fmt: skip
         return DisplayField(mesh, self.values(mesh.places, self._gauge_off_creases(mesh.places)))
 
     def _gauge_off_creases(self, places: Places) -> Gauge:
@@ -148,7 +157,8 @@ class PartField:
             MAX_POINTS,
         )
         owner = spread.triangle
-        values = self.values(Places(spread.place, spread.normal, self.field.face[owner]))
+        normal = part.normals_at(owner, spread.place)
+        values = self.values(Places(spread.place, normal, self.field.face[owner]))
         points = np.bincount(owner, minlength=count)
         means = {}
         for name, column in values.items():
@@ -190,8 +200,9 @@ class PartField:
 
         sums, largest = np.zeros((len(gauge.area), 3)), 0.0
         for hits, located in zip(self._hits, self._located, strict=True):
-            found = find_footprints(self.field, gauge, located)
-            add_powers(found.point, found.weight, sums)
+            for some in _some_at_once(len(located.edge), len(gauge.area)):
+                found = find_footprints(self.field, gauge, located.select(some))
+                add_powers(found.point, found.weight, sums)
             largest = max(largest, float(hits.dent.max(initial=0.0)))
         dents, share, squares = sums.T
         one_more = np.pi / 4.0 * largest**2 / gauge.area

@@ -64,7 +64,7 @@ def coverage_against_time(
     for number, time in enumerate(times):
         both = [number, number + len(times)]
         products = Products(of_all[:, both], of_rest[:, both])
-        mean, _ = mean_and_variance_estimates(products, field.reachable, field.reachable_error)
+        mean, _ = mean_and_variance_estimates(products, field.reach)
         half_width = math.hypot(mean.half_width, open_density * _by_density(mean.value))
         row = {"time_s": time, "mean_coverage": mean.value, "half_width": half_width}
         if rates:

@@ -98,7 +98,8 @@ def _faces(surface: SurfaceTriangles, radius: float, border: SonotrodeBorder) ->
         own = members[first[k] : first[k + 1]]
         area = 0.5 * surface.doubled[own].sum()
         few = _few_faces(corners, outline, flat_faces.frames[k], area)
-        pieces.append(corners[own][:, TRIANGLE] if few is None or len(few) > len(own) else few)
+        every = corners[own][:, TRIANGLE]
+        pieces.append(every if few is None or _box_area(few) > _box_area(every) else few)
         each.append(np.full(len(pieces[-1]), flat_faces.seed[k]))
     pieces.append(border.walls)
     each.append(border.above)
@@ -141,6 +142,12 @@ def _few_faces(
     sides = np.linalg.norm(pieces - np.roll(pieces, -1, axis=1), axis=2) > 0.0
     # a piece that rounding made a point or a line would have no borders
     return np.asarray(pieces[sides.sum(axis=1) >= 3])
+
+
+def _box_area(pieces: np.ndarray) -> float:
+    """Area [m²] of the boxes round some pieces (k, 4, 3): how often a flight enters them."""
+    x, y, z = np.ptp(pieces, axis=1).T
+    return float((x * y + y * z + z * x).sum())
 
 
 def _share_plane(numbers: np.ndarray, vibrating: np.ndarray) -> None:

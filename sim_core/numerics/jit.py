@@ -80,7 +80,13 @@ def _cache_is_usable() -> bool:
         return False
 
 
-CACHED = _cache_is_usable() and not _settings.DISABLE_JIT
+_USABLE = _cache_is_usable()
+CACHED = _USABLE and not _settings.DISABLE_JIT
+
+
+def user_cache() -> Path | None:
+    """This user's own folder for what can be made again; None where there is none."""
+    return CACHE_FOLDER.parent if _USABLE and is_private(CACHE_FOLDER.parent) else None
 
 
 # Threads take turns: one that restored numba's folder while another read it sent compiled code to

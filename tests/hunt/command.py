@@ -20,7 +20,7 @@ import subprocess
 import sys
 import time
 import traceback
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from importlib import import_module
 from pathlib import Path
@@ -64,17 +64,28 @@ class Server:
         self._process.stdout.close()
 
     def run(
-        self, folder: Path, words: Sequence[str], kill_after: float = 0.0, seconds: float = SECONDS
+        self,
+        folder: Path,
+        words: Sequence[str],
+        kill_after: float = 0.0,
+        seconds: float = SECONDS,
+        within: str = "",
     ) -> Outcome:
         """Run `chamberopt WORDS` in a folder.
 
         Args:
             kill_after: seconds after which the command is interrupted with Ctrl-C, if positive.
             seconds: of CPU time that it may take.
+            within: "module:function" of a test, called with the words, runs the command itself.
         """
         request = {"folder": str(folder), "words": list(words), "kill_after": kill_after}
-        print(json.dumps({**request, "seconds": seconds}), file=self._process.stdin, flush=True)
+        request |= {"seconds": seconds, "within": within}
+        print(json.dumps(request), file=self._process.stdin, flush=True)
         return Outcome(**json.loads(self._process.stdout.readline()))
+
+    def warm_up(self, within: str) -> None:
+        """Call a function in the process that the commands are forked from."""
+        print(json.dumps({"warm_up": within}), file=self._process.stdin, flush=True)
 
 
 class Executable:
@@ -146,7 +157,16 @@ def main() -> None:
     answers = os.fdopen(os.dup(1), "w")
     os.dup2(2, 1)
     for line in sys.stdin:
-        print(json.dumps(asdict(_run(json.loads(line)))), file=answers, flush=True)
+        request = json.loads(line)
+        if function := request.get("warm_up"):
+            _function(function)()
+        else:
+            print(json.dumps(asdict(_run(request))), file=answers, flush=True)
+
+
+def _function(name: str) -> Callable[..., Any]:
+    module, _, function = name.partition(":")
+    return getattr(import_module(module), function)
 
 
 def _run(request: dict[str, Any]) -> Outcome:
@@ -204,7 +224,8 @@ def _be_the_command(request: dict[str, Any], files: list[int]) -> None:
         sys.stdout = open(1, "w", closefd=False)  # noqa: SIM115
         sys.stderr = open(2, "w", closefd=False)  # noqa: SIM115
         try:
-            status = command()
+            within = request["within"]
+            status = _function(within)(request["words"]) if within else command()
         except SystemExit as end:
             status = end.code if isinstance(end.code, int) else int(bool(end.code))
         except BaseException:

@@ -8,6 +8,7 @@ import numpy as np
 
 from chamberopt.chamber.build import hidden_share, selection_of
 from chamberopt.chamber.checks.calibration import calibration_warnings
+from chamberopt.chamber.checks.facets import facet_warnings, touched_by_curvature
 from chamberopt.chamber.checks.fillets import fillet_warnings
 from chamberopt.chamber.checks.gaps import gap_warnings, pocket_warnings, surface_warnings
 from chamberopt.chamber.checks.ledges import find_ledges
@@ -95,6 +96,7 @@ def first_facts(design: Design, chamber: Chamber) -> dict[str, Any]:
             "lowest_point_mm": _rounded(low[2] * 1e3),
             "area_mm2": _rounded(part.area.sum() * 1e6),
             "exposed_area_mm2": _rounded(chamber.exposed_area.sum() * 1e6),
+            **_smoothing_facts(part, min(shot.diameters)),
         },
         "target": {
             "triangles": int(part.target.sum()),
@@ -124,6 +126,23 @@ def first_facts(design: Design, chamber: Chamber) -> dict[str, Any]:
     }
 
 
+def _smoothing_facts(part: Part, ball: float) -> dict[str, Any]:
+    """What was done to the facets of the target's rounds, if it has any."""
+    facts = part.smoothing
+    if facts is None or not facts.facet_turn:
+        return {}
+    return {
+        "facets_deg": _rounded(float(np.degrees(facts.facet_turn))),
+        "given_triangles": facts.given_triangles,
+        "smoothed_share": _rounded(facts.moved_share),
+        "smoothed_at_most_mm": _rounded(facts.largest_move * 1e3),
+        "volume_change": _rounded(facts.volume_change),
+        "blunt_creases": facts.blunt_creases,
+        "coarse_facets_share": _rounded(facts.coarse_share),
+        "touched_by_curvature": _rounded(touched_by_curvature(part, ball)),
+    }
+
+
 def with_clearance(facts: dict[str, Any], mesh: TriangleMesh) -> dict[str, Any]:
     """First facts with what a chamber's mesh, which is closed, tells of it."""
     clearance = _rounded(sonotrode_clearance(mesh) * 1e3)
@@ -143,7 +162,12 @@ def notes(design: Design, chamber: Chamber) -> list[str]:
 
 def shot_reach(design: Design, chamber: Chamber) -> Reach:
     """What the shot can reach, with a turning part as drawn; takes a second or two."""
-    return find_reach(chamber_mesh(chamber), min(design.shot.diameters), design.shot.diameter)
+    return find_reach(
+        chamber_mesh(chamber),
+        min(design.shot.diameters),
+        design.shot.diameter,
+        chamber.part.normals_in_cavity(chamber.vertices, chamber.triangles, chamber.source),
+    )
 
 
 def warnings(design: Design, chamber: Chamber, reach: Reach | None = None) -> list[str]:
@@ -152,6 +176,7 @@ def warnings(design: Design, chamber: Chamber, reach: Reach | None = None) -> li
     texts = first_warnings(design, chamber, reach.mesh)
     for name, surface in _to_be_peened(design, chamber).items():
         texts += surface_warnings(reach, surface, name, design.part.target.reachable)
+    texts += facet_warnings(chamber.part, reach.diameter, _reached_share(reach, on_target(chamber)))
     texts += pocket_warnings(reach, chamber)
     turns = design.effects.part_turn is not None
     texts += gap_warnings(reach, chamber, design.shot.diameter, turns)
@@ -233,10 +258,16 @@ def _reach_facts(reach: Reach, chamber: Chamber) -> dict[str, Any]:
     size = areas(chamber.vertices, chamber.triangles)
     facts: dict[str, Any] = {"ball_mm": _rounded(reach.diameter * 1e3)}
     for name, rows in (("target", on_target(chamber)), ("part", chamber.tags == TAG_PART)):
-        touched = float((reach.share * size)[rows].sum())
-        facts[f"{name}_reachable_mm2"] = _rounded(touched * 1e6)
-        facts[f"{name}_reachable_share"] = _rounded(touched / size[rows].sum())
+        share = _reached_share(reach, rows)
+        facts[f"{name}_reachable_mm2"] = _rounded(share * size[rows].sum() * 1e6)
+        facts[f"{name}_reachable_share"] = _rounded(share)
     return facts
+
+
+def _reached_share(reach: Reach, rows: np.ndarray) -> float:
+    """Share of some of the cavity's triangles (k,) bool that the ball can touch."""
+    size = areas(reach.mesh.vertices, reach.mesh.triangles)[rows]
+    return float(reach.share[rows] @ size / size.sum())
 
 
 def _zone_facts(reach: Reach, chamber: Chamber) -> dict[str, Any]:

@@ -20,7 +20,7 @@ from chamberopt.chamber.propose.ranges import LARGEST_MM, Range, propose_charge,
 from chamberopt.chamber.propose.sizes import Sizes, propose_sizes, shape_for
 from chamberopt.chamber.propose.target import Surface, Target, propose_target, surfaces
 from chamberopt.chamber.reach.reach import Reach
-from chamberopt.common.errors import InputError
+from chamberopt.common.errors import InputError, UnreadableError
 from chamberopt.common.progress import step
 from chamberopt.common.toml_fields import MAX_COORDINATE_MM
 from chamberopt.design.design import Design, validate
@@ -129,6 +129,8 @@ def propose(
             tables["chamber"] = _chamber_table(sizes)
             try:
                 made = _checked(tables, {**reasons, **_size_reasons(sizes)}, sizes, known, mesh)
+            except UnreadableError:
+                raise
             except InputError as error:
                 refused = refused or error
                 continue

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from chamberopt.geometry.triangles import area_vectors, areas, unit_vectors
+from chamberopt.geometry.triangles import areas, interpolate, unit_vectors
 
 if TYPE_CHECKING:
     from sim_core import TriangleMesh
@@ -46,17 +46,18 @@ class TouchPoints(NamedTuple):
 
 
 def find_touch_points(
-    mesh: TriangleMesh, spacing: np.ndarray, max_radius: float, overlap: float
+    mesh: TriangleMesh, normals: np.ndarray, spacing: np.ndarray, max_radius: float, overlap: float
 ) -> TouchPoints:
     """Points on all triangles of a mesh, at least one on each, and the largest balls there.
 
     Args:
+        normals: of the surface at the triangles' corners, unit vectors into the cavity, (m, 3, 3).
         spacing: distance between the points on each triangle [m], shape (m,).
         max_radius: limit of the radius [m].
         overlap: how far a ball may reach into a surface [m].
     """
     triangle, point, area = spread_points(mesh.vertices, mesh.triangles, spacing)
-    normal = -unit_vectors(area_vectors(mesh.vertices, mesh.triangles))[triangle]
+    normal = unit_vectors(interpolate(normals[triangle], mesh.corners[triangle], point))
     balls = largest_balls(mesh, point, normal, max_radius, overlap)
     return TouchPoints(triangle, point, normal, area, *balls)
 

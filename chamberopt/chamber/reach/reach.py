@@ -10,7 +10,7 @@ import numpy as np
 from chamberopt.chamber.reach.connectivity import cell_edge, find_regions
 from chamberopt.chamber.reach.largest_ball import TouchPoints, find_touch_points
 from chamberopt.design.shapes import TAG_PART, TAG_SONOTRODE
-from chamberopt.geometry.triangles import areas
+from chamberopt.geometry.triangles import areas, unit_normals
 
 if TYPE_CHECKING:
     from sim_core import TriangleMesh
@@ -40,7 +40,12 @@ class Reach:
     share: np.ndarray  # (k,), of each triangle of the cavity, the share that the ball can touch
 
 
-def find_reach(mesh: TriangleMesh, diameter: float, largest: float | None = None) -> Reach:
+def find_reach(
+    mesh: TriangleMesh,
+    diameter: float,
+    largest: float | None = None,
+    normals: np.ndarray | None = None,
+) -> Reach:
     """Where a ball can touch the surface of a cavity.
 
     The ball is taken as smaller by TOLERATED_OVERLAP. In narrow places it is followed from point to
@@ -50,14 +55,18 @@ def find_reach(mesh: TriangleMesh, diameter: float, largest: float | None = None
     Args:
         diameter: of the smallest ball of the shot [m].
         largest: diameter of the largest [m].
+        normals: of the surface at the corners of the cavity's triangles, unit vectors into the
+            cavity, shape (k, 3, 3); None where the triangles are the surface.
     """
+    if normals is None:
+        normals = np.repeat(-unit_normals(mesh.corners)[:, None], 3, axis=1)
     radius = 0.5 * diameter
     overlap = TOLERATED_OVERLAP * radius
     near_cell = radius + 1.01 * np.sqrt(3.0) * cell_edge(mesh, radius)
     max_radius = max(near_cell, MEASURED_WIDTH * 0.5 * (largest or diameter))
     spacing = _spacing(mesh, SPACING * radius)
     widest = float(spacing.max())
-    touches = find_touch_points(mesh, spacing, max_radius, overlap)
+    touches = find_touch_points(mesh, normals, spacing, max_radius, overlap)
     region, volume = find_regions(mesh, touches, radius - overlap, widest)
     fits = touches.radius >= radius
     region = np.where(fits, region, -1)

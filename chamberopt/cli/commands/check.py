@@ -40,7 +40,7 @@ def check(
     screenshot
         Write an image (.png) of the part with its target and chamber, or of the surface's faults.
     """
-    from chamberopt.common.files import claim_file, claim_folder
+    from chamberopt.common.files import claim_file, claim_folder, whole_or_nothing
 
     with ExitStack() as claims:
         if screenshot is not None:
@@ -48,7 +48,7 @@ def check(
 
             claims.enter_context(claim_file(picture_path(screenshot)))
         if out is not None:
-            claims.enter_context(claim_folder(out))
+            claims.enter_context(whole_or_nothing(claims.enter_context(claim_folder(out))))
         _check(file, pilot, screenshot, json, out)
 
 

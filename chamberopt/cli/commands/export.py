@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from chamberopt.cli.console import print_json, print_remarks, results_folder, show, whole_or_nothing
+from chamberopt.cli.console import print_json, print_remarks, results_folder, show
 from chamberopt.cli.options import Json, Workers, app
 from chamberopt.cli.prepare import compile_with_message
 from chamberopt.common.errors import InputError
@@ -95,7 +95,7 @@ def _files(
     formats: dict[str, ExportFormat], out: Path | None, name: str
 ) -> Iterator[dict[str, Path]]:
     """The file of each format: --out itself if it is a file, else one in a new folder."""
-    from chamberopt.common.files import check_new_file, claim_file
+    from chamberopt.common.files import check_new_file, claim_file, whole_or_nothing
 
     if out is not None and export_formats.is_file(out, formats):
         (only,) = formats

@@ -122,7 +122,7 @@ def _scheduler_address(cluster: str) -> str:
     if "://" in cluster:
         return cluster
     try:
-        content = read_limited(Path(cluster), MAX_TEXT_BYTES, "scheduler file")
+        content = read_limited(Path(cluster), MAX_TEXT_BYTES, "scheduler file", follow=True)
     except FileNotFoundError:
         text = f"neither an address nor a file; give tcp://HOST:PORT, or {SCHEDULER_FILE}"
         raise InputError(f"--cluster: given {cluster!r}, {text}") from None

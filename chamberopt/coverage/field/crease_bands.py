@@ -20,9 +20,9 @@ PIECES_PER_WINDOW = 32  # of a crease, by which its length is measured
 
 
 class CreasePieces(NamedTuple):
-    """Short pieces of creases that a ball can touch: their places on lines, edges and lengths."""
+    """Short pieces of creases that a ball can touch: their places, edges and lengths."""
 
-    places: Places
+    place: np.ndarray
     edge: np.ndarray
     length: np.ndarray
 
@@ -37,8 +37,6 @@ def crease_pieces(
         ball_radius: [m].
         radius: of the windows [m].
     """
-    from chamberopt.coverage.field.windows import Places
-
     start, end = creases.ends[:, 0], creases.ends[:, 1]
     length = np.linalg.norm(end - start, axis=1)
     count = np.maximum(
@@ -49,8 +47,16 @@ def crease_pieces(
     place = start[edge] + ((number + 0.5) / count[edge])[:, None] * (end - start)[edge]
     fits = ball_fits(mesh, place, creases.outward[edge], ball_radius)
     edge, place = edge[fits], place[fits]
-    lines = Places(place, np.zeros((len(place), 3)), creases.line[edge])
-    return CreasePieces(lines, edge, (length / count)[edge])
+    return CreasePieces(place, edge, (length / count)[edge])
+
+
+def on_lines(creases: Creases, place: np.ndarray, edge: np.ndarray) -> tuple[Places, np.ndarray]:
+    """Places (k, 3) [m] on edges (k,) as places on the lines of all divisions, and their rows."""
+    from chamberopt.coverage.field.windows import Places
+
+    division, row = np.nonzero(creases.line[:, edge] >= 0)
+    line = creases.line[division, edge[row]]
+    return Places(place[row], np.zeros((len(row), 3)), line), row
 
 
 class CreaseBand(NamedTuple):
@@ -82,10 +88,14 @@ def find_band(
         return None
     far = dent_radius + 0.5 * float(pieces.length.max())
     near = cKDTree(points.place).sparse_distance_matrix(
-        cKDTree(pieces.places.place), far, output_type="ndarray"
+        cKDTree(pieces.place), far, output_type="ndarray"
     )
     point, edge = near["i"], pieces.edge[near["j"]]
-    beside = (creases.faces[edge] == points.face[point][:, None]).any(axis=1)
+    division = windows.division[point]
+    own, sides = points.face[point][:, None], creases.faces[edge]
+    if windows.faces is not None:
+        own, sides = (windows.faces[division[:, None], faces] for faces in (own, sides))
+    beside = (sides == own).any(axis=1) & (creases.line[division, edge] >= 0)
     point, edge = np.unique(np.column_stack([point, edge])[beside], axis=0).T
     start, end = creases.ends[edge, 0], creases.ends[edge, 1]
     along = end - start
@@ -93,18 +103,19 @@ def find_band(
     foot = start + np.clip(share, 0.0, 1.0)[:, None] * along
     height = np.linalg.norm(points.place[point] - foot, axis=1)
     # Of several edges of one line the nearest counts.
-    order = np.lexsort([height, creases.line[edge], point])
-    key = np.column_stack([point, creases.line[edge]])[order]
+    line = creases.line[windows.division[point], edge]
+    order = np.lexsort([height, line, point])
+    key = np.column_stack([point, line])[order]
     first = np.ones(len(key), dtype=bool)
     first[1:] = (key[1:] != key[:-1]).any(axis=1)
     rows = order[first]
     rows = rows[height[rows] < dent_radius]
     if not len(rows):
         return None
-    line = creases.line[edge[rows]]
-    feet = Places(foot[rows], np.zeros((len(rows), 3)), line)
+    feet = Places(foot[rows], np.zeros((len(rows), 3)), line[rows])
     round_feet = Windows(feet, CREASE_LENGTH * windows.radius)
-    length = round_feet.sums(pieces.places, pieces.length)
+    on, row = on_lines(creases, pieces.place, pieces.edge)
+    length = round_feet.sums(on, pieces.length[row])
     return CreaseBand(
         point[rows].astype(np.int32), height[rows], np.maximum(length, dent_radius), round_feet
     )

@@ -22,7 +22,7 @@ from typing import NamedTuple
 import numpy as np
 
 from chamberopt.coverage.field.windows import Places
-from chamberopt.geometry.triangles import area_vectors, sides_of, unit_vectors
+from chamberopt.geometry.triangles import areas, sides_of, unit_vectors
 
 MIN_EDGE, MAX_EDGE = 0.5, 4.0  # diameters of the gauge
 FINEST = 0.2  # the same, at the border of what a ball can touch, which may be narrow stripes
@@ -73,6 +73,7 @@ class DisplayField:
 def display_mesh(
     vertices: np.ndarray,
     triangles: np.ndarray,
+    normals: np.ndarray,
     shown: np.ndarray,
     face: np.ndarray,
     gauge: float,
@@ -83,6 +84,7 @@ def display_mesh(
     Args:
         vertices: [m], shape (n, 3).
         triangles: shape (m, 3).
+        normals: of the surface at their corners, unit vectors outward, shape (m, 3, 3).
         shown: marks the triangles on which the field is drawn, shape (m,); others are divided only
             where they meet those.
         face: smooth face of each triangle, shape (m,).
@@ -91,7 +93,7 @@ def display_mesh(
     """
     diameter = 2.0 * float(np.sqrt(gauge / np.pi))
     # point: of the part's surface that each vertex is, the same for all vertices at a crease.
-    mesh, point = _with_vertices_of_faces(vertices, triangles, face)
+    mesh, point = _with_vertices_of_faces(vertices, triangles, normals, face)
     value = np.zeros(0)  # of the vertices, as far as it has been read
     settled = np.zeros(0, dtype=np.int64)  # edges that need not be split
     while True:
@@ -129,17 +131,17 @@ def display_mesh(
 
 
 def _with_vertices_of_faces(
-    vertices: np.ndarray, triangles: np.ndarray, face: np.ndarray
+    vertices: np.ndarray, triangles: np.ndarray, normals: np.ndarray, face: np.ndarray
 ) -> tuple[DisplayMesh, np.ndarray]:
     """The part with a vertex of its own for each face, and the part's vertex of each."""
     faces = int(face.max()) + 1
     own, corner = np.unique(triangles * np.int64(faces) + face[:, None], return_inverse=True)
     corner = corner.reshape(-1, 3)
     vertex, face_of = np.divmod(own, faces)
-    area = area_vectors(vertices, triangles)
+    area = areas(vertices, triangles)
     normal = np.zeros((len(own), 3))
     for k in range(3):  # by area: a plane beside a rounded edge stays as it is
-        np.add.at(normal, corner[:, k], area)
+        np.add.at(normal, corner[:, k], area[:, None] * normals[:, k])
     part_triangle = np.arange(len(triangles))
     return DisplayMesh(
         vertices[vertex], corner, unit_vectors(normal), face_of, part_triangle

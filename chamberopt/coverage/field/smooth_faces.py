@@ -2,6 +2,11 @@
 
 A face turns smoothly: all edges between its triangles turn by less than a crease does. So how a
 flat surface is divided into triangles makes no difference to its faces and creases.
+
+No single angle makes an edge sharp: a rounding error would decide where a part has just that. The
+part is divided by angles spread over a range, one DIVISIONS-th of the windows by each. An edge that
+turns by 45 degrees is sharp to three quarters of the windows beside it, so figures pass
+continuously from those of a surface that goes on to those of one that ends.
 """
 
 from __future__ import annotations
@@ -18,9 +23,43 @@ from chamberopt.geometry.triangles import (
     unit_vectors,
 )
 
-# Degrees by which a surface turns at a crease. Facets of round surfaces turn by less.
+# Degrees by which a surface turns at edges that are sharp to half of the windows. Facets of round
+# surfaces turn by less.
 CONVEX_CREASE, HOLLOW_CREASE = 40.0, 60.0
-STRAIGHT_ON = 45.0  # degrees: where creases turn by more, a line of them ends
+STRAIGHT_ON = 45.0  # degrees: where creases turn by more, a line of them ends for half of them
+RANGE = 10.0  # degrees above and below, within which these angles are spread
+DIVISIONS = 32  # by angles in the middles of as many parts of the range, never a whole number
+OFFSETS = RANGE * (2.0 * (np.arange(DIVISIONS) + 0.5) / DIVISIONS - 1.0)  # degrees, from the middle
+GOLDEN = 0.5 * (5.0**0.5 - 1.0)  # share of a turn: steps of it spread evenly over any range
+
+
+class Faces(NamedTuple):
+    """Smooth faces of a part by the divisions that differ, the finest first.
+
+    Attributes:
+        of_triangle: the face of each triangle by the finest division, shape (m,).
+        joined: the face of the finest division that stands for each one together with those that
+            are joined to it, by each division, shape (d, f).
+        of_angle: which division each of the angles makes, shape (DIVISIONS,).
+    """
+
+    of_triangle: np.ndarray
+    joined: np.ndarray
+    of_angle: np.ndarray
+
+    def divisions(self, count: int) -> np.ndarray:
+        """The division that each of so many windows sees, each angle as often, shape (count,)."""
+        return self.of_angle[(DIVISIONS * ((np.arange(count) + 0.5) * GOLDEN % 1.0)).astype(int)]
+
+    @property
+    def middle(self) -> int:
+        """The division by the angles in the middle of their ranges."""
+        return int(self.of_angle[DIVISIONS // 2])
+
+    @property
+    def shares(self) -> np.ndarray:
+        """Share of the windows that see each division, shape (d,)."""
+        return np.bincount(self.of_angle, minlength=len(self.joined)) / DIVISIONS
 
 
 class Creases(NamedTuple):
@@ -29,10 +68,11 @@ class Creases(NamedTuple):
     Attributes:
         ends: of each edge [m], shape (e, 2, 3).
         outward: unit vectors midway between the normals of the two sides, shape (e, 3).
-        line: number of the line, a chain of edges without corners, shape (e,).
-        faces: the smooth faces on both sides, shape (e, 2).
+        line: number of the line, a chain of edges without corners, by each division, -1 where the
+            edge does not divide; no two divisions share a number, shape (d, e).
+        faces: the faces of the finest division on both sides, shape (e, 2).
         of_triangle: crease at each side of each part triangle, -1 if there is none, shape (m, 3).
-        at_corner: some crease that begins or ends at each corner, else -1, shape (m, 3).
+        at_corner: the sharpest crease that begins or ends at each corner, else -1, shape (m, 3).
     """
 
     ends: np.ndarray
@@ -45,7 +85,7 @@ class Creases(NamedTuple):
 
 def find_faces(
     vertices: np.ndarray, triangles: np.ndarray, target: np.ndarray
-) -> tuple[np.ndarray, Creases]:
+) -> tuple[Faces, Creases]:
     """Divide a part into smooth faces; the border of the target divides faces as creases do.
 
     Args:
@@ -54,7 +94,7 @@ def find_faces(
         target: marks the triangles of the target, shape (m,).
 
     Returns:
-        The face of each triangle, shape (m,), and the creases that border on the target.
+        The faces, and the creases of the finest division that border on the target.
     """
     keys = edge_keys(triangles)
     order = np.argsort(keys, kind="stable")
@@ -67,38 +107,69 @@ def find_faces(
         np.arccos(np.clip(np.einsum("ij,ij->i", normal[one // 3], normal[two // 3]), -1.0, 1.0))
     )
     convex = np.einsum("ij,ij->i", apex - vertices[start], normal[one // 3]) < 0.0
-    sharp = turn > np.where(convex, CONVEX_CREASE, HOLLOW_CREASE)
-    joined = ~sharp & (target[one // 3] == target[two // 3])
+    over = turn - np.where(convex, CONVEX_CREASE, HOLLOW_CREASE)
+    inside = target[one // 3] == target[two // 3]
+    joined = inside & (over <= OFFSETS[0])
     face = connected_pieces(one[joined] // 3, two[joined] // 3, len(triangles))[1]
+    beside = np.column_stack([face[one // 3], face[two // 3]])
 
-    edge = np.flatnonzero(sharp & convex & (target[one // 3] | target[two // 3]))
+    is_crease = (over > OFFSETS[0]) & convex & (target[one // 3] | target[two // 3])
+    edge = np.flatnonzero(is_crease)
+    edge = edge[np.lexsort([*np.abs(vertices[end] - vertices[start])[edge].T, over[edge].round(4)])]
     one, two, start, end = one[edge], two[edge], start[edge], end[edge]
     of_triangle = np.full(3 * len(triangles), -1)
     of_triangle[one] = of_triangle[two] = np.arange(len(edge))
     of_vertex = np.full(len(vertices), -1)
-    of_vertex[start] = of_vertex[end] = np.arange(len(edge))
-    return face, Creases(
+    of_vertex[start] = of_vertex[end] = np.arange(len(edge))  # the last, which is the sharpest
+
+    near = inside & (over > OFFSETS[0]) & (over <= OFFSETS[-1])
+    links, corner = _links(vertices, start, end)
+    faces_by: list[np.ndarray] = []
+    lines_by: list[np.ndarray] = []
+    of_angle, before = [], (-1, -1, -1)
+    for offset in OFFSETS:
+        soft, sharp = near & (over <= offset), over[edge] > offset
+        goes_on = sharp[links].all(axis=1) & (corner < STRAIGHT_ON + offset)
+        now = int(soft.sum()), int(sharp.sum()), int(goes_on.sum())  # each a part of the next
+        if now != before:
+            faces_by.append(_joined_faces(beside[soft], int(face.max(initial=-1)) + 1))
+            line = connected_pieces(links[goes_on, 0], links[goes_on, 1], len(edge))[1] + len(
+                lines_by
+            ) * len(edge)
+            lines_by.append(np.where(sharp, line, -1))
+        before = now
+        of_angle.append(len(faces_by) - 1)
+    return Faces(face, np.array(faces_by), np.array(of_angle)), Creases(
         ends=np.stack([vertices[start], vertices[end]], axis=1),
         outward=unit_vectors(normal[one // 3] + normal[two // 3]),
-        line=_lines(vertices, start, end),
-        faces=np.column_stack([face[one // 3], face[two // 3]]),
+        line=np.array(lines_by),
+        faces=beside[edge],
         of_triangle=of_triangle.reshape(-1, 3),
         at_corner=of_vertex[triangles],
     )
 
 
-def _lines(vertices: np.ndarray, start: np.ndarray, end: np.ndarray) -> np.ndarray:
-    """The line of each edge from start to end (e,): edges that go on without a corner are one."""
+def _joined_faces(pairs: np.ndarray, count: int) -> np.ndarray:
+    """The first of the faces that each face is joined to by pairs (k, 2), shape (count,)."""
+    piece = connected_pieces(pairs[:, 0], pairs[:, 1], count)[1]
+    _, first = np.unique(piece, return_index=True)
+    return np.asarray(first[piece])
+
+
+def _links(
+    vertices: np.ndarray, start: np.ndarray, end: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Pairs of edges that meet (k, 2), and the degrees by which the way over both turns (k,)."""
     edges = len(start)
     edge, vertex = np.tile(np.arange(edges), 2), np.concatenate([start, end])
     along = unit_vectors(vertices[end] - vertices[start])
     away = np.concatenate([along, -along])  # direction in which the edge leaves the vertex
     order = np.argsort(vertex, kind="stable")
-    links = []
+    pairs, turns = [np.zeros((0, 2), dtype=int)], [np.zeros(0)]
     for step in range(1, int(np.bincount(vertex).max()) if edges else 0):
         a, b = order[:-step], order[step:]
-        opposite = np.einsum("ij,ij->i", away[a], away[b]) < -np.cos(np.radians(STRAIGHT_ON))
-        same = (vertex[a] == vertex[b]) & opposite
-        links.append(np.column_stack([edge[a[same]], edge[b[same]]]))
-    a, b = np.concatenate(links).T if links else np.zeros((2, 0), dtype=int)
-    return connected_pieces(a, b, edges)[1]
+        a, b = a[vertex[a] == vertex[b]], b[vertex[a] == vertex[b]]
+        pairs.append(np.column_stack([edge[a], edge[b]]))
+        cosine = -np.einsum("ij,ij->i", away[a], away[b])
+        turns.append(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))))
+    return np.concatenate(pairs), np.concatenate(turns)

@@ -82,7 +82,7 @@ def _within(
 
 
 def within_each(corners: np.ndarray, count: int) -> np.ndarray:
-    """So many points [m] on each of some triangles (n, 3, 3), shape (count, n, 3).
+    """So many points [m] on each of some triangles (n, 3, c), shape (count, n, c).
 
     Each triangle takes the next numbers of the sequence, so that what the points miss on one of
     many alike triangles is not missed on all of them.
@@ -102,7 +102,7 @@ def _of_sequence(number: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _between(corners: np.ndarray, u: np.ndarray, v: np.ndarray) -> np.ndarray:
-    """Points a + u (b - a) + v (c - a) on triangles (n, 3, 3)."""
+    """Points a + u (b - a) + v (c - a) on triangles (n, 3, c)."""
     a, b, c = corners.swapaxes(0, 1)
     return np.asarray(a + u * (b - a) + v * (c - a))
 

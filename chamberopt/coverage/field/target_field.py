@@ -26,13 +26,9 @@ from chamberopt.coverage.field.crease_bands import (
     crease_pieces,
     find_band,
 )
-from chamberopt.coverage.field.smooth_faces import Creases, find_faces
-from chamberopt.coverage.field.surface_points import (
-    ball_fits,
-    sampling_errors,
-    sparse_points,
-    spread_points,
-)
+from chamberopt.coverage.field.reached import Reach, reach_from
+from chamberopt.coverage.field.smooth_faces import Creases, Faces, find_faces
+from chamberopt.coverage.field.surface_points import ball_fits, spread_points
 from chamberopt.coverage.field.symmetry import TOLERANCE, Symmetry, find_symmetry
 from chamberopt.geometry.triangles import areas, unit_normals
 
@@ -44,6 +40,9 @@ if TYPE_CHECKING:
     from sim_core import TriangleMesh
 
 OF_WIDE = 0.125  # of the number of windows, for those of twice the radius, which overlap more
+# Area of all windows together [m²], or over the target's where that is more: of windows that are
+# nearly as wide as the target a few tell all.
+MOST_AREA, MOST_OVERLAP, FEWEST_WINDOWS = 0.2, 20.0, 200
 POINTS_OF_ZONE = 1000  # that are tested for a ball before any work
 POINTS_PER_CHOSEN = 2  # that are tested for a ball, for each that becomes the middle of a window
 MIN_WINDOWS = 2.0  # side by side on a target of which they show how even it is
@@ -83,7 +82,7 @@ class TargetField:
     """A part in its chamber, ready to be looked at through windows."""
 
     setting: WindowSetting
-    face: np.ndarray  # smooth face of each part triangle, (m,)
+    faces: Faces
     on_target: np.ndarray  # marks the part triangles of the target, (m,)
     corners: np.ndarray  # of the part triangles [m], (m, 3, 3)
     normals: np.ndarray  # unit vectors out of the part, (m, 3)
@@ -92,9 +91,23 @@ class TargetField:
     has_windows: np.ndarray  # marks the part triangles whose dents can be in a window, (m,)
     touched: Places  # points that a ball can touch, spread evenly over the target
     surface: SurfacePieces  # of the target, or of the whole part
-    reachable: float  # share of the target's area that a ball can touch
-    reachable_error: float  # its standard error, by the choice of points
+    reach: Reach  # share of the target's area that a ball can touch, and its error
     symmetry: Symmetry | None  # None where no two places are alike
+
+    @property
+    def face(self) -> np.ndarray:
+        """Smooth face of each part triangle by the finest division, (m,)."""
+        return self.faces.of_triangle
+
+    @property
+    def drawn_face(self) -> np.ndarray:
+        """Smooth face of each part triangle by the division of pictures, (m,)."""
+        return np.asarray(self.faces.joined[self.faces.middle][self.face])
+
+    @property
+    def reachable(self) -> float:
+        """Share of the target's area that a ball can touch."""
+        return self.reach.share
 
     @property
     def alike(self) -> int:
@@ -106,32 +119,49 @@ class TargetField:
         """Radius of a window [m]."""
         return float(np.sqrt(self.setting.gauge / np.pi))
 
+    @cached_property
+    def target_area(self) -> float:
+        """Area of the target [m²]."""
+        corners = self.corners[self.on_target].reshape(-1, 3)
+        return float(areas(corners, np.arange(len(corners)).reshape(-1, 3)).sum())
+
     @property
     def is_one_window(self) -> bool:
         """Whether windows hold most of the target each, so that they tell nothing of evenness."""
-        corners = self.corners[self.on_target].reshape(-1, 3)
-        target = float(areas(corners, np.arange(len(corners)).reshape(-1, 3)).sum())
         of_window = float(np.median(self.gauge.area)) / self.alike
-        return self.reachable * target < MIN_WINDOWS * of_window
+        return self.reachable * self.target_area < MIN_WINDOWS * of_window
 
     @cached_property
     def gauge(self) -> Gauge:
         """Windows of the gauge round points of the target."""
-        return self.gauge_round(self.some_points(self.setting.points), self.radius)
+        return self._gauge_of(self.setting.points, self.radius)
 
     @cached_property
     def wide(self) -> Gauge:
         """Windows of twice the radius round points of the target."""
-        return self.gauge_round(
-            self.some_points(int(OF_WIDE * self.setting.points)), 2.0 * self.radius
-        )
+        return self._gauge_of(int(OF_WIDE * self.setting.points), 2.0 * self.radius)
 
-    def gauge_round(self, points: Places, radius: float) -> Gauge:
-        """Windows of a radius [m] round points of the part."""
+    def _gauge_of(self, count: int, radius: float) -> Gauge:
+        """Windows of a radius [m], each division as often as its angles, round so many points."""
+        gauge = math.pi * radius**2
+        most = max(MOST_AREA, MOST_OVERLAP * self.target_area) / gauge
+        points = self.some_points(min(count, max(int(most), FEWEST_WINDOWS)))
+        return self.gauge_round(points, radius, self.faces.divisions(len(points.place)))
+
+    def gauge_round(
+        self, points: Places, radius: float, division: np.ndarray | None = None
+    ) -> Gauge:
+        """Windows of a radius [m] round points of the part.
+
+        Args:
+            division: of the part into faces that each window sees; None for that of pictures.
+        """
         from chamberopt.coverage.field.window_areas import window_areas
         from chamberopt.coverage.field.windows import Windows
 
-        windows = Windows(self._points_in_sector(points), radius)
+        if division is None:
+            division = np.full(len(points.place), self.faces.middle)
+        windows = Windows(self._points_in_sector(points), radius, self.faces.joined, division)
         area = self.alike * window_areas(windows, self.surface)
         area[area == 0.0] = np.inf  # nothing can be touched there, so nothing covers it
         band = find_band(windows, self.creases, self.pieces, 0.5 * self.setting.largest_dent)
@@ -184,6 +214,10 @@ class TargetField:
             ]
         return after
 
+    def sharpness(self, edge: np.ndarray) -> np.ndarray:
+        """Share of the windows to which each of these creases is one, (k,)."""
+        return np.asarray(self.faces.shares @ (self.creases.line >= 0))[edge]
+
     def places_of(self, hits: Hits, rows: np.ndarray) -> Places:
         """The contacts of some impacts."""
         from chamberopt.coverage.field.windows import Places
@@ -204,6 +238,17 @@ def require_wide_gauge(chamber: Chamber, setting: WindowSetting) -> None:
         )
 
 
+def require_narrow_gauge(chamber: Chamber, setting: WindowSetting) -> None:
+    """Raise InputError if the windows are so wide that they show no differences in the target."""
+    area, gauge = float(chamber.part.area[chamber.part.target].sum()), setting.gauge
+    if gauge * MIN_WINDOWS > area:
+        raise InputError(
+            f"process.accuracy.gauge_mm2: given {1e6 * gauge:g}, so wide that a target of "
+            f"{1e6 * area:.4g} mm² has fewer than {MIN_WINDOWS:g} windows side by side; give at "
+            f"most {1e6 * area / MIN_WINDOWS:.4g}"
+        )
+
+
 def require_touchable_zones(chamber: Chamber, mesh: TriangleMesh, ball: float) -> None:
     """Raise InputError for a zone of the part that no ball of a radius [m] can touch.
 
@@ -213,7 +258,8 @@ def require_touchable_zones(chamber: Chamber, mesh: TriangleMesh, ball: float) -
     for name, zone in part.zones.items():
         area = np.where(zone, chamber.exposed_area, 0.0)
         spread = spread_points(part.vertices, part.triangles, area, POINTS_OF_ZONE)
-        if not ball_fits(mesh, spread.place, spread.normal, ball).any():
+        normal = part.normals_at(spread.triangle, spread.place)
+        if not ball_fits(mesh, spread.place, normal, ball).any():
             raise InputError(
                 f"zones: {name}: a ball of {2e3 * ball:g} mm touches nothing of it, so it has no "
                 "figures; leave the zone out, or use smaller balls"
@@ -230,16 +276,19 @@ def find_target_field(chamber: Chamber, mesh: TriangleMesh, setting: WindowSetti
 
     part, gauge = chamber.part, setting.gauge
     area = np.where(part.target, part.area, 0.0)
-    face, creases = find_faces(part.vertices, part.triangles, part.target)
+    faces, creases = find_faces(part.vertices, part.triangles, part.target)
+    face = faces.of_triangle
     radius, corners = float(np.sqrt(gauge / np.pi)), part.vertices[part.triangles]
     ball = 0.5 * setting.ball
     touched, fits = _touched(chamber, mesh, area, face, setting)
     symmetry = find_symmetry(chamber, mesh) if setting.symmetric else None
     longest = _longest_side(setting, float(area.sum()), MAX_PIECES)
-    surface = surface_pieces(corners[part.target], face[part.target], mesh, ball, longest)
+    surface = surface_pieces(
+        part.corners_with_normals[part.target], face[part.target], mesh, ball, longest
+    )
     return TargetField(
         setting=setting,
-        face=face,
+        faces=faces,
         on_target=part.target,
         corners=corners,
         normals=unit_normals(corners),
@@ -248,10 +297,7 @@ def find_target_field(chamber: Chamber, mesh: TriangleMesh, setting: WindowSetti
         has_windows=part.target | (creases.at_corner >= 0).any(axis=1),
         touched=touched,
         surface=surface,
-        reachable=float(fits.mean()),
-        reachable_error=math.hypot(
-            *sampling_errors(np.array([some.mean() for some in sparse_points(fits)]))
-        ),
+        reach=reach_from(fits),
         symmetry=symmetry,
     )
 
@@ -265,7 +311,7 @@ def with_whole_part(field: TargetField, chamber: Chamber, mesh: TriangleMesh) ->
         return field
     area = float(chamber.part.area[rest].sum())
     pieces = surface_pieces(
-        field.corners[rest], field.face[rest], mesh, 0.5 * field.setting.ball,
+        chamber.part.corners_with_normals[rest], field.face[rest], mesh, 0.5 * field.setting.ball,
         _longest_side(field.setting, area, MAX_PIECES_OFF_TARGET),
     )  # fmt: skip
     return replace(
@@ -289,5 +335,6 @@ def _touched(
 
     part = chamber.part
     spread = spread_points(part.vertices, part.triangles, area, POINTS_PER_CHOSEN * setting.points)
-    fits = ball_fits(mesh, spread.place, spread.normal, 0.5 * setting.ball)
+    normal = part.normals_at(spread.triangle, spread.place)
+    fits = ball_fits(mesh, spread.place, normal, 0.5 * setting.ball)
     return Places(spread.place[fits], spread.normal[fits], face[spread.triangle[fits]]), fits

@@ -25,7 +25,7 @@ import numpy as np
 
 from chamberopt.coverage.field.surface_points import ball_fits, within_each
 from chamberopt.coverage.field.windows import Places, Windows
-from chamberopt.geometry.triangles import unit_normals
+from chamberopt.geometry.triangles import unit_normals, unit_vectors
 from sim_core import jit
 
 if TYPE_CHECKING:
@@ -63,7 +63,8 @@ def surface_pieces(
     """Divide triangles into pieces, and find what of them a ball can touch.
 
     Args:
-        corners: of the triangles [m], shape (m, 3, 3).
+        corners: of the triangles, each its place [m] and the normal there of the surface that a
+            ball touches, shape (m, 3, 6).
         face: smooth face of each, shape (m,).
         mesh: of the chamber.
         ball_radius: [m].
@@ -72,12 +73,13 @@ def surface_pieces(
     corners, owner = _halved_until(corners, np.arange(len(corners)), longest)
     middle = corners.mean(axis=1)
     beside = corners + NEAR_CORNERS * (middle[:, None] - corners)
-    shares = _touched_share(corners, np.stack([middle, *beside.swapaxes(0, 1)]), mesh, ball_radius)
+    shares = _touched_share(np.stack([middle, *beside.swapaxes(0, 1)]), mesh, ball_radius)
     mixed = (shares > 0.0) & (shares < 1.0)
     finer, finer_owner = _halved_until(corners[mixed], owner[mixed], FINEST * longest)
-    fine = _touched_share(finer, within_each(finer, PLACES_AT_BORDER), mesh, ball_radius)
+    fine = _touched_share(within_each(finer, PLACES_AT_BORDER), mesh, ball_radius)
     corners = np.concatenate([corners[~mixed], finer])
     owner = np.concatenate([owner[~mixed], finer_owner])
+    corners = corners[..., :3]
     shares = np.concatenate([shares[~mixed], fine])
     cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     area = 0.5 * np.linalg.norm(cross, axis=1)
@@ -94,7 +96,7 @@ def window_areas(windows: Windows, pieces: SurfacePieces) -> np.ndarray:
     middle = pieces.corners.mean(axis=1)
     size = float(np.linalg.norm(pieces.corners - middle[:, None], axis=2).max(initial=0.0))
     kept = pieces.touched > 0.0
-    near = Windows(windows.points, windows.radius + size)
+    near = windows.with_radius(windows.radius + size)
     area = np.zeros(len(windows.points.place))
     columns = [np.ascontiguousarray(column[kept]) for column in pieces]
     places = Places(middle[kept], np.zeros((int(kept.sum()), 3)), pieces.face[kept])
@@ -108,10 +110,11 @@ def window_areas(windows: Windows, pieces: SurfacePieces) -> np.ndarray:
 def _halved_until(
     corners: np.ndarray, owner: np.ndarray, longest: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Halve triangles across their longest sides until no side is longer than that [m]."""
+    """Halve triangles (m, 3, 6) across their longest sides until none is longer than that [m]."""
     done, owners = [], []
     while len(corners):
-        sides = np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2)
+        place = corners[..., :3]
+        sides = np.linalg.norm(place - np.roll(place, -1, axis=1), axis=2)
         long = sides.max(axis=1) > longest
         done.append(corners[~long])
         owners.append(owner[~long])
@@ -122,17 +125,15 @@ def _halved_until(
         middle = 0.5 * (a + b)
         corners = np.concatenate([np.stack([a, middle, c], 1), np.stack([middle, b, c], 1)])
         owner = np.tile(owner, 2)
-    return np.concatenate([np.zeros((0, 3, 3)), *done]), np.concatenate(
+    return np.concatenate([np.zeros((0, 3, 6)), *done]), np.concatenate(
         [np.zeros(0, dtype=np.int64), *owners]
     )
 
 
-def _touched_share(
-    corners: np.ndarray, places: np.ndarray, mesh: TriangleMesh, ball_radius: float
-) -> np.ndarray:
-    """Share of the places (k, n, 3) on each triangle (n, 3, 3) where a ball fits."""
-    normal = np.broadcast_to(unit_normals(corners), places.shape).reshape(-1, 3)
-    fits = ball_fits(mesh, places.reshape(-1, 3), normal, ball_radius)
+def _touched_share(places: np.ndarray, mesh: TriangleMesh, ball_radius: float) -> np.ndarray:
+    """Share of places with normals, (k, n, 6), on each of n triangles where a ball fits."""
+    place, normal = np.split(places.reshape(-1, 6), 2, axis=1)
+    fits = ball_fits(mesh, place, unit_vectors(normal), ball_radius)
     return np.asarray(fits.reshape(places.shape[:2]).mean(axis=0))
 
 

@@ -55,11 +55,21 @@ class Windows:
     Args:
         points: the middles of the windows.
         radius: [m].
+        faces: how each division joins the faces, `Faces.joined`; None if it joins none.
+        division: that each window sees, shape (p,); None for the first.
     """
 
-    def __init__(self, points: Places, radius: float) -> None:
-        self.points, self.radius = points, radius
-        place, face = points.place, points.face
+    def __init__(
+        self,
+        points: Places,
+        radius: float,
+        faces: np.ndarray | None = None,
+        division: np.ndarray | None = None,
+    ) -> None:
+        self.points, self.radius, self.faces = points, radius, faces
+        self.division = np.zeros(len(points.face), dtype=int) if division is None else division
+        # Faces that some division joins are looked through together.
+        place, face = points.place, points.face if faces is None else faces[-1][points.face]
         self._grid = grid = _grid_of_faces(place, face, radius)
         cell = ((place - grid.low[face]) / grid.edge).astype(np.int64)
         shape = grid.shape[face]
@@ -70,6 +80,14 @@ class Windows:
         self._first = np.concatenate([[0], np.cumsum(count)]).astype(np.int32)
         self._place = np.ascontiguousarray(place[self._order].T)
         self._normal = np.ascontiguousarray(points.normal[self._order].T)
+
+    def with_radius(self, radius: float) -> Windows:
+        """Windows of another radius [m] round the same points."""
+        return Windows(self.points, radius, self.faces, self.division)
+
+    def select(self, rows: np.ndarray) -> Windows:
+        """The windows of these rows."""
+        return Windows(self.points.select(rows), self.radius, self.faces, self.division[rows])
 
     def pairs(self, contacts: Places) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """Yield indices of points and of the contacts in their windows, some pairs at a time."""
@@ -105,14 +123,20 @@ class Windows:
         """Yield places of points in `_order`, and of contacts among the rows that come third."""
         point, contact = np.empty((2, max(PAIRS_AT_ONCE, len(self._order))), dtype=np.int32)
         done, grid = 0, self._grid
-        face = np.minimum(contacts.face, len(grid.shape) - 1)
-        rows = np.flatnonzero((face == contacts.face) & (grid.shape[face, 0] > 0))
-        columns = Places(*(np.ascontiguousarray(column[rows]) for column in contacts))
+        own = contacts.face if self.faces is None else self.faces[-1][contacts.face]
+        face = np.minimum(own, len(grid.shape) - 1)
+        rows = np.flatnonzero((face == own) & (grid.shape[face, 0] > 0))
+        columns = Places(*(np.ascontiguousarray(one[rows]) for one in (*contacts[:2], own)))
         while done < len(rows):
             done, found = _find_pairs(
                 grid, self._first, self._place, self._normal, columns, self.radius, done,
                 point, contact,
             )  # fmt: skip
+            if self.faces is not None and len(self.faces) > 1:
+                found = _keep_joined(
+                    self.faces, self.division, self.points.face, self._order,
+                    contacts.face, rows, point[:found], contact,
+                )  # fmt: skip
             yield point[:found], contact[:found], rows
 
 
@@ -205,6 +229,18 @@ def _find_pairs(grid, first, x, n_x, contacts, radius, begin, point, contact):  
                     contact[found] = j
                     found += not is_far
     return len(y), found
+
+
+@jit
+def _keep_joined(faces, division, face, order, face_of_contact, rows, point, contact):  # type: ignore[no-untyped-def]
+    """Keep the pairs whose faces the window's own division joins, and return their number."""
+    kept = 0
+    for pair in range(len(point)):
+        i, j = order[point[pair]], rows[contact[pair]]
+        own = division[i]
+        point[kept], contact[kept] = point[pair], contact[pair]
+        kept += faces[own, face[i]] == faces[own, face_of_contact[j]]
+    return kept
 
 
 def _divide(

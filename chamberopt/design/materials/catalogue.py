@@ -12,6 +12,7 @@ from typing import TypeVar
 from pydantic import Field
 
 from chamberopt.common.errors import InputError
+from chamberopt.common.files import read_file
 from chamberopt.common.toml_errors import did_you_mean
 from chamberopt.common.toml_fields import Several, quantity
 from chamberopt.design.materials.yield_speed import Elastic
@@ -133,4 +134,4 @@ def _plain(name: str) -> str:
 @cache
 def _read(file: str, kind: type[File]) -> File:
     path = Path(__file__).with_name(file)
-    return kind.model_validate(tomllib.loads(path.read_text(encoding="utf-8")))
+    return kind.model_validate(tomllib.loads(read_file(path, follow=True).decode()))

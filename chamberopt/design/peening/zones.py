@@ -14,7 +14,7 @@ from pydantic import Field
 
 from chamberopt.common.toml_errors import Problem
 from chamberopt.common.toml_fields import Pair, list_field, quantity
-from chamberopt.design.part import Selection
+from chamberopt.design.part import Selection, Smoothing
 from chamberopt.design.peening.calibration import Calibration, why_no_intensity
 from chamberopt.design.table_base import FileTable
 
@@ -41,6 +41,9 @@ class Zone(FileTable):
         json_schema_extra={"form": NAMES},
     )
     target: Selection = Field(description="its triangles, by the keys of [part.target]")
+    smoothing: Smoothing | None = Field(
+        default=None, description="as part.smoothing; absent: that of the part"
+    )
     coverage_min: float | None = quantity(
         0, 1, "", "least coverage, of all but 5 % of the zone's area", None
     )

@@ -60,7 +60,7 @@ def load_custom_shape(path: Path) -> type[ChamberTable]:
     InputError if the file cannot be read or run, or does not hold exactly one shape.
     """
     try:
-        source = read_limited(path, MAX_TEXT_BYTES, "shape file (.py)")
+        source = read_limited(path, MAX_TEXT_BYTES, "shape file (.py)", follow=True)
     except FileNotFoundError:
         message = toml_errors.explain_missing_file(path, "shape file", "*.py")
         raise InputError(message) from None

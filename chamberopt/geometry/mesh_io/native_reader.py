@@ -12,13 +12,13 @@ import shutil
 import signal
 import subprocess
 import sys
-import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import NamedTuple
 
 from chamberopt.common.errors import InputError
+from chamberopt.common.files import private_folder, write_bytes
 from chamberopt.common.limits import limit_cpu_time, raise_cpu_time
 from chamberopt.common.parallel.lifetime import end_with_stdin
 
@@ -60,9 +60,9 @@ def converted(
         InputError: it took too long.
     """
     seconds = given_seconds() or LEAST_SECONDS + reader.seconds_per_mb * 1e-6 * len(content)
-    with tempfile.TemporaryDirectory() as folder:
+    with private_folder() as folder:
         given, made = Path(folder) / reader.source, Path(folder) / reader.target
-        given.write_bytes(content)
+        write_bytes(given, content)
         words = map(str, (seconds, given, made, *arguments))
         watched, held = os.pipe()  # it is closed when this process ends, however it ends
         try:

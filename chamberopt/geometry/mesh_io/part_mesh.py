@@ -31,9 +31,12 @@ from chamberopt.geometry.mesh_io.readers.step.tessellation import Tessellation
 from chamberopt.geometry.mesh_io.self_intersection import refuse_self_intersection
 from chamberopt.geometry.mesh_io.surface_error import SurfaceError
 from chamberopt.geometry.mesh_io.units import METRES_PER, find_unit
+from chamberopt.geometry.triangles import unit_normals
+
+MEANT = 0.5  # cosine between a facet and the normal of its surface, below which one is wrong
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)  # one that was read once is known again by its identity
 class PartMesh:
     """A closed part in the coordinates of its file."""
 
@@ -44,6 +47,8 @@ class PartMesh:
     sha256: str  # of the file as read
     groups: dict[str, np.ndarray] = field(default_factory=dict)  # name -> triangles, (m,) bool
     unit: str = "m"  # of the file's numbers
+    normals: np.ndarray | None = None  # of the surface at the corners, (m, 3, 3), if the file tells
+    is_exact: bool = False  # whether the triangles were made of the surface itself, as of STEP
 
     @property
     def elements(self) -> np.ndarray:
@@ -68,6 +73,8 @@ class TriangleSoup:
     sha256: str
     unit: str
     bodies: np.ndarray  # (m,), the body of each; 0 where the file does not tell bodies apart
+    normals: np.ndarray | None = None  # as in PartMesh
+    is_exact: bool = False
 
 
 def read_part(path: Path, unit: str = "guess", how: Tessellation | None = None) -> PartMesh:
@@ -126,7 +133,9 @@ def read_triangles(
     numbering, notes = raw.numbering or number_by_position(len(corners)), (*raw.notes, *unit_notes)
     sha256 = hashlib.sha256(content).hexdigest()
     bodies = np.zeros(len(corners), dtype=np.int64) if raw.bodies is None else raw.bodies
-    return TriangleSoup(path, corners, numbering, raw.groups, notes, sha256, unit, bodies)
+    return TriangleSoup(
+        path, corners, numbering, raw.groups, notes, sha256, unit, bodies, raw.normals, raw.is_exact
+    )
 
 
 def close_surface(soup: TriangleSoup, only: np.ndarray | None = None) -> PartMesh:
@@ -151,7 +160,27 @@ def close_surface(soup: TriangleSoup, only: np.ndarray | None = None) -> PartMes
         soup.sha256,
         {name: (given >= 0) & mask[given] for name, mask in soup.groups.items()},
         soup.unit,
+        _normals_at(soup, vertices[triangles], given),
+        soup.is_exact,
     )
+
+
+def _normals_at(soup: TriangleSoup, corners: np.ndarray, given: np.ndarray) -> np.ndarray | None:
+    """Normals at the corners (k, 3, 3) of triangles, of which `given` (k,) are those of the file.
+
+    The facet's own where the file has none, or one that cannot be meant.
+    """
+    if soup.normals is None:
+        return None
+    own = np.repeat(unit_normals(corners)[:, None], 3, axis=1)
+    normals = own.copy()
+    for k in range(3):  # triangles may have been turned over, but their corners stay in place
+        for corner in range(3):
+            same = (given >= 0) & (soup.corners[given, corner] == corners[:, k]).all(axis=1)
+            normals[same, k] = soup.normals[given[same], corner]
+    normals *= np.sign(np.einsum("kci,kci->kc", normals, own))[..., None]
+    meant = np.einsum("kci,kci->kc", normals, own) > MEANT
+    return np.where(meant[..., None], normals, own)
 
 
 def select_triangles(
@@ -185,7 +214,7 @@ def _read_content(path: Path) -> bytes:
     if path.is_dir():
         raise InputError(f"{path}: is a folder; give a mesh file")
     try:
-        content = read_limited(path, MAX_MESH_BYTES, "mesh file")
+        content = read_limited(path, MAX_MESH_BYTES, "mesh file", follow=True)
     except FileNotFoundError:
         remedy = "check part.mesh, which is relative to the design file's folder"
         raise InputError(f"{path}: no such mesh file; {remedy}") from None

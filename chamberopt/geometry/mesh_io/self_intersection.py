@@ -26,18 +26,10 @@ def refuse_self_intersection(path: Path, vertices: np.ndarray, triangles: np.nda
 
     Several bodies may overlap: they are united where the chamber is made.
     """
-    corners = vertices[triangles]
-    touch = TOUCH * float(np.linalg.norm(np.ptp(vertices, axis=0)))
-    shells, _ = find_shells(vertices, triangles)
-    usable = np.flatnonzero(heights(vertices, triangles) > touch)  # thinner ones have no direction
-    found = []
-    for a, b in _close_pairs(corners[usable]):
-        a, b = usable[a], usable[b]
-        same = shells[a] == shells[b]
-        found.append(np.stack(_crossing(corners, a[same], b[same], touch)))
-    pairs = np.concatenate(found, axis=1) if found else np.zeros((2, 0), dtype=np.int64)
+    pairs = crossing_pairs(vertices, triangles)
     if not pairs.shape[1]:
         return
+    corners = vertices[triangles]
     pairs = np.sort(pairs, axis=0)
     first = pairs[:, np.lexsort(pairs[::-1])[0]]
     middle = corners[first].reshape(-1, 3).mean(axis=0)
@@ -48,6 +40,20 @@ def refuse_self_intersection(path: Path, vertices: np.ndarray, triangles: np.nda
         f"{first[1] + 1}); heal it in the CAD program, or make its pieces separate bodies"
     )
     raise SurfaceError(message, corners, sides)
+
+
+def crossing_pairs(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Pairs (2, k) of triangles (m, 3) that cross each other and are of one closed body."""
+    corners = vertices[triangles]
+    touch = TOUCH * float(np.linalg.norm(np.ptp(vertices, axis=0)))
+    shells, _ = find_shells(vertices, triangles)
+    usable = np.flatnonzero(heights(vertices, triangles) > touch)  # thinner ones have no direction
+    found = []
+    for a, b in _close_pairs(corners[usable]):
+        a, b = usable[a], usable[b]
+        same = shells[a] == shells[b]
+        found.append(np.stack(_crossing(corners, a[same], b[same], touch)))
+    return np.concatenate(found, axis=1) if found else np.zeros((2, 0), dtype=np.int64)
 
 
 def _close_pairs(corners: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:

@@ -12,7 +12,16 @@ from typing import TYPE_CHECKING, Any
 from pydantic import TypeAdapter, ValidationError
 
 from chamberopt.common.errors import InputError, first_wrong_value
-from chamberopt.common.files import claim_folder, write_text
+from chamberopt.common.files import (
+    INPUTS,
+    RESULT,
+    claim_folder,
+    make_folder,
+    remove_file,
+    remove_leftovers,
+    write_text,
+)
+from chamberopt.common.limits import MAX_RESULT_BYTES, read_limited
 from chamberopt.design.design import Design
 from chamberopt.optimize.storage import study_inputs
 from chamberopt.optimize.storage.resume import RecordedTrials
@@ -23,11 +32,10 @@ from chamberopt.simulation.evaluation import Evaluation, load_evaluation, save_e
 if TYPE_CHECKING:
     from chamberopt.optimize.study import Study
 
-INPUTS, INPUTS_0_1 = "inputs.json", "asked.json"
+INPUTS_0_1 = "asked.json"
 EFFECTS = "effects.json"
 STUDY = "study.toml"
 CONFIRMED = "confirm"
-RESULT = "result.json"  # written last: a study that has it is finished
 
 
 @contextmanager
@@ -57,7 +65,7 @@ def is_study_folder(folder: Path) -> bool:
 
 
 def is_finished(folder: Path) -> bool:
-    """Whether the study of the folder has its result."""
+    """Whether the study of the folder has its result, which is written last."""
     return (folder / RESULT).is_file()
 
 
@@ -92,11 +100,12 @@ class StudyFolder:
 
     def begin(self) -> None:
         """Write the inputs before the first trial; inputs of a run without trials are replaced."""
+        remove_leftovers(self.path)
         path = self.path / INPUTS
         if path.is_file() and (self.begun or _read_json(path) == self._inputs):
             return
         for name in (EFFECTS, STUDY):
-            (self.path / name).unlink(missing_ok=True)
+            remove_file(self.path / name)
         write_text(path, json.dumps(self._inputs, indent=2) + "\n")
 
     def with_effects_resolved(
@@ -154,7 +163,7 @@ class StudyFolder:
         study_inputs.require_same_files(self._study.design, self._inputs, self.path)
         if trial.stage == "confirm" and isinstance(evaluation, Evaluation):
             path = self._evaluation_path(trial.number)
-            path.parent.mkdir(exist_ok=True)
+            make_folder(path.parent)
             save_evaluation(path, evaluation)  # before the row, which says that this file exists
         self._history.append(trial.row())
         self._timings.append({"number": trial.number, "seconds": round(seconds, 3)})
@@ -165,7 +174,7 @@ class StudyFolder:
 
 def _read_json(path: Path) -> dict[str, Any]:
     try:
-        data = json.loads(path.read_text(encoding="utf-8"))
+        data = json.loads(read_limited(path, MAX_RESULT_BYTES, "file of a study"))
         if not isinstance(data, dict):
             raise TypeError("not a table")
     except OSError as error:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from chamberopt.common.errors import InputError
+from chamberopt.common.files import open_plain
 from chamberopt.common.versions import program_versions
 
 if TYPE_CHECKING:
@@ -72,7 +73,8 @@ def _with_digests(value: Any) -> Any:
     if isinstance(value, list):
         return [_with_digests(item) for item in value]
     if isinstance(value, str) and Path(value).suffix and Path(value).is_file():
-        digest = hashlib.sha256(Path(value).read_bytes()).hexdigest()
+        with open_plain(Path(value), follow=True) as file:
+            digest = hashlib.file_digest(file, "sha256").hexdigest()
         return {"file": Path(value).name, "sha256": digest}
     return value
 

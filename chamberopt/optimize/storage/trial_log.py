@@ -6,16 +6,14 @@ file, timings.jsonl.
 
 import json
 import math
-import os
 from collections.abc import Mapping
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self
 
 from chamberopt.common.errors import InputError
 from chamberopt.common.estimate import Estimate
-from chamberopt.common.files import csv_text, sync_folder
+from chamberopt.common.files import append_bytes, csv_text, read_file, write_bytes
 from chamberopt.common.limits import parse_json
 
 HISTORY = "history.jsonl"
@@ -106,42 +104,32 @@ class JsonLines:
     def append(self, row: Mapping[str, Any]) -> None:
         """Write a row; if OSError is raised, e.g. by a full disk, the file is unchanged."""
         line = (json.dumps(row, allow_nan=False) + "\n").encode()
-        created = not self.path.exists()
-        with open(self.path, "ab", buffering=0) as file:
-            length = os.fstat(file.fileno()).st_size
-            try:
-                while line:
-                    line = line[file.write(line) :]
-                if self._survives_power_cut:
-                    os.fsync(file.fileno())
-            except OSError as error:
-                with suppress(OSError):
-                    os.ftruncate(file.fileno(), length)
-                raise OSError(error.errno, error.strerror, str(self.path)) from error
-        if created and self._survives_power_cut:
-            sync_folder(self.path.parent)
+        append_bytes(self.path, line, self._survives_power_cut)
 
     def rows(self) -> list[dict[str, Any]]:
         """All rows in order, without a last line that a crash cut off; InputError if damaged."""
         return self._read()[0]
 
     def repair(self) -> None:
-        """Remove a last line that a crash cut off, so that the next row begins a new line."""
-        length = self._read()[1]
-        if self.path.exists() and self.path.stat().st_size > length:
-            os.truncate(self.path, length)
+        """Remove a last line that a crash cut off, so that the next row begins a new line.
+
+        A second name of the file, such as a backup's, keeps what it has.
+        """
+        _, whole, cut_off = self._read()
+        if cut_off or (whole and self.path.lstat().st_nlink > 1):
+            write_bytes(self.path, whole)
 
     def damaged(self, line: int) -> InputError:
         """The error for a damaged line; lines are counted from 1."""
         text = "damaged row; restore the file or run the study in a new folder"
         return InputError(f"{self.path}:{line}: {text}")
 
-    def _read(self) -> tuple[list[dict[str, Any]], int]:
-        """The rows, and their length in bytes."""
+    def _read(self) -> tuple[list[dict[str, Any]], bytes, bytes]:
+        """The rows, their bytes, and those of a line that was cut off."""
         try:
-            content = self.path.read_bytes()
+            content = read_file(self.path)
         except FileNotFoundError:
-            return [], 0
+            return [], b"", b""
         except OSError as error:
             text = f"cannot be read: {error.strerror}; check its permissions"
             raise InputError(f"{self.path}: {text}") from None
@@ -155,7 +143,7 @@ class JsonLines:
             if not isinstance(row, dict):
                 raise self.damaged(number)
             rows.append(row)
-        return rows, len(content) - len(incomplete)
+        return rows, content.removesuffix(incomplete), incomplete
 
 
 def read_trials(folder: Path) -> list[dict[str, Any]]:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from chamberopt.common.errors import InputError
-from chamberopt.common.files import write_text
+from chamberopt.common.files import make_folder, write_text
 from chamberopt.output.compare.comparability import require_same_triangles
 from chamberopt.output.compare.comparison import Comparison
 from chamberopt.output.compare.distributions import distributions
@@ -41,7 +41,7 @@ def write_comparison(folder: str | Path, comparison: Comparison) -> list[str]:
         require_same_triangles(
             result.folder, one.target, comparison.results[0].folder, surfaces[0].target
         )
-    folder.mkdir(parents=True, exist_ok=True)
+    make_folder(folder)
     write_text(folder / "compare.txt", comparison_text(comparison) + "\n")
     spread = distributions(surfaces)
     draw_distributions(folder / "distributions.png", comparison, spread)

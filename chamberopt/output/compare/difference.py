@@ -85,7 +85,7 @@ def difference(
     found = Difference(
         0.0 if abs(gap.value) < ZERO_TOLERANCE else gap.value, gap.half_width, paired
     )
-    if after.in_words or before.in_words:
+    if not (after.has_number and before.has_number):
         return replace(found, half_width=math.inf, in_words="not known")
     if found.real or found.value == 0.0 or min(count, len(before.pseudovalues)) < 2:
         return found

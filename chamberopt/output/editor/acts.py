@@ -11,7 +11,7 @@ from typing import Any
 
 from chamberopt.chamber.propose.text import study_lines
 from chamberopt.common.errors import InputError
-from chamberopt.common.files import check_new_file, is_new_or_empty, write_text
+from chamberopt.common.files import check_new_file, is_new_or_empty, remove_file, write_text
 from chamberopt.common.toml_fields import read_toml
 from chamberopt.design.load import is_study
 from chamberopt.optimize.study import load_study
@@ -130,7 +130,7 @@ class Acts:
         try:
             load_study(path)
         except InputError:
-            path.unlink()
+            remove_file(path)
             raise
         return {"study": path.name}
 

@@ -5,19 +5,23 @@ from __future__ import annotations
 import hashlib
 import re
 import stat
+import time
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from chamberopt.common.errors import InputError
-from chamberopt.common.files import write_text
+from chamberopt.common.files import claim_file, open_plain, write_bytes
+from chamberopt.common.limits import MAX_TEXT_BYTES
 from chamberopt.common.toml_fields import read_toml
 from chamberopt.design.design import Design, validate
 from chamberopt.design.shapes.base import is_custom
 
 # By dotted name, in the file's units; None takes a key out of the file.
 Changes = Mapping[str, Any]
+LONGEST_SAVE_S = 5.0  # of another page, which takes a tenth of a second
+LATE_WRITE_S = 0.05  # from an editor's opening of the file to its writing, by far
 # What is changed beside the fields of the page: a target or zone, and what it chooses.
 PICKED = re.compile(
     r"(part\.target|zones\.\d+\.target)\.(surface|faces|direction|angle_deg|box_mm|radius_mm)"
@@ -32,10 +36,12 @@ class EditedFile:
         trusted: whether its shape may be a Python file, which is run.
 
     Raises:
-        InputError: it does not load, or has a shape of the user's that is not trusted.
+        InputError: it is a link, does not load, or has a shape of the user's that is not trusted.
     """
 
     def __init__(self, path: Path, trusted: bool) -> None:
+        if path.is_symlink():
+            raise InputError(f"{path}: is a link; give the file that it leads to: {path.resolve()}")
         self.path = path.resolve()
         self.text, data = read_toml(self.path, "design")
         self._shape = custom_shape(data)
@@ -90,16 +96,28 @@ class EditedFile:
         may not be written, or would not load."""
         text = self.changed_text(changes)
         self.with_changes(changes)
-        if read_toml(self.path, "design")[0] != self.text:
+        if not self.path.stat().st_mode & stat.S_IWUSR:
+            raise InputError(f"{self.path.name}: is read-only; allow writing, or save a copy")
+        with claim_file(self.path, wait=LONGEST_SAVE_S):
+            self._require_unchanged(self.path)
+            write_bytes(self.path, text.encode(), self._look_at_replaced)
+
+    def _look_at_replaced(self, path: Path) -> None:
+        """Raise InputError unless what was replaced is what was read, and stays so."""
+        time.sleep(LATE_WRITE_S)  # an editor that had opened it before may write to it now
+        self._require_unchanged(path)
+
+    def _require_unchanged(self, path: Path) -> None:
+        try:
+            with open_plain(path) as file:
+                content = file.read(MAX_TEXT_BYTES)
+        except FileNotFoundError:
+            content = b""
+        if content.decode("utf-8-sig", errors="replace") != self.text:
             raise InputError(
                 f"{self.path.name}: changed on disk since this page read it, so it is not "
                 "replaced; reload the page to go on from what it says now"
             )
-        mode = stat.S_IMODE(self.path.stat().st_mode)
-        if not mode & stat.S_IWUSR:
-            raise InputError(f"{self.path.name}: is read-only; allow writing, or save a copy")
-        write_text(self.path, text)
-        self.path.chmod(mode)
 
     def is_fixed(self, name: str) -> bool:
         """Whether a number is not the file's own, as of a metal that it takes by its name."""

@@ -23,7 +23,7 @@ def list_results(folder: Path) -> list[dict[str, Any]]:
     for depth in range(1, DEEPEST + 1):
         found += list(folder.glob("/".join(["*"] * depth + [RESULT])))
     rows = []
-    for file in sorted(found, key=lambda one: one.stat().st_mtime, reverse=True):
+    for file in sorted(found, key=lambda one: one.lstat().st_mtime, reverse=True):
         where = file.parent
         if not where.resolve().is_relative_to(folder):
             continue  # a link to elsewhere

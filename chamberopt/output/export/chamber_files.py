@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from chamberopt.chamber.bores_and_deflectors import fitting_names
-from chamberopt.common.files import atomic_write, make_output_folder
+from chamberopt.common.files import make_output_folder, new_file
 from chamberopt.design.shapes import TAG_PART, TAG_SONOTRODE, TAG_WALL, further_sonotrode_tag
 from chamberopt.output.results.load import load_cavity, load_result
 from chamberopt.output.vtp_files import write_stl
@@ -87,7 +87,7 @@ def write_3mf(folder: Path, file: Path) -> None:
         'Type="http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"/></Relationships>',
         MODEL: _model(cavity),
     }
-    with atomic_write(file) as temporary, zipfile.ZipFile(temporary, "w") as package:
+    with new_file(file) as content, zipfile.ZipFile(content, "w") as package:
         for name, text in entries.items():
             entry = zipfile.ZipInfo(name, ZIP_DATE)
             entry.compress_type = zipfile.ZIP_DEFLATED

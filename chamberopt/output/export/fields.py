@@ -10,7 +10,7 @@ import numpy as np
 
 from chamberopt.chamber.part import PartOfFile
 from chamberopt.common.errors import InputError
-from chamberopt.common.files import require_place, write_text
+from chamberopt.common.files import check_new_file, require_place, write_new_texts
 from chamberopt.geometry.mesh_io.part_mesh import PartMesh
 from chamberopt.output.export.abaqus_deck import abaqus_deck
 from chamberopt.output.export.element_fields import (
@@ -88,14 +88,11 @@ def _write_deck(result: Result, surface: Any, to: str, path: Path) -> list[str]:
         )
     remarks += _elements_left_out(fields)
     meanings = [f"{name.upper()}: {combination_of(name)[0]}" for name in fields.columns]
-    for suffix, text in DECKS[to]([*_origin(result), *meanings], simulated, fields).items():
-        file = path.with_stem(path.stem + suffix) if suffix else path
-        write_text(file, text)
-        if suffix:
-            remarks.append(
-                f"{file.name}: element sets by coverage, to be included in the deck's *Assembly"
-            )
-    return remarks
+    decks = DECKS[to]([*_origin(result), *meanings], simulated, fields)
+    files = {path.with_stem(path.stem + suffix): text for suffix, text in decks.items()}
+    write_new_texts({check_new_file(file): text for file, text in files.items()})
+    sets = "element sets by coverage, to be included in the deck's *Assembly"
+    return [*remarks, *(f"{file.name}: {sets}" for file in files if file != path)]
 
 
 def _elements_left_out(fields: ElementFields) -> list[str]:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from chamberopt.common.errors import InputError
-from chamberopt.common.files import atomic_write, check_new_file, write_text
+from chamberopt.common.files import check_new_file, new_file, remove_file, write_text
 from chamberopt.common.versions import versions
 from chamberopt.output.export.formats import FrameName
 from chamberopt.output.export.frame import MEANING, Frame, frame_of
@@ -142,8 +142,8 @@ def _parquet(
         "column_encoding": dict.fromkeys(smooth, "BYTE_STREAM_SPLIT"),
     }
     with (
-        atomic_write(file) as temporary,
-        pyarrow.parquet.ParquetWriter(temporary, schema, **settings) as writer,
+        new_file(file) as content,
+        pyarrow.parquet.ParquetWriter(content, schema, **settings) as writer,
     ):
         yield lambda values: writer.write_batch(pyarrow.record_batch(list(values), schema=schema))
 
@@ -151,19 +151,24 @@ def _parquet(
 @contextmanager
 def _csv(file: Path, columns: Sequence[Column], metadata: dict[str, Any]) -> Iterator[WriteRows]:
     line = ",".join(column.text for column in columns) + "\n"
-    with atomic_write(file) as temporary, open(temporary, "wb") as plain, ExitStack() as stack:
-        out: Any = plain
-        if file.suffix.lower() == ".gz":
-            # Without a name and a time inside, the same impacts give the same bytes.
-            out = stack.enter_context(gzip.GzipFile("", "wb", GZIP_LEVEL, plain, 0))
-        out.write((",".join(column.name for column in columns) + "\n").encode())
+    try:
+        with new_file(file) as plain:
+            with ExitStack() as stack:
+                out: Any = plain
+                if file.suffix.lower() == ".gz":
+                    # Without a name and a time inside, the same impacts give the same bytes.
+                    out = stack.enter_context(gzip.GzipFile("", "wb", GZIP_LEVEL, plain, 0))
+                out.write((",".join(column.name for column in columns) + "\n").encode())
 
-        def write_rows(values: Sequence[np.ndarray]) -> None:
-            lists = [value.tolist() for value in values]
-            out.write("".join([line % row for row in zip(*lists, strict=True)]).encode())
+                def write_rows(values: Sequence[np.ndarray]) -> None:
+                    lists = [value.tolist() for value in values]
+                    out.write("".join([line % row for row in zip(*lists, strict=True)]).encode())
 
-        yield write_rows
-    write_text(beside(file), json.dumps(metadata, indent=2) + "\n")
+                yield write_rows
+            write_text(beside(file), json.dumps(metadata, indent=2) + "\n")
+    except BaseException:
+        remove_file(beside(file))  # a table and what describes it are one
+        raise
 
 
 def beside(file: Path) -> Path:

@@ -29,9 +29,18 @@ def new_figure(width: float, height: float) -> Figure:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
+    ignore_settings_here()
     figure = Figure(figsize=(width, height), dpi=130, layout="constrained")
     FigureCanvasAgg(figure)
     return figure
+
+
+def ignore_settings_here() -> None:
+    """Let no file of settings of matplotlib, which may have come with a design, run programs."""
+    import matplotlib
+
+    if Path("matplotlibrc").exists():
+        matplotlib.rcdefaults()
 
 
 def save_picture(figure: Figure, path: Path) -> None:

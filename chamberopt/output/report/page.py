@@ -12,13 +12,13 @@ from pathlib import Path
 from typing import Any
 
 from chamberopt.common.errors import InputError
-from chamberopt.common.files import claim_file, require_place, write_text
+from chamberopt.common.files import claim_file, read_file, require_place, write_text
 from chamberopt.output.plots.colours import hex_colours
 from chamberopt.output.report import html
 from chamberopt.output.report.part3d import PartScene, part_scene, quantities_in_all
-from chamberopt.output.report.report_data import START, read_design_file, report_contents
+from chamberopt.output.report.report_data import read_design_file, report_contents
 from chamberopt.output.report.sections import sections
-from chamberopt.output.results.load import Result, load_result, summary
+from chamberopt.output.results.load import START, Result, load_result, load_start, summary
 
 REPORT = "report.html"
 GENERATOR = '<meta name="generator" content="chamberopt'
@@ -82,7 +82,7 @@ def _write_report(path: Path, contents: dict[str, Any], loaded: Result) -> PartS
     scene = part_scene(loaded, contents["name"])
     scenes = {"best" if is_study else "result": scene}
     if is_study:
-        start = load_result(loaded.folder / START)
+        start = load_start(loaded)
         scenes = {START: part_scene(start, START, max_triangles=0), **scenes}
     made = f"simulated {contents['made'][:10]}, " if contents["made"] else ""
     subtitle = (
@@ -160,7 +160,7 @@ def require_free_page(path: str | Path, file: PageFile = REPORT_FILE) -> Path:
             f"{path}: a {file.name} is one {first} file; give such a name (--out FILE{first})"
         )
     try:
-        is_own = path.is_file() and file.is_one(path.read_bytes())
+        is_own = path.is_file() and file.is_one(read_file(path))
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror}; {remedy}") from None
     if os.path.lexists(path) and not is_own:
@@ -238,4 +238,4 @@ def _content(drawn: Sequence[dict[str, Any]]) -> dict[str, Any]:
 @cache
 def _asset(name: str) -> str:
     """Text of a script or style sheet of this package."""
-    return (Path(__file__).parent / "browser" / name).read_text(encoding="utf-8")
+    return read_file(Path(__file__).parent / "browser" / name, follow=True).decode()

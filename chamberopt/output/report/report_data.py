@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from chamberopt.common.estimate import Estimate, independent_difference, paired_difference
+from chamberopt.common.files import read_file
 from chamberopt.optimize.storage.study_folder import STUDY
 from chamberopt.output.report.conclusions import (
     accuracy_rows,
@@ -20,12 +21,10 @@ from chamberopt.output.report.conclusions import (
 from chamberopt.output.report.number_text import metric_label, objective_label, plain
 from chamberopt.output.report.peening.tolerances import tolerance_contents
 from chamberopt.output.report.peening.zones import limit_text, zone_contents
-from chamberopt.output.results.load import load_result, load_trials
+from chamberopt.output.results.load import load_result, load_start, load_trials
 
 if TYPE_CHECKING:
     from chamberopt.output.results.load import Result
-
-START = "start"
 
 
 def report_contents(folder: str | Path) -> dict[str, Any]:
@@ -36,7 +35,7 @@ def report_contents(folder: str | Path) -> dict[str, Any]:
     """
     result = load_result(folder)
     study = result.data.get("study")
-    start = load_result(result.folder / START) if study else None
+    start = load_start(result) if study else None
     gain = None if start is None else _change(result.objective, start.objective, result, start)
     rows = load_trials(result.folder) if study else []
     label = objective_label(result.objective_name)
@@ -77,10 +76,10 @@ def report_contents(folder: str | Path) -> dict[str, Any]:
 def _change(after: Estimate, before: Estimate, result: Result, start: Result) -> Estimate:
     """The difference, from pairs of replicas where both ran on the same seeds."""
     if after == before:  # the start is the best: nothing that is shown of it is uncertain
-        return Estimate(0.0, 0.0).not_known("not known") if after.in_words else Estimate(0.0, 0.0)
+        return Estimate(0.0, 0.0) if after.has_number else Estimate(0.0, 0.0).not_known("not known")
     same_seeds = result.seeds == start.seeds
     change = (paired_difference if same_seeds else independent_difference)(after, before)
-    return change.not_known("not known") if after.in_words or before.in_words else change
+    return change if after.has_number and before.has_number else change.not_known("not known")
 
 
 def _question(result: Result, study: Mapping[str, Any] | None) -> dict[str, Any]:
@@ -105,7 +104,7 @@ def _question(result: Result, study: Mapping[str, Any] | None) -> dict[str, Any]
     if not study:
         return question
     if STUDY in result.sha256:
-        tables = tomllib.loads(result.path(STUDY).read_text(encoding="utf-8"))
+        tables = tomllib.loads(read_file(result.path(STUDY)).decode())
         question["constraints"] = [
             " and ".join(f"{name} {'≥' if side == 'min' else '≤'} {limit:g}"
                          for side, limit in limits.items())
@@ -261,4 +260,4 @@ def _text(value: Any) -> str:
 def read_design_file(result: Result) -> tuple[str, str]:
     """Name and text of the design that the result belongs to."""
     name = "best.toml" if result.kind == "study" else "design.toml"
-    return name, result.path(name).read_text(encoding="utf-8")
+    return name, read_file(result.path(name)).decode()

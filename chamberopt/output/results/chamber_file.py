@@ -12,17 +12,19 @@ import numpy as np
 from chamberopt.chamber.build import Chamber
 from chamberopt.chamber.part import Part, PartOfFile
 from chamberopt.common.errors import InputError
-from chamberopt.common.npz_files import load_record
+from chamberopt.common.npz_files import is_of_type, load_record
 from chamberopt.design.shapes import TAG_PART, TAG_SONOTRODE
 from chamberopt.geometry.mesh_io.part_mesh import PartMesh
 from chamberopt.geometry.mesh_io.readers.raw_mesh import ElementNumbers
 from chamberopt.geometry.mesh_io.units import METRES_PER
+from chamberopt.geometry.smoothing.part import SmoothingFacts
 
 if TYPE_CHECKING:
     from chamberopt.output.results.load import Result
 
 CHAMBER_FILE = "chamber.npz"
 LARGEST = 1e4  # m and m²: no part or chamber is larger
+STEEPEST = 1e12  # 1/m: no hollow is more curved, nor a unit vector longer
 REMEDY = "restore the file, or simulate again"
 
 
@@ -32,7 +34,7 @@ def load_chamber(result: Result) -> Chamber:
     It is checked as a whole, because compiled functions trust their input.
     """
     path = result.path(CHAMBER_FILE)
-    parts = Part, PartOfFile, PartMesh, ElementNumbers
+    parts = Part, PartOfFile, PartMesh, ElementNumbers, SmoothingFacts
     chamber = load_record(path, Chamber, parts, REMEDY)
     try:
         _require_sound(chamber)
@@ -66,6 +68,12 @@ def _require_sound(chamber: Chamber) -> None:
     ]
     if len(file.simulated.vertices) != points or len(file.simulated.triangles) != own:
         raise ValueError("the part has another size than in its file's frame")
+    if part.normals is not None:
+        columns.append(("normals", part.normals, "f4", (own, 3, 3), None))
+    if part.hollow is not None:
+        columns.append(("curvature", part.hollow, "f4", (own,), None))
+    if part.smoothing is not None and not is_of_type(part.smoothing, SmoothingFacts):
+        raise ValueError("what smoothing did is not of its types")
     if chamber.fitting is not None:
         columns.append(("fitting", chamber.fitting, "i", (faces,), (-1, faces)))
     if file.original is not None:
@@ -79,7 +87,8 @@ def _require_sound(chamber: Chamber) -> None:
             raise ValueError(f"{name} is of type {column.dtype}")
         if column.shape != shape:
             raise ValueError(f"{name} has the shape {column.shape}, expected {shape}")
-        if dtype == "f8" and not (np.abs(column) <= LARGEST).all():
+        largest = {"f8": LARGEST, "f4": STEEPEST}.get(dtype, np.inf)
+        if not (np.abs(column) <= largest).all():
             raise ValueError(f"{name} has a number that is not finite, or too large")
         if limits and len(column) and not limits[0] <= column.min() <= column.max() < limits[1]:
             raise ValueError(f"{name} is not from {limits[0]} to {limits[1] - 1}")
@@ -98,6 +107,8 @@ def _require_sound(chamber: Chamber) -> None:
         raise ValueError("a name or note is no text")
     if any(mesh.groups or mesh.unit not in METRES_PER for mesh in meshes):
         raise ValueError("the part in its file's frame has groups, or no unit")
+    if any(mesh.normals is not None for mesh in meshes):
+        raise ValueError("the part in its file's frame has normals")
 
 
 def _mesh_columns(name: str, vertices: np.ndarray, triangles: np.ndarray) -> list[Any]:

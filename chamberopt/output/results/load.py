@@ -15,13 +15,14 @@ import numpy as np
 
 from chamberopt.common.errors import InputError
 from chamberopt.common.estimate import Estimate
+from chamberopt.common.files import RESULT, open_plain, require_plain_folder
 from chamberopt.common.limits import MAX_RESULT_BYTES, parse_json, read_limited
 from chamberopt.common.number_text import estimate_text, plain
 from chamberopt.coverage.metrics import find_metric
 from chamberopt.design.design import validate
 from chamberopt.design.load import Design
 from chamberopt.geometry.triangles import areas
-from chamberopt.optimize.storage.study_folder import RESULT, is_study_folder
+from chamberopt.optimize.storage.study_folder import is_study_folder
 from chamberopt.optimize.storage.trial_log import HISTORY, TIMINGS, read_trials
 from chamberopt.output.results.recorded import require_recorded
 from chamberopt.output.vtp_files import (
@@ -39,6 +40,7 @@ if TYPE_CHECKING:
     from chamberopt.simulation.evaluation import Evaluation
 
 FORMAT = 5
+START = "start"
 # Folders of other commands, by the file that each has: what they are, and where that can be seen.
 OTHER_FOLDERS = {
     "calibration.json": "a calibration: see calibration.txt and calibration.png in it; designs "
@@ -98,6 +100,8 @@ def load_result(path: str | Path) -> Result:
         InputError: it is not a results folder, or unfinished, or damaged.
     """
     path = Path(path)
+    if path.name != RESULT and path.is_symlink():
+        path = path.resolve()  # who asks for it gave the link, and learns where results are
     file = path if path.name == RESULT else path / RESULT
     folder = file.parent
     if not file.is_file():
@@ -139,6 +143,12 @@ def load_result(path: str | Path) -> Result:
         )
 
 
+def load_start(study: Result) -> Result:
+    """Read the results folder of a study's start, which is inside that of the study."""
+    with _damage_explained(study.folder / START):
+        return load_result(require_plain_folder(study.folder / START, RESTORE))
+
+
 def load_trials(folder: Path) -> list[dict[str, Any]]:
     """The trial log of a study or sweep, finished or not; InputError where there is none.
 
@@ -176,7 +186,7 @@ def unchanged_file(folder: Path, name: str, sha256: Mapping[str, str]) -> Path:
 def file_sha256(path: Path) -> str:
     """Digest of a file; InputError if it cannot be read."""
     try:
-        with path.open("rb") as file:
+        with open_plain(path) as file:
             return hashlib.file_digest(file, "sha256").hexdigest()
     except OSError as error:
         raise InputError(

@@ -19,6 +19,7 @@ Share = Annotated[float, Field(ge=0.0, le=1.0)]
 Positive = Annotated[float, Field(ge=0.0)]
 Count = Annotated[int, Field(ge=0)]
 Digest = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
+FileName = Annotated[str, Field(pattern=r"^[^/\\:]+$")]  # in the folder itself
 Bounds = Annotated[list[float], Field(min_length=2, max_length=2)]
 Texts = Annotated[list[str], Field(min_length=1)]
 Curve = Annotated[list[float], Field(min_length=1)]
@@ -277,7 +278,7 @@ class _Any(_Table):
     notes: list[str]
     warnings: list[str] = []
     effects: list[_Advice] = []
-    files: dict[str, Digest]
+    files: dict[FileName, Digest]
     versions: dict[str, str]
 
     @model_validator(mode="after")

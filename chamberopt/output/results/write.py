@@ -8,18 +8,17 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from chamberopt.common.files import write_text
+from chamberopt.common.files import RESULT, make_folder, write_text
 from chamberopt.common.npz_files import save_record
 from chamberopt.common.versions import versions
 from chamberopt.coverage.metrics import exposed_target, find_metric
 from chamberopt.coverage.part_impacts import HITS_FILE, save_hits, sort_hits_by_triangle
 from chamberopt.design.load import Design, save_design, with_paths_from
 from chamberopt.optimize import pareto
-from chamberopt.optimize.storage.study_folder import RESULT
 from chamberopt.optimize.storage.trial_log import read_trials, trials_as_csv
 from chamberopt.optimize.study.constraints import judge_zones
 from chamberopt.output.results.chamber_file import CHAMBER_FILE
-from chamberopt.output.results.load import FORMAT, content_sha256, file_sha256
+from chamberopt.output.results.load import FORMAT, START, content_sha256, file_sha256
 from chamberopt.output.vtp_files import write_chamber, write_coverage
 from chamberopt.simulation.complete_result import CandidateResult
 
@@ -55,8 +54,8 @@ def write_study(
     """
     save_design(best.design, folder / "best.toml")
     write_text(folder / "history.csv", trials_as_csv(read_trials(folder)))
-    (folder / "start").mkdir(exist_ok=True)
-    write_result(folder / "start", write_simulation(folder / "start", start))
+    own = make_folder(folder / START)
+    write_result(own, write_simulation(own, start))
     if study_result.study.objective.pareto:
         write_text(folder / "pareto.csv", pareto.as_csv(study_result))
     candidate = _write_candidate(folder, best)

@@ -121,7 +121,7 @@ def draw_in_subprocess(
     name, missing = Path(picture).name, missing_opengl()
     if missing:
         return f"{name} skipped: {missing}"
-    command = [sys.executable, "-m", "chamberopt.output.viewer"]
+    command = [sys.executable, "-P", "-m", "chamberopt.output.viewer"]
     begun = time.monotonic()
     with (
         tempfile.TemporaryFile("w+") as errors,

@@ -153,5 +153,5 @@ def _of_model(name: str, one: Estimate) -> float:
 
 def _slope(one: Estimate, two: Estimate, step: float) -> float:
     """Slope of a figure; 0 where it has no number."""
-    known = all(math.isfinite(e.value) and not e.in_words for e in (one, two))
+    known = all(math.isfinite(e.value) and e.has_number for e in (one, two))
     return (two.value - one.value) / step if known else 0.0

@@ -165,6 +165,7 @@ def on_scale(figure: Estimate, scale: FigureScale) -> Estimate:
         pseudovalues=tuple(value + slope * (y - figure.value) for y in figure.pseudovalues),
         bias=max(0.0, half_width - slope * scatter),
         shared=tuple(slope * one for one in figure.shared),
+        in_words="",
     )
 
 

@@ -27,7 +27,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from chamberopt.chamber.build import build_chamber
-from chamberopt.common.errors import InputError
+from chamberopt.common.errors import InputError, UnreadableError
 from chamberopt.common.estimate import (
     CONFIDENCE,
     FIRST_OF_CALIBRATION,
@@ -212,6 +212,8 @@ def find_tolerances(
     try:
         there = design.changed({**corner, "tolerances": None})  # which would lie about the corner
         simulated = evaluate(there)
+    except UnreadableError:
+        raise
     except InputError as error:
         notes.append(f"the worst corner cannot be simulated, so first order is unchecked: {error}")
         return ToleranceResult(numbers, found, worst_for, corner, tuple(notes))

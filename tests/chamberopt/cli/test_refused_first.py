@@ -102,7 +102,7 @@ def test_a_full_disk_is_told_first(
     command: str, place: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     usage = namedtuple("usage", "total used free")(10**9, 10**9 - 10**6, 10**6)
-    monkeypatch.setattr("chamberopt.common.files.shutil.disk_usage", lambda _: usage)
+    monkeypatch.setattr("chamberopt.common.files.claimed.shutil.disk_usage", lambda _: usage)
     monkeypatch.chdir(place)
     before = sorted(place.rglob("*"))
     assert main(command.split()) == 2

@@ -19,6 +19,7 @@ from chamberopt.coverage.coverage_from_impacts import (
 )
 from chamberopt.coverage.coverage_intervals import coverage_estimates
 from chamberopt.coverage.field.crease_bands import CREASE_LENGTH
+from chamberopt.coverage.field.reached import Reach
 from chamberopt.coverage.field.target_field import (
     Gauge,
     TargetField,
@@ -226,7 +227,7 @@ def test_windows_as_large_as_a_dent_show_the_dents_themselves() -> None:
     found = find_footprints(field, field.gauge, hits)
     batches = [Batch(1, found)]
     sums = sum_dents(batches, len(field.gauge.area))
-    mean = coverage_estimates(batches, sums, 1.0, 1.0)["mean_coverage"]
+    mean = coverage_estimates(batches, sums, Reach(1.0), 1.0)["mean_coverage"]
     share = in_a_disc(field.gauge.windows.points.place, hits).mean()
     assert 0.5 < share < 0.8
     assert mean.value == pytest.approx(share, abs=0.01)
@@ -240,7 +241,7 @@ def test_random_dents_cover_on_average_what_their_discs_cover(gauge_mm2: float) 
     gauge = field.gauge
     treatments = [plane_dents(rng, rng.poisson(1200), 7.499e-3, diameter) for _ in range(16)]
     batches = [Batch(1, find_footprints(field, gauge, hits)) for hits in treatments]
-    found = coverage_estimates(batches, sum_dents(batches, len(gauge.area)), 1.0, 1.0)
+    found = coverage_estimates(batches, sum_dents(batches, len(gauge.area)), Reach(1.0), 1.0)
     middles = gauge.windows.points.place
     inner = np.abs(middles[:, :2]).max(axis=1) < 7.2e-3
     shares = np.array([in_a_disc(middles[inner], hits).mean() for hits in treatments])

@@ -17,6 +17,7 @@ from chamberopt.coverage.coverage_intervals import (
     products_without_each,
     root_of_variance,
 )
+from chamberopt.coverage.field.reached import Reach
 from chamberopt.coverage.field.target_field import Gauge
 from chamberopt.coverage.field.windows import Places, Windows
 from chamberopt.coverage.metrics import NEVER
@@ -87,7 +88,7 @@ def groups_of(name: str, dents: float, groups: int) -> Iterator[dict[str, Estima
 def estimates_of(
     batches: Sequence[Batch], reachable: float, time_ratio: float
 ) -> dict[str, Estimate]:
-    return coverage_estimates(batches, sum_dents(batches, WINDOWS), reachable, time_ratio)
+    return coverage_estimates(batches, sum_dents(batches, WINDOWS), Reach(reachable), time_ratio)
 
 
 def resolution_of(
@@ -368,8 +369,8 @@ def test_the_time_does_not_depend_on_how_long_the_treatment_is() -> None:
     sums, found = sum_dents(batches, WINDOWS), []
     for times_as_long in (1.0, 30.0, 1e5):
         ratio = times_as_long * REPLICAS
-        p05 = quantile_estimate(P05_COVERAGE, sums, 1.0, ratio)
-        found.append(time_to_98(p05, sums, 1.0, ratio, times_as_long * TREATMENT))
+        p05 = quantile_estimate(P05_COVERAGE, sums, Reach(1.0), ratio)
+        found.append(time_to_98(p05, sums, Reach(1.0), ratio, times_as_long * TREATMENT))
     first = found[0]
     assert p05.value == 1.0
     for one in found:

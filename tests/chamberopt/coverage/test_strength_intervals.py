@@ -8,6 +8,7 @@ import pytest
 from chamberopt.chamber.scene import chamber_mesh
 from chamberopt.common.estimate import Estimate, paired_difference
 from chamberopt.coverage.compression import ERROR, OF_DENT, compression_estimate, stress_notes
+from chamberopt.coverage.field.reached import Reach
 from chamberopt.coverage.field.target_field import TargetField, WindowSetting, find_target_field
 from chamberopt.coverage.part_impacts import Hits
 from chamberopt.coverage.strength import strip_dents
@@ -49,7 +50,7 @@ def plane_dents(rng: np.random.Generator, per_mm2: float, diameter: np.ndarray |
 def known(histogram: np.ndarray, reachable: float = 1.0) -> dict[str, Estimate]:
     """Figures of eight batches with the same dents, each simulated for two seconds."""
     parts = np.tile(histogram / 8, (8, 1, 1))
-    return estimates_of(StrengthHistograms(parts, np.full(8, 2.0), 1.0), reachable)
+    return estimates_of(StrengthHistograms(parts, np.full(8, 2.0), 1.0), Reach(reachable))
 
 
 def uniformity(histogram: np.ndarray, reachable: float = 1.0) -> Estimate:
@@ -63,7 +64,7 @@ def figures(field: TargetField, replicas: list[list[Hits]]) -> dict[str, Estimat
         return hits.dent, hits.dent**2 / BALL
 
     found = level_histograms(field, replicas, 2.0, dents)
-    return estimates_of(found, field.reachable)
+    return estimates_of(found, field.reach)
 
 
 def test_an_even_surface_has_the_uniformity_one() -> None:

@@ -11,6 +11,7 @@ from chamberopt.common.errors import InputError
 from chamberopt.common.estimate import Estimate, estimate, paired_difference
 from chamberopt.common.parallel.executor import SerialExecutor, local_executor
 from chamberopt.coverage.dents import dent_diameter
+from chamberopt.coverage.field.reached import Reach
 from chamberopt.coverage.metrics import OBJECTIVES, metric_names
 from chamberopt.coverage.part_impacts import Hits
 from chamberopt.design.design import validate
@@ -71,13 +72,13 @@ def test_random_dents_on_a_plane_cover_what_avrami_says() -> None:
 def test_a_note_says_how_high_coverage_can_go_with_some_of_the_target_out_of_reach() -> None:
     """r of the area covered to 1 and the rest bare: mean r, standard deviation sqrt(r (1 - r))."""
     covered = np.repeat([1.0, 0.0], [80, 20])
-    (note,) = reach_notes(0.8)
+    (note,) = reach_notes(Reach(0.8))
     assert "20.0% of the target is out of reach" in note
     highest = f"mean_coverage above {covered.mean():.2f} or a uniform_coverage above "
     assert f"{highest}{covered.mean() - covered.std():.2f}" in note
-    assert reach_notes(0.999) == ()
-    assert "uniform_coverage above 0.00" in reach_notes(0.4)[0]
-    (of_zone,) = reach_notes(0.8, "zone root")
+    assert reach_notes(Reach(0.999)) == ()
+    assert "uniform_coverage above 0.00" in reach_notes(Reach(0.4))[0]
+    (of_zone,) = reach_notes(Reach(0.8), "zone root")
     assert of_zone.startswith("20.0% of zone root is out of reach")
     assert of_zone.endswith("mean_coverage above 0.80, and its p05_coverage is 0")
 

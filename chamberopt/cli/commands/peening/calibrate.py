@@ -29,8 +29,7 @@ def calibrate(
     measured
         File of measurements (.toml), see docs/peening.md.
     """
-    from tempfile import TemporaryDirectory
-
+    from chamberopt.common.files import private_folder
     from chamberopt.common.parallel.executor import open_executor
     from chamberopt.common.progress import step
     from chamberopt.output.results.calibration_results import (
@@ -47,7 +46,7 @@ def calibrate(
         console.results_folder(out, measured.stem) as folder,
         open_executor(workers, cluster) as executor,
     ):
-        with step("building the chambers"), TemporaryDirectory() as lids:
+        with step("building the chambers"), private_folder() as lids:
             prepared = prepare(loaded, designs, Path(lids))
         for one in prepared.setups:
             compile_with_message(one.design, one.chamber)

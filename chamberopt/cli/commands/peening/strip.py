@@ -58,6 +58,7 @@ def strip(
         Length and width of a small strip.
     """
     from chamberopt.chamber.build import build_chamber
+    from chamberopt.common.files import whole_or_nothing
     from chamberopt.common.parallel.executor import open_executor
     from chamberopt.common.progress import step
     from chamberopt.design.load import load_design
@@ -73,7 +74,7 @@ def strip(
     with (
         console.results_folder(out, f"{design.stem}-strip") as folder,
         open_executor(workers, cluster) as executor,
-        console.whole_or_nothing(folder),
+        whole_or_nothing(folder),
     ):
         with step("building the chamber"):
             if at == LID:

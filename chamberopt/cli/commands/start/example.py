@@ -22,23 +22,28 @@ def example(name: Literal["gear", "plate", "blade", "fir_tree"], /, *, out: Out 
         A pinion on its shaft, a plate that closes the chamber, a compressor blade; or fir_tree,
         a STEP file alone, for docs/tutorial.md.
     """
-    from chamberopt.common.files import claim_folder, write_bytes, write_text
+    from chamberopt.common.files import (
+        claim_folder,
+        make_folder,
+        read_file,
+        write_bytes,
+        write_text,
+    )
 
     shipped = shipped_files()
     if name == CAD_FILE:
         with claim_folder(out or Path(name)) as folder:
             step = shipped / f"designs/parts/{name}.step"
-            write_bytes(folder / step.name, step.read_bytes())
+            write_bytes(folder / step.name, read_file(step, follow=True))
         shown = [f"{folder}: {step.name}", "to go on:", f"  cd {folder}"]
         show([*shown, f"  chamberopt new {step.name} --target FIR_TREE --out chamber"])
         return
     design, study = f"{name}.toml", f"{name}_study.toml"
     with claim_folder(out or Path(name)) as folder:
-        part = folder / "parts" / f"{name}.stl"
-        part.parent.mkdir()
-        write_bytes(part, (shipped / f"designs/parts/{name}.stl").read_bytes())
-        write_bytes(folder / design, (shipped / f"designs/{name}.toml").read_bytes())
-        text = (shipped / f"studies/{STUDIES[name]}.toml").read_text(encoding="utf-8")
+        part = make_folder(folder / "parts") / f"{name}.stl"
+        write_bytes(part, read_file(shipped / f"designs/parts/{name}.stl", follow=True))
+        write_bytes(folder / design, read_file(shipped / f"designs/{name}.toml", follow=True))
+        text = read_file(shipped / f"studies/{STUDIES[name]}.toml", follow=True).decode()
         write_text(folder / study, text.replace("../designs/", ""))
     show(
         [

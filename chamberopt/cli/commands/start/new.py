@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
-from chamberopt.cli.console import print_remarks, show, whole_or_nothing
+from chamberopt.cli.console import print_remarks, show
 from chamberopt.cli.options import Out, app
 from chamberopt.common.errors import one_line
 
@@ -58,7 +58,7 @@ def new(
     from chamberopt.chamber.propose.text import design_text, study_text
     from chamberopt.cli.commands.check import draw_target
     from chamberopt.common.errors import InputError
-    from chamberopt.common.files import claim_folder, write_text
+    from chamberopt.common.files import claim_folder, whole_or_nothing, write_text
     from chamberopt.common.progress import step
     from chamberopt.common.toml_fields import allowed_range
     from chamberopt.design.shot import ShotSize

@@ -50,6 +50,8 @@ class RawMesh:
     notes: tuple[str, ...] = ()  # what was left out or turned into triangles
     numbering: ElementNumbers | None = None  # None if the file has only triangles
     bodies: np.ndarray | None = None  # (m,), the body of each, if each is closed by itself
+    normals: np.ndarray | None = None  # of the surface at the corners, (m, 3, 3); 0: not known
+    is_exact: bool = False  # whether the triangles were made of the surface itself
 
 
 def read_scene(file: BinaryIO | Path, kind: str) -> RawMesh:

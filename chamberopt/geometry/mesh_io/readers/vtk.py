@@ -13,6 +13,7 @@ import numpy as np
 
 from chamberopt.common.errors import InputError
 from chamberopt.common.limits import MAX_ELEMENTS
+from chamberopt.common.npz_files import save_arrays
 from chamberopt.geometry.mesh_io.native_reader import NativeReader, converted
 from chamberopt.geometry.mesh_io.readers.elements import Block, ElementMesh, extract_surface
 from chamberopt.geometry.mesh_io.readers.raw_mesh import RawMesh
@@ -121,8 +122,8 @@ def unpack(given: str, made: str, reader_name: str) -> None:
         array = data.GetCellData().GetArray(k)
         if array is not None and array.GetNumberOfComponents() == 1:  # no texts and vectors
             fields[f"{FIELD}{array.GetName()}"] = vtk_to_numpy(array)
-    np.savez(
-        made,
+    save_arrays(
+        Path(made),
         points=points.astype(np.float64),
         nodes=vtk_to_numpy(cells.GetConnectivityArray()),
         offsets=offsets,

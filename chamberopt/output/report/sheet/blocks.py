@@ -293,7 +293,7 @@ def first_checks(result: Result) -> list[Check]:
         found.append(Check(what, ", ".join(f"{k} {_restitution(x)}" for k, x in laws.items())))
     row = _half_covered(result.data.get("coverage_against_time", []))
     # Where the mean at the end is not resolved, its curve is not to be relied on either.
-    if row and not result.metrics["mean_coverage"].in_words:
+    if row and result.metrics["mean_coverage"].has_number:
         share = Estimate(row["mean_coverage"], row["half_width"])
         what = f"mean coverage of the target after {plain(row['time_s'], 3)} s"
         found.append(Check(what, estimate_text(share, 100.0, "%")))

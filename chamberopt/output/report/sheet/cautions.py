@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
+from chamberopt.chamber.checks.facets import LEFT
 from chamberopt.output.report.number_text import interval_text, plain
 
 if TYPE_CHECKING:
@@ -21,6 +22,11 @@ def cautions(result: Result, contents: Mapping[str, Any]) -> Iterator[str]:
             "Simulated without friction. With it the shot was 22 to 47 % slower in a cylinder (mu "
             "0.1 to 0.5), and coverage takes longer: rely on these times only once the coverage "
             "measured first agrees."
+        )
+    if any(note.startswith(LEFT) for note in contents["notes"]):
+        yield (
+            "The part's file has coarse facets in the place of its rounds, which were not divided: "
+            "coverage and times are those of the facets."
         )
     if any("without a holder" in note for note in contents["notes"]):
         yield "The part is held in the air: its holder is neither designed nor simulated."

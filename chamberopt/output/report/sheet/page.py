@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from chamberopt.common.files import claim_file, write_bytes
 from chamberopt.output.plots.colours import BLACK, GREY
+from chamberopt.output.plots.figure_style import ignore_settings_here
 from chamberopt.output.report.page import PageFile, require_free_page
 from chamberopt.output.report.report_data import report_contents
 from chamberopt.output.report.sheet.blocks import Sheet, calibrated_to, first_checks, setting_blocks
@@ -75,6 +76,7 @@ def draw_sheet(sheet: Sheet, chamber: Chamber) -> Figure:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
+    ignore_settings_here()
     figure = Figure(figsize=(WIDTH / 25.4, HEIGHT / 25.4), dpi=RASTER)
     FigureCanvasAgg(figure)
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0), xlim=(0.0, WIDTH), ylim=(0.0, HEIGHT))

@@ -7,7 +7,6 @@ lines are parallel, so lengths are the same all over the picture.
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,6 +14,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from chamberopt.common.errors import InputError
+from chamberopt.common.files import private_folder
+from chamberopt.common.npz_files import save_arrays
 from chamberopt.output.viewer.actors import GREY, NO_RENDER, Discs, disc_actor, light
 from chamberopt.output.viewer.camera import near_directions, near_views, seen_area, view_frame
 from chamberopt.output.viewer.drawn_part import DrawnPart
@@ -64,9 +65,9 @@ def draw_dents(
     Raises:
         InputError: from `view` the target is seen edge on.
     """
-    with tempfile.TemporaryDirectory() as folder:
+    with private_folder() as folder:
         data = Path(folder) / "dents.npz"
-        np.savez(data, place=dents.place, normal=dents.normal, radius=dents.radius)
+        save_arrays(data, place=dents.place, normal=dents.normal, radius=dents.radius)
         job = {"draw": "dents", "folder": str(result), "dents": str(data), "title": title,
                "view": view, "pixels": pixels}  # fmt: skip
         return draw_in_subprocess(job, picture)

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from chamberopt.common.errors import InputError
-from chamberopt.common.files import atomic_write, write_bytes
+from chamberopt.common.files import new_file, write_bytes
 from chamberopt.output.viewer.subprocess_drawing import file_path
 
 COLOURS = 96  # of a GIF, the same in all frames: with palettes of their own frames would flicker
@@ -56,12 +56,12 @@ def write_film(path: Path, frames: Sequence[np.ndarray], fps: int) -> None:
     import imageio.v2 as imageio
     from imageio_ffmpeg import count_frames_and_secs
 
-    with atomic_write(path) as temporary:
+    with new_file(path) as file:
         imageio.mimwrite(
-            temporary, list(frames), fps=fps, codec="libx264", quality=7, macro_block_size=BLOCK
+            file.name, list(frames), fps=fps, codec="libx264", quality=7, macro_block_size=BLOCK
         )
         try:
-            whole = count_frames_and_secs(str(temporary))[0] == len(frames)
+            whole = count_frames_and_secs(file.name)[0] == len(frames)
         except RuntimeError:
             whole = False
         if not whole:  # ffmpeg does not tell

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from chamberopt.common.files import private_folder
+from chamberopt.common.npz_files import save_arrays
 from chamberopt.output.plots.colours import BLUE, OUTSIDE
 from chamberopt.output.viewer.actors import FAULT, GREY, NO_RENDER, SONOTRODE, add_edges
 from chamberopt.output.viewer.camera import (
@@ -74,9 +75,9 @@ def draw_part(
     none = np.zeros(len(corners), dtype=bool)
     marked, missed = (none if chosen is None else chosen for chosen in (marked, missed))
     edges = np.zeros((0, 2, 3)) if edges is None else edges
-    with tempfile.TemporaryDirectory() as folder:
+    with private_folder() as folder:
         part = Path(folder) / "part.npz"
-        np.savez(
+        save_arrays(
             part, corners=corners * MM, marked=marked & ~missed, missed=missed, edges=edges * MM
         )
         job = {"draw": "part", "part": str(part), "title": title}

@@ -6,13 +6,14 @@ sonotrode hardly moves in the picture.
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from chamberopt.common.files import private_folder
+from chamberopt.common.npz_files import save_arrays
 from chamberopt.output.viewer.actors import (
     DARK,
     Discs,
@@ -78,10 +79,10 @@ def draw_replay(
         "magenta: has just hit the part   pale: target"
     )
     point, axis = (np.zeros(3), np.zeros(3)) if flight.part_axis is None else flight.part_axis
-    with tempfile.TemporaryDirectory() as folder:
+    with private_folder() as folder:
         data = Path(folder) / "flight.npz"
         poses = [rotation_about_line(point * MM, axis, float(angle)) for angle in flight.part_angle]
-        np.savez(
+        save_arrays(
             data,
             time=flight.time,
             balls=flight.balls * MM,

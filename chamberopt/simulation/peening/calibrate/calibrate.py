@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from chamberopt.chamber.build import build_chamber
+from chamberopt.common.files import make_folder
 from chamberopt.common.versions import package_versions
 from chamberopt.design.peening.calibration import (
     OF_STRIPS,
@@ -154,8 +155,7 @@ def prepare(measured: Measured, designs: Mapping[str, Design], folder: Path) -> 
     }  # fmt: skip
     data: list[Data] = []
     for number, strip in enumerate(measured.strip):
-        place = folder / f"strip-{number + 1}"
-        place.mkdir(exist_ok=True)
+        place = make_folder(folder / f"strip-{number + 1}")
         lid = strip_design(design_of(strip), strip.size, place, strip.distance_mm)
         data.append(_arcs(strip, setup_of(lid)))
     for coupon in measured.coupon:

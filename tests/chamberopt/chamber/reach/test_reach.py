@@ -191,12 +191,12 @@ def test_smaller_balls_reach_more_of_a_gear() -> None:
     target = chamber.part.target
     shares = [
         reached_part_share(find_reach(mesh, d), chamber.source, count)[target]
-        for d in (1e-3, 1.5e-3, 4e-3)
+        for d in (1.5e-3, 2.2e-3, 4e-3)
     ]
     weights = chamber.exposed_area[target]
     means = [np.average(share, weights=weights) for share in shares]
     assert all(more > less + 0.02 for more, less in pairwise(means)), means
-    assert means[0] > 0.86
+    assert means[0] > 0.99  # the fillets of its roots have a radius of 0.76 mm
     assert means[-1] < 0.5
 
 

@@ -21,9 +21,10 @@ def cube_mesh(coverage: Callable[[Places], np.ndarray], shown: int = 12) -> Disp
     """The display mesh of a cube, of which the field is drawn on the first triangles only."""
     cube = box([SIDE] * 3)
     drawn = np.arange(12) < shown
-    face, _ = find_faces(cube.vertices, cube.faces, drawn)
+    face = find_faces(cube.vertices, cube.faces, drawn)[0].of_triangle
+    normals = np.repeat(cube.face_normals[:, None], 3, axis=1)
     return display_mesh.display_mesh(
-        np.asarray(cube.vertices), np.asarray(cube.faces), drawn, face, GAUGE, coverage
+        np.asarray(cube.vertices), np.asarray(cube.faces), normals, drawn, face, GAUGE, coverage
     )
 
 

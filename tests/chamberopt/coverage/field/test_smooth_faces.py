@@ -4,12 +4,19 @@ import numpy as np
 import pytest
 import trimesh
 
-from chamberopt.coverage.field.smooth_faces import Creases, find_faces
+from chamberopt.coverage.field.smooth_faces import DIVISIONS, Creases, Faces, find_faces
+
+
+def divided(mesh: trimesh.Trimesh, target: np.ndarray | None = None) -> tuple[Faces, Creases]:
+    wanted = np.ones(len(mesh.faces), dtype=bool) if target is None else target
+    return find_faces(np.asarray(mesh.vertices), np.asarray(mesh.faces), wanted)
 
 
 def faces_of(mesh: trimesh.Trimesh, target: np.ndarray | None = None) -> tuple[np.ndarray, Creases]:
-    wanted = np.ones(len(mesh.faces), dtype=bool) if target is None else target
-    return find_faces(np.asarray(mesh.vertices), np.asarray(mesh.faces), wanted)
+    """The faces and creases of a mesh whose edges are sharp or smooth by all divisions."""
+    faces, creases = divided(mesh, target)
+    assert len(faces.joined) == len(creases.line) == 1
+    return faces.of_triangle, creases._replace(line=creases.line[0])
 
 
 def crease_length(creases: Creases) -> float:
@@ -79,14 +86,40 @@ def test_splitting_triangles_changes_no_face_and_no_crease(kind: str) -> None:
 
 @pytest.mark.parametrize(
     ("turn", "faces", "creases"),
-    [(39.0, 1, 0), (41.0, 2, 4), (90.0, 2, 4), (-41.0, 1, 0), (-59.0, 1, 0), (-61.0, 2, 0)],
+    [(30.0, 1, 0), (50.0, 2, 4), (90.0, 2, 4), (-41.0, 1, 0), (-50.0, 1, 0), (-70.0, 2, 0)],
 )
 def test_edges_divide_by_how_sharply_they_turn(turn: float, faces: int, creases: int) -> None:
-    """Convex edges are creases above 40 degrees; hollow ones divide above 60 and are none."""
+    """Convex edges are creases from 50 degrees on; hollow ones divide from 70 on and are none."""
     found, sharp = faces_of(roof(turn))
     assert len(set(found)) == faces
     assert len(sharp.ends) == creases
     assert len(set(sharp.line)) == min(creases, 1)
+
+
+@pytest.mark.parametrize("turn", [32.0, 38.5, 40.0, 41.5, 49.0, -52.0, -60.0, -66.0])
+def test_edges_of_a_middling_turn_divide_for_a_share_of_the_windows(turn: float) -> None:
+    """From no window at 30 degrees to all at 50, and at hollow edges from 50 to 70."""
+    faces, creases = divided(roof(turn))
+    wanted = (turn - 30.0) / 20.0 if turn > 0.0 else (-turn - 50.0) / 20.0
+    whole = (faces.joined == faces.joined[:, :1]).all(axis=1)
+    assert whole.tolist() == [False, True]
+    assert faces.shares[0] == pytest.approx(wanted, abs=0.5 / DIVISIONS + 1e-9)
+    for count in (100, 2000, 20_000):
+        seen = faces.divisions(count)
+        for some in (seen, seen[::2], seen[3::10]):
+            assert (some == 0).mean() == pytest.approx(wanted, abs=2.0 / len(some) + 0.02)
+    if turn > 0.0:
+        assert (creases.line >= 0).tolist() == [[True] * 4, [False] * 4]
+
+
+def test_corners_of_a_line_divide_it_for_a_share_of_the_windows() -> None:
+    """The rim of an octagonal prism turns by 45 degrees at each corner, and so do its sides."""
+    prism = trimesh.creation.cylinder(1.0, 3.0, sections=8)
+    faces, creases = divided(prism)
+    lines = [len(set(line[line >= 0])) for line in creases.line]
+    assert faces.shares[lines.index(8 + 16)] == 0.5  # the rims in pieces, the sides apart
+    assert faces.shares[lines.index(2)] == 0.25  # round rims, one side
+    assert faces.shares[lines.index(8 + 2)] == 0.25
 
 
 def test_the_border_of_the_target_divides_faces_but_is_no_crease() -> None:

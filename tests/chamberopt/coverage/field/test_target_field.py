@@ -12,6 +12,7 @@ from chamberopt.coverage.field.target_field import (
     TargetField,
     WindowSetting,
     find_target_field,
+    require_narrow_gauge,
     require_wide_gauge,
     with_whole_part,
 )
@@ -64,6 +65,22 @@ def test_a_gauge_too_small_for_the_target_is_refused_with_the_least_that_is_poss
     assert "225 mm²" in str(refused.value)
 
 
+def test_a_gauge_as_wide_as_the_target_is_refused_with_the_most_that_is_possible() -> None:
+    chamber = plane_chamber()
+    require_narrow_gauge(chamber, setting(gauge_mm2=112.0))
+    for given in (113.0, 225.0, 1e6):
+        with pytest.raises(InputError, match=r"process\.accuracy\.gauge_mm2.*at most 112\.5"):
+            require_narrow_gauge(chamber, setting(gauge_mm2=given))
+
+
+def test_of_wide_windows_a_few_tell_all() -> None:
+    """The default of 20,000 would make pairs with all dents of the target, without bound."""
+    field = field_of(plane_chamber(), gauge_mm2=50.0)
+    assert len(field.gauge.area) == 4000
+    assert len(field.wide.area) == 1000
+    assert len(field_of(plane_chamber(), gauge_mm2=5.0).gauge.area) == 20_000
+
+
 def hollow_corner(turn: float) -> tuple[trimesh.Trimesh, np.ndarray]:
     """A block with a long valley between two flat sides, and which triangles are its sides."""
     slope, half, deep = np.radians(0.5 * turn), 8e-3, 4e-3
@@ -97,7 +114,7 @@ def test_beside_a_hollow_corner_two_strips_are_out_of_reach(turn: float) -> None
     place = field.touched.place
     assert np.hypot(place[:, 0], place[:, 2]).min() >= dead - 1.1 * overlap
     # Smooth valleys are one face, sharp ones two.
-    assert len(set(field.touched.face)) == (1 if turn < 60.0 else 2)
+    assert len(set(field.drawn_face[valley])) == (1 if turn < 60.0 else 2)
 
 
 def test_windows_beside_what_is_out_of_reach_are_no_larger_than_what_they_hold() -> None:
@@ -137,7 +154,7 @@ def test_a_box_has_bands_along_its_edges_however_it_is_divided(splits: int) -> N
     rows = len(np.unique(band.point)) / len(field.gauge.area) * mesh.area
     assert rows == pytest.approx(strips, rel=0.06)
     assert band.height.max() < radius
-    assert len(set(field.pieces.places.face)) == 12
+    assert len(set(field.creases.line[0, field.pieces.edge])) == 12
     assert field.pieces.length.sum() == pytest.approx(0.12)
 
 

@@ -94,8 +94,10 @@ def test_pieces_divide_the_surface_and_know_what_a_ball_can_touch() -> None:
     box = trimesh.creation.box((20e-3,) * 3)
     mesh = TriangleMesh(box.vertices, box.faces, np.zeros(12, dtype=np.uint8))
     inward = box.triangles[:, ::-1]
+    normals = np.repeat(-box.face_normals[:, None], 3, axis=1)
+    corners = np.concatenate([inward, normals], axis=2)
     for radius in (1e-3, 4e-3):
-        pieces = surface_pieces(inward, np.arange(12), mesh, 2e-3, radius)
+        pieces = surface_pieces(corners, np.arange(12), mesh, 2e-3, radius)
         assert pieces.area.sum() == pytest.approx(box.area)
         share = (pieces.area * pieces.touched).sum() / box.area
         assert share == pytest.approx((16.04 / 20.0) ** 2, abs=0.01)

@@ -590,10 +590,10 @@ TABLES: dict[str, dict[str, Any]] = {
 
 
 def design_with(folder: Path, shape: str, mesh: trimesh.Trimesh, **keys: Any) -> Design:
-    """The gear's set-up with another shape and part (numbers in mm)."""
+    """The gear's set-up with another shape and part, facets and all (numbers in mm)."""
     mesh.export(folder / "part.stl")
     data = load_design(DESIGNS / "gear.toml").model_dump()
-    data["part"] = {"mesh": str(folder / "part.stl"), "unit": "mm"}
+    data["part"] = {"mesh": str(folder / "part.stl"), "unit": "mm", "smoothing": "off"}
     data["chamber"] = {"shape": shape, "sonotrode_distance_mm": 15.0, **TABLES[shape], **keys}
     return Design.model_validate(data)
 

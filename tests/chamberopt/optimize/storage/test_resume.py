@@ -316,7 +316,7 @@ class TestDamage:
     def test_of_the_whole_history(self, folder: Path) -> None:
         (folder / "history.jsonl").unlink()
         (folder / "history.jsonl").mkdir()
-        with pytest.raises(InputError, match=r"history\.jsonl: cannot be read"):
+        with pytest.raises(InputError, match=r"history\.jsonl: is a folder"):
             run(study(evaluations=6), folder)
 
     def test_of_what_was_asked(self, folder: Path) -> None:

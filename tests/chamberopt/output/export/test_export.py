@@ -376,7 +376,7 @@ def test_where_nothing_may_be_written(
     def denied(*_: object, **__: object) -> None:
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr("chamberopt.common.files.tempfile.TemporaryFile", denied)
+    monkeypatch.setattr("chamberopt.common.files.claimed.tempfile.TemporaryFile", denied)
     for out in ("new", "c.stl"):
         status, _, err = chamberopt("export", simulated, "--to", "chamber-stl", "--out", out)
         assert (status, f"{out}: cannot be written: Permission denied" in err) == (2, True)

@@ -80,7 +80,15 @@ def read_step(path: Path, content: bytes, how: Tessellation | None = None) -> Ra
             key=lambda label: (label.startswith("#"), label),  # colours last
         )
     }
-    return RawMesh(arrays["corners"] / mm, groups, unit, tuple(notes), bodies=body[face_of])
+    return RawMesh(
+        arrays["corners"] / mm,
+        groups,
+        unit,
+        tuple(notes),
+        bodies=body[face_of],
+        normals=arrays["normals"],
+        is_exact=True,
+    )
 
 
 def _face_names(solids: list[list[StepFace]], middles: np.ndarray) -> tuple[str, ...] | None:

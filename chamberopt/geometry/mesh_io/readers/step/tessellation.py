@@ -13,10 +13,12 @@ wanted. Faces with four sides get grids, with cells longer where the face is str
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from chamberopt.common.npz_files import save_arrays
 from chamberopt.geometry.mesh_io.native_reader import allow_more
 from chamberopt.geometry.mesh_io.readers.step.grids import lay_grids
 
@@ -38,7 +40,7 @@ class Tessellation(NamedTuple):
     """
 
     chord: float = 2e-5  # distance that triangles keep from the surface [m]
-    angle: float = math.radians(8.0)  # between neighbours [rad]
+    angle: float = math.radians(6.0)  # between neighbours [rad]
     side: float = 0.0  # longest side [m]; 0: a fortieth of the part's diagonal
 
     def side_at(self, radius: float) -> float:
@@ -51,7 +53,8 @@ class Tessellation(NamedTuple):
 def tessellate(source: str, target: str, chord: str, angle: str, side: str) -> None:
     """Write the triangles of a STEP file as numpy arrays; lengths in mm, angle in rad.
 
-    They are: corners (m, 3, 3) and face_of (m,); how many faces of no solid are left out; of each
+    They are: corners (m, 3, 3), the normals of the faces there, up to their sign and 0 where a face
+    has none, and face_of (m,); how many faces of no solid are left out; of each
     face its body (-1: none), its colour (r, g, b, and 0 if it has none) and the mean of its corners
     (nan if it has none); of each body its name. Or only `fault`: what is wrong, as a sentence.
     """
@@ -67,7 +70,7 @@ def tessellate(source: str, target: str, chord: str, angle: str, side: str) -> N
             raise
         why = str(error).replace(f" file '{source}'", " it")[:160]
         arrays = {"fault": np.array(f"cannot be meshed ({why}); {REMEDY}")}
-    np.savez(target, allow_pickle=False, **arrays)
+    save_arrays(Path(target), **arrays)
 
 
 def _mesh(gmsh: Any, source: str, how: Tessellation) -> dict[str, np.ndarray]:
@@ -109,6 +112,10 @@ def _mesh(gmsh: Any, source: str, how: Tessellation) -> dict[str, np.ndarray]:
     rows = np.searchsorted(numbers[order], np.concatenate([*nodes, np.zeros(0, dtype=np.uint64)]))
     return {
         "corners": points[rows.reshape(-1, 3)],
+        "normals": np.concatenate(
+            [_normals(model, tag, own) for tag, own in zip(faces, nodes, strict=True)]
+            or [np.zeros((0, 3, 3))]
+        ),
         "face_of": np.repeat(np.arange(len(faces)), [len(n) // 3 for n in nodes]),
         "left_out": np.array(len(drawn) - len(faces)),
         "body": np.array([body_of.get(tag, -1) for tag in faces], dtype=int),
@@ -116,6 +123,15 @@ def _mesh(gmsh: Any, source: str, how: Tessellation) -> dict[str, np.ndarray]:
         "middle": np.array([_middle(model, tag) for tag in faces]).reshape(-1, 3),
         "name": np.array([model.getEntityName(3, tag) for tag in bodies], dtype=str),
     }
+
+
+def _normals(model: Any, face: int, nodes: np.ndarray) -> np.ndarray:
+    """Normals of a face at the nodes (3 m,) of its triangles, up to their sign, (m, 3, 3)."""
+    tags, _, places = model.mesh.getNodes(2, face, True, True)
+    first = np.unique(tags, return_index=True)[1]  # a node on a seam comes twice
+    normals = np.reshape(model.getNormal(face, places), (-1, 3))[first]
+    normals[~np.isfinite(normals).all(axis=1)] = 0.0
+    return np.asarray(normals[np.searchsorted(tags[first], nodes)].reshape(-1, 3, 3))
 
 
 class _TriangleCount:

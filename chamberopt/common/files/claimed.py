@@ -1,0 +1,237 @@
+"""Outputs have one writer each, and overwrite nothing."""
+
+from __future__ import annotations
+
+import errno
+import os
+import platform
+import shutil
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from datetime import datetime
+from pathlib import Path
+
+from chamberopt.common.errors import InputError, OutputTakenError
+from chamberopt.common.files.opened import OpenFolder, require_plain_content, require_plain_folder
+from chamberopt.common.files.written import LOCK, is_leftover, remove_leftovers
+
+if sys.platform == "win32":
+    import msvcrt
+
+    HELD = (errno.EACCES, errno.EDEADLK)  # how a lock tells that another process has it
+else:
+    import fcntl
+
+    HELD = (errno.EWOULDBLOCK,)
+
+ANOTHER_FOLDER = "choose another folder (out, or --out)"
+# Bytes that must be free where a command begins to write: a result of a usual part takes a few MB,
+# and on a disk that is nearly full other programs fail too.
+LEAST_FREE = 20_000_000
+LOCKED_BYTE = 1 << 30  # after the holder's name: Windows lets nobody read what is locked
+
+
+def is_new_or_empty(folder: Path) -> bool:
+    """Whether results can be written to a folder: it does not exist, or holds nothing."""
+    if not os.path.lexists(folder):
+        return True
+    return not folder.is_symlink() and folder.is_dir() and all(map(is_leftover, folder.iterdir()))
+
+
+def make_output_folder(path: str | Path) -> Path:
+    """Make a folder for results; InputError if it holds files or cannot be written."""
+    folder = Path(path)
+    if os.path.lexists(folder) and not os.path.isdir(folder):
+        what = "is a file" if os.path.exists(folder) else "is a link that leads nowhere"
+        text = f"{what}; results need a folder"
+        raise OutputTakenError(f"{folder}: {text}: {ANOTHER_FOLDER}")
+    with _writing_in(folder, ANOTHER_FOLDER):
+        folder.mkdir(parents=True, exist_ok=True)
+        require_plain_folder(folder, "give the folder that it leads to")
+        if not is_new_or_empty(folder):
+            text = "already holds files, and results are never overwritten"
+            raise OutputTakenError(f"{folder}: {text}: {ANOTHER_FOLDER} or remove this one")
+        _require_writable(folder)
+    return folder
+
+
+@contextmanager
+def claim_folder(
+    path: str | Path, is_own: Callable[[Path], bool] = lambda folder: False
+) -> Iterator[Path]:
+    """Make a folder for results and hold it against other processes during a `with` block.
+
+    Folders that are made here and are empty at the end are removed.
+
+    Args:
+        is_own: whether a folder that holds files may be used all the same.
+
+    Raises:
+        OutputTakenError: the folder is a file, holds other files, or another process has it.
+        InputError: it cannot be written; or it is a link, or holds one.
+    """
+    folder = Path(path)
+    made = [one for one in (folder, *folder.parents) if not os.path.lexists(one)]
+    try:
+        if not os.path.isdir(folder):
+            make_output_folder(folder)
+        require_plain_folder(folder, "give the folder that it leads to")
+        with _only_writer(folder / LOCK, folder, ANOTHER_FOLDER):
+            if is_own(folder):
+                require_plain_content(folder)
+            else:
+                make_output_folder(folder)
+                remove_leftovers(folder)
+            yield folder
+    finally:
+        for one in made:
+            with suppress(OSError):
+                one.rmdir()
+
+
+@contextmanager
+def claim_file(path: Path, wait: float = 0.0) -> Iterator[Path]:
+    """Hold a file that is to be written against other processes; errors as claim_folder.
+
+    Args:
+        wait: for another writer, at most so long [s].
+    """
+    with _only_writer(path.with_name(f"{LOCK}-{path.name}"), path, "choose another name", wait):
+        yield path
+
+
+@contextmanager
+def _only_writer(lock_file: Path, output: Path, remedy: str, wait: float = 0.0) -> Iterator[None]:
+    """Hold the lock of an output for which there is room.
+
+    The lock belongs to the operating system and ends with its process, however that ends. A forked
+    child would share it until both have ended; workers are spawned. The file holds the name of its
+    process.
+    """
+    name, until = lock_file.name, time.monotonic() + wait
+    with _writing_in(output, remedy):
+        _require_space(lock_file.parent)
+        folder = OpenFolder(lock_file.parent)
+    with folder:
+        with _writing_in(output, remedy):
+            while (lock := _locked(folder, name)) is None:
+                if time.monotonic() >= until:
+                    text = f"is being written by {_holder(folder, name)}; wait until it ends"
+                    raise OutputTakenError(f"{output}: {text}, or {remedy}")
+                time.sleep(0.01)
+        try:
+            since = datetime.now().astimezone().isoformat(sep=" ", timespec="seconds")
+            with suppress(OSError):  # a full disk is reported by the files that matter
+                os.ftruncate(lock, 0)
+                os.write(lock, f"process {os.getpid()} on {platform.node()} since {since}".encode())
+            yield
+        finally:
+            # Before the release: who opened the file that is removed here does not get its lock.
+            with suppress(OSError):
+                folder.remove(name)
+            os.close(lock)
+            if os.name == "nt":  # which removes no open file
+                with suppress(OSError):
+                    folder.remove(name)
+
+
+def _locked(folder: OpenFolder, name: str) -> int | None:
+    """The descriptor of a file that is locked now; None if another process has it.
+
+    InputError for a file with a second name, which may lie anywhere: its content would be lost.
+    """
+    while True:
+        file = folder.open(name, os.O_RDWR | os.O_CREAT)
+        keep = False
+        try:
+            if os.fstat(file).st_nlink > 1:
+                where = folder.path / name
+                raise InputError(f"{where}: has a second name elsewhere; remove this one")
+            _lock(file)
+            there = folder.status(name)  # who had it may have removed it since it was opened here
+            keep = there is not None and os.path.samestat(there, os.fstat(file))
+            if keep:
+                return file
+        except OSError as error:
+            if error.errno in HELD:
+                return None
+            if os.fstat(file).st_size == 0:  # made here: a holder writes its name
+                folder.remove(name)
+            raise
+        finally:
+            if not keep:
+                os.close(file)
+
+
+def _lock(file: int) -> None:
+    """Lock a file for this process alone; an OSError of HELD if another has it."""
+    if sys.platform == "win32":
+        os.lseek(file, LOCKED_BYTE, os.SEEK_SET)
+        try:
+            msvcrt.locking(file, msvcrt.LK_NBLCK, 1)
+        finally:
+            os.lseek(file, 0, os.SEEK_SET)
+    else:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+
+
+def _holder(folder: OpenFolder, name: str) -> str:
+    """Who writes, by its own words."""
+    with suppress(OSError, InputError):
+        file = folder.open(name, os.O_RDONLY)
+        try:
+            return os.read(file, 500).decode(errors="replace") or "another process"
+        finally:
+            os.close(file)
+    return "another process"
+
+
+@contextmanager
+def _writing_in(place: Path | str, remedy: str) -> Iterator[None]:
+    """Turn an error of the operating system into an InputError."""
+    try:
+        yield
+    except OSError as error:
+        text = f"cannot be written: {error.strerror or error}; {remedy}"
+        raise InputError(f"{place}: {text}") from None
+
+
+def check_new_file(path: Path) -> Path:
+    """Return the path of a new file; InputError if it exists or cannot be written."""
+    if os.path.lexists(path):
+        text = "already exists, and nothing is ever overwritten: choose another name or remove it"
+        raise InputError(f"{path}: {text}")
+    require_place(path)
+    return path
+
+
+def require_place(path: Path, option: str = "") -> None:
+    """Raise InputError, which begins with the option, unless a file can be written there."""
+    folder = path.parent
+    if not folder.is_dir():
+        text = f"the folder {path.parent} does not exist; make it first"
+        raise InputError(f"{option}{path}: {text}")
+    if path.is_symlink():
+        text = "is a link, which is not followed here; give another name"
+        raise InputError(f"{option}{path}: {text}")
+    if path.is_dir():
+        raise InputError(f"{option}{path}: is a folder; give another name")
+    with _writing_in(f"{option}{path}", "choose another place"):
+        _require_writable(folder)
+
+
+def _require_writable(folder: Path) -> None:
+    """Raise OSError now rather than after an hour's work."""
+    with tempfile.TemporaryFile(dir=folder):
+        pass
+
+
+def _require_space(folder: Path) -> None:
+    """Raise OSError where results will hardly find room."""
+    disk = shutil.disk_usage(folder)
+    if disk.free < LEAST_FREE and disk.total:  # some file systems do not tell: all is 0
+        text = f"only {1e-6 * disk.free:.1f} MB of this disk are free"
+        raise OSError(errno.ENOSPC, f"{text}, at least {1e-6 * LEAST_FREE:g} are needed")

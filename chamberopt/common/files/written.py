@@ -1,0 +1,201 @@
+"""Write files whole or not at all, and make and remove files and folders."""
+
+from __future__ import annotations
+
+import csv
+import io
+import os
+import secrets
+import shutil
+import stat
+import tempfile
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, contextmanager, suppress
+from pathlib import Path
+from typing import Any, BinaryIO
+
+from chamberopt.common.errors import InputError, spreadsheet_cell
+from chamberopt.common.files.opened import OpenFolder, require_plain, require_plain_folder
+
+LOCK, WRITING = ".lock", ".writing-"
+LEFTOVER_PREFIXES = (LOCK, WRITING)  # of files that a command that was killed may leave
+
+
+@contextmanager
+def new_file(path: Path, look: Callable[[Path], None] | None = None) -> Iterator[BinaryIO]:
+    """Open a temporary file beside `path`, which replaces it when the block ends without an error.
+
+    The file is on the disk before it gets its name, so that neither a crash nor a power cut leaves
+    half a file, and has the permissions of the one that it replaces. Its own name, for libraries
+    that need one, is in `name`: nobody can foresee it, and it has the suffix of `path`.
+
+    Args:
+        look: called with a file that holds what is replaced; with an error, that stays in place.
+    Raises:
+        OSError: it cannot be written.
+        InputError: at `path` is a link, a folder or another thing that is no plain file.
+    """
+    temporary = f"{WRITING}{secrets.token_hex(8)}{path.suffix}"
+    try:
+        with OpenFolder(path.parent) as folder:
+            before = folder.status(path.name)
+            if before is not None:
+                require_plain(path, before)
+            opened = folder.open(temporary, os.O_RDWR | os.O_CREAT | os.O_EXCL)
+            try:
+                with open(str(path.with_name(temporary)), "w+b", opener=lambda *_: opened) as file:
+                    yield file
+                    file.flush()
+                    if before is not None and hasattr(os, "fchmod"):
+                        os.fchmod(opened, stat.S_IMODE(before.st_mode))
+                    os.fsync(opened)
+                    written = folder.status(temporary)
+                    if written is None or not os.path.samestat(written, os.fstat(opened)):
+                        raise OSError(f"{temporary} was replaced while it was written")
+                _put_in_place(folder, temporary, path, look)
+            except BaseException:
+                with suppress(OSError):
+                    folder.remove(temporary)
+                raise
+            folder.sync()
+    except OSError as error:
+        raise OSError(error.errno, error.strerror or str(error), str(path)) from error
+
+
+def _put_in_place(
+    folder: OpenFolder, temporary: str, path: Path, look: Callable[[Path], None] | None
+) -> None:
+    """Give a file its name, with a look at what it replaces."""
+    if look is None or not folder.swap(temporary, path.name):
+        if look is not None:
+            look(path)
+        folder.rename(temporary, path.name)
+        return
+    try:
+        look(path.with_name(temporary))
+    except BaseException:
+        folder.swap(temporary, path.name)
+        raise
+    folder.remove(temporary)
+
+
+def write_bytes(
+    path: Path, content: bytes | memoryview, look: Callable[[Path], None] | None = None
+) -> None:
+    """Write a file, whole or not at all; `look` as in new_file."""
+    with new_file(path, look) as file:
+        file.write(content)
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a UTF-8 text file, whole or not at all."""
+    write_bytes(path, text.encode())
+
+
+def write_new_texts(texts: Mapping[Path, str]) -> None:
+    """Write text files that belong together and are not there yet, all or none."""
+    written = []
+    try:
+        for path, text in texts.items():
+            write_text(path, text)
+            written.append(path)
+    except BaseException:
+        with suppress(OSError):
+            for path in written:
+                remove_file(path)
+        raise
+
+
+def append_bytes(path: Path, content: bytes, survives_power_cut: bool = True) -> None:
+    """Add to the end of a file, all or nothing, and make it if it is not there.
+
+    Raises:
+        OSError: it cannot be written.
+        InputError: it is no plain file, or has a second name (a hard link), which may lie anywhere.
+    """
+    with OpenFolder(path.parent) as folder:
+        is_new = folder.status(path.name) is None
+        try:
+            file = folder.open(path.name, os.O_WRONLY | os.O_APPEND | os.O_CREAT)
+            try:
+                status = os.fstat(file)
+                if status.st_nlink != 1:
+                    text = "has a second name elsewhere; put a copy in its place"
+                    raise InputError(f"{path}: {text}")
+                try:
+                    rest = memoryview(content)
+                    while rest:
+                        rest = rest[os.write(file, rest) :]
+                    if survives_power_cut:
+                        os.fsync(file)
+                except OSError:
+                    with suppress(OSError):
+                        os.ftruncate(file, status.st_size)
+                        if is_new:
+                            folder.remove(path.name)
+                    raise
+            finally:
+                os.close(file)
+        except OSError as error:
+            raise OSError(error.errno, error.strerror, str(path)) from error
+        if is_new and survives_power_cut:
+            folder.sync()
+
+
+def remove_file(path: Path) -> None:
+    """Remove a file, if it is there; of a link not what it leads to."""
+    with OpenFolder(path.parent) as folder:
+        folder.remove(path.name)
+
+
+def make_folder(path: Path) -> Path:
+    """Make a folder inside one of the program, if it is not there; InputError for a link."""
+    with OpenFolder(path.parent) as parent, suppress(FileExistsError):
+        parent.make(path.name)
+    return require_plain_folder(path)
+
+
+@contextmanager
+def whole_or_nothing(folder: Path) -> Iterator[None]:
+    """Empty a folder, which was new or empty before, where the `with` block fails."""
+    try:
+        yield
+    except BaseException:
+        _empty(folder, lambda name: not name.startswith(LOCK))
+        raise
+
+
+def remove_leftovers(folder: Path) -> None:
+    """Remove the temporary files of commands that were killed, from a folder that is held."""
+    _empty(folder, lambda name: name.startswith(WRITING))
+
+
+def _empty(folder: Path, which: Callable[[str], bool]) -> None:
+    """Remove what is in a folder, as far as that can be removed."""
+    with suppress(OSError), os.scandir(folder) as there:
+        for one in [one for one in there if which(one.name)]:
+            with suppress(OSError):
+                if one.is_dir(follow_symlinks=False):
+                    shutil.rmtree(one.path, ignore_errors=True)
+                else:
+                    remove_file(Path(one.path))
+
+
+def is_leftover(path: Path) -> bool:
+    """Whether a command that was killed may have left this; it leaves only plain files."""
+    return path.name.startswith(LEFTOVER_PREFIXES) and stat.S_ISREG(path.lstat().st_mode)
+
+
+def private_folder() -> AbstractContextManager[str]:
+    """Make a temporary folder that only this user can enter, for libraries that need a path."""
+    return tempfile.TemporaryDirectory(prefix="chamberopt-")
+
+
+def csv_text(rows: Sequence[Mapping[str, Any]]) -> str:
+    """A table with a header and the columns of all rows together; what a row lacks stays empty."""
+    text = io.StringIO()
+    columns = dict.fromkeys(name for row in rows for name in row)
+    table = csv.DictWriter(text, list(columns), lineterminator="\n")
+    table.writerow({name: spreadsheet_cell(name) for name in columns})
+    table.writerows({key: spreadsheet_cell(value) for key, value in row.items()} for row in rows)
+    return text.getvalue()

@@ -1,0 +1,316 @@
+r"""Normals of the smooth surface of which a mesh has the facets.
+
+Notation
+    t      turn of an edge [rad], convex positive                            Edges.turn, (e,)
+    l, h   length of an edge, and the lower height of its triangles [m]
+    phi    angle from a facet's normal to the surface's, in the middle of each side of the facet
+           [rad], positive where the surface falls away from it              phi, (m, 3)
+    A      area of a facet [m²]
+    m      unit vector in a facet's plane, out of it across a side           across, (m, 3, 3)
+    S      shape operator of a facet: sum over its sides of l phi / A m mᵀ   [1/m]
+
+The surface is the one of piecewise constant curvature that turns at edges as the facets do: phi
+minimises the sum over the smooth edges of
+
+    l (FIT |t - phi_1 - phi_2| + ‖(l dS_ee, sqrt(l² + h²) dS_em, h dS_mm)‖) + l CREASE |phi|,
+
+dS the difference of the shape operators in the frame of the edge and the direction across it; the
+last term stands for sides at creases. Sums of absolute values let curvature jump at few edges, so
+planes, cylinders and spheres come out exactly, with the plane's own normal where one ends.
+
+Source: E. Grinspun, Y. Gingold, J. Reisman, D. Zorin, "Computing discrete shape operators on
+general meshes", Computer Graphics Forum 25 (2006) 547.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from chamberopt.geometry.triangles import area_vectors, connected_pieces, sides_of, unit_vectors
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
+
+    from chamberopt.geometry.smoothing.rounds import Edges
+
+FIT, CREASE = 2.5, 0.1
+# Of the reweighted least squares: the most steps, [rad] below which a residual counts by its
+# square, and [rad] of the last step.
+STEPS, FLOOR, LAST = 25, 0.01, 1e-3
+FLAT = np.radians(0.5)  # phi below which a facet is a piece of a plane
+PLANE = 1e-4  # rad: facets that turn by less are in one plane, but for the rounding of a file
+# Angle defects by which a vertex is the apex of a cone: at once, or if it is so many times larger
+# than those around it.
+APEX, SMALL_APEX, OF_AROUND = 0.5, np.radians(3.0), 4.0
+
+
+class Facets(NamedTuple):
+    """Measures of the triangles of a surface.
+
+    Attributes:
+        normal: unit vectors outward, shape (m, 3).
+        area: [m²], shape (m,).
+        across: unit vectors in the plane, out of the triangle across each side, shape (m, 3, 3).
+        length: of each side [m], shape (m, 3).
+    """
+
+    normal: np.ndarray
+    area: np.ndarray
+    across: np.ndarray
+    length: np.ndarray
+
+    @property
+    def height(self) -> np.ndarray:
+        """Height [m] over each side, shape (m, 3)."""
+        return np.asarray(2.0 * self.area[:, None] / np.maximum(self.length, 1e-30))
+
+
+def measure_facets(vertices: np.ndarray, triangles: np.ndarray) -> Facets:
+    """Measures of the triangles (m, 3) over vertices (n, 3) [m]."""
+    vector = area_vectors(vertices, triangles)
+    normal = unit_vectors(vector)
+    start, end = sides_of(triangles).T
+    along = (vertices[end] - vertices[start]).reshape(-1, 3, 3)
+    length = np.linalg.norm(along, axis=2)
+    across = np.cross(along / np.maximum(length, 1e-30)[..., None], normal[:, None])
+    area = np.maximum(np.linalg.norm(vector, axis=1), 1e-30)
+    return Facets(normal, area, across, length)
+
+
+def fit_phi(
+    facets: Facets, edges: Edges, is_crease: np.ndarray, fitted: np.ndarray, apexes: np.ndarray
+) -> np.ndarray:
+    """The angles phi (m, 3) [rad]; 0 off the fitted triangles.
+
+    Args:
+        is_crease: marks edges, shape (e,).
+        fitted: marks the triangles that have unknown phi, shape (m,).
+        apexes: marks edges that end at the apex of a cone, shape (e,).
+    """
+    phi = np.zeros(3 * len(fitted))
+    unknown = np.full(3 * len(fitted), -1)
+    unknown[np.repeat(fitted, 3)] = np.arange(3 * fitted.sum())
+    smooth = np.flatnonzero(~is_crease & fitted[edges.triangles].any(axis=1))
+    on_crease = edges.sides[is_crease].ravel()
+    on_crease = on_crease[unknown[on_crease] >= 0]
+    if not fitted.any():
+        return phi.reshape(-1, 3)
+    length = edges.length[smooth]
+    sums = _rows(unknown, edges.sides[smooth], np.ones((len(smooth), 2)))
+    bends = _bend_differences(facets, edges, smooth, unknown, apexes)
+    creases = _rows(unknown, on_crease[:, None], np.ones((len(on_crease), 1)))
+    x = _solve(
+        [sums, *bends, creases],
+        [edges.turn[smooth], *[np.zeros(len(smooth))] * 3, np.zeros(len(on_crease))],
+        [FIT * length, length, CREASE * facets.length.ravel()[on_crease]],
+    )
+    phi[unknown >= 0] = x
+    return phi.reshape(-1, 3)
+
+
+def _rows(unknown: np.ndarray, sides: np.ndarray, factor: np.ndarray) -> csr_array:
+    """A sparse matrix with a row for each row of sides (r, c), with factors (r, c)."""
+    from scipy.sparse import csr_array
+
+    row = np.repeat(np.arange(len(sides)), sides.shape[1])
+    column, values = unknown[sides.ravel()], factor.ravel()
+    kept = column >= 0
+    return csr_array(
+        (values[kept], (row[kept], column[kept])), shape=(len(sides), int(unknown.max()) + 1)
+    )
+
+
+def _bend_differences(
+    facets: Facets, edges: Edges, smooth: np.ndarray, unknown: np.ndarray, apexes: np.ndarray
+) -> list[csr_array]:
+    """Matrices of l dS_ee, sqrt(l² + h²) dS_em, h dS_mm at the smooth edges."""
+    sides, length = edges.sides[smooth], edges.length[smooth]
+    height = facets.height.ravel()[sides].min(axis=1)
+    keeps = ~apexes[smooth]
+    scales = (length * keeps, np.hypot(length, height) * keeps, height)
+    parts: list[list[np.ndarray]] = [[], [], []]
+    for which, sign in ((0, 1.0), (1, -1.0)):
+        triangle, k = np.divmod(sides[:, which], 3)
+        m = facets.across[triangle]  # of the three sides, (s, 3, 3)
+        own = m[np.arange(len(k)), k]
+        along = np.cross(facets.normal[triangle], own)  # the side's own direction
+        of_m = np.einsum("sij,sj->si", m, own)
+        of_e = np.einsum("sij,sj->si", m, along)
+        weight = sign * facets.length[triangle] / facets.area[triangle][:, None]
+        # Both along and across are reversed on the second side, so products keep their sign.
+        for part, product in zip(parts, (of_e * of_e, of_e * of_m, of_m * of_m), strict=True):
+            part.append(weight * product)
+    of_sides = np.concatenate([3 * (sides[:, [w]] // 3) + np.arange(3) for w in (0, 1)], axis=1)
+    return [
+        _rows(unknown, of_sides, scale[:, None] * np.concatenate(part, axis=1))
+        for part, scale in zip(parts, scales, strict=True)
+    ]
+
+
+def _solve(
+    matrices: list[csr_array], right: list[np.ndarray], weights: list[np.ndarray]
+) -> np.ndarray:
+    """Minimise sums of weighted absolute values: of turns, of bends (three rows each), of creases.
+
+    By least squares whose weights are divided by the residuals of the step before.
+    """
+    from scipy.sparse import csc_array, diags_array, vstack
+    from scipy.sparse.linalg import splu
+
+    matrix, target = vstack(matrices).tocsr(), np.concatenate(right)
+    turns, bends = len(weights[0]), len(weights[1])
+    size = np.full(turns + bends + len(weights[2]), 1.0)
+    x = np.zeros(matrix.shape[1])
+    transposed = matrix.T.tocsr()
+    for _ in range(STEPS):
+        scale = np.concatenate(weights) / size
+        rows = np.concatenate([scale[:turns], *[scale[turns : turns + bends]] * 3,
+                               scale[turns + bends :]])  # fmt: skip
+        weighted = diags_array(rows) @ matrix
+        normal = csc_array(transposed @ weighted)
+        normal.setdiag(normal.diagonal() * (1.0 + 1e-12) + 1e-30)
+        solver = splu(normal, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0,
+                      options={"SymmetricMode": True})  # fmt: skip
+        before, x = x, solver.solve(transposed @ (rows * target))
+        if np.abs(x - before).max() < LAST:
+            break
+        residual = np.abs(matrix @ x - target)
+        of_bends = np.sqrt((residual[turns : turns + 3 * bends].reshape(3, -1) ** 2).sum(axis=0))
+        size = np.maximum(
+            np.concatenate([residual[:turns], of_bends, residual[turns + 3 * bends :]]), FLOOR
+        )
+    return np.asarray(x)
+
+
+def phi_of_normals(facets: Facets, normals: np.ndarray) -> np.ndarray:
+    """The angles phi (m, 3) [rad] of normals (m, 3, 3) that are known at the corners."""
+    middle = normals + np.roll(normals, -1, axis=1)
+    sine = np.einsum("mki,mki->mk", middle, facets.across)
+    return np.asarray(np.arctan2(sine, np.einsum("mki,mi->mk", middle, facets.normal)))
+
+
+def hollow_curvature(facets: Facets, phi: np.ndarray) -> np.ndarray:
+    """Largest hollow curvature of each facet [1/m], 0 where none is hollow, shape (m,)."""
+    weight = facets.length * phi / facets.area[:, None]
+    shape = np.einsum("mk,mki,mkj->mij", weight, facets.across, facets.across)
+    return np.asarray(np.maximum(-np.linalg.eigvalsh(shape)[:, 0], 0.0))
+
+
+def corner_normals(
+    facets: Facets,
+    vertices: np.ndarray,
+    triangles: np.ndarray,
+    edges: Edges,
+    is_crease: np.ndarray,
+    phi: np.ndarray,
+    apex: np.ndarray,
+) -> np.ndarray:
+    """Unit normals of the surface at the corners of the triangles, shape (m, 3, 3).
+
+    Args:
+        phi: see above, shape (m, 3).
+        apex: marks vertices, shape (n,): there each facet keeps a normal of its own.
+    """
+    lean = np.tan(phi)[..., None] * facets.across  # at the middles of the sides
+    # Linear over the facet: at a corner the sum of its two sides less the side opposite.
+    own = facets.normal[:, None] + lean + np.roll(lean, 1, axis=1) - np.roll(lean, 2, axis=1)
+    own = unit_vectors(own.reshape(-1, 3))
+    fan = fans(triangles, edges, ~is_crease)
+    count = int(fan.max()) + 1
+    opening = _opening(facets).ravel()
+
+    def mean_of(chosen: np.ndarray, values: np.ndarray) -> np.ndarray:
+        """Sums (count, 3) over the chosen corners of each fan."""
+        weight = np.where(chosen, opening, 0.0)
+        return np.column_stack([np.bincount(fan, weight * one, count) for one in values.T])
+
+    every = np.ones(len(own), dtype=bool)
+    mean = unit_vectors(mean_of(every, own))
+    flat = np.repeat((np.abs(phi) < FLAT).all(axis=1), 3)
+    planes = mean_of(flat, np.repeat(facets.normal, 3, axis=0))
+    plane = unit_vectors(planes)
+    # Planes of one normal are as long as their weights together.
+    total = np.bincount(fan, np.where(flat, opening, 0.0), count)
+    is_one = (total > 0.0) & (np.linalg.norm(planes, axis=1) > np.cos(FLAT) * total)
+    mean[is_one] = plane[is_one]
+    mean = _even_along_lines(mean, vertices, triangles, edges, fan, ~is_crease)
+    result = mean[fan]
+    at_apex = apex[triangles].ravel()
+    result[at_apex] = own[at_apex]
+    return result.reshape(-1, 3, 3)
+
+
+def _even_along_lines(
+    normals: np.ndarray,
+    vertices: np.ndarray,
+    triangles: np.ndarray,
+    edges: Edges,
+    fan: np.ndarray,
+    is_smooth: np.ndarray,
+) -> np.ndarray:
+    """Normals (f, 3) of fans, the same along each line in which two plane facets meet.
+
+    Two plane facets of several triangles each are of a developable surface, whose normal does not
+    change along such a line. New vertices then lie in planes too, which are few faces for a ball.
+    """
+    one, two = edges.triangles.T
+    facet = plane_facets(edges, len(triangles))
+    pair = np.sort(np.column_stack([facet[one], facet[two]]), axis=1)
+    meets = np.flatnonzero(is_smooth & (pair[:, 0] != pair[:, 1]))
+    _, line, edges_of = np.unique(pair[meets], axis=0, return_inverse=True, return_counts=True)
+    meets = meets[edges_of[line.reshape(-1)] > 1]
+    side = edges.sides[meets, 0]
+    following = 3 * (side // 3) + (side % 3 + 1) % 3
+    count, line = connected_pieces(fan[side], fan[following], len(normals))
+    start, end = vertices[triangles.ravel()[side]], vertices[triangles.ravel()[following]]
+    along = unit_vectors(end - start)
+    of_edge = line[fan[side]]
+    first = np.zeros(count, dtype=np.int64)
+    first[of_edge[::-1]] = np.arange(len(of_edge))[::-1]
+    turned = np.abs(np.einsum("ei,ei->e", along, along[first[of_edge]])) < np.cos(PLANE)
+    straight = np.bincount(of_edge, minlength=count) > 0
+    straight[of_edge[turned]] = False
+    sums = np.column_stack([np.bincount(line, column, count) for column in normals.T])
+    lines = np.flatnonzero(straight)
+    direction = along[first[lines]]
+    mean = np.zeros((count, 3))
+    across = sums[lines] - np.einsum("li,li->l", sums[lines], direction)[:, None] * direction
+    mean[lines] = unit_vectors(across)
+    return np.where(straight[line][:, None], mean[line], normals)
+
+
+def plane_facets(edges: Edges, count: int) -> np.ndarray:
+    """The plane facet of each of so many triangles, shape (m,)."""
+    one, two = edges.triangles[np.abs(edges.turn) < PLANE].T
+    return connected_pieces(one, two, count)[1]
+
+
+def fans(triangles: np.ndarray, edges: Edges, joins: np.ndarray) -> np.ndarray:
+    """The fan of each corner, shape (3 m,): corners of a vertex joined by edges (e,)."""
+    one, two = edges.sides[joins].T
+    # Side k begins at corner k; the side across the edge runs the other way.
+    next_of_one, next_of_two = (3 * (s // 3) + (s % 3 + 1) % 3 for s in (one, two))
+    return connected_pieces(np.r_[one, next_of_one], np.r_[next_of_two, two], 3 * len(triangles))[1]
+
+
+def find_apexes(
+    facets: Facets, triangles: np.ndarray, edges: Edges, is_crease: np.ndarray
+) -> np.ndarray:
+    """Marks (n,) the vertices without creases at which the surface comes to a point."""
+    count = int(triangles.max()) + 1
+    defect = 2.0 * np.pi - np.bincount(triangles.ravel(), _opening(facets).ravel(), count)
+    start, end = sides_of(triangles)[edges.sides[:, 0]].T
+    crease_ends = np.bincount(np.r_[start[is_crease], end[is_crease]], minlength=count)
+    size = np.where(crease_ends > 0, 0.0, np.abs(defect))
+    neighbours = np.maximum(np.bincount(np.r_[start, end], minlength=count), 1)
+    around = np.bincount(np.r_[start, end], np.r_[size[end], size[start]], count) / neighbours
+    return np.asarray((size > APEX) | (size > np.maximum(SMALL_APEX, OF_AROUND * around)))
+
+
+def _opening(facets: Facets) -> np.ndarray:
+    """Angle [rad] at each corner, shape (m, 3)."""
+    into = -facets.across  # of the sides k and k - 1, which meet at corner k
+    cosine = -np.einsum("mki,mki->mk", into, np.roll(into, 1, axis=1))
+    return np.arccos(np.clip(cosine, -1.0, 1.0))

@@ -1,0 +1,284 @@
+"""The part's mesh with the rounds of its target divided, and what is known of its facets.
+
+A ball meets the surface that was drawn, of which the file has facets. What is divided are the
+rounds of target and zones, and what is near enough for a ball that touches them to touch it too.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from chamberopt.common.errors import InputError
+from chamberopt.common.kept_records import kept, key_of
+from chamberopt.geometry.mesh_io.part_mesh import PartMesh
+from chamberopt.geometry.mesh_io.readers.raw_mesh import number_by_position
+from chamberopt.geometry.mesh_io.self_intersection import crossing_pairs
+from chamberopt.geometry.smoothing.normals import plane_facets
+from chamberopt.geometry.smoothing.rounds import find_edges, is_hard
+from chamberopt.geometry.smoothing.smooth import Surfaces, divide_rounds, find_surfaces, moves
+from chamberopt.geometry.solids import simplify_planes
+from chamberopt.geometry.triangles import areas, tetrahedron_volumes, unit_normals
+
+if TYPE_CHECKING:
+    from chamberopt.geometry.smoothing.divide import Surface
+
+NEAR = 2e-3  # m from the target: as far as usual balls reach
+DIVIDED = 1e-9  # m: what has moved by less has not moved
+MOST = 0.9  # of the area
+MOST_TRIANGLES = 1.5e6  # of a part: more take too long to fly among
+
+
+@dataclass(frozen=True)
+class SmoothingFacts:
+    """What smoothing has done to a part, and which facets are left.
+
+    Attributes:
+        largest_move: of the surface [m].
+        moved_share: of the target's area, where the surface was moved.
+        volume_change: of the part, relative.
+        given_triangles: number of the file's triangles.
+        blunt_creases: number of edges that turn by no more than facets of rounds may, and are
+            creases all the same.
+        facet_turn: largest turn between the file's facets on rounds of the target, but for a tenth
+            of the area [rad].
+        coarse_turn: the same of the facets that are left coarser than was asked for; 0: of none.
+        coarse_share: share of the target's area on facets that are left coarser.
+        noisy_share: the part of it on rounds left because they are noise.
+        crossing_share: the part of it on rounds left because they would cross others.
+    """
+
+    largest_move: float
+    moved_share: float
+    volume_change: float
+    given_triangles: int
+    blunt_creases: int
+    facet_turn: float
+    coarse_turn: float
+    coarse_share: float
+    noisy_share: float
+    crossing_share: float
+
+
+@dataclass(frozen=True)
+class SmoothPart:
+    """A part with divided rounds.
+
+    Attributes:
+        vertices: [m], shape (n, 3).
+        triangles: shape (k, 3).
+        origin: the file's triangle from which each comes, shape (k,).
+        normals: of the surface at the corners, unit vectors, shape (k, 3, 3).
+        hollow: largest hollow curvature [1/m], shape (k,).
+        facts: what was done.
+    """
+
+    vertices: np.ndarray
+    triangles: np.ndarray
+    origin: np.ndarray
+    normals: np.ndarray
+    hollow: np.ndarray
+    facts: SmoothingFacts
+
+    def of_part(self, mesh: PartMesh) -> PartMesh:
+        """The divided mesh of a part; triangles keep the numbers and groups of the file's."""
+        if len(self.origin) == len(mesh.triangles):
+            return mesh
+        return replace(
+            mesh,
+            vertices=self.vertices,
+            triangles=self.triangles,
+            numbering=mesh.numbering.select(self.origin),
+            groups={name: mask[self.origin] for name, mask in mesh.groups.items()},
+            normals=None,
+        )
+
+
+class Rule(NamedTuple):
+    """How some triangles of the file are smoothed.
+
+    Attributes:
+        triangles: marks them, shape (m,).
+        is_off: whether they stay as they are.
+        turn: largest angle between facets [rad].
+        narrow: width [m] below which facets are not divided.
+        tolerance: the farthest that the surface may move [m].
+    """
+
+    triangles: np.ndarray
+    is_off: bool
+    turn: float
+    narrow: float
+    tolerance: float
+
+
+def smooth(mesh: PartMesh, target: Rule, zones: list[Rule]) -> SmoothPart:
+    """Divide the rounds of a part, or take what an earlier command has made of it.
+
+    Args:
+        target: for the triangles to cover, and for what is near them and the zones.
+        zones: for surfaces that may lie on the target.
+    """
+    values = [one for rule in (target, *zones) for one in rule]
+    key = key_of([mesh.vertices, mesh.triangles, mesh.normals, mesh.is_exact, *values])
+    return kept(SmoothPart, [SmoothingFacts], key, lambda: _smooth(mesh, target, zones))
+
+
+def _smooth(mesh: PartMesh, target: Rule, zones: list[Rule]) -> SmoothPart:
+    """Divide the rounds of a part; arguments as for `smooth`."""
+    rules = [target, *zones]
+    if mesh.normals is None and _has_points_in_facets(mesh, rules):
+        plain, plain_rules = _without_points_in_planes(mesh, rules)
+        found = _divided(plain, plain_rules[0], plain_rules[1:])
+        if len(found.triangles) > len(plain.triangles):
+            return _on_file(found, plain, mesh)
+    return _divided(mesh, target, zones)
+
+
+def _has_points_in_facets(mesh: PartMesh, rules: list[Rule]) -> bool:
+    """Whether a facet of a round to be divided has vertices of the file inside.
+
+    They are on the facet, and not on the surface behind it.
+    """
+    edges = find_edges(mesh.vertices, mesh.triangles)
+    facet, size = plane_facets(edges, len(mesh.triangles)), np.abs(edges.turn)
+    limit = np.full(len(mesh.triangles), np.inf)
+    for rule in rules:
+        limit[rule.triangles] = math.inf if rule.is_off else rule.turn
+    bends = ~is_hard(edges) & (size > limit[edges.triangles].min(axis=1))
+    of_round = np.isin(facet, facet[edges.triangles[bends]])
+    # A vertex inside a facet has triangles of that facet alone around it.
+    low, high = np.full((2, len(mesh.vertices)), -1)
+    low[:] = len(mesh.triangles)
+    for corner in mesh.triangles.T:
+        np.minimum.at(low, corner, facet)
+        np.maximum.at(high, corner, facet)
+    inside = (low == high)[mesh.triangles].any(axis=1)
+    return bool((inside & of_round).any())
+
+
+def _without_points_in_planes(mesh: PartMesh, rules: list[Rule]) -> tuple[PartMesh, list[Rule]]:
+    """The part with as few triangles as its planes need, and its rules.
+
+    Borders of the rules' triangles stay where they are.
+    """
+    marks = np.stack([rule.triangles for rule in rules], axis=1)
+    kinds, label = np.unique(marks, axis=0, return_inverse=True)
+    vertices, triangles, label = simplify_planes(mesh.vertices, mesh.triangles, label.reshape(-1))
+    plain = replace(
+        mesh,
+        vertices=vertices,
+        triangles=triangles,
+        numbering=number_by_position(len(triangles)),
+        groups={},
+    )
+    return plain, [rule._replace(triangles=kinds[label, k]) for k, rule in enumerate(rules)]
+
+
+def _on_file(found: SmoothPart, plain: PartMesh, mesh: PartMesh) -> SmoothPart:
+    """A divided part whose origins are triangles of the file, not of its simplified mesh.
+
+    Each is the triangle that is closest to the middle of the new one, moved into its plane.
+    """
+    from sim_core import TriangleMesh, closest_points
+
+    corners = plain.vertices[plain.triangles[found.origin]]
+    normal, middle = unit_normals(corners), found.vertices[found.triangles].mean(axis=1)
+    height = np.einsum("ki,ki->k", middle - corners[:, 0], normal)
+    surface = TriangleMesh(mesh.vertices, mesh.triangles, np.zeros(len(mesh.triangles), np.uint8))
+    place = middle - height[:, None] * normal
+    origin = closest_points(surface, place, float(np.ptp(mesh.vertices))).triangle
+    facts = replace(found.facts, given_triangles=len(mesh.triangles))
+    return replace(found, origin=origin, facts=facts)
+
+
+def _divided(mesh: PartMesh, target: Rule, zones: list[Rule]) -> SmoothPart:
+    """Divide the rounds of a part whose vertices are all on its surface."""
+    vertices, triangles, on_target = mesh.vertices, mesh.triangles, target.triangles
+    near = _near(vertices, triangles, np.any([one.triangles for one in (target, *zones)], axis=0))
+    surfaces = find_surfaces(vertices, triangles, near, mesh.normals)
+    asked, turn, narrow, tolerance = (np.full(len(triangles), np.inf) for _ in range(4))
+    for rule in (target._replace(triangles=near), *zones):
+        own = rule.triangles
+        asked[own] = math.inf if rule.is_off else rule.turn
+        turn[own], narrow[own], tolerance[own] = rule.turn, rule.narrow, rule.tolerance
+    if mesh.is_exact:
+        asked[:] = np.inf  # the triangles are of the surface itself, as fine as was asked for
+    surfaces = surfaces._replace(rise=np.minimum(surfaces.rise, tolerance))
+    finer, crossing = _divide_apart(mesh, surfaces, asked, narrow)
+    moved = moves(vertices, triangles, finer)
+
+    area = areas(vertices, triangles)
+    of_target = np.where(on_target, area, 0.0) / area[on_target].sum()
+    coarse = on_target & (surfaces.turn > turn) & (not mesh.is_exact)
+    left = coarse & (np.isinf(asked) | surfaces.noisy | crossing)
+    before = tetrahedron_volumes(vertices, triangles).sum()
+    facts = SmoothingFacts(
+        largest_move=float(moved.max()),
+        moved_share=float(of_target[moved > DIVIDED].sum()),
+        volume_change=float(
+            tetrahedron_volumes(finer.vertices, finer.triangles).sum() / before - 1.0
+        ),
+        given_triangles=len(triangles),
+        blunt_creases=surfaces.blunt,
+        facet_turn=_usual_turn(surfaces.turn, area, on_target),
+        coarse_turn=_usual_turn(surfaces.turn, area, left),
+        coarse_share=float(of_target[left].sum()),
+        noisy_share=float(of_target[left & surfaces.noisy & np.isfinite(asked)].sum()),
+        crossing_share=float(of_target[left & crossing & np.isfinite(asked)].sum()),
+    )
+    return SmoothPart(
+        vertices=finer.vertices,
+        triangles=finer.triangles.astype(np.int32),
+        origin=finer.parent,
+        normals=finer.normals.astype(np.float32),
+        hollow=surfaces.hollow[finer.parent].astype(np.float32),
+        facts=facts,
+    )
+
+
+def _divide_apart(
+    mesh: PartMesh, surfaces: Surfaces, limit: np.ndarray, narrow: np.ndarray
+) -> tuple[Surface, np.ndarray]:
+    """Divide the rounds, but not those that would cross others; and mark these (m,)."""
+    crossing = np.zeros(len(mesh.triangles), dtype=bool)
+    while True:
+        stays = surfaces.noisy | crossing
+        finer = divide_rounds(
+            mesh.vertices, mesh.triangles, surfaces, np.where(stays, np.inf, limit), narrow
+        )
+        if len(finer.triangles) == len(mesh.triangles):
+            return finer, crossing
+        if len(finer.triangles) > MOST_TRIANGLES:
+            raise InputError(
+                f"part.smoothing: makes {len(finer.triangles):,} triangles of "
+                f"{len(mesh.triangles):,}; give a larger limit_deg or narrow_mm, or a smaller "
+                "part.target"
+            )
+        pairs = crossing_pairs(finer.vertices, finer.triangles)
+        if not pairs.size:
+            return finer, crossing
+        more = np.isin(surfaces.face, surfaces.face[finer.parent[pairs].ravel()]) & ~crossing
+        crossing |= more if more.any() else True
+
+
+def _near(vertices: np.ndarray, triangles: np.ndarray, chosen: np.ndarray) -> np.ndarray:
+    """Marks (m,) the chosen triangles, and those with a corner near one of theirs."""
+    from scipy.spatial import cKDTree
+
+    corners = np.unique(triangles[chosen])
+    away, _ = cKDTree(vertices[corners]).query(vertices, distance_upper_bound=NEAR)
+    return np.asarray(chosen | np.isfinite(away)[triangles].any(axis=1))
+
+
+def _usual_turn(turn: np.ndarray, area: np.ndarray, chosen: np.ndarray) -> float:
+    """The turn (m,) [rad] that is not exceeded on most of the chosen facets of rounds; or 0."""
+    rows = np.flatnonzero(chosen & (turn > 0.0))
+    if not len(rows):
+        return 0.0
+    rows = rows[np.argsort(turn[rows])]
+    upto = np.cumsum(area[rows])
+    return float(turn[rows][np.searchsorted(upto, MOST * upto[-1])])

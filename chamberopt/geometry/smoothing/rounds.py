@@ -1,0 +1,167 @@
+"""Edges of a part's surface: which of them divide a round into facets, and which are creases.
+
+An angle alone cannot tell: the facets of a coarse fillet turn by as much as the faces of a chamfer.
+A round shows by its neighbours: several facets beside each other turn the same way, with nearly the
+same curvature. An edge without such evidence is a crease.
+
+Facets are triangles that lie in one plane, such as the two halves of a quadrangle.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from chamberopt.geometry.triangles import (
+    area_vectors,
+    connected_pieces,
+    side_pairs,
+    sides_of,
+    unit_vectors,
+)
+
+# Edges that turn by more are no evidence of a round.
+CONVEX_SURE, HOLLOW_SURE = np.radians(40.0), np.radians(60.0)
+# Edges that turn by more are creases, whatever is beside them. Between the two an edge belongs to a
+# round if others show that there is one: the facets of a round turn by nearly the same angle, which
+# may lie on the limit.
+CONVEX_CREASE, HOLLOW_CREASE = np.radians(48.0), np.radians(66.0)
+LEVEL = np.radians(0.3)  # triangles that turn by less are one facet
+# Also those that turn by less than this share of the largest turn of either: halves of a
+# quadrangle that is not quite flat.
+OF_LARGEST = 0.3
+SMOOTH = np.radians(1.0)  # edges that turn by less need no evidence
+ALIKE = (
+    1.6  # factor of curvatures: beside a plane the first facet of a round has 3/4 of the others'
+)
+# A round goes on beyond a facet: its other edges bend about an edge too, by this share of that
+# edge's own bend if it turns by CONVEX_SURE, and by less, with the square, if it turns by less.
+GOES_ON = 0.5
+
+
+class Edges(NamedTuple):
+    """Edges of a closed surface.
+
+    Attributes:
+        sides: the two sides at each edge, 3 t + k for side k of triangle t, shape (e, 2).
+        turn: angle between the normals of both sides [rad], negative in a hollow, shape (e,).
+        length: [m], shape (e,).
+        along: unit vector, shape (e, 3).
+    """
+
+    sides: np.ndarray
+    turn: np.ndarray
+    length: np.ndarray
+    along: np.ndarray
+
+    @property
+    def triangles(self) -> np.ndarray:
+        """The two triangles at each edge, shape (e, 2)."""
+        return np.asarray(self.sides // 3)
+
+
+def find_edges(vertices: np.ndarray, triangles: np.ndarray) -> Edges:
+    """The edges of a closed surface (n, 3) [m], (m, 3) with normals outward."""
+    sides = side_pairs(triangles)
+    normal = unit_vectors(area_vectors(vertices, triangles))
+    start, end = sides_of(triangles)[sides[:, 0]].T
+    along = vertices[end] - vertices[start]
+    length = np.linalg.norm(along, axis=1)
+    along = unit_vectors(along)
+    one, two = normal[sides.T // 3]
+    across = np.einsum("ij,ij->i", np.cross(one, two), along)
+    return Edges(sides, np.arctan2(across, np.einsum("ij,ij->i", one, two)), length, along)
+
+
+def is_hard(edges: Edges) -> np.ndarray:
+    """Marks (e,) the edges that are creases whatever is beside them."""
+    return (edges.turn > CONVEX_CREASE) | (edges.turn < -HOLLOW_CREASE)
+
+
+def find_creases(edges: Edges, area: np.ndarray) -> np.ndarray:
+    """Marks (e,) the edges without evidence of a round.
+
+    Args:
+        area: of the triangles [m²], shape (m,).
+    """
+    size, hard, count = np.abs(edges.turn), is_hard(edges), len(area)
+    one, two = edges.triangles.T
+    largest = np.zeros(count)
+    for triangle in (one, two):
+        np.maximum.at(largest, triangle[~hard], size[~hard])
+    uneven = OF_LARGEST * np.minimum(largest[one], largest[two])
+    smooth = size <= SMOOTH
+    for level in (~hard & (size < LEVEL), ~hard & (size < np.maximum(LEVEL, uneven))):
+        smooth |= level | _has_evidence(edges, level, hard, area)
+    return hard | ~smooth
+
+
+def _has_evidence(
+    edges: Edges, level: np.ndarray, hard: np.ndarray, area: np.ndarray
+) -> np.ndarray:
+    """Marks (e,) the edges that belong to a round.
+
+    Args:
+        level: marks the edges within facets, shape (e,).
+        hard: marks the edges that belong to none, shape (e,).
+        area: of the triangles [m²], shape (m,).
+    """
+    size = np.abs(edges.turn)
+    sure = (edges.turn < CONVEX_SURE) & (edges.turn > -HOLLOW_SURE)
+    one, two = edges.triangles.T
+    facets, facet = connected_pieces(one[level], two[level], len(area))
+    border = np.flatnonzero(~level & ~hard & (facet[one] != facet[two]))
+    evident = np.zeros(len(size), dtype=bool)
+    for bend in (1.0, -1.0):
+        same = border[bend * edges.turn[border] > LEVEL]
+        evident[same] = _is_in_round(
+            facet[edges.triangles[same]],
+            Edges(*(values[same] for values in edges._replace(turn=size))),
+            sure[same],
+            np.bincount(facet, area, facets),
+        )
+    return evident
+
+
+def _is_in_round(facet: np.ndarray, edges: Edges, sure: np.ndarray, area: np.ndarray) -> np.ndarray:
+    """Whether edges that all turn the same way belong to a round, shape (k,).
+
+    Args:
+        facet: on both sides of each, shape (k, 2).
+        edges: the same with turns made positive.
+        sure: marks the edges that are evidence, shape (k,).
+        area: of the facets, shape (f,).
+    """
+    bend = edges.length * edges.turn
+    curvature = np.bincount(facet.T.ravel(), np.tile(bend, 2), len(area)) / np.maximum(area, 1e-30)
+    pairs = np.unique(np.sort(facet[sure], axis=1), axis=0)
+    is_inner = np.bincount(pairs.ravel(), minlength=len(area)) >= 2
+    alike = is_inner[pairs].all(axis=1) & _are_alike(curvature[pairs])
+    of_round = np.zeros(len(area), dtype=bool)
+    of_round[pairs[alike]] = True
+    beside = of_round[facet]
+    bends_beside = _bends_beside(facet, bend, edges.along, len(area))
+    needed = GOES_ON * (edges.turn / CONVEX_SURE) ** 2 * bend
+    goes_on = bends_beside >= needed[:, None]
+    alike = beside.all(axis=1) & _are_alike(curvature[facet])
+    return (goes_on & beside).any(axis=1) & (sure | alike)
+
+
+def _bends_beside(facet: np.ndarray, bend: np.ndarray, along: np.ndarray, count: int) -> np.ndarray:
+    """Bends about each edge of the other edges of the facets on both sides, (k, 2).
+
+    What bends about an axis across the edge does not count: the round of a shaft tells nothing of
+    the edge at its end.
+    """
+    tensor = np.einsum("k,ki,kj->kij", bend, along, along).reshape(-1, 9)
+    sums = np.stack(
+        [np.bincount(facet.T.ravel(), np.tile(one, 2), count) for one in tensor.T], axis=1
+    ).reshape(-1, 3, 3)
+    return np.einsum("kfij,ki,kj->kf", sums[facet], along, along) - bend[:, None]
+
+
+def _are_alike(curvature: np.ndarray) -> np.ndarray:
+    """Whether the curvatures of pairs (k, 2) of facets are those of one round, shape (k,)."""
+    low, high = np.sort(curvature, axis=1).T
+    return np.asarray(high <= ALIKE * low)

@@ -1,0 +1,242 @@
+"""The smooth surface of a part, of which its file has facets.
+
+The facets of a round touch a ball elsewhere than the round does: in a hollow a ball lies across two
+of them and leaves a bare strip between. So rounds are found and their triangles divided, with new
+vertices on the surface of which the file's lie on. What is flat, what has an edge, and what is
+noise stays as it is. No vertex of the file moves.
+
+    rounds    which edges divide a round into facets
+    normals   of the smooth surface at the corners of the facets
+    divide    finer triangles
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from chamberopt.geometry.smoothing.divide import Surface, divide
+from chamberopt.geometry.smoothing.normals import (
+    Facets,
+    corner_normals,
+    find_apexes,
+    fit_phi,
+    hollow_curvature,
+    measure_facets,
+    phi_of_normals,
+    plane_facets,
+)
+from chamberopt.geometry.smoothing.rounds import SMOOTH, Edges, find_creases, find_edges, is_hard
+from chamberopt.geometry.triangles import connected_pieces, sides_of, unit_normals
+
+# Degrees by which the surface turns at an edge. A ball in a hollow touches facets that turn by a
+# angle a at r tan(a / 2) from the edge, on both sides; the strip between is covered by dents of a
+# diameter d if a < d / 2 r. Dents are 0.15 to 0.25 r wide.
+USUAL_LIMIT = np.radians(6.0)
+# Times the rise of the circle that an edge's larger turn and facet are of: of two facets of unequal
+# width the wide one turns by up to twice as much as the edge between them.
+RISE = 2.0
+LEFT_OVER = 0.5  # share of an edge's turn that no round explains, above which it is a crease
+CREASE = np.radians(8.0)  # the least turn of such a crease
+EXPLAINED = 0.25  # share below which an edge without evidence is of the rounds beside it
+# Share of a round's turns that nothing explains, above which it is noise; the same of all turns.
+NOISE, NOISE_IN_ALL = 0.3, 0.2
+LINE = 12.0  # degrees: creases that turn by less and end freely are no line
+TOLD = 3.0  # degrees: smaller turns tell nothing of noise
+
+
+class Surfaces(NamedTuple):
+    """What is known of a part's surface before it is divided.
+
+    Attributes:
+        normals: of the smooth surface at the corners, unit vectors, shape (m, 3, 3).
+        hollow: largest hollow curvature on each triangle [1/m], 0 where there is none, shape (m,).
+        turn: largest turn at the smooth edges of each triangle [rad], shape (m,).
+        crease: marks the sides at creases, shape (m, 3).
+        rise: the farthest that the surface may move from each triangle [m], shape (m,).
+        face: number of the round of each triangle, shape (m,).
+        noisy: marks the triangles of rounds that are noise, shape (m,).
+        blunt: number of the creases that turn by less than the facets of a round may.
+    """
+
+    normals: np.ndarray
+    hollow: np.ndarray
+    turn: np.ndarray
+    crease: np.ndarray
+    rise: np.ndarray
+    face: np.ndarray
+    noisy: np.ndarray
+    blunt: int
+
+
+def find_surfaces(
+    vertices: np.ndarray, triangles: np.ndarray, wanted: np.ndarray, given: np.ndarray | None = None
+) -> Surfaces:
+    """Find rounds and creases of a part, and the normals of the surface behind its facets.
+
+    Args:
+        vertices: [m], shape (n, 3).
+        triangles: closed, normals outward, shape (m, 3).
+        wanted: marks the triangles that matter, shape (m,). Rounds without one are left flat.
+        given: normals at the corners that the file states, unit vectors, shape (m, 3, 3).
+    """
+    edges, facets = find_edges(vertices, triangles), measure_facets(vertices, triangles)
+    size = np.abs(edges.turn)
+    lone = find_creases(edges, facets.area) if given is None else _stated_creases(edges, given)
+    face, fitted = _faces_to_fit(edges, lone, wanted)
+    ends = sides_of(triangles)[edges.sides[:, 0]]
+    apex = find_apexes(facets, triangles, edges, lone)
+    if given is None:
+        phi = fit_phi(facets, edges, lone, fitted, apex[ends].any(axis=1))
+    else:
+        phi = phi_of_normals(facets, given)
+    left = edges.turn - phi.ravel()[edges.sides].sum(axis=1)
+    of_round = fitted[edges.triangles].any(axis=1) & ~lone
+    sharp = of_round & (size > CREASE) & (np.sign(edges.turn) * left > LEFT_OVER * size)
+    explained = lone & ~is_hard(edges) & (np.abs(left) < EXPLAINED * size)
+    is_crease = (lone & ~explained) | sharp
+    on_crease = np.zeros(3 * len(triangles), dtype=bool)
+    on_crease[edges.sides[is_crease]] = True
+    if given is None:
+        given = corner_normals(facets, vertices, triangles, edges, is_crease, phi, apex)
+        noisy = _noise(edges, lone, left, face, fitted, ends)[face] > NOISE
+    else:
+        noisy = np.zeros(len(triangles), dtype=bool)
+    turn, rise = _turns_and_rises(edges, facets, is_crease)
+    return Surfaces(
+        normals=given,
+        hollow=hollow_curvature(facets, phi),
+        turn=turn,
+        crease=on_crease.reshape(-1, 3),
+        rise=RISE * rise,
+        face=face,
+        noisy=noisy,
+        blunt=int((is_crease & ~is_hard(edges) & (size > SMOOTH)).sum()),
+    )
+
+
+def divide_rounds(
+    vertices: np.ndarray,
+    triangles: np.ndarray,
+    surfaces: Surfaces,
+    limit: np.ndarray,
+    narrow: np.ndarray,
+) -> Surface:
+    """Divide the triangles of rounds; the new vertices lie on the smooth surface.
+
+    Args:
+        limit: turn [rad] above which each triangle's edges are split, shape (m,); infinite where
+            the triangle stays as it is.
+        narrow: width of facets [m] below which each triangle is not divided, shape (m,).
+    """
+    surface = Surface(
+        vertices=vertices,
+        triangles=triangles,
+        parent=np.arange(len(triangles)),
+        normals=surfaces.normals,
+        crease=surfaces.crease,
+        rise=surfaces.rise,
+    )
+    return divide(surface, limit, narrow)
+
+
+def moves(vertices: np.ndarray, triangles: np.ndarray, finer: Surface) -> np.ndarray:
+    """How far the divided surface is from each triangle that was divided [m], shape (m,)."""
+    normal = unit_normals(vertices[triangles])[finer.parent]
+    start = vertices[triangles[finer.parent, 0]][:, None]
+    height = np.abs(np.einsum("kci,ki->kc", finer.vertices[finer.triangles] - start, normal))
+    moved = np.zeros(len(triangles))
+    np.maximum.at(moved, finer.parent, height.max(axis=1))
+    return moved
+
+
+def _stated_creases(edges: Edges, normals: np.ndarray) -> np.ndarray:
+    """Marks (e,) the edges at which normals that a file states differ on both sides."""
+    triangle, k = np.divmod(edges.sides.T, 3)
+    start, end = normals[triangle, k], normals[triangle, (k + 1) % 3]
+    cosine = [np.einsum("ei,ei->e", start[0], end[1]), np.einsum("ei,ei->e", end[0], start[1])]
+    return np.asarray(np.minimum(*cosine) < np.cos(SMOOTH))
+
+
+def _faces_to_fit(
+    edges: Edges, is_crease: np.ndarray, wanted: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Rounds, and which of them have normals to be found.
+
+    Args:
+        wanted: marks the triangles that are to be divided, shape (m,).
+
+    Returns:
+        The number of the round to which each triangle belongs, shape (m,), one of its own for one
+        that belongs to none; marks the triangles of rounds with or beside a wanted one, and those
+        beside them across smooth edges, shape (m,).
+    """
+    joins = ~is_crease & (np.abs(edges.turn) > SMOOTH)
+    one, two = edges.triangles[joins].T
+    face = connected_pieces(one, two, len(wanted))[1]
+    in_round = np.zeros(len(wanted), dtype=bool)
+    in_round[edges.triangles[joins]] = True
+    chosen = in_round & np.isin(face, face[in_round & _with_neighbours(wanted, edges.triangles)])
+    return face, _with_neighbours(chosen, edges.triangles[~is_crease])
+
+
+def _with_neighbours(marked: np.ndarray, pairs: np.ndarray) -> np.ndarray:
+    """Marked triangles (m,) and those beside them, by pairs of neighbours (e, 2)."""
+    both = pairs[marked[pairs].any(axis=1)]
+    result = marked.copy()
+    result[both] = True
+    return result
+
+
+def _noise(
+    edges: Edges,
+    lone: np.ndarray,
+    left: np.ndarray,
+    face: np.ndarray,
+    fitted: np.ndarray,
+    ends: np.ndarray,
+) -> np.ndarray:
+    """Share of the turns of each face that no round and no line of creases explains, shape (f,).
+
+    Args:
+        lone: marks the edges without evidence of a round, shape (e,).
+        left: turn of each edge that the fit does not explain [rad], shape (e,).
+        face: of each triangle, shape (m,).
+        fitted: marks the triangles for which there is a fit, shape (m,).
+        ends: vertices of each edge, shape (e, 2).
+    """
+    degrees = np.degrees(np.abs(edges.turn))
+    hard = is_hard(edges)
+    meeting = np.bincount(ends[lone].ravel(), minlength=int(ends.max()) + 1)[ends]
+    free = (meeting == 1).any(axis=1) | (degrees < LINE)
+    no_line = lone & ~hard & (meeting != 2).any(axis=1) & free
+    told = ~hard & (degrees > TOLD) & fitted[edges.triangles].any(axis=1)
+    whole, rest = (np.where(told, edges.length * np.abs(one), 0.0) for one in (edges.turn, left))
+    unexplained = np.where(lone, np.where(no_line, whole, 0.0), rest)
+    count = int(face.max()) + 1
+    one, two = face[edges.triangles].T
+    some, every = (
+        np.bincount(one, weight, count) + np.bincount(two, weight, count)
+        for weight in (unexplained, whole)
+    )
+    if some.sum() > NOISE_IN_ALL * every.sum():
+        return np.ones(count)  # smooth pieces among noise are no rounds either
+    return np.divide(some, every, out=np.zeros(count), where=every > 0.0)
+
+
+def _turns_and_rises(
+    edges: Edges, facets: Facets, is_crease: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """The largest turn [rad] at the smooth sides of each triangle, shape (m,), and the rise [m].
+
+    The rise is that of the circle of which the triangle is a facet, over its chord.
+    """
+    turn = np.zeros(3 * len(facets.area))
+    turn[edges.sides[~is_crease]] = np.abs(edges.turn[~is_crease])[:, None]
+    of_sides = turn.reshape(-1, 3)
+    rise = (of_sides * facets.height).max(axis=1) / 8.0
+    facet = plane_facets(edges, len(rise))
+    of_facet = np.zeros(len(rise))
+    np.maximum.at(of_facet, facet, rise)
+    return of_sides.max(axis=1), of_facet[facet]
