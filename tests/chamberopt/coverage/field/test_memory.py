@@ -8,6 +8,7 @@ import pytest
 
 from chamberopt.chamber.build import build_chamber
 from chamberopt.cli import main
+from chamberopt.cli.commands.search import run, sweep
 from chamberopt.common.parallel import memory
 from chamberopt.common.parallel.executor import SerialExecutor
 from chamberopt.common.parallel.memory import MEMORY, MemoryBudget
@@ -15,6 +16,7 @@ from chamberopt.coverage.coverage_from_impacts import MAX_BATCHES
 from chamberopt.coverage.field.memory import BATCHES, evaluation_bytes, how_many_fit
 from chamberopt.design.design import Design
 from chamberopt.design.load import save_design
+from chamberopt.optimize.study import load_study
 from chamberopt.simulation.evaluate import ReplicaPlan, evaluate
 from tests.helpers.synthetic import plate_design
 
@@ -103,3 +105,22 @@ def test_a_job_larger_than_the_machine_is_refused(
     assert "process.accuracy.points: this takes about" in message
     assert "0.5 GB, half of what is free" in message
     assert not (tmp_path / "new").exists()
+
+
+def test_fewer_run_at_a_time_where_not_all_fit(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+) -> None:
+    save_design(design_with(20_000, 8), tmp_path / "plate.toml")
+    (tmp_path / "study.toml").write_text(
+        'design = "plate.toml"\n[vary]\n"shot.mass_g" = [2, 4]\n[optimizer]\nbatch = 8\n'
+    )
+    study = load_study(tmp_path / "study.toml")
+    chamber = build_chamber(study.design)
+    for gigabytes, workers, all_candidates in ((1.6, 1, False), (3.0, 3, True), (100.0, 8, True)):
+        monkeypatch.setattr(memory, "free_memory", lambda free=gigabytes: free * GIGA)
+        assert sweep._workers_that_fit(study, chamber, 8) == workers
+        told = capsys.readouterr().err
+        assert (f"memory for {workers} of 8 worker processes" in told) == (workers < 8)
+        found = run._candidates_at_once(study, chamber)
+        assert (found == 8) == all_candidates
+        assert ("candidates of optimizer.batch at a time" in capsys.readouterr().err) == (found < 8)
