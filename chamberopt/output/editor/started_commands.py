@@ -33,7 +33,8 @@ class StartedCommand:
         self._lines: list[str] = []
         self._steps: dict[str, dict[str, Any]] = {}
         self._process = subprocess.Popen(
-            [sys.executable, "-c", BEGIN, *arguments, "--progress", "jsonl"],
+            # -P: a file json.py in the folder of a design is no module of the command
+            [sys.executable, "-P", "-c", BEGIN, *arguments, "--progress", "jsonl"],
             cwd=folder,
             start_new_session=True,  # Ctrl-C is for the server, which tells it once
             stdin=subprocess.PIPE,  # it is closed when this process ends, however it ends
