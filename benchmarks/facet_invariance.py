@@ -95,7 +95,7 @@ def cases() -> Iterator[tuple[str, Case]]:
         yield (
             name,
             Case(
-                gear.changed({"process.accuracy.simulated_time_s": 1.0}),
+                gear.changed({"process.accuracy.simulated_time_s": 2.5}),
                 lambda path, twist=twist: gear_file(path, 16.0, twist),
                 {
                     f"fillet points {k} times as close": (
@@ -109,7 +109,7 @@ def cases() -> Iterator[tuple[str, Case]]:
     yield (
         "blade",
         Case(
-            blade.changed({"process.accuracy.simulated_time_s": 2.0}),
+            blade.changed({"process.accuracy.simulated_time_s": 2.5}),
             lambda path: blade_file(path, 0.6, np.radians(4.0)),
             {
                 f"{degrees} degrees at edges": (

@@ -125,11 +125,15 @@ def _rows(unknown: np.ndarray, sides: np.ndarray, factor: np.ndarray) -> csr_arr
 def _bend_differences(
     facets: Facets, edges: Edges, smooth: np.ndarray, unknown: np.ndarray, apexes: np.ndarray
 ) -> list[csr_array]:
-    """Matrices of l dS_ee, sqrt(l² + h²) dS_em, h dS_mm at the smooth edges."""
+    """Matrices of l dS_ee, sqrt(l² + h²) dS_em, h dS_mm at the smooth edges.
+
+    At the apex of a cone the sum of both S_ee stands for the difference, since a cone is straight
+    along its edges, and nothing for dS_em.
+    """
     sides, length = edges.sides[smooth], edges.length[smooth]
     height = facets.height.ravel()[sides].min(axis=1)
     keeps = ~apexes[smooth]
-    scales = (length * keeps, np.hypot(length, height) * keeps, height)
+    scales = (length, np.hypot(length, height) * keeps, height)
     parts: list[list[np.ndarray]] = [[], [], []]
     for which, sign in ((0, 1.0), (1, -1.0)):
         triangle, k = np.divmod(sides[:, which], 3)
@@ -139,9 +143,12 @@ def _bend_differences(
         of_m = np.einsum("sij,sj->si", m, own)
         of_e = np.einsum("sij,sj->si", m, along)
         weight = sign * facets.length[triangle] / facets.area[triangle][:, None]
+        of_sum = np.abs(weight)
+        weights = (np.where(keeps[:, None], weight, of_sum), weight, weight)
         # Both along and across are reversed on the second side, so products keep their sign.
-        for part, product in zip(parts, (of_e * of_e, of_e * of_m, of_m * of_m), strict=True):
-            part.append(weight * product)
+        products = (of_e * of_e, of_e * of_m, of_m * of_m)
+        for part, factor, product in zip(parts, weights, products, strict=True):
+            part.append(factor * product)
     of_sides = np.concatenate([3 * (sides[:, [w]] // 3) + np.arange(3) for w in (0, 1)], axis=1)
     return [
         _rows(unknown, of_sides, scale[:, None] * np.concatenate(part, axis=1))

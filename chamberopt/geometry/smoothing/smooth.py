@@ -37,6 +37,7 @@ USUAL_LIMIT = np.radians(6.0)
 # Times the rise of the circle that an edge's larger turn and facet are of: of two facets of unequal
 # width the wide one turns by up to twice as much as the edge between them.
 RISE = 2.0
+FAR_LARGER = 3.0  # times the area of the facets beside it: a plane facet is no part of a round
 LEFT_OVER = 0.5  # share of an edge's turn that no round explains, above which it is a crease
 CREASE = np.radians(8.0)  # the least turn of such a crease
 EXPLAINED = 0.25  # share below which an edge without evidence is of the rounds beside it
@@ -85,6 +86,7 @@ def find_surfaces(
     size = np.abs(edges.turn)
     lone = find_creases(edges, facets.area) if given is None else _stated_creases(edges, given)
     face, fitted = _faces_to_fit(edges, lone, wanted)
+    fitted &= ~_planes(edges, facets, lone)
     ends = sides_of(triangles)[edges.sides[:, 0]]
     apex = find_apexes(facets, triangles, edges, lone)
     if given is None:
@@ -179,6 +181,21 @@ def _faces_to_fit(
     in_round[edges.triangles[joins]] = True
     chosen = in_round & np.isin(face, face[in_round & _with_neighbours(wanted, edges.triangles)])
     return face, _with_neighbours(chosen, edges.triangles[~is_crease])
+
+
+def _planes(edges: Edges, facets: Facets, is_crease: np.ndarray) -> np.ndarray:
+    """Marks (m,) the triangles of plane facets that are far larger than all facets beside them.
+
+    The facets of a round are nearly alike, so these are no part of it.
+    """
+    facet = plane_facets(edges, len(facets.area))
+    count, area = np.bincount(facet), np.bincount(facet, facets.area)
+    turns = ~is_crease & (np.abs(edges.turn) > SMOOTH)
+    one, two = facet[edges.triangles[turns]].T
+    largest = np.zeros(len(area))
+    np.maximum.at(largest, one, area[two])
+    np.maximum.at(largest, two, area[one])
+    return np.asarray(((count > 1) & (area > FAR_LARGER * largest) & (largest > 0.0))[facet])
 
 
 def _with_neighbours(marked: np.ndarray, pairs: np.ndarray) -> np.ndarray:
