@@ -32,7 +32,7 @@ from chamberopt.design.design import Design
 from chamberopt.design.load import load_design
 from chamberopt.simulation.estimates import weighted_sum
 from chamberopt.simulation.evaluate import evaluate
-from tests.helpers.rounded_solids import Mesh, Solid, circle, outline, stacked
+from tests.helpers.scenes.rounded_solids import Mesh, Solid, circle, outline, stacked
 
 ROOT = Path(__file__).parents[1]
 FIGURES = ("mean_coverage", "uniform_coverage", "p05_coverage", "time_to_98_s")

@@ -15,7 +15,7 @@ from tests.chamberopt.geometry.smoothing.measures import (
     require_sound,
     smoothed,
 )
-from tests.helpers.rounded_solids import Mesh, Outline, Solid, circle, outline
+from tests.helpers.scenes.rounded_solids import Mesh, Outline, Solid, circle, outline
 
 BALL = 1e-3  # radius [m]
 

@@ -17,7 +17,7 @@ from chamberopt.geometry.mesh_io.part_mesh import read_part
 from chamberopt.geometry.smoothing.part import Rule, smooth
 from tests.chamberopt.geometry.smoothing.measures import require_solid, require_sound, smoothed
 from tests.helpers.mesh_files import write_stl
-from tests.helpers.rounded_solids import Mesh, Solid, circle, outline
+from tests.helpers.scenes.rounded_solids import Mesh, Solid, circle, outline
 
 GEAR = Path(__file__).parents[4] / "designs/gear.toml"
 

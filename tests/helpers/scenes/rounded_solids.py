@@ -243,7 +243,7 @@ def _grid(
         np.arange(columns if around else columns - 1),
         indexing="ij",
     )
-    i, j = i.ravel(), j.ravel()
+    i, j = np.ravel(i), np.ravel(j)
     k, m = (i + 1) % rows, (j + 1) % columns
     a, b, c, d = i * columns + j, i * columns + m, k * columns + m, k * columns + j
     other = np.zeros(len(i), dtype=bool) if rng is None else rng.random(len(i)) < 0.5
