@@ -238,12 +238,8 @@ def _grid(
 
     Their normals are along the rows' direction x the columns', reversed.
     """
-    i, j = np.meshgrid(
-        np.arange(rows if closed else rows - 1),
-        np.arange(columns if around else columns - 1),
-        indexing="ij",
-    )
-    i, j = np.ravel(i), np.ravel(j)
+    i = np.arange(rows if closed else rows - 1).repeat(columns if around else columns - 1)
+    j = np.arange(len(i)) % (columns if around else columns - 1)
     k, m = (i + 1) % rows, (j + 1) % columns
     a, b, c, d = i * columns + j, i * columns + m, k * columns + m, k * columns + j
     other = np.zeros(len(i), dtype=bool) if rng is None else rng.random(len(i)) < 0.5
