@@ -14,10 +14,10 @@ import importlib.util
 import math
 import sys
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
-from types import ModuleType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -32,7 +32,7 @@ from chamberopt.design.design import Design
 from chamberopt.design.load import load_design
 from chamberopt.simulation.estimates import weighted_sum
 from chamberopt.simulation.evaluate import evaluate
-from tests.helpers.rounded_solids import Mesh, Solid, circle, outline, stacked
+from tests.helpers.scenes.rounded_solids import Mesh, Solid, circle, outline, stacked
 
 ROOT = Path(__file__).parents[1]
 FIGURES = ("mean_coverage", "uniform_coverage", "p05_coverage", "time_to_98_s")
@@ -61,7 +61,7 @@ class Case(NamedTuple):
 
     design: Design
     fine: Draw
-    coarse: dict[str, Draw]
+    coarse: Mapping[str, Draw]
 
 
 def main() -> None:
@@ -91,48 +91,39 @@ def cases() -> Iterator[tuple[str, Case]]:
     lathe = Solid(outline([(0, 0), (8, 0), (8, 4, 1.5), (4, 4, 2.0 * BALL), (4, 10, 1.5), (0, 10)]))
     yield "lathe part", of_solid(small, lathe)
     yield "torus ring", of_solid(small, Solid(circle(2.0, 7.0)))
-    for name, twist in (("spur gear", 0.0), ("helical gear", np.radians(27.0))):
-        yield (
-            name,
-            Case(
-                gear.changed({"process.accuracy.simulated_time_s": 2.5}),
-                lambda path, twist=twist: gear_file(path, 16.0, twist),
-                {
-                    f"fillet points {k} times as close": (
-                        lambda path, k=k, twist=twist: gear_file(path, k, twist)
-                    )
-                    for k in ((1.0, 2.0, 4.0, 8.0) if not twist else (1.0, 2.0))
-                },
-            ),
-        )
+    for name, helix, counts in (
+        ("spur gear", 0.0, (1.0, 2.0, 4.0, 8.0)),
+        ("helical gear", np.radians(27.0), (1.0, 2.0)),
+    ):
+        coarse = {
+            f"fillet points {k:g} times as close": partial(gear_file, fillet=k, helix=helix)
+            for k in counts
+        }
+        resolved = gear.changed({"process.accuracy.simulated_time_s": 2.5})
+        yield name, Case(resolved, partial(gear_file, fillet=16.0, helix=helix), coarse)
     blade = load_design(ROOT / "designs/blade.toml")
-    yield (
-        "blade",
-        Case(
-            blade.changed({"process.accuracy.simulated_time_s": 2.5}),
-            lambda path: blade_file(path, 0.6, np.radians(4.0)),
-            {
-                f"{degrees} degrees at edges": (
-                    lambda path, degrees=degrees: blade_file(path, 1.2, np.radians(degrees))
-                )
-                for degrees in (20, 33)
-            },
-        ),
-    )
+    coarse = {
+        f"{degrees} degrees at edges": partial(blade_file, edge=1.2, turn=np.radians(degrees))
+        for degrees in (20, 33)
+    }
+    fine = partial(blade_file, edge=0.6, turn=np.radians(4.0))
+    yield "blade", Case(blade.changed({"process.accuracy.simulated_time_s": 2.5}), fine, coarse)
 
 
 def of_solid(design: Design, solid: Solid) -> Case:
     """The case of a solid of lines and arcs."""
-    coarse: dict[str, Draw] = {}
-    for degrees in (15.0, 30.0):
-        step = np.radians(degrees)
-        coarse[f"strips of {degrees:g} degrees"] = lambda path, step=step: write(
-            path, solid.strips(step)
-        )
+
+    def strips(path: Path, step: float) -> None:
+        write(path, solid.strips(step))
+
+    coarse: dict[str, Draw] = {
+        f"strips of {degrees} degrees": partial(strips, step=np.radians(degrees))
+        for degrees in (15, 30)
+    }
     coarse["irregular, 22.5 degrees"] = lambda path: write(
         path, solid.irregular(np.radians(22.5), SIZE)
     )
-    return Case(design, lambda path: write(path, solid.strips(FINE)), coarse)
+    return Case(design, partial(strips, step=FINE), coarse)
 
 
 def write(path: Path, mesh: Mesh) -> None:
@@ -169,7 +160,7 @@ def blade_file(path: Path, edge: float, turn: float) -> None:
     blade.main(path)
 
 
-def part_module(name: str) -> ModuleType:
+def part_module(name: str) -> Any:
     """A script of designs/parts as a module of its own."""
     folder = str(ROOT / "designs/parts")
     if folder not in sys.path:

@@ -13,9 +13,13 @@ Notation
     s      rise of the middle over the chord [m]
 
     s = dp.dn / (4 + 2 |n0 + n1|)        along n0 + n1: exact on a circle
-    n = n0 + n1 - 1.5 f (f . (n0 + n1))  in the middle, before it is made a unit vector: that of a
-                                         cubic with these ends and normals; f is e without what of
-                                         it runs along n0 x n1
+    n = n0 + n1 - 1.5 f (e . (n0 + n1))  in the middle, before it is made a unit vector: that of a
+                                         cubic with these ends and normals
+    f ~ (W² + |det W|) e, with f . e = 1
+
+W is the shape operator of the triangle, which its three normals tell. Among all f with f . e = 1
+this one turns the normal where the surface bends: across the lines of a cylinder, along e on a
+sphere and in the straight directions of a saddle.
 """
 
 from __future__ import annotations
@@ -153,7 +157,7 @@ def _middles(surface: Surface, sides: np.ndarray) -> tuple[np.ndarray, ...]:
 def _tilts(
     surface: Surface, sides: np.ndarray, normal: np.ndarray, e: np.ndarray, is_crease: np.ndarray
 ) -> np.ndarray:
-    """The directions f of edges on both sides, (2, e, 3).
+    """The vectors f of edges on both sides, (2, e, 3); of creases each side has its own W.
 
     Args:
         normal: in the middle of the edges, of any length, shape (2, e, 3).

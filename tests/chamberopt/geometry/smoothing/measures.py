@@ -11,7 +11,7 @@ from chamberopt.geometry.smoothing.divide import Surface
 from chamberopt.geometry.smoothing.smooth import Surfaces, divide_rounds, find_surfaces, moves
 from chamberopt.geometry.solids import split_bodies
 from chamberopt.geometry.triangles import areas, find_shells, side_pairs, unit_normals, unit_vectors
-from tests.helpers.rounded_solids import Mesh, Solid, on_sides
+from tests.helpers.scenes.rounded_solids import Mesh, Solid, on_sides
 
 POINTS = 5000
 

@@ -17,7 +17,7 @@ from chamberopt.geometry.mesh_io.part_mesh import read_part
 from chamberopt.geometry.smoothing.part import Rule, smooth
 from tests.chamberopt.geometry.smoothing.measures import require_solid, require_sound, smoothed
 from tests.helpers.mesh_files import write_stl
-from tests.helpers.rounded_solids import Mesh, Solid, circle, outline
+from tests.helpers.scenes.rounded_solids import Mesh, Solid, circle, outline
 
 GEAR = Path(__file__).parents[4] / "designs/gear.toml"
 
@@ -44,22 +44,35 @@ def meshes(draw: st.DrawFn) -> Mesh:
     return 1e-3 * vertices, triangles
 
 
-SETTINGS = settings(
-    max_examples=20, deadline=None, suppress_health_check=[HealthCheck.too_slow], derandomize=True
-)
+def few(count: int) -> settings:
+    slow = [HealthCheck.too_slow]
+    return settings(max_examples=count, deadline=None, suppress_health_check=slow, derandomize=True)
 
 
-@SETTINGS
+shifts = st.tuples(*[st.floats(-6e-3, 6e-3)] * 3)
+
+
+def united(one: Mesh, two: Mesh, shift: tuple[float, ...]) -> Mesh:
+    return mesh_of(body(one) + body((two[0] + np.array(shift), two[1])))
+
+
+@few(8)
 @given(meshes())
 def test_drawn_solids(mesh: Mesh) -> None:
     require_sound_part(mesh)
 
 
-@SETTINGS
-@given(meshes(), meshes(), st.tuples(*[st.floats(-6e-3, 6e-3)] * 3))
-def test_unions(one: Mesh, two: Mesh, shift: tuple[float, float, float]) -> None:
-    both = body(one) + body((two[0] + np.array(shift), two[1]))
-    require_sound_part(mesh_of(both))
+@few(5)
+@given(meshes(), meshes(), shifts)
+def test_unions(one: Mesh, two: Mesh, shift: tuple[float, ...]) -> None:
+    require_sound_part(united(one, two, shift))
+
+
+@pytest.mark.long
+@few(150)
+@given(meshes(), meshes(), shifts)
+def test_many_unions(one: Mesh, two: Mesh, shift: tuple[float, ...]) -> None:
+    require_sound_part(united(one, two, shift))
 
 
 @pytest.mark.parametrize("gap", [0.05e-3, 0.3e-3])

@@ -6,7 +6,7 @@ import trimesh
 
 from chamberopt.geometry.triangles import unit_normals
 from tests.chamberopt.geometry.smoothing.measures import require_sound, smoothed
-from tests.helpers.rounded_solids import Mesh, Solid, circle, outline, regular_polygon
+from tests.helpers.scenes.rounded_solids import Mesh, Solid, circle, outline, regular_polygon
 
 MM = 1e-3
 RISE = float(np.tan(np.radians(31.0)))

@@ -63,7 +63,7 @@ class Piece(NamedTuple):
 Outline = list[Piece]
 
 
-def outline(corners: Sequence[tuple[float, ...]]) -> Outline:
+def outline(corners: Sequence[Sequence[float]] | np.ndarray) -> Outline:
     """The outline of a polygon, counter-clockwise, of corners (x, y) or (x, y, radius)."""
     at = np.array([corner[:2] for corner in corners], dtype=float)
     radius = np.array([corner[2] if len(corner) > 2 else 0.0 for corner in corners])
@@ -134,7 +134,9 @@ class Solid:
                 ],
                 axis=2,
             )
-            return _welded(grid.reshape(-1, 3), _grid(*grid.shape[:2], closed, True, rng))
+            return _welded(
+                grid.reshape(-1, 3), _grid(grid.shape[0], grid.shape[1], closed, True, rng)
+            )
         levels = [np.c_[points, np.full(len(points), z)] for z in (0.0, self.height)]
         return stacked(np.stack(levels, axis=1), rng)
 
@@ -216,7 +218,7 @@ def stacked(rows: np.ndarray, rng: np.random.Generator | None = None) -> Mesh:
         rows: points of each outline, counter-clockwise from above, shape (points, outlines, 3).
         rng: for diagonals either way.
     """
-    triangles = _grid(*rows.shape[:2], True, False, rng)[:, ::-1]
+    triangles = _grid(rows.shape[0], rows.shape[1], True, False, rng)[:, ::-1]
     last = rows.shape[1] - 1
     low, high = (
         rows.shape[1] * np.asarray(manifold3d.triangulate([rows[:, k, :2]]), dtype=np.int64) + k
@@ -236,12 +238,8 @@ def _grid(
 
     Their normals are along the rows' direction x the columns', reversed.
     """
-    i, j = np.meshgrid(
-        np.arange(rows if closed else rows - 1),
-        np.arange(columns if around else columns - 1),
-        indexing="ij",
-    )
-    i, j = i.ravel(), j.ravel()
+    i = np.arange(rows if closed else rows - 1).repeat(columns if around else columns - 1)
+    j = np.arange(len(i)) % (columns if around else columns - 1)
     k, m = (i + 1) % rows, (j + 1) % columns
     a, b, c, d = i * columns + j, i * columns + m, k * columns + m, k * columns + j
     other = np.zeros(len(i), dtype=bool) if rng is None else rng.random(len(i)) < 0.5
@@ -253,13 +251,13 @@ def _grid(
 def _welded(vertices: np.ndarray, triangles: np.ndarray) -> Mesh:
     """The mesh with equal vertices made one, outside out, and without triangles of no area."""
     size = np.abs(vertices).max()
-    _, first, number = np.unique(
+    _, first, numbers = np.unique(
         np.round(vertices / (1e-9 * size)).astype(np.int64),
         axis=0,
         return_index=True,
         return_inverse=True,
     )
-    triangles = number.reshape(-1)[triangles]
+    triangles = np.asarray(numbers).reshape(-1)[triangles]
     kept = (triangles != np.roll(triangles, 1, axis=1)).all(axis=1)
     return vertices[first], triangles[kept]
 
