@@ -67,7 +67,7 @@ def converted(
         watched, held = os.pipe()  # it is closed when this process ends, however it ends
         try:
             run = subprocess.run(
-                [sys.executable, "-c", BEGIN + reader.code, *words],
+                [sys.executable, "-P", "-c", BEGIN + reader.code, *words],
                 stdin=watched,
                 capture_output=True,
                 timeout=WALL_CLOCK_S,

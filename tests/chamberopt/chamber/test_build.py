@@ -307,7 +307,8 @@ def test_the_gears_target_is_its_toothed_rim() -> None:
     corners = part.vertices[part.triangles[part.target]]
     normal = area_vectors(part.vertices, part.triangles)[part.target]
     assert np.hypot(corners[..., 0], corners[..., 1]).min() > 0.017
-    assert np.abs(normal[:, 2]).max() < 1e-6 * np.linalg.norm(normal, axis=1).min()
+    # New vertices near the teeth's ends may lean by a third of a degree.
+    assert (np.abs(normal[:, 2]) < 0.006 * np.linalg.norm(normal, axis=1)).all()
 
 
 @pytest.mark.parametrize(

@@ -16,7 +16,7 @@ import pytest
 
 import chamberopt
 from chamberopt.common.files import claim_file
-from chamberopt.geometry.mesh_io.native_reader import converted
+from chamberopt.geometry.mesh_io.native_reader import NativeReader, converted
 from tests.chamberopt.common.files.scene import RUN
 from tests.helpers.results.digests import accept_changes, replace_result
 from tests.hunt.command import Server, fault, fingerprint
@@ -175,7 +175,8 @@ def test_no_process_imports_what_lies_where_it_is_started(
     monkeypatch.chdir(tmp_path)
     (tmp_path / "json.py").write_text("raise SystemExit('planted')")
     code = "import json; open(sys.argv[2], 'w').write(json.__file__)"
-    with converted(b"", "given", "made", code) as made:
+    reader = NativeReader("given", "made", code, 1.0)
+    with converted(reader, tmp_path / "part", b"") as made:
         assert made is not None
         assert not Path(made.read_text()).is_relative_to(tmp_path)
 

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from PIL import Image, ImageSequence
 
-from chamberopt.common import files
 from chamberopt.common.errors import InputError
+from chamberopt.common.files import claimed
 from chamberopt.output.viewer.images import film
 from chamberopt.output.viewer.images.film import film_path, write_film
 
@@ -54,7 +54,7 @@ def test_where_no_film_can_be_is_said(tmp_path: Path, monkeypatch: pytest.Monkey
         raise PermissionError(13, "Permission denied")
 
     with monkeypatch.context() as patch:
-        patch.setattr(files.tempfile, "TemporaryFile", refuse)
+        patch.setattr(claimed.tempfile, "TemporaryFile", refuse)
         with pytest.raises(InputError, match=r"a\.gif: cannot be written: Permission"):
             film_path(tmp_path / "a.gif")
     monkeypatch.setattr(film, "find_spec", lambda _: None)
