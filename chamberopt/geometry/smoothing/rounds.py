@@ -32,9 +32,8 @@ LEVEL = np.radians(0.3)  # triangles that turn by less are one facet
 # of one: halves of a quadrangle that is not quite flat.
 OF_LARGEST = 0.3
 SMOOTH = np.radians(1.0)  # edges that turn by less need no evidence
-ALIKE = (
-    1.6  # factor of curvatures: beside a plane the first facet of a round has 3/4 of the others'
-)
+# Factor of curvatures: beside a plane the first facet of a round has 3/4 of that of the others.
+ALIKE = 1.6
 # A round goes on beyond a facet: its other edges bend about an edge too, by this share of that
 # edge's own bend if it turns by CONVEX_SURE, and by less, with the square, if it turns by less.
 GOES_ON = 0.5

@@ -2,8 +2,8 @@
 
 The facets of a round touch a ball elsewhere than the round does: in a hollow a ball lies across two
 of them and leaves a bare strip between. So rounds are found and their triangles divided, with new
-vertices on the surface of which the file's lie on. What is flat, what has an edge, and what is
-noise stays as it is. No vertex of the file moves.
+vertices on the surface on which the file's vertices lie. Planes, sharp edges and noise stay as they
+are. No vertex of the file moves.
 
     rounds    which edges divide a round into facets
     normals   of the smooth surface at the corners of the facets
@@ -30,10 +30,6 @@ from chamberopt.geometry.smoothing.normals import (
 from chamberopt.geometry.smoothing.rounds import SMOOTH, Edges, find_creases, find_edges, is_hard
 from chamberopt.geometry.triangles import connected_pieces, sides_of, unit_normals
 
-# Degrees by which the surface turns at an edge. A ball in a hollow touches facets that turn by a
-# angle a at r tan(a / 2) from the edge, on both sides; the strip between is covered by dents of a
-# diameter d if a < d / 2 r. Dents are 0.15 to 0.25 r wide.
-USUAL_LIMIT = np.radians(6.0)
 # Times the rise of the circle that an edge's larger turn and facet are of: of two facets of unequal
 # width the wide one turns by up to twice as much as the edge between them.
 RISE = 2.0
