@@ -80,12 +80,14 @@ def limit_cpu_time(seconds: float) -> None:
 
 
 def raise_cpu_time(seconds: float) -> None:
-    """Allow this process so much more computing time than `limit_cpu_time` did."""
+    """Allow this process so much more computing time than `limit_cpu_time` did, if it did."""
     try:
         import resource
     except ImportError:
         return
-    limit_cpu_time(resource.getrlimit(resource.RLIMIT_CPU)[0] + seconds)
+    soft, _ = resource.getrlimit(resource.RLIMIT_CPU)
+    if soft != resource.RLIM_INFINITY:
+        limit_cpu_time(soft + seconds)
 
 
 def require_size(path: Path, size: int, most: int, what: str) -> None:
