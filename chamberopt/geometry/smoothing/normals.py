@@ -228,20 +228,17 @@ def corner_normals(
     count = int(fan.max()) + 1
     opening = _opening(facets).ravel()
 
-    def mean_of(chosen: np.ndarray, values: np.ndarray) -> np.ndarray:
-        """Sums (count, 3) over the chosen corners of each fan."""
-        weight = np.where(chosen, opening, 0.0)
+    def sums_of(weight: np.ndarray, values: np.ndarray) -> np.ndarray:
+        """Weighted sums (count, 3) over the corners of each fan."""
         return np.column_stack([np.bincount(fan, weight * one, count) for one in values.T])
 
-    every = np.ones(len(own), dtype=bool)
-    mean = unit_vectors(mean_of(every, own))
-    flat = np.repeat((np.abs(phi) < FLAT).all(axis=1), 3)
-    planes = mean_of(flat, np.repeat(facets.normal, 3, axis=0))
-    plane = unit_vectors(planes)
+    mean = unit_vectors(sums_of(opening, own))
+    of_planes = np.where(np.repeat((np.abs(phi) < FLAT).all(axis=1), 3), opening, 0.0)
+    planes = sums_of(of_planes, np.repeat(facets.normal, 3, axis=0))
     # Planes of one normal are as long as their weights together.
-    total = np.bincount(fan, np.where(flat, opening, 0.0), count)
+    total = np.bincount(fan, of_planes, count)
     is_one = (total > 0.0) & (np.linalg.norm(planes, axis=1) > np.cos(FLAT) * total)
-    mean[is_one] = plane[is_one]
+    mean[is_one] = unit_vectors(planes)[is_one]
     mean = _even_along_lines(mean, vertices, triangles, edges, fan, ~is_crease)
     result = mean[fan]
     at_apex = apex[triangles].ravel()

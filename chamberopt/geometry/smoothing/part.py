@@ -85,7 +85,8 @@ class SmoothPart:
 
     def of_part(self, mesh: PartMesh) -> PartMesh:
         """The divided mesh of a part; triangles keep the numbers and groups of the file's."""
-        if len(self.origin) == len(mesh.triangles):
+        # Numbers of triangles tell nothing: a simplified mesh may have as many when it is divided.
+        if np.array_equal(self.triangles, mesh.triangles):
             return mesh
         return replace(
             mesh,
@@ -151,8 +152,8 @@ def _has_points_in_facets(mesh: PartMesh, rules: list[Rule]) -> bool:
     bends = ~is_hard(edges) & (size > limit[edges.triangles].min(axis=1))
     of_round = np.isin(facet, facet[edges.triangles[bends]])
     # A vertex inside a facet has triangles of that facet alone around it.
-    low, high = np.full((2, len(mesh.vertices)), -1)
-    low[:] = len(mesh.triangles)
+    low = np.full(len(mesh.vertices), len(mesh.triangles))
+    high = np.full(len(mesh.vertices), -1)
     for corner in mesh.triangles.T:
         np.minimum.at(low, corner, facet)
         np.maximum.at(high, corner, facet)
