@@ -51,8 +51,8 @@ CASES = {
     "plate": Case("plate", {}, 4.0),
     "plate, two ball sizes": Case("plate", {"shot.diameter_mm": None, "shot.mix": SIZES}, 4.0),
     "blade": Case("blade", {}, 10.0),
-    "gear, 15 % out of reach": Case("gear", {}, 1.5),
-    "gear, reachable": Case("gear", {"part.target.reachable": True}, 1.5),
+    "gear": Case("gear", {}, 1.5),
+    "gear as in the file, 15 % out of reach": Case("gear", {"part.smoothing": "off"}, 1.5),
     "gear, turning": Case("gear_turning", {}, 4.0),
 }
 

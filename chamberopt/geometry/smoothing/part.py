@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 NEAR = 2e-3  # m from the target: as far as usual balls reach
 DIVIDED = 1e-9  # m: what has moved by less has not moved
 MOST = 0.9  # of the area
+ALONG = np.radians(1.0)  # planes of a facet differ by less
 MOST_TRIANGLES = 1.5e6  # of a part: more take too long to fly among
 
 
@@ -182,7 +183,8 @@ def _without_points_in_planes(mesh: PartMesh, rules: list[Rule]) -> tuple[PartMe
 def _on_file(found: SmoothPart, plain: PartMesh, mesh: PartMesh) -> SmoothPart:
     """A divided part whose origins are triangles of the file, not of its simplified mesh.
 
-    Each is the triangle that is closest to the middle of the new one, moved into its plane.
+    Each is the triangle that is closest to the middle of the new one, moved into its plane; or
+    closest to the middle of the simplified one where that is beyond the plane's border.
     """
     from sim_core import TriangleMesh, closest_points
 
@@ -190,8 +192,11 @@ def _on_file(found: SmoothPart, plain: PartMesh, mesh: PartMesh) -> SmoothPart:
     normal, middle = unit_normals(corners), found.vertices[found.triangles].mean(axis=1)
     height = np.einsum("ki,ki->k", middle - corners[:, 0], normal)
     surface = TriangleMesh(mesh.vertices, mesh.triangles, np.zeros(len(mesh.triangles), np.uint8))
-    place = middle - height[:, None] * normal
-    origin = closest_points(surface, place, float(np.ptp(mesh.vertices))).triangle
+    size = float(np.ptp(mesh.vertices))
+    origin = closest_points(surface, middle - height[:, None] * normal, size).triangle
+    of_file = unit_normals(mesh.vertices[mesh.triangles])
+    beyond = np.flatnonzero(np.einsum("ki,ki->k", of_file[origin], normal) < np.cos(ALONG))
+    origin[beyond] = closest_points(surface, corners[beyond].mean(axis=1), size).triangle
     facts = replace(found.facts, given_triangles=len(mesh.triangles))
     return replace(found, origin=origin, facts=facts)
 

@@ -8,7 +8,10 @@ by Gmsh.
 
 from __future__ import annotations
 
+import functools
+import multiprocessing
 from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -142,44 +145,7 @@ class Solid:
 
     def irregular(self, step: float, size: float) -> Mesh:
         """A mesh by Gmsh, of facets that turn by a step [rad] on rounds and of a size elsewhere."""
-        import gmsh
-
-        gmsh.initialize(interruptible=False)
-        try:
-            gmsh.option.setNumber("General.Terminal", 0)
-            gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", 2.0 * np.pi / step)
-            gmsh.option.setNumber("Mesh.MeshSizeMax", size)
-            gmsh.option.setNumber("Mesh.RandomSeed", 1)
-            occ = gmsh.model.occ
-
-            def point(at: np.ndarray) -> int:
-                place = (at[0], at[1], 0.0) if self.height is not None else (at[0], 0.0, at[1])
-                return int(occ.addPoint(*place))
-
-            starts = [point(one.start) for one in self.outline]
-            curves = [
-                occ.addCircleArc(one, point(piece.centre), two)
-                if piece.turn
-                else occ.addLine(one, two)
-                for piece, one, two in zip(
-                    self.outline, starts, [*starts[1:], starts[0]], strict=True
-                )
-            ]
-            face = (2, occ.addPlaneSurface([occ.addCurveLoop(curves)]))
-            if self.height is None:
-                occ.revolve([face], 0, 0, 0, 0, 0, 1, 2.0 * np.pi)
-                occ.remove([face])
-            else:
-                occ.extrude([face], 0, 0, self.height)
-            occ.synchronize()
-            gmsh.model.mesh.generate(2)
-            tags, places, _ = gmsh.model.mesh.getNodes()
-            _, corners = gmsh.model.mesh.getElementsByType(2)
-        finally:
-            gmsh.finalize()
-        row = np.zeros(int(tags.max()) + 1, dtype=np.int64)
-        row[tags] = np.arange(len(tags))
-        vertices, triangles = _welded(places.reshape(-1, 3), row[corners].reshape(-1, 3))
+        vertices, triangles = _gmsh_process().submit(_mesh_with_gmsh, self, step, size).result()
         outward = self.nearest(vertices[triangles].mean(axis=1))[1]
         if self.height is not None:
             z = vertices[triangles][:, :, 2]
@@ -209,6 +175,49 @@ class Solid:
     def _is_axis(self, piece: Piece) -> bool:
         ends = abs(piece.start[0]) + abs(piece.end[0])
         return self.height is None and not piece.turn and ends < 1e-12
+
+
+@functools.cache
+def _gmsh_process() -> ProcessPoolExecutor:
+    """A process for Gmsh, whose faults would end that of the tests without a word."""
+    return ProcessPoolExecutor(1, multiprocessing.get_context("spawn"))
+
+
+def _mesh_with_gmsh(solid: Solid, step: float, size: float) -> Mesh:
+    import gmsh
+
+    gmsh.initialize(interruptible=False)
+    try:
+        gmsh.option.setNumber("General.Terminal", 0)
+        gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", 2.0 * np.pi / step)
+        gmsh.option.setNumber("Mesh.MeshSizeMax", size)
+        gmsh.option.setNumber("Mesh.RandomSeed", 1)
+        occ = gmsh.model.occ
+
+        def point(at: np.ndarray) -> int:
+            place = (at[0], at[1], 0.0) if solid.height is not None else (at[0], 0.0, at[1])
+            return int(occ.addPoint(*place))
+
+        starts = [point(one.start) for one in solid.outline]
+        curves = [
+            occ.addCircleArc(one, point(piece.centre), two) if piece.turn else occ.addLine(one, two)
+            for piece, one, two in zip(solid.outline, starts, [*starts[1:], starts[0]], strict=True)
+        ]
+        face = (2, occ.addPlaneSurface([occ.addCurveLoop(curves)]))
+        if solid.height is None:
+            occ.revolve([face], 0, 0, 0, 0, 0, 1, 2.0 * np.pi)
+            occ.remove([face])
+        else:
+            occ.extrude([face], 0, 0, solid.height)
+        occ.synchronize()
+        gmsh.model.mesh.generate(2)
+        tags, places, _ = gmsh.model.mesh.getNodes()
+        _, corners = gmsh.model.mesh.getElementsByType(2)
+    finally:
+        gmsh.finalize()
+    row = np.zeros(int(tags.max()) + 1, dtype=np.int64)
+    row[tags] = np.arange(len(tags))
+    return _welded(places.reshape(-1, 3), row[corners].reshape(-1, 3))
 
 
 def stacked(rows: np.ndarray, rng: np.random.Generator | None = None) -> Mesh:

@@ -74,7 +74,6 @@ def test_fine_facets_are_left() -> None:
     assert len(smoothed(mesh).finer.triangles) == len(mesh[1])
 
 
-@pytest.mark.long
 @pytest.mark.parametrize(
     ("name", "degrees", "rms", "normals"),
     [
@@ -141,10 +140,7 @@ def test_chamfer_of_a_shaft_stays_sharp(chamfer: float, degrees: float) -> None:
 
 @pytest.mark.parametrize(
     "draw",
-    [
-        lambda: TORUS.strips(np.radians(15.0)),
-        pytest.param(lambda: TORUS.irregular(np.radians(22.5), 4e-3), marks=pytest.mark.long),
-    ],
+    [lambda: TORUS.strips(np.radians(15.0)), lambda: TORUS.irregular(np.radians(22.5), 4e-3)],
 )
 def test_saddles_become_few_triangles(draw: Callable[[], Mesh]) -> None:
     """Two halvings both ways make 16 of one; triangles whose normals go astray make hundreds."""

@@ -5,9 +5,6 @@ import pytest
 from benchmarks.facet_invariance import FIGURES, OFF, apart, cases, figures_of, rows_of
 from chamberopt.common.estimate import Estimate
 
-pytestmark = pytest.mark.long
-
-
 CASES = dict(cases())
 SHORT = {"process.accuracy.simulated_time_s": 2.0}
 

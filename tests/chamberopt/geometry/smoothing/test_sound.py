@@ -19,9 +19,6 @@ from tests.chamberopt.geometry.smoothing.measures import require_solid, require_
 from tests.helpers.mesh_files import write_stl
 from tests.helpers.scenes.rounded_solids import Mesh, Solid, circle, outline
 
-pytestmark = pytest.mark.long
-
-
 GEAR = Path(__file__).parents[4] / "designs/gear.toml"
 
 
@@ -124,7 +121,10 @@ def require_sound_part(mesh: Mesh) -> None:
     every = np.ones(len(part.triangles), dtype=bool)
     result = smooth(part, Rule(every, False, np.radians(6.0), 6e-5, np.inf), [])
     require_solid(
-        (part.vertices, part.triangles), (result.vertices, result.triangles), result.origin
+        (part.vertices, part.triangles),
+        (result.vertices, result.triangles),
+        result.origin,
+        result.facts.largest_move,
     )
 
 

@@ -33,7 +33,6 @@ def test_sharp_solids_stay(name: str) -> None:
     require_unmoved(solid.strips(0.1))
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("name", OUTLINES)
 def test_sharp_solids_in_irregular_triangles_stay(name: str) -> None:
     require_unmoved(Solid(OUTLINES[name], 20 * MM).irregular(2.0 * np.pi, 5 * MM))
@@ -67,14 +66,7 @@ CHORD_ERROR = {"cylinder": 43e-6, "sphere": 16e-6, "box": 20e-6}
 
 
 @pytest.mark.parametrize("share", [0.005, 0.05, 0.5, 2.0])
-@pytest.mark.parametrize(
-    "name",
-    [
-        "sphere",
-        pytest.param("cylinder", marks=pytest.mark.long),
-        pytest.param("box", marks=pytest.mark.long),
-    ],
-)
+@pytest.mark.parametrize("name", SURFACES)
 def test_noise_is_not_made_worse(name: str, share: float) -> None:
     """Vertices moved by a share of the facets' chord error: nothing moves, or it gets better."""
     vertices, triangles = SURFACES[name]()
