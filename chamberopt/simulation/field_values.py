@@ -33,6 +33,7 @@ from chamberopt.coverage.strength import (
 )
 from chamberopt.design.peening.calibration import calibrated_strip
 from chamberopt.simulation.evaluate import prepare_target
+from sim_core import TriangleMesh, closest_points
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
@@ -119,6 +120,7 @@ class PartField:
             strength_um, saturation_time_s: peening strength S [µm] and T, see coverage/strength.py.
             almen_intensity_mmA: [mmA]; only where the design has a calibration to strips.
             compression_depth_um: [µm], see coverage/compression.py; absent for some metals.
+            moved_um: distance of the surface from the file's facets [µm]; absent if none moved.
         """
         gauge = gauge or self.field.gauge_round(places, self.field.radius)
         fits = self.reachable(places) & np.isfinite(gauge.area)
@@ -131,7 +133,18 @@ class PartField:
             "reachable": fits.astype(float),
             **known,
             "resolved": enough.astype(float),
+            **self._moved(places),
         }
+
+    def _moved(self, places: Places) -> dict[str, np.ndarray]:
+        """How far smoothing has moved the surface, see `values`."""
+        part = self._chamber.part
+        if part.smoothing is None or part.file is None or part.file.original is None:
+            return {}
+        given, size = part.file.original, float(np.ptp(part.vertices))
+        vertices = given.vertices @ part.file.rotation.T + part.file.shift
+        facets = TriangleMesh(vertices, given.triangles, np.zeros(len(given.triangles), np.uint8))
+        return {"moved_um": 1e6 * closest_points(facets, places.place, size).distance}
 
     def element_values(self) -> dict[str, np.ndarray]:
         """Means of the values over each triangle of the part, and what is its own.

@@ -32,6 +32,7 @@ COLUMNS = {
     "almen_intensity_mmA": ("Almen intensity, mmA", "dents"),
     "saturation_time_s": ("saturation time of an Almen strip, s", "dents"),
     "compression_depth_um": ("estimated depth of compression, micrometres", "dents"),
+    "moved_um": ("distance of the smooth surface from the facets, micrometres", "area"),
     "impacts": ("number of simulated impacts", "sum"),
     "dents": ("number of simulated dents", "sum"),
     "exposed_area_mm2": ("area inside the chamber, mm2", "sum"),

@@ -1,8 +1,12 @@
 """Values in windows and of triangles against counts by hand, and intervals that hold the truth."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+from benchmarks.facet_invariance import cases
+from chamberopt.chamber.build import build_chamber
 from chamberopt.coverage.coverage_from_impacts import coverage_from_dent_density
 from chamberopt.output.plots.quantities import QUANTITIES
 from chamberopt.simulation.evaluation import Evaluation
@@ -34,6 +38,22 @@ def evaluation() -> Evaluation:
 @pytest.fixture(scope="module")
 def field(evaluation: Evaluation) -> PartField:
     return PartField(DESIGN, PLANE, evaluation)
+
+
+def test_how_far_the_surface_was_moved_is_known_everywhere(tmp_path: Path) -> None:
+    """Nowhere further than the largest move, and on the share of the target that was moved."""
+    case = dict(cases())["block, R = 3 r"]
+    case.coarse["strips of 30 degrees"](tmp_path / "part.stl")
+    design = case.design.changed({"part.mesh": str(tmp_path / "part.stl"), "part.unit": "mm"})
+    chamber = build_chamber(design)
+    assert chamber.part.smoothing is not None
+    values = PartField(design, chamber, evaluation_of(design, chamber, [no_hits()] * 3))
+    moved = values.element_values()["moved_um"]
+    largest = 1e6 * chamber.part.smoothing.largest_move
+    assert 0.7 * largest < np.nanmax(moved) <= 1.001 * largest
+    area = np.where(chamber.part.target, chamber.part.area, 0.0)
+    share = area[moved > 0.01].sum() / area.sum()
+    assert share == pytest.approx(chamber.part.smoothing.moved_share, abs=0.02)
 
 
 def times_longer() -> float:
@@ -68,7 +88,8 @@ def test_values_of_an_even_rain_of_equal_dents(field: PartField) -> None:
 
 def test_there_is_all_that_can_be_drawn(field: PartField) -> None:
     elements = field.element_values()
-    of_others = {"zone", "almen_intensity_mmA"}  # designs with zones, and calibrated ones
+    # Of designs with zones, of calibrated ones, and of parts with rounds.
+    of_others = {"zone", "almen_intensity_mmA", "moved_um"}
     assert {one.column for one in QUANTITIES.values()} - of_others <= set(elements)
     assert {column.shape for column in elements.values()} == {(len(PLANE.part.triangles),)}
 
