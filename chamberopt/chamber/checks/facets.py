@@ -11,7 +11,7 @@ from chamberopt.chamber.reach.reach import TOLERATED_OVERLAP
 if TYPE_CHECKING:
     from chamberopt.chamber.part import Part
 
-LEAST_SHARE = 1e-3  # of the target's area that is worth a word
+LEAST_SHARE = 0.01  # of the target's area that is worth a word
 LEFT = "coverage is that of facets: "  # begins the warning
 
 

@@ -223,7 +223,7 @@ def _divided(mesh: PartMesh, target: Rule, zones: list[Rule]) -> SmoothPart:
     left = coarse & (np.isinf(asked) | surfaces.noisy | crossing)
     before = tetrahedron_volumes(vertices, triangles).sum()
     facts = SmoothingFacts(
-        largest_move=float(moved.max()),
+        largest_move=float(moved[moved > DIVIDED].max(initial=0.0)),
         moved_share=float(of_target[moved > DIVIDED].sum()),
         volume_change=float(
             tetrahedron_volumes(finer.vertices, finer.triangles).sum() / before - 1.0
