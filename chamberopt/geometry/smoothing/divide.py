@@ -28,10 +28,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from chamberopt.geometry.triangles import area_vectors, edge_keys, unit_vectors
+from chamberopt.geometry.triangles import area_vectors, edge_keys, unit_normals, unit_vectors
 
 LEVELS = 6  # rounds of splitting; 90 degrees an edge at 6 degrees take four
 TURNED = 0.6  # cosine between a triangle and the normals at its corners: below, it is not made
+STRAIGHT = 6.0  # a side that bends by so many times less than the limit makes no triangle lean
 SLACK = 1.02  # what bends by the limit is not split, whichever way it is rounded
 WEAK = 0.1  # sine between the sides of a crease below which it has no tangent of its own
 LESS = 1.0 / 3.0  # rise of the middle of half an edge over that of the edge, with a margin over 1/4
@@ -93,6 +94,7 @@ def _split_once(
         np.repeat(of_parent[surface.parent], 3)[sides].min(axis=1) for of_parent in (limit, narrow)
     )
     wanted = (bend > SLACK * most) & (width > least)
+    wanted |= (bend > most / STRAIGHT) & _folds(surface, limit).ravel()[sides].any(axis=1)
     wanted &= ~whole.ravel()[sides].any(axis=1)
     while True:
         new = np.full(3 * len(surface.triangles), -1)
@@ -112,6 +114,19 @@ def _split_once(
             return finer, np.where(side >= 0, whole[row[:, None], side], False)
         whole = whole | (bad[:, None] & (new.reshape(-1, 3) >= 0))
         wanted &= ~whole.ravel()[sides].any(axis=1)
+
+
+def _folds(surface: Surface, limit: np.ndarray) -> np.ndarray:
+    """Marks (k, 3) the longest side of each triangle that leans by more than the limit.
+
+    A long and narrow triangle leans away from the surface's normals by the rise along its longest
+    side over its height, though no side bends by much; two of them make a fold.
+    """
+    corners = surface.vertices[surface.triangles]
+    cosine = np.einsum("ki,ki->k", unit_normals(corners), unit_vectors(surface.normals.sum(axis=1)))
+    length = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
+    leans = cosine < np.cos(np.minimum(limit[surface.parent], np.pi))
+    return np.asarray(leans[:, None] & (length >= length.max(axis=1, keepdims=True)))
 
 
 def _middles(surface: Surface, sides: np.ndarray) -> tuple[np.ndarray, ...]:

@@ -41,6 +41,9 @@ FIT, CREASE = 2.5, 0.5
 STEPS, FLOOR, LAST = 25, 0.01, 1e-3
 FLAT = np.radians(0.5)  # phi below which a facet is a piece of a plane
 PLANE = 1e-4  # rad: facets that turn by less are in one plane, but for the rounding of a file
+MANY_SIDES = 64  # of a plane that is one facet
+OPPOSITE = 0.45  # cosine between sides across which a facet bends about one axis
+ONE_LINE = 0.02  # of squares: sides that bend by less at a corner are one line, 16 degrees
 # Angle defects by which a vertex is the apex of a cone: at once, or if it is so many times larger
 # than those around it.
 APEX, SMALL_APEX, OF_AROUND = 0.5, np.radians(3.0), 4.0
@@ -79,8 +82,53 @@ def measure_facets(vertices: np.ndarray, triangles: np.ndarray) -> Facets:
     return Facets(normal, area, across, length)
 
 
+class Pieces(NamedTuple):
+    """The facets of a surface: quadrangles of strips and other small planes, or single triangles.
+
+    Attributes:
+        number: of the piece of each triangle, shape (m,).
+        inner: marks the sides between triangles of one piece, shape (3 m,).
+    """
+
+    number: np.ndarray
+    inner: np.ndarray
+
+    def around(self, triangle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The outer sides of the pieces of triangles (r,): rows of these, and sides, (k,) each."""
+        outer = np.flatnonzero(~self.inner)
+        outer = outer[np.argsort(self.number[outer // 3], kind="stable")]
+        ends = np.searchsorted(self.number[outer // 3], np.arange(int(self.number.max()) + 2))
+        first = ends[self.number[triangle]]
+        count = ends[self.number[triangle] + 1] - first
+        row = np.repeat(np.arange(len(triangle)), count)
+        before = np.repeat(np.cumsum(count) - count, count)
+        return row, outer[first[row] + np.arange(len(row)) - before]
+
+
+def find_pieces(edges: Edges, is_crease: np.ndarray, count: int) -> Pieces:
+    """The facets of so many triangles: planes of no more than MANY_SIDES, and other triangles."""
+    joins = ~is_crease & (np.abs(edges.turn) < PLANE)
+    number = connected_pieces(*edges.triangles[joins].T, count)[1]
+    outer = np.bincount(np.repeat(number, 3), ~_between_alike(number, edges, count))
+    is_simple = outer <= MANY_SIDES
+    number = np.where(is_simple[number], number, number.max() + 1 + np.arange(count))
+    return Pieces(number, _between_alike(number, edges, count))
+
+
+def _between_alike(number: np.ndarray, edges: Edges, count: int) -> np.ndarray:
+    """Marks the sides (3 m,) at edges between triangles of one number."""
+    marked = np.zeros(3 * count, dtype=bool)
+    marked[edges.sides[number[edges.triangles[:, 0]] == number[edges.triangles[:, 1]]]] = True
+    return marked
+
+
 def fit_phi(
-    facets: Facets, edges: Edges, is_crease: np.ndarray, fitted: np.ndarray, apexes: np.ndarray
+    facets: Facets,
+    pieces: Pieces,
+    edges: Edges,
+    is_crease: np.ndarray,
+    fitted: np.ndarray,
+    apexes: np.ndarray,
 ) -> np.ndarray:
     """The angles phi (m, 3) [rad]; 0 off the fitted triangles.
 
@@ -91,7 +139,11 @@ def fit_phi(
     """
     phi = np.zeros(3 * len(fitted))
     unknown = np.full(3 * len(fitted), -1)
-    unknown[np.repeat(fitted, 3)] = np.arange(3 * fitted.sum())
+    at_apex = np.zeros(len(fitted), dtype=bool)
+    at_apex[edges.triangles[apexes]] = True
+    straight = _straight_to_creases(facets, pieces, edges, is_crease)
+    is_unknown = np.repeat(fitted, 3) & (~straight | np.repeat(at_apex, 3))
+    unknown[is_unknown] = np.arange(is_unknown.sum())
     smooth = np.flatnonzero(~is_crease & fitted[edges.triangles].any(axis=1))
     on_crease = edges.sides[is_crease].ravel()
     on_crease = on_crease[unknown[on_crease] >= 0]
@@ -108,6 +160,25 @@ def fit_phi(
     )
     phi[unknown >= 0] = x
     return phi.reshape(-1, 3)
+
+
+def _straight_to_creases(
+    facets: Facets, pieces: Pieces, edges: Edges, is_crease: np.ndarray
+) -> np.ndarray:
+    """Marks the sides (3 m,) at creases towards which no side of their facet tells of a bend.
+
+    Those of a cylinder or cone at its ends: the facets turn along them alone.
+    """
+    turns = np.zeros(3 * len(facets.area), dtype=bool)
+    turns[edges.sides[~is_crease & (np.abs(edges.turn) > PLANE)]] = True
+    crease = edges.sides[is_crease].ravel()
+    row, side = pieces.around(crease // 3)
+    across = facets.across.reshape(-1, 3)
+    cosine = np.abs(np.einsum("ri,ri->r", across[crease[row]], across[side]))
+    tells = np.bincount(row, turns[side] & (cosine > OPPOSITE), len(crease)) > 0
+    straight = np.zeros(len(turns), dtype=bool)
+    straight[crease[~tells]] = True
+    return straight
 
 
 def _rows(unknown: np.ndarray, sides: np.ndarray, factor: np.ndarray) -> csr_array:
@@ -207,6 +278,7 @@ def hollow_curvature(facets: Facets, phi: np.ndarray) -> np.ndarray:
 
 def corner_normals(
     facets: Facets,
+    pieces: Pieces,
     vertices: np.ndarray,
     triangles: np.ndarray,
     edges: Edges,
@@ -224,6 +296,7 @@ def corner_normals(
     # Linear over the facet: at a corner the sum of its two sides less the side opposite.
     own = facets.normal[:, None] + lean + np.roll(lean, 1, axis=1) - np.roll(lean, 2, axis=1)
     own = unit_vectors(own.reshape(-1, 3))
+    own = _at_corners_of_pieces(own, facets, pieces, triangles, edges, is_crease, phi)
     fan = fans(triangles, edges, ~is_crease)
     count = int(fan.max()) + 1
     opening = _opening(facets).ravel()
@@ -244,6 +317,44 @@ def corner_normals(
     at_apex = apex[triangles].ravel()
     result[at_apex] = own[at_apex]
     return result.reshape(-1, 3, 3)
+
+
+def _at_corners_of_pieces(
+    own: np.ndarray,
+    facets: Facets,
+    pieces: Pieces,
+    triangles: np.ndarray,
+    edges: Edges,
+    is_crease: np.ndarray,
+    phi: np.ndarray,
+) -> np.ndarray:
+    """Unit normals (3 m, 3) at corners, of pieces of several triangles by the sides beside them.
+
+    The normal leans by phi across each side of the piece that ends at the corner. A side at a
+    crease with a phi of 0 tells nothing: a cone leans across its straight lines alone.
+    """
+    told = ~pieces.inner
+    on_crease = edges.sides[is_crease].ravel()
+    told[on_crease[np.abs(phi.ravel()[on_crease]) < FLAT]] = False
+    side = np.flatnonzero(told)
+    following = 3 * (side // 3) + (side % 3 + 1) % 3
+    vertex = triangles.astype(np.int64).ravel()
+    place = np.repeat(pieces.number, 3) * (int(vertex.max()) + 1) + vertex
+    _, corner = np.unique(place, return_inverse=True)
+    corner = corner.reshape(-1)
+    at, m = np.r_[corner[side], corner[following]], facets.across.reshape(-1, 3)[np.r_[side, side]]
+    lean, count = np.tan(phi.ravel())[np.r_[side, side]], int(corner.max()) + 1
+    square = np.empty((count, 3, 3))
+    right = np.column_stack([np.bincount(at, lean * m[:, i], count) for i in range(3)])
+    for i in range(3):
+        for j in range(3):
+            square[:, i, j] = np.bincount(at, m[:, i] * m[:, j], count)
+    leaning = np.einsum("cij,cj->ci", np.linalg.pinv(square, rcond=ONE_LINE, hermitian=True), right)
+    several = np.bincount(pieces.number, minlength=int(pieces.number.max()) + 1)[pieces.number] > 1
+    rows = np.flatnonzero(np.repeat(several, 3))
+    result = own.copy()
+    result[rows] = unit_vectors(facets.normal[rows // 3] + leaning[corner[rows]])
+    return result
 
 
 def _even_along_lines(

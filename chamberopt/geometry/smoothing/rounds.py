@@ -34,9 +34,13 @@ OF_LARGEST = 0.3
 SMOOTH = np.radians(1.0)  # edges that turn by less need no evidence
 # Factor of curvatures: beside a plane the first facet of a round has 3/4 of that of the others.
 ALIKE = 1.6
+# The same of the curvatures about an edge: those of a cone and of its flat end are alike in sum.
+ALIKE_ABOUT_AXIS = 4.0
 # A round goes on beyond a facet: its other edges bend about an edge too, by this share of that
 # edge's own bend if it turns by CONVEX_SURE, and by less, with the square, if it turns by less.
 GOES_ON = 0.5
+ACROSS = 0.4  # cosine between edges of a facet below which they bend about different axes
+FEW_EDGES = 64
 
 
 class Edges(NamedTuple):
@@ -141,14 +145,16 @@ def _is_in_round(facet: np.ndarray, edges: Edges, sure: np.ndarray, area: np.nda
     curvature = np.bincount(facet.T.ravel(), np.tile(bend, 2), len(area)) / np.maximum(area, 1e-30)
     pairs = np.unique(np.sort(facet[sure], axis=1), axis=0)
     is_inner = np.bincount(pairs.ravel(), minlength=len(area)) >= 2
-    alike = is_inner[pairs].all(axis=1) & _are_alike(curvature[pairs])
-    of_round = np.zeros(len(area), dtype=bool)
-    of_round[pairs[alike]] = True
-    beside = of_round[facet]
     bends_beside = _bends_beside(facet, bend, edges.along, len(area))
+    about_axis = (bends_beside + bend[:, None]) / np.maximum(area[facet], 1e-30)
+    alike = is_inner[facet].all(axis=1) & _are_alike(curvature[facet], ALIKE)
+    alike &= sure & _are_alike(about_axis, ALIKE_ABOUT_AXIS)
+    of_round = np.zeros(len(area), dtype=bool)
+    of_round[facet[alike]] = True
+    beside = of_round[facet]
     needed = GOES_ON * (edges.turn / CONVEX_SURE) ** 2 * bend
     goes_on = bends_beside >= needed[:, None]
-    alike = beside.all(axis=1) & _are_alike(curvature[facet])
+    alike = beside.all(axis=1) & _are_alike(curvature[facet], ALIKE)
     return (goes_on & beside).any(axis=1) & (sure | alike)
 
 
@@ -156,16 +162,28 @@ def _bends_beside(facet: np.ndarray, bend: np.ndarray, along: np.ndarray, count:
     """Bends about each edge of the other edges of the facets on both sides, (k, 2).
 
     What bends about an axis across the edge does not count: the round of a shaft tells nothing of
-    the edge at its end.
+    the edge at its end. Nor does the round of a cone, whose lines are not quite across its end.
     """
     tensor = np.einsum("k,ki,kj->kij", bend, along, along).reshape(-1, 9)
     sums = np.stack(
         [np.bincount(facet.T.ravel(), np.tile(one, 2), count) for one in tensor.T], axis=1
     ).reshape(-1, 3, 3)
-    return np.einsum("kfij,ki,kj->kf", sums[facet], along, along) - bend[:, None]
+    bends = np.einsum("kfij,ki,kj->kf", sums[facet], along, along) - bend[:, None]
+    # Of facets with few edges those nearly across are taken out, pair by pair.
+    number = np.bincount(facet.ravel(), minlength=count)
+    order = np.argsort(facet.ravel(), kind="stable")
+    first = np.cumsum(number) - number
+    place = np.flatnonzero(number[facet.ravel()] <= FEW_EDGES)
+    times = number[facet.ravel()[place]]
+    pair = np.repeat(place, times)
+    other = np.arange(len(pair)) - np.repeat(np.cumsum(times) - times, times)
+    other = order[first[facet.ravel()[pair]] + other] // 2
+    cosine = np.einsum("ri,ri->r", along[pair // 2], along[other])
+    across = np.where(np.abs(cosine) < ACROSS, bend[other] * cosine**2, 0.0)
+    return bends - np.bincount(pair, across, 2 * len(bend)).reshape(-1, 2)
 
 
-def _are_alike(curvature: np.ndarray) -> np.ndarray:
-    """Whether the curvatures of pairs (k, 2) of facets are those of one round, shape (k,)."""
+def _are_alike(curvature: np.ndarray, factor: float) -> np.ndarray:
+    """Whether the curvatures of pairs (k, 2) of facets differ by no more, shape (k,)."""
     low, high = np.sort(curvature, axis=1).T
-    return np.asarray(high <= ALIKE * low)
+    return np.asarray(high <= factor * low)

@@ -21,6 +21,7 @@ from chamberopt.geometry.smoothing.normals import (
     Facets,
     corner_normals,
     find_apexes,
+    find_pieces,
     fit_phi,
     hollow_curvature,
     measure_facets,
@@ -85,8 +86,9 @@ def find_surfaces(
     fitted &= ~_planes(edges, facets, lone)
     ends = sides_of(triangles)[edges.sides[:, 0]]
     apex = find_apexes(facets, triangles, edges, lone)
+    pieces = find_pieces(edges, lone, len(triangles))
     if given is None:
-        phi = fit_phi(facets, edges, lone, fitted, apex[ends].any(axis=1))
+        phi = fit_phi(facets, pieces, edges, lone, fitted, apex[ends].any(axis=1))
     else:
         phi = phi_of_normals(facets, given)
     left = edges.turn - phi.ravel()[edges.sides].sum(axis=1)
@@ -97,7 +99,7 @@ def find_surfaces(
     on_crease = np.zeros(3 * len(triangles), dtype=bool)
     on_crease[edges.sides[is_crease]] = True
     if given is None:
-        given = corner_normals(facets, vertices, triangles, edges, is_crease, phi, apex)
+        given = corner_normals(facets, pieces, vertices, triangles, edges, is_crease, phi, apex)
         noisy = _noise(edges, lone, left, face, fitted, ends)[face] > NOISE
     else:
         noisy = np.zeros(len(triangles), dtype=bool)
