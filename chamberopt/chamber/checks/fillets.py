@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 OF_FILLET, OF_SLOT = 0.5, 0.25  # largest shot, of the fillet's radius and of the slot's width
 LEAST_TURN, SHARP = 1.0, 60.0  # degrees at an inner edge of a fillet's facets; more has no fillet
+FOLD = 15.0  # degrees: inner edges that turn by more are of a fillet, even of a single facet
 HOLLOW = 1.0 / 3.0  # share of the turning near an edge of a fillet that is inwards, less outwards
 SMALLEST = 0.05  # share of the inner edges' length, or of the slots' area, that may be smaller
 MAX_POINTS = 5000  # of the surface that slots are looked for at
@@ -38,18 +39,24 @@ def fillet_warnings(reach: Reach, chamber: Chamber, largest: float) -> list[str]
 
 
 def inner_edges(
-    vertices: np.ndarray, triangles: np.ndarray, chosen: np.ndarray
+    vertices: np.ndarray,
+    triangles: np.ndarray,
+    chosen: np.ndarray,
+    hollow: np.ndarray | None = None,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """The inner edges between chosen triangles: of each its middle, length and fillet radius.
 
     Facets of a height L that turn by an angle a at each edge touch a circle of the radius
     L / (2 tan(a / 2)); at edges that turn by more than SHARP it is 0. Triangles of a shaft or a
     cone turn inwards at some edges too: an edge counts only if the surface round it is HOLLOW.
+    Where the curvature behind the facets is known, its radius is taken: facets of a surface that
+    bends both ways fold inwards here and there.
 
     Args:
         vertices: [m], shape (n, 3).
         triangles: normals out of the part, shape (m, 3).
         chosen: marks triangles, shape (m,).
+        hollow: curvature of the surface behind them [1/m], 0 where none is known, shape (m,).
     Returns:
         Middles [m], shape (e, 3), lengths [m] and radii [m], shape (e,).
     """
@@ -71,12 +78,16 @@ def inner_edges(
     over = vertices[triangles[triangle[two]]].mean(axis=1) - ends[:, 0]
     inwards = np.where(np.einsum("ij,ij->i", over, a) > 0.0, turn, -turn)
     around = sides[one], ends[:, 1] - ends[:, 0]
-    hollow = _turn_across(*around, inwards) > HOLLOW * _turn_across(*around, turn)
-    inner = (inwards > np.radians(LEAST_TURN)) & (hollow | (turn > np.radians(SHARP)))
+    goes_in = _turn_across(*around, inwards) > HOLLOW * _turn_across(*around, turn)
+    inner = (inwards > np.radians(LEAST_TURN)) & (goes_in | (turn > np.radians(SHARP)))
     # Mean height of the two triangles over their edge; `size` is an area.
     height = (size[triangle[one]] + size[triangle[two]]) / np.maximum(length, 1e-300)
     turn = turn[inner]
     radius = height[inner] / (2.0 * np.tan(0.5 * turn))
+    if hollow is not None:
+        curvature = np.maximum(hollow[triangle[one]], hollow[triangle[two]])[inner]
+        known = (curvature > 0.0) | (turn < np.radians(FOLD))
+        radius[known] = 1.0 / np.maximum(curvature[known], 1e-9)
     radius[turn > np.radians(SHARP)] = 0.0
     return ends.mean(axis=1)[inner], length[inner], radius
 
@@ -104,7 +115,8 @@ def _turn_across(ends: np.ndarray, way: np.ndarray, turns: np.ndarray) -> np.nda
 
 
 def _fillets(chamber: Chamber, chosen: np.ndarray, largest: float) -> list[str]:
-    middle, length, radius = inner_edges(chamber.part.vertices, chamber.part.triangles, chosen)
+    part = chamber.part
+    middle, length, radius = inner_edges(part.vertices, part.triangles, chosen, part.hollow)
     small = radius * OF_FILLET < largest
     if length[small].sum() < largest:  # what is shorter than a ball is no fillet
         return []

@@ -108,7 +108,8 @@ class Pieces(NamedTuple):
 def find_pieces(edges: Edges, is_crease: np.ndarray, count: int) -> Pieces:
     """The facets of so many triangles: planes of no more than MANY_SIDES, and other triangles."""
     joins = ~is_crease & (np.abs(edges.turn) < PLANE)
-    number = connected_pieces(*edges.triangles[joins].T, count)[1]
+    one, two = edges.triangles[joins].T
+    number = connected_pieces(one, two, count)[1]
     outer = np.bincount(np.repeat(number, 3), ~_between_alike(number, edges, count))
     is_simple = outer <= MANY_SIDES
     number = np.where(is_simple[number], number, number.max() + 1 + np.arange(count))
