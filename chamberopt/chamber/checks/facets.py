@@ -27,14 +27,14 @@ def facet_warnings(part: Part, ball: float, reachable: float) -> list[str]:
         return []
     noisy = facts.noisy_share >= max(facts.crossing_share, LEAST_SHARE)
     if noisy:
-        why = "which are no rounds but noise, and were left as they are"
-        remedy = "smooth the scan, or give a mesh with finer facets"
+        why = "which fit no round, as on a scan or on bevels, and were left as they are"
+        remedy = "if rounds are meant, smooth the scan or give a mesh with finer facets"
     elif facts.crossing_share >= LEAST_SHARE:
         why = "which would cross others if they were divided"
         remedy = "give a mesh with finer facets"
     else:
-        why = "which part.smoothing leaves as they are"
-        remedy = "leave it out, or give a mesh with finer facets"
+        why = "which were left as they are"
+        remedy = "give a mesh with finer facets, or change part.smoothing"
     return [
         f"{LEFT}they turn by {np.degrees(facts.coarse_turn):.2g} degrees on "
         f"{facts.coarse_share:.0%} of the target, {why}; in their hollows a ball lies across two "

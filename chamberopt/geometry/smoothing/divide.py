@@ -35,6 +35,8 @@ TURNED = 0.6  # cosine between a triangle and the normals at its corners: below,
 STRAIGHT = 6.0  # a side that bends by so many times less than the limit makes no triangle lean
 SLACK = 1.02  # what bends by the limit is not split, whichever way it is rounded
 WEAK = 0.1  # sine between the sides of a crease below which it has no tangent of its own
+FARTHER = 3.0  # a surface so many times farther than a side may move is not approached
+LEVEL = 1e-3  # rise over length of what is as good as straight
 LESS = 1.0 / 3.0  # rise of the middle of half an edge over that of the edge, with a margin over 1/4
 TIE = 1e-6  # relative difference of diagonals that counts as none
 
@@ -89,13 +91,13 @@ def _split_once(
 ) -> tuple[Surface, np.ndarray]:
     """One round of splitting; edges stay whole where a new triangle would be turned over."""
     sides = np.argsort(edge_keys(surface.triangles), kind="stable").reshape(-1, 2)
-    place, normal, bend, width = _middles(surface, sides)
+    place, normal, bend, width, is_near = _middles(surface, sides)
     most, least = (
         np.repeat(of_parent[surface.parent], 3)[sides].min(axis=1) for of_parent in (limit, narrow)
     )
     wanted = (bend > SLACK * most) & (width > least)
     wanted |= (bend > most / STRAIGHT) & _folds(surface, limit).ravel()[sides].any(axis=1)
-    wanted &= ~whole.ravel()[sides].any(axis=1)
+    wanted &= is_near & ~whole.ravel()[sides].any(axis=1)
     while True:
         new = np.full(3 * len(surface.triangles), -1)
         new[sides[wanted]] = len(surface.vertices) + np.arange(wanted.sum())[:, None]
@@ -134,7 +136,8 @@ def _middles(surface: Surface, sides: np.ndarray) -> tuple[np.ndarray, ...]:
 
     Returns:
         Places [m], shape (e, 3); normals on both sides, shape (2, e, 3); the bend along each edge
-        [rad], shape (e,), and its width across the bend [m], shape (e,).
+        [rad], shape (e,), and its width across the bend [m], shape (e,); marks edges whose middle
+        may move as far as their surface is away, or nearly, shape (e,).
     """
     triangle, k = np.divmod(sides.T, 3)
     own, following = (
@@ -158,6 +161,7 @@ def _middles(surface: Surface, sides: np.ndarray) -> tuple[np.ndarray, ...]:
     size = np.linalg.norm(both, axis=1)
     rise = np.einsum("ei,ei->e", chord, change) / (4.0 + 2.0 * size)
     far = surface.rise[triangle].max(axis=0)
+    is_near = np.abs(rise) <= FARTHER * far + LEVEL * length
     rise = np.clip(rise, -far, far)
     place = 0.5 * (start + end) + rise[:, None] * unit_vectors(both)
     bend = np.maximum(_angle(a, b), _lean(a, e) + _lean(b, e))
@@ -166,7 +170,7 @@ def _middles(surface: Surface, sides: np.ndarray) -> tuple[np.ndarray, ...]:
     normal = n0 + n1
     f = _tilts(surface, sides, normal, e, is_crease)
     normal = normal - 1.5 * np.einsum("sei,ei->se", normal, e)[..., None] * f
-    return place, unit_vectors(normal), bend, width
+    return place, unit_vectors(normal), bend, width, is_near
 
 
 def _tilts(

@@ -17,7 +17,8 @@ from chamberopt.common.kept_records import kept, key_of
 from chamberopt.geometry.mesh_io.part_mesh import PartMesh
 from chamberopt.geometry.mesh_io.readers.raw_mesh import number_by_position
 from chamberopt.geometry.mesh_io.self_intersection import crossing_pairs
-from chamberopt.geometry.smoothing.normals import plane_facets
+from chamberopt.geometry.smoothing.divide import LESS
+from chamberopt.geometry.smoothing.normals import measure_facets, plane_facets
 from chamberopt.geometry.smoothing.rounds import find_edges, is_hard
 from chamberopt.geometry.smoothing.smooth import Surfaces, divide_rounds, find_surfaces, moves
 from chamberopt.geometry.solids import simplify_planes
@@ -213,14 +214,17 @@ def _divided(mesh: PartMesh, target: Rule, zones: list[Rule]) -> SmoothPart:
         turn[own], narrow[own], tolerance[own] = rule.turn, rule.narrow, rule.tolerance
     if mesh.is_exact:
         asked[:] = np.inf  # the triangles are of the surface itself, as fine as was asked for
-    surfaces = surfaces._replace(rise=np.minimum(surfaces.rise, tolerance))
+    # Sides of halves move again, all together by 1 / (1 - LESS) times what the first does.
+    surfaces = surfaces._replace(rise=np.minimum(surfaces.rise, (1.0 - LESS) * tolerance))
     finer, crossing = _divide_apart(mesh, surfaces, asked, narrow)
     moved = moves(vertices, triangles, finer)
 
     area = areas(vertices, triangles)
     of_target = np.where(on_target, area, 0.0) / area[on_target].sum()
     coarse = on_target & (surfaces.turn > turn) & (not mesh.is_exact)
-    left = coarse & (np.isinf(asked) | surfaces.noisy | crossing)
+    is_whole = np.bincount(finer.parent, minlength=len(triangles)) == 1
+    is_whole &= measure_facets(vertices, triangles).height.min(axis=1) > narrow
+    left = coarse & (np.isinf(asked) | surfaces.noisy | crossing | is_whole)
     before = tetrahedron_volumes(vertices, triangles).sum()
     facts = SmoothingFacts(
         largest_move=float(moved[moved > DIVIDED].max(initial=0.0)),

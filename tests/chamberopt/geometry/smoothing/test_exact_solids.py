@@ -78,7 +78,7 @@ def test_fine_facets_are_left() -> None:
     ("name", "degrees", "rms", "normals"),
     [
         ("cylinder", 15.0, 0.25, 0.3),
-        ("block, R = 1 r", 15.0, 0.3, 0.3),
+        ("block, R = 1 r", 15.0, 0.31, 0.3),
         ("block, R = 1.5 r", 22.5, 0.15, 0.15),
         ("block, R = 3 r", 30.0, 0.15, 0.15),
         ("torus", 22.5, 0.2, 0.2),

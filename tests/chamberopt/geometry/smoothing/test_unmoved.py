@@ -24,7 +24,8 @@ SHARP = {
                 (-12, 10), (-40, 10)],
 }  # fmt: skip
 OUTLINES = {name: outline(MM * np.array(one)) for name, one in SHARP.items()}
-OUTLINES |= {"hexagon": regular_polygon(6, 10 * MM), "octagon": regular_polygon(8, 10 * MM)}
+OUTLINES |= {"hexagon": regular_polygon(6, 10 * MM), "octagon": regular_polygon(8, 10 * MM),
+             "9 sides": regular_polygon(9, 10 * MM)}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", OUTLINES)
