@@ -90,6 +90,8 @@ def cases() -> Iterator[tuple[str, Case]]:
         yield f"block, R = {times:g} r", of_solid(small, Solid(outline(corners), 8.0))
     lathe = Solid(outline([(0, 0), (8, 0), (8, 4, 1.5), (4, 4, 2.0 * BALL), (4, 10, 1.5), (0, 10)]))
     yield "lathe part", of_solid(small, lathe)
+    cone = Solid(outline([(0, 0), (8, 0), (4, 10), (0, 10)]))
+    yield "cone", of_solid(small, cone)
     yield "torus ring", of_solid(small, Solid(circle(2.0, 7.0)))
     for name, helix, counts in (
         ("spur gear", 0.0, (1.0, 2.0, 4.0, 8.0)),

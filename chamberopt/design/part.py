@@ -136,9 +136,7 @@ class SmoothingTable(FileTable):
     off: bool = Field(
         default=False, description='{ off = true }: smoothing = "off", the facets of the file'
     )
-    limit_deg: float = quantity(
-        1, 30, "degrees", "largest angle between facets: a tenth of the ball's radius wide", 6.0
-    )
+    limit_deg: float = quantity(1, 30, "degrees", "largest angle between facets", 6.0)
     narrow_mm: float = quantity(
         0.001, 10, "mm", "width below which facets are not divided: a tenth of a ball's radius",
         0.06,
