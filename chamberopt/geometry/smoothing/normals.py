@@ -93,6 +93,11 @@ class Pieces(NamedTuple):
     number: np.ndarray
     inner: np.ndarray
 
+    @property
+    def has_several(self) -> np.ndarray:
+        """Marks the triangles of pieces of several, shape (m,)."""
+        return np.asarray(np.bincount(self.number)[self.number] > 1)
+
     def around(self, triangle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The outer sides of the pieces of triangles (r,): rows of these, and sides, (k,) each."""
         outer = np.flatnonzero(~self.inner)
@@ -140,10 +145,7 @@ def fit_phi(
     """
     phi = np.zeros(3 * len(fitted))
     unknown = np.full(3 * len(fitted), -1)
-    at_apex = np.zeros(len(fitted), dtype=bool)
-    at_apex[edges.triangles[apexes]] = True
-    straight = _straight_to_creases(facets, pieces, edges, is_crease)
-    is_unknown = np.repeat(fitted, 3) & (~straight | np.repeat(at_apex, 3))
+    is_unknown = np.repeat(fitted, 3) & ~_straight_to_creases(facets, pieces, edges, is_crease)
     unknown[is_unknown] = np.arange(is_unknown.sum())
     smooth = np.flatnonzero(~is_crease & fitted[edges.triangles].any(axis=1))
     on_crease = edges.sides[is_crease].ravel()
@@ -166,13 +168,14 @@ def fit_phi(
 def _straight_to_creases(
     facets: Facets, pieces: Pieces, edges: Edges, is_crease: np.ndarray
 ) -> np.ndarray:
-    """Marks the sides (3 m,) at creases towards which no side of their facet tells of a bend.
+    """Marks the sides (3 m,) of pieces at creases, towards which no other side tells of a bend.
 
     Those of a cylinder or cone at its ends: the facets turn along them alone.
     """
     turns = np.zeros(3 * len(facets.area), dtype=bool)
     turns[edges.sides[~is_crease & (np.abs(edges.turn) > PLANE)]] = True
     crease = edges.sides[is_crease].ravel()
+    crease = crease[pieces.has_several[crease // 3]]
     row, side = pieces.around(crease // 3)
     across = facets.across.reshape(-1, 3)
     cosine = np.abs(np.einsum("ri,ri->r", across[crease[row]], across[side]))
@@ -351,8 +354,7 @@ def _at_corners_of_pieces(
         for j in range(3):
             square[:, i, j] = np.bincount(at, m[:, i] * m[:, j], count)
     leaning = np.einsum("cij,cj->ci", np.linalg.pinv(square, rcond=ONE_LINE, hermitian=True), right)
-    several = np.bincount(pieces.number, minlength=int(pieces.number.max()) + 1)[pieces.number] > 1
-    rows = np.flatnonzero(np.repeat(several, 3))
+    rows = np.flatnonzero(np.repeat(pieces.has_several, 3))
     result = own.copy()
     result[rows] = unit_vectors(facets.normal[rows // 3] + leaning[corner[rows]])
     return result

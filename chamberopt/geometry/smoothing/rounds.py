@@ -21,8 +21,8 @@ from chamberopt.geometry.triangles import (
     unit_vectors,
 )
 
-# Edges that turn by more are no evidence of a round. No regular prism turns by as much: rounding would
-# decide.
+# Edges that turn by more are no evidence of a round. No regular prism turns by as much: rounding
+# would decide.
 CONVEX_SURE, HOLLOW_SURE = np.radians(38.0), np.radians(55.0)
 # Edges that turn by more are creases, whatever is beside them. Between the two an edge belongs to a
 # round if others show that there is one: the facets of a round turn by nearly the same angle, which
