@@ -17,7 +17,7 @@ from chamberopt.common.kept_records import kept, key_of
 from chamberopt.geometry.mesh_io.part_mesh import PartMesh
 from chamberopt.geometry.mesh_io.readers.raw_mesh import number_by_position
 from chamberopt.geometry.mesh_io.self_intersection import crossing_pairs
-from chamberopt.geometry.smoothing.divide import LESS
+from chamberopt.geometry.smoothing.divide import LESS, SLACK
 from chamberopt.geometry.smoothing.normals import measure_facets, plane_facets
 from chamberopt.geometry.smoothing.rounds import find_edges, is_hard
 from chamberopt.geometry.smoothing.smooth import Surfaces, divide_rounds, find_surfaces, moves
@@ -221,8 +221,9 @@ def _divided(mesh: PartMesh, target: Rule, zones: list[Rule]) -> SmoothPart:
 
     area = areas(vertices, triangles)
     of_target = np.where(on_target, area, 0.0) / area[on_target].sum()
-    coarse = on_target & (surfaces.turn > turn) & (not mesh.is_exact)
+    coarse = on_target & (surfaces.turn > SLACK * turn) & (not mesh.is_exact)
     is_whole = np.bincount(finer.parent, minlength=len(triangles)) == 1
+    is_whole &= _bend(surfaces.normals) > SLACK * turn
     is_whole &= measure_facets(vertices, triangles).height.min(axis=1) > narrow
     left = coarse & (np.isinf(asked) | surfaces.noisy | crossing | is_whole)
     before = tetrahedron_volumes(vertices, triangles).sum()
@@ -282,6 +283,12 @@ def _near(vertices: np.ndarray, triangles: np.ndarray, chosen: np.ndarray) -> np
     corners = np.unique(triangles[chosen])
     away, _ = cKDTree(vertices[corners]).query(vertices, distance_upper_bound=NEAR)
     return np.asarray(chosen | np.isfinite(away)[triangles].any(axis=1))
+
+
+def _bend(normals: np.ndarray) -> np.ndarray:
+    """The largest angle [rad] between normals (m, 3, 3) at corners of each triangle, shape (m,)."""
+    cosine = np.einsum("mki,mki->mk", normals, np.roll(normals, 1, axis=1)).min(axis=1)
+    return np.asarray(np.arccos(np.clip(cosine, -1.0, 1.0)))
 
 
 def _usual_turn(turn: np.ndarray, area: np.ndarray, chosen: np.ndarray) -> float:
