@@ -165,8 +165,18 @@ def _smoothing_notes(part: Part) -> list[str]:
         f"{np.degrees(facts.facet_turn):.2g} degrees; {facts.moved_share:.0%} of the target was "
         f"divided along the surface behind them, at most {1e3 * facts.largest_move:.2g} mm away "
         f"({facts.given_triangles:,} triangles became {len(part.triangles):,}); "
-        'part.smoothing = "off" keeps the facets'
+        'part.smoothing = "off" keeps the facets' + _sharp_edges(facts.blunt_creases)
     ]
+
+
+def _sharp_edges(count: int) -> str:
+    """What is to be known of edges that are sharp although they turn by no more than facets may."""
+    if not count:
+        return ""
+    return (
+        f"; {count:,} edges of the part that turn by no more than such facets do are taken for "
+        "sharp, as at chamfers: if the drawing has none, give a mesh with finer facets"
+    )
 
 
 @dataclass(frozen=True)
