@@ -155,6 +155,6 @@ def test_chamfer_of_a_shaft_stays_sharp(chamfer: float, degrees: float) -> None:
     [lambda: TORUS.strips(np.radians(15.0)), lambda: TORUS.irregular(np.radians(22.5), 4e-3)],
 )
 def test_saddles_become_few_triangles(draw: Callable[[], Mesh]) -> None:
-    """Two halvings both ways make 16 of one; triangles whose normals go astray make hundreds; folds take a few."""
+    """Two halvings both ways make 16 of one, folds a few more; normals that go astray hundreds."""
     mesh = draw()
     assert len(smoothed(mesh).finer.triangles) < 18 * len(mesh[1])
