@@ -56,16 +56,23 @@ def united(one: Mesh, two: Mesh, shift: tuple[float, ...]) -> Mesh:
     return mesh_of(body(one) + body((two[0] + np.array(shift), two[1])))
 
 
-@few(8)
+@few(5)
 @given(meshes())
 def test_drawn_solids(mesh: Mesh) -> None:
     require_sound_part(mesh)
 
 
-@few(5)
+@few(3)
 @given(meshes(), meshes(), shifts)
 def test_unions(one: Mesh, two: Mesh, shift: tuple[float, ...]) -> None:
     require_sound_part(united(one, two, shift))
+
+
+@pytest.mark.long
+@few(60)
+@given(meshes())
+def test_many_drawn_solids(mesh: Mesh) -> None:
+    require_sound_part(mesh)
 
 
 @pytest.mark.long
