@@ -12,7 +12,7 @@ import gc
 import os
 from collections.abc import Sequence
 
-from chamberopt.cli.interrupt import interruptible
+from chamberopt.cli.interrupt import ignore_late_ctrl_c, interruptible
 
 __all__ = ["main"]
 
@@ -26,4 +26,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     with interruptible():
         from chamberopt.cli.command_line import run_command
 
-        return run_command(arguments)
+        status = run_command(arguments)
+    if arguments is None:
+        ignore_late_ctrl_c()
+    return status

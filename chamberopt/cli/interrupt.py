@@ -55,6 +55,15 @@ def interruptible() -> Iterator[None]:
         os._exit(130)
 
 
+def ignore_late_ctrl_c() -> None:
+    """Let Ctrl-C change nothing at the end of a process, whose command is done.
+
+    Its threads are still joined then, and the signal would end it with another exit status.
+    """
+    if threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
 def _would_be_lost(frame: FrameType | None) -> bool:
     while frame is not None:
         package = str(frame.f_globals.get("__name__", "")).partition(".")[0]

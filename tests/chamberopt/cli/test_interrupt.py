@@ -56,3 +56,18 @@ def test_ctrl_c_is_never_lost(name: str, seconds: float, place: Path) -> None:
     assert "Traceback" not in message
     assert "interrupted" in message
     shutil.rmtree(place / "out", ignore_errors=True)
+
+
+def test_ctrl_c_after_the_command_changes_nothing(place: Path) -> None:
+    """The process has its exit status; only its threads are still to be joined."""
+    late = "status = main(); os.kill(os.getpid(), signal.SIGINT); sys.exit(status)"
+    done = subprocess.run(
+        [sys.executable, "-c", f"import os, signal, sys; from chamberopt.cli import main; {late}",
+         "materials"],
+        cwd=place,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )  # fmt: skip
+    assert (done.returncode, done.stderr) == (0, "")
