@@ -59,12 +59,15 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def start(place: Path, name: str, out: Path) -> subprocess.Popen[str]:
+def start(
+    place: Path, name: str, out: Path, *program: str, stdout: int = subprocess.DEVNULL
+) -> subprocess.Popen[str]:
+    """Start a command by a program of Python, such as -m chamberopt, in a session of its own."""
     return subprocess.Popen(
-        [sys.executable, "-m", "chamberopt", *COMMANDS[name], "--out", str(out)],
+        [sys.executable, *program, *COMMANDS[name], "--out", str(out)],
         cwd=place,
         env={**os.environ, "PYTHONPATH": str(ROOT)},
-        stdout=subprocess.DEVNULL,
+        stdout=stdout,
         stderr=subprocess.PIPE,
         text=True,
         start_new_session=True,
@@ -115,7 +118,7 @@ def kill_and_check(
     place: Path, name: str, out: Path, whole: dict[str, bytes], seconds: float
 ) -> bool:
     """Start a command and kill it after some seconds; whether it was still running."""
-    going = start(place, name, out)
+    going = start(place, name, out, "-m", "chamberopt")
     try:
         _, message = going.communicate(timeout=seconds)
     except subprocess.TimeoutExpired:
@@ -137,7 +140,7 @@ def check(place: Path, name: str, kills: int, seed: int) -> None:
     undisturbed = place / "whole" / name  # the name is in the pictures
     if not undisturbed.exists():
         began = time.monotonic()
-        first = start(place, name, undisturbed)
+        first = start(place, name, undisturbed, "-m", "chamberopt")
         assert first.wait(600) == 0
         (place / f"{name}.seconds").write_text(str(time.monotonic() - began))
     whole, seconds = files(undisturbed), float((place / f"{name}.seconds").read_text())
@@ -147,7 +150,7 @@ def check(place: Path, name: str, kills: int, seed: int) -> None:
         for _ in range(2 if name in RESUMES else 1):
             done += kill_and_check(place, name, out, whole, rng.uniform(0.0, 1.1 * seconds))
         if name in RESUMES:
-            last = start(place, name, out)
+            last = start(place, name, out, "-m", "chamberopt")
             _, message = last.communicate(timeout=600)
             assert last.returncode == 0, message
             ended = files(out)
@@ -179,15 +182,7 @@ def test_killed_at_thirty_random_moments(name: str, place: Path) -> None:
 
 def interrupt_and_check(place: Path, name: str, out: Path, seconds: float) -> int:
     """Start a command and press Ctrl-C after some seconds in it; its exit status."""
-    going = subprocess.Popen(
-        [sys.executable, "-c", BEGIN, *COMMANDS[name], "--out", str(out)],
-        cwd=place,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
-    )
+    going = start(place, name, out, "-c", BEGIN, stdout=subprocess.PIPE)
     assert going.stdout is not None
     assert going.stdout.readline() == "\n"
     time.sleep(seconds)
