@@ -19,6 +19,7 @@ from chamberopt.geometry.triangles import (
     area_vectors,
     areas,
     connected_pieces,
+    count_up,
     edge_keys,
     side_pairs,
     sides_of,
@@ -290,7 +291,7 @@ class _TargetMesh:
         start = np.searchsorted(self.triangles.ravel()[corner], np.arange(len(self.vertices) + 1))
         count = start[points + 1] - start[points]
         point = np.repeat(np.arange(len(points)), count)
-        inside = np.arange(len(point)) - np.repeat(np.cumsum(count) - count, count)
+        inside = count_up(count)
         return corner[start[points][point] + inside] // 3, point
 
     def _collapses_well(self, moved: np.ndarray, kept: np.ndarray) -> np.ndarray:

@@ -21,6 +21,11 @@ def unique_rows(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return order[is_new], which
 
 
+def count_up(times: np.ndarray) -> np.ndarray:
+    """The numbers from 0 to n - 1 for each n of `times` (k,), one after another."""
+    return np.asarray(np.arange(times.sum()) - np.repeat(np.cumsum(times) - times, times))
+
+
 def connected_pieces(a: np.ndarray, b: np.ndarray, count: int) -> tuple[int, np.ndarray]:
     """Connected pieces of a graph with links a (k,) to b (k,): number, and piece of each node."""
     from scipy.sparse import coo_array
@@ -168,6 +173,12 @@ def unit_vectors(vectors: np.ndarray) -> np.ndarray:
     """Vectors (..., 3) scaled to length 1; a zero vector stays zero."""
     length = np.linalg.norm(vectors, axis=-1, keepdims=True)
     return np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0.0)
+
+
+def angles_between(one: np.ndarray, two: np.ndarray) -> np.ndarray:
+    """Angles [rad] between unit vectors (..., 3), shape (...)."""
+    half = 0.5 * np.linalg.norm(one - two, axis=-1)
+    return np.asarray(2.0 * np.arcsin(np.clip(half, 0.0, 1.0)))
 
 
 def closest_on_each(corners: np.ndarray, points: np.ndarray) -> np.ndarray:

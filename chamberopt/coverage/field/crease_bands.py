@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from chamberopt.coverage.field.surface_points import ball_fits
+from chamberopt.geometry.triangles import count_up
 
 if TYPE_CHECKING:
     from chamberopt.coverage.field.smooth_faces import Creases
@@ -43,7 +44,7 @@ def crease_pieces(
         1, np.ceil(length / (2.0 * CREASE_LENGTH * radius) * PIECES_PER_WINDOW)
     ).astype(int)
     edge = np.repeat(np.arange(len(count)), count)
-    number = np.arange(len(edge)) - np.repeat(np.cumsum(count) - count, count)
+    number = count_up(count)
     place = start[edge] + ((number + 0.5) / count[edge])[:, None] * (end - start)[edge]
     fits = ball_fits(mesh, place, creases.outward[edge], ball_radius)
     edge, place = edge[fits], place[fits]

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from chamberopt.chamber.reach.reach import TOLERATED_OVERLAP
-from chamberopt.geometry.triangles import unit_normals
+from chamberopt.geometry.triangles import count_up, unit_normals
 
 if TYPE_CHECKING:
     from sim_core import TriangleMesh
@@ -67,7 +67,7 @@ def spread_within(
     share = max(share, float(area.sum()) / most)
     count = np.where(area > 0.0, 1 + (area / share).astype(int), 0)
     triangle = np.repeat(np.arange(len(area)), count)
-    number = np.arange(len(triangle)) - np.repeat(np.cumsum(count) - count, count)
+    number = count_up(count)
     return _within(vertices, triangles, triangle, number)
 
 

@@ -28,7 +28,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from chamberopt.geometry.triangles import area_vectors, edge_keys, unit_normals, unit_vectors
+from chamberopt.geometry.triangles import (
+    angles_between,
+    area_vectors,
+    edge_keys,
+    unit_normals,
+    unit_vectors,
+)
 
 LEVELS = 6  # rounds of splitting; 90 degrees an edge at 6 degrees take four
 TURNED = 0.6  # cosine between a triangle and the normals at its corners: below, it is not made
@@ -164,7 +170,7 @@ def _middles(surface: Surface, sides: np.ndarray) -> tuple[np.ndarray, ...]:
     is_near = np.abs(rise) <= FARTHER * far + LEVEL * length
     rise = np.clip(rise, -far, far)
     place = 0.5 * (start + end) + rise[:, None] * unit_vectors(both)
-    bend = np.maximum(_angle(a, b), _lean(a, e) + _lean(b, e))
+    bend = np.maximum(angles_between(a, b), _lean(a, e) + _lean(b, e))
     width = np.abs(np.einsum("ei,ei->e", chord, unit_vectors(change)))
 
     normal = n0 + n1
@@ -208,11 +214,6 @@ def _tilts(
     size, turned = (np.where(is_crease, one, one.sum(axis=0)) for one in (size, turned))
     share = np.divide(turned, size, out=np.zeros_like(size), where=size > 0.0)
     return e + share[..., None] * m
-
-
-def _angle(one: np.ndarray, two: np.ndarray) -> np.ndarray:
-    """Angles [rad] between unit vectors (e, 3)."""
-    return np.asarray(2.0 * np.arcsin(np.clip(0.5 * np.linalg.norm(one - two, axis=1), 0.0, 1.0)))
 
 
 def _lean(normal: np.ndarray, e: np.ndarray) -> np.ndarray:

@@ -28,7 +28,13 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from chamberopt.geometry.triangles import area_vectors, connected_pieces, sides_of, unit_vectors
+from chamberopt.geometry.triangles import (
+    area_vectors,
+    connected_pieces,
+    count_up,
+    sides_of,
+    unit_vectors,
+)
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
@@ -106,26 +112,18 @@ class Pieces(NamedTuple):
         first = ends[self.number[triangle]]
         count = ends[self.number[triangle] + 1] - first
         row = np.repeat(np.arange(len(triangle)), count)
-        before = np.repeat(np.cumsum(count) - count, count)
-        return row, outer[first[row] + np.arange(len(row)) - before]
+        return row, outer[first[row] + count_up(count)]
 
 
-def find_pieces(edges: Edges, is_crease: np.ndarray, count: int) -> Pieces:
+def find_pieces(edges: Edges, count: int) -> Pieces:
     """The facets of so many triangles: planes of no more than MANY_SIDES, and other triangles."""
-    joins = ~is_crease & (np.abs(edges.turn) < PLANE)
-    one, two = edges.triangles[joins].T
-    number = connected_pieces(one, two, count)[1]
-    outer = np.bincount(np.repeat(number, 3), ~_between_alike(number, edges, count))
-    is_simple = outer <= MANY_SIDES
-    number = np.where(is_simple[number], number, number.max() + 1 + np.arange(count))
-    return Pieces(number, _between_alike(number, edges, count))
-
-
-def _between_alike(number: np.ndarray, edges: Edges, count: int) -> np.ndarray:
-    """Marks the sides (3 m,) at edges between triangles of one number."""
-    marked = np.zeros(3 * count, dtype=bool)
-    marked[edges.sides[number[edges.triangles[:, 0]] == number[edges.triangles[:, 1]]]] = True
-    return marked
+    number = plane_facets(edges, count)
+    one, two = number[edges.triangles].T
+    inner = np.zeros(3 * count, dtype=bool)
+    inner[edges.sides[one == two]] = True
+    is_simple = (np.bincount(np.repeat(number, 3), ~inner) <= MANY_SIDES)[number]
+    number = np.where(is_simple, number, number.max() + 1 + np.arange(count))
+    return Pieces(number, inner & np.repeat(is_simple, 3))
 
 
 def fit_phi(
@@ -144,14 +142,14 @@ def fit_phi(
         apexes: marks edges that end at the apex of a cone, shape (e,).
     """
     phi = np.zeros(3 * len(fitted))
+    if not fitted.any():
+        return phi.reshape(-1, 3)
     unknown = np.full(3 * len(fitted), -1)
     is_unknown = np.repeat(fitted, 3) & ~_straight_to_creases(facets, pieces, edges, is_crease)
     unknown[is_unknown] = np.arange(is_unknown.sum())
     smooth = np.flatnonzero(~is_crease & fitted[edges.triangles].any(axis=1))
     on_crease = edges.sides[is_crease].ravel()
     on_crease = on_crease[unknown[on_crease] >= 0]
-    if not fitted.any():
-        return phi.reshape(-1, 3)
     length = edges.length[smooth]
     sums = _rows(unknown, edges.sides[smooth], np.ones((len(smooth), 2)))
     bends = _bend_differences(facets, edges, smooth, unknown, apexes)
@@ -337,26 +335,27 @@ def _at_corners_of_pieces(
     The normal leans by phi across each side of the piece that ends at the corner. A side at a
     crease with a phi of 0 tells nothing: a cone leans across its straight lines alone.
     """
-    told = ~pieces.inner
+    corners = np.flatnonzero(np.repeat(pieces.has_several, 3))
+    told = ~pieces.inner & np.repeat(pieces.has_several, 3)
     on_crease = edges.sides[is_crease].ravel()
     told[on_crease[np.abs(phi.ravel()[on_crease]) < FLAT]] = False
     side = np.flatnonzero(told)
     following = 3 * (side // 3) + (side % 3 + 1) % 3
-    vertex = triangles.astype(np.int64).ravel()
-    place = np.repeat(pieces.number, 3) * (int(vertex.max()) + 1) + vertex
-    _, corner = np.unique(place, return_inverse=True)
-    corner = corner.reshape(-1)
+    # One corner of a piece for all of its triangles that meet there.
+    vertex = triangles.astype(np.int64).ravel()[corners]
+    place = pieces.number[corners // 3] * (int(triangles.max()) + 1) + vertex
+    corner = np.full(len(own), -1)
+    corner[corners] = np.unique(place, return_inverse=True)[1].reshape(-1)
     at, m = np.r_[corner[side], corner[following]], facets.across.reshape(-1, 3)[np.r_[side, side]]
-    lean, count = np.tan(phi.ravel())[np.r_[side, side]], int(corner.max()) + 1
+    lean, count = np.tan(phi.ravel())[np.r_[side, side]], int(corner.max(initial=-1)) + 1
     square = np.empty((count, 3, 3))
     right = np.column_stack([np.bincount(at, lean * m[:, i], count) for i in range(3)])
     for i in range(3):
         for j in range(3):
             square[:, i, j] = np.bincount(at, m[:, i] * m[:, j], count)
     leaning = np.einsum("cij,cj->ci", np.linalg.pinv(square, rcond=ONE_LINE, hermitian=True), right)
-    rows = np.flatnonzero(np.repeat(pieces.has_several, 3))
     result = own.copy()
-    result[rows] = unit_vectors(facets.normal[rows // 3] + leaning[corner[rows]])
+    result[corners] = unit_vectors(facets.normal[corners // 3] + leaning[corner[corners]])
     return result
 
 

@@ -22,7 +22,7 @@ from chamberopt.geometry.smoothing.normals import measure_facets, plane_facets
 from chamberopt.geometry.smoothing.rounds import find_edges, is_hard
 from chamberopt.geometry.smoothing.smooth import Surfaces, divide_rounds, find_surfaces, moves
 from chamberopt.geometry.solids import simplify_planes
-from chamberopt.geometry.triangles import areas, tetrahedron_volumes, unit_normals
+from chamberopt.geometry.triangles import angles_between, areas, tetrahedron_volumes, unit_normals
 
 if TYPE_CHECKING:
     from chamberopt.geometry.smoothing.divide import Surface
@@ -223,7 +223,8 @@ def _divided(mesh: PartMesh, target: Rule, zones: list[Rule]) -> SmoothPart:
     of_target = np.where(on_target, area, 0.0) / area[on_target].sum()
     coarse = on_target & (surfaces.turn > SLACK * turn) & (not mesh.is_exact)
     is_whole = np.bincount(finer.parent, minlength=len(triangles)) == 1
-    is_whole &= _bend(surfaces.normals) > SLACK * turn
+    bend = angles_between(surfaces.normals, np.roll(surfaces.normals, 1, axis=1)).max(axis=1)
+    is_whole &= bend > SLACK * turn
     is_whole &= measure_facets(vertices, triangles).height.min(axis=1) > narrow
     left = coarse & (np.isinf(asked) | surfaces.noisy | crossing | is_whole)
     before = tetrahedron_volumes(vertices, triangles).sum()
@@ -283,12 +284,6 @@ def _near(vertices: np.ndarray, triangles: np.ndarray, chosen: np.ndarray) -> np
     corners = np.unique(triangles[chosen])
     away, _ = cKDTree(vertices[corners]).query(vertices, distance_upper_bound=NEAR)
     return np.asarray(chosen | np.isfinite(away)[triangles].any(axis=1))
-
-
-def _bend(normals: np.ndarray) -> np.ndarray:
-    """The largest angle [rad] between normals (m, 3, 3) at corners of each triangle, shape (m,)."""
-    cosine = np.einsum("mki,mki->mk", normals, np.roll(normals, 1, axis=1)).min(axis=1)
-    return np.asarray(np.arccos(np.clip(cosine, -1.0, 1.0)))
 
 
 def _usual_turn(turn: np.ndarray, area: np.ndarray, chosen: np.ndarray) -> float:

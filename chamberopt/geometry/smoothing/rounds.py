@@ -16,6 +16,7 @@ import numpy as np
 from chamberopt.geometry.triangles import (
     area_vectors,
     connected_pieces,
+    count_up,
     side_pairs,
     sides_of,
     unit_vectors,
@@ -171,14 +172,12 @@ def _bends_beside(facet: np.ndarray, bend: np.ndarray, along: np.ndarray, count:
     ).reshape(-1, 3, 3)
     bends = np.einsum("kfij,ki,kj->kf", sums[facet], along, along) - bend[:, None]
     # Of facets with few edges those nearly across are taken out, pair by pair.
-    number = np.bincount(facet.ravel(), minlength=count)
-    order = np.argsort(facet.ravel(), kind="stable")
-    first = np.cumsum(number) - number
-    place = np.flatnonzero(number[facet.ravel()] <= FEW_EDGES)
-    times = number[facet.ravel()[place]]
-    pair = np.repeat(place, times)
-    other = np.arange(len(pair)) - np.repeat(np.cumsum(times) - times, times)
-    other = order[first[facet.ravel()[pair]] + other] // 2
+    side = facet.ravel()  # two of each edge
+    number, order = np.bincount(side, minlength=count), np.argsort(side, kind="stable")
+    few = np.flatnonzero(number[side] <= FEW_EDGES)
+    times, first = number[side[few]], (np.cumsum(number) - number)[side[few]]
+    pair = np.repeat(few, times)
+    other = order[np.repeat(first, times) + count_up(times)] // 2
     cosine = np.einsum("ri,ri->r", along[pair // 2], along[other])
     across = np.where(np.abs(cosine) < ACROSS, bend[other] * cosine**2, 0.0)
     return bends - np.bincount(pair, across, 2 * len(bend)).reshape(-1, 2)

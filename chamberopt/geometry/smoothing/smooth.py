@@ -86,8 +86,8 @@ def find_surfaces(
     fitted &= ~_planes(edges, facets, lone)
     ends = sides_of(triangles)[edges.sides[:, 0]]
     apex = find_apexes(facets, triangles, edges, lone)
-    pieces = find_pieces(edges, lone, len(triangles))
     if given is None:
+        pieces = find_pieces(edges, len(triangles))
         phi = fit_phi(facets, pieces, edges, lone, fitted, apex[ends].any(axis=1))
     else:
         phi = phi_of_normals(facets, given)
