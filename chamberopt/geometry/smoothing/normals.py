@@ -41,10 +41,10 @@ if TYPE_CHECKING:
 
     from chamberopt.geometry.smoothing.rounds import Edges
 
-FIT, CREASE = 2.5, 0.5
+FIT, CREASE, DOUBTED = 2.5, 0.5, 0.005
 # Of the reweighted least squares: the most steps, [rad] below which a residual counts by its
 # square, and [rad] of the last step.
-STEPS, FLOOR, LAST = 25, 0.01, 1e-3
+STEPS, FEW_STEPS, FLOOR, LAST = 25, 10, 0.01, 1e-3
 FLAT = np.radians(0.5)  # phi below which a facet is a piece of a plane
 PLANE = 1e-4  # rad: facets that turn by less are in one plane, but for the rounding of a file
 MANY_SIDES = 64  # of a plane that is one facet
@@ -133,6 +133,8 @@ def fit_phi(
     is_crease: np.ndarray,
     fitted: np.ndarray,
     apexes: np.ndarray,
+    doubted: np.ndarray,
+    turning: np.ndarray,
 ) -> np.ndarray:
     """The angles phi (m, 3) [rad]; 0 off the fitted triangles.
 
@@ -140,6 +142,9 @@ def fit_phi(
         is_crease: marks edges, shape (e,).
         fitted: marks the triangles that have unknown phi, shape (m,).
         apexes: marks edges that end at the apex of a cone, shape (e,).
+        doubted: marks the creases that may be none, shape (e,): they hold phi by very little, and
+            a few steps are enough.
+        turning: marks the edges whose turn counts, shape (e,): all but creases, and some of these.
     """
     phi = np.zeros(3 * len(fitted))
     if not fitted.any():
@@ -150,14 +155,18 @@ def fit_phi(
     smooth = np.flatnonzero(~is_crease & fitted[edges.triangles].any(axis=1))
     on_crease = edges.sides[is_crease].ravel()
     on_crease = on_crease[unknown[on_crease] >= 0]
+    of_turns = np.flatnonzero(turning & fitted[edges.triangles].any(axis=1))
     length = edges.length[smooth]
-    sums = _rows(unknown, edges.sides[smooth], np.ones((len(smooth), 2)))
+    pull = np.full(len(unknown), CREASE)
+    pull[edges.sides[doubted]] = DOUBTED
+    sums = _rows(unknown, edges.sides[of_turns], np.ones((len(of_turns), 2)))
     bends = _bend_differences(facets, edges, smooth, unknown, apexes)
     creases = _rows(unknown, on_crease[:, None], np.ones((len(on_crease), 1)))
     x = _solve(
         [sums, *bends, creases],
-        [edges.turn[smooth], *[np.zeros(len(smooth))] * 3, np.zeros(len(on_crease))],
-        [FIT * length, length, CREASE * facets.length.ravel()[on_crease]],
+        [edges.turn[of_turns], *[np.zeros(len(smooth))] * 3, np.zeros(len(on_crease))],
+        [FIT * edges.length[of_turns], length, (pull * facets.length.ravel())[on_crease]],
+        FEW_STEPS if doubted.any() else STEPS,
     )
     phi[unknown >= 0] = x
     return phi.reshape(-1, 3)
@@ -230,7 +239,7 @@ def _bend_differences(
 
 
 def _solve(
-    matrices: list[csr_array], right: list[np.ndarray], weights: list[np.ndarray]
+    matrices: list[csr_array], right: list[np.ndarray], weights: list[np.ndarray], steps: int
 ) -> np.ndarray:
     """Minimise sums of weighted absolute values: of turns, of bends (three rows each), of creases.
 
@@ -244,7 +253,7 @@ def _solve(
     size = np.full(turns + bends + len(weights[2]), 1.0)
     x = np.zeros(matrix.shape[1])
     transposed = matrix.T.tocsr()
-    for _ in range(STEPS):
+    for _ in range(steps):
         scale = np.concatenate(weights) / size
         rows = np.concatenate([scale[:turns], *[scale[turns : turns + bends]] * 3,
                                scale[turns + bends :]])  # fmt: skip
@@ -271,11 +280,15 @@ def phi_of_normals(facets: Facets, normals: np.ndarray) -> np.ndarray:
     return np.asarray(np.arctan2(sine, np.einsum("mki,mi->mk", middle, facets.normal)))
 
 
+def shape_operators(facets: Facets, phi: np.ndarray) -> np.ndarray:
+    """S of each facet [1/m], shape (m, 3, 3)."""
+    weight = facets.length * phi / facets.area[:, None]
+    return np.asarray(np.einsum("mk,mki,mkj->mij", weight, facets.across, facets.across))
+
+
 def hollow_curvature(facets: Facets, phi: np.ndarray) -> np.ndarray:
     """Largest hollow curvature of each facet [1/m], 0 where none is hollow, shape (m,)."""
-    weight = facets.length * phi / facets.area[:, None]
-    shape = np.einsum("mk,mki,mkj->mij", weight, facets.across, facets.across)
-    return np.asarray(np.maximum(-np.linalg.eigvalsh(shape)[:, 0], 0.0))
+    return np.asarray(np.maximum(-np.linalg.eigvalsh(shape_operators(facets, phi))[:, 0], 0.0))
 
 
 def corner_normals(

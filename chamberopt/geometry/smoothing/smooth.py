@@ -6,6 +6,7 @@ vertices on the surface on which the file's vertices lie. Planes, sharp edges an
 are. No vertex of the file moves.
 
     rounds    which edges divide a round into facets
+    irregular which others do, if the facets are irregular triangles
     normals   of the smooth surface at the corners of the facets
     divide    finer triangles
 """
@@ -17,6 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from chamberopt.geometry.smoothing.divide import Surface, divide
+from chamberopt.geometry.smoothing.irregular import find_continued, valleys
 from chamberopt.geometry.smoothing.normals import (
     Facets,
     corner_normals,
@@ -35,6 +37,8 @@ from chamberopt.geometry.triangles import connected_pieces, sides_of, unit_norma
 # width the wide one turns by up to twice as much as the edge between them.
 RISE = 2.0
 FAR_LARGER = 3.0  # times the area of the facets beside it: a plane facet is no part of a round
+BY_CHANCE = 8  # the most triangles of a round that lie in one plane by chance
+FITS = 3  # the last one to what the others have found
 LEFT_OVER = 0.5  # share of an edge's turn that no round explains, above which it is a crease
 CREASE = np.radians(8.0)  # the least turn of such a crease
 EXPLAINED = 0.25  # share below which an edge without evidence is of the rounds beside it
@@ -82,15 +86,22 @@ def find_surfaces(
     edges, facets = find_edges(vertices, triangles), measure_facets(vertices, triangles)
     size = np.abs(edges.turn)
     lone = find_creases(edges, facets.area) if given is None else _stated_creases(edges, given)
-    face, fitted = _faces_to_fit(edges, lone, wanted)
-    fitted &= ~_planes(edges, facets, lone)
     ends = sides_of(triangles)[edges.sides[:, 0]]
-    apex = find_apexes(facets, triangles, edges, lone)
-    if given is None:
-        pieces = find_pieces(edges, len(triangles))
-        phi = fit_phi(facets, pieces, edges, lone, fitted, apex[ends].any(axis=1))
-    else:
-        phi = phi_of_normals(facets, given)
+    pieces = find_pieces(edges, len(triangles))
+    sides = vertices[np.roll(triangles, -1, axis=1)] - vertices[triangles]
+    for fits_left in reversed(range(FITS)):
+        face, fitted = _faces_to_fit(edges, lone, wanted)
+        fitted &= ~_planes(edges, facets, lone)
+        apex = find_apexes(facets, triangles, edges, lone)
+        if given is not None:
+            phi = phi_of_normals(facets, given)
+            break
+        doubted = lone & ~is_hard(edges) & fitted[edges.triangles].any(axis=1) & (fits_left > 0)
+        turning = ~lone | (doubted & valleys(edges, pieces, lone))
+        phi = fit_phi(facets, pieces, edges, lone, fitted, apex[ends].any(axis=1), doubted, turning)
+        if not doubted.any():
+            break
+        lone = lone & ~find_continued(sides, edges, facets, lone, phi)
     left = edges.turn - phi.ravel()[edges.sides].sum(axis=1)
     of_round = fitted[edges.triangles].any(axis=1) & ~lone
     sharp = of_round & (size > CREASE) & (np.sign(edges.turn) * left > LEFT_OVER * size)
@@ -184,15 +195,16 @@ def _faces_to_fit(
 def _planes(edges: Edges, facets: Facets, is_crease: np.ndarray) -> np.ndarray:
     """Marks (m,) the triangles of plane facets that are far larger than all facets beside them.
 
-    The facets of a round are nearly alike, so these are no part of it.
+    The facets of a round are nearly alike, so these are no part of it. A few irregular triangles of
+    a round may lie in one plane by chance, so beside single triangles each of them counts.
     """
     facet = plane_facets(edges, len(facets.area))
     count, area = np.bincount(facet), np.bincount(facet, facets.area)
     turns = ~is_crease & (np.abs(edges.turn) > SMOOTH)
-    one, two = facet[edges.triangles[turns]].T
     largest = np.zeros(len(area))
-    np.maximum.at(largest, one, area[two])
-    np.maximum.at(largest, two, area[one])
+    for one, two in (facet[edges.triangles[turns]].T, facet[edges.triangles[turns, ::-1]].T):
+        by_chance = np.where(count[two] == 1, np.minimum(count[one], BY_CHANCE), 1)
+        np.maximum.at(largest, one, by_chance * area[two])
     return np.asarray(((count > 1) & (area > FAR_LARGER * largest) & (largest > 0.0))[facet])
 
 

@@ -236,6 +236,34 @@ def stacked(rows: np.ndarray, rng: np.random.Generator | None = None) -> Mesh:
     return _welded(rows.reshape(-1, 3), np.concatenate([triangles, low[:, ::-1], high]))
 
 
+def staggered(
+    low: float, high: float, height: float, count: int, rng: np.random.Generator | None = None
+) -> Mesh:
+    """A frustum of rings of vertices, each half a step ahead of the one below, with nearly even
+    triangles. The edges along a ring are valleys.
+
+    Args:
+        low, high: radii of the ends.
+        count: vertices in a ring.
+        rng: for vertices that are off by up to a fifth of a step.
+    """
+    rows = max(2, round(height / (np.sqrt(3.0) / 2.0 * np.pi * (low + high) / count)))
+    ring, k = np.divmod(np.arange((rows + 1) * count), count)
+    off = np.zeros((2, len(k))) if rng is None else rng.uniform(-0.2, 0.2, (2, len(k)))
+    off[1, (ring == 0) | (ring == rows)] = 0.0
+    z = height * (ring + off[1]) / rows
+    radius, angle = low + (high - low) * z / height, 2.0 * np.pi * (k + 0.5 * ring + off[0]) / count
+    vertices = np.c_[radius * np.cos(angle), radius * np.sin(angle), z]
+    below, step = np.arange(rows * count), np.where(k[: rows * count] == count - 1, 1 - count, 1)
+    right, above = below + step, below + count
+    sides = np.r_[np.c_[below, right, above], np.c_[right, above + step, above]]
+    ends = [
+        np.asarray(manifold3d.triangulate([vertices[at : at + count, :2]]), dtype=np.int64) + at
+        for at in (0, count * rows)
+    ]
+    return _welded(vertices, np.concatenate([sides, ends[0][:, ::-1], ends[1]]))
+
+
 def _left(vector: np.ndarray) -> np.ndarray:
     return np.stack([-vector[..., 1], vector[..., 0]], axis=-1)
 

@@ -15,7 +15,7 @@ from tests.chamberopt.geometry.smoothing.measures import (
     require_sound,
     smoothed,
 )
-from tests.helpers.scenes.rounded_solids import Mesh, Outline, Solid, circle, outline
+from tests.helpers.scenes.rounded_solids import Mesh, Outline, Solid, circle, outline, staggered
 
 BALL = 1e-3  # radius [m]
 
@@ -51,6 +51,7 @@ SOLIDS = {
     "torus": TORUS,
     "sphere": SPHERE,
 }
+FRUSTUM = Solid(outline([(0, 0), (8e-3, 0), (4e-3, 10e-3), (0, 10e-3)]))
 
 
 def halvings(degrees: float, limit: float = 6.0) -> int:
@@ -78,6 +79,9 @@ def test_fine_facets_are_left() -> None:
     ("name", "degrees", "rms", "normals"),
     [
         ("cylinder", 15.0, 0.25, 0.3),
+        ("cylinder", 22.5, 0.15, 0.15),
+        ("frustum", 15.0, 0.25, 0.3),
+        ("frustum", 30.0, 0.15, 0.3),
         ("block, R = 1 r", 15.0, 0.31, 0.3),
         ("block, R = 1.5 r", 22.5, 0.15, 0.15),
         ("block, R = 3 r", 30.0, 0.15, 0.15),
@@ -86,7 +90,7 @@ def test_fine_facets_are_left() -> None:
     ],
 )
 def test_irregular_triangles(name: str, degrees: float, rms: float, normals: float) -> None:
-    solid = SOLIDS[name]
+    solid = FRUSTUM if name == "frustum" else SOLIDS[name]
     before, after = errors_before_and_after(solid, solid.irregular(np.radians(degrees), 4e-3))
     assert after.rms < rms * before.rms
     assert after.largest < before.largest
@@ -136,6 +140,36 @@ def test_frustums(top: float, height: float, count: int) -> None:
     assert after.rms < 0.6 * before.rms
     assert after.largest < 0.6 * before.largest
     require_sound(smoothed(mesh))
+
+
+@pytest.mark.parametrize("seed", [None, 1])
+@pytest.mark.parametrize("count", [12, 18, 24])
+@pytest.mark.parametrize(("high", "height"), [(8, 16), (4, 10)])
+def test_even_triangles_in_rings(high: float, height: float, count: int, seed: int | None) -> None:
+    """Facets of 30 to 15 degrees with valleys between, most of which are no evidence of a round."""
+    solid = Solid(outline([(0, 0), (8, 0), (high, height), (0, height)]))
+    rng = None if seed is None else np.random.default_rng(seed)
+    mesh = staggered(8.0, high, height, count, rng)
+    before, after = errors_before_and_after(solid, mesh)
+    assert after.rms < 0.2 * before.rms
+    assert after.largest < 0.4 * before.largest
+    assert after.normals_usually < 0.4 * before.normals_usually
+    result = smoothed(mesh)
+    assert result.found.blunt == 0
+    assert len(result.finer.triangles) < 40 * len(mesh[1])
+    require_sound(result)
+
+
+@pytest.mark.parametrize("degrees", [10.0, 15.0])
+@pytest.mark.parametrize("chamfer", [30.0, 38.0])
+def test_chamfer_in_irregular_triangles_stays_sharp(chamfer: float, degrees: float) -> None:
+    """A round does not go on across the edge of a chamfer, but it does across other edges."""
+    in_ = 2e-3 * np.tan(np.radians(chamfer))
+    corners = [(0, 0), (6e-3 - in_, 0), (6e-3, 2e-3), (6e-3, 20e-3), (0, 20e-3)]
+    shaft = Solid(outline(corners))
+    before, after = errors_before_and_after(shaft, shaft.irregular(np.radians(degrees), 3e-3))
+    assert after.rms < 0.4 * before.rms
+    assert after.largest < 0.4 * before.largest
 
 
 @pytest.mark.parametrize("chamfer", [15.0, 30.0, 38.0])
