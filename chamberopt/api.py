@@ -45,7 +45,7 @@ def simulate(
     Args:
         out: new or empty folder.
         analytic: use the exact cylinder, box or prism instead of its mesh, if the chamber is one.
-        tolerances: also simulate what the design's tolerances do; see "tolerances" of result.data.
+        tolerances: also simulate what the design's tolerances do; see result.record.tolerances.
         workers: number of threads, by default one per core; it does not change the result.
         progress: called as progress(done, total, None) after each replica.
     Raises:

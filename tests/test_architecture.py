@@ -17,7 +17,7 @@ ORDER = {
         "common geometry design chamber coverage simulation optimize output api cli __main__"
     ),
     "chamberopt/geometry": "triangles faces+solids+remesh slivers mesh_io smoothing",
-    "chamberopt/geometry/smoothing": "rounds normals divide smooth part",
+    "chamberopt/geometry/smoothing": "rounds normals irregular+divide smooth part",
     "chamberopt/geometry/mesh_io": "surface_error native_reader+units+holes+self_intersection "
     "readers formats healing part_mesh",
     "chamberopt/design": (
@@ -34,7 +34,7 @@ ORDER = {
     "chamberopt/optimize": "study+search storage "
     "sensitivity+evaluate_candidate+observe candidates run_study pareto+run_sweep",
     "chamberopt/cli": "interrupt+options+resume console prepare commands command_line",
-    "chamberopt/output": "vtp_reader vtp_files plots results resimulate viewer save_run "
+    "chamberopt/output": "records vtp_reader vtp_files plots results resimulate viewer save_run "
     "report+export compare editor",
     "sim_core": "errors numerics balls effects geometry motion impulses scene contact detect loop",
 }

@@ -83,7 +83,20 @@ def print_warnings(design: Design, chamber: Chamber, which: str = "") -> list[st
 
 
 def print_json(values: Mapping[str, Any]) -> None:
-    print(json.dumps(values, indent=2))
+    print(json.dumps(values, indent=2, default=_json_value))
+
+
+def _json_value(value: Any) -> Any:
+    """An estimate or a record as JSON values; TypeError for anything else."""
+    from pydantic import BaseModel
+
+    from chamberopt.common.estimate import Estimate
+
+    if isinstance(value, Estimate):
+        return value.interval_json()
+    if isinstance(value, BaseModel):
+        return value.model_dump(mode="json", exclude_unset=True)
+    raise TypeError(f"{type(value).__name__} is no JSON value")
 
 
 def print_result(

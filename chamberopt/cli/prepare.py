@@ -87,7 +87,9 @@ def advise_effects(design: Design, chamber: Chamber) -> list[dict[str, Any]]:
     with local_executor() as executor, step("pilot runs") as progress:
         advice = with_effects_resolved(design, chamber, executor, progress, prepare)[1]
         advice = advice or advise(design, chamber, executor, progress, prepare)
-    return [one.as_json() for one in advice]
+    from chamberopt.output.results.write import advice_record
+
+    return [advice_record(one).model_dump(mode="json") for one in advice]
 
 
 def seconds_of(progress: Progress, whole: float) -> Callable[[float], None]:

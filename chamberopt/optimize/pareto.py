@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -71,19 +71,3 @@ def as_csv(result: StudyResult) -> str:
             line |= dict(zip((name, f"{name}_pm"), shown, strict=True))
         lines.append({**line, **one.parameters})
     return csv_text(lines)
-
-
-def front_json(result: StudyResult) -> list[dict[str, Any]]:
-    """The confirmed front, from the best by the first objective to the best by the second."""
-    front = [one for one in pareto_points(result) if one.on_front and one.stage == "confirm"]
-    return [
-        {
-            "parameters": one.parameters,
-            "standing": one.feasibility,
-            "objectives": {
-                name: goal.interval_json()
-                for name, goal in zip(result.study.objective.goals, one.goals, strict=True)
-            },
-        }
-        for one in sorted(front, key=lambda one: -one.goals[0].value)
-    ]

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -64,27 +63,6 @@ class Sensitivity:
             ranges.append(f"{one.name} may {'be ' if one.texts else ''}{may} {loss}")
         share = f"{self.together:.0%}"
         return [*ranges, f"of all designs within these ranges {share} lose no more than that"]
-
-    def as_json(self) -> dict[str, Any]:
-        """Plain JSON values."""
-        return {
-            "noise": self.noise,
-            "expected": self.expected.interval_json(),
-            "together": self.together,
-            "parameters": {
-                one.name: {
-                    "flat": list(one.flat),
-                    "share_of_variance": one.share,
-                    "values": one.values.tolist(),
-                    "mean": one.mean.tolist(),
-                    "half_width": one.half_width.tolist(),
-                    "or_worse": one.or_worse.tolist(),
-                    "main_effect": one.effect.tolist(),
-                    **({"choices": list(one.texts)} if one.texts else {}),
-                }
-                for one in self.slices
-            },
-        }
 
 
 def analyse_sensitivity(

@@ -55,9 +55,8 @@ def save_simulation(
     """
     folder = make_output_folder(folder)
     with whole_or_nothing(folder):  # without its result.json, what was written is of no use
-        data = write_simulation(folder, complete_result(design, chamber, evaluation))
-        more = {"tolerances": tolerances.as_json()} if tolerances else {}
-        write_result(folder, data | more, advice, warned)
+        completed = complete_result(design, chamber, evaluation)
+        write_result(folder, write_simulation(folder, completed, tolerances), advice, warned)
     return _draw_coverage([folder], [evaluation], [folder.resolve().name], folder / "coverage.png")
 
 
@@ -95,9 +94,9 @@ def save_study(
         results = threads.map(complete, (study_result.start, study_result.best))
         _draw_diagrams(folder, study_result)
         start, best = results
-        data = write_study(folder, study_result, start, best)
+        record = write_study(folder, study_result, start, best)
         remarks = _draw_start_and_best(folder, study_result, threads)
-    write_result(folder, data, advice, warned)
+    write_result(folder, record, advice, warned)
     return remarks
 
 
@@ -107,9 +106,9 @@ def save_sweep(folder: str | Path, sweep: SweepResult) -> list[str]:
     Adds the files of results.write.write_sweep, map.png and, last of all, result.json.
     """
     folder = Path(folder)
-    data = write_sweep(folder, sweep)
+    record = write_sweep(folder, sweep)
     remarks = sweep_map(folder / "map.png", sweep)
-    write_result(folder, data)
+    write_result(folder, record)
     return remarks
 
 

@@ -80,16 +80,6 @@ class Advice:
     def largest_change(self) -> float:
         return max(abs(change.value) for change in self.changes.values())
 
-    def as_json(self) -> dict[str, Any]:
-        """As JSON values."""
-        return {
-            "effect": self.effect,
-            "on": self.on,
-            "verdict": self.verdict,
-            "said": str(self),
-            "changes": {name: one.interval_json() for name, one in self.changes.items()},
-        }
-
     def __str__(self) -> str:
         """The advice as a sentence for the user."""
         name, largest = max(self.changes.items(), key=lambda item: abs(item[1].value))
@@ -232,7 +222,7 @@ def groups(design: Design, chamber: Chamber) -> list[dict[str, Any]]:
     """What dimensionless groups say of each effect that can be switched, without a simulation.
 
     Returns:
-        As `Advice.as_json`, without a verdict and changes.
+        For each effect its name, whether it is on, and a sentence.
     """
     found = []
     for effect in _switchable(design, chamber):

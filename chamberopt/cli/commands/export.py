@@ -119,7 +119,7 @@ def _write_impacts(
     from chamberopt.output.vtp_files import PART
 
     require_writable(files)
-    recorded = result.data["replicas"]
+    recorded = result.record.replicas
     count = replica_count(result, replicas)
     for name in (PART, HITS_FILE):  # the impacts are compared with them at the end
         result.path(name)

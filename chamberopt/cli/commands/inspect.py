@@ -104,7 +104,11 @@ def inspect(
             with step("drawing") if screenshot else nullcontext():
                 viewer.inspect(infos, look, screenshot)
     if json:
-        first = {**loaded[0].data, "folder": str(loaded[0].folder)} if len(loaded) == 1 else {}
+        first = (
+            {**loaded[0].record.as_json(), "folder": str(loaded[0].folder)}
+            if len(loaded) == 1
+            else {}
+        )
         folders = [str(one.folder) for one in loaded]
         image, page = screenshot and str(screenshot), html and str(html)
         print_json({**first, "folders": folders, "screenshot": image, "page": page})

@@ -149,7 +149,7 @@ def _simulate(
 ) -> tuple[Result, list[str]]:
     assert one.chamber is not None
     design = _with_seeds(one.design, settings)
-    analytic = one.result is not None and one.result.data.get("analytic")
+    analytic = one.result is not None and one.result.record.analytic
     cavity = analytic_cavity(design, one.chamber) if analytic else None
     design, advice = prepare(design, one.chamber, cavity)
     with step(f"{one.label}: replicas", design.process.accuracy.replicas) as progress:
@@ -211,7 +211,7 @@ def _mesh(one: Candidate) -> tuple[str, str]:
     if one.chamber is not None:
         return one.chamber.part.sha256, one.chamber.part.unit
     assert one.result is not None
-    return one.result.part_sha256, part_unit(one.result)
+    return one.result.record.part_sha256, part_unit(one.result)
 
 
 def _target(result: Result) -> np.ndarray:
@@ -220,7 +220,7 @@ def _target(result: Result) -> np.ndarray:
 
 def _seed_settings(result: Result) -> SeedSettings:
     seed, stream = result.seeds
-    plan = ReplicaPlan(int(result.data["replicas"]), stream, result.objective_name)
+    plan = ReplicaPlan(result.record.replicas, stream, result.objective_name)
     return SeedSettings(seed, plan)
 
 

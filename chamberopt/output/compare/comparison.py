@@ -65,7 +65,8 @@ class Comparison:
                 name: [gap.as_json() for gap in gaps] for name, gaps in self.differences.items()
             },
             "coverage_against_time": [
-                result.data.get("coverage_against_time", []) for result in self.results
+                [row.model_dump(exclude_unset=True) for row in result.record.coverage_against_time]
+                for result in self.results
             ],
         }
 
@@ -90,7 +91,7 @@ def comparison_of(results: Sequence[Result], names: Sequence[str]) -> Comparison
     first, folders = results[0], [result.folder for result in results]
     designs = [result.design for result in results]
     require_same_part(
-        folders, designs, [(result.part_sha256, part_unit(result)) for result in results]
+        folders, designs, [(result.record.part_sha256, part_unit(result)) for result in results]
     )
     require_same_time(folders, designs)
     require_same_gauge(folders, designs)
@@ -117,7 +118,7 @@ def comparison_of(results: Sequence[Result], names: Sequence[str]) -> Comparison
 
 def part_unit(result: Result) -> str:
     """Return the unit in which the part's file was read."""
-    return str(result.data.get("part_unit") or result.design.part.unit)
+    return result.record.part_unit or result.design.part.unit
 
 
 def _difference(name: str, first: Result, other: Result, confidence: float) -> Difference:
@@ -129,7 +130,7 @@ def _difference(name: str, first: Result, other: Result, confidence: float) -> D
     if found.time_ratio is None:
         return found
     # An estimate knows batches of replicas, not how many replicas there were.
-    return replace(found, replicas=math.ceil(found.time_ratio * other.data["replicas"]))
+    return replace(found, replicas=math.ceil(found.time_ratio * other.record.replicas))
 
 
 def _metal(design: Design) -> tuple[Any, ...]:
@@ -169,9 +170,9 @@ def _design_values(result: Result) -> dict[str, Any]:
         values["chamber.shape"] = Path(values["chamber.shape"]).name  # its content is shape_sha256
     return {
         **values,
-        REPLICAS: result.data.get("replicas", values.get(REPLICAS)),
-        "shape_sha256": result.data.get("shape_sha256", "")[:12],
-        "analytic": bool(result.data.get("analytic", False)),
+        REPLICAS: result.record.replicas,
+        "shape_sha256": result.record.shape_sha256[:12],
+        "analytic": result.record.analytic,
     }
 
 

@@ -39,7 +39,7 @@ def draw_distributions(path: Path, comparison: Comparison, found: Distributions)
     curves = [
         CoverageCurve(
             label if time is None else f"{label}: {_time_to_98(time)}",
-            result.data.get("coverage_against_time") or [],
+            result.record.coverage_against_time,
             line_style(k),
             time,
         )

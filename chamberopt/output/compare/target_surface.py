@@ -100,6 +100,6 @@ def read_target_surface(result: Result) -> TargetSurface:
         interval=np.where(reached, field["coverage_interval"][used], 0.0).astype(float),
         resolved=~reached | (np.asarray(field["resolved"])[used] > 0.5),
         window_radius=math.sqrt(result.design.process.accuracy.gauge_mm2 / math.pi),
-        dents=float(result.data["field"]["dents_in_median_window"]),
+        dents=result.record.field.dents_in_median_window,
         hits=hits.on(target & (np.asarray(part["exposed_area_mm2"]) > 0.0)),
     )

@@ -120,9 +120,9 @@ def _part_of_file(result: Result, surface: Any) -> PartOfFile:
 
 def _origin(result: Result) -> list[str]:
     """Where the numbers come from, for the first lines of a deck."""
-    design, version = result.design, result.data["versions"]["chamberopt"]
+    design, version = result.design, result.record.versions["chamberopt"]
     return [
         f"chamberopt {version}: simulated ultrasonic shot peening, values of each element",
-        f"part file {design.part.mesh_path.name}, sha256 {result.part_sha256}",
+        f"part file {design.part.mesh_path.name}, sha256 {result.record.part_sha256}",
         f"treatment time {design.process.treatment_time:g} s, seed {result.seeds[0]}",
     ]

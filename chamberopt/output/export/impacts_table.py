@@ -95,13 +95,13 @@ def _metadata(
         "replicas": replicas,
         "simulated_time_s": replicas * design.process.recorded_time,
         "treatment_time_s": design.process.treatment_time,
-        "same_as_result": replicas == result.data["replicas"],
+        "same_as_result": replicas == result.record.replicas,
         "seed": result.seeds[0],
         "stream": result.seeds[1],
         "analytic": rebuilt.cavity is not None,
-        "part_sha256": result.part_sha256,
+        "part_sha256": result.record.part_sha256,
         "part_triangles": len(rebuilt.chamber.part.triangles),
-        "design": result.data["design"],
+        "design": result.record.design,
         "versions": versions(),
     }
 

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from chamberopt.common.estimate import Estimate
+    from chamberopt.output.records import CoverageAtTime
 
 MAX_HALF_WIDTH = 0.15  # a curve ends where its coverage is known no better than that
 MAX_BANDS = 3  # results with a band around the 5th percentile; more bands would hide each other
@@ -57,13 +58,13 @@ class CoverageCurve:
 
     Args:
         label: legend.
-        rows: time_s, mean_coverage, half_width, and p05_coverage, p05_half_width where known.
+        rows: coverage at some times, in their order.
         style: colour and line style.
         time_to_98: peening time until 95 % of the area is covered to 98 % [s], if known.
     """
 
     label: str
-    rows: Sequence[Mapping[str, float]]
+    rows: Sequence[CoverageAtTime]
     style: Mapping[str, Any] = field(default_factory=dict)
     time_to_98: Estimate | None = None
 
@@ -149,14 +150,18 @@ def draw_coverage_over_time(
     style_axes(axes, "peening time [s]", "coverage [%]")
 
 
-def _known_lines(rows: Sequence[Mapping[str, float]], max_half_width: float) -> list[np.ndarray]:
+def _known_lines(rows: Sequence[CoverageAtTime], max_half_width: float) -> list[np.ndarray]:
     """Mean and 5th percentile, each with rows times, values, half-widths, shape (3, n)."""
+    means = [(row.time_s, row.mean_coverage, row.half_width) for row in rows]
+    percentiles = [
+        (row.time_s, row.p05_coverage, row.p05_half_width)
+        for row in rows
+        if row.p05_coverage is not None and row.p05_half_width is not None
+    ]
     lines = []
-    for name, width in (("mean_coverage", "half_width"), ("p05_coverage", "p05_half_width")):
-        has_it = [row for row in rows if name in row]
-        known = takewhile(lambda row, width=width: row[width] <= max_half_width, has_it)  # type: ignore[misc]
-        table = [[row["time_s"], row[name], row[width]] for row in known]
-        lines.append(np.array(table).reshape(-1, 3).T)
+    for table in (means, percentiles):
+        known = list(takewhile(lambda row: row[2] <= max_half_width, table))
+        lines.append(np.array(known).reshape(-1, 3).T)
     return lines
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from textwrap import fill
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -19,6 +19,9 @@ from chamberopt.output.plots.coverage import (
 )
 from chamberopt.output.plots.figure_style import SMALL, new_figure, svg_text
 from chamberopt.output.plots.study import EvaluatedCandidate, draw_convergence, slices_figure
+
+if TYPE_CHECKING:
+    from chamberopt.output.records import CoverageAtTime
 
 WIDE, NARROW = (11.0, 3.8), (5.5, 4.0)  # inch
 Y_LABEL = 40  # letters of a line that fit beside a chart
@@ -83,7 +86,7 @@ def slices_chart(parameters: Sequence[Mapping[str, Any]], y_label: str) -> str:
 
 
 def coverage_over_time_chart(
-    curves: Mapping[str, Sequence[Mapping[str, float]]], treatment_time: float
+    curves: Mapping[str, Sequence[CoverageAtTime]], treatment_time: float
 ) -> str:
     """Mean and 5th percentile of coverage over peening time [s], by name of the result."""
     figure = new_figure(*NARROW)

@@ -24,6 +24,7 @@ from chamberopt.output.report.number_text import (
 from chamberopt.output.report.peening.zones import zone_lines
 
 if TYPE_CHECKING:
+    from chamberopt.output.records import ModelRecord, StudyRecord
     from chamberopt.output.results.load import Result
 
 STEPS = {
@@ -67,8 +68,8 @@ def answer(result: Result, start: Result | None, gain: Estimate | None) -> str:
         return f"{text} (95 % intervals); {full_coverage(result)}."
     named = label.text if result.objective_name in OBJECTIVES else label.in_full
     before, after = label.format(start.objective), label.format(result.objective)
-    study = result.data["study"]
-    if study["best"]["parameters"] == study["start"]["parameters"]:
+    study = result.study
+    if study is not None and study.best.parameters == study.start.parameters:
         return (
             f"No better chamber than the start was found: its {named} is {before} (95 % interval)."
         )
@@ -114,21 +115,22 @@ def _constraint_texts(result: Result, limited: tuple[str, ...]) -> Iterator[str]
     Args:
         limited: begins reasons that the best's zones have in sentences of their own.
     """
-    study, label = result.data.get("study", {}), objective_label(result.objective_name)
-    for one in study.get("confirmed", []):
-        reasons = one["reason"].split("; ") if one["standing"] != FEASIBLE else []
-        if one["parameters"] == study["best"]["parameters"]:
+    study, label = result.study, objective_label(result.objective_name)
+    if study is None:
+        return
+    for one in study.confirmed:
+        reasons = one.reason.split("; ") if one.standing != FEASIBLE else []
+        if one.parameters == study.best.parameters:
             whose = "The best chamber found"
             reasons = [text for text in reasons if not text.startswith(limited)]
-        elif one["parameters"] == study["start"]["parameters"]:
+        elif one.parameters == study.start.parameters:
             whose = "The start"
-        elif one["objective"]["value"] > result.objective.value:
-            value = label.format(Estimate.from_json(one["objective"]))
-            whose = f"Another chamber, whose {label.text} is {value}"
+        elif one.objective.value > result.objective.value:
+            whose = f"Another chamber, whose {label.text} is {label.format(one.objective)}"
         else:
             continue
         if reasons:
-            yield f"{whose}: constraints {MET[one['standing']]}: {', '.join(reasons)}."
+            yield f"{whose}: constraints {MET[one.standing]}: {', '.join(reasons)}."
 
 
 def full_coverage(result: Result) -> str:
@@ -143,36 +145,34 @@ def full_coverage(result: Result) -> str:
     return f"95 % of its area is covered to 98 % after {Label('', 's').format(time)}"
 
 
-def accuracy_rows(result: Result, study: Mapping[str, Any] | None) -> dict[str, str]:
+def accuracy_rows(result: Result) -> dict[str, str]:
     """The intervals of the answer, and the replicas behind them."""
     objective, mean = objective_label(result.objective_name), metric_label("mean_coverage")
-    stop_reason = result.data.get("stopped_by", "")
-    field = result.data["field"]
-    needed = field["simulated_s_needed"]["p05_times_intensity"]
+    record, field = result.record, result.record.field
+    needed = field.simulated_s_needed.p05_times_intensity
     rows = {
         f"95 % interval of the {objective.text}": objective.format(result.objective),
         f"95 % interval of the {mean.text}": mean.format(result.metrics["mean_coverage"]),
-        "replicas, each with its own seed": f"{result.data['replicas']}",
-        "number of replicas": STOP_REASONS.get(stop_reason, stop_reason),
-        "dents in the median window": plain(field["dents_in_median_window"], 3),
+        "replicas, each with its own seed": f"{record.replicas}",
+        "number of replicas": STOP_REASONS.get(record.stopped_by, record.stopped_by),
+        "dents in the median window": plain(field.dents_in_median_window, 3),
         "simulation that resolves every figure": f"{plain(needed, 2)} s of all replicas"
         if needed and not result.resolves_places
         else "",
     }
-    if study and "accuracy" in study:
-        search = study["accuracy"]["search"]
-        replicas = f"up to {search['replicas']} replicas"
-        if half_width := search.get("objective_half_width"):
+    if result.study:
+        search = result.study.accuracy.search
+        replicas = f"up to {search.replicas} replicas"
+        if half_width := search.objective_half_width:
             replicas = f"± {half_width:g} requested"
-        time = search.get("simulated_time_s")
+        time = search.simulated_time_s
         rows["a candidate of the search"] = replicas + (f" of {plain(time)} s" if time else "")
-    exact = result.data.get("analytic")
-    rows["chamber's walls"] = "exact planes and cylinders" if exact else "triangles"
+    rows["chamber's walls"] = "exact planes and cylinders" if record.analytic else "triangles"
     return {name: text for name, text in rows.items() if text}
 
 
 def cost_rows(
-    result: Result, study: Mapping[str, Any] | None, evaluations: Sequence[Mapping[str, Any]]
+    result: Result, evaluations: Sequence[Mapping[str, Any]]
 ) -> dict[str, dict[str, str]]:
     """What the result cost.
 
@@ -180,8 +180,8 @@ def cost_rows(
         "answer": simulated time, collisions and run time of the result itself; for a study also
         "evaluations": their numbers and the run time of all.
     """
-    data = result.data
-    collisions = data["collisions"]
+    record, study = result.record, result.study
+    collisions = record.collisions
     kinds = [
         f"{_count(collisions[name])} {kind}"
         for name, kind in COLLISIONS.items()
@@ -189,19 +189,19 @@ def cost_rows(
     ]
     rows = {
         "answer": {
-            "simulated time": f"{plain(data['simulated_time_s'])} s",
+            "simulated time": f"{plain(record.simulated_time_s)} s",
             "collisions": f"{_count(collisions.get('total', 0))}: {', '.join(kinds)}",
-            **{STEPS.get(name, name): f"{s:.2f} s" for name, s in data["timings_s"].items()},
+            **{STEPS.get(name, name): f"{s:.2f} s" for name, s in record.timings_s.items()},
         }
     }
     if study:
         rows["evaluations"] = {
-            "in the search": _count(study["evaluations"]),
-            "of these not simulated": _count(study.get("failed", 0)),
-            "of these given up after a few replicas": _count(study.get("given_up", 0)),
-            "of these miss a constraint": _count(study.get("missing_a_constraint", 0)),
+            "in the search": _count(study.evaluations),
+            "of these not simulated": _count(study.failed),
+            "of these given up after a few replicas": _count(study.given_up),
+            "of these miss a constraint": _count(study.missing_a_constraint),
             "confirmations": _count(sum(row["stage"] == "confirm" for row in evaluations)),
-            "run time of all": f"{plain(study['seconds'], 3)} s",
+            "run time of all": f"{plain(study.seconds, 3)} s",
         }
     return rows
 
@@ -210,11 +210,10 @@ def _count(number: float) -> str:
     return plain(float(number), 12)
 
 
-def influence(study: Mapping[str, Any], label: Label) -> dict[str, Any]:
+def influence(study: StudyRecord, label: Label) -> dict[str, Any]:
     """Which parameters mattered, by the study's model of all its evaluations.
 
     Args:
-        study: "study" of result.json.
         label: of the objective; numbers are returned in its unit.
 
     Returns:
@@ -228,14 +227,12 @@ def influence(study: Mapping[str, Any], label: Label) -> dict[str, Any]:
             flat: range in which it may lie without losing more than the noise.
             values, mean, half_width, effect: its curves.
     """
-    model, count, names = study.get("model"), study["evaluations"], list(study["vary"])
+    model, count, names = study.model, study.evaluations, list(study.vary)
     if not model:
-        return {
-            "parameters": [],
-            "said": [_reason_without_model(count, study.get("failed", 0), len(names))],
-        }
+        said = [_reason_without_model(count, study.failed, len(names))]
+        return {"parameters": [], "said": said}
     rows = sorted(
-        (_parameter_row(name, study, label) for name in names if name in model["parameters"]),
+        (_parameter_row(name, study, model, label) for name in names if name in model.parameters),
         key=lambda row: (-row["surely"], -row["loss"]),
     )
     sentences = []
@@ -268,21 +265,23 @@ def influence(study: Mapping[str, Any], label: Label) -> dict[str, Any]:
             "The effects of single parameters are "
             f"{per_cent(shares)} of the variance over the bounds{rest}."
         )
-    noise = with_unit(abs(label.factor) * model["noise"], label.unit)
+    noise = with_unit(abs(label.factor) * model.noise, label.unit)
     sentences.append(
         f"In its shaded range, each parameter alone loses no more than the noise, {noise}. "
-        f"Of all designs with every parameter in its range, {per_cent(model['together'])} lose no "
+        f"Of all designs with every parameter in its range, {per_cent(model.together)} lose no "
         "more than that."
     )
     return {"parameters": rows, "said": sentences}
 
 
-def _parameter_row(name: str, study: Mapping[str, Any], label: Label) -> dict[str, Any]:
-    parameter, best = study["model"]["parameters"][name], study["model"]["expected"]
+def _parameter_row(
+    name: str, study: StudyRecord, model: ModelRecord, label: Label
+) -> dict[str, Any]:
+    parameter, best = model.parameters[name], model.expected
     size = abs(label.factor)
-    losses = [size * (best["value"] - mean) for mean in parameter["mean"]]
-    half_widths = [size * math.hypot(half, best["half_width"]) for half in parameter["half_width"]]
-    or_worse = parameter.get("or_worse", [False] * len(losses))
+    losses = [size * (best.value - mean) for mean in parameter.mean]
+    half_widths = [size * math.hypot(half, best.half_width) for half in parameter.half_width]
+    or_worse = parameter.or_worse or [False] * len(losses)
     worst = max(range(len(losses)), key=losses.__getitem__)
     certain = [loss - half for loss, half in zip(losses, half_widths, strict=True)]
     loss, half_width = max(0.0, losses[worst]), half_widths[worst]
@@ -291,20 +290,20 @@ def _parameter_row(name: str, study: Mapping[str, Any], label: Label) -> dict[st
         text = f"{with_unit(loss, label.unit)} or more"
     return {
         "name": name,
-        "share": parameter["share_of_variance"],
+        "share": parameter.share_of_variance,
         "loss": loss,
         "loss_half_width": None if or_worse[worst] else half_width,
         "loss_text": text,
         "surely": max(0.0, *certain),
-        "flat": parameter["flat"],
-        "texts": parameter.get("choices", []),
-        "start": study["start"]["parameters"][name],
-        "best": study["best"]["parameters"][name],
-        "values": parameter["values"],
-        "mean": [label.factor * value for value in parameter["mean"]],
-        "half_width": [size * value for value in parameter["half_width"]],
+        "flat": parameter.flat,
+        "texts": parameter.choices,
+        "start": study.start.parameters[name],
+        "best": study.best.parameters[name],
+        "values": parameter.values,
+        "mean": [label.factor * value for value in parameter.mean],
+        "half_width": [size * value for value in parameter.half_width],
         "or_worse": or_worse,
-        "effect": [label.factor * value for value in parameter["main_effect"]],
+        "effect": [label.factor * value for value in parameter.main_effect],
     }
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 from chamberopt.common import number_text
 from chamberopt.common.errors import InputError
@@ -45,10 +44,10 @@ class Label:
         """The estimate with its interval, in the unit shown."""
         return typeset(number_text.estimate_text(estimate, self.factor, self.unit, sign))
 
-    def scale(self, estimate: Estimate) -> dict[str, Any]:
-        """The estimate as JSON values in the unit shown."""
+    def scale(self, estimate: Estimate) -> Estimate:
+        """The interval in the unit shown."""
         value, half_width = self.factor * estimate.value, abs(self.factor) * estimate.half_width
-        return Estimate(value, half_width, in_words=estimate.in_words).interval_json()
+        return Estimate(value, half_width, in_words=estimate.in_words)
 
 
 def metric_label(name: str) -> Label:
@@ -106,9 +105,8 @@ def with_interval(value: float, half_width: float, unit: str = "", sign: bool = 
     return typeset(number_text.with_interval(value, half_width, unit, sign))
 
 
-def interval_text(row: Mapping[str, Any], unit: str = "", sign: bool = False) -> str:
-    """What Label.scale returned, as text."""
-    shown = Estimate.from_interval_json(row)
+def interval_text(shown: Estimate, unit: str = "", sign: bool = False) -> str:
+    """An interval in the unit shown, as text."""
     return typeset(number_text.estimate_text(shown, unit=unit, sign=sign))
 
 

@@ -89,8 +89,8 @@ def part_scene(result: Result, title: str, max_triangles: int = MAX_TRIANGLES) -
         "title": title,
         "treatment": result.design.process.treatment_time,
         "curve": [
-            [row["time_s"], row["mean_coverage"], row["half_width"]]
-            for row in result.data.get("coverage_against_time", [])
+            [row.time_s, row.mean_coverage, row.half_width]
+            for row in result.record.coverage_against_time
         ],
         "columns": {
             **{

@@ -24,6 +24,7 @@ from chamberopt.output.report.peening.zones import limit_text, zone_contents
 from chamberopt.output.results.load import load_result, load_start, load_trials
 
 if TYPE_CHECKING:
+    from chamberopt.output.records import FrontPoint, StudyRecord
     from chamberopt.output.results.load import Result
 
 
@@ -34,7 +35,7 @@ def report_contents(folder: str | Path) -> dict[str, Any]:
         InputError: the folder is no finished result.
     """
     result = load_result(folder)
-    study = result.data.get("study")
+    record, study = result.record, result.study
     start = load_start(result) if study else None
     gain = None if start is None else _change(result.objective, start.objective, result, start)
     rows = load_trials(result.folder) if study else []
@@ -42,9 +43,9 @@ def report_contents(folder: str | Path) -> dict[str, Any]:
     zones = zone_contents(result)
     candidates = {"result": result} if start is None else {"start": start, "best": result}
     return {
-        "kind": result.kind,
+        "kind": record.kind,
         "name": result.folder.resolve().name,
-        "made": result.data.get("created", ""),
+        "made": record.created,
         "answer": answer(result, start, gain),
         "answer_lines": answer_lines(result, zones),
         "question": _question(result, study),
@@ -52,23 +53,23 @@ def report_contents(folder: str | Path) -> dict[str, Any]:
         "calibrated": result.design.calibration is not None,
         "zones": zones,
         "field": _field(result),
-        "front": [_pareto_row(row) for row in study.get("front", [])] if study else [],
+        "front": [_pareto_row(row) for row in study.front] if study else [],
         "evaluations": [_evaluation(row, label.factor) for row in rows],
         "influence": influence(study, label) if study and start else None,
         "coverage_against_time": {
-            name: one.data.get("coverage_against_time", []) for name, one in candidates.items()
+            name: one.record.coverage_against_time for name, one in candidates.items()
         },
-        "tolerances": tolerance_contents(result.data.get("tolerances")),
-        "accuracy": accuracy_rows(result, study),
-        "cost": cost_rows(result, study, rows),
+        "tolerances": tolerance_contents(record.tolerances),
+        "accuracy": accuracy_rows(result),
+        "cost": cost_rows(result, rows),
         "effects": _effects(result),
-        "notes": _notes(result, study),
-        "warnings": result.data.get("warnings"),
+        "notes": [*(study.notes if study else ()), *record.notes],
+        "warnings": record.warnings,
         "design": _design(result, start),
         "identity": {
-            "part, SHA-256": result.part_sha256,
+            "part, SHA-256": record.part_sha256,
             "seed": f"{result.seeds[0]}, stream “{result.seeds[1]}”",
-            **{name: str(version) for name, version in result.data.get("versions", {}).items()},
+            **record.versions,
         },
     }
 
@@ -82,13 +83,15 @@ def _change(after: Estimate, before: Estimate, result: Result, start: Result) ->
     return change if after.has_number and before.has_number else change.not_known("not known")
 
 
-def _question(result: Result, study: Mapping[str, Any] | None) -> dict[str, Any]:
+def _question(result: Result, study: StudyRecord | None) -> dict[str, Any]:
     label, design = objective_label(result.objective_name), result.design
-    chamber = result.data.get("chamber", {})
-    target = ("target_triangles", "target_exposed_area_mm2")
+    chamber = result.record.chamber
     question: dict[str, Any] = {
         "part": design.part.mesh_path.name,
-        "target": {name: chamber[name] for name in target if name in chamber},
+        "target": {
+            "target_triangles": chamber.target_triangles,
+            "target_exposed_area_mm2": chamber.target_exposed_area_mm2,
+        },
         "shape": design.chamber.shape,
         "treatment_time_s": design.process.treatment_time,
         "objective": {
@@ -103,7 +106,7 @@ def _question(result: Result, study: Mapping[str, Any] | None) -> dict[str, Any]
     }
     if not study:
         return question
-    if STUDY in result.sha256:
+    if STUDY in result.record.files:
         tables = tomllib.loads(read_file(result.path(STUDY)).decode())
         question["constraints"] = [
             " and ".join(f"{name} {'≥' if side == 'min' else '≤'} {limit:g}"
@@ -111,20 +114,20 @@ def _question(result: Result, study: Mapping[str, Any] | None) -> dict[str, Any]
             for name, limits in tables.get("constraints", {}).items()
         ]  # fmt: skip
     question["constraints"] += [
-        f"{limit_text(row)} of zone {zone['name']}"
-        for zone in result.data.get("zones", [])
-        for row in zone["limits"]
+        f"{limit_text(limit)} of zone {zone.name}"
+        for zone in result.record.zones
+        for limit in zone.limits
     ]
     question["vary"] = [
         {
             "name": name,
             "values": (", " if isinstance(ends[0], str) else " to ").join(map(plain, ends)),
-            "start": study["start"]["parameters"][name],
-            "best": study["best"]["parameters"][name],
+            "start": study.start.parameters[name],
+            "best": study.best.parameters[name],
         }
-        for name, ends in study["vary"].items()
+        for name, ends in study.vary.items()
     ]
-    return {**question, "evaluations": study["evaluations"], "algorithm": study["algorithm"]}
+    return {**question, "evaluations": study.evaluations, "algorithm": study.algorithm}
 
 
 def _metrics(result: Result, start: Result | None) -> list[dict[str, Any]]:
@@ -160,19 +163,20 @@ def _metrics(result: Result, start: Result | None) -> list[dict[str, Any]]:
 
 def _field(result: Result) -> dict[str, Any]:
     """The windows in which coverage is measured."""
-    field = result.data["field"]
-    labels = {name: metric_label(name) for name in field["double_gauge"]}
-    shown = ("gauge_mm2", "reachable_share", "crease_share")
+    field = result.record.field
+    labels = {name: metric_label(name) for name in field.double_gauge}
     return {
-        **{name: field[name] for name in shown},
-        "dents": field["dents_in_median_window"],
+        "gauge_mm2": field.gauge_mm2,
+        "reachable_share": field.reachable_share,
+        "crease_share": field.crease_share,
+        "dents": field.dents_in_median_window,
         "double_gauge": [
             {
                 "label": labels[name].text,
                 "unit": labels[name].unit,
-                "result": labels[name].scale(Estimate.from_json(one)),
+                "result": labels[name].scale(one),
             }
-            for name, one in field["double_gauge"].items()
+            for name, one in field.double_gauge.items()
         ],
     }
 
@@ -190,21 +194,20 @@ def _evaluation(row: Mapping[str, Any], factor: float) -> dict[str, Any]:
     }
 
 
-def _pareto_row(row: Mapping[str, Any]) -> dict[str, Any]:
+def _pareto_row(point: FrontPoint) -> dict[str, Any]:
     """A candidate of the confirmed Pareto front, its objectives in the unit shown."""
     objectives = []
-    for name, value in row["objectives"].items():
+    for name, value in point.objectives.items():
         label = objective_label(name)
-        scaled = label.scale(Estimate.from_interval_json(value))
-        objectives.append({"label": label.text, "unit": label.unit, "result": scaled})
-    return {"parameters": row["parameters"], "objectives": objectives}
+        objectives.append({"label": label.text, "unit": label.unit, "result": label.scale(value)})
+    return {"parameters": point.parameters, "objectives": objectives}
 
 
 def _effects(result: Result) -> dict[str, Any]:
     """Which effects are on, and what a pilot run estimated of each where one was made."""
     effects = result.design.effects.model_dump(mode="json", exclude={"auto"})
     return {
-        "pilot": result.data.get("effects", []),
+        "pilot": result.record.effects,
         "effects": [
             {"effect": name, "value": _effect_text(name, value)} for name, value in effects.items()
         ],
@@ -219,15 +222,10 @@ def _effect_text(name: str, value: Any) -> str:
     return "on" if value else "off"
 
 
-def _notes(result: Result, study: Mapping[str, Any] | None) -> list[str]:
-    """What limits the answer: notes of the study, and of the simulation."""
-    return [*(study or {}).get("notes", []), *result.notes]
-
-
 def _design(result: Result, start: Result | None) -> list[dict[str, Any]]:
     """Every value of the design by its dotted name, with the start's where that differs."""
-    values = dict(_flatten(result.data["design"]))
-    before = dict(_flatten(start.data["design"])) if start else {}
+    values = dict(_flatten(result.record.design))
+    before = dict(_flatten(start.record.design)) if start else {}
     # The file's name only: its folder is private to the machine.
     values["part.mesh"] = before["part.mesh"] = result.design.part.mesh_path.name
     rows = []
@@ -259,5 +257,5 @@ def _text(value: Any) -> str:
 
 def read_design_file(result: Result) -> tuple[str, str]:
     """Name and text of the design that the result belongs to."""
-    name = "best.toml" if result.kind == "study" else "design.toml"
+    name = "best.toml" if result.study else "design.toml"
     return name, read_file(result.path(name)).decode()

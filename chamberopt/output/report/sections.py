@@ -59,9 +59,8 @@ def sections(
 
 def _question(contents: Contents) -> str:
     question = contents["question"]
-    part, target = question["part"], question["target"]
-    reach = ""
-    if area := target.get("target_exposed_area_mm2"):
+    part, reach = question["part"], ""
+    if area := question["target"]["target_exposed_area_mm2"]:
         field = contents["field"]
         reach = (
             f" ({plain(area)} mm² in the chamber; the shot can reach "
@@ -287,20 +286,16 @@ def _effects(contents: Contents) -> str:
     content = [html.table("In this result", (), switched, numbers=False)]
     if pilot:
         rows = [
-            (
-                one["effect"],
-                one["verdict"],
-                *(_percentage(change) for change in one["changes"].values()),
-            )
+            (one.effect, one.verdict, *(_percentage(change) for change in one.changes.values()))
             for one in pilot
         ]
-        head = ("effect", "verdict", *(f"change of {name}" for name in pilot[0]["changes"]))
+        head = ("effect", "verdict", *(f"change of {name}" for name in pilot[0].changes))
         content += [
             html.paragraph(
                 "The effects were chosen by a short pilot run, in which each was switched alone:"
             ),
             html.table("", head, rows),
-            html.items(one["said"] for one in pilot),
+            html.items(one.said for one in pilot),
         ]
     else:
         content.append(
@@ -312,8 +307,8 @@ def _effects(contents: Contents) -> str:
     return html.section("Physical effects", *content)
 
 
-def _percentage(change: Contents) -> str:
-    return typeset(estimate_text(Estimate.from_interval_json(change), 100.0, "%", sign=True))
+def _percentage(change: Estimate) -> str:
+    return typeset(estimate_text(change, 100.0, "%", sign=True))
 
 
 def _notes(contents: Contents) -> str:

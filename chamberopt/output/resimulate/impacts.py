@@ -87,13 +87,13 @@ def simulate_impacts(
         yield one
         if progress:
             progress(number + 1, count, None)
-    if count == result.data["replicas"]:
+    if count == result.record.replicas:
         _require_same_impacts(result, np.concatenate(triangles), np.concatenate(speeds))
 
 
 def replica_count(result: Result, replicas: int | None) -> int:
     """How many replicas to simulate: all unless fewer are wanted. InputError for more or none."""
-    there = int(result.data["replicas"])
+    there = result.record.replicas
     if replicas is not None and not 1 <= replicas <= there:
         raise InputError(f"--replicas: given {replicas}; the result has {there}, give 1 to {there}")
     return replicas or there
@@ -162,7 +162,7 @@ def dented_share(dents: Dents, chamber: Chamber) -> float:
 def _replicas_ahead(result: Result) -> int:
     """Replicas to begin before the one that is yielded: one a core, unless their logs are long."""
     part = load_part(result)
-    impacts = float(part["impacts"].sum()) / result.data["replicas"]
+    impacts = float(part["impacts"].sum()) / result.record.replicas
     return max(0, min(core_count(), int(MAX_IMPACTS_IN_MEMORY / max(impacts, 1.0)) - 1))
 
 

@@ -73,8 +73,9 @@ class RebuiltReplica:
 def rebuild_chamber(result: Result) -> RebuiltChamber:
     """The chamber of a result from its own folder; InputError if its file is not as it was."""
     chamber = load_chamber(result)
-    is_analytic = result.data.get("analytic")
-    return RebuiltChamber(chamber, analytic_cavity(result.design, chamber) if is_analytic else None)
+    return RebuiltChamber(
+        chamber, analytic_cavity(result.design, chamber) if result.record.analytic else None
+    )
 
 
 def rebuild_replica(result: Result, number: int = 0) -> RebuiltReplica:
@@ -83,7 +84,7 @@ def rebuild_replica(result: Result, number: int = 0) -> RebuiltReplica:
     Raises:
         InputError: the result has no such replica, or its chamber's file is not as it was.
     """
-    there = int(result.data["replicas"])
+    there = result.record.replicas
     if not 0 <= number < there:
         raise InputError(
             f"--replica: given {number}; the result has {there}, give 0 to {there - 1}"
@@ -103,8 +104,6 @@ def _identity(triangle: np.ndarray, speed: np.ndarray) -> np.ndarray:
 
 def made_by(result: Result) -> str:
     """Versions of the programs that made a result, for messages."""
-    made = result.data.get("versions", {})
+    made = result.record.versions
     names = ("chamberopt", "manifold3d", "numba", "numpy", "system")
-    return (
-        ", ".join(f"{name} {made[name]}" for name in names if name in made) or "an unknown version"
-    )
+    return ", ".join(f"{name} {made[name]}" for name in names if name in made)

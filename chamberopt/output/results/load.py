@@ -8,6 +8,7 @@ import shlex
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -24,7 +25,13 @@ from chamberopt.design.load import Design
 from chamberopt.geometry.triangles import areas
 from chamberopt.optimize.storage.study_folder import is_study_folder
 from chamberopt.optimize.storage.trial_log import HISTORY, TIMINGS, read_trials
-from chamberopt.output.results.recorded import require_recorded
+from chamberopt.output.records import (
+    FORMAT,
+    CandidateRecord,
+    ResultRecord,
+    StudyRecord,
+    read_record,
+)
 from chamberopt.output.vtp_files import (
     CHAMBER,
     COVERAGE,
@@ -39,7 +46,6 @@ from chamberopt.output.vtp_files import (
 if TYPE_CHECKING:
     from chamberopt.simulation.evaluation import Evaluation
 
-FORMAT = 5
 START = "start"
 # Folders of other commands, by the file that each has: what they are, and where that can be seen.
 OTHER_FOLDERS = {
@@ -55,26 +61,38 @@ RESTORE = "restore the folder from where it came, or simulate again"
 
 @dataclass(frozen=True)
 class Result:
-    """A results folder that has been read.
+    """A results folder that has been read; a study stands for its best design as confirmed.
 
-    kind: "simulation" or "study"; a study stands for its best design as confirmed.
     design: the candidate that the figures belong to.
-    seeds: process.seed and the name of the random stream.
-    sha256: of each data file beside result.json, by its name.
-    data: everything in result.json.
+    record: everything in result.json.
     """
 
     folder: Path
-    kind: str
     design: Design
-    objective_name: str
-    objective: Estimate
-    metrics: dict[str, Estimate]
-    part_sha256: str
-    seeds: tuple[int, str]
-    notes: tuple[str, ...]
-    sha256: dict[str, str]
-    data: dict[str, Any]
+    record: CandidateRecord
+
+    @property
+    def study(self) -> StudyRecord | None:
+        """The record of the study; None for a simulation."""
+        return self.record.study
+
+    @property
+    def objective_name(self) -> str:
+        return self.record.objective.name
+
+    @property
+    def objective(self) -> Estimate:
+        return self.record.objective.estimate
+
+    @cached_property
+    def metrics(self) -> dict[str, Estimate]:
+        """The metrics that this version of the program knows."""
+        return {name: one for name, one in self.record.metrics.items() if find_metric(name)}
+
+    @property
+    def seeds(self) -> tuple[int, str]:
+        """The number process.seed and the name of the random stream."""
+        return self.record.seed, self.record.stream
 
     @property
     def gauge_mm2(self) -> float:
@@ -84,13 +102,12 @@ class Result:
     @property
     def resolves_places(self) -> bool:
         """Whether the windows have the dents that figures of single places take."""
-        field = self.data["field"]
-        needed = field["dents_needed"]["p05_times_intensity"]
-        return bool(field["dents_in_median_window"] >= needed)
+        field = self.record.field
+        return field.dents_in_median_window >= (field.dents_needed.p05_times_intensity or 0.0)
 
     def path(self, name: str) -> Path:
         """Path of a data file of the result; InputError unless it is the file that was written."""
-        return unchanged_file(self.folder, name, self.sha256)
+        return unchanged_file(self.folder, name, self.record.files)
 
 
 def load_result(path: str | Path) -> Result:
@@ -115,32 +132,16 @@ def load_result(path: str | Path) -> Result:
         what = next(is_other, f"not a results folder, {RESULT} is missing")
         raise InputError(f"{folder}: {what}; here a folder made by simulate or run is needed")
     with _damage_explained(file):
-        data = _read_data(file)
-        if data["kind"] == "sweep":
+        record = _read_record(file)
+        if not isinstance(record, CandidateRecord):
             raise InputError(
                 f"{folder}: a sweep is a map of many candidates, not the result of one; simulate "
                 "the design that you want from it, such as its best.toml"
             )
-        design = validate(Design, data["design"], file, recorded=True)
-        if data["seed"] != design.process.seed:
-            raise ValueError(f"seed: given {data['seed']}, its design has {design.process.seed}")
-        return Result(
-            folder=folder,
-            kind=data["kind"],
-            design=design,
-            objective_name=data["objective"]["name"],
-            objective=Estimate.from_json(data["objective"]),
-            metrics={
-                name: Estimate.from_json(found)
-                for name, found in data["metrics"].items()
-                if find_metric(name)
-            },
-            part_sha256=data["part_sha256"],
-            seeds=(data["seed"], data["stream"]),
-            notes=tuple(data["notes"]),
-            sha256=data["files"],
-            data=data,
-        )
+        design = validate(Design, record.design, file, recorded=True)
+        if record.seed != design.process.seed:
+            raise ValueError(f"seed: given {record.seed}, its design has {design.process.seed}")
+        return Result(folder, design, record)
 
 
 def load_start(study: Result) -> Result:
@@ -157,7 +158,7 @@ def load_trials(folder: Path) -> list[dict[str, Any]]:
     file = folder / RESULT
     if file.is_file():
         with _damage_explained(file):
-            sha256 = _read_data(file)["files"]
+            sha256 = _read_record(file).files
         for name in sorted({HISTORY, TIMINGS} & sha256.keys()):
             unchanged_file(folder, name, sha256)
     return read_trials(folder)
@@ -263,7 +264,7 @@ def _damage_explained(file: Path) -> Iterator[None]:
         ) from None
 
 
-def _read_data(file: Path) -> dict[str, Any]:
+def _read_record(file: Path) -> ResultRecord:
     """The content of a result.json that this version of the program reads whole; or InputError."""
     content = read_limited(file, MAX_RESULT_BYTES, "file of a result")
     data = parse_json(content)
@@ -273,8 +274,7 @@ def _read_data(file: Path) -> dict[str, Any]:
         raise _of_another_format(file, data)
     if data.get("sha256") != content_sha256(data):
         raise InputError(f"{file}: not as it was written: its sha256 is another; {RESTORE}")
-    require_recorded(data)
-    return data
+    return read_record(data)
 
 
 def _of_another_format(file: Path, data: dict[str, Any]) -> InputError:

@@ -46,13 +46,13 @@ class ResultInfo:
 def result_info(result: Result) -> ResultInfo:
     """Collect what the viewer needs from a result."""
     treatment = result.design.process.treatment_time
-    times = [row["time_s"] for row in result.data.get("coverage_against_time", [])]
+    times = [row.time_s for row in result.record.coverage_against_time]
     return ResultInfo(
         folder=str(result.folder),
         title=f"{result.folder.resolve().name}\n{summary(result)}",
         treatment_s=treatment,
         longest_s=max([treatment, *times]),
-        sha256=result.sha256,
+        sha256=result.record.files,
         zones=[zone.name for zone in result.design.zones],
     )
 

@@ -22,7 +22,7 @@ from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Executor
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -88,23 +88,6 @@ class ToleratedFigure:
     simulated: Estimate | None = None
     agrees: bool = True
 
-    def as_json(self) -> dict[str, Any]:
-        """Plain JSON values."""
-        values = {
-            name: getattr(self, name).interval_json()
-            for name in ("nominal", "q05", "q95", "lowest", "highest")
-        }
-        effects = {
-            name: {"low": low.interval_json(), "high": high.interval_json()}
-            for name, (low, high) in self.effects.items()
-        }
-        corner = None
-        if self.predicted and self.simulated:
-            both = {"predicted": self.predicted, "simulated": self.simulated}
-            shown = {name: one.interval_json() for name, one in both.items()}
-            corner = {**shown, "agrees": self.agrees}
-        return {**values, "effects": effects, "corner": corner}
-
 
 @dataclass(frozen=True)
 class ToleranceResult:
@@ -119,20 +102,6 @@ class ToleranceResult:
     worst_for: str
     corner: dict[str, float]
     notes: tuple[str, ...]
-
-    def as_json(self) -> dict[str, Any]:
-        """Plain JSON values."""
-        return {
-            "box": {
-                one.name: {"low": one.low, "nominal": one.nominal, "high": one.high,
-                           "changed_to": one.changed.value(one.name)}
-                for one in self.numbers
-            },
-            "worst_for": self.worst_for,
-            "corner": self.corner,
-            "figures": {name: one.as_json() for name, one in self.figures.items()},
-            "notes": list(self.notes),
-        }  # fmt: skip
 
 
 def simulate_tolerances(

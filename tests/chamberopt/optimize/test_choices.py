@@ -21,7 +21,7 @@ from chamberopt.output.plots.study import convergence_picture, slices_figure, sl
 from chamberopt.output.plots.sweep import sweep_map
 from chamberopt.output.report.conclusions import influence
 from chamberopt.output.report.number_text import Label
-from chamberopt.output.results.recorded import _Model
+from chamberopt.output.results.write import study_record
 from chamberopt.simulation.evaluation import Evaluation
 from tests.helpers.known_optima import NO_FRILLS
 from tests.helpers.studies import run_in_folder, sweep_in_folder
@@ -88,7 +88,8 @@ def test_tables_charts_and_sentences_have_the_texts(searched: StudyResult, tmp_p
     np.testing.assert_array_equal(material.values, [0.0, 1.0, 2.0])
     assert found.sentences()[0].startswith("shot.material may be zirconia without losing")
     assert found.sentences()[1].startswith("shot.mass_g may go from")
-    recorded = _Model.model_validate(found.as_json())
+    recorded = study_record(searched).model
+    assert recorded is not None
     assert recorded.parameters["shot.material"].choices == list(material.texts)
     assert recorded.parameters["shot.material"].flat == ["zirconia"]
     assert recorded.parameters["shot.mass_g"].flat == list(mass.flat)
@@ -102,16 +103,10 @@ def test_tables_charts_and_sentences_have_the_texts(searched: StudyResult, tmp_p
 
 def test_the_report_has_the_texts(searched: StudyResult) -> None:
     assert searched.sensitivity is not None
-    about = {
-        "model": searched.sensitivity.as_json(),
-        "evaluations": 14,
-        "vary": {name: list(one.ends) for name, one in searched.study.vary.items()},
-        "start": {"parameters": searched.start.parameters},
-        "best": {"parameters": searched.best.parameters},
-    }
-    assert about["vary"]["shot.material"] == ["steel", "zirconia", "silicon_nitride"]
+    about = study_record(searched)
+    assert about.vary["shot.material"] == ["steel", "zirconia", "silicon_nitride"]
     rows = {row["name"]: row for row in influence(about, Label("score"))["parameters"]}
-    assert rows["shot.material"]["texts"] == about["vary"]["shot.material"]
+    assert rows["shot.material"]["texts"] == about.vary["shot.material"]
     assert rows["shot.material"]["best"] == "zirconia"
     assert rows["shot.mass_g"]["texts"] == []
 

@@ -257,7 +257,7 @@ def test_the_real_thing_end_to_end(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     again = load_result(tmp_path / "1")
     assert again.design == one.best.design
     assert load_result(tmp_path / "1" / "start").objective == one.start.evaluation.objective
-    assert {"chamber", "simulate", "coverage"} <= set(again.data["timings_s"])
+    assert {"chamber", "simulate", "coverage"} <= set(again.record.timings_s)
 
 
 def test_history_rows_are_plain_json(tmp_path: Path) -> None:

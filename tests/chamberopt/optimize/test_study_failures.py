@@ -365,7 +365,7 @@ class TestCommandLine:
         assert not Path("out/result.json").exists()
         assert main(["run", "small.toml", "--out", "out"]) == 0
         assert len(evaluated) == ROWS
-        assert load_result("out").kind == "study"
+        assert load_result("out").record.kind == "study"
 
     def test_a_finished_study_is_shown_not_run(
         self, evaluated: list, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch

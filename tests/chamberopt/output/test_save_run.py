@@ -47,13 +47,13 @@ def test_zones_read_back_and_are_shown_from_the_folder_alone(tmp_path: Path) -> 
     result = load_result(moved)
     assert result.design.zones == design.zones
     assert result.metrics["left.p05_coverage"].in_words == ""
-    (found,) = result.data["zones"]
-    assert found["name"] == "left"
-    assert 0.4 < found["reachable_share"] < 0.6  # of what is a lid too, outside the chamber
-    assert found["limits"][0]["standing"] == "not met"
-    assert load_chamber(result).part.zones["left"].sum() == found["triangles"]
+    (found,) = result.record.zones
+    assert found.name == "left"
+    assert 0.4 < found.reachable_share < 0.6  # of what is a lid too, outside the chamber
+    assert found.limits[0].standing == "not met"
+    assert load_chamber(result).part.zones["left"].sum() == found.triangles
     part = load_part(result)
-    assert part["zone"].sum() == part["zone_left"].sum() == found["triangles"]
+    assert part["zone"].sum() == part["zone_left"].sum() == found.triangles
     text = report_contents(moved)
     (limit,) = text["zones"]["zones"][0]["limits"]
     assert limit["label"] == "coverage that 95 % of the zone's area exceeds"
@@ -86,17 +86,19 @@ def test_simulation_reads_back(tmp_path: Path) -> None:
     }
     result = load_result(folder)
     assert result == load_result(folder / "result.json")
-    assert result.kind == "simulation"
+    assert result.record.kind == "simulation"
     assert result.design == DESIGN
     assert load_design(folder / "design.toml") == DESIGN
     assert result.objective == EVALUATION.objective
     assert result.metrics == EVALUATION.metrics
-    assert result.part_sha256 == hashlib.sha256(DESIGN.part.mesh_path.read_bytes()).hexdigest()
+    assert (
+        result.record.part_sha256 == hashlib.sha256(DESIGN.part.mesh_path.read_bytes()).hexdigest()
+    )
     assert result.seeds == (DESIGN.process.seed, "search")
-    assert list(CHAMBER.notes) == list(result.notes)
+    assert list(CHAMBER.notes) == result.record.notes
     for name in ("python", "chamberopt", "numpy", "numba", "manifold3d", "nlopt"):
-        assert result.data["versions"][name][0].isdigit()
-    assert result.data["timings_s"]["simulate"] == 1.0
+        assert result.record.versions[name][0].isdigit()
+    assert result.record.timings_s["simulate"] == 1.0
     assert summary(result) == summary(EVALUATION)
 
 
@@ -135,7 +137,7 @@ def test_a_study_leaves_everything_and_its_best_design_can_be_used(tmp_path: Pat
         "chamber.npz", "start", "inputs.json", "timings.jsonl", "confirm", "hits.npz",
     }  # fmt: skip
     result = load_result(folder)
-    assert result.kind == "study"
+    assert result.record.kind == "study"
     assert result.design == outcome.best.design == load_design(folder / "best.toml")
     assert load_design(folder / "design.toml") == DESIGN
     assert result.seeds == (DESIGN.process.seed, outcome.best.evaluation.stream)
@@ -145,11 +147,12 @@ def test_a_study_leaves_everything_and_its_best_design_can_be_used(tmp_path: Pat
     assert (gain.value, gain.half_width) == pytest.approx(
         (outcome.gain.value, outcome.gain.half_width)
     )
-    about = result.data["study"]
-    assert about["improved"]
-    assert about["gain"]["value"] == outcome.gain.value
-    assert about["evaluations"] - about["failed"] == 12  # what is not simulated costs nothing
-    assert about["failed"] == sum(trial.objective is None for trial in outcome.trials)
+    about = result.study
+    assert about is not None
+    assert about.improved
+    assert about.gain == outcome.gain
+    assert about.evaluations - about.failed == 12  # what is not simulated costs nothing
+    assert about.failed == sum(trial.objective is None for trial in outcome.trials)
     assert (folder / "convergence.png").stat().st_size > 20_000
     assert len((folder / "history.csv").read_text().splitlines()) == len(outcome.trials) + 1
     json.loads((folder / "result.json").read_text(), parse_constant=lambda name: pytest.fail(name))

@@ -20,6 +20,7 @@ from chamberopt.common.parallel.executor import SerialExecutor, local_executor
 from chamberopt.coverage.metrics import exposed_target
 from chamberopt.design.design import validate
 from chamberopt.design.load import Design
+from chamberopt.output.results.write import advice_record
 from chamberopt.simulation import effect_pilot
 from chamberopt.simulation.effect_pilot import MEASURED, Advice, advise, with_effects_resolved
 from tests.helpers.synthetic import dents_at, plate_design
@@ -70,7 +71,7 @@ def test_a_verdict_follows_from_the_largest_change_and_its_interval(
     one = Advice("drag", on, "because", changes, 0.01)
     assert said in str(one)
     assert "because" in str(one)
-    assert one.as_json()["verdict"] == one.verdict
+    assert advice_record(one).verdict == one.verdict
 
 
 def pretend(strength: dict[str, float], monkeypatch: pytest.MonkeyPatch) -> list[Design]:

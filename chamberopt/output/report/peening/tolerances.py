@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from chamberopt.common.estimate import Estimate
 from chamberopt.output.plots.figure_style import SMALL, new_figure, svg_text
@@ -11,40 +11,46 @@ from chamberopt.output.plots.tolerances import TornadoBar, draw_tornado
 from chamberopt.output.report import html
 from chamberopt.output.report.number_text import Label, interval_text, metric_label, plain
 
+if TYPE_CHECKING:
+    from chamberopt.output.records import TolerancesRecord, ToleratedFigureRecord
+
 MAX_CHARTS = 3
 COLUMNS = ("nominal", "q05", "q95")
 
 
-def tolerance_contents(found: Mapping[str, Any] | None) -> dict[str, Any] | None:
-    """Ranges and figures in the units shown, from "tolerances" of a result.json.
+def tolerance_contents(found: TolerancesRecord | None) -> dict[str, Any] | None:
+    """Ranges and figures in the units shown, from the record of tolerances.
 
     The figure that the worst corner belongs to comes first.
     """
     if not found:
         return None
-    names = sorted(found["figures"], key=lambda name: name != found["worst_for"])
+    names = sorted(found.figures, key=lambda name: name != found.worst_for)
     return {
-        "box": [{"name": name, **one} for name, one in found["box"].items()],
-        "corner": found["corner"],
-        "worst_for": metric_label(found["worst_for"]).text if found["worst_for"] else "",
-        "figures": [_figure(metric_label(name), found["figures"][name]) for name in names],
-        "notes": found["notes"],
+        "box": [{"name": name, **one.model_dump()} for name, one in found.box.items()],
+        "corner": found.corner,
+        "worst_for": metric_label(found.worst_for).text if found.worst_for else "",
+        "figures": [_figure(metric_label(name), found.figures[name]) for name in names],
+        "notes": found.notes,
     }
 
 
-def _figure(label: Label, one: Mapping[str, Any]) -> dict[str, Any]:
-    def shown(interval: Mapping[str, Any]) -> dict[str, Any]:
-        return label.scale(Estimate.from_interval_json(interval))
-
-    corner = one["corner"]
+def _figure(label: Label, one: ToleratedFigureRecord) -> dict[str, Any]:
+    corner = one.corner
     return {
         "label": label.text,
         "unit": label.unit,
-        **{name: shown(one[name]) for name in COLUMNS},
-        "corner": corner and {name: shown(corner[name]) for name in ("predicted", "simulated")},
+        "nominal": label.scale(one.nominal),
+        "q05": label.scale(one.q05),
+        "q95": label.scale(one.q95),
+        "corner": corner
+        and {
+            "predicted": label.scale(corner.predicted),
+            "simulated": label.scale(corner.simulated),
+        },
         "effects": {
-            name: {end: shown(ends[end]) for end in ("low", "high")}
-            for name, ends in one["effects"].items()
+            name: {"low": label.scale(ends.low), "high": label.scale(ends.high)}
+            for name, ends in one.effects.items()
         },
     }
 
@@ -93,7 +99,7 @@ def tornado_chart(figures: list[dict[str, Any]]) -> str:
 
     def bar(figure: Mapping[str, Any], name: str) -> TornadoBar:
         ends = figure["effects"][name]
-        return TornadoBar(name, *map(Estimate.from_interval_json, (ends["low"], ends["high"])))
+        return TornadoBar(name, ends["low"], ends["high"])
 
     def size(name: str) -> float:
         return max(abs(end.value) for end in bar(figures[0], name)[1:])
@@ -108,5 +114,5 @@ def tornado_chart(figures: list[dict[str, Any]]) -> str:
     return svg_text(drawn, "tolerances")
 
 
-def _resolved(ends: Mapping[str, Any]) -> bool:
-    return any(abs(one["value"]) > one["half_width"] for one in ends.values())
+def _resolved(ends: Mapping[str, Estimate]) -> bool:
+    return any(abs(one.value) > one.half_width for one in ends.values())

@@ -12,17 +12,18 @@ from chamberopt.output.report import html
 from chamberopt.output.report.number_text import Label, interval_text, metric_label, per_cent, plain
 
 if TYPE_CHECKING:
+    from chamberopt.output.records import ZoneLimit
     from chamberopt.output.results.load import Result
 
 
 SIGNS = {"min": "≥", "max": "≤"}
 
 
-def limit_text(limit: Mapping[str, Any]) -> str:
+def limit_text(limit: ZoneLimit) -> str:
     """Such as "coverage_min = 0.98"; each end of a band has its sign, as "intensity_mmA ≥ 0.1"."""
-    sides = dict(LIMITED[limit["key"]])
-    sign = "=" if len(sides) == 1 else SIGNS[sides[limit["metric"].rpartition(".")[2]]]
-    return f"{limit['key']} {sign} {limit['limit']:g}"
+    sides = dict(LIMITED[limit.key])
+    sign = "=" if len(sides) == 1 else SIGNS[sides[limit.metric.rpartition(".")[2]]]
+    return f"{limit.key} {sign} {limit.limit:g}"
 
 
 def zone_lines(contents: Mapping[str, Any]) -> list[dict[str, Any]]:
@@ -34,7 +35,7 @@ def zone_lines(contents: Mapping[str, Any]) -> list[dict[str, Any]]:
     lines = []
     for zone in contents["zones"]:
         judged = "; ".join(
-            f"{limit_text(row)} is {row['standing']} ({interval_text(row['figure'], row['unit'])})"
+            f"{row['text']} is {row['standing']} ({interval_text(row['figure'], row['unit'])})"
             for row in zone["limits"]
         )
         mean = interval_text(zone["mean_coverage"], "%")
@@ -46,25 +47,30 @@ def zone_lines(contents: Mapping[str, Any]) -> list[dict[str, Any]]:
 
 def zone_contents(result: Result) -> dict[str, Any]:
     """The figures of each zone, and whether they meet the zone's limits."""
-    zones, rows = result.data.get("zones", []), []
+    zones, rows = result.record.zones, []
     for name in METRICS:
         label = _of_zone(name)
-        figures = [result.metrics.get(f"{zone['name']}.{name}") for zone in zones]
+        figures = [result.metrics.get(f"{zone.name}.{name}") for zone in zones]
         if any(figures):
             cells = [one and label.scale(one) for one in figures]
             rows.append({"label": label.with_unit, "zones": cells})
 
-    def with_figure(limit: Mapping[str, Any]) -> dict[str, Any]:
-        label = _of_zone(limit["metric"].rpartition(".")[2])
-        figure = label.scale(result.metrics[limit["metric"]])
-        return {**limit, "label": label.text, "unit": label.unit, "figure": figure}
+    def with_figure(limit: ZoneLimit) -> dict[str, Any]:
+        label = _of_zone(limit.metric.rpartition(".")[2])
+        return {
+            **limit.model_dump(),
+            "text": limit_text(limit),
+            "label": label.text,
+            "unit": label.unit,
+            "figure": label.scale(result.metrics[limit.metric]),
+        }
 
     mean = metric_label("mean_coverage")
     shown = [
         {
-            **zone,
-            "limits": [*map(with_figure, zone["limits"])],
-            "mean_coverage": mean.scale(result.metrics[f"{zone['name']}.mean_coverage"]),
+            **zone.model_dump(exclude={"limits"}),
+            "limits": [*map(with_figure, zone.limits)],
+            "mean_coverage": mean.scale(result.metrics[f"{zone.name}.mean_coverage"]),
         }
         for zone in zones
     ]
@@ -85,7 +91,7 @@ def zones_section(contents: Mapping[str, Any]) -> str:
     limits = [
         (
             zone["name"],
-            limit_text(row),
+            row["text"],
             f"{row['label']}: {interval_text(row['figure'], row['unit'])}",
             row["standing"],
         )

@@ -20,6 +20,7 @@ from chamberopt.output.report.sheet.cautions import cautions
 
 if TYPE_CHECKING:
     from chamberopt.design.sonotrode import VibratingFace
+    from chamberopt.output.records import CoverageAtTime
     from chamberopt.output.results.load import Result
 
 MOST_ROWS = 4  # of zones, tolerances, sizes of shot: more are left to the report
@@ -126,7 +127,7 @@ def _part(result: Result, contents: Contents) -> Iterator[Row]:
         axis = ", ".join(plain(one) for one in turn.axis)
         speed = swing if turn.rpm is None else f"{plain(turn.rpm)} turns a minute"
         yield "turns", f"{speed} about the file's axis ({axis})"
-    area = contents["question"]["target"].get("target_exposed_area_mm2")
+    area = contents["question"]["target"]["target_exposed_area_mm2"]
     share = per_cent(contents["field"]["reachable_share"])
     if area:
         yield "target", f"{plain(area)} mm² in the chamber; the shot can reach {share} of it"
@@ -144,8 +145,7 @@ def _chamber(result: Result) -> Iterator[Row]:
     for what, several in counted.items():
         if several:
             yield what, f"{len(several)}: see the report"
-    volume = result.data.get("chamber", {}).get("volume_mm3")
-    if volume:
+    if volume := result.record.chamber.volume_mm3:
         yield "free volume", f"{plain(1e-3 * volume)} cm³"
 
 
@@ -267,14 +267,14 @@ def _warnings(contents: Contents) -> Iterator[Row]:
 
 
 def _identity(result: Result, contents: Contents) -> Iterator[Row]:
-    versions = result.data.get("versions", {})
-    yield "program", f"chamberopt {versions.get('chamberopt', 'of an unknown version')}"
-    yield "simulated", f"{contents['made'][:10]}, {result.data['replicas']} replicas"
+    record = result.record
+    yield "program", f"chamberopt {record.versions['chamberopt']}"
+    yield "simulated", f"{contents['made'][:10]}, {record.replicas} replicas"
     yield "seed", contents["identity"]["seed"]
-    yield "part, sha256", result.part_sha256
-    if result.data.get("shape_sha256"):
-        yield "shape, sha256", result.data["shape_sha256"]
-    yield "result, sha256", result.data["sha256"]
+    yield "part, sha256", record.part_sha256
+    if record.shape_sha256:
+        yield "shape, sha256", record.shape_sha256
+    yield "result, sha256", record.sha256
 
 
 def first_checks(result: Result) -> list[Check]:
@@ -291,11 +291,11 @@ def first_checks(result: Result) -> list[Check]:
         laws = {name: getattr(design.materials, name) for name in ("sonotrode", "wall", "part")}
         what = f"ball drop: one ball at {plain(DROP_SPEED)} m/s, speed after over speed before"
         found.append(Check(what, ", ".join(f"{k} {_restitution(x)}" for k, x in laws.items())))
-    row = _half_covered(result.data.get("coverage_against_time", []))
+    row = _half_covered(result.record.coverage_against_time)
     # Where the mean at the end is not resolved, its curve is not to be relied on either.
     if row and result.metrics["mean_coverage"].has_number:
-        share = Estimate(row["mean_coverage"], row["half_width"])
-        what = f"mean coverage of the target after {plain(row['time_s'], 3)} s"
+        share = Estimate(row.mean_coverage, row.half_width)
+        what = f"mean coverage of the target after {plain(row.time_s, 3)} s"
         found.append(Check(what, estimate_text(share, 100.0, "%")))
     intensity = result.metrics.get("almen_intensity")
     if intensity is None:
@@ -326,9 +326,9 @@ def _restitution(law: Any) -> str:
     return plain(float(restitution_at(np.array(DROP_SPEED), law.restitution)), 2)
 
 
-def _half_covered(rows: list[Mapping[str, Any]]) -> Mapping[str, Any] | None:
+def _half_covered(rows: list[CoverageAtTime]) -> CoverageAtTime | None:
     """The row of the curve nearest to half coverage, where counting tells most."""
-    return min(rows, key=lambda row: abs(row["mean_coverage"] - 0.5), default=None)
+    return min(rows, key=lambda row: abs(row.mean_coverage - 0.5), default=None)
 
 
 def _more(several: Any, most: int, what: str) -> Iterator[Row]:

@@ -58,7 +58,7 @@ def write_sheet(result: str | Path, path: str | Path | None = None) -> tuple[Pat
     path = require_free_page(loaded.folder / SHEET if path is None else path, SHEET_FILE)
     with claim_file(path):
         contents, chamber = report_contents(result), load_chamber(loaded)
-        kind = f"{KINDS.get(loaded.kind, loaded.kind)}; simulated {contents['made'][:10]}"
+        kind = f"{KINDS[loaded.record.kind]}; simulated {contents['made'][:10]}"
         sheet = Sheet(
             f"{contents['question']['part']}: {contents['name']}",
             kind,

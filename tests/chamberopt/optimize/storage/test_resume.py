@@ -563,7 +563,7 @@ def test_the_real_thing_killed_from_a_shell(tmp_path: Path) -> None:
         undisturbed.metrics,
     )
     for name in ("gain", "best", "confirmed", "start"):
-        assert ended.data["study"][name] == undisturbed.data["study"][name]
+        assert getattr(ended.study, name) == getattr(undisturbed.study, name)
     assert (out / "coverage.vtp").read_bytes() == (tmp_path / "whole" / "coverage.vtp").read_bytes()
 
 

@@ -105,7 +105,7 @@ def test_designs_of_one_name_on_the_draws_of_the_first(
             5,
             None,
         )
-        assert result.data["replicas"] == 5
+        assert result.record.replicas == 5
 
 
 def test_a_design_against_a_confirmed_result(

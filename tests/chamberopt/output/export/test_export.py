@@ -239,7 +239,7 @@ def test_a_study_gives_the_impacts_of_its_best_and_of_its_start(
     for folder in (study, study / "start"):
         table = table_of(folder, tmp_path / f"{folder.name}.parquet")
         require_result_again(folder, table)
-        assert table["replica"].max() == load_result(folder).data["replicas"] - 1
+        assert table["replica"].max() == load_result(folder).record.replicas - 1
 
 
 def test_an_analytical_cavity_gives_its_own_impacts(place: Path, tmp_path: Path) -> None:
@@ -383,7 +383,7 @@ def test_where_nothing_may_be_written(
 
 
 def test_the_whole_chamber_as_stl_and_3mf(study: Path, tmp_path: Path) -> None:
-    volume = load_result(study).data["chamber"]["volume_mm3"]
+    volume = load_result(study).record.chamber.volume_mm3
     cavity = read_cavity(study)
     write_cavity(study, tmp_path / "c.stl")
     write_3mf(study, tmp_path / "c.3mf")

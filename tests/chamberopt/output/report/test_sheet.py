@@ -63,7 +63,7 @@ def test_its_figures_are_those_of_the_report(folder: Path) -> None:
     assert rows["Sonotrode"]["face"] == "Ø 50 mm"
     assert rows["Shot"]["balls"] == "30 of Ø 3 mm"
     assert rows["Chamber"]["diameter"] == "50 mm"
-    assert rows["Made with"]["part, sha256"] == load_result(folder).part_sha256
+    assert rows["Made with"]["part, sha256"] == load_result(folder).record.part_sha256
     assert "how far its numbers may be off is not known" in rows["Tolerances"][""]
     assert "was not checked" in rows["Warnings"][""]
     assert "Simulated without friction" in rows["Not in these figures"][""]
@@ -74,8 +74,8 @@ def test_what_to_measure_first_without_a_calibration(folder: Path) -> None:
     assert checks["amplitude"] == "50 µm peak to valley"
     assert checks["ball"].startswith("sonotrode 0.7")
     assert checks["A"].startswith("not known before")  # no strips, no intensity
-    curve = load_result(folder).data["coverage_against_time"]
-    nearest = min(curve, key=lambda row: abs(row["mean_coverage"] - 0.5))["mean_coverage"]
+    curve = load_result(folder).record.coverage_against_time
+    nearest = min(curve, key=lambda row: abs(row.mean_coverage - 0.5)).mean_coverage
     assert float(checks["mean"].split()[0]) == pytest.approx(100.0 * nearest, abs=0.5)
     few = load_result(folder)
     few.metrics["mean_coverage"] = Estimate(0.5, math.inf, in_words="not resolved")
@@ -99,11 +99,10 @@ def test_a_calibrated_mix_with_zones_and_tolerances(folder: Path) -> None:
     })  # fmt: skip
     loaded, contents = load_result(folder), report_contents(folder)
     intensity = Estimate(0.2, 0.01)
-    result = replace(
-        loaded, design=design, metrics={**loaded.metrics, "almen_intensity": intensity}
-    )
-    label, shown = metric_label("almen_intensity"), intensity.interval_json()
-    limit = {"key": "coverage_min", "metric": "z.p05_coverage", "limit": 0.9, "unit": "mmA"}
+    result = replace(loaded, design=design)
+    result.metrics["almen_intensity"] = intensity
+    label, shown = metric_label("almen_intensity"), intensity
+    limit = {"text": "coverage_min = 0.9", "metric": "z.p05_coverage", "unit": "mmA"}
     limits = [{**limit, "standing": one, "figure": shown} for one in ("met", "not met")]
     figure = {"label": label.text, "unit": "mmA", "q05": shown, "q95": shown, "corner": None}
     contents |= {

@@ -2,6 +2,7 @@
 
 import csv
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -39,7 +40,13 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         nominal = evaluate(DESIGN)
         found = find_tolerances(DESIGN, plan_tolerances(DESIGN), nominal, evaluate)
         save_simulation(folder, DESIGN, chamber, nominal, tolerances=found)
-        assert load_result(folder).data["tolerances"] == json.loads(json.dumps(found.as_json()))
+        recorded = load_result(folder).record.tolerances
+        assert recorded is not None
+        assert recorded.figures.keys() == found.figures.keys()
+        for name, one in found.figures.items():
+            assert recorded.figures[name].q05 == replace(
+                one.q05, pseudovalues=(), shared=(), bias=0.0
+            )
     return folder
 
 
@@ -53,16 +60,16 @@ def test_the_report_has_a_section_and_a_chart(folder: Path, tmp_path: Path) -> N
     page = write_report(folder, tmp_path / "page.html")[0].read_text(encoding="utf-8")
     for text in ("<h2>Tolerances</h2>", 'id="tolerances"', "27 to 30 whole balls"):
         assert text in page
-    json.dumps(contents, allow_nan=False)
 
 
 def test_the_table_has_a_row_for_each_figure_and_number(folder: Path, tmp_path: Path) -> None:
     write_tolerance_table(folder, tmp_path / "table.csv")
     with (tmp_path / "table.csv").open() as file:
         rows = list(csv.DictReader(file))
-    data = load_result(folder).data["tolerances"]
-    assert len(rows) == 2 * len(data["figures"])
-    assert float(rows[0]["q05"]) == data["figures"][rows[0]["figure"]]["q05"]["value"]
+    data = load_result(folder).record.tolerances
+    assert data is not None
+    assert len(rows) == 2 * len(data.figures)
+    assert float(rows[0]["q05"]) == data.figures[rows[0]["figure"]].q05.value
 
 
 def test_a_result_without_tolerances_has_no_table(folder: Path, tmp_path: Path) -> None:

@@ -1,19 +1,34 @@
-"""What a result.json must hold: every key that commands read, with the types of all values.
+"""The record of a result: all of its result.json, typed.
 
-A result comes from elsewhere, and its digests tell only that it is whole. Nothing of it is used
-before this has found it as `write.py` makes it.
+Writers build a record and readers load one, so both follow from its fields. A result comes from
+elsewhere, and its digests tell only that it is whole. Nothing of it is used before every value was
+found to have its type.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from datetime import datetime
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self, TypeAlias
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    PlainSerializer,
+    ValidationError,
+    WrapValidator,
+    field_serializer,
+    model_serializer,
+    model_validator,
+)
 
 from chamberopt.common.errors import InputError, first_wrong_value
+from chamberopt.common.estimate import Estimate
 from chamberopt.coverage.metrics import METRICS, find_metric, parse_objective
 
+FORMAT = 5
 ROUNDING = 1e-9
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
 Positive = Annotated[float, Field(ge=0.0)]
@@ -36,15 +51,18 @@ class _Table(BaseModel):
     model_config = ConfigDict(strict=True, allow_inf_nan=False)
 
 
-class _Interval(_Table):
+class _IntervalValues(_Table):
     """A value and its half-width; null where there is none, with words in its place."""
 
     value: float | None
     half_width: Positive | None
     in_words: str = ""
 
+    def estimate(self) -> Estimate:
+        return Estimate.from_interval_json(self.model_dump())
 
-class _Known(_Interval):
+
+class _KnownValues(_IntervalValues):
     """An interval that has a value, and a half-width unless words stand in its place."""
 
     @model_validator(mode="after")
@@ -54,14 +72,53 @@ class _Known(_Interval):
         return self
 
 
-class _Estimate(_Known):
+class _EstimateValues(_KnownValues):
     pseudovalues: list[float]
     bias: float | None  # none if infinite, where there is no dent at all
     shared: list[float]
 
+    def estimate(self) -> Estimate:
+        return Estimate.from_json(self.model_dump())
 
-class _Objective(_Estimate):
+
+def _estimate(value: Any, read: Callable[[Any], _IntervalValues]) -> Estimate:
+    return value if isinstance(value, Estimate) else read(value).estimate()
+
+
+if TYPE_CHECKING:
+    Interval: TypeAlias = Estimate
+    KnownInterval: TypeAlias = Estimate
+    WholeEstimate: TypeAlias = Estimate
+    Ends: TypeAlias = list[float | str]
+else:  # estimates, each stored with so much of it as is needed
+    _READ, _AS_INTERVAL = WrapValidator(_estimate), PlainSerializer(Estimate.interval_json)
+    Interval = Annotated[_IntervalValues, _READ, _AS_INTERVAL]
+    KnownInterval = Annotated[_KnownValues, _READ, _AS_INTERVAL]
+    WholeEstimate = Annotated[_EstimateValues, _READ, PlainSerializer(Estimate.to_json)]
+    Ends = Bounds | Texts  # of a number, or all that a text may be
+
+
+def _with_units(metrics: dict[str, Estimate]) -> dict[str, dict[str, Any]]:
+    """The metrics as JSON values, each with its unit."""
+    found = {name: find_metric(name) for name in metrics}
+    return {
+        name: {**one.to_json(), "unit": metric.unit if (metric := found[name]) else ""}
+        for name, one in metrics.items()
+    }
+
+
+class Objective(_Table):
+    """The figure that a study maximises, or that a simulation is judged by."""
+
     name: str
+    estimate: WholeEstimate
+
+    @model_validator(mode="before")
+    @classmethod
+    def _of_one_table(cls, data: Any) -> Any:
+        if isinstance(data, dict) and "estimate" not in data:
+            return {"name": data.get("name"), "estimate": data}
+        return data
 
     @model_validator(mode="after")
     def _is_an_objective(self) -> Self:
@@ -71,25 +128,31 @@ class _Objective(_Estimate):
             raise ValueError(str(error)) from None
         return self
 
+    @model_serializer
+    def _as_one_table(self) -> dict[str, Any]:
+        return {"name": self.name, **self.estimate.to_json(), "unit": ""}
 
-class _Needed(_Table):
+
+class Needed(_Table):
     mean_and_std: Positive | None
     p05_times_intensity: Positive | None
 
 
-class _Field(_Table):
+class FieldRecord(_Table):
     gauge_mm2: Positive
     points: Count
     dents_in_median_window: Positive
-    dents_needed: _Needed
-    simulated_s_needed: _Needed
+    dents_needed: Needed
+    simulated_s_needed: Needed
     reachable_share: float
     crease_share: float
     alike_places: Annotated[int, Field(ge=1)]
-    double_gauge: dict[str, _Estimate]
+    double_gauge: dict[str, WholeEstimate]
+
+    _units = field_serializer("double_gauge")(_with_units)
 
 
-class _AtTime(_Table):
+class CoverageAtTime(_Table):
     """One row of the coverage against time."""
 
     time_s: Positive
@@ -99,43 +162,43 @@ class _AtTime(_Table):
     p05_half_width: Positive | None = None
 
 
-class _ZoneLimit(_Table):
+class ZoneLimit(_Table):
     key: str
     limit: float
     metric: str
     standing: Literal["met", "not met", "not known"]
 
 
-class _Zone(_Table):
+class ZoneRecord(_Table):
     """A zone of the part, and whether its figures meet its limits."""
 
     name: str
     triangles: Count
     exposed_area_mm2: Positive
     reachable_share: Share
-    limits: list[_ZoneLimit]
+    limits: list[ZoneLimit]
 
 
-class _Chamber(_Table):
+class ChamberRecord(_Table):
     volume_mm3: Positive
     target_exposed_area_mm2: Positive
     target_triangles: Count
 
 
-class _Advice(_Table):
+class AdviceRecord(_Table):
     """Why an effect was chosen by pilot runs."""
 
     effect: str
     on: bool
     verdict: str
     said: str
-    changes: dict[str, _Interval]
+    changes: dict[str, Interval]
 
 
-class _Slice(_Table):
+class SliceRecord(_Table):
     """The model of a study's score along one parameter."""
 
-    flat: Bounds | Texts
+    flat: Ends
     choices: list[str] = []
     share_of_variance: float
     values: Curve
@@ -152,62 +215,72 @@ class _Slice(_Table):
         return self
 
 
-class _Model(_Table):
+class ModelRecord(_Table):
     noise: float
-    expected: _Known
+    expected: KnownInterval
     together: float
-    parameters: dict[str, _Slice]
+    parameters: dict[str, SliceRecord]
 
 
-class _Candidate(_Table):
-    parameters: dict[str, float | str]
+class CandidatePoint(_Table):
+    parameters: dict[str, int | float | str]
 
 
-class _FrontPoint(_Candidate):
+class BestRecord(CandidatePoint):
+    searched_as: int | None = None
+
+
+class FrontPoint(CandidatePoint):
     standing: str
-    objectives: dict[str, _Interval]
+    objectives: dict[str, Interval]
 
 
-class _Confirmed(_Candidate):
+class ConfirmedRecord(CandidatePoint):
     searched_as: int | None
-    objective: _Estimate
+    objective: WholeEstimate
     feasible: bool
     standing: str
     reason: str
 
 
-class _Start(_Candidate):
-    objective: _Estimate
-    metrics: dict[str, _Estimate]
+class StartRecord(CandidatePoint):
+    objective: WholeEstimate
+    metrics: dict[str, WholeEstimate]
+
+    _units = field_serializer("metrics")(_with_units)
 
 
-class _Accuracy(_Table):
+class AccuracyRecord(_Table):
+    """How accurately candidates were simulated: process.accuracy of the design."""
+
+    model_config = ConfigDict(extra="allow")
+
     replicas: Count
     simulated_time_s: Positive | None = None
     objective_half_width: Positive | None = None
 
 
-class _Accuracies(_Table):
-    search: _Accuracy
-    confirm: _Accuracy
+class Accuracies(_Table):
+    search: AccuracyRecord
+    confirm: AccuracyRecord
 
 
-class _Study(_Table):
+class StudyRecord(_Table):
     algorithm: str
-    vary: dict[str, Bounds | Texts]
+    vary: dict[str, Ends]
     evaluations: Count
     given_up: Count = 0
-    accuracy: _Accuracies
+    accuracy: Accuracies
     failed: Count
     missing_a_constraint: Count
-    gain: _Estimate
+    gain: WholeEstimate
     improved: bool
     notes: list[str] = []
-    model: _Model | None = None
-    front: list[_FrontPoint] = []
-    best: _Candidate
-    start: _Start
-    confirmed: list[_Confirmed]
+    model: ModelRecord | None = None
+    front: list[FrontPoint] = []
+    best: BestRecord
+    start: StartRecord
+    confirmed: list[ConfirmedRecord]
     seconds: Positive
 
     @model_validator(mode="after")
@@ -220,43 +293,43 @@ class _Study(_Table):
         return self
 
 
-class _Range(_Table):
+class ToleratedRange(_Table):
     """A number with a tolerance, and the value at which it was simulated too."""
 
-    low: float
-    nominal: float
-    high: float
-    changed_to: float
+    low: int | float
+    nominal: int | float
+    high: int | float
+    changed_to: int | float
 
 
-class _Ends(_Table):
-    low: _Known
-    high: _Known
+class EffectEnds(_Table):
+    low: KnownInterval
+    high: KnownInterval
 
 
-class _InCorner(_Table):
-    predicted: _Known
-    simulated: _Known
+class InCorner(_Table):
+    predicted: KnownInterval
+    simulated: KnownInterval
     agrees: bool
 
 
-class _ToleratedFigure(_Table):
-    nominal: _Known
-    q05: _Known
-    q95: _Known
-    lowest: _Known
-    highest: _Known
-    effects: dict[str, _Ends]
-    corner: _InCorner | None
+class ToleratedFigureRecord(_Table):
+    nominal: KnownInterval
+    q05: KnownInterval
+    q95: KnownInterval
+    lowest: KnownInterval
+    highest: KnownInterval
+    effects: dict[str, EffectEnds]
+    corner: InCorner | None
 
 
-class _Tolerances(_Table):
+class TolerancesRecord(_Table):
     """Figures over the box of tolerances."""
 
-    box: dict[str, _Range]
+    box: dict[str, ToleratedRange]
     worst_for: str
-    corner: dict[str, float]
-    figures: dict[str, _ToleratedFigure]
+    corner: dict[str, int | float]
+    figures: dict[str, ToleratedFigureRecord]
     notes: list[str]
 
     @model_validator(mode="after")
@@ -270,16 +343,18 @@ class _Tolerances(_Table):
         return self
 
 
-class _Any(_Table):
+class ResultRecord(_Table):
     """Any result."""
 
     kind: Literal["simulation", "study", "sweep"]
+    format: int
     created: Annotated[str, AfterValidator(_dated)]
     notes: list[str]
-    warnings: list[str] = []
-    effects: list[_Advice] = []
+    warnings: list[str] | None = None  # of `chamberopt check`; None if it was not run
+    effects: list[AdviceRecord] = []
     files: dict[FileName, Digest]
     versions: dict[str, str]
+    sha256: str = ""  # of all the rest
 
     @model_validator(mode="after")
     def _is_of_a_version(self) -> Self:
@@ -287,32 +362,60 @@ class _Any(_Table):
             raise ValueError("versions: chamberopt is missing")
         return self
 
+    def as_json(self) -> dict[str, Any]:
+        """The record as JSON values; keys that its writer left out are left out."""
+        return self.model_dump(mode="json", exclude_unset=True)
 
-class _Candidates(_Any):
+
+class SweepFacts(_Table):
+    """A sweep, in numbers."""
+
+    objective: str
+    vary: dict[str, Ends]
+    method: str
+    count: int | None
+    seed: int | None
+    candidates: Count
+    failed: Count
+    missing_a_constraint: Count
+    accuracy: AccuracyRecord
+    best: dict[str, Any] | None
+    seconds: Positive
+
+
+class SweepRecord(ResultRecord):
+    """The result of a sweep, which nothing reads but its digests."""
+
+    sweep: SweepFacts
+
+
+class CandidateRecord(ResultRecord):
     """The result of a candidate: a simulation, or the best of a study."""
 
     REQUIRED: ClassVar = [name for name, metric in METRICS.items() if metric.required]
 
-    objective: _Objective
-    metrics: dict[str, _Estimate]
-    zones: list[_Zone] = []
-    field: _Field
-    coverage_against_time: list[_AtTime]
+    objective: Objective
+    metrics: dict[str, WholeEstimate]
+    zones: list[ZoneRecord] = []
+    field: FieldRecord
+    coverage_against_time: list[CoverageAtTime]
     seed: Annotated[int, Field(ge=0, le=2**63 - 1)]
     stream: str
     replicas: Annotated[int, Field(ge=1, le=1_000_000)]
     stopped_by: str
     analytic: bool
     simulated_time_s: Positive
-    collisions: dict[str, Positive]
+    collisions: dict[str, Count]
     timings_s: dict[str, Positive]
-    chamber: _Chamber
+    chamber: ChamberRecord
     design: dict[str, Any]
     part_sha256: Digest
     part_unit: str
     shape_sha256: Digest | Literal[""] = ""
-    study: _Study | None = None
-    tolerances: _Tolerances | None = None
+    study: StudyRecord | None = None
+    tolerances: TolerancesRecord | None = None
+
+    _units = field_serializer("metrics")(_with_units)
 
     @model_validator(mode="after")
     def _is_whole(self) -> Self:
@@ -334,10 +437,10 @@ class _Candidates(_Any):
         return self
 
 
-def require_recorded(data: dict[str, Any]) -> None:
-    """Raise ValueError, which names the key, unless commands can use all of a result.json."""
-    model = _Any if data.get("kind") == "sweep" else _Candidates
+def read_record(data: dict[str, Any]) -> ResultRecord:
+    """The record of a result.json; ValueError names a key that is not as its writer makes it."""
+    model = ResultRecord if data.get("kind") == "sweep" else CandidateRecord
     try:
-        model.model_validate(data)
+        return model.model_validate(data)
     except ValidationError as error:
         raise ValueError(first_wrong_value(error)) from None
