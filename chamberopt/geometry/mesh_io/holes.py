@@ -8,10 +8,12 @@ Source: G. Barequet and M. Sharir, Computer Aided Geometric Design 12 (1995) 207
 
 from __future__ import annotations
 
+from collections import defaultdict
+
 import numpy as np
 
 from chamberopt.geometry.mesh_io.surface_error import format_point
-from chamberopt.geometry.triangles import sides_of
+from chamberopt.geometry.triangles import connected_pieces, sides_of
 
 MAX_WIDTH = 0.03  # of the part's diagonal: the widest hole that is closed automatically
 MAX_RIM_EDGES = 64  # the time for a rim grows with the cube of its edges
@@ -53,9 +55,9 @@ def close_holes(
 
 def count_holes(edges: np.ndarray) -> int:
     """Number of connected pieces that open edges (k, 2) form."""
-    import networkx
-
-    return int(networkx.number_connected_components(networkx.Graph(edges.tolist())))
+    ends, numbers = np.unique(edges, return_inverse=True)
+    a, b = numbers.reshape(-1, 2).T
+    return connected_pieces(a, b, len(ends))[0]
 
 
 def _simple_rims(triangles: np.ndarray, edges: np.ndarray) -> list[list[int]]:
@@ -64,12 +66,21 @@ def _simple_rims(triangles: np.ndarray, edges: np.ndarray) -> list[list[int]]:
     That is against the side of the triangle beside its first edge. Holes that touch in a corner
     are left out.
     """
-    import networkx
-
-    graph, sides, rims = networkx.Graph(edges.tolist()), sides_of(triangles), []
-    for piece in sorted(networkx.connected_components(graph), key=min):
-        if 3 <= len(piece) <= MAX_RIM_EDGES and all(graph.degree[end] == 2 for end in piece):
-            rim = [start for start, _ in networkx.find_cycle(graph, min(piece))]
+    neighbours: dict[int, list[int]] = defaultdict(list)
+    for a, b in edges.tolist():
+        neighbours[a].append(b)
+        neighbours[b].append(a)
+    sides, rims, walked = sides_of(triangles), [], set()
+    for start in sorted(neighbours):
+        rim: list[int] = []
+        here = start
+        while here not in walked and len(neighbours[here]) == 2:
+            walked.add(here)
+            rim.append(here)
+            one, other = neighbours[here]
+            here = other if len(rim) > 1 and one == rim[-2] else one
+        # A walk that stops elsewhere met a corner where holes touch, or an earlier walk to one.
+        if here == start and 3 <= len(rim) <= MAX_RIM_EDGES:
             against = (sides == (rim[1], rim[0])).all(axis=1).any()
             rims.append(rim if against else rim[::-1])
     return rims
