@@ -24,9 +24,11 @@ BLOCK = 16  # pixels: every MP4 player shows sides that are multiples of it
 def film_path(film: str | Path) -> Path:
     """Return where a film may be written; InputError for other suffixes or unusable places."""
     path = file_path(film, (".gif", ".mp4"), "films are written as .gif or .mp4")
-    if path.suffix.lower() == ".mp4" and find_spec("imageio_ffmpeg") is None:
+    missing = [name for name in ("imageio", "imageio_ffmpeg") if find_spec(name) is None]
+    if path.suffix.lower() == ".mp4" and missing:
         raise InputError(
-            f"{path}: .mp4 needs a further package: pip install 'chamberopt[mp4]', or write a .gif"
+            f"{path}: .mp4 needs {' and '.join(missing)}: pip install 'chamberopt[mp4]', "
+            "or write a .gif"
         )
     return path
 
