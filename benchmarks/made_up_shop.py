@@ -25,7 +25,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import tomli_w
+import tomlkit
 
 from benchmarks.synthetic_shops import PRIORS, ROOT, Z, measure
 from benchmarks.table import print_table
@@ -95,7 +95,7 @@ def main() -> None:
         print_table(compared(arguments.compare))
         return
     values = {"design": "", **measurements(arguments.seed)}  # the design first
-    arguments.out.write_text(HEADING + tomli_w.dumps(values), encoding="utf-8")
+    arguments.out.write_text(HEADING + tomlkit.dumps(values), encoding="utf-8")
     print(f"wrote {arguments.out}")
 
 

@@ -47,7 +47,6 @@ ONE_IMPORTER = {
     "vtk": "output/viewer/",
     "starlette": "output/editor/",
     "uvicorn": "output/editor/server.py",
-    "tomlkit": "output/editor/edited_file.py",
     "distributed": "common/parallel/dask_cluster.py",
     "dask": "common/parallel/dask_cluster.py",
     # VTK's file readers alone, which need no OpenGL

@@ -1,7 +1,6 @@
 """Load and save design files; every problem of a file is reported in one error."""
 
 import os
-import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -26,14 +25,14 @@ def load_design(path: str | Path) -> Design:
 
 def save_design(design: Design, path: str | Path) -> None:
     """Write a design file that loads back as the same design, with paths relative to the file."""
-    import tomli_w
+    import tomlkit
 
     path = Path(path)
     data = with_paths_from(path.resolve().parent, _without_none(design.model_dump()))
     header = "# A complete candidate chamber, written by chamberopt.\n"
     header += "# Units are in the names; amplitude_um is zero-to-peak, "
     header += "amplitude_pv_um peak-to-valley.\n\n"
-    write_text(path, header + lists_on_one_line(tomli_w.dumps(data)))
+    write_text(path, header + tomlkit.dumps(data))
 
 
 def with_paths_from(folder: Path, value: Any) -> Any:
@@ -66,18 +65,3 @@ def _without_none(value: Any) -> Any:
     if isinstance(value, Mapping):
         return {k: _without_none(v) for k, v in value.items() if v is not None and v != ()}
     return [_without_none(inner) for inner in value] if isinstance(value, tuple) else value
-
-
-def lists_on_one_line(toml: str) -> str:
-    """Put the numbers of a list on one line; tomli_w writes every number on its own."""
-    lines: list[str] = []
-    opened = 0
-    for line in toml.splitlines():
-        if opened:
-            lines[-1] += line.strip() + " "
-        else:
-            lines.append(line)
-        if opened or line.endswith("= ["):
-            opened += line.count("[") - line.count("]")
-    joined = (re.sub(r"= \[.*", lambda m: m[0].replace("[ ", "["), line) for line in lines)
-    return "\n".join(re.sub(r",\s*\]", "]", line).rstrip() for line in joined) + "\n"

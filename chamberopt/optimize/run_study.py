@@ -198,13 +198,13 @@ def fixed_target(study: Study) -> np.ndarray | None:
 
 def save_inputs(study: Study, folder: Path) -> None:
     """Write design.toml and study.toml, to be read and run again."""
-    import tomli_w
+    import tomlkit
 
     if (folder / STUDY).is_file():
         return
     save_design(study.design, folder / "design.toml")
     values = study.model_dump(mode="json", exclude={"design"}, exclude_none=True)
-    write_text(folder / STUDY, tomli_w.dumps({"design": "design.toml", **values}))
+    write_text(folder / STUDY, tomlkit.dumps({"design": "design.toml", **values}))
 
 
 @dataclass

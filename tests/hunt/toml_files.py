@@ -9,7 +9,7 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-import tomli_w
+import tomlkit
 
 ROOT = Path(__file__).resolve().parents[2]
 ESCAPE = "\x1b]0;name\x07\x1b[31m"
@@ -74,7 +74,7 @@ def _altered_values(rng: random.Random, source: str) -> str:
             table[last] = table[last] * rng.choice((-1, 0, 1e-3, 1e3, 10, 0.1, 2))
         else:
             table[last] = odd_value(rng)
-    return tomli_w.dumps(data)
+    return tomlkit.dumps(data)
 
 
 def _altered_text(rng: random.Random, source: str) -> bytes:

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import tomli_w
+import tomlkit
 
 from chamberopt.chamber.propose.proposal import Proposal
 from chamberopt.chamber.propose.target import Surface
@@ -94,8 +94,7 @@ def _line(key: str, value: Any) -> str:
         return f"{key} = [{', '.join(_line('', one)[3:] for one in value)}]"
     if isinstance(value, float) and value.is_integer():
         value = int(value)
-    text = tomli_w.dumps({"x": value})[4:].strip()
-    return f"{key} = {text}"
+    return f"{key} = {tomlkit.item(value).as_string()}"
 
 
 def _choices(known: Sequence[Surface]) -> list[str]:

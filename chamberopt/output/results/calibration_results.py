@@ -12,7 +12,7 @@ import numpy as np
 from chamberopt.common.files import write_text
 from chamberopt.common.number_text import plain
 from chamberopt.common.versions import versions
-from chamberopt.design.load import lists_on_one_line, save_design
+from chamberopt.design.load import save_design
 from chamberopt.design.peening.calibration import TIME_ERROR, Calibration, Parameter
 from chamberopt.output.plots.calibration import calibration_picture
 from chamberopt.simulation.peening.calibrate.calibrate import Calibrated
@@ -55,9 +55,9 @@ def write_calibration_results(folder: Path, found: Calibrated) -> None:
 
 def machine_text(table: Calibration) -> str:
     """The content of machine.toml."""
-    import tomli_w
+    import tomlkit
 
-    return HEADER + lists_on_one_line(tomli_w.dumps(table.model_dump()))
+    return HEADER + tomlkit.dumps(table.model_dump())
 
 
 def calibration_text(found: Calibrated, predictions: list[Prediction]) -> list[str]:

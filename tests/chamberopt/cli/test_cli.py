@@ -428,6 +428,7 @@ def test_help_loads_nothing_heavy() -> None:
         "scipy",
         "matplotlib",
         "numpy",
+        "tomlkit",
     }
     code = (
         f"import sys; from chamberopt.cli import main; main(['--help']); print({heavy} & "

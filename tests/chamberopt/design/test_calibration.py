@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-import tomli_w
+import tomlkit
 
 from chamberopt.chamber.checks.calibration import calibration_warnings
 from chamberopt.common.errors import InputError
@@ -28,7 +28,7 @@ def calibrated(**changes: Any) -> Design:
 
 
 def test_a_design_names_the_file_and_holds_its_numbers(tmp_path: Path) -> None:
-    (tmp_path / "machine.toml").write_text(tomli_w.dumps(ALL), encoding="utf-8")
+    (tmp_path / "machine.toml").write_text(tomlkit.dumps(ALL), encoding="utf-8")
     own = tmp_path / "own.toml"
     save_design(plate_design(), own)
     named = tmp_path / "named.toml"

@@ -266,6 +266,16 @@ class TestRoundTrip:
         save_design(other, tmp_path / "awkward.toml")
         assert load_design(tmp_path / "awkward.toml") == other
 
+    def test_awkward_names(self, design_file: Path) -> None:
+        """A line separator and what looks like the end of a list, in the name of a file."""
+        name = "a = [ b, ] \u2028.stl"
+        design_file.with_name("part.stl").rename(design_file.with_name(name))
+        text = design_file.read_text(encoding="utf-8").replace("part.stl", name)
+        design_file.write_text(text, encoding="utf-8")
+        design = load_design(design_file)
+        save_design(design, design_file.with_name("again.toml"))
+        assert load_design(design_file.with_name("again.toml")) == design
+
     def test_mesh_path_is_rewritten_relative(self, design: Design, tmp_path: Path) -> None:
         (tmp_path / "deep" / "er").mkdir(parents=True)
         save_design(design, tmp_path / "deep" / "er" / "d.toml")

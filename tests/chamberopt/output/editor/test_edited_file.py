@@ -11,8 +11,6 @@ from chamberopt.output.editor.edited_file import EditedFile
 from chamberopt.output.editor.fields import design_fields
 from tests.hunt.base import write_base
 
-pytest.importorskip("tomlkit", reason="extra `page` is not installed")
-
 
 @pytest.fixture
 def file(tmp_path: Path) -> EditedFile:

@@ -10,7 +10,7 @@ import h5py
 import numpy as np
 import pytest
 import pyvista
-import tomli_w
+import tomlkit
 
 from chamberopt.chamber.build import Chamber, build_chamber
 from chamberopt.common.errors import InputError
@@ -102,7 +102,7 @@ def design_with(mesh: Path, **target: float) -> Design:
     }
     values["process"]["treatment_time_s"] = 3000.0  # coverage from 50 to 98 %
     path = mesh.parent / "design.toml"
-    path.write_text(tomli_w.dumps(values))
+    path.write_text(tomlkit.dumps(values))
     return load_design(path)
 
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-import tomli_w
+import tomlkit
 
 from chamberopt.common.errors import InputError
 from chamberopt.common.parallel.executor import SerialExecutor
@@ -105,7 +105,7 @@ def _chamber() -> Any:
 
 def calibrated(folder: Path, data: dict[str, Any]) -> Calibrated:
     path = folder / "measured.toml"
-    path.write_text(tomli_w.dumps(data), encoding="utf-8")
+    path.write_text(tomlkit.dumps(data), encoding="utf-8")
     measured, designs = load_measured(path)
     prepared = prepare(measured, designs, folder)
     return calibrate(measured, designs, prepared, SerialExecutor(), simulator=known_impacts)
@@ -275,7 +275,7 @@ def test_a_wrong_file_is_refused_before_any_work(
     drop = {"surface": "part", "speed_m_s": 3.0, "restitution": 0.5}
     data = {"design": "plate.toml", "drop": [drop]} | change
     path = tmp_path / "measured.toml"
-    path.write_text(tomli_w.dumps(data), encoding="utf-8")
+    path.write_text(tomlkit.dumps(data), encoding="utf-8")
     with pytest.raises(InputError) as error:
         prepare(*load_measured(path), tmp_path)
     assert message in str(error.value)
@@ -301,6 +301,6 @@ def test_shot_of_two_materials_is_refused(tmp_path: Path) -> None:
     save_design(plate_design().changed({"shot.material": "zirconia"}), tmp_path / "zirconia.toml")
     drop = {"surface": "part", "speed_m_s": 3.0, "restitution": 0.5, "design": "zirconia.toml"}
     path = tmp_path / "measured.toml"
-    path.write_text(tomli_w.dumps({"design": "plate.toml", "drop": [drop]}), encoding="utf-8")
+    path.write_text(tomlkit.dumps({"design": "plate.toml", "drop": [drop]}), encoding="utf-8")
     with pytest.raises(InputError, match="calibrate each on its own"):
         load_measured(path)
