@@ -58,9 +58,8 @@ class CandidateEvaluator:
         counts_worst = study.objective.over_tolerances == "worst"
         self.space = ParameterSpace(study.design, study.vary, counts_worst)
         self.reference = Reference()
-        accuracy = study.at_search_accuracy(study.design).process.accuracy
-        is_fixed = accuracy.objective_half_width is None
-        self._replicas = accuracy.replicas if is_fixed else 0  # of a candidate of the search
+        self._first_look = study.first_look
+        self._replicas = study.at_search_accuracy(study.design).process.accuracy.replicas
 
     def goals(self, evaluation: Evaluation) -> tuple[Estimate, ...]:
         """Estimate of each objective of the study."""
@@ -123,9 +122,9 @@ class CandidateEvaluator:
         """
         if not trial.goals:
             return 0.0
-        few = self._study.optimizer.first_replicas
-        given_up = trial.replicas == few < self._replicas
-        return evaluation_cost(few, self._replicas) if given_up else 1.0
+        if self._first_look is None or trial.replicas != self._first_look:
+            return 1.0
+        return evaluation_cost(self._first_look, self._replicas)
 
     def trial(
         self, number: int, point: np.ndarray, stage: str, evaluation: Evaluation | InputError
@@ -172,10 +171,9 @@ class CandidateEvaluator:
         design = self._study.at_search_accuracy(design)
         if best_low is not None:
             self._require_promise(design, best_low)
-        few = self._study.optimizer.first_replicas
-        if best_low is not None and 0 < few < self._replicas:
-            first = self._simulate(design, "search", few)
-            if len(self._study.objective.goals) == 1 and first.objective.high < best_low:
+        if best_low is not None and self._first_look is not None:
+            first = self._simulate(design, "search", self._first_look)
+            if first.objective.high < best_low:
                 return first
         return self._simulate(design, "search", replicas)
 

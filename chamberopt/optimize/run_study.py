@@ -92,6 +92,13 @@ class StudyResult:
         return (f"constraints: {self.best.reason}",)
 
     @property
+    def given_up(self) -> int:
+        """Number of candidates of the search that got no more replicas than those of a first look."""
+        few = self.study.first_look
+        search = (one for one in self.trials if one.stage == "search")
+        return sum(one.replicas == few for one in search) if few else 0
+
+    @property
     def improved(self) -> bool:
         """Whether the best beats the start by more than the interval of the gain."""
         return self.gain.low > 0.0

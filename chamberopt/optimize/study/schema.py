@@ -243,6 +243,17 @@ class Study(FileTable):
         """The constraints of the study, and the limits of its design's zones."""
         return {**self.constraints, **zone_constraints(self.design)}
 
+    @property
+    def first_look(self) -> int | None:
+        """Replicas after which a candidate of the search may be given up; None if it never is.
+
+        Each candidate gets all replicas with two objectives, and where an accuracy is asked for.
+        """
+        accuracy = self.at_search_accuracy(self.design).process.accuracy
+        few = self.optimizer.first_replicas
+        refines = len(self.objective.goals) == 1 and accuracy.objective_half_width is None
+        return few if refines and 0 < few < accuracy.replicas else None
+
     def at_search_accuracy(self, design: Design) -> Design:
         """A candidate at the accuracy of the search, which is usually coarser than its own.
 

@@ -255,8 +255,6 @@ def _number(value: float) -> float | None:
 def study_record(result: StudyResult) -> StudyRecord:
     """The record of a study that has ended."""
     search = [trial for trial in result.trials if trial.stage == "search"]
-    few = result.study.optimizer.first_replicas
-    all_of = max((trial.replicas or 0 for trial in search), default=0)
     more: dict[str, Any] = {}
     if result.sensitivity:
         more["model"] = _about_model(result.sensitivity)
@@ -269,7 +267,7 @@ def study_record(result: StudyResult) -> StudyRecord:
         algorithm=result.algorithm,
         vary={name: list(one.ends) for name, one in result.study.vary.items()},
         evaluations=len(search),
-        given_up=sum(one.replicas == few < all_of for one in search),
+        given_up=result.given_up,
         accuracy=Accuracies(search=_search_accuracy(result.study), confirm=confirm),
         failed=sum(trial.objective is None for trial in search),
         missing_a_constraint=_missing_a_constraint(search),

@@ -146,11 +146,9 @@ def _result_lines(result: StudyResult) -> list[str]:
         names = " and ".join(study.objective.pareto)
         lines += [f"the Pareto front of {names}: pareto.csv, pareto.png", ""]
     replicas, seconds = best.evaluation.replicas, study.design.process.recorded_time
-    searched, few = study.at_search_accuracy(study.design), study.optimizer.first_replicas
-    effort = console.replicas_text(searched)
-    is_less = few < searched.process.accuracy.replicas
-    if is_less and any(one.stage == "search" and one.replicas == few for one in result.trials):
-        effort += f"; {few} where they showed that a candidate is worse"
+    effort = console.replicas_text(study.at_search_accuracy(study.design))
+    if result.given_up:
+        effort += f"; {study.first_look} where they showed that a candidate is worse"
     return [
         *lines,
         f"± 95 % intervals; start and best: {replicas} replicas of {seconds:g} s with seeds of "

@@ -57,3 +57,27 @@ def test_how_well_a_design_is_known_is_none_of_its_choices() -> None:
         ValueError, match=r"process\.accuracy\.simulated_time_s.*see \[search_accuracy\]"
     ):
         with_search_accuracy({}, **{"process.accuracy.simulated_time_s": (0.5, 2.0)})
+
+
+@pytest.mark.parametrize(
+    ("first", "accuracy", "objective", "looks"),
+    [
+        (3, {"replicas": 8}, {}, 3),
+        (0, {"replicas": 8}, {}, None),
+        (8, {"replicas": 8}, {}, None),
+        # As many as are enough for the accuracy, by chance or not, is no first look.
+        (10, {"replicas": 64, "objective_half_width": 0.01}, {}, None),
+        (3, {"replicas": 8}, {"pareto": ["uniform_coverage", "minus_time_to_98_s"]}, None),
+    ],
+)
+def test_who_may_be_given_up(
+    first: int, accuracy: dict, objective: dict, looks: int | None
+) -> None:
+    study = Study(
+        design=GEAR,
+        vary=VARY,
+        objective=objective,
+        optimizer={"first_replicas": first},
+        search_accuracy=accuracy,
+    )
+    assert study.first_look == looks
