@@ -24,7 +24,12 @@ from chamberopt.optimize.search.search_model import Observations, SearchModel
 from chamberopt.optimize.search.stopping import Scored
 from chamberopt.optimize.storage.study_folder import StudyFolder
 from chamberopt.optimize.storage.trial_log import Trial
-from chamberopt.optimize.study.constraints import FEASIBLE, INFEASIBLE, assess_feasibility
+from chamberopt.optimize.study.constraints import (
+    FEASIBLE,
+    INFEASIBLE,
+    Violation,
+    assess_feasibility,
+)
 from chamberopt.simulation.evaluation import Evaluation
 
 if TYPE_CHECKING:
@@ -51,7 +56,7 @@ class ConfirmedCandidate:
     # FEASIBLE if the whole intervals of the constrained figures are within their limits, INFEASIBLE
     # if one is outside, else NOT_KNOWN.
     feasibility: str
-    reason: str  # the limits that are, or may be, violated
+    violations: tuple[Violation, ...]  # of limits, certain or possible
     goals: tuple[Estimate, ...]  # of each objective of the study
     # What the design's tolerances cost of the first objective on average, by the search's model;
     # those of numbers that do not vary are not in it. 0 if there is no model.
@@ -60,6 +65,11 @@ class ConfirmedCandidate:
     @property
     def feasible(self) -> bool:
         return self.feasibility == FEASIBLE
+
+    @property
+    def reason(self) -> str:
+        """The limits that are, or may be, violated, in words."""
+        return "; ".join(one.text for one in self.violations)
 
 
 class Candidates:

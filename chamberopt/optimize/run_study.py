@@ -93,7 +93,7 @@ class StudyResult:
 
     @property
     def given_up(self) -> int:
-        """Number of candidates of the search that got no more replicas than those of a first look."""
+        """Number of candidates of the search that got no more replicas than a first look."""
         few = self.study.first_look
         search = (one for one in self.trials if one.stage == "search")
         return sum(one.replicas == few for one in search) if few else 0

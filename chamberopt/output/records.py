@@ -28,7 +28,7 @@ from chamberopt.common.errors import InputError, first_wrong_value
 from chamberopt.common.estimate import Estimate
 from chamberopt.coverage.metrics import METRICS, find_metric, parse_objective
 
-FORMAT = 5
+FORMAT = 6
 ROUNDING = 1e-9
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
 Positive = Annotated[float, Field(ge=0.0)]
@@ -235,12 +235,19 @@ class FrontPoint(CandidatePoint):
     objectives: dict[str, Interval]
 
 
+class ViolationRecord(_Table):
+    """A limit that is, or may be, violated: by which figure, and in words."""
+
+    figure: str
+    text: str
+
+
 class ConfirmedRecord(CandidatePoint):
     searched_as: int | None
     objective: WholeEstimate
     feasible: bool
     standing: str
-    reason: str
+    violations: list[ViolationRecord]
 
 
 class StartRecord(CandidatePoint):

@@ -44,7 +44,7 @@ def report(result: Path, /, *, sheet: bool = False, json: Json = False, out: Pag
         print_json({**facts, "report": str(path)})
         return
     size = f"{path.stat().st_size / 1e6:.1f} MB"
-    lines = [one["text"] for one in facts["answer_lines"]]
+    lines = [one.text for one in facts["answer_lines"]]
     show([facts["answer"], *lines, *facts["remarks"], f"report in {path}, {size}"])
 
 

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterator, Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 from pydantic import Field
 
@@ -19,6 +19,13 @@ from chamberopt.design.table_base import FileTable
 NO_SIZE = 1e-12  # a limit below it is as good as 0, and a violation is not measured by it
 FEASIBLE, NOT_KNOWN, INFEASIBLE = "feasible", "not known", "infeasible"
 MET = {FEASIBLE: "met", NOT_KNOWN: "not known", INFEASIBLE: "not met"}  # a limit of a zone
+
+
+class Violation(NamedTuple):
+    """A limit that is, or may be, violated."""
+
+    figure: str  # name of the metric, or of the number of the design
+    text: str  # the figure, and how it compares with the limit
 
 
 class Limits(FileTable):
@@ -137,12 +144,9 @@ def describe_violations(name: str, figure: Estimate, limits: Limits) -> list[str
 
 def assess_feasibility(
     constraints: Mapping[str, Limits], figures: Mapping[str, Estimate]
-) -> tuple[str, str]:
-    """Whether the estimates meet all limits, judged by their whole 95 % intervals.
-
-    The second text names the limits that are, or may be, violated.
-    """
-    feasibility, reasons = FEASIBLE, []
+) -> tuple[str, tuple[Violation, ...]]:
+    """Whether the estimates meet all limits, judged by their whole 95 % intervals."""
+    feasibility, violations = FEASIBLE, []
     for name, limits in constraints.items():
         figure = figures[name]
         for _, excess, comparison in _excesses(figure, limits):
@@ -151,8 +155,9 @@ def assess_feasibility(
             is_violated = excess > figure.half_width
             feasibility = INFEASIBLE if is_violated or feasibility == INFEASIBLE else NOT_KNOWN
             value = f"{name} {figure.in_words or f'{figure.value:.4g} ± {figure.half_width:.2g}'}"
-            reasons.append(f"{value} {'' if is_violated else 'may be '}{comparison}")
-    return feasibility, "; ".join(reasons)
+            text = f"{value} {'' if is_violated else 'may be '}{comparison}"
+            violations.append(Violation(name, text))
+    return feasibility, tuple(violations)
 
 
 def standard_error(figure: Estimate) -> float:

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal
 
 from chamberopt.chamber.checks.calibration import misfit_texts
 from chamberopt.common.estimate import Estimate
 from chamberopt.coverage.metrics import OBJECTIVES
 from chamberopt.coverage.resolution import NOT_RESOLVED
 from chamberopt.optimize.candidates import POINTS_PER_PARAMETER
-from chamberopt.optimize.study.constraints import FEASIBLE, MET
+from chamberopt.optimize.study.constraints import MET
 from chamberopt.output.report.number_text import (
     Label,
     metric_label,
@@ -92,45 +93,58 @@ def answer(result: Result, start: Result | None, gain: Estimate | None) -> str:
     )
 
 
-def answer_lines(result: Result, zones: Mapping[str, Any]) -> list[dict[str, Any]]:
+@dataclass(frozen=True)
+class AnswerLine:
+    """A sentence that belongs to the answer.
+
+    about: of which candidate or thing it speaks; "best" is the result itself.
+    warns: whether a limit is not certainly met, or the calibration has something to know.
+    """
+
+    about: Literal["zone", "best", "start", "other", "calibration"]
+    text: str
+    warns: bool
+
+
+def answer_lines(result: Result, zones: Mapping[str, Any]) -> list[AnswerLine]:
     """What belongs to the answer: zones with their limits, constraints, doubts of a calibration.
 
     Args:
         zones: as zone_contents returns them.
-    Returns:
-        "text" of each sentence, and "warns": whether a limit is not certainly met, or the
-        calibration has something to know.
     """
-    limited = tuple(f"{row['metric']} " for zone in zones["zones"] for row in zone["limits"])
+    lines = [AnswerLine("zone", one["text"], one["warns"]) for one in zone_lines(zones)]
+    lines += _constraint_lines(result)
     calibration = result.design.calibration
     doubts = [*misfit_texts(calibration), calibration.not_mmA] if calibration else []
-    texts = [*_constraint_texts(result, limited)]
-    texts += [f"{one[0].upper()}{one[1:]}." for one in doubts if one]
-    return [*zone_lines(zones), *({"text": text, "warns": True} for text in texts)]
+    return lines + [
+        AnswerLine("calibration", f"{one[0].upper()}{one[1:]}.", True) for one in doubts if one
+    ]
 
 
-def _constraint_texts(result: Result, limited: tuple[str, ...]) -> Iterator[str]:
+def _constraint_lines(result: Result) -> Iterator[AnswerLine]:
     """Which constraints the best, the start and candidates better than the best may not meet.
 
-    Args:
-        limited: begins reasons that the best's zones have in sentences of their own.
+    The zones of the best have sentences of their own.
     """
+    limited = {limit.metric for zone in result.record.zones for limit in zone.limits}
     study, label = result.study, objective_label(result.objective_name)
     if study is None:
         return
     for one in study.confirmed:
-        reasons = one.reason.split("; ") if one.standing != FEASIBLE else []
+        violations = one.violations
+        about: Literal["best", "start", "other"] = "other"
         if one.parameters == study.best.parameters:
-            whose = "The best chamber found"
-            reasons = [text for text in reasons if not text.startswith(limited)]
+            about, whose = "best", "The best chamber found"
+            violations = [found for found in violations if found.figure not in limited]
         elif one.parameters == study.start.parameters:
-            whose = "The start"
+            about, whose = "start", "The start"
         elif one.objective.value > result.objective.value:
             whose = f"Another chamber, whose {label.text} is {label.format(one.objective)}"
         else:
             continue
-        if reasons:
-            yield f"{whose}: constraints {MET[one.standing]}: {', '.join(reasons)}."
+        if violations:
+            texts = ", ".join(found.text for found in violations)
+            yield AnswerLine(about, f"{whose}: constraints {MET[one.standing]}: {texts}.", True)
 
 
 def full_coverage(result: Result) -> str:

@@ -103,8 +103,7 @@ def _answer(contents: Contents) -> str:
         value = html.text(_tile_value(row, "result"))
         tiles.append(f"<div><dt>{html.text(row['label'])}</dt><dd>{value}</dd>{start}</div>")
     lines = "".join(
-        html.paragraph(one["text"], "warning" if one["warns"] else "")
-        for one in contents["answer_lines"]
+        html.paragraph(one.text, "warning" if one.warns else "") for one in contents["answer_lines"]
     )
     limits = LIMITS_OF_CALIBRATED if contents["calibrated"] else LIMITS_OF_INTERVALS
     content = (

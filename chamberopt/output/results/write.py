@@ -43,6 +43,7 @@ from chamberopt.output.records import (
     TolerancesRecord,
     ToleratedFigureRecord,
     ToleratedRange,
+    ViolationRecord,
     ZoneLimit,
     ZoneRecord,
 )
@@ -287,7 +288,7 @@ def study_record(result: StudyResult) -> StudyRecord:
                 objective=candidate.evaluation.objective,
                 feasible=candidate.feasible,
                 standing=candidate.feasibility,
-                reason=candidate.reason,
+                violations=[ViolationRecord(**one._asdict()) for one in candidate.violations],
             )
             for candidate in result.confirmed
         ],

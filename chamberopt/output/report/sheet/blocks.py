@@ -39,7 +39,6 @@ EXPECTED = (
     "saturation_time_s",
     "compression_depth_um",
 )
-OF_OTHERS = ("The start:", "Another chamber,")  # begin answer_lines on other chambers of a study
 DROP_SPEED = 3.0  # m/s, as of a ball that falls 0.46 m; docs/peening.md
 KINDS = ("arc heights", "coverage", "dent diameters", "ball drops", "amplitude", "impact rates")
 
@@ -215,9 +214,9 @@ def _expected(result: Result, contents: Contents) -> Iterator[Row]:
             yield row["label"], interval_text(row["result"], row["unit"])
     if reason := why_no_intensity(calibration):
         yield "", f"{reason[0].upper()}{reason[1:]}."
-    for one in contents["answer_lines"][len(contents["zones"]["zones"]) :]:
-        if not one["text"].startswith(OF_OTHERS):
-            yield "", one["text"]
+    for one in contents["answer_lines"]:
+        if one.about in ("best", "calibration"):  # zones have a block of their own
+            yield "", one.text
     limits = LIMITS_OF_CALIBRATED if contents["calibrated"] else LIMITS_OF_INTERVALS
     yield "", f"± 95 % intervals. {limits}"
 

@@ -8,6 +8,7 @@ import pytest
 from chamberopt.chamber.build import build_chamber
 from chamberopt.common.errors import InputError
 from chamberopt.output import viewer
+from chamberopt.output.records import FORMAT
 from chamberopt.output.results.load import load_result
 from chamberopt.output.save_run import save_simulation
 from tests.helpers.results.digests import replace_result
@@ -72,6 +73,6 @@ def test_what_is_no_result_is_said(tmp_path: Path) -> None:
         replace_result(folder, wrong)
         with pytest.raises(InputError, match="damaged"):
             load_result(folder)
-    (folder / "result.json").write_text(text.replace('"format": 5', '"format": 99'))
+    (folder / "result.json").write_text(text.replace(f'"format": {FORMAT}', '"format": 99'))
     with pytest.raises(InputError, match=r"in format 99, expected 5: .* read it with that version"):
         load_result(folder)
