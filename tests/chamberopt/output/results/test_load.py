@@ -74,5 +74,5 @@ def test_what_is_no_result_is_said(tmp_path: Path) -> None:
         with pytest.raises(InputError, match="damaged"):
             load_result(folder)
     (folder / "result.json").write_text(text.replace(f'"format": {FORMAT}', '"format": 99'))
-    with pytest.raises(InputError, match=r"in format 99, expected 5: .* read it with that version"):
+    with pytest.raises(InputError, match=rf"in format 99, expected {FORMAT}: .* read it with"):
         load_result(folder)
