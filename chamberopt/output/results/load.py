@@ -95,6 +95,10 @@ class Result:
         return self.record.seed, self.record.stream
 
     @property
+    def notes(self) -> tuple[str, ...]:
+        return tuple(self.record.notes)
+
+    @property
     def gauge_mm2(self) -> float:
         """Area of the windows in which coverage is measured."""
         return self.design.process.accuracy.gauge_mm2
@@ -118,7 +122,10 @@ def load_result(path: str | Path) -> Result:
     """
     path = Path(path)
     if path.name != RESULT and path.is_symlink():
-        path = path.resolve()  # who asks for it gave the link, and learns where results are
+        try:
+            path = path.resolve()  # who asks for it gave the link, and learns where results are
+        except (OSError, RuntimeError):  # RuntimeError before Python 3.13
+            raise InputError(f"{path}: a link that leads back to itself; remove it") from None
     file = path if path.name == RESULT else path / RESULT
     folder = file.parent
     if not file.is_file():

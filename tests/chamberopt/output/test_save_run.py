@@ -59,7 +59,7 @@ def test_zones_read_back_and_are_shown_from_the_folder_alone(tmp_path: Path) -> 
     assert limit["label"] == "coverage that 95 % of the zone's area exceeds"
     (line,) = text["answer_lines"]
     assert line.text.startswith("Zone left: coverage_min = 0.999 is not met (")
-    assert line["warns"]
+    assert line.warns
     assert not [row for row in text["metrics"] if "." in row["name"]]
     seen = OpenedResult(viewer.result_info(result))
     assert "zones" in seen.quantities

@@ -76,3 +76,10 @@ def test_what_is_no_result_is_said(tmp_path: Path) -> None:
     (folder / "result.json").write_text(text.replace(f'"format": {FORMAT}', '"format": 99'))
     with pytest.raises(InputError, match=rf"in format 99, expected {FORMAT}: .* read it with"):
         load_result(folder)
+
+
+def test_a_link_that_leads_back_to_itself_is_refused(tmp_path: Path) -> None:
+    loop = tmp_path / "loop"
+    loop.symlink_to(loop)
+    with pytest.raises(InputError, match="a link that leads back to itself"):
+        load_result(loop)
