@@ -35,6 +35,7 @@ from matplotlib.figure import Figure
 
 from chamberopt.cli import main
 from chamberopt.common.parallel import executor
+from chamberopt.common.versions import versions
 from chamberopt.output import viewer
 from chamberopt.output.compare import comparison_folder
 from chamberopt.simulation.convergence import study as convergence_study
@@ -144,6 +145,7 @@ MASKS = {
     r"[\d.]+(?= MB)": MASKED,
     r"(?<=candidates in )[\d.]+ \w+": MASKED,
     rf"^({TIMED})\n.*$": rf"\1\n{MASKED}",
+    rf"^({'|'.join(versions())})\n.*$": rf"\1\n{MASKED}",
 }
 # Of a first run, and of a busy machine.
 LEFT_OUT = re.compile(r"^(compiling the simulator.*|.*, about .* left)\n", re.MULTILINE)
