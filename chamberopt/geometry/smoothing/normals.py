@@ -133,8 +133,8 @@ def fit_phi(
     is_crease: np.ndarray,
     fitted: np.ndarray,
     apexes: np.ndarray,
-    doubted: np.ndarray,
-    turning: np.ndarray,
+    doubted: np.ndarray | None = None,
+    told: np.ndarray | None = None,
 ) -> np.ndarray:
     """The angles phi (m, 3) [rad]; 0 off the fitted triangles.
 
@@ -142,9 +142,9 @@ def fit_phi(
         is_crease: marks edges, shape (e,).
         fitted: marks the triangles that have unknown phi, shape (m,).
         apexes: marks edges that end at the apex of a cone, shape (e,).
-        doubted: marks the creases that may be none, shape (e,): they hold phi by very little, and
-            a few steps are enough.
-        turning: marks the edges whose turn counts, shape (e,): all but creases, and some of these.
+        doubted: marks the creases that may be none, shape (e,): they hold phi by very little. Then
+            the phi is for looking further, and a few steps are enough.
+        told: marks the creases whose turn counts all the same, shape (e,).
     """
     phi = np.zeros(3 * len(fitted))
     if not fitted.any():
@@ -155,10 +155,11 @@ def fit_phi(
     smooth = np.flatnonzero(~is_crease & fitted[edges.triangles].any(axis=1))
     on_crease = edges.sides[is_crease].ravel()
     on_crease = on_crease[unknown[on_crease] >= 0]
-    of_turns = np.flatnonzero(turning & fitted[edges.triangles].any(axis=1))
+    pull, of_turns = np.full(len(unknown), CREASE), smooth
+    if doubted is not None and told is not None:
+        pull[edges.sides[doubted]] = DOUBTED
+        of_turns = np.flatnonzero((~is_crease | told) & fitted[edges.triangles].any(axis=1))
     length = edges.length[smooth]
-    pull = np.full(len(unknown), CREASE)
-    pull[edges.sides[doubted]] = DOUBTED
     sums = _rows(unknown, edges.sides[of_turns], np.ones((len(of_turns), 2)))
     bends = _bend_differences(facets, edges, smooth, unknown, apexes)
     creases = _rows(unknown, on_crease[:, None], np.ones((len(on_crease), 1)))
@@ -166,7 +167,7 @@ def fit_phi(
         [sums, *bends, creases],
         [edges.turn[of_turns], *[np.zeros(len(smooth))] * 3, np.zeros(len(on_crease))],
         [FIT * edges.length[of_turns], length, (pull * facets.length.ravel())[on_crease]],
-        FEW_STEPS if doubted.any() else STEPS,
+        STEPS if doubted is None else FEW_STEPS,
     )
     phi[unknown >= 0] = x
     return phi.reshape(-1, 3)

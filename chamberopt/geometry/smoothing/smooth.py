@@ -21,6 +21,7 @@ from chamberopt.geometry.smoothing.divide import Surface, divide
 from chamberopt.geometry.smoothing.irregular import find_continued, valleys
 from chamberopt.geometry.smoothing.normals import (
     Facets,
+    Pieces,
     corner_normals,
     find_apexes,
     find_pieces,
@@ -38,7 +39,7 @@ from chamberopt.geometry.triangles import connected_pieces, sides_of, unit_norma
 RISE = 2.0
 FAR_LARGER = 3.0  # times the area of the facets beside it: a plane facet is no part of a round
 BY_CHANCE = 8  # the most triangles of a round that lie in one plane by chance
-FITS = 3  # the last one to what the others have found
+LOOKS = 2  # for edges across which a round goes on, each a fit to what was found before
 LEFT_OVER = 0.5  # share of an edge's turn that no round explains, above which it is a crease
 CREASE = np.radians(8.0)  # the least turn of such a crease
 EXPLAINED = 0.25  # share below which an edge without evidence is of the rounds beside it
@@ -88,20 +89,18 @@ def find_surfaces(
     lone = find_creases(edges, facets.area) if given is None else _stated_creases(edges, given)
     ends = sides_of(triangles)[edges.sides[:, 0]]
     pieces = find_pieces(edges, len(triangles))
-    sides = vertices[np.roll(triangles, -1, axis=1)] - vertices[triangles]
-    for fits_left in reversed(range(FITS)):
-        face, fitted = _faces_to_fit(edges, lone, wanted)
-        fitted &= ~_planes(edges, facets, lone)
-        apex = find_apexes(facets, triangles, edges, lone)
-        if given is not None:
-            phi = phi_of_normals(facets, given)
-            break
-        doubted = lone & ~is_hard(edges) & fitted[edges.triangles].any(axis=1) & (fits_left > 0)
-        turning = ~lone | (doubted & valleys(edges, pieces, lone))
-        phi = fit_phi(facets, pieces, edges, lone, fitted, apex[ends].any(axis=1), doubted, turning)
-        if not doubted.any():
-            break
-        lone = lone & ~find_continued(sides, edges, facets, lone, phi)
+    if given is None:
+        for _ in range(LOOKS):
+            continued = _continued(edges, facets, pieces, vertices, triangles, lone, wanted)
+            if not continued.any():
+                break
+            lone = lone & ~continued
+    face, fitted = _faces_to_fit(edges, facets, lone, wanted)
+    apex = find_apexes(facets, triangles, edges, lone)
+    if given is None:
+        phi = fit_phi(facets, pieces, edges, lone, fitted, apex[ends].any(axis=1))
+    else:
+        phi = phi_of_normals(facets, given)
     left = edges.turn - phi.ravel()[edges.sides].sum(axis=1)
     of_round = fitted[edges.triangles].any(axis=1) & ~lone
     sharp = of_round & (size > CREASE) & (np.sign(edges.turn) * left > LEFT_OVER * size)
@@ -170,8 +169,34 @@ def _stated_creases(edges: Edges, normals: np.ndarray) -> np.ndarray:
     return np.asarray(np.minimum(*cosine) < np.cos(SMOOTH))
 
 
+def _continued(
+    edges: Edges,
+    facets: Facets,
+    pieces: Pieces,
+    vertices: np.ndarray,
+    triangles: np.ndarray,
+    lone: np.ndarray,
+    wanted: np.ndarray,
+) -> np.ndarray:
+    """Marks (e,) the edges without evidence across which a round goes on.
+
+    Args:
+        lone: marks the edges without evidence, shape (e,).
+        wanted: marks the triangles that are to be divided, shape (m,).
+    """
+    _, fitted = _faces_to_fit(edges, facets, lone, wanted)
+    doubted = lone & ~is_hard(edges) & fitted[edges.triangles].any(axis=1)
+    if not doubted.any():
+        return doubted
+    apexes = find_apexes(facets, triangles, edges, lone)[sides_of(triangles)[edges.sides[:, 0]]]
+    told = doubted & valleys(edges, pieces, lone)
+    phi = fit_phi(facets, pieces, edges, lone, fitted, apexes.any(axis=1), doubted, told)
+    sides = vertices[np.roll(triangles, -1, axis=1)] - vertices[triangles]
+    return find_continued(sides, edges, facets, lone, phi)
+
+
 def _faces_to_fit(
-    edges: Edges, is_crease: np.ndarray, wanted: np.ndarray
+    edges: Edges, facets: Facets, is_crease: np.ndarray, wanted: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Rounds, and which of them have normals to be found.
 
@@ -181,7 +206,7 @@ def _faces_to_fit(
     Returns:
         The number of the round to which each triangle belongs, shape (m,), one of its own for one
         that belongs to none; marks the triangles of rounds with or beside a wanted one, and those
-        beside them across smooth edges, shape (m,).
+        beside them across smooth edges, shape (m,). Plane faces beside rounds are left out.
     """
     joins = ~is_crease & (np.abs(edges.turn) > SMOOTH)
     one, two = edges.triangles[joins].T
@@ -189,7 +214,8 @@ def _faces_to_fit(
     in_round = np.zeros(len(wanted), dtype=bool)
     in_round[edges.triangles[joins]] = True
     chosen = in_round & np.isin(face, face[in_round & _with_neighbours(wanted, edges.triangles)])
-    return face, _with_neighbours(chosen, edges.triangles[~is_crease])
+    fitted = _with_neighbours(chosen, edges.triangles[~is_crease])
+    return face, fitted & ~_planes(edges, facets, is_crease)
 
 
 def _planes(edges: Edges, facets: Facets, is_crease: np.ndarray) -> np.ndarray:
