@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
 from chamberopt.chamber.checks.calibration import misfit_texts
@@ -13,6 +12,7 @@ from chamberopt.coverage.metrics import OBJECTIVES
 from chamberopt.coverage.resolution import NOT_RESOLVED
 from chamberopt.optimize.candidates import POINTS_PER_PARAMETER
 from chamberopt.optimize.study.constraints import MET
+from chamberopt.output.report.answer_line import AnswerLine
 from chamberopt.output.report.number_text import (
     Label,
     metric_label,
@@ -93,27 +93,13 @@ def answer(result: Result, start: Result | None, gain: Estimate | None) -> str:
     )
 
 
-@dataclass(frozen=True)
-class AnswerLine:
-    """A sentence that belongs to the answer.
-
-    about: of which candidate or thing it speaks; "best" is the result itself.
-    warns: whether a limit is not certainly met, or the calibration has something to know.
-    """
-
-    about: Literal["zone", "best", "start", "other", "calibration"]
-    text: str
-    warns: bool
-
-
 def answer_lines(result: Result, zones: Mapping[str, Any]) -> list[AnswerLine]:
     """What belongs to the answer: zones with their limits, constraints, doubts of a calibration.
 
     Args:
         zones: as zone_contents returns them.
     """
-    lines = [AnswerLine("zone", one["text"], one["warns"]) for one in zone_lines(zones)]
-    lines += _constraint_lines(result)
+    lines = [*zone_lines(zones), *_constraint_lines(result)]
     calibration = result.design.calibration
     doubts = [*misfit_texts(calibration), calibration.not_mmA] if calibration else []
     return lines + [

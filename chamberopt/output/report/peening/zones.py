@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from chamberopt.coverage.metrics import METRICS
 from chamberopt.design.peening.zones import LIMITED
 from chamberopt.output.report import html
+from chamberopt.output.report.answer_line import AnswerLine
 from chamberopt.output.report.number_text import Label, interval_text, metric_label, per_cent, plain
 
 if TYPE_CHECKING:
@@ -26,8 +27,8 @@ def limit_text(limit: ZoneLimit) -> str:
     return f"{limit.key} {sign} {limit.limit:g}"
 
 
-def zone_lines(contents: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """A sentence on each zone for the answer, and whether it warns that a limit is not met.
+def zone_lines(contents: Mapping[str, Any]) -> list[AnswerLine]:
+    """A sentence on each zone for the answer, which warns if a limit is not certainly met.
 
     Args:
         contents: as `zone_contents` returns them.
@@ -41,7 +42,7 @@ def zone_lines(contents: Mapping[str, Any]) -> list[dict[str, Any]]:
         mean = interval_text(zone["mean_coverage"], "%")
         text = f"Zone {zone['name']}: {judged or f'no limits; mean coverage {mean}'}."
         is_met = all(row["standing"] == "met" for row in zone["limits"])
-        lines.append({"text": text, "warns": not is_met})
+        lines.append(AnswerLine("zone", text, warns=not is_met))
     return lines
 
 

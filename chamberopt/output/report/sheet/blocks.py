@@ -14,7 +14,6 @@ from chamberopt.common.number_text import estimate_text
 from chamberopt.design.peening.calibration import why_no_intensity
 from chamberopt.design.peening.tolerances import tolerance_box
 from chamberopt.output.report.number_text import interval_text, metric_label, per_cent, plain
-from chamberopt.output.report.peening.zones import zone_lines
 from chamberopt.output.report.sections import LIMITS_OF_CALIBRATED, LIMITS_OF_INTERVALS
 from chamberopt.output.report.sheet.cautions import cautions
 
@@ -223,9 +222,10 @@ def _expected(result: Result, contents: Contents) -> Iterator[Row]:
 
 def _zones(contents: Contents) -> Iterator[Row]:
     """A sentence for each zone, those whose limits are not met first."""
-    lines = sorted(zone_lines(contents["zones"]), key=lambda line: not line["warns"])
+    lines = [one for one in contents["answer_lines"] if one.about == "zone"]
+    lines.sort(key=lambda line: not line.warns)
     for one in lines[:MOST_ROWS]:
-        yield "", one["text"]
+        yield "", one.text
     yield from _more(lines, MOST_ROWS, "more zones")
 
 

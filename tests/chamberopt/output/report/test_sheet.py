@@ -19,6 +19,7 @@ from chamberopt.common.estimate import Estimate
 from chamberopt.output import viewer
 from chamberopt.output.report import report_contents
 from chamberopt.output.report.number_text import interval_text, metric_label
+from chamberopt.output.report.peening.zones import zone_lines
 from chamberopt.output.report.sheet import write_sheet
 from chamberopt.output.report.sheet.blocks import Block, Check, Sheet, first_checks, setting_blocks
 from chamberopt.output.report.sheet.page import HEIGHT, WIDTH, _save, draw_sheet
@@ -105,11 +106,13 @@ def test_a_calibrated_mix_with_zones_and_tolerances(folder: Path) -> None:
     limit = {"text": "coverage_min = 0.9", "metric": "z.p05_coverage", "unit": "mmA"}
     limits = [{**limit, "standing": one, "figure": shown} for one in ("met", "not met")]
     figure = {"label": label.text, "unit": "mmA", "q05": shown, "q95": shown, "corner": None}
+    zones = {"zones": [
+        {"name": f"z{k}", "limits": limits[k // 3 : k // 3 + 1], "mean_coverage": shown}
+        for k in range(6)
+    ]}  # fmt: skip
     contents |= {
-        "zones": {"zones": [
-            {"name": f"z{k}", "limits": limits[k // 3 : k // 3 + 1], "mean_coverage": shown}
-            for k in range(6)
-        ]},
+        "zones": zones,
+        "answer_lines": zone_lines(zones),
         "metrics": [
             *contents["metrics"],
             {"name": "almen_intensity", "label": label.text, "unit": "mmA", "result": shown},
