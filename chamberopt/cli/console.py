@@ -89,14 +89,13 @@ def print_json(values: Mapping[str, Any]) -> None:
 
 def _json_value(value: Any) -> Any:
     """An estimate or a record as JSON values; TypeError for anything else."""
-    from pydantic import BaseModel
-
     from chamberopt.common.estimate import Estimate
+    from chamberopt.output.records import Table
 
     if isinstance(value, Estimate):
         return value.interval_json()
-    if isinstance(value, BaseModel):
-        return value.model_dump(mode="json", exclude_unset=True)
+    if isinstance(value, Table):
+        return value.as_json()
     if is_dataclass(value) and not isinstance(value, type):
         return asdict(value)
     raise TypeError(f"{type(value).__name__} is no JSON value")

@@ -65,6 +65,7 @@ def advise_effects(design: Design, chamber: Chamber) -> list[dict[str, Any]]:
     """Find by pilot runs which effects a design needs; the advice as plain JSON values."""
     from chamberopt.common.parallel.executor import local_executor
     from chamberopt.common.progress import step
+    from chamberopt.output.results.write import advice_record
     from chamberopt.simulation.effect_pilot import (
         IMPACTS,
         MAX_TIME,
@@ -87,9 +88,7 @@ def advise_effects(design: Design, chamber: Chamber) -> list[dict[str, Any]]:
     with local_executor() as executor, step("pilot runs") as progress:
         advice = with_effects_resolved(design, chamber, executor, progress, prepare)[1]
         advice = advice or advise(design, chamber, executor, progress, prepare)
-    from chamberopt.output.results.write import advice_record
-
-    return [advice_record(one).model_dump(mode="json") for one in advice]
+    return [advice_record(one).as_json() for one in advice]
 
 
 def seconds_of(progress: Progress, whole: float) -> Callable[[float], None]:

@@ -45,13 +45,17 @@ def _dated(text: str) -> str:
     return text
 
 
-class _Table(BaseModel):
+class Table(BaseModel):
     """A table of result.json; further keys are no fault."""
 
     model_config = ConfigDict(strict=True, allow_inf_nan=False)
 
+    def as_json(self) -> dict[str, Any]:
+        """The table as JSON values; keys that its writer left out are left out."""
+        return self.model_dump(mode="json", exclude_unset=True)
 
-class _IntervalValues(_Table):
+
+class _IntervalValues(Table):
     """A value and its half-width; null where there is none, with words in its place."""
 
     value: float | None
@@ -100,14 +104,15 @@ else:  # estimates, each stored with so much of it as is needed
 
 def _with_units(metrics: dict[str, Estimate]) -> dict[str, dict[str, Any]]:
     """The metrics as JSON values, each with its unit."""
-    found = {name: find_metric(name) for name in metrics}
-    return {
-        name: {**one.to_json(), "unit": metric.unit if (metric := found[name]) else ""}
-        for name, one in metrics.items()
-    }
+
+    def unit(name: str) -> str:
+        metric = find_metric(name)
+        return metric.unit if metric else ""
+
+    return {name: {**one.to_json(), "unit": unit(name)} for name, one in metrics.items()}
 
 
-class Objective(_Table):
+class Objective(Table):
     """The figure that a study maximises, or that a simulation is judged by."""
 
     name: str
@@ -133,12 +138,12 @@ class Objective(_Table):
         return {"name": self.name, **self.estimate.to_json(), "unit": ""}
 
 
-class Needed(_Table):
+class Needed(Table):
     mean_and_std: Positive | None
     p05_times_intensity: Positive | None
 
 
-class FieldRecord(_Table):
+class FieldRecord(Table):
     gauge_mm2: Positive
     points: Count
     dents_in_median_window: Positive
@@ -152,7 +157,7 @@ class FieldRecord(_Table):
     _units = field_serializer("double_gauge")(_with_units)
 
 
-class CoverageAtTime(_Table):
+class CoverageAtTime(Table):
     """One row of the coverage against time."""
 
     time_s: Positive
@@ -162,14 +167,14 @@ class CoverageAtTime(_Table):
     p05_half_width: Positive | None = None
 
 
-class ZoneLimit(_Table):
+class ZoneLimit(Table):
     key: str
     limit: float
     metric: str
     standing: Literal["met", "not met", "not known"]
 
 
-class ZoneRecord(_Table):
+class ZoneRecord(Table):
     """A zone of the part, and whether its figures meet its limits."""
 
     name: str
@@ -179,13 +184,13 @@ class ZoneRecord(_Table):
     limits: list[ZoneLimit]
 
 
-class ChamberRecord(_Table):
+class ChamberRecord(Table):
     volume_mm3: Positive
     target_exposed_area_mm2: Positive
     target_triangles: Count
 
 
-class AdviceRecord(_Table):
+class AdviceRecord(Table):
     """Why an effect was chosen by pilot runs."""
 
     effect: str
@@ -195,7 +200,7 @@ class AdviceRecord(_Table):
     changes: dict[str, Interval]
 
 
-class SliceRecord(_Table):
+class SliceRecord(Table):
     """The model of a study's score along one parameter."""
 
     flat: Ends
@@ -205,24 +210,24 @@ class SliceRecord(_Table):
     mean: Curve
     half_width: Curve
     main_effect: Curve
-    or_worse: list[bool] | None = None  # results before 0.2 lack it
+    or_worse: list[bool]
 
     @model_validator(mode="after")
     def _is_as_long(self) -> Self:
         curves = (self.values, self.mean, self.half_width, self.main_effect, self.or_worse)
-        if len({len(one) for one in curves if one is not None}) > 1:
+        if len({len(one) for one in curves}) > 1:
             raise ValueError("curves of different lengths")
         return self
 
 
-class ModelRecord(_Table):
+class ModelRecord(Table):
     noise: float
     expected: KnownInterval
     together: float
     parameters: dict[str, SliceRecord]
 
 
-class CandidatePoint(_Table):
+class CandidatePoint(Table):
     parameters: dict[str, int | float | str]
 
 
@@ -235,7 +240,7 @@ class FrontPoint(CandidatePoint):
     objectives: dict[str, Interval]
 
 
-class ViolationRecord(_Table):
+class ViolationRecord(Table):
     """A limit that is, or may be, violated: by which figure, and in words."""
 
     figure: str
@@ -257,7 +262,7 @@ class StartRecord(CandidatePoint):
     _units = field_serializer("metrics")(_with_units)
 
 
-class AccuracyRecord(_Table):
+class AccuracyRecord(Table):
     """How accurately candidates were simulated: process.accuracy of the design."""
 
     model_config = ConfigDict(extra="allow")
@@ -267,16 +272,16 @@ class AccuracyRecord(_Table):
     objective_half_width: Positive | None = None
 
 
-class Accuracies(_Table):
+class Accuracies(Table):
     search: AccuracyRecord
     confirm: AccuracyRecord
 
 
-class StudyRecord(_Table):
+class StudyRecord(Table):
     algorithm: str
     vary: dict[str, Ends]
     evaluations: Count
-    given_up: Count = 0
+    given_up: Count
     accuracy: Accuracies
     failed: Count
     missing_a_constraint: Count
@@ -300,7 +305,7 @@ class StudyRecord(_Table):
         return self
 
 
-class ToleratedRange(_Table):
+class ToleratedRange(Table):
     """A number with a tolerance, and the value at which it was simulated too."""
 
     low: int | float
@@ -309,18 +314,18 @@ class ToleratedRange(_Table):
     changed_to: int | float
 
 
-class EffectEnds(_Table):
+class EffectEnds(Table):
     low: KnownInterval
     high: KnownInterval
 
 
-class InCorner(_Table):
+class InCorner(Table):
     predicted: KnownInterval
     simulated: KnownInterval
     agrees: bool
 
 
-class ToleratedFigureRecord(_Table):
+class ToleratedFigureRecord(Table):
     nominal: KnownInterval
     q05: KnownInterval
     q95: KnownInterval
@@ -330,7 +335,7 @@ class ToleratedFigureRecord(_Table):
     corner: InCorner | None
 
 
-class TolerancesRecord(_Table):
+class TolerancesRecord(Table):
     """Figures over the box of tolerances."""
 
     box: dict[str, ToleratedRange]
@@ -350,7 +355,7 @@ class TolerancesRecord(_Table):
         return self
 
 
-class ResultRecord(_Table):
+class ResultRecord(Table):
     """Any result."""
 
     kind: Literal["simulation", "study", "sweep"]
@@ -369,12 +374,8 @@ class ResultRecord(_Table):
             raise ValueError("versions: chamberopt is missing")
         return self
 
-    def as_json(self) -> dict[str, Any]:
-        """The record as JSON values; keys that its writer left out are left out."""
-        return self.model_dump(mode="json", exclude_unset=True)
 
-
-class SweepFacts(_Table):
+class SweepFacts(Table):
     """A sweep, in numbers."""
 
     objective: str

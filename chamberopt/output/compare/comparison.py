@@ -65,7 +65,7 @@ class Comparison:
                 name: [gap.as_json() for gap in gaps] for name, gaps in self.differences.items()
             },
             "coverage_against_time": [
-                [row.model_dump(exclude_unset=True) for row in result.record.coverage_against_time]
+                [row.as_json() for row in result.record.coverage_against_time]
                 for result in self.results
             ],
         }

@@ -281,7 +281,7 @@ def _parameter_row(
     size = abs(label.factor)
     losses = [size * (best.value - mean) for mean in parameter.mean]
     half_widths = [size * math.hypot(half, best.half_width) for half in parameter.half_width]
-    or_worse = parameter.or_worse or [False] * len(losses)
+    or_worse = parameter.or_worse
     worst = max(range(len(losses)), key=losses.__getitem__)
     certain = [loss - half for loss, half in zip(losses, half_widths, strict=True)]
     loss, half_width = max(0.0, losses[worst]), half_widths[worst]

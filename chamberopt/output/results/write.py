@@ -60,7 +60,6 @@ if TYPE_CHECKING:
     from chamberopt.optimize.run_sweep import SweepResult
     from chamberopt.optimize.sensitivity import Sensitivity
     from chamberopt.optimize.storage.trial_log import Trial
-    from chamberopt.optimize.study.schema import Study
     from chamberopt.simulation.effect_pilot import Advice
     from chamberopt.simulation.evaluation import Evaluation
     from chamberopt.simulation.peening.tolerances import ToleranceResult, ToleratedFigure
@@ -255,21 +254,23 @@ def _number(value: float) -> float | None:
 
 def study_record(result: StudyResult) -> StudyRecord:
     """The record of a study that has ended."""
+    study, replicas = result.study, result.best.evaluation.replicas
     search = [trial for trial in result.trials if trial.stage == "search"]
     more: dict[str, Any] = {}
     if result.sensitivity:
         more["model"] = _about_model(result.sensitivity)
-    if result.study.objective.pareto:
+    if study.objective.pareto:
         more["front"] = _about_front(result)
-    confirm = AccuracyRecord(
-        **_accuracy_values(result.study.design) | {"replicas": result.best.evaluation.replicas}
+    accuracy = Accuracies(
+        search=_accuracy(study.at_search_accuracy(study.design)),
+        confirm=_accuracy(study.design).model_copy(update={"replicas": replicas}),
     )
     return StudyRecord(
         algorithm=result.algorithm,
-        vary={name: list(one.ends) for name, one in result.study.vary.items()},
+        vary={name: list(one.ends) for name, one in study.vary.items()},
         evaluations=len(search),
         given_up=result.given_up,
-        accuracy=Accuracies(search=_search_accuracy(result.study), confirm=confirm),
+        accuracy=accuracy,
         failed=sum(trial.objective is None for trial in search),
         missing_a_constraint=_missing_a_constraint(search),
         gain=result.gain,
@@ -385,7 +386,7 @@ def _about_sweep(sweep: SweepResult) -> SweepRecord:
             candidates=len(sweep.trials),
             failed=sum(trial.objective is None for trial in sweep.trials),
             missing_a_constraint=_missing_a_constraint(sweep.trials),
-            accuracy=_search_accuracy(study),
+            accuracy=_accuracy(study.at_search_accuracy(study.design)),
             best=best.row() if best else None,
             seconds=round(sweep.seconds, 3),
         ),
@@ -399,13 +400,8 @@ def _missing_a_constraint(trials: Sequence[Trial]) -> int:
     return sum(one.objective is not None and not one.feasible for one in trials)
 
 
-def _search_accuracy(study: Study) -> AccuracyRecord:
-    return AccuracyRecord(**_accuracy_values(study.at_search_accuracy(study.design)))
-
-
-def _accuracy_values(design: Design) -> dict[str, Any]:
-    values: dict[str, Any] = design.process.accuracy.model_dump(exclude_none=True)
-    return values
+def _accuracy(design: Design) -> AccuracyRecord:
+    return AccuracyRecord.model_validate(design.process.accuracy.model_dump(exclude_none=True))
 
 
 def _design_values(design: Design, folder: Path) -> dict[str, Any]:

@@ -43,6 +43,7 @@ def a_model(mean: list[float], half_width: list[float]) -> ModelRecord:
         mean=mean,
         half_width=half_width,
         main_effect=mean,
+        or_worse=[False] * len(mean),
     )
     expected = Estimate(mean[0], half_width[0])
     return ModelRecord(noise=0.01, expected=expected, together=1.0, parameters={"x": curve})
