@@ -21,7 +21,7 @@ from benchmarks.analytic_report import report
 from benchmarks.analytic_runs import PEENED, Effort, bin_edges, calibrated, rows, run
 from benchmarks.pictures import IMAGES
 from benchmarks.table import RESULTS, write_csv
-from chamberopt.common.parallel.executor import local_executor
+from chamberopt.common.executor import local_executor
 from chamberopt.design.load import load_design
 
 ROOT = Path(__file__).parents[1]

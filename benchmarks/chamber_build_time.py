@@ -57,7 +57,7 @@ def row(path: Path, runs: int) -> dict[str, Any]:
     from chamberopt.chamber.scene import chamber_mesh
     from chamberopt.design.design import validate
     from chamberopt.design.load import load_design
-    from chamberopt.geometry.mesh_io.part_mesh import read_part
+    from chamberopt.geometry.meshes.part_mesh import read_part
     from sim_core import compile_simulator  # noqa: F401  its import is not timed
     from sim_core.geometry.obstacle_set import build_obstacle_set
 

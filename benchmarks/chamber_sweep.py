@@ -24,9 +24,9 @@ import numpy as np
 from benchmarks.noisy_problems import RESULTS
 from benchmarks.table import write_csv
 from chamberopt.chamber.build import build_chamber
-from chamberopt.common.parallel.executor import SerialExecutor
+from chamberopt.common.executor import SerialExecutor
 from chamberopt.design.load import Design, load_design
-from chamberopt.optimize.study.constraints import standard_error
+from chamberopt.search.study.constraints import standard_error
 from chamberopt.simulation.evaluate import ReplicaPlan, evaluate
 
 ROOT = RESULTS.parents[1]

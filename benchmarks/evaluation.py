@@ -37,7 +37,7 @@ def evaluation(accuracy: float) -> dict[str, Any]:
     """The row of one evaluation in this process, in which chamberopt is not imported yet."""
     from chamberopt.chamber.build import build_chamber
     from chamberopt.chamber.scene import build_scene, chamber_mesh
-    from chamberopt.common.parallel.executor import local_executor
+    from chamberopt.common.executor import local_executor
     from chamberopt.design.load import load_design
     from chamberopt.simulation.evaluate import evaluate
     from sim_core import compile_simulator
@@ -84,7 +84,7 @@ def replica_shares(design: Any, chamber: Any) -> dict[str, float]:
     Measured with replicas that have neither warm-up nor recorded time, the first, and both.
     """
     from chamberopt.chamber.scene import chamber_mesh, replica_seed
-    from chamberopt.simulation.convergence.parameters import TIME, WARM_UP
+    from chamberopt.simulation.convergence import TIME, WARM_UP
     from chamberopt.simulation.replicas import ReplicaSetting, simulate_replica
 
     mesh = chamber_mesh(chamber)

@@ -35,9 +35,9 @@ import numpy as np
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT))
 
-from chamberopt.common.parallel.executor import SerialExecutor, local_executor, share  # noqa: E402
-from chamberopt.optimize.run_sweep import evaluate_point, plan_sweep  # noqa: E402
-from chamberopt.optimize.study import Study, load_study  # noqa: E402
+from chamberopt.common.executor import SerialExecutor, local_executor, share  # noqa: E402
+from chamberopt.search.run_sweep import evaluate_point, plan_sweep  # noqa: E402
+from chamberopt.search.study import Study, load_study  # noqa: E402
 
 CANDIDATES, NOTHINGS = 24, 1000
 ASKED = 0.9
@@ -51,7 +51,7 @@ def workers(kind: str, count: int) -> Iterator[Executor]:
         if kind == "dask":
             from distributed import LocalCluster
 
-            from chamberopt.common.parallel.dask_cluster import DaskExecutor
+            from chamberopt.common.dask_cluster import DaskExecutor
 
             local = LocalCluster(
                 n_workers=count, threads_per_worker=1, processes=True, dashboard_address=":0"

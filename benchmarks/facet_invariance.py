@@ -26,7 +26,7 @@ import trimesh
 from benchmarks.table import print_table, write_csv
 from chamberopt.chamber.build import build_chamber
 from chamberopt.common.estimate import Estimate
-from chamberopt.common.parallel.executor import core_count
+from chamberopt.common.executor import core_count
 from chamberopt.coverage.metrics import parse_objective
 from chamberopt.design.design import Design
 from chamberopt.design.load import load_design

@@ -102,7 +102,7 @@ def workers(count: int) -> dict[str, Any]:
 def evaluation(count: int, workers: int) -> tuple[float, float]:
     """Seconds by the clock of the second of two evaluations, and those of its figures alone."""
     from chamberopt.chamber.build import build_chamber
-    from chamberopt.common.parallel.executor import local_executor
+    from chamberopt.common.executor import local_executor
     from chamberopt.design.load import load_design
     from chamberopt.simulation.evaluate import evaluate
 

@@ -46,8 +46,8 @@ from chamberopt.coverage.metrics import OBJECTIVES
 from chamberopt.coverage.part_impacts import Hits
 from chamberopt.coverage.percentile import exposure_from_density, sum_dents
 from chamberopt.coverage.strength_intervals import strength_estimates
+from chamberopt.design.calibration import calibrated_strip
 from chamberopt.design.load import Design
-from chamberopt.design.peening.calibration import calibrated_strip
 from chamberopt.simulation import estimates
 from tests.helpers.synthetic import chamber_round, plane_chamber, plate_design
 

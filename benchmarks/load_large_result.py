@@ -40,7 +40,7 @@ def written(folder: Path, size: str, impacts: int) -> tuple[int, int]:
     from chamberopt.chamber.build import build_chamber
     from chamberopt.design.design import validate
     from chamberopt.design.load import load_design
-    from chamberopt.output.save_run import save_simulation
+    from chamberopt.workflows.save_run import save_simulation
 
     gear = load_design(ROOT / "designs" / "gear.toml")
     data = gear.model_dump()

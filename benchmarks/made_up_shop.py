@@ -29,9 +29,9 @@ import tomlkit
 
 from benchmarks.synthetic_shops import PRIORS, ROOT, Z, measure
 from benchmarks.table import print_table
+from chamberopt.design.calibration import Calibration, Parameter
 from chamberopt.design.load import load_design
-from chamberopt.design.peening.calibration import Calibration, Parameter
-from chamberopt.simulation.peening.strip import StripSize
+from chamberopt.peening.strip import StripSize
 
 SHOP = ROOT / "designs" / "shop"
 HIDDEN: dict[Parameter, float] = {

@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from chamberopt.coverage.metrics import highest_uniform_coverage
-from chamberopt.optimize.search.domain import Axis, Domain
+from chamberopt.search.optimiser.domain import Axis, Domain
 
 RESULTS = Path(__file__).parent / "results"
 REPLICAS = 8

@@ -37,14 +37,14 @@ import numpy as np
 from benchmarks.noisy_problems import ASIDE, REPLICAS, Problem, problems
 from benchmarks.table import print_table, write_csv
 from chamberopt.common.estimate import Estimate, estimate
-from chamberopt.optimize.evaluate_candidate import evaluation_cost
-from chamberopt.optimize.search.acquisition import recommend_points
-from chamberopt.optimize.search.gaussian_process import moderate_variances
-from chamberopt.optimize.search.maximise import maximise
-from chamberopt.optimize.search.search_model import LimitedFigure, Observations, SearchModel
-from chamberopt.optimize.search.stopping import Scored
-from chamberopt.optimize.study import Limits, schema
-from chamberopt.optimize.study.constraints import (
+from chamberopt.search.evaluate_candidate import evaluation_cost
+from chamberopt.search.optimiser.acquisition import recommend_points
+from chamberopt.search.optimiser.gaussian_process import moderate_variances
+from chamberopt.search.optimiser.maximise import maximise
+from chamberopt.search.optimiser.search_model import LimitedFigure, Observations, SearchModel
+from chamberopt.search.optimiser.stopping import Scored
+from chamberopt.search.study import Limits, schema
+from chamberopt.search.study.constraints import (
     FEASIBLE,
     INFEASIBLE,
     assess_feasibility,

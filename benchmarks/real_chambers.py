@@ -21,13 +21,13 @@ from unittest.mock import patch
 import numpy as np
 
 from benchmarks.table import print_table, write_csv
-from chamberopt.common.parallel.executor import local_executor
-from chamberopt.optimize import run_study
-from chamberopt.optimize.search.domain import Domain
-from chamberopt.optimize.search.stopping import Begin
-from chamberopt.optimize.storage.study_folder import open_study_folder
-from chamberopt.optimize.study import load_study
-from chamberopt.optimize.study.schema import Optimizer
+from chamberopt.common.executor import local_executor
+from chamberopt.search import run_study
+from chamberopt.search.optimiser.domain import Domain
+from chamberopt.search.optimiser.stopping import Begin
+from chamberopt.search.study import load_study
+from chamberopt.search.study.schema import Optimizer
+from chamberopt.search.study_folder import open_study_folder
 
 ROOT = Path(__file__).parents[1]
 

@@ -12,10 +12,10 @@ import math
 from pathlib import Path
 
 from chamberopt.chamber.build import build_chamber
+from chamberopt.common.executor import local_executor
 from chamberopt.common.files import csv_text, write_text
-from chamberopt.common.parallel.executor import local_executor
 from chamberopt.design.load import load_design
-from chamberopt.simulation.peening.responses import PairedRuns, on_scale, response, scale_of
+from chamberopt.peening.responses import PairedRuns, on_scale, response, scale_of
 
 ROOT = Path(__file__).resolve().parents[1]
 FIGURE = "mean_coverage"

@@ -24,7 +24,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from benchmarks.table import print_table, write_csv
 from chamberopt.coverage import strength_intervals
-from chamberopt.coverage.field.reached import Reach
+from chamberopt.coverage.field.surface_points import Reach
 from chamberopt.coverage.strength import LEVELS, levels, saturated_strength
 from chamberopt.coverage.strength_intervals import MAX_STEP, StrengthHistograms, estimates_of
 

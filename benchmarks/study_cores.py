@@ -24,11 +24,11 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from benchmarks.scenes import ROOT
 from benchmarks.table import print_table
-from chamberopt.common.parallel.executor import local_executor
-from chamberopt.optimize.run_study import run_study
-from chamberopt.optimize.storage.study_folder import open_study_folder
-from chamberopt.optimize.storage.trial_log import HISTORY
-from chamberopt.optimize.study import Study, load_study
+from chamberopt.common.executor import local_executor
+from chamberopt.search.run_study import run_study
+from chamberopt.search.study import Study, load_study
+from chamberopt.search.study_folder import open_study_folder
+from chamberopt.search.trial_log import HISTORY
 
 SIMULATED_S = 1.0
 INTERVAL_S = 0.015

@@ -28,11 +28,11 @@ from benchmarks.table import print_table, write_csv
 from chamberopt.chamber.build import build_chamber
 from chamberopt.chamber.scene import chamber_mesh
 from chamberopt.common.estimate import estimate
-from chamberopt.common.parallel.executor import SerialExecutor
+from chamberopt.common.executor import SerialExecutor
 from chamberopt.design.load import Design
-from chamberopt.optimize.run_study import run_study
-from chamberopt.optimize.storage.study_folder import open_study_folder
-from chamberopt.optimize.study import Study, load_study
+from chamberopt.search.run_study import run_study
+from chamberopt.search.study import Study, load_study
+from chamberopt.search.study_folder import open_study_folder
 from chamberopt.simulation.evaluate import evaluate, prepare_target
 from chamberopt.simulation.evaluation import Evaluation
 

@@ -23,36 +23,21 @@ import numpy as np
 from benchmarks.table import print_table, write_csv
 from chamberopt.chamber.build import Chamber, build_chamber
 from chamberopt.common.estimate import normal_quantile
-from chamberopt.common.parallel.executor import SerialExecutor
+from chamberopt.common.executor import SerialExecutor
+from chamberopt.design.calibration import Calibration, Parameter
 from chamberopt.design.design import Design
 from chamberopt.design.load import load_design
-from chamberopt.design.peening.calibration import Calibration, Parameter
+from chamberopt.peening.calibrate import PRIORS, calibrate, prepare
+from chamberopt.peening.calibration_errors import evaluate_calibrated
+from chamberopt.peening.measured import Measured, MeasuredDents, dent_errors, with_amplitude
+from chamberopt.peening.next_measurement import predict
+from chamberopt.peening.posterior import Model
+from chamberopt.peening.setups import SIMULATED
+from chamberopt.peening.probes import ArcProbe, PartProbe, SaturationProbe, whole_target
+from chamberopt.peening.setups import DropModel, Setup, exact_calibration, simulate_setup
+from chamberopt.peening.strip import StripSize, strip_cells
+from chamberopt.peening.strip_holder import strip_design
 from chamberopt.simulation.evaluate import evaluate
-from chamberopt.simulation.peening.calibrate.calibrate import PRIORS, calibrate, prepare
-from chamberopt.simulation.peening.calibrate.measured import (
-    Measured,
-    MeasuredDents,
-    dent_errors,
-    with_amplitude,
-)
-from chamberopt.simulation.peening.calibrate.next_measurement import predict
-from chamberopt.simulation.peening.calibrate.posterior import Model
-from chamberopt.simulation.peening.calibrate.probes import (
-    ArcProbe,
-    PartProbe,
-    SaturationProbe,
-    whole_target,
-)
-from chamberopt.simulation.peening.calibrate.setups import (
-    SIMULATED,
-    DropModel,
-    Setup,
-    exact_calibration,
-    simulate_setup,
-)
-from chamberopt.simulation.peening.calibration_errors import evaluate_calibrated
-from chamberopt.simulation.peening.strip import StripSize, strip_cells
-from chamberopt.simulation.peening.strip_holder import strip_design
 
 ROOT = Path(__file__).parents[1]
 DISC = StripSize(0.026, 0.026, is_disc=True)

@@ -22,11 +22,11 @@ from typing import TYPE_CHECKING
 from chamberopt.common.errors import InputError
 from chamberopt.design.design import Design
 from chamberopt.design.load import load_design
-from chamberopt.optimize.study import Study, load_study
+from chamberopt.search.study import Study, load_study
 
 if TYPE_CHECKING:
     from chamberopt.common.progress import Progress
-    from chamberopt.output.results.load import Result
+    from chamberopt.results.load import Result
 
 __all__ = ["Design", "Study", "load_design", "load_study", "optimise", "show", "simulate"]
 
@@ -54,13 +54,13 @@ def simulate(
     """
     from chamberopt.chamber.analytic import analytic_cavity
     from chamberopt.chamber.build import build_chamber
+    from chamberopt.common.executor import local_executor
     from chamberopt.common.files import claim_folder
-    from chamberopt.common.parallel.executor import local_executor
-    from chamberopt.output.results.load import load_result
-    from chamberopt.output.save_run import save_simulation
+    from chamberopt.peening.calibration_errors import evaluate_calibrated
+    from chamberopt.peening.tolerances import plan_tolerances, simulate_tolerances
+    from chamberopt.results.load import load_result
     from chamberopt.simulation.effect_pilot import with_effects_resolved
-    from chamberopt.simulation.peening.calibration_errors import evaluate_calibrated
-    from chamberopt.simulation.peening.tolerances import plan_tolerances, simulate_tolerances
+    from chamberopt.workflows.save_run import save_simulation
 
     _require("design", design, Design, "load_design")
     if tolerances:
@@ -94,12 +94,12 @@ def optimise(
             meets the constraints.
     """
     from chamberopt.chamber.build import build_chamber
-    from chamberopt.common.parallel.executor import local_executor
-    from chamberopt.optimize.run_study import run_study
-    from chamberopt.optimize.storage.study_folder import open_study_folder
-    from chamberopt.output.results.load import load_result
-    from chamberopt.output.save_run import save_study
+    from chamberopt.common.executor import local_executor
+    from chamberopt.results.load import load_result
+    from chamberopt.search.run_study import run_study
+    from chamberopt.search.study_folder import open_study_folder
     from chamberopt.simulation.effect_pilot import with_effects_resolved
+    from chamberopt.workflows.save_run import save_study
 
     _require("study", study, Study, "load_study")
     with open_study_folder(study, out) as folder, local_executor(workers) as executor:
@@ -120,8 +120,10 @@ def show(result: Result, screenshot: str | Path | None = None) -> None:
     Args:
         screenshot: image file to write instead of opening a window.
     """
-    from chamberopt.output.results.load import Result
-    from chamberopt.output.viewer import ViewState, inspect, result_info
+    from chamberopt.results.load import Result
+    from chamberopt.viewer.opened_result import result_info
+    from chamberopt.viewer.view_state import ViewState
+    from chamberopt.viewer.window import inspect
 
     _require("result", result, Result, "simulate")
     inspect([result_info(result)], ViewState(), screenshot)

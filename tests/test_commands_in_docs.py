@@ -9,7 +9,7 @@ import pytest
 
 from benchmarks.made_up_shop import SHOP, compared
 from chamberopt.cli import main
-from chamberopt.output.viewer import missing_opengl
+from chamberopt.pictures.subprocess_drawing import missing_opengl
 
 ROOT = Path(__file__).parents[1]
 QUICK = {

@@ -34,13 +34,12 @@ import pytest
 from matplotlib.figure import Figure
 
 from chamberopt.cli import main
-from chamberopt.common.parallel import executor
+from chamberopt.common import executor
 from chamberopt.common.versions import versions
-from chamberopt.output import viewer
-from chamberopt.output.compare import comparison_folder
-from chamberopt.simulation.convergence import study as convergence_study
+from chamberopt.simulation import convergence as convergence_study
+from chamberopt.workflows import comparison_folder
 from tests.chamberopt.common.files.scene import write_scene
-from tests.chamberopt.simulation.convergence.test_study import made_up_replica
+from tests.chamberopt.simulation.test_study import made_up_replica
 from tests.helpers.synthetic import DESIGNS
 
 FROZEN = Path(__file__).with_name("frozen")
@@ -189,7 +188,7 @@ def patch_surroundings(patch: pytest.MonkeyPatch, sheets: list[Figure]) -> None:
 
     The study of accuracy gets made-up replicas and CPU times: what it advises follows from these.
     """
-    patch.setattr(viewer, "draw_coverage", lambda *_: None)
+    patch.setattr("chamberopt.workflows.save_run.draw_coverage", lambda *_: None)
     patch.setattr(comparison_folder, "draw_coverage", lambda *_: None)
     patch.setattr(comparison_folder, "draw_difference", lambda *_: None)
     patch.setattr(executor, "local_executor", lambda *_, **__: executor.ThreadExecutor(1))

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from chamberopt.output.viewer import missing_opengl
+from chamberopt.pictures.subprocess_drawing import missing_opengl
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")

@@ -18,15 +18,14 @@ from benchmarks.cases import peening_cylinder
 from benchmarks.cases.row import Row
 from chamberopt.chamber.build import build_chamber
 from chamberopt.common.estimate import Estimate
-from chamberopt.common.parallel.executor import local_executor
+from chamberopt.common.executor import local_executor
 from chamberopt.coverage.part_impacts import Hits
+from chamberopt.design.almen_strip import strip_material
 from chamberopt.design.load import Design, load_design
 from chamberopt.design.materials import PartMaterial
-from chamberopt.design.peening.almen_strip import strip_material
-from chamberopt.simulation.peening.kirk_fit import kirk_fits
-from chamberopt.simulation.peening.strip import StripDents, StripSize, count_dents, strip_cells
-from chamberopt.simulation.peening.strip_intervals import MULTIPLES, heights, strip_saturation
-from chamberopt.simulation.peening.virtual_strip import VirtualStrip, peen_strip, strip_in_lid
+from chamberopt.peening.kirk_fit import MULTIPLES, heights, kirk_fits, strip_saturation
+from chamberopt.peening.strip import StripDents, StripSize, count_dents, strip_cells
+from chamberopt.peening.virtual_strip import VirtualStrip, peen_strip, strip_in_lid
 
 PLATE = Path(__file__).parents[2] / "designs" / "plate.toml"
 DISC = StripSize(60e-3, 60e-3, is_disc=True)  # of the lid of 70 mm
@@ -137,7 +136,7 @@ def whole_strip() -> VirtualStrip:
 
 def picture(path: Path) -> None:
     """The saturation curve of the example."""
-    from chamberopt.output.plots.strip import strip_picture
+    from chamberopt.pictures.charts.strip import strip_picture
 
     strip_picture(path, whole_strip())
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from chamberopt.common.errors import InputError
 from chamberopt.design.shapes import TAG_PART, TAG_SONOTRODE, TAG_WALL
-from chamberopt.design.shapes.cylinder import Cylinder
+from chamberopt.design.shapes.straight import Cylinder
 from chamberopt.geometry.triangles import area_vectors, tetrahedron_volumes
 
 if TYPE_CHECKING:

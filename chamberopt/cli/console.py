@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
     from chamberopt.common.estimate import Estimate
     from chamberopt.design.load import Design
+    from chamberopt.peening.tolerances import ToleranceResult
     from chamberopt.simulation.evaluation import Evaluation
-    from chamberopt.simulation.peening.tolerances import ToleranceResult
 
 T = TypeVar("T")
 RESULTS = Path("results")  # where results go without --out
@@ -90,7 +90,7 @@ def print_json(values: Mapping[str, Any]) -> None:
 def _json_value(value: Any) -> Any:
     """An estimate or a record as JSON values; TypeError for anything else."""
     from chamberopt.common.estimate import Estimate
-    from chamberopt.output.records import Table
+    from chamberopt.results.records import Table
 
     if isinstance(value, Estimate):
         return value.interval_json()
@@ -175,7 +175,7 @@ def tolerance_lines(found: ToleranceResult) -> list[str]:
 def zone_lines(design: Design, evaluation: Evaluation) -> list[str]:
     """Whether the limits of each zone are met, a line each."""
     from chamberopt.common.number_text import estimate_text
-    from chamberopt.optimize.study.constraints import judge_zones
+    from chamberopt.search.study.constraints import judge_zones
 
     return [
         f"zone {zone}: {row['key']} {row['limit']:g}: {row['standing']} "

@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
     from chamberopt.common.progress import Progress
     from chamberopt.design.load import Design
-    from chamberopt.output.resimulate.rebuild import RebuiltReplica
-    from chamberopt.output.results.load import Result
+    from chamberopt.results.load import Result
+    from chamberopt.results.rebuild import RebuiltReplica
     from chamberopt.simulation.effect_pilot import Advice
     from sim_core import AnalyticCavity
 
@@ -63,9 +63,9 @@ def resolve_effects(
 
 def advise_effects(design: Design, chamber: Chamber) -> list[dict[str, Any]]:
     """Find by pilot runs which effects a design needs; the advice as plain JSON values."""
-    from chamberopt.common.parallel.executor import local_executor
+    from chamberopt.common.executor import local_executor
     from chamberopt.common.progress import step
-    from chamberopt.output.results.write import advice_record
+    from chamberopt.results.write import advice_record
     from chamberopt.simulation.effect_pilot import (
         IMPACTS,
         MAX_TIME,
@@ -99,9 +99,9 @@ def seconds_of(progress: Progress, whole: float) -> Callable[[float], None]:
 def load_replica(folder: Path, number: int) -> tuple[Result, RebuiltReplica]:
     """A result and one of its replicas, to be compiled and simulated again."""
     from chamberopt.coverage.part_impacts import HITS_FILE
-    from chamberopt.output.resimulate.rebuild import rebuild_replica
-    from chamberopt.output.results.load import load_result
-    from chamberopt.output.vtp_files import CHAMBER, COVERAGE, PART
+    from chamberopt.results.load import load_result
+    from chamberopt.results.rebuild import rebuild_replica
+    from chamberopt.results.vtp_files import CHAMBER, COVERAGE, PART
 
     loaded = load_result(folder)
     for name in (PART, COVERAGE, CHAMBER, HITS_FILE):  # they are read after the simulation

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from chamberopt.common.errors import InputError
 
 if TYPE_CHECKING:
-    from chamberopt.optimize.storage.study_folder import StudyFolder
+    from chamberopt.search.study_folder import StudyFolder
 
 
 def resume_command(study: Path, folder: Path, plan: Mapping[str, Any] | None = None) -> str:
@@ -48,7 +48,7 @@ def unfinished(study: Path, name: str) -> list[str]:
         name: of the folder in results/ that the command would use.
     """
     from chamberopt.common.limits import MAX_RESULT_BYTES, read_limited
-    from chamberopt.optimize.storage.study_folder import INPUTS, is_finished, is_study_folder
+    from chamberopt.search.study_folder import INPUTS, is_finished, is_study_folder
 
     results, remarks = Path("results"), []
     for folder in (results / name, *sorted(results.glob(f"{name}-[0-9]*"))):

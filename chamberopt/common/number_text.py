@@ -6,11 +6,13 @@ An interval is given to one or two digits, and its value to the same decimals.
 from __future__ import annotations
 
 import math
+import re
 
 from chamberopt.common.estimate import ZERO_TOLERANCE, Estimate
 
 NEARLY_ALL = 1e-3  # shares that leave less are said in words
 MOST_NINES = 6
+THIN_SPACE = "\u202f"  # between thousands; no line breaks there
 
 
 def estimate_text(
@@ -84,3 +86,13 @@ def with_interval(value: float, half_width: float, unit: str = "", sign: bool = 
 def _rounded(value: float, decimals: int) -> str:
     text = f"{round(value, decimals):.{max(0, decimals)}f}"
     return text if float(text) else text.removeprefix("-")
+
+
+def typeset(text: str) -> str:
+    """Text with gaps between thousands from 10 000 on, and a minus as long as a plus."""
+
+    def grouped(number: re.Match[str]) -> str:
+        return f"{int(number[0]):,}".replace(",", THIN_SPACE)
+
+    text = re.sub(r"(?<![\d.,e])\d{5,}(?!e)", grouped, text).replace(" °", f"{THIN_SPACE}°")
+    return re.sub(r"(?<!\w)-(?=\d)", "−", text)

@@ -11,8 +11,8 @@ from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
 from pathlib import Path
 
+from chamberopt.common.executor import core_count
 from chamberopt.common.files import read_file
-from chamberopt.common.parallel.executor import core_count
 
 SIMULATION_PACKAGES = ("chamberopt", "numpy", "scipy", "numba", "manifold3d")
 # The search depends on two more. Packages that only draw or print are left out.

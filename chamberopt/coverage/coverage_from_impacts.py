@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 
-from chamberopt.common.parallel.memory import MEMORY
+from chamberopt.common.memory import MEMORY
 from chamberopt.coverage.field.crease_bands import on_lines
 
 if TYPE_CHECKING:

@@ -17,7 +17,7 @@ import numpy as np
 
 from chamberopt.common import toml_errors
 from chamberopt.common.errors import InputError
-from chamberopt.design.peening.calibration import why_no_intensity
+from chamberopt.design.calibration import why_no_intensity
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber

@@ -22,8 +22,7 @@ import numpy as np
 
 from chamberopt.common.estimate import Estimate, estimate, jackknife, shared_half_width
 from chamberopt.coverage.coverage_from_impacts import Batch
-from chamberopt.coverage.field.reached import CERTAIN, Reach
-from chamberopt.coverage.field.surface_points import sampling_errors, sparse_points
+from chamberopt.coverage.field.surface_points import CERTAIN, Reach, sampling_errors, sparse_points
 from chamberopt.coverage.metrics import FULL_COVERAGE, NEVER, P05, P95
 
 SPLITS = 6  # of the replicas into halves

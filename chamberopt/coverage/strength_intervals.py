@@ -24,8 +24,7 @@ import numpy as np
 from chamberopt.common.estimate import Estimate, estimate, jackknife
 from chamberopt.coverage.coverage_from_impacts import in_halves
 from chamberopt.coverage.coverage_intervals import root_of_variance
-from chamberopt.coverage.field.reached import Reach
-from chamberopt.coverage.field.surface_points import sampling_errors, sparse_points
+from chamberopt.coverage.field.surface_points import Reach, sampling_errors, sparse_points
 from chamberopt.coverage.metrics import P05, P95
 from chamberopt.coverage.percentile import in_order
 from chamberopt.coverage.strength import (

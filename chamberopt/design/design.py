@@ -19,17 +19,14 @@ from chamberopt.common import toml_errors
 from chamberopt.common.errors import InputError
 from chamberopt.common.toml_errors import CrossCheckError, Problem, text_choices
 from chamberopt.common.toml_fields import Several, from_file, list_field
-from chamberopt.design.effects import Effects
-from chamberopt.design.materials import Materials, with_numbers
-from chamberopt.design.part import PartTable
-from chamberopt.design.peening.calibration import (
+from chamberopt.design.calibration import (
     CalibrationField,
     calibration_problems,
     with_measured_values,
 )
-from chamberopt.design.peening.tolerances import FORM as TOLERANCE_FORM
-from chamberopt.design.peening.tolerances import Tolerance, tolerance_problems
-from chamberopt.design.peening.zones import MAX_ZONES, Zone, zone_problems
+from chamberopt.design.effects import Effects
+from chamberopt.design.materials import Materials, with_numbers
+from chamberopt.design.part import PartTable
 from chamberopt.design.process import Process
 from chamberopt.design.shapes import SHAPES, ChamberTable
 from chamberopt.design.shapes.base import is_custom
@@ -38,6 +35,9 @@ from chamberopt.design.shapes.imported import IMPORTED, Imported
 from chamberopt.design.shot import ShotTable
 from chamberopt.design.sonotrode import FurtherSonotrode, Sonotrode
 from chamberopt.design.table_base import MAX_NAMES, STRICT, FileTable
+from chamberopt.design.tolerances import FORM as TOLERANCE_FORM
+from chamberopt.design.tolerances import Tolerance, tolerance_problems
+from chamberopt.design.zones import MAX_ZONES, Zone, zone_problems
 
 # Each further sonotrode has a tag below 255 and needs a cut through all walls that come before it.
 MAX_SONOTRODES = 50

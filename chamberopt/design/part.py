@@ -22,8 +22,8 @@ from chamberopt.common.toml_fields import (
     quantity,
 )
 from chamberopt.design.table_base import FileTable
-from chamberopt.geometry.mesh_io.readers.step.tessellation import Tessellation
-from chamberopt.geometry.mesh_io.units import Unit
+from chamberopt.geometry.meshes.step_tessellation import Tessellation
+from chamberopt.geometry.meshes.units import Unit
 from chamberopt.geometry.smoothing.part import Rule
 
 MAX_FACES = 500

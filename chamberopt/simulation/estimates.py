@@ -33,8 +33,13 @@ from chamberopt.coverage.coverage_from_impacts import (
     kept_footprints,
     locate_dents,
 )
-from chamberopt.coverage.coverage_intervals import coverage_estimates
-from chamberopt.coverage.field.reached import CERTAIN, RULE_OF_THREE, Reach
+from chamberopt.coverage.coverage_intervals import (
+    NOT_RESOLVED,
+    Resolution,
+    coverage_estimates,
+    find_resolution,
+)
+from chamberopt.coverage.field.surface_points import CERTAIN, RULE_OF_THREE, Reach
 from chamberopt.coverage.field.target_field import Gauge, TargetField
 from chamberopt.coverage.metrics import (
     METRICS,
@@ -46,14 +51,13 @@ from chamberopt.coverage.metrics import (
 )
 from chamberopt.coverage.part_impacts import Hits, TargetImpacts
 from chamberopt.coverage.percentile import in_order, sum_dents, time_to_98
-from chamberopt.coverage.resolution import NOT_RESOLVED, Resolution, find_resolution
 from chamberopt.coverage.strength_intervals import strength_estimates
-from chamberopt.design.peening.calibration import calibrated_strip
+from chamberopt.design.calibration import calibrated_strip
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
+    from chamberopt.design.calibration import Calibration
     from chamberopt.design.load import Design
-    from chamberopt.design.peening.calibration import Calibration
 
 
 SHARES = frozenset({"mean_coverage", "std_coverage", "p05_coverage", "p95_coverage"})

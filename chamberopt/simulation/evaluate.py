@@ -12,10 +12,10 @@ import numpy as np
 
 from chamberopt.chamber.analytic import cavity_note
 from chamberopt.chamber.checks.check import friction_notes
-from chamberopt.chamber.checks.facets import facet_warnings
+from chamberopt.chamber.checks.fillets import facet_warnings
 from chamberopt.chamber.scene import chamber_mesh
 from chamberopt.common.estimate import Estimate
-from chamberopt.common.parallel.executor import share
+from chamberopt.common.executor import share
 from chamberopt.common.progress import Progress
 from chamberopt.coverage.compression import stress_notes
 from chamberopt.coverage.dents import dent_diameter

@@ -13,10 +13,10 @@ from chamberopt.common.errors import InputError
 from chamberopt.common.estimate import Estimate
 from chamberopt.common.limits import MAX_NUMBER
 from chamberopt.common.npz_files import is_of_type, load_record, save_record
+from chamberopt.coverage.coverage_intervals import Resolution
 from chamberopt.coverage.field.symmetry import MAX_COPIES
 from chamberopt.coverage.metrics import METRICS, find_metric
 from chamberopt.coverage.part_impacts import Hits, require_impacts
-from chamberopt.coverage.resolution import Resolution
 
 REMEDY = "restore the file or run the study in a new folder"
 

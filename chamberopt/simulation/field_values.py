@@ -9,7 +9,8 @@ Notation
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -31,8 +32,10 @@ from chamberopt.coverage.strength import (
     saturated_strength,
     strip_dents,
 )
-from chamberopt.design.peening.calibration import calibrated_strip
+from chamberopt.design.calibration import calibrated_strip
 from chamberopt.simulation.evaluate import prepare_target
+from chamberopt.simulation.evaluation import require_triangles
+from chamberopt.simulation.time_curve import coverage_against_time
 from sim_core import TriangleMesh, closest_points
 
 if TYPE_CHECKING:
@@ -324,3 +327,39 @@ def _quantile(counts: np.ndarray, share: float) -> np.ndarray:
     before = upto[rows, level] - counts[rows, level]
     inside = _ratio(wanted - before, counts[rows, level])
     return np.asarray((level + inside) / LEVELS)
+
+
+# All that is computed of a candidate before its result is written, from its evaluation.
+
+
+@dataclass(frozen=True)
+class CandidateResult:
+    """A simulated candidate with the fields and curves of its result folder."""
+
+    design: Design
+    chamber: Chamber
+    evaluation: Evaluation
+    element_values: dict[str, np.ndarray]  # of each triangle of the part, by name, (m,) each
+    display: DisplayField  # fields at the vertices of a mesh to draw
+    time_curve: list[dict[str, float]]  # coverage against peening time, a row a time
+
+
+def complete_result(design: Design, chamber: Chamber, evaluation: Evaluation) -> CandidateResult:
+    """Compute what only a final result needs; a search does without it.
+
+    InputError if the evaluation, which a resumed study has read from a file, is of another part.
+    """
+    require_triangles(evaluation, len(chamber.part.triangles))
+    seen = PartField(design, chamber, evaluation)
+    with ThreadPoolExecutor(2) as threads:  # compiled code, most of it, works beside other threads
+        element_values = threads.submit(seen.element_values)
+        display = threads.submit(seen.display)
+        time_curve = coverage_against_time(design, seen.target, evaluation)
+        return CandidateResult(
+            design=design,
+            chamber=chamber,
+            evaluation=evaluation,
+            element_values=element_values.result(),
+            display=display.result(),
+            time_curve=time_curve,
+        )

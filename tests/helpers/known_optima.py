@@ -4,9 +4,9 @@ from pathlib import Path
 
 import numpy as np
 
-from chamberopt.common.parallel.executor import SerialExecutor
+from chamberopt.common.executor import SerialExecutor
 from chamberopt.design.load import load_design
-from chamberopt.optimize.study import Study
+from chamberopt.search.study import Study
 from tests.helpers.studies import run_in_folder
 from tests.helpers.synthetic import DESIGNS
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from chamberopt.geometry.mesh_io.part_mesh import PartMesh
+from chamberopt.geometry.meshes.part_mesh import PartMesh
 from chamberopt.geometry.triangles import areas, tetrahedron_volumes
 
 SIDES = (20.0, 30.0, 40.0)

@@ -2,6 +2,6 @@
 
 import pytest
 
-from chamberopt.output.viewer import missing_opengl
+from chamberopt.pictures.subprocess_drawing import missing_opengl
 
 needs_opengl = pytest.mark.skipif(missing_opengl() is not None, reason="no OpenGL library")

@@ -2,11 +2,11 @@
 
 from pathlib import Path
 
-from chamberopt.common.parallel.executor import SerialExecutor
-from chamberopt.optimize.run_study import StudyResult, run_study
-from chamberopt.optimize.run_sweep import SweepPlan, SweepResult, run_sweep
-from chamberopt.optimize.storage.study_folder import open_study_folder
-from chamberopt.optimize.study import Study
+from chamberopt.common.executor import SerialExecutor
+from chamberopt.search.run_study import StudyResult, run_study
+from chamberopt.search.run_sweep import SweepPlan, SweepResult, run_sweep
+from chamberopt.search.study import Study
+from chamberopt.search.study_folder import open_study_folder
 
 
 def run_in_folder(

@@ -12,9 +12,9 @@ from chamberopt.chamber.build import Chamber
 from chamberopt.chamber.part import Part
 from chamberopt.chamber.scene import chamber_mesh
 from chamberopt.common.estimate import Estimate, estimate
+from chamberopt.coverage.coverage_intervals import Resolution
 from chamberopt.coverage.metrics import OBJECTIVES, metric_names
 from chamberopt.coverage.part_impacts import Hits
-from chamberopt.coverage.resolution import Resolution
 from chamberopt.design.load import Design, load_design
 from chamberopt.geometry.triangles import areas
 from chamberopt.simulation.estimates import (

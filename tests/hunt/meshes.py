@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
-from tests.chamberopt.geometry.mesh_io.test_formats import intact_files
+from tests.chamberopt.geometry.meshes.test_formats import intact_files
 from tests.helpers.mesh_files import CORNERS, QUADS, SIDES, write_ascii_stl, write_stl
 
 ROOT = Path(__file__).parents[2]

@@ -21,8 +21,8 @@ from typing import Any
 import numpy as np
 
 from chamberopt.common.errors import FORMULA
-from chamberopt.output.results.load import content_sha256
-from chamberopt.output.results.write import data_digests
+from chamberopt.results.load import content_sha256
+from chamberopt.results.write import data_digests
 from tests.hunt.meshes import HUGE
 from tests.hunt.toml_files import odd_value
 

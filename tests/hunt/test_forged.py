@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from chamberopt.output.vtp_files import pyvista, save_surface
+from chamberopt.results.vtp_files import pyvista, save_surface
 from tests.helpers.results.digests import accept_changes
 from tests.hunt.base import write_base
 from tests.hunt.command import Server, fault

@@ -221,7 +221,7 @@ def test_ctrl_c_at_fifty_random_moments(place: Path) -> None:
 def test_the_page_is_ended_at_twenty_random_moments(tmp_path: Path) -> None:
     """Of any signal, and any command that it started: nothing is left after seconds."""
     pytest.importorskip("uvicorn", reason="extra `page` is not installed")
-    from tests.chamberopt.output.editor.test_started_commands import left_in, served_with_a_running
+    from tests.chamberopt.page.test_started_commands import left_in, served_with_a_running
 
     rng = np.random.default_rng(4)
     for number in range(20):
@@ -241,7 +241,7 @@ def test_the_page_is_ended_at_twenty_random_moments(tmp_path: Path) -> None:
 def test_the_page_takes_no_body_beyond_its_limit(tmp_path: Path) -> None:
     """Bodies in chunks of any size, whole, cut off and malformed: the server goes on in bounds."""
     pytest.importorskip("uvicorn", reason="extra `page` is not installed")
-    from tests.chamberopt.output.editor.conftest import Served
+    from tests.chamberopt.page.conftest import Served
 
     rng, page = np.random.default_rng(5), Served(tmp_path)
     resident = Path(f"/proc/{page.process.pid}/statm")

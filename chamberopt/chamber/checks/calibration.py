@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from chamberopt.design.peening.calibration import NO_STRIPS
+from chamberopt.design.calibration import NO_STRIPS
 
 if TYPE_CHECKING:
+    from chamberopt.design.calibration import Calibration
     from chamberopt.design.load import Design
-    from chamberopt.design.peening.calibration import Calibration
 
 # Beyond these the model was tried by no measurement of the machine.
 AMPLITUDE_RANGE, DIAMETER_RANGE, DENSITY_RANGE = 1.3, 1.5, 1.05

@@ -8,14 +8,17 @@ import numpy as np
 
 from chamberopt.chamber.build import hidden_share, selection_of
 from chamberopt.chamber.checks.calibration import calibration_warnings
-from chamberopt.chamber.checks.facets import facet_warnings, touched_by_curvature
-from chamberopt.chamber.checks.fillets import fillet_warnings
-from chamberopt.chamber.checks.gaps import gap_warnings, pocket_warnings, surface_warnings
-from chamberopt.chamber.checks.ledges import find_ledges
+from chamberopt.chamber.checks.fillets import facet_warnings, fillet_warnings, touched_by_curvature
+from chamberopt.chamber.checks.gaps import (
+    find_ledges,
+    gap_warnings,
+    pocket_warnings,
+    surface_warnings,
+)
 from chamberopt.chamber.checks.place_names import CEILING, SIDE_WALL, on_target, surface_names
 from chamberopt.chamber.dimensionless import free_path
 from chamberopt.chamber.part import turning_axis
-from chamberopt.chamber.reach.reach import Reach, find_reach, reached_part_share
+from chamberopt.chamber.reach import Reach, find_reach, reached_part_share
 from chamberopt.chamber.scene import (
     build_scene,
     chamber_mesh,
@@ -23,8 +26,8 @@ from chamberopt.chamber.scene import (
     require_ball_count,
     require_turnable,
 )
-from chamberopt.design.peening.tolerances import require_tolerances, tolerance_box
 from chamberopt.design.shapes import TAG_PART, TAG_SONOTRODE, TAG_WALL, is_sonotrode
+from chamberopt.design.tolerances import require_tolerances, tolerance_box
 from chamberopt.geometry.triangles import areas, edge_keys, sides_of, tetrahedron_volumes
 
 if TYPE_CHECKING:

@@ -14,14 +14,58 @@ import numpy as np
 
 from chamberopt.chamber.checks.gaps import MAX_COSINE
 from chamberopt.chamber.checks.place_names import one_of
-from chamberopt.chamber.reach.largest_ball import largest_balls
-from chamberopt.chamber.reach.reach import TOLERATED_OVERLAP
+from chamberopt.chamber.largest_ball import largest_balls
+from chamberopt.chamber.reach import TOLERATED_OVERLAP
 from chamberopt.design.shapes import TAG_PART
 from chamberopt.geometry.triangles import area_vectors, edge_keys, sides_of
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
-    from chamberopt.chamber.reach.reach import Reach
+    from chamberopt.chamber.part import Part
+    from chamberopt.chamber.reach import Reach
+
+# Warnings about facets of a part's rounds that are left as the file has them.
+
+LEAST_SHARE = 0.01  # of the target's area that is worth a word
+LEFT = "coverage is that of facets: "  # begins the warning
+
+
+def facet_warnings(part: Part, ball: float, reachable: float) -> list[str]:
+    """A warning that the figures of the target are those of its facets.
+
+    Args:
+        ball: diameter of the smallest ball [m].
+        reachable: share of the target that it can touch between the facets.
+    """
+    facts = part.smoothing
+    if facts is None or facts.coarse_share < LEAST_SHARE:
+        return []
+    noisy = facts.noisy_share >= max(facts.crossing_share, LEAST_SHARE)
+    if noisy:
+        why = "which fit no round, as on a scan or on bevels, and were left as they are"
+        remedy = "if rounds are meant, smooth the scan or give a mesh with finer facets"
+    elif facts.crossing_share >= LEAST_SHARE:
+        why = "which would cross others if they were divided"
+        remedy = "give a mesh with finer facets"
+    else:
+        why = "which were left as they are"
+        remedy = "give a mesh with finer facets, or change part.smoothing"
+    return [
+        f"{LEFT}they turn by {np.degrees(facts.coarse_turn):.2g} degrees on "
+        f"{facts.coarse_share:.0%} of the target, {why}; in their hollows a ball lies across two "
+        f"of them: by facets a ball of {1e3 * ball:g} mm touches {reachable:.1%} of the target, by "
+        f"the curvature of its rounds up to {touched_by_curvature(part, ball):.1%}; {remedy}"
+    ]
+
+
+def touched_by_curvature(part: Part, ball: float) -> float:
+    """Share of the target where no hollow is rounder than a ball of a diameter [m]."""
+    if part.hollow is None:
+        return 1.0
+    fits = part.hollow * 0.5 * ball <= 1.0 + TOLERATED_OVERLAP
+    area = part.area[part.target]
+    return float(area[fits[part.target]].sum() / area.sum())
+
 
 OF_FILLET, OF_SLOT = 0.5, 0.25  # largest shot, of the fillet's radius and of the slot's width
 LEAST_TURN, SHARP = 1.0, 60.0  # degrees at an inner edge of a fillet's facets; more has no fillet

@@ -5,31 +5,177 @@ Every number is a rule of thumb with its reason beside it; a study then varies t
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from chamberopt.chamber.build import Chamber, build_chamber
 from chamberopt.chamber.checks.check import shot_reach, warnings
-from chamberopt.chamber.propose.balls import fit_fillets, propose_ball, touched_shares
+from chamberopt.chamber.checks.fillets import OF_FILLET, inner_edges
+from chamberopt.chamber.largest_ball import largest_balls, spread_points
 from chamberopt.chamber.propose.pose import propose_pose, square_to_walls
-from chamberopt.chamber.propose.ranges import LARGEST_MM, Range, propose_charge, propose_ranges
-from chamberopt.chamber.propose.sizes import Sizes, propose_sizes, shape_for
-from chamberopt.chamber.propose.target import Surface, Target, propose_target, surfaces
-from chamberopt.chamber.reach.reach import Reach
+from chamberopt.chamber.propose.proposed_target import (
+    Sizes,
+    Surface,
+    Target,
+    propose_sizes,
+    propose_target,
+    shape_for,
+    surfaces,
+)
+from chamberopt.chamber.reach import TOLERATED_OVERLAP, Reach
+from chamberopt.chamber.scene import MAX_BALLS
 from chamberopt.common.errors import InputError, UnreadableError
 from chamberopt.common.progress import step
-from chamberopt.common.toml_fields import MAX_COORDINATE_MM
+from chamberopt.common.toml_fields import MAX_COORDINATE_MM, allowed_range
 from chamberopt.design.design import Design, validate
 from chamberopt.design.materials import alloy, ball, balls
 from chamberopt.design.shapes import TAG_SONOTRODE
-from chamberopt.geometry.mesh_io.part_mesh import PartMesh, read_part
-from chamberopt.geometry.mesh_io.surface_error import format_box
-from chamberopt.geometry.mesh_io.units import GUESSED
-from chamberopt.geometry.triangles import areas, rotation_matrix
+from chamberopt.design.shapes.base import ParametricChamber
+from chamberopt.design.shot import ShotTable
+from chamberopt.geometry.meshes.part_mesh import PartMesh, read_part
+from chamberopt.geometry.meshes.surface_error import format_box
+from chamberopt.geometry.meshes.units import GUESSED
+from chamberopt.geometry.triangles import area_vectors, areas, rotation_matrix, unit_vectors
+
+# Propose a ball: the largest sold that touches nearly all that the smallest would.
+#
+# If there are such balls of at most half the radius of the target's fillets, it is one of those.
+
+POINTS = 20_000  # on the target
+MISSED = 0.05  # share of the target's area that a larger ball may leave out
+
+
+def touched_shares(
+    vertices: np.ndarray, triangles: np.ndarray, target: np.ndarray, diameters: Sequence[float]
+) -> np.ndarray:
+    """Share of a part's target that balls of these diameters [m] can touch, from any side.
+
+    Args:
+        vertices: of the part [m], shape (n, 3).
+        triangles: normals out of the part, shape (m, 3).
+        target: marks triangles, shape (m,).
+    Returns:
+        One share for each diameter.
+    """
+    from sim_core import TriangleMesh
+
+    own = triangles[target]
+    spacing = np.full(len(own), np.sqrt(areas(vertices, own).sum() / POINTS))
+    triangle, point, area = spread_points(vertices, own, spacing)
+    normal = unit_vectors(area_vectors(vertices, own))[triangle]
+    mesh = TriangleMesh(vertices, triangles, np.zeros(len(triangles), dtype=np.uint8))
+    overlap = TOLERATED_OVERLAP * 0.5 * min(diameters)
+    radius = largest_balls(mesh, point, normal, 0.5 * max(diameters), overlap)[0]
+    touched = [area[radius >= 0.5 * one - overlap].sum() for one in diameters]
+    return np.array(touched) / area.sum()
+
+
+def fit_fillets(
+    vertices: np.ndarray, triangles: np.ndarray, target: np.ndarray, diameters: Sequence[float]
+) -> np.ndarray:
+    """Whether each of the diameters [m] is small enough for the fillets of a part's target.
+
+    Arguments as in `touched_shares`. Inner edges without a fillet are left out: no ball fits there.
+    """
+    _, length, radius = inner_edges(vertices, triangles, target)
+    small = [(radius > 0.0) & (OF_FILLET * radius < one) for one in diameters]
+    return np.array([length[own].sum() < one for own, one in zip(small, diameters, strict=True)])
+
+
+def propose_ball(
+    shares: np.ndarray, fits: np.ndarray, diameters: Sequence[float]
+) -> tuple[float, str]:
+    """The diameter [m] of the ball, and the reason.
+
+    Args:
+        shares, fits: of `touched_shares` and `fit_fillets`.
+        diameters: [m], in ascending order.
+    """
+    touching = shares >= shares[0] - MISSED
+    both = touching & fits
+    chosen = int(np.flatnonzero(both if both.any() else touching)[-1])
+    reason = f"touches {shares[chosen]:.0%} of the target"
+    if both.any() and not fits.all():
+        reason += ", at most half the radius of its fillets"
+    elif chosen + 1 < len(diameters):
+        larger = f"{1e3 * diameters[chosen + 1]:g} mm {shares[chosen + 1]:.0%}"
+        reason += f", balls of {larger}"
+    return diameters[chosen], reason
+
+
+# Propose the mass of the charge, and the numbers that the study varies, in steps of a shop.
+
+LAYER, PACKED = 0.25, 0.9069  # the charge, in layers of balls; share of a plane that one covers
+LIGHTER, HEAVIER = 0.4, 2.5  # charges of the study, as shares of the first
+FINE_MM, COARSE_MM = 0.5, 1.0  # steps of lengths
+FEW_MM = 400.0  # range of a length up to which its step is fine: a study takes 999 of them
+LARGEST_MM = allowed_range(ParametricChamber.model_fields["height_mm"])[1]  # side of a chamber
+HEAVIEST_G = allowed_range(ShotTable.model_fields["mass_g"])[1]
+
+
+class Range(NamedTuple):
+    """What a number of the design may be, in its unit."""
+
+    low: float
+    high: float
+    step: float
+
+
+def propose_charge(floor: float, diameter: float, ball_mass: float) -> tuple[float, str]:
+    """Mass of the charge [g] to two digits, and the reason for it.
+
+    Args:
+        floor: area of the sonotrode [m²].
+        diameter, ball_mass: of a ball [m], [kg].
+    """
+    count = max(1, round(LAYER * PACKED * floor / (math.pi / 4.0 * diameter**2)))
+    wanted, most = 1e3 * count * ball_mass, _heaviest_g(ball_mass)
+    if wanted > most:
+        return most, "the most that is supported, less than a quarter of a layer of balls"
+    return min(float(f"{wanted:.2g}"), most), "a quarter of a layer of balls on the sonotrode"
+
+
+def propose_ranges(
+    sizes: Sizes, mass_g: float, ball_mm: float, ball_mass: float
+) -> dict[str, Range]:
+    """What the study varies, by dotted name."""
+    distance, height = round(1e3 * sizes.distance), round(1e3 * sizes.height)
+    far = round(1.25 * distance)
+    near = max(round(0.4 * distance), math.ceil(2.0 * ball_mm))
+    # Above the part even when it is highest, so that no ball is caught between.
+    low = math.ceil(far + 1e3 * sizes.top + 2.0 * ball_mm)
+    high = min(round(1.5 * height), LARGEST_MM)
+    digit = _second_digit(mass_g)
+    least, most = (digit * round(share * mass_g / digit) for share in (LIGHTER, HEAVIER))
+    mass = (least, min(most, _heaviest_g(ball_mass)), digit)
+    return {
+        "chamber.height_mm": _lengths(min(low, height), high),
+        "chamber.sonotrode_distance_mm": _lengths(min(near, distance), far),
+        "shot.mass_g": Range(*(float(f"{one:.6g}") for one in mass)),
+    }
+
+
+def _lengths(low: float, high: float) -> Range:
+    """All lengths between two whole ones [mm]."""
+    return Range(low, high, FINE_MM if high - low <= FEW_MM else COARSE_MM)
+
+
+def _second_digit(mass: float) -> float:
+    """What a mass changes by if its second digit does so by one."""
+    return 10.0 ** (math.floor(math.log10(mass)) - 1)
+
+
+def _heaviest_g(ball_mass: float) -> float:
+    """The largest charge [g] of two digits that the program takes."""
+    most = min(1e3 * MAX_BALLS * ball_mass, HEAVIEST_G)
+    digit = _second_digit(most)
+    return float(f"{digit * math.floor(most / digit + 1e-9):.6g}")
+
 
 LARGEST_BALL = 3e-3  # m: larger ones are used, but are few and slow to cover
 BALLS_ACROSS = 50  # ball diameters in the part's width: with smaller balls there are thousands

@@ -9,7 +9,7 @@ from typing import Any
 import tomlkit
 
 from chamberopt.chamber.propose.proposal import Proposal
-from chamberopt.chamber.propose.target import Surface
+from chamberopt.chamber.propose.proposed_target import Surface
 from chamberopt.common.errors import one_line
 from chamberopt.design.load import with_paths_from
 

@@ -24,15 +24,15 @@ def accuracy(
     budget_s
         CPU seconds to spend on simulations; with more, smaller errors become visible.
     """
-    from chamberopt.common.parallel.executor import local_executor
+    from chamberopt.common.executor import local_executor
     from chamberopt.common.progress import step
     from chamberopt.design.load import load_design
-    from chamberopt.output.results.accuracy_results import accuracy_text, write_accuracy_results
-    from chamberopt.simulation.convergence.study import (
+    from chamberopt.simulation.convergence import (
         describe_cost,
         require_budget,
         run_convergence_study,
     )
+    from chamberopt.workflows.save_accuracy import accuracy_text, write_accuracy_results
 
     require_budget(budget_s)
     one = load_design(design)

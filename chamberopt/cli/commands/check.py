@@ -13,7 +13,7 @@ from chamberopt.cli.prepare import advise_effects
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
-    from chamberopt.chamber.reach.reach import Reach
+    from chamberopt.chamber.reach import Reach
 
 
 @app.command
@@ -44,7 +44,7 @@ def check(
 
     with ExitStack() as claims:
         if screenshot is not None:
-            from chamberopt.output.viewer.subprocess_drawing import picture_path
+            from chamberopt.pictures.subprocess_drawing import picture_path
 
             claims.enter_context(claim_file(picture_path(screenshot)))
         if out is not None:
@@ -57,10 +57,10 @@ def _check(file: Path, pilot: bool, screenshot: Path | None, json: bool, out: Pa
     from chamberopt.chamber.checks.check import describe, first_facts, shot_reach
     from chamberopt.common.files import write_text
     from chamberopt.common.progress import step
-    from chamberopt.geometry.mesh_io.surface_error import SurfaceError
-    from chamberopt.optimize.study import Study, load
-    from chamberopt.optimize.study.parameters import setting
-    from chamberopt.output.vtp_files import write_chamber
+    from chamberopt.geometry.meshes.surface_error import SurfaceError
+    from chamberopt.results.vtp_files import write_chamber
+    from chamberopt.search.study import Study, load
+    from chamberopt.search.study.parameters import setting
     from chamberopt.simulation.effect_pilot import groups
 
     loaded = load(file)
@@ -70,7 +70,7 @@ def _check(file: Path, pilot: bool, screenshot: Path | None, json: bool, out: Pa
             chamber = build_chamber(design)
     except SurfaceError as error:
         if screenshot is not None:  # the faults in red; the message itself follows on stderr
-            from chamberopt.output.viewer import draw_part
+            from chamberopt.pictures.part import draw_part
 
             with step("drawing"):
                 remark = draw_part(error.corners, str(error), screenshot, edges=error.edges)
@@ -111,8 +111,8 @@ def _check(file: Path, pilot: bool, screenshot: Path | None, json: bool, out: Pa
 
 def draw_target(chamber: Chamber, reach: Reach, screenshot: Path) -> None:
     """Draw the part with its target, and the target's triangles that hardly a ball can touch."""
-    from chamberopt.chamber.reach.reach import reached_part_share
-    from chamberopt.output.viewer import draw_part
+    from chamberopt.chamber.reach import reached_part_share
+    from chamberopt.pictures.part import draw_part
 
     part = chamber.part
     missed = part.target & (reached_part_share(reach, chamber.source, len(part.triangles)) <= 0.5)

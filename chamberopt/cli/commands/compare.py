@@ -12,9 +12,9 @@ from chamberopt.cli.prepare import compile_with_message, resolve_effects
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
     from chamberopt.design.load import Design
-    from chamberopt.output.compare.candidates import Candidate
-    from chamberopt.output.results.load import Result
+    from chamberopt.results.load import Result
     from chamberopt.simulation.effect_pilot import Advice
+    from chamberopt.workflows.compared_candidates import Candidate
     from sim_core import AnalyticCavity
 
 
@@ -39,10 +39,10 @@ def compare(
         Compare after this time; results of another treatment time are simulated again.
     """
     from chamberopt.common.progress import step
-    from chamberopt.output.compare.candidates import read_candidates
-    from chamberopt.output.compare.comparison import comparison_of
-    from chamberopt.output.compare.comparison_folder import COMPARE, write_comparison
-    from chamberopt.output.compare.table import comparison_text
+    from chamberopt.documents.comparison import comparison_text
+    from chamberopt.results.compare.comparison import comparison_of
+    from chamberopt.workflows.compared_candidates import read_candidates
+    from chamberopt.workflows.comparison_folder import COMPARE, write_comparison
 
     with results_folder(out, "compare") as folder:
         with step("reading and building"):
@@ -58,8 +58,8 @@ def _results(
     candidates: list[Candidate], folder: Path, workers: int | None, cluster: str | None
 ) -> list[Result]:
     """The results of all candidates; missing ones are simulated."""
-    from chamberopt.common.parallel.executor import open_executor
-    from chamberopt.output.compare.candidates import simulate_missing
+    from chamberopt.common.executor import open_executor
+    from chamberopt.workflows.compared_candidates import simulate_missing
 
     if not any(one.missing for one in candidates):
         return [one.result for one in candidates if one.result is not None]

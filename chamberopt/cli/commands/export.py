@@ -13,11 +13,11 @@ from chamberopt.cli.console import print_json, print_remarks, results_folder, sh
 from chamberopt.cli.options import Json, Workers, app
 from chamberopt.cli.prepare import compile_with_message
 from chamberopt.common.errors import InputError
-from chamberopt.output.export import formats as export_formats
-from chamberopt.output.export.formats import FORMATS, ExportFormat, FrameName
+from chamberopt.export import formats as export_formats
+from chamberopt.export.formats import FORMATS, ExportFormat, FrameName
 
 if TYPE_CHECKING:
-    from chamberopt.output.results.load import Result
+    from chamberopt.results.load import Result
 
 To = Annotated[
     list[str] | None,
@@ -60,7 +60,7 @@ def export(
         Folder for the files, new or empty; for a single format also a file that does not exist.
     """
     from chamberopt.common.progress import step
-    from chamberopt.output.results.load import load_result
+    from chamberopt.results.load import load_result
 
     formats = export_formats.formats_by_name(to or ())
     from_impacts = [name for name, one in formats.items() if one.writer is None]
@@ -110,13 +110,13 @@ def _write_impacts(
     result: Result, files: list[Path], frame: FrameName, replicas: int | None, workers: int | None
 ) -> int:
     """Simulate the result again, write its impacts to the files, and return their number."""
-    from chamberopt.common.parallel.executor import open_executor
+    from chamberopt.common.executor import open_executor
     from chamberopt.common.progress import step
     from chamberopt.coverage.part_impacts import HITS_FILE
-    from chamberopt.output.export.impacts_table import require_writable, write_impacts
-    from chamberopt.output.resimulate.impacts import replica_count
-    from chamberopt.output.resimulate.rebuild import rebuild_chamber
-    from chamberopt.output.vtp_files import PART
+    from chamberopt.export.impacts_table import require_writable, write_impacts
+    from chamberopt.results.impacts import replica_count
+    from chamberopt.results.rebuild import rebuild_chamber
+    from chamberopt.results.vtp_files import PART
 
     require_writable(files)
     recorded = result.record.replicas

@@ -60,18 +60,21 @@ def inspect(
         Write an HTML page that shows the parts in a browser.
     """
     from chamberopt.common.progress import step
-    from chamberopt.output import viewer
-    from chamberopt.output.results.load import load_result, summary
+    from chamberopt.pictures.subprocess_drawing import picture_path, require_opengl
+    from chamberopt.results.load import load_result, summary
+    from chamberopt.viewer.opened_result import result_info
+    from chamberopt.viewer.view_state import ViewState, parse_clip, parse_view
+    from chamberopt.viewer.window import inspect as open_window
 
-    look = viewer.ViewState(
+    look = ViewState(
         quantity=quantity,
         time_s=time_s,
         below=below,
-        cut=viewer.parse_clip(clip) if clip else None,
+        cut=parse_clip(clip) if clip else None,
         cut_part=cut_part,
         chamber=chamber,
         triangle=triangle,
-        eye=viewer.parse_view(view) if view else None,
+        eye=parse_view(view) if view else None,
     )
     if not results:
         raise InputError("inspect: requires an argument: one or more results folders")
@@ -81,9 +84,9 @@ def inspect(
     to_folder = screenshot is None and (off_screen or out is not None)
     with ExitStack() as claims:
         if html is not None:
-            from chamberopt.output.report import require_free_page, write_part_page
+            from chamberopt.printers.report_page import require_free_page, write_part_page
 
-            if look != viewer.ViewState():
+            if look != ViewState():
                 text = "the page of --html sets the view in the browser"
                 remedy = "remove the options that set the initial view"
                 raise InputError(f"inspect: {text}; {remedy}")
@@ -91,7 +94,7 @@ def inspect(
         if to_folder:
             screenshot = claims.enter_context(results_folder(out, "inspect")) / "inspect.png"
         if screenshot is not None:
-            viewer.require_opengl(viewer.picture_path(screenshot))
+            require_opengl(picture_path(screenshot))
         with step("reading"):
             loaded = [load_result(path) for path in results]
         if not json:
@@ -100,9 +103,9 @@ def inspect(
             with step("writing the page"):
                 print_remarks(write_part_page([one.folder for one in loaded], html))
         if html is None or screenshot is not None:
-            infos = [viewer.result_info(one) for one in loaded]
+            infos = [result_info(one) for one in loaded]
             with step("drawing") if screenshot else nullcontext():
-                viewer.inspect(infos, look, screenshot)
+                open_window(infos, look, screenshot)
     if json:
         first = (
             {**loaded[0].record.as_json(), "folder": str(loaded[0].folder)}

@@ -36,7 +36,7 @@ def report(result: Path, /, *, sheet: bool = False, json: Json = False, out: Pag
         _write_sheet(result, json, out)
         return
     from chamberopt.common.progress import step
-    from chamberopt.output.report import write_report
+    from chamberopt.printers.report_page import write_report
 
     with step("writing the page"):
         path, facts = write_report(result, out)
@@ -50,7 +50,7 @@ def report(result: Path, /, *, sheet: bool = False, json: Json = False, out: Pag
 
 def _write_sheet(result: Path, json: bool, out: Path | None) -> None:
     from chamberopt.common.progress import step
-    from chamberopt.output.report.sheet import write_sheet
+    from chamberopt.printers.sheet_page import write_sheet
 
     with step("writing the sheet"):
         path, facts = write_sheet(result, out)

@@ -35,14 +35,14 @@ def simulate(
     """
     from chamberopt.chamber.analytic import analytic_cavity
     from chamberopt.chamber.build import build_chamber
-    from chamberopt.common.parallel.executor import open_executor
+    from chamberopt.common.executor import open_executor
     from chamberopt.common.progress import step
     from chamberopt.coverage.field.memory import PROCESS, evaluation_bytes, how_many_fit
     from chamberopt.design.load import load_design
-    from chamberopt.output.save_run import save_simulation
-    from chamberopt.simulation.peening.calibration_errors import evaluate_calibrated
-    from chamberopt.simulation.peening.tolerances import plan_tolerances, simulate_tolerances
+    from chamberopt.peening.calibration_errors import evaluate_calibrated
+    from chamberopt.peening.tolerances import plan_tolerances, simulate_tolerances
     from chamberopt.simulation.replicas import most_replicas
+    from chamberopt.workflows.save_run import save_simulation
 
     candidate = load_design(design)
     if tolerances:

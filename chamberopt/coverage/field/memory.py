@@ -11,8 +11,8 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+from chamberopt.common import memory
 from chamberopt.common.errors import InputError
-from chamberopt.common.parallel import memory
 from chamberopt.coverage.field.target_field import MAX_PIECES, PIECES_PER_WINDOW
 from chamberopt.geometry.triangles import areas
 

@@ -26,9 +26,8 @@ from chamberopt.coverage.field.crease_bands import (
     crease_pieces,
     find_band,
 )
-from chamberopt.coverage.field.reached import Reach, reach_from
 from chamberopt.coverage.field.smooth_faces import Creases, Faces, find_faces
-from chamberopt.coverage.field.surface_points import ball_fits, spread_points
+from chamberopt.coverage.field.surface_points import Reach, ball_fits, reach_from, spread_points
 from chamberopt.coverage.field.symmetry import TOLERANCE, Symmetry, find_symmetry
 from chamberopt.geometry.triangles import areas, unit_normals
 

@@ -1,6 +1,7 @@
 """Materials of balls and surfaces: tables of a design, and a catalogue of what they may name."""
 
 from chamberopt.design.materials.catalogue import (
+    BRINELL_TO_PASCAL,
     alloy,
     alloys,
     ball,
@@ -11,7 +12,6 @@ from chamberopt.design.materials.catalogue import (
 )
 from chamberopt.design.materials.named_metals import DEFAULT_C0, computed_v0, with_numbers
 from chamberopt.design.materials.tables import Materials, PartMaterial, RestitutionTable
-from chamberopt.design.materials.yield_speed import BRINELL_TO_PASCAL
 
 __all__ = [
     "BRINELL_TO_PASCAL",

@@ -6,8 +6,16 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from chamberopt.common.toml_errors import Problem
-from chamberopt.design.materials.catalogue import Alloy, Ball, alloys, balls, find, unknown
-from chamberopt.design.materials.yield_speed import BRINELL_TO_PASCAL, yield_speed
+from chamberopt.design.materials.catalogue import (
+    BRINELL_TO_PASCAL,
+    Alloy,
+    Ball,
+    alloys,
+    balls,
+    find,
+    unknown,
+    yield_speed,
+)
 
 SURFACES = ("wall", "sonotrode", "part")
 OTHER_LAW = {"exponent", "e_at_m_s"}  # with one of these a table has all of its law

@@ -21,8 +21,8 @@ from pydantic import Field, model_validator
 
 from chamberopt.common.toml_errors import CrossCheckError, Problem
 from chamberopt.common.toml_fields import Pair, Several, list_field, quantity
+from chamberopt.design.materials.catalogue import BRINELL_TO_PASCAL
 from chamberopt.design.materials.named_metals import NOT_NAMED, name_problems
-from chamberopt.design.materials.yield_speed import BRINELL_TO_PASCAL
 from chamberopt.design.table_base import SI, FileTable
 
 if TYPE_CHECKING:

@@ -6,7 +6,8 @@ The names a shape of one's own may import from here are below; registry.py lists
 from chamberopt.common.errors import InputError
 from chamberopt.common.toml_fields import quantity
 from chamberopt.design.shapes.base import ChamberTable, ParametricChamber, WalledChamber
-from chamberopt.design.shapes.construction.surface import (
+from chamberopt.design.shapes.registry import SHAPES
+from chamberopt.design.shapes.surface import (
     TAG_PART,
     TAG_SONOTRODE,
     TAG_WALL,
@@ -15,7 +16,6 @@ from chamberopt.design.shapes.construction.surface import (
     is_sonotrode,
     lofted,
 )
-from chamberopt.design.shapes.registry import SHAPES
 
 __all__ = [
     "SHAPES", "TAG_PART", "TAG_SONOTRODE", "TAG_WALL", "ChamberTable", "InputError",

@@ -18,16 +18,17 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from chamberopt.common.toml_errors import CrossCheckError, Problem
 from chamberopt.common.toml_fields import Several, from_file, list_field, quantity
-from chamberopt.design.shapes.construction import outline, profile
-from chamberopt.design.shapes.construction.cad_setup import Setup
-from chamberopt.design.shapes.construction.limits import (
+from chamberopt.design.shapes import outlines
+from chamberopt.design.shapes.cad_setup import Setup
+from chamberopt.design.shapes.hole_and_deflector_tables import Deflector, Hole
+from chamberopt.design.shapes.surface import (
     MIN_LENGTH,
     MIN_LENGTH_MM,
+    ShapeSurface,
+    lofted,
     refuse_above,
     refuse_meeting_walls,
 )
-from chamberopt.design.shapes.construction.surface import ShapeSurface, lofted
-from chamberopt.design.shapes.hole_and_deflector_tables import Deflector, Hole
 from chamberopt.design.table_base import SI, FileTable
 
 
@@ -155,7 +156,7 @@ class PolygonChamber(ParametricChamber):
 
     @model_validator(mode="after")
     def _makes_a_cavity(self) -> Self:
-        room = outline.largest_inward_move(self.floor())
+        room = outlines.largest_inward_move(self.floor())
         refuse_meeting_walls(self.slope, [-room / self.height], self.inclination_deg)
         limit = max(MIN_LENGTH_MM, 1e3 * (room + min(0.0, self.lean)))
         why = "too large for the sides between the edges"
@@ -166,17 +167,17 @@ class PolygonChamber(ParametricChamber):
         """4 triangles for each corner of the rounded polygon."""
         floor = self.floor()
         if self.radius:
-            corner, direction = outline.corner_arcs(floor, self.facets)
+            corner, direction = outlines.corner_arcs(floor, self.facets)
         else:
             corner, direction = np.arange(len(floor)), np.zeros((len(floor), 2))
         moves = (0.0 - self.radius, self.lean - self.radius)
-        rings = [outline.move_sides(floor, x)[corner] + self.radius * direction for x in moves]
+        rings = [outlines.move_sides(floor, x)[corner] + self.radius * direction for x in moves]
         return self.lofted_over(*rings)
 
     def room(self) -> float:
         """Volume [m³] of the cavity with sharp edges, by Simpson's rule, which is exact here."""
         moves = (share * self.lean for share in (0.0, 0.5, 1.0))
-        low, middle, high = (outline.area_inside(self.floor(), move) for move in moves)
+        low, middle, high = (outlines.area_inside(self.floor(), move) for move in moves)
         return self.height / 6.0 * (1.0 * low + 4.0 * middle + 1.0 * high)
 
 
@@ -212,24 +213,24 @@ class RoundChamber(WalledChamber):
         wall = line[(line[:, 0] > 0.0) & (line[:, 1] > 0.0)]
         least_slopes = (MIN_LENGTH - wall[:, 0]) / wall[:, 1]
         refuse_meeting_walls(self.slope, least_slopes, self.inclination_deg)
-        limit = max(MIN_LENGTH_MM, 1e3 * profile.largest_corner_radius(self.profile()))
+        limit = max(MIN_LENGTH_MM, 1e3 * outlines.largest_corner_radius(self.profile()))
         why = "too large for the sides beside an edge"
         refuse_above("corner_radius_mm", self.corner_radius_mm, limit, why)
-        if profile.crosses_itself(self._rounded()):
+        if outlines.crosses_itself(self._rounded()):
             text = f"given {self.corner_radius_mm:g}, with which the profile crosses itself"
             raise CrossCheckError([Problem("corner_radius_mm", f"{text}; lower it")])
         return self
 
     def surface(self, vertices: np.ndarray, triangles: np.ndarray) -> ShapeSurface:
         """2 * facets triangles for each point of the rounded profile."""
-        return profile.revolve(self._rounded(), self.facets)
+        return outlines.revolve(self._rounded(), self.facets)
 
     def room(self) -> float:
         """Volume [m³] of the round cavity."""
-        return profile.revolved_volume(self._rounded())
+        return outlines.revolved_volume(self._rounded())
 
     def _rounded(self) -> np.ndarray:
-        return profile.round_corners(self.profile(), 1e-3 * self.corner_radius_mm, self.facets)
+        return outlines.round_corners(self.profile(), 1e-3 * self.corner_radius_mm, self.facets)
 
 
 def is_custom(shape: object) -> bool:

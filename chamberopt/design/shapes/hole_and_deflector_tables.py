@@ -18,7 +18,7 @@ from chamberopt.common.toml_fields import (
     quantity,
 )
 from chamberopt.design.table_base import SI, FileTable, Metres
-from chamberopt.geometry.mesh_io.units import Unit
+from chamberopt.geometry.meshes.units import Unit
 
 SIZE_KEYS = {
     "plate": ("size_mm",),

@@ -15,8 +15,8 @@ from pydantic import Field, field_validator
 from chamberopt.common.toml_errors import CrossCheckError, Problem
 from chamberopt.common.toml_fields import Pair, Several, list_field
 from chamberopt.design.shapes.base import RoundChamber
-from chamberopt.design.shapes.construction.limits import MIN_LENGTH, MIN_LENGTH_MM
-from chamberopt.design.shapes.construction.profile import find_contact
+from chamberopt.design.shapes.outlines import find_contact
+from chamberopt.design.shapes.surface import MIN_LENGTH, MIN_LENGTH_MM
 
 
 class Revolve(RoundChamber):

@@ -6,26 +6,75 @@ rounds of target and zones, and what is near enough for a ball that touches them
 
 from __future__ import annotations
 
+import hashlib
 import math
+from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 import numpy as np
 
 from chamberopt.common.errors import InputError
-from chamberopt.common.kept_records import kept, key_of
-from chamberopt.geometry.mesh_io.part_mesh import PartMesh
-from chamberopt.geometry.mesh_io.readers.raw_mesh import number_by_position
-from chamberopt.geometry.mesh_io.self_intersection import crossing_pairs
+from chamberopt.common.files import make_folder, remove_file
+from chamberopt.common.npz_files import load_record, save_record
+from chamberopt.common.versions import sources_digest
+from chamberopt.geometry.meshes.part_mesh import PartMesh
+from chamberopt.geometry.meshes.raw_mesh import number_by_position
+from chamberopt.geometry.meshes.self_intersection import crossing_pairs
 from chamberopt.geometry.smoothing.divide import LESS, SLACK
 from chamberopt.geometry.smoothing.normals import measure_facets, plane_facets
 from chamberopt.geometry.smoothing.rounds import find_edges, is_hard
 from chamberopt.geometry.smoothing.smooth import Surfaces, divide_rounds, find_surfaces, moves
 from chamberopt.geometry.solids import simplify_planes
 from chamberopt.geometry.triangles import angles_between, areas, tetrahedron_volumes, unit_normals
+from sim_core import user_cache
 
 if TYPE_CHECKING:
     from chamberopt.geometry.smoothing.divide import Surface
+
+# Records that take seconds to make, kept in the user's cache folder for the next command.
+
+Record = TypeVar("Record")
+MOST_KEPT = 40  # records that are kept: each holds a few MB
+
+
+def key_of(values: Iterable[object]) -> str:
+    """A digest of arrays and other values, and of this program's sources."""
+    digest = hashlib.sha256(sources_digest().encode())
+    for value in values:
+        if isinstance(value, np.ndarray):
+            digest.update(f"{value.dtype} {value.shape}".encode())
+            digest.update(np.ascontiguousarray(value).tobytes())
+        else:
+            digest.update(repr(value).encode())
+    return digest.hexdigest()[:32]
+
+
+def kept(
+    kind: type[Record], others: Sequence[type], key: str, make: Callable[[], Record]
+) -> Record:
+    """The record of a key, made only if it is not kept yet.
+
+    Args:
+        kind: its class.
+        others: classes of what it holds.
+    """
+    cache = user_cache()
+    if cache is None:
+        return make()
+    folder = cache / "kept"
+    with suppress(InputError):  # not there, or damaged: it is made again
+        return load_record(folder / f"{key}.npz", kind, others, "")
+    record = make()
+    with suppress(InputError, OSError):  # such as a full disk: every command makes its own
+        make_folder(folder)
+        save_record(folder / f"{key}.npz", record)
+        found = sorted(folder.glob("*.npz"), key=lambda path: path.stat().st_mtime)
+        for path in found[:-MOST_KEPT]:
+            remove_file(path)
+    return record
+
 
 NEAR = 2e-3  # m from the target: as far as usual balls reach
 DIVIDED = 1e-9  # m: what has moved by less has not moved

@@ -9,7 +9,7 @@ from chamberopt.chamber.analytic import analytic_cavity, impacts_on_chamber
 from chamberopt.chamber.build import Chamber, build_chamber
 from chamberopt.chamber.part import Part
 from chamberopt.common.errors import InputError
-from chamberopt.common.parallel.executor import local_executor
+from chamberopt.common.executor import local_executor
 from chamberopt.design.design import validate
 from chamberopt.design.load import Design, load_design
 from chamberopt.simulation.evaluate import evaluate

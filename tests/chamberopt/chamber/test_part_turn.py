@@ -12,7 +12,7 @@ from chamberopt.chamber.scene import build_scene, chamber_mesh, require_turnable
 from chamberopt.common.errors import InputError
 from chamberopt.design.design import Design
 from chamberopt.design.load import load_design, save_design
-from chamberopt.optimize.study import load_study
+from chamberopt.search.study import load_study
 
 ROOT = Path(__file__).resolve().parents[3]
 DESIGN = ROOT / "designs" / "gear_turning.toml"

@@ -8,13 +8,12 @@ import numpy as np
 import pytest
 import trimesh
 
-from chamberopt.chamber.propose.ranges import propose_charge, propose_ranges
-from chamberopt.chamber.propose.sizes import Sizes
-from chamberopt.chamber.propose.target import propose_target, surfaces
+from chamberopt.chamber.propose.proposal import propose_charge, propose_ranges
+from chamberopt.chamber.propose.proposed_target import Sizes, propose_target, surfaces
 from chamberopt.chamber.propose.text import design_text
-from chamberopt.geometry.mesh_io.part_mesh import PartMesh
-from chamberopt.geometry.mesh_io.readers.raw_mesh import number_by_position
-from chamberopt.optimize.study.parameters import Varied
+from chamberopt.geometry.meshes.part_mesh import PartMesh
+from chamberopt.geometry.meshes.raw_mesh import number_by_position
+from chamberopt.search.study.parameters import Varied
 
 
 @pytest.mark.parametrize(

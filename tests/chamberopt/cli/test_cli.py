@@ -382,7 +382,7 @@ class TestCheck:
         ) -> None:  # type: ignore[no-untyped-def]
             drawn.append((title, int(marked.sum()), len(edges), int(missed.sum())))
 
-        monkeypatch.setattr("chamberopt.output.viewer.draw_part", draw)
+        monkeypatch.setattr("chamberopt.pictures.part.draw_part", draw)
         design = copies / "designs" / "gear.toml"
         design.write_text(design.read_text().replace("diameter_mm = 1.5", "diameter_mm = 2.5"))
         if open_part:
@@ -486,7 +486,7 @@ class TestWhole:
         self, small: Path, chamberopt: Said, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         monkeypatch.setattr(
-            "chamberopt.output.viewer.subprocess_drawing.missing_opengl", lambda: "not in this test"
+            "chamberopt.pictures.subprocess_drawing.missing_opengl", lambda: "not in this test"
         )
         text = Path("designs/plate.toml").read_text(encoding="utf-8")
         heavier = text.replace("mass_g = 3.308", "mass_g = 9.9").replace("seed = 1", "seed = 5")
@@ -535,7 +535,7 @@ class TestWhole:
 
     @pytest.mark.long
     def test_inspect(self, small: Path, chamberopt: Said) -> None:
-        from chamberopt.output.viewer import missing_opengl
+        from chamberopt.pictures.subprocess_drawing import missing_opengl
 
         if missing_opengl():
             pytest.skip(missing_opengl() or "")

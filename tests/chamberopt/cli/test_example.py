@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from chamberopt.cli import main
-from chamberopt.optimize.study import load_study
+from chamberopt.search.study import load_study
 
 ROOT = Path(__file__).resolve().parents[3]
 NAMES = ("gear", "plate", "blade")
@@ -21,7 +21,7 @@ NAMES = ("gear", "plate", "blade")
 PLANTED = (
     "designs/.env", "designs/results/x/result.json", "designs/notes.txt", "designs/mine.toml",
     "designs/parts/mine.stl", "designs/__pycache__/a.pyc", "studies/results/x", "studies/mine.toml",
-    "chamberopt/.env", "chamberopt/notes.txt", "chamberopt/output/results/x/result.json",
+    "chamberopt/.env", "chamberopt/notes.txt", "chamberopt/results/x/result.json",
     "sim_core/.env", ".env", "results/x/result.json", "docs/notes.txt",
 )  # fmt: skip
 

@@ -13,9 +13,8 @@ from unittest.mock import patch
 import pytest
 
 from chamberopt.cli import main
-from chamberopt.output import viewer
-from chamberopt.output.compare import comparison_folder
-from chamberopt.output.records import FORMAT
+from chamberopt.results.records import FORMAT
+from chamberopt.workflows import comparison_folder, save_run
 from tests.helpers.opengl import needs_opengl
 from tests.helpers.results.digests import replace_result
 from tests.helpers.results.report_folders import studied
@@ -79,7 +78,7 @@ def looked_at(
     with (
         patch.object(comparison_folder, "draw_coverage", lambda *_: None),
         patch.object(comparison_folder, "draw_difference", lambda *_: None),
-        patch.object(viewer, "draw_coverage", lambda *_: None),
+        patch.object(save_run, "draw_coverage", lambda *_: None),
     ):
         look("compare", one, other, *again, "--out", out / "again")
     return {

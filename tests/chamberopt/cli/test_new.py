@@ -9,15 +9,14 @@ import numpy as np
 import pytest
 import trimesh
 
-from chamberopt.chamber.propose.balls import propose_ball, touched_shares
 from chamberopt.chamber.propose.pose import propose_pose, square_to_walls
-from chamberopt.chamber.propose.proposal import Proposal, propose
-from chamberopt.chamber.propose.target import propose_target, surfaces
+from chamberopt.chamber.propose.proposal import Proposal, propose, propose_ball, touched_shares
+from chamberopt.chamber.propose.proposed_target import propose_target, surfaces
 from chamberopt.cli import main
 from chamberopt.design.load import load_design
-from chamberopt.geometry.mesh_io.part_mesh import PartMesh, read_part
+from chamberopt.geometry.meshes.part_mesh import PartMesh, read_part
 from chamberopt.geometry.triangles import rotation_matrix
-from chamberopt.optimize.study import load_study
+from chamberopt.search.study import load_study
 from tests.chamberopt.design.test_shipped_parts import PARTS
 from tests.helpers.eight_parts import EIGHT_PARTS, KEPT_ASIDE, ExamplePart
 

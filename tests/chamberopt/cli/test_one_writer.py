@@ -59,7 +59,7 @@ def test_the_second_is_told_at_once(
 
     monkeypatch.chdir(folder)
     monkeypatch.setattr("chamberopt.chamber.build.build_chamber", never)
-    monkeypatch.setattr("chamberopt.output.viewer.subprocess_drawing.subprocess.Popen", never)
+    monkeypatch.setattr("chamberopt.pictures.subprocess_drawing.subprocess.Popen", never)
     before = sorted(folder.rglob("*"))
     with claimed(Path(output)):
         assert main(command.split()) == 2
@@ -91,7 +91,7 @@ def test_a_default_folder_that_is_held_is_passed_over(
 
     monkeypatch.chdir(folder)
     monkeypatch.setattr("chamberopt.chamber.build.build_chamber", begin)
-    monkeypatch.setattr("chamberopt.simulation.convergence.study.run_convergence_study", begin)
+    monkeypatch.setattr("chamberopt.simulation.convergence.run_convergence_study", begin)
     seen: list[list[Path]] = []
     real = ExitStack.enter_context
 

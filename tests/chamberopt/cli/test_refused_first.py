@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from chamberopt.cli import main
-from chamberopt.common.parallel.executor import local_executor
+from chamberopt.common.executor import local_executor
 from tests.helpers.results.short_plate import plate_result
 from tests.hunt.base import write_base
 
@@ -37,9 +37,9 @@ def no_work(monkeypatch: pytest.MonkeyPatch) -> None:
     for module in ("export", "resimulate.replay", "resimulate.dents", "simulate", "accuracy"):
         monkeypatch.setattr(f"chamberopt.cli.commands.{module}.compile_with_message", work)
     monkeypatch.setattr("chamberopt.chamber.build.build_chamber", work)
-    monkeypatch.setattr("chamberopt.simulation.peening.calibrate.calibrate.prepare", work)
-    monkeypatch.setattr("chamberopt.output.viewer.subprocess_drawing.subprocess.Popen", work)
-    monkeypatch.setattr("chamberopt.output.report.page.report_contents", work)
+    monkeypatch.setattr("chamberopt.peening.calibrate.prepare", work)
+    monkeypatch.setattr("chamberopt.pictures.subprocess_drawing.subprocess.Popen", work)
+    monkeypatch.setattr("chamberopt.printers.report_page.report_contents", work)
 
 
 @pytest.mark.usefixtures("no_work")
@@ -133,7 +133,7 @@ def test_impacts_that_are_not_there_are_missed_first(
 def test_a_picture_that_cannot_be_drawn_is_told_first(
     command: str, place: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    where = "chamberopt.output.viewer.subprocess_drawing.missing_opengl"
+    where = "chamberopt.pictures.subprocess_drawing.missing_opengl"
     monkeypatch.setattr(where, lambda: "no OpenGL library found")
     monkeypatch.chdir(place)
     assert main(command.split()) == 2
@@ -183,7 +183,7 @@ def test_a_part_that_misses_the_chamber_is_drawn(
     def draw(corners: np.ndarray, title: str, picture: Path, edges: np.ndarray) -> None:
         drawn.append((corners, edges))
 
-    monkeypatch.setattr("chamberopt.output.viewer.draw_part", draw)
+    monkeypatch.setattr("chamberopt.pictures.part.draw_part", draw)
     monkeypatch.chdir(place)
     text = Path("design.toml").read_text(encoding="utf-8")
     text = text.replace("height_mm = 30", "height_mm = 14")  # only its lower end is in there

@@ -7,7 +7,7 @@ from scipy.spatial import cKDTree
 
 from chamberopt.chamber.build import Chamber, build_chamber
 from chamberopt.chamber.scene import chamber_mesh
-from chamberopt.common.parallel.executor import SerialExecutor
+from chamberopt.common.executor import SerialExecutor
 from chamberopt.coverage.coverage_from_impacts import (
     MAX_BATCHES,
     Batch,
@@ -19,7 +19,7 @@ from chamberopt.coverage.coverage_from_impacts import (
 )
 from chamberopt.coverage.coverage_intervals import coverage_estimates
 from chamberopt.coverage.field.crease_bands import CREASE_LENGTH
-from chamberopt.coverage.field.reached import Reach
+from chamberopt.coverage.field.surface_points import Reach
 from chamberopt.coverage.field.target_field import (
     Gauge,
     TargetField,

@@ -12,12 +12,18 @@ import pytest
 from chamberopt.common.estimate import Estimate, estimate, jackknife
 from chamberopt.coverage.coverage_from_impacts import Batch, Footprints, in_batches, joined
 from chamberopt.coverage.coverage_intervals import (
+    DENTS_FOR_MEAN,
+    DENTS_FOR_PLACES,
+    ENOUGH,
+    NOT_RESOLVED,
+    Resolution,
     coverage_estimates,
+    find_resolution,
     mean_and_variance,
     products_without_each,
     root_of_variance,
 )
-from chamberopt.coverage.field.reached import Reach
+from chamberopt.coverage.field.surface_points import Reach
 from chamberopt.coverage.field.target_field import Gauge
 from chamberopt.coverage.field.windows import Places, Windows
 from chamberopt.coverage.metrics import NEVER
@@ -28,14 +34,6 @@ from chamberopt.coverage.percentile import (
     sum_dents,
     time_to_98,
     time_to_98_estimate,
-)
-from chamberopt.coverage.resolution import (
-    DENTS_FOR_MEAN,
-    DENTS_FOR_PLACES,
-    ENOUGH,
-    NOT_RESOLVED,
-    Resolution,
-    find_resolution,
 )
 from chamberopt.simulation.estimates import as_resolved, resolution_notes
 

@@ -20,7 +20,7 @@ from chamberopt.coverage.metrics import (
 )
 from chamberopt.coverage.part_impacts import Hits, TargetImpacts
 from chamberopt.design.design import validate
-from chamberopt.optimize import study
+from chamberopt.search import study
 from tests.helpers.synthetic import evaluation_of, no_hits, plane_chamber, plate_design
 
 DESIGN = plate_design(process__treatment_time_s=50)

@@ -8,8 +8,8 @@ import pytest
 from chamberopt.common.estimate import Estimate
 from chamberopt.common.number_text import estimate_text, share_in_words
 from chamberopt.coverage.metrics import OBJECTIVES
-from chamberopt.output.compare.difference import difference
-from chamberopt.output.report.number_text import interval_text, metric_label
+from chamberopt.documents.wording import interval_text, metric_label
+from chamberopt.results.compare.difference import difference
 from chamberopt.simulation.estimates import weighted_sum
 from tests.helpers.synthetic import evaluation_of, plane_chamber, plate_design, random_dents
 

@@ -7,7 +7,7 @@ import pytest
 
 from chamberopt.chamber.scene import chamber_mesh
 from chamberopt.common.estimate import Estimate
-from chamberopt.coverage.field.reached import CERTAIN, Reach, reach_from
+from chamberopt.coverage.field.surface_points import CERTAIN, Reach, reach_from
 from chamberopt.coverage.field.target_field import WindowSetting, find_target_field
 from chamberopt.coverage.percentile import P05_COVERAGE, DentSums, quantile_estimate, time_to_98
 from chamberopt.simulation.estimates import SeenDents, estimate_metrics, reach_notes

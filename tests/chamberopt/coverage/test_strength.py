@@ -15,7 +15,7 @@ from chamberopt.coverage.strength import (
     strip_dents,
     time_near,
 )
-from chamberopt.design.peening.almen_strip import strip_material
+from chamberopt.design.almen_strip import strip_material
 from tests.helpers.results.strength_histograms import histogram_of
 from tests.helpers.synthetic import plate_design
 

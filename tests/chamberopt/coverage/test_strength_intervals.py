@@ -8,7 +8,7 @@ import pytest
 from chamberopt.chamber.scene import chamber_mesh
 from chamberopt.common.estimate import Estimate, paired_difference
 from chamberopt.coverage.compression import ERROR, OF_DENT, compression_estimate, stress_notes
-from chamberopt.coverage.field.reached import Reach
+from chamberopt.coverage.field.surface_points import Reach
 from chamberopt.coverage.field.target_field import TargetField, WindowSetting, find_target_field
 from chamberopt.coverage.part_impacts import Hits
 from chamberopt.coverage.strength import strip_dents
@@ -19,7 +19,7 @@ from chamberopt.coverage.strength_intervals import (
     level_histograms,
     strength_estimates,
 )
-from chamberopt.design.peening.almen_strip import strip_material
+from chamberopt.design.almen_strip import strip_material
 from tests.helpers.results.strength_histograms import histogram_of
 from tests.helpers.synthetic import dents_at, no_hits, plane_chamber, plate_design, triangles_at
 

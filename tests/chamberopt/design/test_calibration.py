@@ -13,9 +13,9 @@ import tomlkit
 from chamberopt.chamber.checks.calibration import calibration_warnings
 from chamberopt.common.errors import InputError
 from chamberopt.coverage.metrics import metric_problem
+from chamberopt.design.calibration import calibrated_strip
 from chamberopt.design.design import validate
 from chamberopt.design.load import Design, load_design, save_design
-from chamberopt.design.peening.calibration import calibrated_strip
 from tests.helpers.synthetic import machine_values, plate_design
 
 ALL = machine_values(amplitude=0.05, C0=0.02, v0=0.3, mu=0.1, hardness=0.1, K=0.12, beta=0.1)

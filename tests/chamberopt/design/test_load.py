@@ -11,8 +11,8 @@ import pytest
 from chamberopt.common import toml_errors
 from chamberopt.common.errors import InputError
 from chamberopt.design.load import Design, load_design, save_design
-from chamberopt.optimize.study import Limits, Study, load, load_study
-from chamberopt.optimize.study.schema import Algorithm
+from chamberopt.search.study import Limits, Study, load, load_study
+from chamberopt.search.study.schema import Algorithm
 
 ROOT = Path(__file__).resolve().parents[3]
 DESIGNS = sorted((ROOT / "designs").glob("*.toml"))

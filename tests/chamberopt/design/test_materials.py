@@ -7,9 +7,9 @@ import pytest
 
 from chamberopt.cli import main
 from chamberopt.common.errors import InputError
+from chamberopt.design.calibration import scaled_restitution
 from chamberopt.design.load import Design, load_design, save_design
 from chamberopt.design.materials import alloy, alloys, ball, ball_sizes, balls, computed_v0, grades
-from chamberopt.design.peening.calibration import scaled_restitution
 
 TABLES = """
 [part]

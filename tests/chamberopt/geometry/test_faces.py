@@ -3,7 +3,7 @@
 import numpy as np
 
 from chamberopt.geometry.faces import Faces
-from chamberopt.geometry.mesh_io.part_mesh import read_part
+from chamberopt.geometry.meshes.part_mesh import read_part
 from tests.chamberopt.design.test_shipped_parts import PARTS
 
 

@@ -16,11 +16,11 @@ from chamberopt.chamber.build import build_chamber
 from chamberopt.chamber.scene import chamber_mesh, scene_physics
 from chamberopt.common.errors import InputError
 from chamberopt.common.estimate import Estimate
-from chamberopt.common.parallel.executor import SerialExecutor, local_executor
+from chamberopt.common.executor import SerialExecutor, local_executor
 from chamberopt.coverage.metrics import exposed_target
 from chamberopt.design.design import validate
 from chamberopt.design.load import Design
-from chamberopt.output.results.write import advice_record
+from chamberopt.results.write import advice_record
 from chamberopt.simulation import effect_pilot
 from chamberopt.simulation.effect_pilot import MEASURED, Advice, advise, with_effects_resolved
 from tests.helpers.synthetic import dents_at, plate_design

@@ -9,9 +9,9 @@ from chamberopt.chamber.build import build_chamber
 from chamberopt.chamber.scene import chamber_mesh
 from chamberopt.common.errors import InputError
 from chamberopt.common.estimate import Estimate, estimate, paired_difference
-from chamberopt.common.parallel.executor import SerialExecutor, local_executor
+from chamberopt.common.executor import SerialExecutor, local_executor
 from chamberopt.coverage.dents import dent_diameter
-from chamberopt.coverage.field.reached import Reach
+from chamberopt.coverage.field.surface_points import Reach
 from chamberopt.coverage.metrics import OBJECTIVES, metric_names
 from chamberopt.coverage.part_impacts import Hits
 from chamberopt.design.design import validate

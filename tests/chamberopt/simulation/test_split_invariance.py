@@ -11,7 +11,7 @@ import trimesh
 from chamberopt.chamber.build import Chamber, build_chamber
 from chamberopt.chamber.scene import chamber_mesh
 from chamberopt.common.estimate import independent_difference
-from chamberopt.common.parallel.executor import local_executor
+from chamberopt.common.executor import local_executor
 from chamberopt.coverage.part_impacts import Hits
 from chamberopt.design.load import Design, load_design
 from chamberopt.simulation.evaluate import evaluate

@@ -10,10 +10,10 @@ from chamberopt.chamber.checks.check import warnings
 from chamberopt.chamber.scene import chamber_mesh
 from chamberopt.common.errors import InputError
 from chamberopt.common.estimate import Estimate
-from chamberopt.common.parallel.executor import SerialExecutor
+from chamberopt.common.executor import SerialExecutor
 from chamberopt.coverage.field.target_field import require_touchable_zones
 from chamberopt.coverage.metrics import metric_names
-from chamberopt.optimize.study.constraints import judge_zones
+from chamberopt.search.study.constraints import judge_zones
 from chamberopt.simulation.evaluate import ReplicaPlan, evaluate
 from tests.helpers.synthetic import (
     evaluation_of,

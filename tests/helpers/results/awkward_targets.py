@@ -9,7 +9,7 @@ import numpy as np
 import trimesh
 from trimesh.boolean import union
 
-from chamberopt.output.viewer.subprocess_drawing import without_display
+from chamberopt.pictures.subprocess_drawing import without_display
 
 TARGETS = {  # of designs with these parts
     "crank pin": "box_mm = [[-7.9, -5.5, -5.5], [7.9, 5.5, 5.5]]",
@@ -58,8 +58,8 @@ def seen_shares() -> dict[str, dict[str, object]]:
 
 
 if __name__ == "__main__":
-    from chamberopt.output.viewer.camera import cells_of, directions, near_views, seen_area
-    from chamberopt.output.vtp_files import pyvista
+    from chamberopt.pictures.camera import cells_of, directions, near_views, seen_area
+    from chamberopt.results.vtp_files import pyvista
 
     shares = {}
     for name, (mesh, marked) in parts().items():

@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 
 from chamberopt.coverage.dents import Dents
-from chamberopt.output.viewer.actors import Discs
-from chamberopt.output.viewer.drawn_part import DrawnPart
-from chamberopt.output.viewer.images import dents as dent_map
-from chamberopt.output.viewer.subprocess_drawing import without_display
-from chamberopt.output.vtp_files import read_surface
+from chamberopt.pictures import dents as dent_map
+from chamberopt.pictures.actors import Discs
+from chamberopt.pictures.drawn_part import DrawnPart
+from chamberopt.pictures.subprocess_drawing import without_display
+from chamberopt.results.vtp_files import read_surface
 
 
 def dent_sides(

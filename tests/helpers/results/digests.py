@@ -4,8 +4,8 @@ import json
 from pathlib import Path
 from typing import Any
 
-from chamberopt.output.results.load import content_sha256
-from chamberopt.output.results.write import data_digests
+from chamberopt.results.load import content_sha256
+from chamberopt.results.write import data_digests
 
 
 def replace_result(folder: Path, data: dict[str, Any]) -> None:

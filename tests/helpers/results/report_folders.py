@@ -4,9 +4,9 @@ from pathlib import Path
 
 from chamberopt.chamber.build import Chamber, build_chamber
 from chamberopt.common.errors import InputError
-from chamberopt.common.parallel.executor import SerialExecutor
-from chamberopt.optimize.study import Study
-from chamberopt.output.save_run import save_simulation, save_study
+from chamberopt.common.executor import SerialExecutor
+from chamberopt.search.study import Study
+from chamberopt.workflows.save_run import save_simulation, save_study
 from tests.helpers.studies import run_in_folder
 from tests.helpers.synthetic import plate_design, poisson_evaluation
 

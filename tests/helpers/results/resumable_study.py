@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 
 from chamberopt.common.errors import InputError
-from chamberopt.common.parallel.executor import SerialExecutor
+from chamberopt.common.executor import SerialExecutor
 from chamberopt.design.load import Design, load_design
-from chamberopt.optimize.run_study import StudyResult
-from chamberopt.optimize.storage.trial_log import JsonLines
-from chamberopt.optimize.study import Study
+from chamberopt.search.run_study import StudyResult
+from chamberopt.search.study import Study
+from chamberopt.search.trial_log import JsonLines
 from chamberopt.simulation.evaluation import Evaluation
 from tests.helpers.studies import run_in_folder
 from tests.helpers.synthetic import DESIGNS, judged

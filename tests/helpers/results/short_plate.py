@@ -4,11 +4,11 @@ from pathlib import Path
 from unittest.mock import patch
 
 from chamberopt.chamber.build import build_chamber
-from chamberopt.common.parallel.executor import SerialExecutor
-from chamberopt.output import viewer
-from chamberopt.output.results.load import Result, load_result
-from chamberopt.output.save_run import save_simulation
+from chamberopt.common.executor import SerialExecutor
+from chamberopt.results.load import Result, load_result
 from chamberopt.simulation.evaluate import evaluate
+from chamberopt.workflows import save_run
+from chamberopt.workflows.save_run import save_simulation
 from tests.helpers.synthetic import plate_design
 
 
@@ -20,6 +20,6 @@ def plate_result(folder: Path) -> Result:
         process__accuracy__replicas=3,
     )
     chamber = build_chamber(design)
-    with patch.object(viewer, "draw_coverage", lambda *_: None):
+    with patch.object(save_run, "draw_coverage", lambda *_: None):
         save_simulation(folder, design, chamber, evaluate(design, chamber, SerialExecutor()))
     return load_result(folder)

@@ -12,10 +12,11 @@ import trimesh
 
 from chamberopt.coverage.field.display_mesh import DisplayField, DisplayMesh
 from chamberopt.coverage.part_impacts import Hits, save_hits, sort_hits_by_triangle
-from chamberopt.output.plots.quantities import QUANTITIES
-from chamberopt.output.results.write import data_digests
-from chamberopt.output.viewer import ResultInfo, ViewState
-from chamberopt.output.vtp_files import pyvista, write_chamber, write_coverage
+from chamberopt.pictures.charts.quantities import QUANTITIES
+from chamberopt.results.vtp_files import pyvista, write_chamber, write_coverage
+from chamberopt.results.write import data_digests
+from chamberopt.viewer.opened_result import ResultInfo
+from chamberopt.viewer.view_state import ViewState
 
 TREATMENT = 10.0  # s
 SIZE = 960, 680  # pixels
@@ -98,8 +99,8 @@ def _fields(z: np.ndarray) -> dict[str, np.ndarray]:
 
 def picture(subject: ResultInfo, look: ViewState) -> np.ndarray:
     """What the window would show of it, (height, width, 3) uint8."""
-    from chamberopt.output.viewer.plotter import ResultPlotter
-    from chamberopt.output.viewer.window import open_results
+    from chamberopt.viewer.plotter import ResultPlotter
+    from chamberopt.viewer.window import open_results
 
     stage = ResultPlotter(open_results([subject], look), off_screen=True, size=SIZE)
     stage.draw(look)
@@ -119,7 +120,7 @@ LOOKS = {
 
 def right_and_wrong(folder: Path) -> dict[str, np.ndarray]:
     """The right pictures, and wrong ones in other colours, on another scale or of another mesh."""
-    from chamberopt.output.viewer import plotter
+    from chamberopt.viewer import plotter
 
     right = ball_result(folder / "ball")
     drawn = {name: picture(right, look) for name, look in LOOKS.items()}
@@ -137,8 +138,8 @@ def right_and_wrong(folder: Path) -> dict[str, np.ndarray]:
 
 def driven(folder: Path) -> list[dict[str, Any]]:
     """What a window shows after each key, click and slide: its look, and what is in its views."""
-    from chamberopt.output.viewer.actors import PALE
-    from chamberopt.output.viewer.window import Window, open_results
+    from chamberopt.pictures.actors import PALE
+    from chamberopt.viewer.window import Window, open_results
 
     subjects = [ball_result(folder / "one"), ball_result(folder / "two")]
     window = Window(open_results(subjects, ViewState()), ViewState(), off_screen=True)

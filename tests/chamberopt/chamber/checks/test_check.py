@@ -11,8 +11,8 @@ import pytest
 
 from chamberopt.chamber.build import Chamber, build_chamber
 from chamberopt.chamber.checks.check import describe, shot_reach, warnings
-from chamberopt.chamber.checks.ledges import find_ledges
-from chamberopt.chamber.reach.reach import Reach
+from chamberopt.chamber.checks.gaps import find_ledges
+from chamberopt.chamber.reach import Reach
 from chamberopt.design.design import Design, validate
 from chamberopt.design.load import load_design
 from chamberopt.design.shapes import TAG_SONOTRODE

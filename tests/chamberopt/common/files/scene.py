@@ -11,12 +11,12 @@ from typing import Any
 from chamberopt.chamber import build
 from chamberopt.chamber.checks import check
 from chamberopt.cli import main
+from chamberopt.common import executor
 from chamberopt.common.files import write_bytes
-from chamberopt.common.parallel import executor
-from chamberopt.optimize.run_study import ChamberSimulator
-from chamberopt.output import save_run
-from chamberopt.output.viewer import subprocess_drawing
-from chamberopt.simulation.peening import calibration_errors
+from chamberopt.peening import calibration_errors
+from chamberopt.pictures import subprocess_drawing
+from chamberopt.search.run_study import ChamberSimulator
+from chamberopt.workflows import save_run
 from tests.hunt.base import write_base
 
 TINY = {"simulated_time_s": "0.02", "warmup_time_s": "0.001", "replicas": "3", "mass_g": "0.5"}

@@ -13,8 +13,8 @@ from typing import Any
 from chamberopt.cli import main
 from chamberopt.common.errors import InputError
 from chamberopt.common.files import opened, written
-from chamberopt.output.editor.edited_file import EditedFile
-from chamberopt.output.viewer import subprocess_drawing
+from chamberopt.page.edited_file import EditedFile
+from chamberopt.pictures import subprocess_drawing
 
 CALLS = ((os, "open"), (os, "write"), (os, "fsync"), (os, "replace"), (os, "mkdir"),
          (fcntl, "flock"))  # fmt: skip

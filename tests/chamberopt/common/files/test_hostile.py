@@ -16,7 +16,7 @@ import pytest
 
 import chamberopt
 from chamberopt.common.files import claim_file
-from chamberopt.geometry.mesh_io.native_reader import NativeReader, converted
+from chamberopt.geometry.meshes.native_reader import NativeReader, converted
 from tests.chamberopt.common.files.scene import RUN
 from tests.helpers.results.digests import accept_changes, replace_result
 from tests.hunt.command import Server, fault, fingerprint
@@ -185,7 +185,7 @@ def test_no_picture_heeds_settings_that_lie_where_it_is_drawn(tmp_path: Path) ->
     """With TeX, they could put any file on a picture."""
     (tmp_path / "matplotlibrc").write_text("text.usetex: True\n")
     code = (
-        "from chamberopt.output.plots.figure_style import new_figure; "
+        "from chamberopt.pictures.charts.figure_style import new_figure; "
         "print(new_figure(1.0, 1.0).text(0.0, 0.0, 'x').get_usetex())"
     )
     drawn = subprocess.run(

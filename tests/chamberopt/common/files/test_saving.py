@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from chamberopt.common.errors import InputError
-from chamberopt.output.editor.edited_file import EditedFile
+from chamberopt.page.edited_file import EditedFile
 from tests.chamberopt.common.files.scene import write_scene
 
 ROUNDS = 40

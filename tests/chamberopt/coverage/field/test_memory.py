@@ -8,15 +8,15 @@ import pytest
 
 from chamberopt.chamber.build import build_chamber
 from chamberopt.cli import main
-from chamberopt.cli.commands.search import run, sweep
-from chamberopt.common.parallel import memory
-from chamberopt.common.parallel.executor import SerialExecutor
-from chamberopt.common.parallel.memory import MEMORY, MemoryBudget
+from chamberopt.cli.commands import run, sweep
+from chamberopt.common import memory
+from chamberopt.common.executor import SerialExecutor
+from chamberopt.common.memory import MEMORY, MemoryBudget
 from chamberopt.coverage.coverage_from_impacts import MAX_BATCHES
 from chamberopt.coverage.field.memory import BATCHES, evaluation_bytes, how_many_fit
 from chamberopt.design.design import Design
 from chamberopt.design.load import save_design
-from chamberopt.optimize.study import load_study
+from chamberopt.search.study import load_study
 from chamberopt.simulation.evaluate import ReplicaPlan, evaluate
 from tests.helpers.synthetic import plate_design
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from chamberopt.chamber.reach.reach import TOLERATED_OVERLAP
+from chamberopt.chamber.reach import TOLERATED_OVERLAP
 from chamberopt.coverage.field.surface_points import ball_fits, spread_points, spread_within
 from chamberopt.geometry.triangles import areas
 from sim_core import TriangleMesh

@@ -14,11 +14,10 @@ from chamberopt.chamber.build import build_chamber
 from chamberopt.cli import main
 from chamberopt.common.errors import InputError
 from chamberopt.design.load import load_design, save_design
-from chamberopt.optimize.study import load_study
-from chamberopt.output import viewer
-from chamberopt.output.compare.comparison import compare
-from chamberopt.output.results.load import load_result
-from chamberopt.output.save_run import save_simulation
+from chamberopt.results.compare.comparison import compare
+from chamberopt.results.load import load_result
+from chamberopt.search.study import load_study
+from chamberopt.workflows.save_run import save_simulation
 from tests.helpers.synthetic import poisson_evaluation
 
 ROOT = Path(__file__).resolve().parents[4]
@@ -124,7 +123,7 @@ def test_a_file_that_changes_is_another_shape(folder: Path) -> None:
 def test_results_name_the_file_and_can_be_read_without_it(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(viewer, "draw_coverage", lambda *_: None)
+    monkeypatch.setattr("chamberopt.workflows.save_run.draw_coverage", lambda *_: None)
     design = load_design(folder / "d.toml")
     chamber = build_chamber(design)
     for name, changed in (("first", design), ("second", design.changed({"chamber.side_mm": 70}))):
@@ -331,7 +330,7 @@ def test_without_a_height_no_key_is_blamed_for_the_ceiling(folder: Path) -> None
 def test_results_of_a_file_that_was_edited_are_told_apart_and_still_read(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(viewer, "draw_coverage", lambda *_: None)
+    monkeypatch.setattr("chamberopt.workflows.save_run.draw_coverage", lambda *_: None)
     for name, text in (("first", PYRAMID), ("second", PYRAMID.replace("0.5e-3 *", "0.4e-3 *"))):
         (folder / "pyramid.py").write_text(text, encoding="utf-8")
         design = load_design(folder / "d.toml")

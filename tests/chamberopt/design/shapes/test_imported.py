@@ -14,12 +14,12 @@ import trimesh
 from chamberopt.chamber.build import Chamber, build_chamber
 from chamberopt.chamber.checks.check import describe
 from chamberopt.common.errors import InputError
-from chamberopt.common.parallel.executor import SerialExecutor
+from chamberopt.common.executor import SerialExecutor
 from chamberopt.design.design import Design, validate
 from chamberopt.design.load import load_design, save_design
 from chamberopt.design.shapes import TAG_PART, TAG_SONOTRODE, TAG_WALL
 from chamberopt.geometry.triangles import area_vectors, areas
-from chamberopt.optimize.study import Study
+from chamberopt.search.study import Study
 from tests.helpers.studies import run_in_folder
 from tests.helpers.synthetic import judged
 

@@ -18,10 +18,10 @@ from chamberopt.chamber.build import build_chamber
 from chamberopt.common.errors import InputError
 from chamberopt.design.load import Design, load_design
 from chamberopt.design.shapes import SHAPES, TAG_SONOTRODE, TAG_WALL
-from chamberopt.design.shapes.construction.surface import ShapeSurface
-from chamberopt.design.shapes.construction.surface_check import find_fault
+from chamberopt.design.shapes.custom import find_fault
+from chamberopt.design.shapes.surface import ShapeSurface
 from chamberopt.geometry.triangles import areas
-from chamberopt.simulation.convergence.parameters import FACETS, numerical_parameters
+from chamberopt.simulation.convergence import FACETS, numerical_parameters
 
 DESIGNS = Path(__file__).resolve().parents[4] / "designs"
 NOTHING = np.zeros((0, 3)), np.zeros((0, 3), dtype=int)

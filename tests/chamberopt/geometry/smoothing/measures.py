@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from chamberopt.geometry.mesh_io.self_intersection import crossing_pairs
+from chamberopt.geometry.meshes.self_intersection import crossing_pairs
 from chamberopt.geometry.smoothing.divide import Surface
 from chamberopt.geometry.smoothing.smooth import Surfaces, divide_rounds, find_surfaces, moves
 from chamberopt.geometry.solids import split_bodies

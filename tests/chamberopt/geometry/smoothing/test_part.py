@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
-from chamberopt.geometry.mesh_io.part_mesh import read_part
+from chamberopt.geometry.meshes.part_mesh import read_part
 from chamberopt.geometry.smoothing.part import Rule, smooth
 
 

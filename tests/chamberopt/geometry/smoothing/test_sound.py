@@ -13,7 +13,7 @@ from chamberopt.chamber.build import build_chamber
 from chamberopt.chamber.scene import chamber_mesh
 from chamberopt.coverage.field.symmetry import find_symmetry
 from chamberopt.design.load import load_design
-from chamberopt.geometry.mesh_io.part_mesh import read_part
+from chamberopt.geometry.meshes.part_mesh import read_part
 from chamberopt.geometry.smoothing.part import Rule, smooth
 from tests.chamberopt.geometry.smoothing.measures import require_solid, require_sound, smoothed
 from tests.helpers.mesh_files import write_stl

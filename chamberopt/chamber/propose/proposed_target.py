@@ -1,0 +1,267 @@
+"""Propose which surface of a part to peen: names of its file, or faces between its edges."""
+
+from __future__ import annotations
+
+import colorsys
+import math
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from itertools import count
+from typing import Any
+
+import numpy as np
+
+from chamberopt.common.errors import InputError
+from chamberopt.common.number_text import plain
+from chamberopt.geometry.faces import Faces
+from chamberopt.geometry.meshes.part_mesh import PartMesh, select_triangles
+from chamberopt.geometry.triangles import areas, border_edges
+
+# Propose a chamber's shape and sizes from the part's box and the ball's diameter.
+
+# In ball diameters, and as a share of the part's width: room for balls to get round the part and
+# gather speed. They are starting points that a study varies.
+SIDE_GAP, GAP_SHARE, MIN_GAP = 5.0, 0.15, 4e-3
+DISTANCE, DISTANCE_SHARE, MIN_DISTANCE = 6.0, 0.2, 8e-3
+ABOVE = 5.0  # ball diameters between target and ceiling
+SHAPES = ("cylinder", "box", "prism", "conformal")
+LONG = 1.6  # length over width from which the walls follow the part's sides
+SIDES = 6  # of a prism
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """Sizes of a chamber, and how the part is in it."""
+
+    shape: str
+    plan: dict[str, Any]  # keys of [chamber] for its form in plan, and their values
+    distance: float  # sonotrode to part [m]
+    height: float  # [m]
+    gap: float  # part to side wall [m]
+    through_ceiling: bool  # whether the part goes out there
+    top: float  # of what must be below the ceiling, over the part's lowest point [m]
+
+
+def shape_for(box: np.ndarray) -> str:
+    """The shape for a part whose box has these sides (3,) [m]."""
+    return "box" if max(box[:2]) > LONG * min(box[:2]) else "cylinder"
+
+
+def propose_sizes(
+    vertices: np.ndarray, target_top: float, ball: float, shape: str, wider: float = 1.0
+) -> Sizes:
+    """The sizes of a chamber of a shape, one of SHAPES.
+
+    Args:
+        vertices: of the part as it is turned, its lowest point at z = 0 [m], shape (n, 3).
+        target_top: the target's highest point [m].
+        ball: diameter [m].
+        wider: factor on the room beside, below and above the part.
+    """
+    top = float(vertices[:, 2].max())
+    width = float(np.ptp(vertices[:, :2], axis=0).max())
+    distance = 1e-3 * _up_mm(
+        max(DISTANCE * ball, DISTANCE_SHARE * min(width, top), MIN_DISTANCE) * wider
+    )
+    above = ABOVE * ball * wider
+    through = top > target_top + 2.0 * above
+    below = target_top if through else top
+    height = 1e-3 * _up_mm(distance + below + above)
+    inside = vertices[vertices[:, 2] <= height - distance + 1e-9]
+    # The box of the whole part is centred on the axis.
+    middle = 0.5 * (vertices[:, :2].min(axis=0) + vertices[:, :2].max(axis=0))
+    half = np.abs(inside[:, :2] - middle).max(axis=0)
+    gap = max(SIDE_GAP * ball, GAP_SHARE * 2.0 * float(half.max()), MIN_GAP) * wider
+    radius = float(np.linalg.norm(inside[:, :2] - middle, axis=1).max())
+    across = _up_mm(2.0 * (radius + gap))
+    plans: dict[str, dict[str, Any]] = {
+        "cylinder": {"diameter_mm": across},
+        "box": dict(zip(("length_mm", "width_mm"), map(_up_mm, 2.0 * (half + gap)), strict=True)),
+        "prism": {"sides": SIDES, "across_mm": across},
+        "conformal": {"outline": "hull", "gap_mm": _up_mm(gap)},
+    }
+    return Sizes(shape, plans[shape], distance, height, gap, through, below)
+
+
+def _up_mm(length: float) -> float:
+    """A length [m] in whole millimetres, rounded up."""
+    return float(math.ceil(1e3 * length - 1e-6))
+
+
+CREASE_DEG = 30.0
+MOST = 0.5  # share of the area above which a name is what is left beside what was marked
+MAX_KINDS = 40  # of faces that are listed, those with the largest area
+FOR = "(?:peen|target|(?:ge)?strahl|grenaill)"
+MEANT = re.compile(FOR, re.I)  # names that say what they are for
+NOT, GAP = "un|not?|non|without|kein|keine|nicht|ohne|sans|pas", r"[\s_-]"
+# Names of what is left out: unpeened, DO_NOT_PEEN, nicht zu strahlen, mask.
+LEFT_OUT = re.compile(rf"(?<![a-z])(?:(?:{NOT})(?:{GAP}+.*)?{FOR}|mask|abdeck)", re.I)
+AS_LARGE = 0.9  # of the largest face's area: such as the other side of a blade
+PATTERN = 6  # alike faces from which a face counts as a feature that repeats, such as a tooth's
+COLOUR, VIVID = re.compile(r"#([0-9a-f]{2})([0-9a-f]{2})([0-9a-f]{2})$", re.I), 100
+FACE = re.compile(r"face (\d+)", re.I)
+WHOLE: dict[str, Any] = {"surface": ["all"]}  # in [part.target]
+
+
+@dataclass(frozen=True)
+class Surface:
+    """A surface that can be the target: a name of the file, or a face with all that are like it."""
+
+    name: str  # as --target takes it
+    keys: dict[str, Any]  # of [part.target]
+    triangles: np.ndarray  # (m,) bool
+    text: str  # what it is, in a few words
+    colour: str = ""  # of the file, if it is of just these triangles
+
+
+@dataclass(frozen=True)
+class Target:
+    """What is to be peened."""
+
+    keys: dict[str, Any]  # of [part.target]
+    triangles: np.ndarray  # (m,) bool
+    reason: str
+
+
+def surfaces(mesh: PartMesh) -> list[Surface]:
+    """The surfaces to choose from: the file's names, then faces, the largest first."""
+    area = areas(mesh.vertices, mesh.triangles)
+    named: dict[bytes, Surface] = {}
+    for name, marked in sorted(
+        mesh.groups.items(), key=lambda one: (COLOUR.match(one[0]) is not None, len(one[0]))
+    ):
+        same = named.get(marked.tobytes())
+        colour = name if COLOUR.match(name) else ""
+        if same is not None:
+            named[marked.tobytes()] = replace(same, colour=same.colour or colour)
+        elif marked.any():
+            named[marked.tobytes()] = replace(_named(mesh, name, marked), colour=colour)
+    return sorted(named.values(), key=lambda one: -area[one.triangles].sum()) + _faces(mesh)
+
+
+def propose_target(mesh: PartMesh, known: Sequence[Surface], wanted: Iterable[str]) -> Target:
+    """The target that is asked for by names of surfaces; without any, the likeliest.
+
+    Raises:
+        InputError: there is no surface of that name.
+    """
+    chosen = {one.name: one for one in (_find(mesh, known, name) for name in wanted)}
+    if chosen:
+        whole = [one for one in chosen.values() if one.keys == WHOLE and one.triangles.all()]
+        return _joined(whole or list(chosen.values()), "as --target asks")
+    named, faces = (
+        [one for one in known if ("surface" in one.keys) is kind] for kind in (True, False)
+    )
+    named = [one for one in named if not LEFT_OUT.search(one.name)]
+    if meant := [one for one in named if MEANT.search(one.name)]:
+        return _joined(meant, "the name says what it is for")
+    marked = [one for one in named if _is_vivid(one.colour) and not one.triangles.all()]
+    if marked:
+        best = min(marked, key=lambda one: _from_red(one.colour))
+        several = ", the reddest of several" if len(marked) > 1 else ""
+        return _joined([best], f"its colour {best.colour} marks it{several}")
+    area = areas(mesh.vertices, mesh.triangles)
+    special = [
+        one
+        for one in named
+        if area[one.triangles].sum() < MOST * area.sum()
+        and len(border_edges(mesh.triangles[one.triangles]))  # otherwise it is a whole body
+    ]
+    if special:
+        return _joined(special[:1], "the largest surface that the file names, beside the rest")
+    repeated = [one for one in faces if one.keys["faces"][0].get("alike")]
+    counts = {one.name: _count(one) for one in repeated}
+    features = [one for one in repeated if counts[one.name] >= PATTERN]
+    if features:
+        best = max(features, key=lambda one: float(area[one.triangles].sum()))
+        fits = {counts[best.name] * k // 2 for k in (1, 2, 4)}
+        pattern = [one for one in features if counts[one.name] in fits]
+        return _joined(pattern, "faces that repeat round the part, such as those of teeth")
+    sizes = [area[one.triangles].sum() for one in faces]
+    large = [one for one, size in zip(faces, sizes, strict=True) if size >= AS_LARGE * sizes[0]]
+    return _joined(large, "the largest between sharp edges")
+
+
+def _faces(mesh: PartMesh) -> list[Surface]:
+    """The kinds of faces, each with all that are alike."""
+    faces = Faces(mesh.vertices, mesh.triangles, CREASE_DEG)
+    left, found = np.ones(faces.count, dtype=bool), []
+    for face in np.argsort(-faces.area, kind="stable"):
+        if left[face]:
+            same = faces.alike(face) & left
+            left &= ~same
+            found.append((float(faces.area[same].sum()), int(face), same))
+    found.sort(key=lambda one: -one[0])
+    listed = []
+    taken = {name.lower() for name in mesh.groups}  # a name of the file goes first
+    free = (name for number in count(1) if (name := f"face {number}") not in taken)
+    for (area, face, same), name in zip(found[:MAX_KINDS], free, strict=False):
+        place = [_decimals(1e3 * x) for x in faces.place(face)]
+        key: dict[str, Any] = {"at_mm": place, "crease_deg": CREASE_DEG}
+        several = int(same.sum())
+        if several > 1:
+            key["alike"] = True
+        marked = same[faces.of_triangle]
+        text = f"{several} faces alike, {_mm2(area)} in all" if several > 1 else _mm2(area)
+        listed.append(Surface(name, {"faces": [key]}, marked, text))
+    return listed
+
+
+def _named(mesh: PartMesh, name: str, marked: np.ndarray) -> Surface:
+    area = float(areas(mesh.vertices, mesh.triangles[marked]).sum())
+    return Surface(name, {"surface": [name]}, marked, _mm2(area))
+
+
+def _is_vivid(name: str) -> bool:
+    """Whether a name is a colour, and not a grey of the whole body."""
+    found = COLOUR.match(name)
+    levels = [int(level, 16) for level in found.groups()] if found else [0]
+    return max(levels) - min(levels) > VIVID
+
+
+def _from_red(colour: str) -> float:
+    """How far the hue of a colour is from red, the usual one of a mark, from 0 to 1/2."""
+    hue = colorsys.rgb_to_hsv(*bytes.fromhex(colour[1:]))[0]
+    return min(hue, 1.0 - hue)
+
+
+def _count(surface: Surface) -> int:
+    return int(re.match(r"\d+", surface.text)[0])  # type: ignore[index]
+
+
+def _find(mesh: PartMesh, known: Sequence[Surface], name: str) -> Surface:
+    alike = [one for one in known if one.name.lower() == name.lower()]
+    if alike:
+        return min(alike, key=lambda one: one.name != name)
+    if name.lower() == "all":
+        whole = np.ones(len(mesh.triangles), dtype=bool)
+        return Surface("all", WHOLE, whole, "the whole surface")
+    if FACE.fullmatch(name):
+        faces = [one.name for one in known if "faces" in one.keys]
+        text = f"the part has {faces[0]} to {faces[-1]}"
+        raise InputError(f"--target: given {name!r}, but {text}")
+    return _named(
+        mesh, name, select_triangles(mesh.groups, [name], len(mesh.triangles), "--target")
+    )
+
+
+def _joined(chosen: Sequence[Surface], reason: str) -> Target:
+    """One target of several surfaces; InputError for names mixed with faces."""
+    keys: dict[str, Any] = {}
+    for one in chosen:
+        for key, values in one.keys.items():
+            keys.setdefault(key, []).extend(values)
+    if len(keys) > 1:
+        text = "names of the file and faces cannot be one target; give one kind"
+        raise InputError(f"--target: given {[one.name for one in chosen]}; {text}")
+    marked = np.any([one.triangles for one in chosen], axis=0)
+    return Target(keys, marked, f"{', '.join(one.name for one in chosen)}: {reason}")
+
+
+def _mm2(area: float) -> str:
+    return f"{plain(1e6 * area, 3)} mm²"
+
+
+def _decimals(value: float) -> float:
+    return round(float(value), 3) + 0.0

@@ -1,0 +1,302 @@
+"""Where a ball can touch the cavity's surface when it comes from the sonotrode."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from chamberopt.chamber.largest_ball import TouchPoints, find_touch_points
+from chamberopt.design.shapes import TAG_PART, TAG_SONOTRODE
+from chamberopt.geometry.triangles import area_vectors, areas, connected_pieces, unit_normals
+
+if TYPE_CHECKING:
+    from chamberopt.chamber.largest_ball import TouchPoints
+    from sim_core import TriangleMesh
+
+# Regions in which a ball's centre can move: from where to where a ball gets in the cavity.
+#
+# The open space is a grid of cells in which the centre may lie anywhere, refined from coarse to
+# fine. Where it is too narrow for such cells, points midway between the walls continue it: the
+# centres of the largest balls that touch the surface, and, in cells without open space nearby,
+# the point that is farthest from all walls. Two points are linked if the ball can move straight
+# from one to the other.
+
+MAX_CELLS = 3e6  # take half a second; with more, cells are made larger
+HALVINGS = 3
+EDGE = 0.5  # of the ball's radius
+DIAGONAL = np.sqrt(3.0)
+NEIGHBOURS = 8
+NEARBY = 5  # cells: beside a plain wall, open space is two cells from where a centre can lie at all
+PUSHES, SHORTER = 12, 0.7  # the last step is a hundredth of a cell
+STEP = 0.25  # of the radius: steps in which a straight way is checked
+
+
+class Cells(NamedTuple):
+    """A grid of cubic cells over the cavity, shape (nx, ny, nz)."""
+
+    low: np.ndarray  # lowest corner [m], (3,)
+    edge: float  # of a cell [m]
+    # The open space that a cell belongs to, from 1 on; 0 where a centre may not lie anywhere in it.
+    space: np.ndarray
+    unsure: np.ndarray  # whether a ball's centre may lie in some of the cell
+
+    def middles(self, chosen: np.ndarray) -> np.ndarray:
+        """Middles (n, 3) [m] of the cells that are true in (nx, ny, nz)."""
+        return np.asarray(self.low + self.edge * (np.argwhere(chosen) + 0.5))
+
+    def at(self, places: np.ndarray) -> np.ndarray:
+        """The open space (n,) at each of the places (n, 3) [m]."""
+        index = np.clip(
+            ((places - self.low) / self.edge).astype(np.int64), 0, np.array(self.space.shape) - 1
+        )
+        return np.asarray(self.space[tuple(index.T)])
+
+
+def cell_edge(mesh: TriangleMesh, radius: float) -> float:
+    """Side [m] of the cells for a ball of this radius [m]; larger if there would be too many."""
+    volume = float(np.prod(np.ptp(mesh.vertices, axis=0)))
+    return float(max(EDGE * radius, (volume / MAX_CELLS) ** (1.0 / 3.0)))
+
+
+def open_cells(mesh: TriangleMesh, radius: float) -> Cells:
+    """Cells in which the centre of a ball of this radius [m] may lie anywhere, and open spaces.
+
+    Cells outside the cavity and inside the part count too, but no ball touches the surface there.
+    """
+    from scipy.ndimage import label
+
+    from sim_core import closest_points
+
+    low, edge = mesh.vertices.min(axis=0), cell_edge(mesh, radius)
+    blocks = np.ceil(np.ptp(mesh.vertices, axis=0) / (edge * 2**HALVINGS)).astype(np.int64)
+    free, unsure = np.zeros(blocks, dtype=bool), np.ones(blocks, dtype=bool)
+    for halvings in range(HALVINGS, -1, -1):
+        side = edge * 2**halvings
+        half = 0.5 * DIAGONAL * side
+        index = np.argwhere(unsure)
+        found = closest_points(mesh, low + side * (index + 0.5), radius + half)
+        free[tuple(index.T)] = found.triangle < 0
+        unsure[tuple(index.T)] = (found.triangle >= 0) & (found.distance > radius - half)
+        if halvings:
+            free, unsure = (
+                np.kron(cells, np.ones((2, 2, 2), dtype=bool)) for cells in (free, unsure)
+            )
+    return Cells(low, edge, label(free, structure=np.ones((3, 3, 3)))[0], unsure)
+
+
+def find_regions(
+    mesh: TriangleMesh, touches: TouchPoints, radius: float, spacing: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """The regions in which the centre of a ball of a radius [m] can move.
+
+    Args:
+        spacing: largest distance between neighbouring touch points [m].
+    Returns:
+        Region of each touch point, -1 where the ball does not fit, (p,) int; and the volume [m³] of
+        the open space in each region.
+    """
+    cells = open_cells(mesh, radius)
+    spaces = int(cells.space.max())
+    fits = touches.radius > radius
+    centre = touches.centre[fits]
+    node = cells.at(centre) - 1
+    inside = np.isin(np.arange(spaces + 1), node + 1) & (np.arange(spaces + 1) > 0)
+    cells = cells._replace(space=np.where(inside[cells.space], cells.space, 0))
+    tight = node < 0
+    node[tight] = spaces + np.arange(tight.sum())
+    narrow = np.concatenate([centre[tight], _midway_points(mesh, cells, radius)])
+    count = spaces + len(narrow)
+    links = _links_to_spaces(mesh, cells, narrow, radius, spacing) + np.array([spaces, 0])
+    region = connected_pieces(links[:, 0], links[:, 1], count)[1]
+    more = _links_between(mesh, narrow, region[spaces:], radius, spacing) + spaces
+    links = np.concatenate([links, more])
+    region = connected_pieces(links[:, 0], links[:, 1], count)[1]
+    of_touch = np.full(len(touches.point), -1)
+    of_touch[fits] = region[node]
+    size = np.bincount(cells.space.ravel(), minlength=spaces + 1)[1:]
+    volume = np.bincount(region[:spaces], size, int(region.max(initial=-1)) + 1) * cells.edge**3
+    return of_touch, volume
+
+
+def _midway_points(mesh: TriangleMesh, cells: Cells, radius: float) -> np.ndarray:
+    """Points (n, 3) [m] where a centre may lie in cells near no open space, or near several.
+
+    Each moves from the cell's middle away from the closest wall, in ever smaller steps, until it is
+    midway between the walls.
+    """
+    from scipy.ndimage import maximum_filter, minimum_filter
+
+    from sim_core import closest_points
+
+    highest = maximum_filter(cells.space, size=NEARBY)
+    numbers = np.where(cells.space > 0, cells.space, np.iinfo(np.int32).max)
+    lowest = minimum_filter(numbers, size=NEARBY)
+    place = cells.middles(cells.unsure & ((highest == 0) | (highest != lowest)))
+    beside = closest_points(mesh, place, radius + DIAGONAL * cells.edge)
+    outward = area_vectors(mesh.vertices, mesh.triangles)[beside.triangle]
+    place = place[np.einsum("ij,ij->i", place - beside.point, outward) < 0.0]
+    best, widest = place.copy(), np.zeros(len(place))
+    step = 0.5 * cells.edge
+    for _ in range(PUSHES):
+        found = closest_points(mesh, place, radius + DIAGONAL * cells.edge)
+        wider = found.distance > widest
+        best[wider], widest[wider] = place[wider], found.distance[wider]
+        away = place - found.point
+        place = place + step * away / np.maximum(np.linalg.norm(away, axis=1), 1e-12)[:, None]
+        step *= SHORTER
+    return best[widest >= radius]
+
+
+def _links_to_spaces(
+    mesh: TriangleMesh, cells: Cells, centre: np.ndarray, radius: float, spacing: float
+) -> np.ndarray:
+    """Links (k, 2) from points in narrow places (n, 3) [m] to open spaces nearby, one a pair."""
+    from scipy.ndimage import binary_erosion
+    from scipy.spatial import KDTree
+
+    free = cells.space > 0
+    border_cells = free & ~binary_erosion(free, structure=np.ones((3, 3, 3)))
+    if not border_cells.any() or not len(centre):
+        return np.zeros((0, 2), dtype=np.int64)
+    border, border_space = cells.middles(border_cells), cells.space[border_cells] - 1
+    far = 3.0 * cells.edge + spacing
+    most = min(NEIGHBOURS, len(border))
+    away, found = KDTree(border).query(centre, k=range(1, most + 1), distance_upper_bound=far)
+    linked = np.full((len(centre), most), -1)  # the open spaces that each point is linked to
+    for k in range(most):
+        here = np.flatnonzero(np.isfinite(away[:, k]))
+        space = border_space[found[here, k]]
+        new = (linked[here, :k] != space[:, None]).all(axis=1)
+        here, space = here[new], space[new]
+        way = _is_way_clear(mesh, centre[here], border[found[here, k]], radius)
+        linked[here[way], k] = space[way]
+    start, column = np.nonzero(linked >= 0)
+    return np.column_stack([start, linked[start, column]])
+
+
+def _links_between(
+    mesh: TriangleMesh, centre: np.ndarray, region: np.ndarray, radius: float, spacing: float
+) -> np.ndarray:
+    """Links (k, 2) between nearby points in narrow places that are not in the same region yet."""
+    from scipy.spatial import KDTree
+
+    if len(centre) < 2:
+        return np.zeros((0, 2), dtype=np.int64)
+    away, found = KDTree(centre).query(
+        centre, k=min(3 * NEIGHBOURS, len(centre)), distance_upper_bound=3.0 * spacing
+    )
+    here, k = np.nonzero(np.isfinite(away))
+    there = found[here, k]
+    new = region[here] != region[there]
+    here, there = here[new], there[new]
+    way = _is_way_clear(mesh, centre[here], centre[there], radius)
+    return np.column_stack([here[way], there[way]])
+
+
+def _is_way_clear(
+    mesh: TriangleMesh, start: np.ndarray, end: np.ndarray, radius: float
+) -> np.ndarray:
+    """Whether the ball can move straight from each start (n, 3) [m] to its end, (n,) bool."""
+    from sim_core import closest_points
+
+    clear = np.ones(len(start), dtype=bool)
+    longest = np.linalg.norm(end - start, axis=1).max(initial=0.0)
+    steps = int(np.ceil(longest / (STEP * radius))) + 1
+    for share in np.linspace(0.0, 1.0, steps + 1)[1:-1]:
+        rows = np.flatnonzero(clear)
+        found = closest_points(mesh, start[rows] + share * (end - start)[rows], radius)
+        clear[rows[found.triangle >= 0]] = False
+    return clear
+
+
+# Share of its radius that a ball may reach into a surface. This is what facets that turn by 8
+# degrees each take from it, or by 3 in a hollow hardly rounder than the ball. Dents are deeper, and
+# so are the tolerances of a gap.
+TOLERATED_OVERLAP = 0.01
+SPACING = 1.0 / 3.0  # of the radius: distance between touch points
+MAX_POINTS = 100_000  # on the part, and as many on everything else
+MIN_POINTS = 4  # on a triangle of the part, unless there are too many
+MEASURED_WIDTH = 1.25  # of the largest ball: wider gaps are not measured
+
+
+@dataclass(frozen=True)
+class Reach:
+    """What a ball reaches in a cavity."""
+
+    mesh: TriangleMesh  # with k triangles
+    diameter: float  # of the ball [m]
+    touches: TouchPoints  # the p points that were checked
+    fits: np.ndarray  # (p,), whether no wall is in the ball's way at the point
+    reached: np.ndarray  # (p,), whether it fits and gets there from the sonotrode
+    region: np.ndarray  # (p,), number of the region of its centre, -1 where it does not fit
+    region_volume: np.ndarray  # of the open space in each region [m³]
+    spacing: float  # largest distance between touch points [m]
+    share: np.ndarray  # (k,), of each triangle of the cavity, the share that the ball can touch
+
+
+def find_reach(
+    mesh: TriangleMesh,
+    diameter: float,
+    largest: float | None = None,
+    normals: np.ndarray | None = None,
+) -> Reach:
+    """Where a ball can touch the surface of a cavity.
+
+    The ball is taken as smaller by TOLERATED_OVERLAP. In narrow places it is followed from point to
+    point in steps of a quarter radius, so that a bent passage hardly wider than the ball may count
+    as closed.
+
+    Args:
+        diameter: of the smallest ball of the shot [m].
+        largest: diameter of the largest [m].
+        normals: of the surface at the corners of the cavity's triangles, unit vectors into the
+            cavity, shape (k, 3, 3); None where the triangles are the surface.
+    """
+    if normals is None:
+        normals = np.repeat(-unit_normals(mesh.corners)[:, None], 3, axis=1)
+    radius = 0.5 * diameter
+    overlap = TOLERATED_OVERLAP * radius
+    near_cell = radius + 1.01 * np.sqrt(3.0) * cell_edge(mesh, radius)
+    max_radius = max(near_cell, MEASURED_WIDTH * 0.5 * (largest or diameter))
+    spacing = _spacing(mesh, SPACING * radius)
+    widest = float(spacing.max())
+    touches = find_touch_points(mesh, normals, spacing, max_radius, overlap)
+    region, volume = find_regions(mesh, touches, radius - overlap, widest)
+    fits = touches.radius >= radius
+    region = np.where(fits, region, -1)
+    start = np.unique(region[fits & (mesh.tags[touches.triangle] == TAG_SONOTRODE)])
+    reached = fits & np.isin(region, start)
+    share = _share(touches.triangle, touches.area, reached, len(mesh.triangles))
+    return Reach(mesh, diameter, touches, fits, reached, region, volume, widest, share)
+
+
+def reached_part_share(reach: Reach, source: np.ndarray, count: int) -> np.ndarray:
+    """Share (count,) that the ball can touch of each part triangle in the cavity, else 0.
+
+    Args:
+        source: part triangle that each triangle of the cavity lies on, else -1; shape (k,).
+    """
+    own = source >= 0
+    size = areas(reach.mesh.vertices, reach.mesh.triangles)[own]
+    return _share(source[own], size, reach.share[own], count)
+
+
+def _share(triangle: np.ndarray, area: np.ndarray, touched: np.ndarray, count: int) -> np.ndarray:
+    """Share (count,) of each triangle that is touched, from its pieces (p,) and their shares."""
+    whole = np.bincount(triangle, area, count)
+    part = np.bincount(triangle, touched * area, count)
+    return np.divide(part, whole, out=np.zeros(count), where=whole > 0.0)
+
+
+def _spacing(mesh: TriangleMesh, wanted: float) -> np.ndarray:
+    """Distance [m] between touch points on each triangle (k,)."""
+    size = areas(mesh.vertices, mesh.triangles)
+    spacing = np.full(len(size), wanted)
+    for chosen in (mesh.tags == TAG_PART, mesh.tags != TAG_PART):
+        spacing[chosen] = max(wanted, float(np.sqrt(size[chosen].sum() / MAX_POINTS)))
+    on_part = mesh.tags == TAG_PART
+    if MIN_POINTS * on_part.sum() <= MAX_POINTS:
+        spacing[on_part] = np.minimum(spacing[on_part], np.sqrt(size[on_part] / MIN_POINTS))
+    return np.maximum(spacing, 1e-12)

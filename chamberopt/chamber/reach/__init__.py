@@ -1,1 +1,0 @@
-"""What a ball can touch in a cavity."""

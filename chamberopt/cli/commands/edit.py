@@ -1,0 +1,60 @@
+"""The command `edit`: a design on a page in the browser."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from chamberopt.cli.console import show
+from chamberopt.cli.options import app
+
+
+@app.command
+def edit(
+    design: Path, /, *, port: int = 0, trust_shape: Annotated[bool, Parameter(negative="")] = False
+) -> None:
+    """Edit a design on a page in the browser: see the chamber, pick the target, turn the part, run.
+
+    The page is for one person on this machine, and needs no network. Ctrl-C ends it.
+
+    Parameters
+    ----------
+    design
+        Design file (.toml).
+    port
+        Port of 127.0.0.1 at which the page is; by default a free one.
+    trust_shape
+        Run the design's own shape, a Python file, without asking.
+    """
+    from chamberopt.common.errors import InputError
+    from chamberopt.common.progress import step
+
+    file = _trusted(design, trust_shape)  # what is wrong with it is told before anything starts
+    try:
+        with step("starting"):
+            from chamberopt.page.server import serve
+    except ModuleNotFoundError as error:
+        raise InputError(
+            f"the page needs {error.name}: install it with pip install 'chamberopt[page]'"
+        ) from None
+
+    def tell(address: str) -> None:
+        show([f"{design} is at {address}", "Ctrl-C ends the page"])
+
+    serve(design, port, file, tell)
+
+
+def _trusted(path: Path, trusted: bool) -> bool:
+    """Whether the design's shape may be a Python file; InputError if it does not load."""
+    from chamberopt.common.toml_fields import read_toml
+    from chamberopt.page.edited_file import EditedFile, custom_shape
+
+    shape = custom_shape(read_toml(path, "design")[1])
+    if shape and not trusted and sys.stdin.isatty():
+        question = f"{path}: runs the Python file {shape}, which may do anything; go on? [y/N] "
+        trusted = input(question).strip().lower() == "y"
+    EditedFile(path, trusted)
+    return trusted

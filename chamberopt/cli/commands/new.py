@@ -1,0 +1,143 @@
+"""The command `new`: a first design and study for a part."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+from cyclopts import Parameter
+
+from chamberopt.cli.console import print_remarks, show
+from chamberopt.cli.options import Out, app
+from chamberopt.common.errors import one_line
+
+if TYPE_CHECKING:
+    from chamberopt.chamber.propose.proposal import Proposal
+    from chamberopt.chamber.propose.proposed_target import Surface
+
+PICK = "pick"
+MAX_LISTED = 12
+
+
+@app.command
+def new(
+    part: Path,
+    /,
+    *,
+    target: Annotated[tuple[str, ...], Parameter(negative="")] = (),
+    shape: Literal["cylinder", "box", "prism", "conformal"] | None = None,
+    material: str = "",
+    shot: str = "steel",
+    ball_mm: float | None = None,
+    unit: Literal["um", "mm", "cm", "m", "in", "guess"] = "guess",
+    out: Out = None,
+) -> None:
+    """Propose a first design and study for a part, each number with its reason, and a picture.
+
+    Parameters
+    ----------
+    part
+        The part's file: STEP, STL, OBJ, PLY, 3MF, Nastran, Abaqus, Gmsh or VTK.
+    target
+        What is to be peened: a name of the file, "face N" as the command lists them, or all; may
+        be given several times. pick lists the surfaces and asks. By default the likeliest.
+    shape
+        Form of the chamber; by default a cylinder, or a box for a long part.
+    material
+        Alloy of the part; `chamberopt materials` lists them.
+    shot
+        Material of the balls; `chamberopt shot` lists them.
+    ball_mm
+        Diameter of a ball; by default the largest sold that touches nearly all of the target.
+    unit
+        Of the numbers in the part's file; by default what the file states, or its size suggests.
+    """
+    import chamberopt.pictures.part  # noqa: F401  # loaded before the folder is held
+    from chamberopt.chamber.propose.proposal import Wanted, propose
+    from chamberopt.chamber.propose.text import design_text, study_text
+    from chamberopt.cli.commands.check import draw_target
+    from chamberopt.common.errors import InputError
+    from chamberopt.common.files import claim_folder, whole_or_nothing, write_text
+    from chamberopt.common.progress import step
+    from chamberopt.common.toml_fields import allowed_range
+    from chamberopt.design.shot import ShotSize
+    from chamberopt.results.vtp_files import pyvista
+
+    _require_file(part)
+    low, high = allowed_range(ShotSize.model_fields["diameter_mm"])
+    if ball_mm is not None and not low <= ball_mm <= high:
+        allowed = f"from {low:g} to {high:g} mm"
+        raise InputError(f"--ball-mm: given {ball_mm:g}; allowed: {allowed}")
+    if PICK in target and not sys.stdin.isatty():
+        raise InputError("--target: pick asks, and nobody answers here; give names or faces")
+
+    def choose(known: Sequence[Surface]) -> Sequence[str]:
+        return _picked(known) if PICK in target else target
+
+    out = out or Path(part.stem if part.suffix else f"{part.name}_chamber")
+    with claim_folder(out):
+        pass  # what is wrong with it is told before the work
+    made = propose(part, Wanted(unit, shape, material, shot, ball_mm), choose)
+    pyvista()  # not while the folder is held: Ctrl-C ends an import at once, and would leave it
+    with claim_folder(out) as folder, whole_or_nothing(folder):
+        write_text(folder / "design.toml", design_text(made, folder))
+        write_text(folder / "study.toml", study_text(made, "design.toml"))
+        with step("drawing"):
+            draw_target(made.chamber, made.reach, folder / "design.png")
+    show(_summary(made))
+    print_remarks(f"note: {one_line(text)}" for text in made.mesh.notes)
+    print_remarks(f"warning: {text}" for text in made.warnings)
+    show([f"design in {folder / 'design.toml'}", f"study in {folder / 'study.toml'}"])
+
+
+def _require_file(part: Path) -> None:
+    """Raise InputError unless the part is a file that a design can name."""
+    from chamberopt.common.errors import InputError
+
+    if not part.is_file():
+        what = "is a folder" if part.is_dir() else "is no plain file"
+        what = what if part.exists() else "no such file"
+        raise InputError(f"{part}: {what}; give the file of the part, from CAD or a scanner")
+    try:
+        str(part.resolve()).encode()
+    except UnicodeEncodeError:
+        text = "its path is not UTF-8, so that no design can name it; rename the file or its folder"
+        raise InputError(f"{part}: {text}") from None
+
+
+def _picked(known: Sequence[Surface]) -> Sequence[str]:
+    """The names that the user chooses of the surfaces."""
+    from chamberopt.common.errors import InputError
+
+    show(_listed(known, len(known)))
+    try:
+        answer = input("to be peened, separated by commas: ").strip()
+    except EOFError:
+        raise InputError("--target: pick got no answer; answer, or give names or faces") from None
+    if any(one.name == answer for one in known):  # a name can have commas
+        return [answer]
+    return [name.strip() for name in answer.split(",") if name.strip()]
+
+
+def _summary(made: Proposal) -> list[str]:
+    """What is proposed and why, a line each, and what else could be the target."""
+    lines = [f"{'part.target':38}{one_line(made.reasons['part.target'])}"]
+    for table, values in made.tables.items():
+        for key, value in values.items():
+            reason = made.reasons.get(f"{table}.{key}")
+            if reason:
+                text = f"{value:g}" if isinstance(value, float) else value
+                lines.append(f"{table + '.' + key:38}{text}: {reason}")
+    return [*lines, *_listed(made.known, MAX_LISTED)]
+
+
+def _listed(known: Sequence[Surface], most: int) -> list[str]:
+    """The surfaces to choose from."""
+    lines = []
+    for one in known[:most]:
+        place = f", one at {one.keys['faces'][0]['at_mm']} mm" if "faces" in one.keys else ""
+        lines.append(f"  {one_line(one.name)}: {one.text}{place}")
+    more = [f"  and {len(known) - most} more (--target pick)"] if len(known) > most else []
+    return ["surfaces to choose from (--target):", *lines, *more]

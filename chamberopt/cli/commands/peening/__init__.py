@@ -1,1 +1,0 @@
-"""The commands in the trade's terms, one file each."""

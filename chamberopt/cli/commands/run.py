@@ -1,0 +1,156 @@
+"""The command `run`: the search for a better design."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from chamberopt.cli import console
+from chamberopt.cli.interrupt import Interrupt
+from chamberopt.cli.options import Cluster, Json, Resumable, Workers, app
+from chamberopt.cli.prepare import compile_with_message, resolve_effects
+from chamberopt.cli.resume import quoted, resume_command, resume_note, unfinished
+
+if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
+    from chamberopt.chamber.build import Chamber
+    from chamberopt.search.run_study import StudyResult
+    from chamberopt.search.study import Study
+    from chamberopt.search.study_folder import StudyFolder
+
+
+@app.command
+def run(
+    study: Path,
+    /,
+    *,
+    workers: Workers = None,
+    cluster: Cluster = None,
+    json: Json = False,
+    out: Resumable = None,
+) -> None:
+    """Search for a better design, confirm it with new seeds, and write it as best.toml.
+
+    With --out of an interrupted run, the run is resumed. Ctrl-C stops after the running
+    evaluations; a second Ctrl-C stops at once.
+
+    Parameters
+    ----------
+    study
+        Study file (.toml).
+    """
+    with Interrupt() as interrupt:
+        from chamberopt.chamber.build import build_chamber
+        from chamberopt.common.executor import open_executor
+        from chamberopt.common.progress import step
+        from chamberopt.results.load import load_result, summary
+        from chamberopt.search.study import load_study
+        from chamberopt.search.study_folder import open_study_folder
+
+        loaded = load_study(study)
+        if out is None:
+            console.print_remarks(unfinished(study, study.stem))
+        claim = partial(open_study_folder, loaded)
+        with console.claimed_folder(out, study.stem, claim) as folder:
+            if folder.finished:
+                line = f"best design: {summary(load_result(folder.path))}"
+                console.print_finished(folder.path, "study", [line], json)
+                return
+            with step("building the chamber"):
+                chamber = build_chamber(loaded.design)
+            command = resume_command(study, folder.path)
+            with resume_note(folder, command), open_executor(workers, cluster) as executor:
+                how_to_resume = f"to resume: {command}"
+                result, notes = _search(folder, chamber, executor, interrupt, how_to_resume)
+            lines = [*_result_lines(result), *console.note_lines(notes)]
+            console.print_result(lines, folder.path, json)
+            if not json:
+                show, best = quoted("report", folder.path), folder.path / "best.toml"
+                console.show([f"to see it: {show}; the design: {best}"])
+
+
+def _search(
+    folder: StudyFolder,
+    chamber: Chamber,
+    executor: Executor,
+    interrupt: Interrupt,
+    how_to_resume: str,
+) -> tuple[StudyResult, list[str]]:
+    """Run or resume the study of a folder and save its result; returns notes for the user too.
+
+    Args:
+        chamber: chamber of the study's design.
+    """
+    from chamberopt.chamber.build import build_chamber
+    from chamberopt.common.progress import step
+    from chamberopt.search.run_study import run_study
+    from chamberopt.workflows.save_run import save_study
+
+    study, advice = folder.with_effects_resolved(
+        lambda design: resolve_effects(design, chamber, executor)
+    )
+    at_once = _candidates_at_once(study, chamber)
+    compile_with_message(study.design, chamber)
+    if done := len(folder.recorded.trials):
+        console.print_remarks([f"{folder.path}: resuming after {done} evaluations"])
+    with step("evaluations", study.optimizer.evaluations) as progress:
+        interrupt.wait_for_evaluation(how_to_resume)
+        result = run_study(
+            study, folder, executor, progress, stop=lambda: interrupt.requested, at_once=at_once
+        )
+    with step("writing and drawing"):
+        best = result.best.design
+        found = build_chamber(best, result.target)
+        warnings = console.print_warnings(best, found, " of the best design")
+        console.print_remarks(save_study(folder.path, result, advice, warnings))
+    notes = [*map(str, advice), *result.warnings, *result.notes, *chamber.notes]
+    return result, [*notes, *result.best.evaluation.notes]
+
+
+def _candidates_at_once(study: Study, chamber: Chamber) -> int:
+    """How many candidates of a batch fit into memory; InputError if one does not."""
+    from chamberopt.coverage.field.memory import PROCESS, evaluation_bytes, how_many_fit
+    from chamberopt.simulation.replicas import most_replicas
+
+    settings = study.optimizer
+    replicas = settings.confirm_replicas * 2 ** (settings.confirm_rounds - 1)
+    replicas = max(replicas, most_replicas(study.design))
+    each = evaluation_bytes(study.design, chamber, replicas)
+    count = how_many_fit(settings.batch, each, PROCESS)
+    if count < settings.batch:
+        text = f"there is memory for {count} of the {settings.batch} candidates of optimizer.batch"
+        console.print_remarks([f"{text} at a time; the others wait, and figures stay the same"])
+    return count
+
+
+def _result_lines(result: StudyResult) -> list[str]:
+    from chamberopt.common.number_text import plain
+
+    study, start, best = result.study, result.start, result.best
+    lines = [f"{'parameter':34}{'start':>12}{'best':>12}"]
+    for name in study.vary:
+        values = (f"{plain(one.parameters[name], 6):>12}" for one in (start, best))
+        lines.append(f"{name:34}{''.join(values)}")
+    for title, one in (("start", start), ("best", best)):
+        limits = console.zone_lines(one.design, one.evaluation)
+        lines += ["", title, *console.evaluation_lines(one.evaluation), *limits]
+    verdict = "better than the start" if result.improved else "within the noise of the start"
+    if result.gain.in_words:
+        verdict = "the objective of the start or of the best design is not known"
+    lines += ["", f"{console.estimate_line('gain', result.gain)}: {verdict}"]
+    if result.sensitivity:
+        lines += ["", *result.sensitivity.sentences(), ""]
+    if study.objective.pareto:
+        names = " and ".join(study.objective.pareto)
+        lines += [f"the Pareto front of {names}: pareto.csv, pareto.png", ""]
+    replicas, seconds = best.evaluation.replicas, study.design.process.recorded_time
+    effort = console.replicas_text(study.at_search_accuracy(study.design))
+    if result.given_up:
+        effort += f"; {study.first_look} where they showed that a candidate is worse"
+    return [
+        *lines,
+        f"± 95 % intervals; start and best: {replicas} replicas of {seconds:g} s with seeds of "
+        f"their own; candidates of the search in history.csv: {effort}",
+    ]

@@ -1,1 +1,0 @@
-"""The commands that simulate many candidates, one file each."""

@@ -1,1 +1,0 @@
-"""The commands that begin a design, one file each."""

@@ -1,0 +1,114 @@
+"""The command `sweep`: a map of a study's parameters."""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from chamberopt.cli import console
+from chamberopt.cli.options import Cluster, Json, Resumable, Workers, app
+from chamberopt.cli.prepare import compile_with_message, resolve_effects
+from chamberopt.cli.resume import resume_command, resume_note, unfinished
+
+if TYPE_CHECKING:
+    from chamberopt.chamber.build import Chamber
+    from chamberopt.search.study import Study
+
+
+@app.command
+def sweep(
+    study: Path,
+    /,
+    *,
+    grid: int | None = None,
+    sobol: int | None = None,
+    seed: int | None = None,
+    workers: Workers = None,
+    cluster: Cluster = None,
+    json: Json = False,
+    out: Resumable = None,
+) -> None:
+    """Simulate candidates on a grid or spread evenly over [vary], instead of searching.
+
+    With --out of an interrupted sweep, the sweep is resumed.
+
+    Parameters
+    ----------
+    study
+        Study file (.toml).
+    grid
+        Values of each parameter, bounds included: N parameters give GRID^N candidates, fewer
+        where a parameter can have fewer values.
+    sobol
+        Number of candidates, at Sobol points; powers of 2 are spread most evenly. Those alike
+        are simulated once.
+    seed
+        Seed of the Sobol points, by default the study's optimizer.seed.
+    """
+    from chamberopt.chamber.build import build_chamber
+    from chamberopt.common.executor import open_executor
+    from chamberopt.common.number_text import plain
+    from chamberopt.common.progress import step
+    from chamberopt.results.write import best_row_note
+    from chamberopt.search.run_sweep import plan_sweep, run_sweep
+    from chamberopt.search.study import load_study
+    from chamberopt.search.study_folder import open_study_folder
+    from chamberopt.workflows.save_run import save_sweep
+
+    loaded = load_study(study)
+    plan = plan_sweep(loaded, grid, sobol, seed)
+    name = f"{study.stem}-sweep"
+    if out is None:
+        console.print_remarks(unfinished(study, name))
+    claim = partial(open_study_folder, loaded, plan=plan.as_json())
+    with console.claimed_folder(out, name, claim) as folder, ExitStack() as workers_end:
+        if folder.finished:
+            console.print_finished(folder.path, "sweep", [], json)
+            return
+        with step("building the chamber"):
+            chamber = build_chamber(loaded.design)
+        command = resume_command(study, folder.path, plan.as_json())
+        workers_end.enter_context(resume_note(folder, command))
+        if cluster is None:
+            workers = _workers_that_fit(loaded, chamber, workers)
+        executor = workers_end.enter_context(open_executor(workers, cluster, "processes"))
+        loaded, advice = folder.with_effects_resolved(
+            lambda design: resolve_effects(design, chamber, executor)
+        )
+        compile_with_message(loaded.design, chamber)
+        with step("candidates", len(plan.points)) as progress:
+            result = run_sweep(loaded, plan, folder, executor, progress)
+        with step("writing and drawing"):
+            console.print_remarks(save_sweep(folder.path, result))
+    effort = console.replicas_text(loaded.at_search_accuracy(loaded.design))
+    lines = [f"{len(result.trials)} candidates in {result.seconds:.0f} s, {effort} each"]
+    best = result.best
+    if best is not None and best.objective is not None:
+        lines += ["", f"best, number {best.number + 1}"]
+        lines += [f"{name:34}{plain(value, 5):>12}" for name, value in best.parameters.items()]
+        estimates = {loaded.objective.goals[0]: best.objective, **best.metrics}
+        lines += [console.estimate_line(name, estimate) for name, estimate in estimates.items()]
+    notes = [*map(str, advice)]
+    failed = [trial for trial in result.trials if trial.objective is None]
+    if failed:
+        notes.append(f"{len(failed)} candidates failed, the first because: {failed[0].reason}")
+    notes.append(best_row_note(result))
+    console.print_result([*lines, *console.note_lines(notes)], folder.path, json)
+
+
+def _workers_that_fit(study: Study, chamber: Chamber, wanted: int | None) -> int | None:
+    """How many of the wanted worker processes fit into memory; InputError if one does not."""
+    from chamberopt.common.executor import core_count
+    from chamberopt.coverage.field.memory import PROCESS, evaluation_bytes, how_many_fit
+    from chamberopt.simulation.replicas import most_replicas
+
+    design = study.at_search_accuracy(study.design)
+    each = PROCESS + evaluation_bytes(design, chamber, most_replicas(design))
+    asked = core_count() if wanted is None else wanted
+    count = how_many_fit(asked, each, PROCESS)
+    if count < asked:
+        text = f"there is memory for {count} of {asked} worker processes; figures stay the same"
+        console.print_remarks([text])
+    return count if count < asked else wanted

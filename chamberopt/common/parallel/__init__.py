@@ -1,1 +1,0 @@
-"""Executors that run replicas and candidates: threads, processes, a Dask cluster."""

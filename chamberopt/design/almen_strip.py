@@ -1,0 +1,51 @@
+"""Almen strips: sizes, material, and the speed at which a ball starts to dent one."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+from chamberopt.design.materials import BRINELL_TO_PASCAL, PartMaterial, ball
+from chamberopt.design.materials.catalogue import Elastic, yield_speed
+
+if TYPE_CHECKING:
+    from chamberopt.design.shot import ShotTable
+
+StripType = Literal["N", "A", "C"]
+STRIP_C0 = 0.91
+STRIP_HB = 450.0  # SAE 1070 spring steel of 44 to 50 HRC (SAE J442)
+
+
+@dataclass(frozen=True)
+class AlmenStrip:
+    """Dimensions [m] of a strip; the type tells the thickness (SAE J442)."""
+
+    type: StripType
+    thickness: float
+    length: float = 76.2e-3
+    width: float = 19.0e-3
+
+
+STRIPS = {
+    one.type: one
+    for one in (AlmenStrip("N", 0.79e-3), AlmenStrip("A", 1.29e-3), AlmenStrip("C", 2.39e-3))
+}
+# Arc height over that on an A strip, and the range [mm on an A strip] in which a type is used:
+# "approximate", AMS-S-13165 6.10; bending by the same layer goes with 1 / thickness².
+OVER_A: dict[StripType, float] = {"N": 3.0, "A": 1.0, "C": 1.0 / 3.5}
+USED_FOR: dict[StripType, tuple[float, float]] = {
+    "N": (0.0, 0.1016), "A": (0.1016, 0.6096), "C": (0.6096, math.inf),
+}  # fmt: skip
+STRIP_STEEL = Elastic(205e9, 0.29)
+
+
+def strip_material(shot: ShotTable) -> PartMaterial:
+    """Hardness and restitution of a strip under this shot.
+
+    A charge that is given by its density alone counts as steel in its elasticity.
+    """
+    elastic = ball(shot.material or "steel").elastic
+    hardness = STRIP_HB * BRINELL_TO_PASCAL
+    v0 = yield_speed(elastic, STRIP_STEEL, shot.density, hardness, STRIP_C0)
+    return PartMaterial(C0=STRIP_C0, v0_m_s=v0, hardness_HB=STRIP_HB)

@@ -1,0 +1,313 @@
+"""What measurements tell of one machine: factors on numbers of its designs, and Almen constants.
+
+`chamberopt calibrate` finds them. A design that names the file is simulated with these values in
+the place of its own, and its figures have intervals that include what is not known of them.
+
+Notation, with the names of PARAMETERS
+    amplitude   factor on the amplitude of the sonotrode
+    C0, v0      factors on restitution and yield speed of all surfaces, balls and strips
+    mu          factor on the coefficients of friction, where a design has friction
+    hardness    factor on the hardness of the part, B of Kirk's law of dents
+    K           arc height over peening strength [mmA/mm]
+    beta        dents on a real strip over those that are simulated
+    m, C        mean and covariance of their natural logarithms     (log_mean, log_covariance)
+    L           lower triangle with L L' = C
+    g           slopes of a figure by the logarithms
+    L' g        independent standard errors of the figure
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from functools import cached_property
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar, get_args
+
+import numpy as np
+from pydantic import BeforeValidator, Field, ValidationError, ValidationInfo
+
+from chamberopt.common.errors import InputError
+from chamberopt.common.toml_errors import CrossCheckError, Problem, explain_validation_error
+from chamberopt.common.toml_fields import Pair, Several, from_file, list_field, quantity, read_toml
+from chamberopt.design.almen_strip import strip_material
+from chamberopt.design.materials import PartMaterial, RestitutionTable
+from chamberopt.design.table_base import FileTable
+
+if TYPE_CHECKING:
+    from chamberopt.design.shot import ShotTable
+
+Parameter = Literal["amplitude", "C0", "v0", "mu", "hardness", "K", "beta"]
+PARAMETERS: tuple[Parameter, ...] = get_args(Parameter)
+OF_STRIPS: tuple[Parameter, ...] = ("K", "beta")
+MAX_LOG = 10.0
+# Standard error of ln T by what the model leaves out, such as dents after the strongest of a spot:
+# no saturation time is better known than to ± 15 %.
+TIME_ERROR = 0.075
+ROUNDING = 1e-9
+WHOLE_STRIP = "whole strip"
+NOT_BY_CHANCE = 2.0  # standard deviations
+NO_STRIPS = (
+    "the design's calibration has no arc heights of strips, so there is no Almen intensity; "
+    "measure some, add them as [[strip]] and run chamberopt calibrate again"
+)
+NO_CALIBRATION = (
+    "Almen intensity in mmA takes a calibration to measured strips: see chamberopt calibrate, and "
+    'give the design calibration = "machine.toml"'
+)
+Law = TypeVar("Law", bound=RestitutionTable)
+
+
+class Misfit(FileTable):
+    """How well the model explains the measurements of one kind."""
+
+    kind: str = Field(description="of measurement")
+    chi2: float = quantity(0, 1e12, "", "sum of squared residuals over their variances")
+    values: int = quantity(1, 1_000_000, "", "number of measured values")
+    error_scale: float = quantity(
+        1, 1e6, "", "factor on their errors without which the model does not explain them", 1.0
+    )
+
+
+class Calibration(FileTable):
+    """What is known of one machine."""
+
+    program: str = Field(description="version of chamberopt that made it")
+    parameters: Annotated[Several[Parameter], Field(min_length=1)] = list_field(
+        f"some of {', '.join(PARAMETERS)}", "what is calibrated"
+    )
+    log_mean: Several[float] = list_field(
+        "a list of numbers", "means of their logarithms, in the order of parameters"
+    )
+    log_covariance: Several[Several[float]] = list_field(
+        "a list of as many lists of numbers", "covariance of their logarithms, same order"
+    )
+    amplitude_um: Pair = list_field(
+        "[lowest, highest], zero-to-peak in µm", "amplitudes at which was measured"
+    )
+    ball_diameter_mm: Pair = list_field("[lowest, highest] in mm", "of the balls measured with")
+    ball_density_kg_m3: float = quantity(500, 25000, "kg/m³", "of the balls measured with")
+    strips: str = Field(
+        default=WHOLE_STRIP, description="what was measured: arc heights and K are those of one"
+    )
+    misfits: Several[Misfit] = list_field("a list of tables", "by kind of measurement", ())
+
+    def _problems(self) -> Iterator[Problem]:
+        count = len(self.parameters)
+        if len(set(self.parameters)) < count:
+            yield Problem("parameters", f"given {list(self.parameters)}; name each once")
+        if (OF_STRIPS[0] in self.parameters) != (OF_STRIPS[1] in self.parameters):
+            yield Problem("parameters", "has one of K and beta; strips give both or neither")
+        if len(self.log_mean) != count:
+            text = f"has {len(self.log_mean)} numbers for {count} parameters"
+            yield Problem("log_mean", f"{text}; make it again with chamberopt calibrate")
+        elif max(map(abs, self.log_mean)) > MAX_LOG:
+            text = f"given {max(self.log_mean, key=abs):g}; allowed: -{MAX_LOG:g} to {MAX_LOG:g}"
+            yield Problem("log_mean", text)
+        yield from self._covariance_problems(count)
+        for name in ("amplitude_um", "ball_diameter_mm"):
+            low, high = getattr(self, name)
+            if not 0.0 < low <= high:
+                text = f"given [{low:g}, {high:g}]; allowed: [lowest, highest], above 0"
+                yield Problem(name, text)
+
+    def _covariance_problems(self, count: int) -> Iterator[Problem]:
+        rows, again = self.log_covariance, "make it again with chamberopt calibrate"
+        if len(rows) != count or any(len(row) != count for row in rows):
+            yield Problem("log_covariance", f"is not {count} rows of {count} numbers; {again}")
+            return
+        matrix = np.array(rows)
+        size = float(np.abs(matrix).max())
+        if size > MAX_LOG**2:
+            yield Problem("log_covariance", f"has {size:g}, more than {MAX_LOG**2:g}; {again}")
+        elif np.abs(matrix - matrix.T).max() > ROUNDING * size:
+            yield Problem("log_covariance", f"is not symmetric; {again}")
+        elif np.linalg.eigvalsh(matrix).min() < -ROUNDING * size:
+            text = "is not positive semi-definite, as covariances are"
+            yield Problem("log_covariance", f"{text}; {again}")
+
+    def factor(self, name: Parameter) -> float:
+        """The mean value of a parameter; 1 if it is not calibrated."""
+        if name not in self.parameters:
+            return 1.0
+        return math.exp(self.log_mean[self.parameters.index(name)])
+
+    def log_sd(self, name: Parameter) -> float:
+        """Standard deviation of the logarithm of a parameter; 0 if it is not calibrated."""
+        if name not in self.parameters:
+            return 0.0
+        at = self.parameters.index(name)
+        return math.sqrt(max(0.0, self.log_covariance[at][at]))
+
+    def intensity_mmA(self, strength_um: float) -> float:  # noqa: N802
+        """Almen intensity [mmA] of a peening strength [µm]."""
+        return self.factor("K") * 1e-3 * strength_um
+
+    @property
+    def not_mmA(self) -> str:  # noqa: N802
+        """What its intensities are where they are not those of whole strips; else ""."""
+        if not self.has_strips or self.strips == WHOLE_STRIP:
+            return ""
+        return (
+            f"calibration: what is called mmA is mm of arc height of a {self.strips}, with which "
+            "it was made, not of a whole strip"
+        )
+
+    @property
+    def has_strips(self) -> bool:
+        """Whether arc heights were measured, without which there is no Almen intensity."""
+        return "K" in self.parameters
+
+    @cached_property
+    def _triangle(self) -> np.ndarray:
+        """L, in the order of PARAMETERS; rows and columns of those not calibrated are 0."""
+        rows = [PARAMETERS.index(name) for name in self.parameters]
+        matrix = np.array(self.log_covariance)
+        # A parameter that is known exactly has a row of zeros, for which there is no L.
+        tiny = ROUNDING * max(float(np.abs(matrix).max()), ROUNDING)
+        order = np.argsort(rows)
+        found = np.zeros((len(PARAMETERS), len(PARAMETERS)))
+        at = np.array(rows)[order]
+        ordered = matrix[np.ix_(order, order)] + tiny * np.eye(len(rows))
+        found[np.ix_(at, at)] = np.linalg.cholesky(ordered)
+        return found
+
+    def errors(self, slopes: Mapping[Parameter, float], of_model: float = 0.0) -> tuple[float, ...]:
+        """L' g, one standard error for each of PARAMETERS, and last that of the model itself.
+
+        Those of two figures subtract.
+
+        Args:
+            slopes: g by name of the parameter; others are 0.
+            of_model: standard error by what the model leaves out.
+        """
+        slope = np.array([slopes.get(name, 0.0) for name in PARAMETERS])
+        return *(self._triangle.T @ slope).tolist(), of_model
+
+
+def why_no_intensity(calibration: Calibration | None) -> str:
+    """Why a design with this calibration has no Almen intensity; "" if it has one."""
+    if calibration is None:
+        return NO_CALIBRATION
+    return "" if calibration.has_strips else NO_STRIPS
+
+
+def _read(given: Any, info: ValidationInfo) -> Any:
+    """The table of a file, if a path is given."""
+    if not isinstance(given, str):
+        return given
+    if (info.context or {}).get("recorded"):  # a result holds the numbers, and names no file
+        raise CrossCheckError([Problem("", f"given {given!r} in a result; simulate again")])
+    path = from_file(given, info.context)
+    try:
+        remedy = "make one with chamberopt calibrate"
+        values = read_toml(path, "calibration", remedy)[1]
+        if "parameters" not in values:
+            raise InputError(f"{path}: holds no calibration; {remedy}")
+        return Calibration.model_validate(values)
+    except InputError as error:
+        raise CrossCheckError([Problem("", str(error))]) from None
+    except ValidationError as error:
+        found = explain_validation_error(error, Calibration)
+        texts = (f"{path.name}: {one.field}: {one.text}" for one in found)
+        raise CrossCheckError([Problem("", text) for text in texts]) from None
+
+
+CalibrationField = Annotated[
+    Calibration | None,
+    BeforeValidator(_read),
+    Field(
+        default=None,
+        description="of the machine: a file that chamberopt calibrate wrote",
+        json_schema_extra={"form": 'the path of a calibration, such as "machine.toml"'},
+    ),
+]
+
+
+def with_measured_values(design: Any) -> Any:
+    """A Design with the values of its calibration in the place of its own.
+
+    It is for a simulation alone: it has no calibration, and its values are not checked.
+    """
+    one: Calibration | None = design.calibration
+    if one is None:
+        return design
+    materials, effects = design.materials, design.effects
+    moving = dict.fromkeys(("amplitude_um", "amplitude_pv_um"), one.factor("amplitude"))
+    part = _with_measured_restitution(materials.part, one)
+    hardness = part.hardness_HB * one.factor("hardness")
+    laws = {
+        name: _with_measured_restitution(getattr(materials, name), one)
+        for name in ("shot", "wall", "sonotrode")
+    }
+    friction = effects.friction
+    if friction is not None:
+        friction = _times(friction, {"mu": one.factor("mu"), "mu_balls": one.factor("mu")})
+    return design.model_copy(
+        update={
+            "sonotrode": _times(design.sonotrode, moving),
+            "sonotrodes": tuple(_times(further, moving) for further in design.sonotrodes),
+            "materials": materials.model_copy(
+                update={**laws, "part": part.model_copy(update={"hardness_HB": hardness})}
+            ),
+            "effects": effects.model_copy(update={"friction": friction}),
+            "calibration": None,
+        }
+    )
+
+
+def calibration_problems(design: Any) -> Iterator[Problem]:
+    """Values beyond those of a Design that its calibration gives it, as one edited by hand may."""
+    one: Calibration | None = design.calibration
+    if one is None:
+        return
+    remedy = "correct log_mean, or make it again with chamberopt calibrate"
+    found = with_measured_values(design)
+    tables = {name: getattr(found, name) for name in ("sonotrode", "materials", "effects")}
+    tables |= {f"sonotrodes.{k}": further for k, further in enumerate(found.sonotrodes)}
+    for name, table in tables.items():
+        try:
+            type(table).model_validate(table.model_dump())
+        except ValidationError as error:
+            for problem in explain_validation_error(error, type(table)):
+                text = f"{name}.{problem.field} would be out of range: {problem.text}"
+                yield Problem("calibration", f"{text}; {remedy}")
+    # C0 may come out above 1 by its own error, and is 1 then.
+    least = one.factor("C0") * math.exp(-NOT_BY_CHANCE * one.log_sd("C0"))
+    for name in ("shot", "wall", "sonotrode", "part"):
+        law = getattr(design.materials, name)
+        key = "C0" if law.e_at_m_s is None else "e_at_m_s"
+        highest = law.C0 if law.e_at_m_s is None else max(e for _, e in law.e_at_m_s)
+        if highest * least > 1.0:
+            text = f"its C0 makes materials.{name}.{key} {highest * one.factor('C0'):.3g}"
+            yield Problem("calibration", f"{text}; allowed: to 1; {remedy}")
+
+
+def calibrated_strip(shot: ShotTable, calibration: Calibration | None) -> PartMaterial:
+    """The metal of an Almen strip under this shot; its hardness is known."""
+    strip = strip_material(shot)
+    return strip if calibration is None else _with_measured_restitution(strip, calibration)
+
+
+def _times(table: Any, factors: Mapping[str, float]) -> Any:
+    """A table with some of its numbers multiplied; those that are not set stay so."""
+    values = {name: getattr(table, name) for name in factors}
+    changed = {name: one * factors[name] for name, one in values.items() if one is not None}
+    return table.model_copy(update=changed)
+
+
+def _with_measured_restitution(law: Law, one: Calibration) -> Law:
+    return scaled_restitution(law, one.factor("C0"), one.factor("v0"))
+
+
+def scaled_restitution(law: Law, c0: float, v0: float) -> Law:
+    """A restitution law with factors on C0 and v0; no restitution is above 1.
+
+    Its v0 is no longer that of the catalogue.
+    """
+    law = law.model_copy(update={"v0_for": None})
+    if law.e_at_m_s is not None:
+        points = tuple((speed * v0, min(1.0, e * c0)) for speed, e in law.e_at_m_s)
+        law = law.model_copy(update={"e_at_m_s": points})
+    scaled: Law = _times(law, {"C0": c0, "v0_m_s": v0})
+    lowered = scaled.C0 is not None and scaled.C0 > 1.0
+    return scaled.model_copy(update={"C0": 1.0}) if lowered else scaled

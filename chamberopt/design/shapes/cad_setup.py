@@ -1,0 +1,222 @@
+"""Read a set-up from CAD: the room over its sonotrode, with the sonotrode's face at z = 0.
+
+The part is either a separate closed body, which is cut out of the room later, or the piece of the
+room's surface that it bounds. The room is the closed surface that the sonotrode's face belongs to,
+whichever way its triangles face.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+
+from chamberopt.common.errors import InputError
+from chamberopt.design.shapes.surface import TAG_PART, TAG_SONOTRODE, TAG_WALL, ShapeSurface
+from chamberopt.geometry.meshes.part_mesh import (
+    PartMesh,
+    TriangleSoup,
+    close_surface,
+    read_triangles,
+    select_triangles,
+)
+from chamberopt.geometry.meshes.surface_error import OpenSurfaceError, format_point
+from chamberopt.geometry.solids import Solid, make_solid, overlap_volume, snap_to_grid, unite
+from chamberopt.geometry.triangles import area_vectors, find_shells, find_unwalled_border
+
+FLATNESS = 2e-6  # m: rounding in a text file may lift a sonotrode's corners by this much
+AXIS_TOLERANCE = 1e-6  # rad: a direction this close to an axis of the file is taken as that axis
+VOLUME_TOLERANCE = 1e-6  # relative
+FACING_TOLERANCE = 1e-3  # share of the area that triangles facing another way may take away
+
+
+@dataclass(frozen=True)
+class Setup:
+    """The set-up as drawn, with the face of its sonotrode at z = 0 and facing up."""
+
+    room: ShapeSurface  # without the part if that is a separate body
+    # In the file's frame, normals out of the part, with the notes on the whole set-up. It is a
+    # piece of the room's surface unless it is a separate body.
+    part: PartMesh
+    turn: np.ndarray  # rotation from the file's frame, shape (3, 3), before the shift
+    shift: np.ndarray  # [m], shape (3,)
+    distance: float  # from the sonotrode to the lowest point of the part [m]
+
+
+def read_setup(path: Path, unit: str, part: tuple[str, ...], sonotrode: tuple[str, ...]) -> Setup:
+    """The set-up in a file, which is read again only after it has changed.
+
+    `part` and `sonotrode` (its face) are names of the file's groups. InputError if a name is not in
+    the file, the room is not closed, or the face is not flat.
+    """
+    try:
+        stamp = path.stat()
+    except OSError:
+        read_triangles(path, unit)  # its error names what is wrong
+        raise
+    return _read_once(path, unit, part, sonotrode, stamp.st_mtime_ns, stamp.st_size)
+
+
+@lru_cache(maxsize=4)
+def _read_once(
+    path: Path,
+    unit: str,
+    part: tuple[str, ...],
+    sonotrode: tuple[str, ...],
+    _changed: int,
+    _size: int,
+) -> Setup:
+    read = read_triangles(path, unit)
+    in_part = _select_some(read, part, "chamber.part")
+    in_face = _select_some(read, sonotrode, "chamber.sonotrode")
+    if count := (in_part & in_face).sum():
+        raise InputError(f"chamber.part: {count} of its triangles are the sonotrode's too")
+    body, whole = _separate_part(read, in_part)
+    mesh, room_notes = _room_over_sonotrode(whole, sonotrode)
+    in_part = select_triangles(mesh.groups, part, len(mesh.triangles), "chamber.part")
+    in_face = select_triangles(mesh.groups, sonotrode, len(mesh.triangles), "chamber.sonotrode")
+    turn, shift, turn_notes = _pose(mesh, in_face)
+    vertices = snap_to_grid(mesh.vertices @ turn.T + shift)
+    vertices[np.unique(mesh.triangles[in_face]), 2] = 0.0
+    border = find_unwalled_border(vertices, mesh.triangles, in_face)
+    if border is not None:
+        place = format_point(turn.T @ (border - shift))
+        why = "walls must rise from it all round, as a moving edge is not supported"
+        raise InputError(f"chamber.sonotrode: its face has a free edge at {place}: {why}")
+    tags = np.select([in_face, in_part], [TAG_SONOTRODE, TAG_PART], TAG_WALL).astype(np.uint8)
+    source = None
+    if body is None:
+        body = _piece_of_part(mesh, in_part)
+        source = np.where(in_part, np.cumsum(in_part) - 1, -1).astype(np.int32)
+    notes = tuple(dict.fromkeys((*body.notes, *mesh.notes, *room_notes, *turn_notes)))
+    lowest = snap_to_grid(body.vertices @ turn.T + shift)[:, 2].min()
+    room = ShapeSurface(vertices, mesh.triangles, tags, source)
+    return Setup(room, replace(body, notes=notes), turn, shift, float(lowest))
+
+
+def _select_some(read: TriangleSoup, names: tuple[str, ...], field: str) -> np.ndarray:
+    """The triangles with these names, (m,) bool; InputError if they are none or all."""
+    chosen = select_triangles(read.groups, names, len(read.corners), field)
+    if not chosen.any() or chosen.all():
+        what = "all" if chosen.any() else "none"
+        raise InputError(f"{field}: {list(names)} are {what} of the triangles of {read.path.name}")
+    return chosen
+
+
+def _separate_part(read: TriangleSoup, in_part: np.ndarray) -> tuple[PartMesh | None, PartMesh]:
+    """The part as a closed body, and the closed surface of the rest.
+
+    None and the whole surface where only a piece of the part's surface is drawn.
+    """
+    try:
+        body = close_surface(read, in_part)
+    except OpenSurfaceError:
+        return None, close_surface(read)
+    try:
+        return body, close_surface(read, ~in_part)
+    except OpenSurfaceError as error:
+        open_rest = error
+    try:
+        return None, close_surface(read)  # the piece was a closed body only because it was healed
+    except OpenSurfaceError:
+        why = "chamber.part is a closed body, so that what is around it must be closed without it"
+        message = f"{open_rest}; {why}"
+        raise OpenSurfaceError(message, open_rest.corners, open_rest.edges) from None
+
+
+def _pick(mesh: PartMesh, triangles: np.ndarray, rows: np.ndarray) -> PartMesh:
+    """The rows (m,) bool of the triangles (m, 3), with their vertices, groups and numbers."""
+    used, numbers = np.unique(triangles[rows], return_inverse=True)
+    return replace(
+        mesh,
+        vertices=mesh.vertices[used],
+        triangles=numbers.reshape(-1, 3).astype(np.int32),
+        numbering=mesh.numbering.select(rows),
+        groups={name: mask[rows] for name, mask in mesh.groups.items()},
+    )
+
+
+def _piece_of_part(mesh: PartMesh, in_part: np.ndarray) -> PartMesh:
+    """The part as the piece of the room's surface that it bounds, in the order of the room."""
+    if not in_part.any():
+        text = "none of it bounds the room over the sonotrode; check the groups of the file"
+        raise InputError(f"chamber.part: {text}")
+    piece = _pick(mesh, mesh.triangles[:, ::-1], in_part)
+    return replace(piece, groups={name: own for name, own in piece.groups.items() if own.any()})
+
+
+def _room_over_sonotrode(mesh: PartMesh, sonotrode: tuple[str, ...]) -> tuple[PartMesh, list[str]]:
+    """The closed surface with the sonotrode and the bodies in it, facing out of the room; notes.
+
+    What lies around it, such as the outside of a chamber with thick walls, is left out.
+    """
+    face = select_triangles(mesh.groups, sonotrode, len(mesh.triangles), "chamber.sonotrode")
+    facing = area_vectors(mesh.vertices, mesh.triangles[face])
+    total_area = np.linalg.norm(facing, axis=1).sum()
+    if np.linalg.norm(facing.sum(axis=0)) < (1.0 - FACING_TOLERANCE) * total_area:
+        text = "its triangles are not flat, they face different ways; name one flat face"
+        raise InputError(f"chamber.sonotrode: {text}")
+    shells, volumes = find_shells(mesh.vertices, mesh.triangles)
+    face_shells = np.unique(shells[face])
+    if len(face_shells) != 1:
+        where = f"on {len(face_shells)} separate closed surfaces"
+        remedy = "name the one flat face that is the floor of the room"
+        raise InputError(f"chamber.sonotrode: its triangles are {where}; {remedy}")
+    outward = np.where((volumes < 0.0)[shells][:, None], mesh.triangles[:, ::-1], mesh.triangles)
+    bodies = []
+    for k in range(len(volumes)):
+        name, only = f"closed surface {k + 1} of the set-up", np.flatnonzero(shells == k)
+        bodies.append(make_solid(mesh.vertices, outward, name, only=only))
+    first = int(face_shells[0])
+    inside = [k for k in range(len(volumes)) if k != first and _is_inside(bodies[k], bodies[first])]
+    least = (1.0 - VOLUME_TOLERANCE) * sum(bodies[k].volume for k in inside)
+    if inside and unite([bodies[k] for k in inside], "").volume < least:
+        text = "closed surfaces that stand in its room overlap; unite them in the CAD program"
+        raise InputError(f"the set-up: {text}")
+    triangles = np.where(np.isin(shells, inside)[:, None], outward[:, ::-1], outward)
+    room = _pick(mesh, triangles, np.isin(shells, [first, *inside]))
+    left = len(volumes) - 1 - len(inside)
+    note = f"{left} closed surfaces that are not in the room over the sonotrode are left out"
+    return room, [note] if left else []
+
+
+def _is_inside(body: Solid, room: Solid) -> bool:
+    """Whether a body stands in the room, not beside or around it; InputError if it crosses it."""
+    common = overlap_volume(body, room)
+    smaller = min(body.volume, room.volume)
+    if VOLUME_TOLERANCE * body.volume < common < (1.0 - VOLUME_TOLERANCE) * smaller:
+        raise InputError(
+            f"the set-up: {body.name}, {1e9 * body.volume:.4g} mm³, crosses the wall of the room "
+            "over the sonotrode; unite them in the CAD program, or name it in chamber.part"
+        )
+    return common >= (1.0 - VOLUME_TOLERANCE) * body.volume
+
+
+def _pose(mesh: PartMesh, face: np.ndarray) -> tuple[np.ndarray, np.ndarray, list[str]]:
+    """Rotation (3, 3) and shift (3,) [m] that put the face at z = 0, facing up; and a note."""
+    up = -area_vectors(mesh.vertices, mesh.triangles[face]).sum(axis=0)
+    up /= np.linalg.norm(up)
+    axis = np.round(up)
+    up = axis if np.abs(up - axis).max() < AXIS_TOLERANCE else up
+    heights = mesh.vertices[np.unique(mesh.triangles[face])] @ up
+    if np.ptp(heights) > FLATNESS:
+        raise InputError(
+            "chamber.sonotrode: its triangles are not flat, they reach from "
+            f"{1e3 * heights.min():.6g} to {1e3 * heights.max():.6g} mm along their mean normal; "
+            "name the peening face alone"
+        )
+    shift = np.array([0.0, 0.0, -(heights.min() + heights.max()) / 2.0])
+    direction = (np.round(up, 4) + 0.0).tolist()
+    note = f"turned so that the direction {direction} in the file is up"
+    return _rotation_to_z(up), shift, [] if up[2] == 1.0 else [note]
+
+
+def _rotation_to_z(up: np.ndarray) -> np.ndarray:
+    """The smallest rotation (3, 3) of a unit vector to (0, 0, 1); about x from (0, 0, -1)."""
+    x, y, z = up
+    if z < -1.0 + AXIS_TOLERANCE:
+        return np.diag([1.0, -1.0, -1.0])
+    cross = np.array([[0.0, 0.0, -x], [0.0, 0.0, -y], [x, y, 0.0]])
+    return np.asarray(np.eye(3) + cross + cross @ cross / (1.0 + z))

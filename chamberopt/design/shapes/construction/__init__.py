@@ -1,1 +1,0 @@
-"""Geometry that several chamber shapes share."""

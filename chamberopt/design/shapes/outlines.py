@@ -1,0 +1,173 @@
+"""Profiles of round cavities: rounded at their corners and turned about the axis.
+
+A profile is a line of points (r, z) [m], shape (n, 2), from the sonotrode's edge to the axis.
+
+    axis
+     :______ (0, z)
+     :      \\
+     :       |   the wall
+    _:_______|   floor: from the axis to the first point, at z = 0
+"""
+
+import numpy as np
+
+from chamberopt.design.shapes.surface import MIN_LENGTH, ShapeSurface, lofted
+
+# Convex outlines in plan: their sides moved, their corners rounded.
+#
+# An outline is an array of corners (n, 2) [m], counter-clockwise.
+
+
+def corner_angles(outline: np.ndarray) -> np.ndarray:
+    """Angle [rad] by which the outline turns left at each corner, (n,)."""
+    before, after = _directions(outline)
+    cross = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
+    return np.arctan2(cross, np.einsum("ij,ij->i", before, after))
+
+
+def move_sides(outline: np.ndarray, distance: float) -> np.ndarray:
+    """Corners of the outline whose sides are moved outward by a distance [m]."""
+    before, after = _directions(outline)
+    outward = np.c_[before[:, 1] + after[:, 1], -before[:, 0] - after[:, 0]]
+    return outline + distance * outward / (1.0 + np.einsum("ij,ij->i", before, after))[:, None]
+
+
+def largest_inward_move(outline: np.ndarray) -> float:
+    """How far [m] all sides can be moved inward until one of them is only MIN_LENGTH long."""
+    tangent = np.tan(corner_angles(outline) / 2.0)
+    length = np.hypot(*(np.roll(outline, -1, axis=0) - outline).T)
+    return max(0.0, float(((length - MIN_LENGTH) / (tangent + np.roll(tangent, -1))).min()))
+
+
+def area_inside(outline: np.ndarray, distance: float = 0.0) -> float:
+    """Area [m²] of the outline whose sides are moved outward by a distance [m]."""
+    (x, y), (xn, yn) = outline.T, np.roll(outline, -1, axis=0).T
+    around = np.hypot(xn - x, yn - y).sum()
+    corners = np.tan(corner_angles(outline) / 2.0).sum()
+    area = 0.5 * (x * yn - y * xn).sum() + distance * around + distance * distance * corners
+    return float(area)
+
+
+def corner_arcs(outline: np.ndarray, facets: int) -> tuple[np.ndarray, np.ndarray]:
+    """Points of a rounded outline: the corner of each, (k,), and its direction from there, (k, 2).
+
+    Corners plus radius times directions are the outline grown by the radius. Each corner has a fan
+    from the normal of one side to that of the next, in steps of at most a full turn / facets. A
+    corner of less than half a step gets one direction, longer than 1, that moves both sides by the
+    radius.
+    """
+    before, _ = _directions(outline)
+    turn = corner_angles(outline)
+    steps = facets * turn / (2.0 * np.pi)
+    count = np.where(steps < 0.5, 0, np.ceil(steps - 1e-9)).astype(int)
+    corner = np.repeat(np.arange(len(outline)), count + 1)
+    step = np.concatenate([np.arange(n + 1) for n in count])
+    share = np.where(count[corner] > 0, step / np.maximum(count[corner], 1), 0.5)
+    angle = np.arctan2(-before[:, 0], before[:, 1])[corner] + share * turn[corner]
+    size = np.where(count > 0, 1.0, 1.0 / np.cos(turn / 2.0))[corner]
+    return corner, size[:, None] * np.c_[np.cos(angle), np.sin(angle)]
+
+
+def _directions(outline: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Unit vectors (n, 2) along the side before and the side after each corner."""
+    after = np.roll(outline, -1, axis=0) - outline
+    after /= np.hypot(*after.T)[:, None]
+    return np.roll(after, 1, axis=0), after
+
+
+def turn_angles(line: np.ndarray) -> np.ndarray:
+    """Angle [rad] by which the line turns left at each of its points, (n,); 0 at both ends."""
+    along = np.diff(line, axis=0)
+    before, after = along[:-1], along[1:]
+    cross = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
+    return np.r_[0.0, np.arctan2(cross, np.einsum("ij,ij->i", before, after)), 0.0]
+
+
+def largest_corner_radius(line: np.ndarray) -> float:
+    """Largest radius [m] to which all corners can be rounded.
+
+    The arc of radius r begins r tan(angle / 2) from its corner; two arcs must not meet.
+    """
+    tangent = np.tan(np.abs(turn_angles(line)) / 2.0)
+    length = np.hypot(*np.diff(line, axis=0).T)
+    with np.errstate(divide="ignore"):
+        return max(0.0, float(((length - MIN_LENGTH) / (tangent[:-1] + tangent[1:])).min()))
+
+
+def round_corners(line: np.ndarray, radius: float, facets: int) -> np.ndarray:
+    """The line with arcs in place of its corners, in steps of at most a full turn / facets.
+
+    The ends of arcs lie on the line. A corner of less than half a step stays as it is.
+    """
+    if radius <= MIN_LENGTH:
+        return line
+    points = [line[:1]]
+    for corner, before, after, turn in zip(
+        line[1:-1], line[:-2], line[2:], turn_angles(line)[1:-1], strict=True
+    ):
+        steps = facets * abs(turn) / (2.0 * np.pi)
+        if steps < 0.5:
+            points.append(corner[None])
+            continue
+        arriving, leaving = _unit(corner - before), _unit(after - corner)
+        centre = corner + radius / np.cos(turn / 2.0) * _unit(leaving - arriving)
+        begin = corner - radius * np.tan(abs(turn) / 2.0) * arriving - centre
+        angle = turn * np.linspace(0.0, 1.0, int(np.ceil(steps - 1e-9)) + 1)[:, None]
+        across = np.array([-begin[1], begin[0]])
+        points.append(centre + np.cos(angle) * begin + np.sin(angle) * across)
+    return np.concatenate([*points, line[-1:]])
+
+
+def find_contact(line: np.ndarray) -> np.ndarray | None:
+    """A point (2,) [m] where the line folds back or comes nearer to itself than MIN_LENGTH."""
+    sharp = np.abs(turn_angles(line)) > np.pi - 1e-3
+    if sharp.any():
+        return line[np.argmax(sharp)]
+    start, end = line[:-1], line[1:]
+    i, j = np.triu_indices(len(start), 2)
+    ends = ((i, j), (i + 1, j), (j, i), (j + 1, i))
+    apart = np.min([_distance(line[k], start[m], end[m]) for k, m in ends], axis=0)
+    near = (apart < MIN_LENGTH) | _cross(start[i], end[i], start[j], end[j])
+    return start[i[np.argmax(near)]] if near.any() else None
+
+
+def crosses_itself(line: np.ndarray) -> bool:
+    """Whether two sides of the line that are not neighbours cross."""
+    start, end = line[:-1], line[1:]
+    i, j = np.triu_indices(len(start), 2)
+    return bool(_cross(start[i], end[i], start[j], end[j]).any())
+
+
+def revolved_volume(line: np.ndarray) -> float:
+    """Volume [m³] inside the line turned about the axis: a sum of truncated cones."""
+    (r0, r1), rise = (line[:-1, 0], line[1:, 0]), np.diff(line[:, 1])
+    return float(np.pi / 3.0 * (rise * (r0 * r0 + r0 * r1 + r1 * r1)).sum())
+
+
+def revolve(line: np.ndarray, facets: int) -> ShapeSurface:
+    """The cavity under the line: `facets` flat sides for a full turn, their corners on the line."""
+    angle = 2.0 * np.pi * np.arange(facets) / facets
+    circle = np.c_[np.cos(angle), np.sin(angle)]
+    rings = [np.c_[r * circle, np.full(facets, z)] for r, z in line[:-1]]
+    flat = line[-1, 1] == line[-2, 1]
+    return lofted(rings, None if flat else np.array([0.0, 0.0, line[-1, 1]]))
+
+
+def _unit(vector: np.ndarray) -> np.ndarray:
+    return vector / np.hypot(*vector)
+
+
+def _distance(point: np.ndarray, start: np.ndarray, end: np.ndarray) -> np.ndarray:
+    """Distance [m] of points (k, 2) from straight pieces, one each."""
+    along = end - start
+    share = np.einsum("ij,ij->i", point - start, along) / np.einsum("ij,ij->i", along, along)
+    return np.hypot(*(point - start - np.clip(share, 0.0, 1.0)[:, None] * along).T)
+
+
+def _cross(a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray) -> np.ndarray:
+    """Whether pieces ab and cd cross, (k,) bool."""
+
+    def side(p: np.ndarray, q: np.ndarray, x: np.ndarray) -> np.ndarray:
+        return np.sign((q - p)[:, 0] * (x - p)[:, 1] - (q - p)[:, 1] * (x - p)[:, 0])
+
+    return (side(a, b, c) * side(a, b, d) < 0.0) & (side(c, d, a) * side(c, d, b) < 0.0)

@@ -1,0 +1,88 @@
+"""The closed surface that a shape makes, with a tag on each triangle."""
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from chamberopt.common.toml_errors import CrossCheckError, Problem
+
+# Smallest lengths of a cavity, and errors that name the largest value that still makes one.
+
+# Shorter sides and smaller radii count as 0 [m]: a fiftieth of usual shot, far above the grid that
+# solids are rounded to.
+MIN_LENGTH = 5e-5
+MIN_LENGTH_MM = 1e3 * MIN_LENGTH
+
+
+def refuse_above(key: str, given: float, limit: float, why: str) -> None:
+    """Raise CrossCheckError if the value of a key [mm or degrees] exceeds a limit of its sign."""
+    if abs(given) > abs(limit):
+        fits = math.trunc(limit * 1e3) / 1e3  # rounded towards 0, so that this value does fit
+        text = f"given {given:g}, {why}; {fits:.7g} is the furthest that fits"
+        raise CrossCheckError([Problem(key, text)])
+
+
+def refuse_meeting_walls(slope: float, limits: Iterable[float], inclination_deg: float) -> None:
+    """Raise CrossCheckError if walls lean in so far that they meet below the ceiling.
+
+    Slope is the tangent of the inclination, outward; `limits` has the least that each wall allows.
+    """
+    least = max(limits, default=-math.inf)
+    if slope < least:
+        why, limit_deg = "with which walls meet below the ceiling", math.degrees(math.atan(least))
+        refuse_above("inclination_deg", inclination_deg, limit_deg, why)
+
+
+# Further sonotrodes have the tags from 3 on, in the design's order.
+TAG_PART, TAG_SONOTRODE, TAG_WALL = 0, 1, 2
+
+
+def further_sonotrode_tag(k: int) -> int:
+    """Tag of sonotrodes.k of a design."""
+    return TAG_WALL + 1 + k
+
+
+def is_sonotrode(tags: np.ndarray) -> np.ndarray:
+    """Which tags (k,) belong to a sonotrode, the first or a further one."""
+    return (tags == TAG_SONOTRODE) | (tags > TAG_WALL)
+
+
+@dataclass(frozen=True)
+class ShapeSurface:
+    """The cavity before the part is taken out of it."""
+
+    vertices: np.ndarray  # [m], shape (n, 3), float64
+    triangles: np.ndarray  # shape (k, 3), int32; closed, normals pointing out of the cavity
+    tags: np.ndarray  # shape (k,), uint8
+    # Shape (k,), int32: the part triangle that each TAG_PART triangle lies on, else -1. None where
+    # the part is a separate body that still has to be cut out.
+    source: np.ndarray | None = None
+
+
+def lofted(rings: Sequence[np.ndarray], peak: np.ndarray | None = None) -> ShapeSurface:
+    """Closed surface through rings of points, lowest first; its floor is the sonotrode.
+
+            ____ ring 1      ceiling: a fan about its middle, or about a peak
+           /____\\
+           |    | ring 0     floor: a fan about its middle
+
+    Rings are points [m], each (n, 3) with the same n, round a convex outline, counter-clockwise
+    from above; the peak is [m], (3,). There are 2 n triangles a ring.
+    """
+    n, k = len(rings[0]), len(rings)
+    middle = rings[-1].mean(axis=0) if peak is None else peak
+    vertices = np.concatenate([*rings, [rings[0].mean(axis=0), middle]])
+    here, beside = np.arange(n), (np.arange(n) + 1) % n
+    floor = np.c_[np.full(n, k * n), beside, here]
+    sides = []
+    for ring in range(k - 1):
+        low, high = ring * n, (ring + 1) * n
+        sides.append(np.c_[low + here, low + beside, high + beside])
+        sides.append(np.c_[low + here, high + beside, high + here])
+    top = (k - 1) * n
+    ceiling = np.c_[np.full(n, k * n + 1), top + here, top + beside]
+    triangles = np.concatenate([floor, *sides, ceiling]).astype(np.int32)
+    tags = np.repeat(np.array([TAG_SONOTRODE, TAG_WALL], dtype=np.uint8), [n, len(triangles) - n])
+    return ShapeSurface(vertices, triangles, tags)

@@ -1,0 +1,111 @@
+"""A comparison as text: what differs, every figure, and whether each difference is real."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from chamberopt.common.estimate import CONFIDENCE, Estimate
+from chamberopt.common.number_text import estimate_text
+from chamberopt.results.compare.comparison import Comparison
+from chamberopt.results.compare.difference import MAX_TIME_RATIO, Difference
+
+HEADER = ("difference", "real", "to know: simulate")
+
+
+def comparison_text(comparison: Comparison) -> str:
+    """Return one table for two candidates; for more, one of figures and then one of differences."""
+    first, *later = comparison.labels
+    rows = [
+        [name, *(_shown(value) for value in values)]
+        for name, values in comparison.parameters.items()
+    ]
+    if not rows:
+        rows = [["the designs do not differ"]]
+    figures = {
+        name: [estimate_text(estimate) for estimate in estimates]
+        for name, estimates in comparison.metrics.items()
+    }
+    gaps = {
+        name: [_cells(gap) for gap in several] for name, several in comparison.differences.items()
+    }
+    if len(later) == 1:
+        heads = [f"{later[0]} - {first}", *HEADER[1:]]
+        rows += [[name, *cells, *gaps[name][0]] for name, cells in figures.items()]
+        blocks = [_aligned([["", *comparison.labels, *heads], *rows])]
+    else:
+        rows += [[name, *cells] for name, cells in figures.items()]
+        blocks = [_aligned([["", *comparison.labels], *rows])]
+        for k, label in enumerate(later):
+            table = [[f"{label} - {first}", *HEADER], *([name, *gaps[name][k]] for name in figures)]
+            blocks.append(_aligned(table))
+    return "\n\n".join(["\n".join(block) for block in blocks] + ["\n".join(_legend(comparison))])
+
+
+def _legend(comparison: Comparison) -> list[str]:
+    """Lines that explain the table."""
+    first, *later = comparison.labels
+    lines = [
+        "(±: 95 % interval. real: the difference is larger than its interval, which holds for each "
+        "figure alone."
+    ]
+    if any(gap.replicas for several in comparison.differences.values() for gap in several):
+        lines.append(
+            "to know: how many times as long to simulate, and replicas, if the difference is as "
+            "large as it looks; even then it shows in one case of two."
+        )
+    if len(later) > 1:
+        lines.append(
+            f"Differences have intervals of {100.0 * comparison.confidence:.4g} %, so that all "
+            f"{len(later)} of a figure hold together with {100.0 * CONFIDENCE:g} % (Bonferroni)."
+        )
+    for k, label in enumerate(later):
+        paired = [several[k].paired for several in comparison.differences.values()]
+        if any(paired):
+            lines.append(f"{label} - {first}: paired, replica by replica on the same seeds.")
+        elif comparison.results[k + 1].seeds == comparison.results[0].seeds:
+            lines.append(
+                f"{label} - {first}: taken as independent, because the numbers of replicas differ."
+            )
+        else:
+            lines.append(f"{label} - {first}: independent, on other seeds.")
+    if any(gap.in_words for several in comparison.differences.values() for gap in several):
+        lines.append(
+            "not resolved: too few dents were simulated for this figure; notes of the results say "
+            "how many it takes."
+        )
+    return [*lines[:-1], lines[-1] + ")"]
+
+
+def _cells(gap: Difference) -> list[str]:
+    """Cells of a difference: its value, whether it is real, and what it takes to know."""
+    shown = estimate_text(Estimate(gap.value, gap.half_width, in_words=gap.in_words), sign=True)
+    if gap.half_width == 0.0 and not gap.in_words:
+        return [shown, "exact", ""]
+    if gap.value == 0.0 or gap.in_words:
+        return [shown, "no", ""]
+    if gap.real:
+        return [shown, "yes", ""]
+    if gap.time_ratio is None or gap.replicas is None:
+        return [shown, "no", f"more than {MAX_TIME_RATIO} × as long"]
+    return [shown, "no", f"{_times(gap.time_ratio)} × as long, {gap.replicas} replicas"]
+
+
+def _times(times: float) -> str:
+    return f"{times:.1f}" if times < 10.0 else f"{math.ceil(times)}"
+
+
+def _shown(value: Any) -> str:
+    return "-" if value is None else f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def _aligned(rows: Sequence[Sequence[str]]) -> list[str]:
+    """Align the cells of rows; the first row is the header."""
+    count = max(map(len, rows))
+    whole = [[*row, *[""] * (count - len(row))] for row in rows]
+    widths = [max(len(row[i]) for row in whole) for i in range(count)]
+    return [
+        "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
+        for row in whole
+    ]

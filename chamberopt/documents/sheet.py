@@ -1,0 +1,380 @@
+"""What a process sheet says: blocks of names and values, from what a result holds."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import PurePath
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from chamberopt.chamber.checks.fillets import LEFT
+from chamberopt.common.estimate import Estimate
+from chamberopt.common.number_text import estimate_text
+from chamberopt.design.calibration import why_no_intensity
+from chamberopt.design.tolerances import tolerance_box
+from chamberopt.documents.sections import LIMITS_OF_CALIBRATED, LIMITS_OF_INTERVALS
+from chamberopt.documents.wording import interval_text, metric_label, per_cent, plain
+
+if TYPE_CHECKING:
+    from chamberopt.design.sonotrode import VibratingFace
+    from chamberopt.results.load import Result
+    from chamberopt.results.records import CoverageAtTime
+
+# What the figures of a process sheet do not hold, in words for a shop, before its warnings.
+
+TIME = "time_to_98_s"
+
+
+def cautions(result: Result, contents: Mapping[str, Any]) -> Iterator[str]:
+    """Sentences on what is simulated otherwise than it is done, and on what is not reached."""
+    yield from _time(result, contents)
+    if result.design.effects.friction is None:
+        yield (
+            "Simulated without friction. With it the shot was 22 to 47 % slower in a cylinder (mu "
+            "0.1 to 0.5), and coverage takes longer: rely on these times only once the coverage "
+            "measured first agrees."
+        )
+    if any(note.startswith(LEFT) for note in contents["notes"]):
+        yield (
+            "The part's file has coarse facets in the place of its rounds, which were not divided: "
+            "coverage and times are those of the facets."
+        )
+    if any("without a holder" in note for note in contents["notes"]):
+        yield "The part is held in the air: its holder is neither designed nor simulated."
+    ends = [note.partition(" = ")[0] for note in contents["notes"] if " lies on its " in note]
+    if ends:
+        yield (
+            f"The search ended on its bounds of {', '.join(ends)}: a better chamber may lie beyond."
+        )
+
+
+def _time(result: Result, contents: Mapping[str, Any]) -> Iterator[str]:
+    """Whether the peening time is shorter than what covers the target."""
+    time, planned = result.metrics.get(TIME), result.design.process.treatment_time
+    if time is None or time.in_words == "not resolved" or time.value <= planned:
+        return
+    if time.in_words == "never":
+        yield "95 % of the target's area is never 98 % covered, however long it is peened."
+        return
+    row = next(one["result"] for one in contents["metrics"] if one["name"] == TIME)
+    needed = time.in_words or f"{interval_text(row)} s"
+    yield (
+        f"The peening time of {plain(planned)} s is too short: 95 % of the target's area is 98 % "
+        f"covered after {needed}."
+    )
+
+
+MOST_ROWS = 4  # of zones, tolerances, sizes of shot: more are left to the report
+MOST_KEYS = 8  # of the chamber
+MOST_WARNINGS = 2
+UNITS = {"_mm": "mm", "_deg": "degrees", "_um": "µm"}
+EXPECTED = (
+    "mean_coverage",
+    "p05_coverage",
+    "time_to_98_s",
+    "exposure",
+    "almen_intensity",
+    "almen_intensity_p05",
+    "almen_intensity_p95",
+    "strength_um",
+    "saturation_time_s",
+    "compression_depth_um",
+)
+DROP_SPEED = 3.0  # m/s, as of a ball that falls 0.46 m; docs/peening.md
+KINDS = ("arc heights", "coverage", "dent diameters", "ball drops", "amplitude", "impact rates")
+
+Row = tuple[str, str]  # a name and its value; with the name "" a sentence
+Contents = Mapping[str, Any]  # of report_contents
+
+
+@dataclass(frozen=True)
+class Block:
+    """A title with rows below it."""
+
+    title: str
+    rows: tuple[Row, ...]
+
+
+@dataclass(frozen=True)
+class Check:
+    """What to measure before production, and what is expected of it."""
+
+    what: str
+    expected: str
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """All that a sheet says.
+
+    name: of the result.
+    kind: what it is.
+    answer: as in the report.
+    calibration: what the machine was calibrated by.
+    """
+
+    name: str
+    kind: str
+    answer: str
+    blocks: list[Block]
+    measure_first: list[Check]
+    calibration: str
+
+
+def setting_blocks(result: Result, contents: Contents, face_mm: tuple[float, ...]) -> list[Block]:
+    """What is built and set, expected and allowed.
+
+    Args:
+        face_mm: size of the sonotrode, as face_size_mm gives it.
+    """
+    found = (
+        ("Part and pose", _part(result, contents)),
+        ("Chamber", _chamber(result)),
+        ("Sonotrode", _sonotrode(result, face_mm)),
+        ("Shot", _shot(result)),
+        ("Made with", _identity(result, contents)),
+        ("Peening, and what to expect", _expected(result, contents)),
+        ("Zones and limits", _zones(contents)),
+        ("Tolerances", _tolerances(result, contents)),
+        ("Not in these figures", (("", text) for text in cautions(result, contents))),
+        ("Warnings", _warnings(contents)),
+    )
+    return [Block(title, tuple(rows)) for title, rows in ((t, [*r]) for t, r in found) if rows]
+
+
+def _part(result: Result, contents: Contents) -> Iterator[Row]:
+    part, turn = result.design.part, result.design.effects.part_turn
+    yield "part", contents["question"]["part"]
+    metal = result.design.materials.part
+    yield "metal", f"{metal.alloy or 'not named'}, {plain(metal.hardness_HB)} HB"
+    if result.design.chamber.shape == "imported":
+        yield "pose", "as drawn with its chamber"
+    else:
+        turns = [
+            f"{plain(angle)}° about {axis}"
+            for axis, angle in zip("xyz", part.rotate_deg, strict=True)
+            if angle
+        ]
+        yield "turned", ", then ".join(turns) or "as in its file"
+        x, y = part.offset_mm
+        yield "offset from the axis", f"x {plain(x)} mm, y {plain(y)} mm" if x or y else "none"
+        distance = result.design.chamber.sonotrode_distance_mm
+        yield "sonotrode to lowest point", f"{plain(distance)} mm"
+    if turn is not None:
+        swing = (
+            f"{plain(turn.angle_deg or 0.0)}° to each side at {plain(turn.frequency_hz or 0)} Hz"
+        )
+        axis = ", ".join(plain(one) for one in turn.axis)
+        speed = swing if turn.rpm is None else f"{plain(turn.rpm)} turns a minute"
+        yield "turns", f"{speed} about the file's axis ({axis})"
+    area = contents["question"]["target"]["target_exposed_area_mm2"]
+    share = per_cent(contents["field"]["reachable_share"])
+    if area:
+        yield "target", f"{plain(area)} mm² in the chamber; the shot can reach {share} of it"
+
+
+def _chamber(result: Result) -> Iterator[Row]:
+    table = result.design.chamber.model_dump(mode="json", exclude_none=True)
+    yield "shape", PurePath(table.pop("shape")).name
+    for key in ("sonotrode_distance_mm", "facets", "mesh", "unit"):
+        table.pop(key, None)
+    counted = {key: table.pop(key, ()) for key in ("holes", "deflectors")}
+    rows = [_key_row(key, value) for key, value in table.items() if value not in (0, 0.0, [])]
+    yield from rows[:MOST_KEYS]
+    yield from _more(rows, MOST_KEYS, "more numbers")
+    for what, several in counted.items():
+        if several:
+            yield what, f"{len(several)}: see the report"
+    if volume := result.record.chamber.volume_mm3:
+        yield "free volume", f"{plain(1e-3 * volume)} cm³"
+
+
+def _key_row(key: str, value: Any) -> Row:
+    """A number of the chamber by its name in the file, with its unit apart."""
+    unit = next((unit for end, unit in UNITS.items() if key.endswith(end)), "")
+    name = key.removesuffix(next(end for end in UNITS if UNITS[end] == unit)) if unit else key
+    if isinstance(value, bool):
+        text = "yes" if value else "no"
+    elif isinstance(value, int | float):
+        text = f"{plain(value)} {unit}".rstrip()
+    else:
+        names = value if isinstance(value, list) else [value]
+        is_text = all(isinstance(one, str) for one in names)
+        text = ", ".join(names) if is_text else "see the report"
+    return name.replace("_", " "), text
+
+
+def _sonotrode(result: Result, face_mm: tuple[float, ...]) -> Iterator[Row]:
+    design = result.design
+    size = " × ".join(map(plain, face_mm))
+    yield "face", f"Ø {size} mm" if len(face_mm) == 1 else f"{size} mm"
+    yield "frequency", f"{plain(design.sonotrode.frequency_khz)} kHz"
+    yield "amplitude", _amplitude(design.sonotrode)
+    yield "peak speed of the face", f"{plain(design.sonotrode.peak_speed, 3)} m/s"
+    if design.calibration is not None:
+        factor = plain(design.calibration.factor("amplitude"), 3)
+        yield "calibrated to", f"{factor} times the amplitude that is set"
+    for one in design.sonotrodes[:MOST_ROWS]:
+        place = ", ".join(plain(x) for x in one.at_mm)
+        yield f"further, Ø {plain(one.diameter_mm)} mm", f"at ({place}) mm: {_amplitude(one)}"
+    yield from _more(design.sonotrodes, MOST_ROWS, "more sonotrodes")
+
+
+def _amplitude(face: VibratingFace) -> str:
+    one = face.zero_to_peak_um
+    return f"{plain(one)} µm zero-to-peak = {plain(2.0 * one)} µm peak to valley"
+
+
+def _shot(result: Result) -> Iterator[Row]:
+    shot = result.design.shot
+    yield "material", f"{shot.material or 'not named'}, {plain(shot.density)} kg/m³"
+    several = len(shot.sizes) > 1
+    for diameter, count in shot.sizes[:MOST_ROWS]:
+        mass = 1e3 * shot.density * np.pi / 6.0 * diameter**3 * count
+        text = f"{count:,} of Ø {plain(1e3 * diameter)} mm"
+        yield "balls", f"{text}, {plain(mass, 3)} g" if several else text
+    yield from _more(shot.sizes, MOST_ROWS, "more sizes")
+    yield "mass of these balls", f"{plain(_weighed_g(result))} g (asked: {plain(shot.mass_g)} g)"
+
+
+def _weighed_g(result: Result) -> float:
+    """Mass of the whole balls [g]."""
+    return 1e3 * result.design.shot.ball_mass * result.design.shot.count
+
+
+def _expected(result: Result, contents: Contents) -> Iterator[Row]:
+    """Peening time and figures; where the design is not calibrated, why there is no mmA."""
+    yield "peening time", f"{plain(result.design.process.treatment_time)} s"
+    objective, *others = contents["metrics"]
+    calibration = result.design.calibration
+    has_intensity = calibration is not None and calibration.has_strips
+    for row in (objective, *others):
+        if row is objective or row["name"] in EXPECTED:
+            if row["name"] == "strength_um" and has_intensity:
+                continue
+            yield row["label"], interval_text(row["result"], row["unit"])
+    if reason := why_no_intensity(calibration):
+        yield "", f"{reason[0].upper()}{reason[1:]}."
+    for one in contents["answer_lines"]:
+        if one.about in ("best", "calibration"):  # zones have a block of their own
+            yield "", one.text
+    limits = LIMITS_OF_CALIBRATED if contents["calibrated"] else LIMITS_OF_INTERVALS
+    yield "", f"± 95 % intervals. {limits}"
+
+
+def _zones(contents: Contents) -> Iterator[Row]:
+    """A sentence for each zone, those whose limits are not met first."""
+    lines = [one for one in contents["answer_lines"] if one.about == "zone"]
+    lines.sort(key=lambda line: not line.warns)
+    for one in lines[:MOST_ROWS]:
+        yield "", one.text
+    yield from _more(lines, MOST_ROWS, "more zones")
+
+
+def _tolerances(result: Result, contents: Contents) -> Iterator[Row]:
+    """Ranges, and what they cost if the result holds that."""
+    box = tolerance_box(result.design)
+    for name, (low, high) in [*box.items()][:MOST_ROWS]:
+        yield name, f"{plain(low)} to {plain(high)}, as designed {plain(result.design.value(name))}"
+    yield from _more(box, MOST_ROWS, "more tolerances")
+    found = contents["tolerances"]
+    if not box:
+        yield "", "The design has no [tolerances]: how far its numbers may be off is not known."
+    elif found is None:
+        yield "", "What they cost was not simulated: chamberopt simulate --tolerances tells it."
+    else:
+        wanted = [metric_label(name).text for name in ("almen_intensity", "mean_coverage")]
+        figures = found["figures"]
+        chosen = [figures[0], *(one for one in figures[1:] if one["label"] in wanted)]
+        for one in chosen[:3]:
+            q05, q95 = (interval_text(one[end]) for end in ("q05", "q95"))
+            corner = one["corner"]
+            worst = f"; worst {interval_text(corner['simulated'])}" if corner else ""
+            unit = f" [{one['unit']}]" if one["unit"] else ""
+            yield f"{one['label']}{unit}", f"5 % below {q05}; 5 % above {q95}{worst}"
+
+
+def _warnings(contents: Contents) -> Iterator[Row]:
+    warnings = contents["warnings"]
+    if warnings is None:
+        yield "", "The design was not checked: chamberopt check lists its warnings."
+    elif not warnings:
+        yield "", "There are none."
+    for text in (warnings or ())[:MOST_WARNINGS]:
+        yield "", text
+    yield from _more(warnings or (), MOST_WARNINGS, "more warnings")
+    if contents["notes"]:
+        yield "", f"Notes in the report: {len(contents['notes'])}."
+
+
+def _identity(result: Result, contents: Contents) -> Iterator[Row]:
+    record = result.record
+    yield "program", f"chamberopt {record.versions['chamberopt']}"
+    yield "simulated", f"{contents['made'][:10]}, {record.replicas} replicas"
+    yield "seed", contents["identity"]["seed"]
+    yield "part, sha256", record.part_sha256
+    if record.shape_sha256:
+        yield "shape, sha256", record.shape_sha256
+    yield "result, sha256", record.sha256
+
+
+def first_checks(result: Result) -> list[Check]:
+    """What to measure first, with what is expected of it."""
+    design, calibration = result.design, result.design.calibration
+    wanted = 2.0 * design.sonotrode.zero_to_peak_um
+    expected = f"{plain(wanted)} µm peak to valley"
+    if calibration is not None:
+        factor, sd = calibration.factor("amplitude"), 1.96 * calibration.log_sd("amplitude")
+        low, middle, high = (plain(wanted * factor * np.exp(x), 3) for x in (-sd, 0.0, sd))
+        expected = f"{middle} ({low} to {high}) µm peak to valley where {plain(wanted)} is set"
+    found = [Check("amplitude of the face, by laser or accelerometer", expected)]
+    if calibration is None:
+        laws = {name: getattr(design.materials, name) for name in ("sonotrode", "wall", "part")}
+        what = f"ball drop: one ball at {plain(DROP_SPEED)} m/s, speed after over speed before"
+        found.append(Check(what, ", ".join(f"{k} {_restitution(x)}" for k, x in laws.items())))
+    row = _half_covered(result.record.coverage_against_time)
+    # Where the mean at the end is not resolved, its curve is not to be relied on either.
+    if row and result.metrics["mean_coverage"].has_number:
+        share = Estimate(row.mean_coverage, row.half_width)
+        what = f"mean coverage of the target after {plain(row.time_s, 3)} s"
+        found.append(Check(what, estimate_text(share, 100.0, "%")))
+    intensity = result.metrics.get("almen_intensity")
+    if intensity is None:
+        strip = "not known before: calibrates to mmA"
+        found.append(Check("A strips at 4 or 5 times, for chamberopt calibrate", strip))
+    else:
+        text = metric_label("almen_intensity").format(intensity)
+        found.append(Check("intensity by A strips at the target", text))
+    found.append(
+        Check("mass of the shot, before and after", f"{plain(_weighed_g(result))} g before")
+    )
+    return found
+
+
+def calibrated_to(result: Result) -> str:
+    """What the machine was calibrated by, and what else could be measured; "" if it was not."""
+    if result.design.calibration is None:
+        return ""
+    kinds = {misfit.kind for misfit in result.design.calibration.misfits}
+    have, lacking = ([kind for kind in KINDS if (kind in kinds) is one] for one in (True, False))
+    more = f" What it has not, and would make it surer: {', '.join(lacking)}." if lacking else ""
+    return f"The machine is calibrated by: {', '.join(have)}.{more}" if have else ""
+
+
+def _restitution(law: Any) -> str:
+    from sim_core import restitution_at
+
+    return plain(float(restitution_at(np.array(DROP_SPEED), law.restitution)), 2)
+
+
+def _half_covered(rows: list[CoverageAtTime]) -> CoverageAtTime | None:
+    """The row of the curve nearest to half coverage, where counting tells most."""
+    return min(rows, key=lambda row: abs(row.mean_coverage - 0.5), default=None)
+
+
+def _more(several: Any, most: int, what: str) -> Iterator[Row]:
+    if len(several) > most:
+        more = len(several) - most
+        yield "", f"{more} {what if more > 1 else what.removesuffix('s')} in the report."

@@ -1,0 +1,130 @@
+"""Numbers of the report as text, and the label and unit of each metric and objective."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+from chamberopt.common import number_text
+from chamberopt.common.errors import InputError
+from chamberopt.common.estimate import Estimate
+from chamberopt.coverage.metrics import OBJECTIVES, find_metric, parse_objective
+
+# Sentences of an answer, with what they speak of.
+
+
+@dataclass(frozen=True)
+class AnswerLine:
+    """A sentence that belongs to the answer.
+
+    about: of which candidate or thing it speaks; "best" is the result itself.
+    warns: whether a limit is not certainly met, or the calibration has something to know.
+    """
+
+    about: Literal["zone", "best", "start", "other", "calibration"]
+    text: str
+    warns: bool
+
+
+@dataclass(frozen=True)
+class Label:
+    """Text of a metric or an objective.
+
+    Args:
+        text: name in plain words.
+        unit: of the number shown.
+        factor: number shown over number stored; negative for an objective that falls with a metric.
+        meaning: explanation, where the text needs one.
+    """
+
+    text: str
+    unit: str = ""
+    factor: float = 1.0
+    meaning: str = ""
+
+    @property
+    def in_full(self) -> str:
+        """Such as "weighted sum (mean coverage − 0.001 × ...)"."""
+        return f"{self.text} ({self.meaning})" if self.meaning else self.text
+
+    @property
+    def with_unit(self) -> str:
+        """Such as "mean coverage [%]"."""
+        return f"{self.text} [{self.unit}]" if self.unit else self.text
+
+    def format(self, estimate: Estimate, sign: bool = False) -> str:
+        """The estimate with its interval, in the unit shown."""
+        return number_text.typeset(
+            number_text.estimate_text(estimate, self.factor, self.unit, sign)
+        )
+
+    def scale(self, estimate: Estimate) -> Estimate:
+        """The interval in the unit shown."""
+        value, half_width = self.factor * estimate.value, abs(self.factor) * estimate.half_width
+        return Estimate(value, half_width, in_words=estimate.in_words)
+
+
+def metric_label(name: str) -> Label:
+    """The label of a metric; shares of the surface are shown in per cent."""
+    metric = find_metric(name)
+    if metric is None:
+        return Label(name.replace("_", " "))
+    if name.endswith("_coverage"):
+        return Label(metric.summary, "%", 100.0)
+    return Label(metric.summary, "" if metric.unit == "balls" else metric.unit)  # "number of balls"
+
+
+def objective_label(name: str) -> Label:
+    """The label of an objective: the metric's label where it is a multiple of one metric."""
+    try:
+        objective = parse_objective(name)
+    except InputError:  # written by another version of the program
+        return Label(name.replace("_", " "))
+    (metric, weight), *others = objective.terms.items()
+    if not others and weight:
+        label = metric_label(metric)
+        return Label(label.text, label.unit, label.factor / weight)
+    if name in OBJECTIVES:
+        return Label(name.replace("_", " "), meaning=objective.summary)
+    return Label("weighted sum", meaning=_sum_text(objective.terms))
+
+
+def _sum_text(terms: Mapping[str, float]) -> str:
+    """Such as "mean coverage of the target − 0.001 × number of balls"; shares are 0 to 1."""
+    text = ""
+    for name, weight in terms.items():
+        metric = find_metric(name)
+        words = metric.summary if metric else name
+        if metric and metric.unit not in ("", "balls"):
+            words += f" [{metric.unit}]"
+        words = f"({words})" if " - " in words else words
+        size = "" if abs(weight) == 1.0 else f"{plain(abs(weight))} × "
+        sign = "−" if weight < 0.0 else "+" if text else ""
+        text += f" {sign} {size}{words}" if sign else f"{size}{words}"
+    return text.strip()
+
+
+def plain(value: float | str, digits: int = 4) -> str:
+    """The number to a number of significant digits, without an exponent if it is of usual size."""
+    return number_text.typeset(number_text.plain(value, digits))
+
+
+def with_unit(value: float, unit: str = "") -> str:
+    """The number to two significant digits, with its unit."""
+    return f"{plain(value, 2)} {unit}".rstrip()
+
+
+def with_interval(value: float, half_width: float, unit: str = "", sign: bool = False) -> str:
+    """Such as "0.809 ± 0.004 mm"; exact values stand alone."""
+    return number_text.typeset(number_text.with_interval(value, half_width, unit, sign))
+
+
+def interval_text(shown: Estimate, unit: str = "", sign: bool = False) -> str:
+    """An interval in the unit shown, as text."""
+    return number_text.typeset(number_text.estimate_text(shown, unit=unit, sign=sign))
+
+
+def per_cent(value: float) -> str:
+    """A share in whole per cent."""
+    return f"{100.0 * value:.0f} %"

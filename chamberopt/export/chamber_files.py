@@ -1,0 +1,127 @@
+"""The chamber for the workshop, in mm: the cavity as one closed body, or its surfaces by name.
+
+Normals point out of the cavity. The 3MF file holds one closed object. Its triangles have named base
+materials, one for each surface; programs without materials see one body.
+
+Source: 3MF Core Specification 1.3, chapters 3.3, 4.1 and 5.1.
+"""
+
+from __future__ import annotations
+
+import zipfile
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from chamberopt.chamber.bores_and_deflectors import fitting_names
+from chamberopt.common.files import make_output_folder, new_file
+from chamberopt.design.shapes import TAG_PART, TAG_SONOTRODE, TAG_WALL, further_sonotrode_tag
+from chamberopt.results.load import load_cavity, load_result
+from chamberopt.results.vtp_files import write_stl
+
+NAMES = {TAG_PART: "part", TAG_SONOTRODE: "sonotrode", TAG_WALL: "wall"}
+PART_COLOUR, WALL_COLOUR, SONOTRODE_COLOUR = "#B9BEC4", "#9DB7CC", "#E08A2E"
+ZIP_DATE = (1980, 1, 1, 0, 0, 0)  # a fixed date: the same chamber gives the same bytes
+CORE = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02"
+MODEL = "3D/3dmodel.model"
+
+
+class NamedSurfaces(NamedTuple):
+    """A cavity and the surfaces that it consists of.
+
+    Args:
+        vertices: [mm], shape (n, 3).
+        triangles: closed, normals out of the cavity, shape (k, 3).
+        surfaces: by name, which triangles belong to it, shape (k,) bool.
+    """
+
+    vertices: np.ndarray
+    triangles: np.ndarray
+    surfaces: dict[str, np.ndarray]
+
+
+def read_cavity(folder: Path) -> NamedSurfaces:
+    """Read the chamber of a results folder.
+
+    Surfaces are named part, sonotrode and wall, and as in the design sonotrodes.0, chamber.holes.0,
+    chamber.deflectors.0 and so on.
+    """
+    result = load_result(folder)
+    chamber = load_cavity(result)
+    tags = np.asarray(chamber["tag"])
+    stored = "fitting" in chamber.array_names
+    fitting = np.asarray(chamber["fitting"]) if stored else np.full(len(tags), -1)
+    surfaces = {_name(int(tag)): (tags == tag) & (fitting < 0) for tag in np.unique(tags)}
+    for number, name in enumerate(fitting_names(result.design)):
+        surfaces[name] = fitting == number
+    surfaces = {name: own for name, own in surfaces.items() if own.any()}
+    points, triangles = np.asarray(chamber.points), np.asarray(chamber.regular_faces)
+    return NamedSurfaces(points, triangles, surfaces)
+
+
+def write_cavity(folder: Path, file: Path) -> None:
+    """Write the whole cavity as binary STL."""
+    cavity = read_cavity(folder)
+    write_stl(file, cavity.vertices, cavity.triangles)
+
+
+def write_stl_per_surface(folder: Path, out: Path) -> None:
+    """Write a binary STL of each surface of the cavity into a new folder."""
+    cavity, out = read_cavity(folder), make_output_folder(out)
+    for name, own in cavity.surfaces.items():
+        write_stl(out / f"{name}.stl", cavity.vertices, cavity.triangles[own])
+
+
+def write_3mf(folder: Path, file: Path) -> None:
+    """Write the cavity as 3MF."""
+    cavity = read_cavity(folder)
+    entries = {
+        "[Content_Types].xml": '<Types xmlns="http://schemas.openxmlformats.org/package/2006/content-types">'
+        '<Default Extension="rels" ContentType="application/'
+        'vnd.openxmlformats-package.relationships+xml"/>'
+        '<Default Extension="model" ContentType="application/'
+        'vnd.ms-package.3dmanufacturing-3dmodel+xml"/></Types>',
+        "_rels/.rels": '<Relationships xmlns="http://schemas.openxmlformats.org/package/2006/relationships">'
+        f'<Relationship Id="rel0" Target="/{MODEL}" '
+        'Type="http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"/></Relationships>',
+        MODEL: _model(cavity),
+    }
+    with new_file(file) as content, zipfile.ZipFile(content, "w") as package:
+        for name, text in entries.items():
+            entry = zipfile.ZipInfo(name, ZIP_DATE)
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            package.writestr(entry, f'<?xml version="1.0" encoding="UTF-8"?>\n{text}')
+
+
+def _model(cavity: NamedSurfaces) -> str:
+    surface = np.zeros(len(cavity.triangles), dtype=int)
+    for number, own in enumerate(cavity.surfaces.values()):
+        surface[own] = number
+    bases = [f'<base name="{name}" displaycolor="{_colour(name)}"/>' for name in cavity.surfaces]
+    vertices = [f'<vertex x="{x!r}" y="{y!r}" z="{z!r}"/>' for x, y, z in cavity.vertices.tolist()]
+    triangles = [
+        f'<triangle v1="{a}" v2="{b}" v3="{c}" pid="1" p1="{number}"/>'
+        for (a, b, c), number in zip(cavity.triangles.tolist(), surface.tolist(), strict=True)
+    ]
+    return "\n".join(
+        [
+            f'<model unit="millimeter" xml:lang="en" xmlns="{CORE}">',
+            f'<resources><basematerials id="1">{"".join(bases)}</basematerials>',
+            '<object id="2" name="chamber" type="model" pid="1" pindex="0"><mesh><vertices>',
+            *vertices,
+            "</vertices><triangles>",
+            *triangles,
+            '</triangles></mesh></object></resources><build><item objectid="2"/></build></model>',
+        ]
+    )
+
+
+def _name(tag: int) -> str:
+    return NAMES.get(tag) or f"sonotrodes.{tag - further_sonotrode_tag(0)}"
+
+
+def _colour(name: str) -> str:
+    if name.startswith("sonotrode"):
+        return SONOTRODE_COLOUR
+    return PART_COLOUR if name == "part" else WALL_COLOUR

@@ -1,0 +1,137 @@
+"""From the values of the part's triangles to the values of the elements of the part's file."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from chamberopt.geometry.triangles import areas
+
+if TYPE_CHECKING:
+    from chamberopt.geometry.meshes.part_mesh import PartMesh
+
+# Meaning of each column of part.vtp, and how the triangles of an element are combined: their sum,
+# or a mean weighted with exposed area, impacts or dents. Values are those of the field, which are
+# measured in windows round each place, as means over the triangle.
+COLUMNS = {
+    "coverage": ("share of the surface that is dented after the treatment, 0 to 1", "area"),
+    "coverage_interval": ("width of the 95 % interval of coverage at a place", "area"),
+    "dent_density": ("dented area per area after the treatment", "area"),
+    "dents_in_window": ("number of simulated dents in the window round a place", "area"),
+    "reachable": ("share of the surface that a ball can touch, 0 to 1", "area"),
+    "resolved": ("share of the surface with dents enough for its coverage, 0 to 1", "area"),
+    "impacts_per_mm2": ("impacts per mm2 in the treatment", "area"),
+    "energy_per_mm2": ("energy of impacts in the treatment, mJ/mm2", "area"),
+    "mean_normal_speed": ("mean normal speed of impacts, m/s", "impacts"),
+    "p90_normal_speed": ("90th percentile of the normal speed, m/s", "impacts"),
+    "mean_angle_deg": ("mean angle of impacts to the surface, degrees, 90 is head on", "impacts"),
+    "mean_dent_um": ("mean diameter of dents, micrometres", "dents"),
+    "strength_um": ("peening strength, micrometres", "dents"),
+    "almen_intensity_mmA": ("Almen intensity, mmA", "dents"),
+    "saturation_time_s": ("saturation time of an Almen strip, s", "dents"),
+    "compression_depth_um": ("estimated depth of compression, micrometres", "dents"),
+    "moved_um": ("distance of the smooth surface from the facets, micrometres", "area"),
+    "impacts": ("number of simulated impacts", "sum"),
+    "dents": ("number of simulated dents", "sum"),
+    "exposed_area_mm2": ("area inside the chamber, mm2", "sum"),
+    "reachable_area_mm2": ("area that a ball can touch, mm2", "sum"),
+    "target": ("1: must be covered", "any"),
+}
+ZONE_COLUMN = "zone_"  # begins the column of each zone
+
+
+def combination_of(column: str) -> tuple[str, str]:
+    """Meaning and combination of a column, as in COLUMNS."""
+    if column.startswith(ZONE_COLUMN):
+        return f"1: in the zone {column.removeprefix(ZONE_COLUMN)}", "any"
+    return COLUMNS[column]
+
+
+def _columns(surface: Any) -> tuple[str, ...]:
+    zones = (name for name in surface.cell_data if name.startswith(ZONE_COLUMN))
+    return (*COLUMNS, *zones)
+
+
+WEIGHTS = {"area": "exposed_area_mm2", "impacts": "impacts", "dents": "dents"}
+
+
+@dataclass(frozen=True)
+class ElementFields:
+    """Values of the elements of the part's file.
+
+    Args:
+        numbers: element numbers in rising order, shape (e,) int64.
+        columns: values by name of the column, shape (e,) float64; NaN where there is no value.
+    """
+
+    numbers: np.ndarray
+    columns: dict[str, np.ndarray]
+
+
+def fields_of_elements(surface: Any, number: np.ndarray) -> ElementFields:
+    """Combine the columns of part.vtp for each element.
+
+    Args:
+        surface: part.vtp as PyVista reads it.
+        number: element number of each triangle, shape (m,); 0 for triangles in no element.
+    """
+    cells = np.flatnonzero(number > 0)
+    return _combined(surface, cells, number[cells], np.ones(len(cells)), _columns(surface))
+
+
+def fields_of_remeshed_elements(
+    surface: Any, number: np.ndarray, original: PartMesh, simulated: PartMesh
+) -> ElementFields:
+    """Combine the columns where the part was simulated in other triangles than its file has.
+
+    A triangle counts for the element that contains its centre. An element that contains no centre
+    gets the values of the triangles around the centres of its own triangles. Sums are left out,
+    because triangles reach across elements.
+    """
+    cells = np.flatnonzero(number > 0)
+    small = np.flatnonzero(~np.isin(original.elements, number[cells]) & (original.elements > 0))
+    share = np.ones(len(cells))
+    if len(small):
+        from sim_core import TriangleMesh, closest_points
+
+        tags = np.zeros(len(simulated.triangles), dtype=np.uint8)
+        mesh = TriangleMesh(simulated.vertices, simulated.triangles, tags)
+        centres = original.vertices[original.triangles[small]].mean(axis=1)
+        around = closest_points(mesh, centres, float(np.ptp(original.vertices))).triangle
+        own_area = areas(original.vertices, original.triangles[small])
+        share_around = own_area / areas(simulated.vertices, simulated.triangles[around])
+        cells, share = np.r_[cells, around], np.r_[share, share_around]
+    numbers = np.r_[number[number > 0], original.elements[small]]
+    names = tuple(name for name in _columns(surface) if combination_of(name)[1] != "sum")
+    return _combined(surface, cells, numbers, share, names)
+
+
+def _combined(
+    surface: Any, cells: np.ndarray, number: np.ndarray, share: np.ndarray, names: tuple[str, ...]
+) -> ElementFields:
+    """Combine triangles (cells) by element number; share (k,) is how much of a triangle counts."""
+    numbers, element = np.unique(number, return_inverse=True)
+
+    def total(values: np.ndarray) -> np.ndarray:
+        return np.bincount(element, values, len(numbers))
+
+    columns = {}
+    for name in names:
+        if name not in surface.cell_data:
+            continue
+        values = np.asarray(surface[name], dtype=np.float64)[cells]
+        combination = combination_of(name)[1]
+        if combination == "sum":
+            columns[name] = total(values)
+        elif combination == "any":
+            columns[name] = (total(values) > 0.0).astype(np.float64)
+        else:
+            weight = np.asarray(surface[WEIGHTS[combination]])[cells] * share
+            weight = np.where(np.isfinite(values), weight, 0.0)
+            sums, weights = total(weight * np.nan_to_num(values)), total(weight)
+            columns[name] = np.divide(
+                sums, weights, out=np.full(len(numbers), np.nan), where=weights > 0.0
+            )
+    return ElementFields(numbers, columns)

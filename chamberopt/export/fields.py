@@ -1,0 +1,127 @@
+"""The fields of a result for other programs: ParaView files, Abaqus and Nastran decks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from chamberopt.chamber.part import PartOfFile
+from chamberopt.common.errors import InputError
+from chamberopt.common.files import check_new_file, require_place, write_new_texts
+from chamberopt.export.decks import abaqus_deck, nastran_deck
+from chamberopt.export.element_fields import (
+    ElementFields,
+    combination_of,
+    fields_of_elements,
+    fields_of_remeshed_elements,
+)
+from chamberopt.geometry.meshes.part_mesh import PartMesh
+from chamberopt.results.chamber_file import CHAMBER_FILE, load_chamber
+from chamberopt.results.load import Result, load_part, load_result
+from chamberopt.results.vtp_files import PART, save_surface
+
+DECKS: dict[str, Callable[[list[str], PartMesh, ElementFields], dict[str, str]]] = {
+    "abaqus": abaqus_deck,
+    "nastran": nastran_deck,
+}
+FIELD_FORMATS = ("vtp", "vtkhdf", *DECKS)
+
+
+def write_fields(folder: str | Path, path: str | Path, to: str) -> list[str]:
+    """Write the fields of a results folder to a file and return remarks for the user.
+
+    Args:
+        folder: the results folder.
+        path: the file to write; it is replaced.
+        to: "vtp" or "vtkhdf" writes the part's triangles, posed in the chamber [mm], with their
+            values. "abaqus" or "nastran" writes values by the element numbers of the
+            part's file, to be included in its deck. Where that file numbers no elements, the
+            triangles are written too, in the file's frame and unit, numbered from 1.
+
+    Raises:
+        InputError: the folder is not a result, or its files have changed since.
+    """
+    path = Path(path)
+    if to not in FIELD_FORMATS:
+        raise InputError(f"fields are not written as {to!r}; use one of {', '.join(FIELD_FORMATS)}")
+    if to not in DECKS and path.suffix.lower() != f".{to}":
+        raise InputError(
+            f"{path}: {to} files need their ending; name it {path.with_suffix('.' + to).name}"
+        )
+    require_place(path)
+    result = load_result(folder)
+    surface = load_part(result)
+    if to not in DECKS:
+        save_surface(path, surface)
+        return []
+    return _write_deck(result, surface, to, path)
+
+
+def _write_deck(result: Result, surface: Any, to: str, path: Path) -> list[str]:
+    if path.resolve() == result.design.part.mesh_path:
+        raise InputError(f"{path}: is the part's own file; choose another name")
+    part = _part_of_file(result, surface)
+    simulated, original = part.simulated, part.original
+    own = (original or simulated).numbering.own
+    number = np.asarray(surface["element"]) if own else np.arange(1, surface.n_cells + 1)
+    fields = fields_of_elements(surface, number)
+    remarks = []
+    if own and original is not None:
+        fields = fields_of_remeshed_elements(surface, number, original, simulated)
+        remarks.append(
+            "the target was simulated in triangles of target.element_mm: each element gets the "
+            "mean over the triangles whose centres it contains, and no sums"
+        )
+    if not own:
+        remarks.append(
+            f"{result.design.part.mesh_path.name} has no unique element numbers: its triangles "
+            f"are written too, in {simulated.unit}, numbered from 1"
+        )
+    added = int((number == 0).sum())
+    if added:
+        remarks.append(
+            f"left out {added} triangles that are in no element of the file: they close its holes"
+        )
+    remarks += _elements_left_out(fields)
+    meanings = [f"{name.upper()}: {combination_of(name)[0]}" for name in fields.columns]
+    decks = DECKS[to]([*_origin(result), *meanings], simulated, fields)
+    files = {path.with_stem(path.stem + suffix): text for suffix, text in decks.items()}
+    write_new_texts({check_new_file(file): text for file, text in files.items()})
+    sets = "element sets by coverage, to be included in the deck's *Assembly"
+    return [*remarks, *(f"{file.name}: {sets}" for file in files if file != path)]
+
+
+def _elements_left_out(fields: ElementFields) -> list[str]:
+    """Remarks on elements without a value; one for each number of such elements."""
+    names: dict[int, list[str]] = {}
+    for name, values in fields.columns.items():
+        names.setdefault(int(np.isnan(values).sum()), []).append(name)
+    return [
+        f"left out {without} of {len(fields.numbers)} elements, not exposed or never hit: "
+        f"{', '.join(columns)}"
+        for without, columns in names.items()
+        if without
+    ]
+
+
+def _part_of_file(result: Result, surface: Any) -> PartOfFile:
+    """The part as it was simulated, and as its file has it; InputError if they are of another."""
+    file = load_chamber(result).part.file
+    if file is None or len(file.simulated.triangles) != surface.n_cells:
+        raise InputError(
+            f"{result.folder}: {CHAMBER_FILE} and {PART} are of different parts; simulate again"
+        )
+    return file
+
+
+def _origin(result: Result) -> list[str]:
+    """Where the numbers come from, for the first lines of a deck."""
+    design, version = result.design, result.record.versions["chamberopt"]
+    return [
+        f"chamberopt {version}: simulated ultrasonic shot peening, values of each element",
+        f"part file {design.part.mesh_path.name}, sha256 {result.record.part_sha256}",
+        f"treatment time {design.process.treatment_time:g} s, seed {result.seeds[0]}",
+    ]

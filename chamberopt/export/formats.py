@@ -1,0 +1,197 @@
+"""The formats that `chamberopt export` can write, one entry a format."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from chamberopt.common.errors import InputError
+from chamberopt.geometry.meshes.units import METRES_PER
+
+if TYPE_CHECKING:
+    from chamberopt.chamber.part import Part
+
+FrameName = Literal["part", "chamber"]
+
+
+@dataclass(frozen=True)
+class ExportFormat:
+    """A format and how it is written.
+
+    Args:
+        file: name of the file in a folder of exports; a name without an ending is a folder.
+        summary: a line for --help.
+        endings: endings that the user's own file name may have.
+        writer: "module.function" in this package, called with (results folder, file, *arguments);
+            it returns remarks or None. Its module is imported when it is needed. None for impacts,
+            which are simulated again, once for all formats of impacts.
+        arguments: further arguments of the writer.
+    """
+
+    file: str
+    summary: str
+    endings: tuple[str, ...] = ()
+    writer: str | None = None
+    arguments: tuple[str, ...] = ()
+
+    def write(self, folder: Path, file: Path) -> list[str]:
+        """Write the file from a results folder and return remarks for the user."""
+        module, function = str(self.writer).split(".")
+        write = getattr(import_module(f"chamberopt.export.{module}"), function)
+        return write(folder, file, *self.arguments) or []
+
+
+STUDY = "study-csv"  # the only one for a study without a result, and for a sweep
+FORMATS = {
+    "impacts-parquet": ExportFormat(
+        "impacts.parquet",
+        "every impact: time, triangle, position, velocity, ball, dent",
+        (".parquet",),
+    ),
+    "impacts-csv": ExportFormat(
+        "impacts.csv", "the same as text; compressed with --out FILE.csv.gz", (".csv", ".csv.gz")
+    ),
+    "fields-vtp": ExportFormat(
+        "fields.vtp",
+        "the values of each triangle of the part, for ParaView",
+        (".vtp",),
+        "fields.write_fields",
+        ("vtp",),
+    ),
+    "fields-vtkhdf": ExportFormat(
+        "fields.vtkhdf", "the same as VTKHDF", (".vtkhdf",), "fields.write_fields", ("vtkhdf",)
+    ),
+    "fields-abaqus": ExportFormat(
+        "fields.inp",
+        "distributions on the elements of the part's file",
+        (".inp", ".inc"),
+        "fields.write_fields",
+        ("abaqus",),
+    ),
+    "fields-nastran": ExportFormat(
+        "fields.bdf",
+        "PLOAD4 on the elements of the part's file",
+        (".bdf", ".nas"),
+        "fields.write_fields",
+        ("nastran",),
+    ),
+    "chamber-stl": ExportFormat(
+        "chamber.stl",
+        "the cavity as one closed body, in mm",
+        (".stl",),
+        "chamber_files.write_cavity",
+    ),
+    "chamber-stl-per-tag": ExportFormat(
+        "chamber-stl",
+        "one STL for each surface of the cavity: part, sonotrode, wall ...",
+        (),
+        "chamber_files.write_stl_per_surface",
+    ),
+    "chamber-3mf": ExportFormat(
+        "chamber.3mf",
+        "the closed cavity with named surfaces, in mm",
+        (".3mf",),
+        "chamber_files.write_3mf",
+    ),
+    "tolerances-csv": ExportFormat(
+        "tolerances.csv",
+        "what each tolerance does to each figure",
+        (".csv",),
+        "tolerance_table.write_tolerance_table",
+    ),
+    STUDY: ExportFormat(
+        "study.csv",
+        "the evaluations of a study or sweep, finished or not",
+        (".csv",),
+        "study_table.write_study_table",
+    ),
+}
+
+
+def formats_by_name(names: Sequence[str]) -> dict[str, ExportFormat]:
+    """Return the formats with these names, each once.
+
+    Raises:
+        InputError: a name is unknown, or there is none.
+    """
+    if not names:
+        raise InputError(
+            f"--to: give one or more of {', '.join(FORMATS)} (chamberopt export --help)"
+        )
+    for name in names:
+        if name not in FORMATS:
+            from chamberopt.common.toml_errors import did_you_mean  # imports pydantic
+
+            raise InputError(
+                f"--to: given {name!r}; {did_you_mean(name, FORMATS)} (chamberopt export --help)"
+            )
+    return {name: FORMATS[name] for name in dict.fromkeys(names)}
+
+
+def is_file(out: Path, formats: dict[str, ExportFormat]) -> bool:
+    """Return whether --out names a file rather than a folder.
+
+    Raises:
+        InputError: it names a file, but there are several formats, or the file is of another one.
+    """
+    if not _has_ending(out, [ending for one in FORMATS.values() for ending in one.endings]):
+        return False
+    name, single = next(iter(formats.items()))
+    if len(formats) > 1:
+        raise InputError(f"--out {out}: one file for {len(formats)} formats; give a folder")
+    if not _has_ending(out, single.endings):
+        names = f"a name in {' or '.join(single.endings)}, or " if single.endings else ""
+        raise InputError(f"--out {out}: is not a file of {name}; give {names}a folder")
+    return True
+
+
+def _has_ending(path: Path, endings: Sequence[str]) -> bool:
+    return path.name.lower().endswith(tuple(endings)) if endings else False
+
+
+# Coordinate frames of exported positions and directions: of the part's file, or of the chamber.
+
+MEANING = {
+    "part": "of the part's file: its axes, its origin, its unit",
+    "chamber": "of the chamber: z up, the sonotrode's mean face at z = 0, "
+    "the chamber's axis at x = y = 0",
+}
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A frame, and how it lies in the chamber's frame.
+
+    Args:
+        name: "part" or "chamber".
+        unit: unit of its lengths.
+        rotation: applied first on the way to the chamber's frame, shape (3, 3).
+        shift: applied second [m], shape (3,).
+    """
+
+    name: FrameName
+    unit: str
+    rotation: np.ndarray
+    shift: np.ndarray
+
+    def positions(self, metres: np.ndarray) -> np.ndarray:
+        """Convert positions in the chamber's frame [m], shape (n, 3), to this frame and unit."""
+        moved: np.ndarray = (metres - self.shift) @ self.rotation / METRES_PER[self.unit]
+        return moved
+
+    def directions(self, vectors: np.ndarray) -> np.ndarray:
+        """Rotate vectors of the chamber's frame, shape (n, 3), to this frame."""
+        turned: np.ndarray = vectors @ self.rotation
+        return turned
+
+
+def frame_of(name: FrameName, part: Part) -> Frame:
+    """Return the frame of that name; lengths in the chamber's frame are in mm."""
+    if name == "chamber" or part.file is None:
+        return Frame(name, "mm", np.eye(3), np.zeros(3))
+    return Frame(name, part.unit, part.file.rotation, part.file.shift)

@@ -1,1 +1,0 @@
-"""One reader for each mesh format; elements.py makes triangles of finite elements."""

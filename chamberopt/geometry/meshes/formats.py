@@ -1,0 +1,114 @@
+"""The mesh formats that are read; a file is recognised by its content, then by its name."""
+
+from __future__ import annotations
+
+import logging
+import re
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import NamedTuple
+
+from chamberopt.common.errors import InputError
+from chamberopt.geometry.meshes.abaqus import read_abaqus
+from chamberopt.geometry.meshes.gmsh import read_gmsh
+from chamberopt.geometry.meshes.nastran import read_nastran
+from chamberopt.geometry.meshes.obj import read_obj
+from chamberopt.geometry.meshes.ply import read_ply
+from chamberopt.geometry.meshes.raw_mesh import RawMesh
+from chamberopt.geometry.meshes.step import read_step
+from chamberopt.geometry.meshes.step_tessellation import Tessellation
+from chamberopt.geometry.meshes.stl import is_binary_stl, read_stl
+from chamberopt.geometry.meshes.threemf import read_3mf
+from chamberopt.geometry.meshes.vtk import read_vtk
+
+
+class MeshFormat(NamedTuple):
+    """A mesh format and its reader."""
+
+    name: str
+    suffixes: tuple[str, ...]  # usual endings of file names
+    content: re.Pattern[bytes]  # what the file begins with, or a line that it holds
+    read: Callable[[Path, bytes], RawMesh]
+
+
+def _begins_with(pattern: str) -> re.Pattern[bytes]:
+    return re.compile(rb"\A\s*(?:" + pattern.encode() + rb")")
+
+
+def _has_line(pattern: str) -> re.Pattern[bytes]:
+    """Matches a line anywhere in the file that begins with the pattern."""
+    return re.compile(rb"^[ \t]*(?:" + pattern.encode() + rb")", re.M | re.I)
+
+
+VTK = r"# vtk DataFile|(?:<\?xml[^>]*>\s*)?<VTKFile"
+NASTRAN = r"GRID\*?(?:[ \t]+|,)[ \t]*\d|BEGIN[ \t]+BULK"
+MESH_FORMATS = (
+    MeshFormat("3MF", (".3mf",), _begins_with(r"PK\x03\x04"), read_3mf),
+    MeshFormat("STEP", (".step", ".stp"), _begins_with("ISO-10303-21"), read_step),
+    MeshFormat("PLY", (".ply",), _begins_with(r"ply\s"), read_ply),
+    MeshFormat("Gmsh", (".msh",), _begins_with(r"\$MeshFormat"), read_gmsh),
+    MeshFormat("VTK", (".vtk", ".vtp", ".vtu"), _begins_with(VTK), read_vtk),
+    MeshFormat("STL", (".stl",), _begins_with(r"solid[^\0]*facet"), read_stl),
+    MeshFormat("Nastran", (".dat", ".data", ".bdf", ".nas"), _has_line(NASTRAN), read_nastran),
+    MeshFormat("Abaqus", (".inp",), _has_line(r"\*(?:HEADING|NODE|PART)\b"), read_abaqus),
+    MeshFormat("OBJ", (".obj",), _has_line(r"v[ \t]+[-+.\d]+[ \t]+[-+.\d]"), read_obj),
+)
+HEAD = 1 << 16  # bytes in which a text file shows its format, even after comments
+BINARY_HEAD = 1 << 10
+
+
+def read_raw_mesh(path: Path, content: bytes, how: Tessellation | None = None) -> RawMesh:
+    """Read a file; `how` is for faces of CAD.
+
+    Raises:
+        InputError: the format is not known, has no faces of CAD, or is damaged or truncated.
+    """
+    found = _find_format(path, content)
+    if how is not None and found.name != "STEP":
+        raise InputError(
+            f"{path}: part.tessellation is for STEP, and the file is {found.name}, which has its "
+            "own triangles; leave it out, or see part.target.element_mm"
+        )
+    try:
+        with _libraries_quiet():
+            return found.read(path, content) if how is None else read_step(path, content, how)
+    except (InputError, MemoryError):
+        raise
+    except Exception as error:  # each library fails in its own way on a damaged file
+        text = str(error).strip() or type(error).__name__
+        raise InputError(
+            f"{path}: cannot be read as {found.name}, it is damaged or truncated "
+            f"({text.splitlines()[0][:120]}); export it again"
+        ) from None
+
+
+@contextmanager
+def _libraries_quiet() -> Iterator[None]:
+    """Suppress what libraries say of a damaged file, since the mesh is checked as a whole."""
+    before = logging.root.manager.disable
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        logging.disable(logging.ERROR)
+        try:
+            yield
+        finally:
+            logging.disable(before)
+
+
+def _find_format(path: Path, content: bytes) -> MeshFormat:
+    if is_binary_stl(content):
+        return next(one for one in MESH_FORMATS if one.name == "STL")
+    is_binary = b"\0" in content[:BINARY_HEAD]
+    head = content[: BINARY_HEAD if is_binary else HEAD]
+    for one in MESH_FORMATS:
+        if one.content.search(head):
+            return one
+    for one in MESH_FORMATS:
+        if path.suffix.lower() in one.suffixes:
+            return one
+    suffixes = ", ".join(suffix for one in MESH_FORMATS for suffix in one.suffixes)
+    raise InputError(
+        f"{path}: its mesh format is not known, by its content or name; use {suffixes}"
+    )

@@ -1,0 +1,223 @@
+"""Read the mesh of a part: one closed surface in metres, its normals outward.
+
+A file passes through these steps:
+    formats: recognise the format and read its triangles;
+    units: convert to metres;
+    healing, holes: make one closed surface of the triangles;
+    self_intersection: refuse a surface that crosses itself.
+
+What needs no guessing is put right, with a note for the user. Everything else is refused, with the
+reason and the place. The triangles keep their order and their corners, so that coverage can be
+given on the mesh of the user.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+
+from chamberopt.common import toml_errors
+from chamberopt.common.errors import InputError
+from chamberopt.common.limits import MAX_MESH_BYTES, read_limited, require_few
+from chamberopt.geometry.meshes.formats import read_raw_mesh
+from chamberopt.geometry.meshes.healing import sew_bodies, turn_outward
+from chamberopt.geometry.meshes.raw_mesh import ElementNumbers, number_by_position
+from chamberopt.geometry.meshes.self_intersection import refuse_self_intersection
+from chamberopt.geometry.meshes.step_tessellation import Tessellation
+from chamberopt.geometry.meshes.surface_error import SurfaceError
+from chamberopt.geometry.meshes.units import METRES_PER, find_unit
+from chamberopt.geometry.triangles import unit_normals
+
+MEANT = 0.5  # cosine between a facet and the normal of its surface, below which one is wrong
+
+
+@dataclass(frozen=True, eq=False)  # one that was read once is known again by its identity
+class PartMesh:
+    """A closed part in the coordinates of its file."""
+
+    vertices: np.ndarray  # (n, 3) float64 [m]
+    triangles: np.ndarray  # (m, 3) int32, in the file's order; normals point outward
+    numbering: ElementNumbers  # the file's element to which each triangle belongs
+    notes: tuple[str, ...]  # what was changed
+    sha256: str  # of the file as read
+    groups: dict[str, np.ndarray] = field(default_factory=dict)  # name -> triangles, (m,) bool
+    unit: str = "m"  # of the file's numbers
+    normals: np.ndarray | None = None  # of the surface at the corners, (m, 3, 3), if the file tells
+    is_exact: bool = False  # whether the triangles were made of the surface itself, as of STEP
+
+    @property
+    def elements(self) -> np.ndarray:
+        """Number of each triangle's element in the file, (m,) int64; 0 if it has none there."""
+        return self.numbering.elements
+
+    @property
+    def size(self) -> np.ndarray:
+        """Sides (3,) of the bounding box [m]."""
+        return np.ptp(self.vertices, axis=0)
+
+
+@dataclass(frozen=True)
+class TriangleSoup:
+    """The triangles of a file in metres, before a closed surface is made of them."""
+
+    path: Path
+    corners: np.ndarray  # (m, 3, 3) [m], in the coordinates of the file
+    numbering: ElementNumbers
+    groups: dict[str, np.ndarray]
+    notes: tuple[str, ...]
+    sha256: str
+    unit: str
+    bodies: np.ndarray  # (m,), the body of each; 0 where the file does not tell bodies apart
+    normals: np.ndarray | None = None  # as in PartMesh
+    is_exact: bool = False
+
+
+def read_part(path: Path, unit: str = "guess", how: Tessellation | None = None) -> PartMesh:
+    """Read a part whose numbers are in um, mm, cm, m or in; or guess the unit.
+
+    Args:
+        how: how fine the triangles of a STEP file are.
+
+    Raises:
+        InputError: the file is missing, empty, truncated or not finite; its surface is open, not
+            manifold or crosses itself; or it has a size that no part has.
+    """
+    soup = read_triangles(path, unit, how)
+    try:
+        return close_surface(soup)
+    except SurfaceError as error:
+        if how is not None:
+            error.args = (f"{error}; or make part.tessellation finer",)
+        raise
+
+
+def read_part_cached(path: Path, unit: str = "guess", how: Tessellation | None = None) -> PartMesh:
+    """As read_part, but reads a file again only if it has changed: a study builds many chambers."""
+    try:
+        stamp = path.stat()
+    except OSError:
+        return read_part(path, unit, how)  # raises an error that explains why
+    return _read_part_cached(path, unit, how, stamp.st_mtime_ns, stamp.st_size)
+
+
+@lru_cache(maxsize=8)
+def _read_part_cached(
+    path: Path, unit: str, how: Tessellation | None, _changed: int, _size: int
+) -> PartMesh:
+    return read_part(path, unit, how)
+
+
+def read_triangles(
+    path: Path, unit: str = "guess", how: Tessellation | None = None
+) -> TriangleSoup:
+    """Read a mesh file without making a surface of it; raises InputError as read_part."""
+    content = _read_content(path)
+    raw = read_raw_mesh(path, content, how)
+    corners = raw.corners
+    if not len(corners):
+        raise InputError(f"{path}: holds no triangles; export a surface mesh")
+    require_few(path, len(corners), "triangles")
+    bad = np.flatnonzero(~np.isfinite(corners).all(axis=(1, 2)))
+    if len(bad):
+        raise InputError(
+            f"{path}: {len(bad)} triangles have a corner that is not a number, "
+            f"the first is triangle {bad[0] + 1} of {len(corners)}; export the mesh again"
+        )
+    unit, unit_notes = find_unit(path, content, corners, unit, raw.unit)
+    corners = corners * METRES_PER[unit] + 0.0  # + 0.0 turns -0 into 0, to be one place
+    numbering, notes = raw.numbering or number_by_position(len(corners)), (*raw.notes, *unit_notes)
+    sha256 = hashlib.sha256(content).hexdigest()
+    bodies = np.zeros(len(corners), dtype=np.int64) if raw.bodies is None else raw.bodies
+    return TriangleSoup(
+        path, corners, numbering, raw.groups, notes, sha256, unit, bodies, raw.normals, raw.is_exact
+    )
+
+
+def close_surface(soup: TriangleSoup, only: np.ndarray | None = None) -> PartMesh:
+    """Make one closed surface of all triangles, or of those marked by `only` (m,).
+
+    Raises:
+        SurfaceError: with the place where the surface is open, not manifold or crosses itself.
+    """
+    path = soup.path
+    chosen = np.arange(len(soup.corners)) if only is None else np.flatnonzero(only)
+    vertices, triangles, source, healed = sew_bodies(
+        path, soup.corners[chosen], soup.bodies[chosen]
+    )
+    triangles, turned = turn_outward(path, vertices, triangles)
+    refuse_self_intersection(path, vertices, triangles)
+    given = np.where(source >= 0, chosen[source], -1)  # -1: closes a hole
+    return PartMesh(
+        vertices,
+        triangles.astype(np.int32),
+        soup.numbering.select(given),
+        tuple(f"{path.name}: {note}" for note in (*soup.notes, *healed, *turned)),
+        soup.sha256,
+        {name: (given >= 0) & mask[given] for name, mask in soup.groups.items()},
+        soup.unit,
+        _normals_at(soup, vertices[triangles], given),
+        soup.is_exact,
+    )
+
+
+def _normals_at(soup: TriangleSoup, corners: np.ndarray, given: np.ndarray) -> np.ndarray | None:
+    """Normals at the corners (k, 3, 3) of triangles, of which `given` (k,) are those of the file.
+
+    The facet's own where the file has none, or one that cannot be meant.
+    """
+    if soup.normals is None:
+        return None
+    own = np.repeat(unit_normals(corners)[:, None], 3, axis=1)
+    normals = own.copy()
+    for k in range(3):  # triangles may have been turned over, but their corners stay in place
+        for corner in range(3):
+            same = (given >= 0) & (soup.corners[given, corner] == corners[:, k]).all(axis=1)
+            normals[same, k] = soup.normals[given[same], corner]
+    normals *= np.sign(np.einsum("kci,kci->kc", normals, own))[..., None]
+    meant = np.einsum("kci,kci->kc", normals, own) > MEANT
+    return np.where(meant[..., None], normals, own)
+
+
+def select_triangles(
+    groups: Mapping[str, np.ndarray], names: Iterable[str], count: int, field: str
+) -> np.ndarray:
+    """Mark (count,) the triangles of the named groups; "all" means every triangle.
+
+    Case matters only if the file has names that differ in nothing else.
+
+    Raises:
+        InputError: the file has no group of that name; names the design's field that holds it.
+    """
+    by_lower = {name.lower(): name for name in groups}
+    chosen = np.zeros(count, dtype=bool)
+    for name in names:
+        known = name if name in groups else by_lower.get(name.lower())
+        if name == "all" and known is None:
+            chosen[:] = True
+        elif known is None:
+            hint = "its file names none: 'all'"
+            if groups:
+                hint = toml_errors.did_you_mean(name, ["all", *groups])
+            raise InputError(f"{field}: {name!r} is not a name in the part's file; {hint}")
+        else:
+            chosen |= groups[known]
+    return chosen
+
+
+def _read_content(path: Path) -> bytes:
+    """The bytes of a file that exists, can be read and is not empty."""
+    if path.is_dir():
+        raise InputError(f"{path}: is a folder; give a mesh file")
+    try:
+        content = read_limited(path, MAX_MESH_BYTES, "mesh file", follow=True)
+    except FileNotFoundError:
+        remedy = "check part.mesh, which is relative to the design file's folder"
+        raise InputError(f"{path}: no such mesh file; {remedy}") from None
+    if not content.strip():
+        raise InputError(f"{path}: the file is empty; export the mesh again")
+    return content

@@ -1,0 +1,239 @@
+"""Read STEP files, parts and assemblies, in the file's unit; names and colours are groups."""
+
+from __future__ import annotations
+
+import re
+from functools import cache
+from importlib.util import find_spec
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from chamberopt.common.errors import InputError
+from chamberopt.geometry.meshes.native_reader import NativeReader, converted
+from chamberopt.geometry.meshes.raw_mesh import RawMesh
+from chamberopt.geometry.meshes.step_tessellation import REMEDY, Tessellation
+from chamberopt.geometry.meshes.units import METRES_PER
+
+# What a STEP file says in its text: the unit of its numbers, and the names of faces.
+#
+# An entity is `#12 = TYPE('name', #7, ...);`; a complex one has several types: `#12 = (A()
+# B(#7));`.
+#
+# Source: ISO 10303-21 (exchange structure), ISO 10303-42 (geometry and topology).
+
+# A quote in a string is written twice, which reads as two strings: no text is read in two ways.
+ENTITY = re.compile(r"#(\d+)\s*=\s*\(?\s*([A-Z_0-9]+)\s*((?:'[^']*+'|[^';])*+);")
+STRING = re.compile(r"'((?:[^']|'')*+)'")
+NUMBER = re.compile(r"[-+]?\d*\.?\d+(?:\.?[Ee][-+]?\d+)?")
+REFERENCE = re.compile(r"#(\d+)")
+IGNORED = dict.fromkeys(range(32))  # characters of a string, such as the end of a line
+ESCAPE = re.compile(
+    r"\\X2\\(?P<utf16>(?:[0-9A-F]{4})+)\\X0\\|\\X4\\(?P<utf32>(?:[0-9A-F]{8})+)\\X0\\"
+    r"|\\X\\(?P<byte>[0-9A-F]{2})|\\S\\(?P<upper>.)|\\(?P<itself>\\)|'(?P<quote>')"
+)
+UNIT_ASSIGNED = re.compile(r"GLOBAL_UNIT_ASSIGNED_CONTEXT\s*\(\s*\(([^)]*)\)")
+SI_UNIT = re.compile(r"SI_UNIT\s*\(\s*(?:\.(\w+)\.|\$)\s*,\s*\.METRE\.\s*\)")
+CONVERTED_UNIT = re.compile(r"CONVERSION_BASED_UNIT\s*\(\s*'(\w+)'")
+PREFIXES = {"": "m", "MILLI": "mm", "CENTI": "cm", "MICRO": "um"}
+NAMED = {"INCH": "in", "MILLIMETRE": "mm", "MILLIMETER": "mm"}
+FACES = ("ADVANCED_FACE", "FACE_SURFACE")
+SHELLS, TURNED_SHELL = ("CLOSED_SHELL", "OPEN_SHELL"), "ORIENTED_CLOSED_SHELL"
+SOLIDS = ("MANIFOLD_SOLID_BREP", "BREP_WITH_VOIDS", "FACETED_BREP")
+BOUNDS, LOOPS = ("FACE_OUTER_BOUND", "FACE_BOUND"), ("EDGE_LOOP", "POLY_LOOP")
+# The way from a face to its corners. A curve, on which points lie too, is not on it.
+LEADS_TO = {
+    **dict.fromkeys(FACES, BOUNDS),
+    **dict.fromkeys(BOUNDS, LOOPS),
+    "EDGE_LOOP": ("ORIENTED_EDGE",),
+    "ORIENTED_EDGE": ("EDGE_CURVE",),
+    "EDGE_CURVE": ("VERTEX_POINT",),
+    "VERTEX_POINT": ("CARTESIAN_POINT",),
+    "POLY_LOOP": ("CARTESIAN_POINT",),
+}
+# Names that CAD programs give to faces that have none.
+NO_NAMES = ("", "NONE")
+
+
+class StepFace(NamedTuple):
+    """A face of a solid."""
+
+    name: str  # "" if it has none
+    middle: np.ndarray  # mean of its corners, (3,), in the file's numbers; nan if it has none
+
+
+def stated_unit(text: str) -> str | None:
+    """Unit of the lengths of a STEP file, as in part.unit; None if it is none of these."""
+    assigned = UNIT_ASSIGNED.search(text)
+    for number in REFERENCE.findall(assigned[1]) if assigned else ():
+        entity = re.search(rf"#{number}\s*=([^;]*);", text)
+        if entity and "LENGTH_UNIT" in entity[1]:
+            si, converted = SI_UNIT.search(entity[1]), CONVERTED_UNIT.search(entity[1])
+            if converted:
+                return NAMED.get(converted[1].upper())
+            return PREFIXES.get(si[1] or "") if si else None
+    return None
+
+
+def read_solids(text: str) -> list[list[StepFace]]:
+    """The faces of each solid, in the order of its shells."""
+    entities = {number: (kind, value) for number, kind, value in ENTITY.findall(text)}
+
+    def linked(number: str, kinds: tuple[str, ...]) -> list[str]:
+        """Entities of these kinds to which one refers."""
+        found = REFERENCE.findall(STRING.sub("", entities[number][1]))
+        return [one for one in found if one in entities and entities[one][0] in kinds]
+
+    @cache
+    def corners(number: str) -> frozenset[str]:
+        """The points at the ends of a face's edges."""
+        kind = entities[number][0]
+        if kind == "CARTESIAN_POINT":
+            return frozenset([number])
+        return frozenset().union(*map(corners, linked(number, LEADS_TO[kind])))
+
+    def face(number: str) -> StepFace:
+        name = STRING.search(entities[number][1])
+        texts = [STRING.sub("", entities[corner][1]) for corner in sorted(corners(number))]
+        places = [list(map(float, NUMBER.findall(text))) for text in texts]
+        middle = np.mean(places, axis=0) if places else np.full(3, np.nan)
+        return StepFace(_decoded(name[1] if name else ""), middle)
+
+    solids = []
+    for number, (kind, _) in entities.items():
+        if kind in SOLIDS:
+            shells = [
+                closed
+                for shell in linked(number, (*SHELLS, TURNED_SHELL))
+                for closed in (
+                    linked(shell, SHELLS) if entities[shell][0] == TURNED_SHELL else [shell]
+                )
+            ]
+            solids.append([face(one) for shell in shells for one in linked(shell, FACES)])
+    return solids
+
+
+def _decoded(text: str) -> str:
+    """A string of ISO 10303-21 as text; "" for a name that stands for none."""
+    text = ESCAPE.sub(_character, text.translate(IGNORED)).strip()
+    return "" if text.upper() in NO_NAMES else text
+
+
+def _character(escape: re.Match[str]) -> str:
+    """What an escape stands for; half a character becomes U+FFFD."""
+    kind = str(escape.lastgroup)
+    given = escape[kind]
+    if kind in ("utf16", "utf32"):
+        return bytes.fromhex(given).decode(f"{kind[:3]}-{kind[3:]}-be", errors="replace")
+    if kind == "byte":
+        return chr(int(given, 16))
+    return chr(ord(given) | 0x80) if kind == "upper" else given
+
+
+MESH = (
+    "from chamberopt.geometry.meshes.step_tessellation import tessellate; tessellate(*sys.argv[1:])"
+)
+READER = NativeReader("part.step", "part.npz", MESH, seconds_per_mb=60.0)
+NAMED_FACE = re.compile(r"(?:ADVANCED_FACE|FACE_SURFACE)\s*\(\s*'(?!'|NONE')")
+# Of a body's size: how far the middle of a face may be from that in the file's text.
+SAME_PLACE = 1e-4
+
+
+def read_step(path: Path, content: bytes, how: Tessellation | None = None) -> RawMesh:
+    """Mesh the bodies of a STEP file, in its own unit; an assembly's parts are placed as in it.
+
+    Groups are the names of bodies and of faces, and the colours of faces, as "#ff0000".
+    """
+    if find_spec("gmsh") is None:
+        raise InputError(f"{path}: STEP needs the package gmsh: pip install 'chamberopt[cad]'")
+    how = how or Tessellation()
+    limits = 1e3 * how.chord, how.angle, 1e3 * how.side
+    with converted(READER, path, content, *limits) as file:
+        if file is None:
+            raise InputError(f"{path}: ended its reader; {REMEDY}")
+        with np.load(file) as loaded:
+            arrays: dict[str, np.ndarray] = dict(loaded)
+    if "fault" in arrays:
+        raise InputError(f"{path}: {arrays['fault']}")
+    if not len(arrays["corners"]):
+        raise InputError(f"{path}: holds no faces; {REMEDY}")
+    try:
+        text = content.decode()
+    except UnicodeDecodeError:
+        text = content.decode("latin-1")
+    stated = stated_unit(text)
+    unit = stated or "mm"
+    mm = 1e3 * METRES_PER[unit]
+    face_of, body = arrays["face_of"], arrays["body"]
+    solids = read_solids(text) if NAMED_FACE.search(text) else []
+    names = [name.rpartition("/")[2] for name in arrays["name"]]
+    notes = [
+        f"STEP: {len(body)} faces meshed to {1e6 * how.chord:g} µm and "
+        f"{np.degrees(how.angle):.3g} degrees"
+    ]
+    if left_out := int(arrays["left_out"]):
+        what = "1 face" if left_out == 1 else f"{left_out} faces"
+        notes.append(f"STEP: {what} beside the solids, such as sketches, left out")
+    if stated is None:
+        notes.append("the file's own unit is not one of part.unit: its lengths are read in mm")
+    labels = [{names[k]} if k >= 0 else set() for k in body]
+    for k, name in enumerate(names):
+        faces = np.flatnonzero(body == k)
+        own = _face_names(solids, arrays["middle"][faces] / mm)
+        if own is None:
+            notes.append(f"the faces of {name or 'a body'} are not certain: no names for them")
+        for face, label in zip(faces.tolist(), own or (), strict=bool(own)):
+            labels[face].add(label)
+    for face, (r, g, b, visible) in enumerate(arrays["colour"].tolist()):
+        if visible:
+            labels[face].add(f"#{r:02x}{g:02x}{b:02x}")
+    groups = {
+        label: np.array([label in own for own in labels])[face_of]
+        for label in sorted(
+            {label for own in labels for label in own if label},
+            key=lambda label: (label.startswith("#"), label),  # colours last
+        )
+    }
+    return RawMesh(
+        arrays["corners"] / mm,
+        groups,
+        unit,
+        tuple(notes),
+        bodies=body[face_of],
+        normals=arrays["normals"],
+        is_exact=True,
+    )
+
+
+def _face_names(solids: list[list[StepFace]], middles: np.ndarray) -> tuple[str, ...] | None:
+    """Names of the faces of a body, in order.
+
+    Faces are in the order of the solid in the file. That it is this solid is seen from the middles
+    of its faces: moved and turned as one, they are those of the body.
+
+    Args:
+        middles: mean of each face's corners, (k, 3), in the file's numbers.
+    Returns:
+        None if no solid is the body, or several that differ in their names could be.
+    """
+    if not any(face.name for faces in solids for face in faces):
+        return ()
+    alike = {
+        tuple(face.name for face in faces)
+        for faces in solids
+        if len(faces) == len(middles)
+        and _is_moved(np.array([face.middle for face in faces]), middles)
+    }
+    return alike.pop() if len(alike) == 1 else None
+
+
+def _is_moved(one: np.ndarray, other: np.ndarray) -> bool:
+    """Whether places (k, 3) are the others, moved and turned as one; nan is left out."""
+    kept = np.isfinite(one).all(axis=1) & np.isfinite(other).all(axis=1)
+    if not kept.any():
+        return False
+    one, other = (places[kept] - places[kept].mean(axis=0) for places in (one, other))
+    u, _, v = np.linalg.svd(one.T @ other)  # Kabsch's best rotation
+    turn = u @ np.diag([1.0, 1.0, np.linalg.det(u @ v)]) @ v
+    return bool(np.abs(one @ turn - other).max() <= SAME_PLACE * np.ptp(other, axis=0).max())

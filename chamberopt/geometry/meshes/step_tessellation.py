@@ -1,0 +1,257 @@
+"""Mesh the faces of a STEP file with Gmsh; runs in a process of its own.
+
+The side h of the triangles follows the radius of curvature r of surfaces and edges, so that fillets
+are fine and planes coarse:
+
+    h = min(side, sqrt(5 chord r), max(angle r, 4 chord)), where r is 3 chord at least
+
+Neighbours then turn by about the angle, but for radii too small for a ball. The middle of an
+equilateral triangle is h² / 6 r below a sphere; 5 instead of 6 leaves room for longer sides than
+wanted. Faces with four sides get grids, with cells longer where the face is straight.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from chamberopt.common.npz_files import save_arrays
+from chamberopt.geometry.meshes.native_reader import allow_more
+
+# Lay grids on curved faces with four sides: fine across a fillet or a tooth, coarse along it.
+#
+# A grid has as many rows in each of its two directions as the curvature of its lines there asks
+# for. Opposite edges have the same number; faces that share an edge pass it on to each other.
+
+GRID_SAMPLES = 13  # in each direction: enough for the curvature of a fillet or an aerofoil
+ON_EDGE = 0.01  # of a face's parameters
+MOST_TIMES_LONGER = 6.0  # one side of a grid's cell than the other
+# A line whose curvature varies so much that even rows would be this many times more is no grid's.
+MOST_TIMES_MORE = 3.0
+Grid = tuple[tuple[int, int, int], tuple[int, int, int]]  # in each direction: two edges, rows
+
+
+def lay_grids(model: Any, faces: list[int], side_at: Callable[[float], float]) -> None:
+    """Lay grids where faces have four sides, and leave all others to the mesher.
+
+    Args:
+        model: gmsh.model.
+        side_at: wanted side of triangles by the radius of curvature.
+    """
+    curved = (face for face in faces if model.getType(2, face) != "Plane")
+    grids = {face: grid for face in curved if (grid := _find_grid(model, face, side_at))}
+    rows: dict[int, int] = {}
+    is_new = True
+    while is_new:
+        is_new = False
+        for one, other, wanted in (line for grid in grids.values() for line in grid):
+            most = max(wanted, rows.get(one, 0), rows.get(other, 0))
+            is_new |= (rows.get(one), rows.get(other)) != (most, most)
+            rows[one] = rows[other] = most
+    for edge, count in rows.items():
+        model.mesh.setTransfiniteCurve(edge, count + 1)
+    for face in grids:
+        model.mesh.setTransfiniteSurface(face, "AlternateLeft")
+
+
+def _find_grid(model: Any, face: int, side_at: Callable[[float], float]) -> Grid | None:
+    """The edges at the four ends of a face's parameters and the rows between, if it has such."""
+    edges = [tag for _, tag in model.getBoundary([(2, face)], oriented=False)]
+    low, high = map(np.array, model.getParametrizationBounds(2, face))
+    at_end: dict[tuple[int, int], int] = {}
+    for edge in edges if len(set(edges)) == len(edges) == 4 else ():
+        first, last = model.getParametrizationBounds(1, edge)
+        along = np.linspace(first[0], last[0], 5)
+        places = np.reshape(model.reparametrizeOnSurface(1, edge, along, face), (-1, 2))
+        shares = (places - low) / (high - low)
+        for axis, end in ((0, 0), (0, 1), (1, 0), (1, 1)):
+            if np.abs(shares[:, axis] - end).max() < ON_EDGE:
+                at_end[axis, end] = edge
+    if len(set(at_end.values())) < 4:
+        return None
+    u, v = np.meshgrid(*np.linspace(low, high, GRID_SAMPLES).T, indexing="ij")
+    flat = np.stack([u, v], axis=-1).ravel()
+    points = np.reshape(model.getValue(2, face, flat), (GRID_SAMPLES, GRID_SAMPLES, 3))
+    lines = [_line(points, side_at), _line(points.transpose(1, 0, 2), side_at)]
+    if any(more > MOST_TIMES_MORE for _, _, more in lines):
+        return None
+    (along_u, side_u, _), (along_v, side_v, _) = lines
+    side_u = min(side_u, MOST_TIMES_LONGER * side_v)
+    side_v = min(side_v, MOST_TIMES_LONGER * side_u)
+    return (
+        (at_end[1, 0], at_end[1, 1], math.ceil(along_u / side_u)),
+        (at_end[0, 0], at_end[0, 1], math.ceil(along_v / side_v)),
+    )
+
+
+def _line(points: np.ndarray, side_at: Callable[[float], float]) -> tuple[float, float, float]:
+    """The longest of lines (points of each, lines, 3), their shortest wanted side, and waste.
+
+    Waste is how many times more rows of that side are than rows of the side wanted in each place.
+    """
+    steps = np.diff(points, axis=0)
+    length = np.maximum(np.linalg.norm(steps, axis=2), 1e-12)
+    ahead = steps / length[..., None]
+    turn = np.arccos(np.clip((ahead[1:] * ahead[:-1]).sum(axis=2), -1.0, 1.0))
+    between = (length[1:] + length[:-1]) / 2
+    radius = (between / np.maximum(turn, 1e-9)).min(axis=1)
+    side = np.array([side_at(one) for one in radius.tolist()])
+    waste = (between.max(axis=1) / side.min()).sum() / (between.max(axis=1) / side).sum()
+    return float(length.sum(axis=0).max()), float(side.min()), float(waste)
+
+
+SHORTEST_IN_CHORDS, SMALLEST_RADIUS_IN_CHORDS = 4.0, 3.0
+LONGEST_IN_DIAGONALS = 1.0 / 40.0  # of the part's box, where no longest side is given
+PRECISION = 1e-4  # of the number of sides along an edge
+MOST_TRIANGLES = 2e6  # which take minutes
+SECONDS_PER_TRIANGLE = 3e-4  # of computing time, at most: ten times what was measured
+SAMPLES = 9  # of a face's curvature, in each direction
+LIBRARIES = "on Debian: apt-get install libglu1-mesa libxcursor1 libxft2 libxinerama1"
+REMEDY = "the file is damaged, or holds no solid; export it again as AP214 or AP242"
+
+
+class Tessellation(NamedTuple):
+    """How fine the triangles of a CAD file are.
+
+    The corner between two facets of a hollow keeps a ball away by 1 / cos(angle / 2) - 1 of its
+    radius, 0.25 % by default. The check of what a ball can reach allows for 1 %.
+    """
+
+    chord: float = 2e-5  # distance that triangles keep from the surface [m]
+    angle: float = math.radians(6.0)  # between neighbours [rad]
+    side: float = 0.0  # longest side [m]; 0: a fortieth of the part's diagonal
+
+    def side_at(self, radius: float) -> float:
+        """Wanted side of triangles where the radius of curvature is `radius`."""
+        radius = max(radius, SMALLEST_RADIUS_IN_CHORDS * self.chord)
+        by_angle = max(self.angle * radius, SHORTEST_IN_CHORDS * self.chord)
+        return min(self.side, by_angle, math.sqrt(5.0 * self.chord * radius))
+
+
+def tessellate(source: str, target: str, chord: str, angle: str, side: str) -> None:
+    """Write the triangles of a STEP file as numpy arrays; lengths in mm, angle in rad.
+
+    They are: corners (m, 3, 3), the normals of the faces there, up to their sign and 0 where a face
+    has none, and face_of (m,); how many faces of no solid are left out; of each
+    face its body (-1: none), its colour (r, g, b, and 0 if it has none) and the mean of its corners
+    (nan if it has none); of each body its name. Or only `fault`: what is wrong, as a sentence.
+    """
+    try:
+        import gmsh
+
+        gmsh.initialize(readConfigFiles=False, interruptible=False)
+        arrays = _mesh(gmsh, source, Tessellation(float(chord), float(angle), float(side)))
+    except OSError as error:  # its library was not loaded
+        arrays = {"fault": np.array(f"Gmsh cannot be loaded ({error}); {LIBRARIES}")}
+    except Exception as error:
+        if type(error) is not Exception:  # as Gmsh's are
+            raise
+        why = str(error).replace(f" file '{source}'", " it")[:160]
+        arrays = {"fault": np.array(f"cannot be meshed ({why}); {REMEDY}")}
+    save_arrays(Path(target), **arrays)
+
+
+def _mesh(gmsh: Any, source: str, how: Tessellation) -> dict[str, np.ndarray]:
+    for option, value in {
+        "General.Verbosity": 0,
+        "General.NumThreads": 1,
+        "Geometry.OCCImportLabels": 1,
+        "Mesh.MeshSizeFromCurvature": 2.0 * math.pi / how.angle,
+        "Mesh.MeshSizeFromPoints": 0,
+        "Mesh.MeshSizeExtendFromBoundary": 0,
+        "Mesh.LcIntegrationPrecision": PRECISION,
+        "Mesh.Algorithm": 5,  # Delaunay; the frontal one leaves thinner triangles
+    }.items():
+        gmsh.option.setNumber(option, value)
+    gmsh.open(source)
+    model = gmsh.model
+    bodies = [tag for _, tag in model.getEntities(3)]
+    body_of = {face: k for k, tag in enumerate(bodies) for face in model.getAdjacencies(3, tag)[1]}
+    drawn = [tag for _, tag in model.getEntities(2)]
+    faces = [tag for tag in drawn if tag in body_of] or drawn  # sketches beside solids are no part
+    box = np.array([model.getBoundingBox(2, tag) for tag in faces]).reshape(-1, 2, 3)
+    diagonal = np.linalg.norm(box[:, 1].max(axis=0) - box[:, 0].min(axis=0)) if faces else 0.0
+    how = how._replace(side=how.side or LONGEST_IN_DIAGONALS * float(diagonal))
+    triangles = _TriangleCount(model, faces)
+    if not triangles(how) <= MOST_TRIANGLES:
+        return {"fault": np.array(triangles.advice(how))}
+    allow_more(SECONDS_PER_TRIANGLE * triangles(how))
+    lay_grids(model, faces, how.side_at)
+
+    def size(_dim: int, _tag: int, _x: float, _y: float, _z: float, by_angle: float) -> float:
+        return how.side_at(by_angle / how.angle)
+
+    model.mesh.setSizeCallback(size)
+    model.mesh.generate(2)
+    numbers, coordinates, _ = model.mesh.getNodes()
+    order = np.argsort(numbers)
+    points = coordinates.reshape(-1, 3)[order]
+    nodes = [model.mesh.getElementsByType(2, tag)[1] for tag in faces]
+    rows = np.searchsorted(numbers[order], np.concatenate([*nodes, np.zeros(0, dtype=np.uint64)]))
+    return {
+        "corners": points[rows.reshape(-1, 3)],
+        "normals": np.concatenate(
+            [_normals(model, tag, own) for tag, own in zip(faces, nodes, strict=True)]
+            or [np.zeros((0, 3, 3))]
+        ),
+        "face_of": np.repeat(np.arange(len(faces)), [len(n) // 3 for n in nodes]),
+        "left_out": np.array(len(drawn) - len(faces)),
+        "body": np.array([body_of.get(tag, -1) for tag in faces], dtype=int),
+        "colour": np.array([model.getColor(2, tag) for tag in faces], dtype=int).reshape(-1, 4),
+        "middle": np.array([_middle(model, tag) for tag in faces]).reshape(-1, 3),
+        "name": np.array([model.getEntityName(3, tag) for tag in bodies], dtype=str),
+    }
+
+
+def _normals(model: Any, face: int, nodes: np.ndarray) -> np.ndarray:
+    """Normals of a face at the nodes (3 m,) of its triangles, up to their sign, (m, 3, 3)."""
+    tags, _, places = model.mesh.getNodes(2, face, True, True)
+    first = np.unique(tags, return_index=True)[1]  # a node on a seam comes twice
+    normals = np.reshape(model.getNormal(face, places), (-1, 3))[first]
+    normals[~np.isfinite(normals).all(axis=1)] = 0.0
+    return np.asarray(normals[np.searchsorted(tags[first], nodes)].reshape(-1, 3, 3))
+
+
+class _TriangleCount:
+    """About how many triangles the faces of a model take, by how fine they are."""
+
+    def __init__(self, model: Any, faces: list[int]) -> None:
+        self._areas = np.array([model.occ.getMass(2, face) for face in faces])
+        self._radii = [_radii(model, face) for face in faces]
+
+    def __call__(self, how: Tessellation) -> float:
+        """Number of equilateral triangles of the wanted sides, about."""
+        each = [np.mean([how.side_at(one) ** -2.0 for one in own]) for own in self._radii]
+        return float(self._areas @ np.array(each)) * 4.0 / math.sqrt(3.0)
+
+    def advice(self, how: Tessellation) -> str:
+        """Why there would be too many triangles, with the smallest value that gives fewer."""
+        if not math.isfinite(self(how)):
+            return f"has a face of no finite area; {REMEDY}"
+        is_side = self(how._replace(side=math.inf)) <= MOST_TRIANGLES
+        name = "side" if is_side else "chord"
+        text = f"about {1e-6 * self(how):.3g} million triangles, at most {1e-6 * MOST_TRIANGLES:g}"
+        value = getattr(how, name)
+        while self(how._replace(**{name: value})) > MOST_TRIANGLES:
+            value *= 1.05
+        return f"{text} are made; give part.tessellation.{name}_mm = {value:.2g} or more"
+
+
+def _radii(model: Any, face: int) -> list[float]:
+    """Radii of curvature of a face, at places all over it."""
+    low, high = map(np.array, model.getParametrizationBounds(2, face))
+    shares = (np.arange(SAMPLES) + 0.5) / SAMPLES
+    u, v = np.meshgrid(*(low + shares[:, None] * (high - low)).T)
+    bent = model.getCurvature(2, face, np.stack([u, v], axis=-1).ravel())
+    return [1.0 / max(abs(one), 1e-9) for one in bent]
+
+
+def _middle(model: Any, face: int) -> np.ndarray:
+    """Mean of a face's corners, (3,); nan if it has none."""
+    corners = [tag for dim, tag in model.getBoundary([(2, face)], recursive=True) if dim == 0]
+    places = [model.getValue(0, tag, []) for tag in corners]
+    return np.mean(places, axis=0) if places else np.full(3, np.nan)

@@ -1,1 +1,0 @@
-"""The folder of a study while it runs, and how a stopped study is resumed."""

@@ -1,7 +1,0 @@
-"""What a study file says: design, what varies, what is maximised, what must hold, and budget."""
-
-from chamberopt.optimize.study.constraints import Limits
-from chamberopt.optimize.study.load import load, load_study
-from chamberopt.optimize.study.schema import Objective, Study
-
-__all__ = ["Limits", "Objective", "Study", "load", "load_study"]

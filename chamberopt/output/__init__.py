@@ -1,1 +1,0 @@
-"""What people look at and hand on: results folders, plots, viewer, report, comparison, export."""

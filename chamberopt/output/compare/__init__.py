@@ -1,1 +1,0 @@
-"""Candidates side by side: `chamberopt compare`."""

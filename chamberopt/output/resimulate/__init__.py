@@ -1,1 +1,0 @@
-"""A stored result simulated again, for its single impacts and flights."""

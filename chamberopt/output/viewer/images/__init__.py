@@ -1,1 +1,0 @@
-"""Images and films that are drawn without a window."""

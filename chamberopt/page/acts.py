@@ -1,0 +1,245 @@
+"""What the page of one design can do: each act takes a question and gives an answer."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from contextlib import suppress
+from itertools import count
+from pathlib import Path
+from threading import Lock
+from typing import Any
+
+from chamberopt.chamber.propose.text import study_lines
+from chamberopt.common.errors import InputError
+from chamberopt.common.files import check_new_file, is_new_or_empty, remove_file, write_text
+from chamberopt.common.toml_fields import read_toml
+from chamberopt.design.load import is_study
+from chamberopt.documents.comparison import comparison_text
+from chamberopt.page.answers import part_answer, shape_answer
+from chamberopt.page.checker import Checker
+from chamberopt.page.edited_file import EditedFile, custom_shape, design_fields
+from chamberopt.page.picking import Picker
+from chamberopt.page.started_commands import StartedCommand
+from chamberopt.printers.report_page import REPORT, parts_content
+from chamberopt.printers.sheet_page import SHEET
+from chamberopt.results.compare.comparison import compare
+from chamberopt.results.load import load_result, summary
+from chamberopt.search.study import load_study
+
+# Results below the design's folder: their list, one or two in 3D, and their difference.
+
+RESULT = "result.json"
+DEEPEST = 4  # folders below the design's in which results are looked for
+
+
+def list_results(folder: Path) -> list[dict[str, Any]]:
+    """Results below a folder, the newest first, each with its figures in one line."""
+    found = []
+    for depth in range(1, DEEPEST + 1):
+        found += list(folder.glob("/".join(["*"] * depth + [RESULT])))
+    rows = []
+    for file in sorted(found, key=lambda one: one.lstat().st_mtime, reverse=True):
+        where = file.parent
+        if not where.resolve().is_relative_to(folder):
+            continue  # a link to elsewhere
+        row: dict[str, Any] = {"folder": where.relative_to(folder).as_posix()}
+        row |= {name: (where / name).is_file() for name in (REPORT, SHEET)}
+        try:
+            result = load_result(where)
+            row["text"] = summary(result)
+        except InputError as error:
+            row["text"], row["unusable"] = str(error), True
+        rows.append(row)
+    return rows
+
+
+def shown(folders: Sequence[Path]) -> dict[str, Any]:
+    """Content of the 3D view of results, side by side; of several, also how they differ.
+
+    Raises:
+        InputError: one is no usable result, or they cannot be compared.
+    """
+    html, content = parts_content(folders)
+    text = comparison_text(compare(folders)) if len(folders) > 1 else ""
+    return {"content": content, "html": html, "comparison": text}
+
+
+MOST_FILES = 20  # texts of the file that pages may have read
+STUDY_NAME = re.compile(r"\w[\w .+-]{0,100}\.toml")
+COMMANDS = ("simulate", "run", "sweep", "report", "sheet")
+
+
+class Acts:
+    """The acts of the page of one design, each with the name of its address.
+
+    A question says by its `read` which text of the file its page read.
+
+    Args:
+        trusted: whether designs may have a Python file as their shape, which is run.
+    """
+
+    def __init__(self, path: Path, trusted: bool) -> None:
+        self._path, self._trusted = path.resolve(), trusted
+        self._files: dict[str, EditedFile] = {}
+        first = self._read()
+        self._picker, self._checker = Picker(), Checker(first.path, first.text)
+        self._command: StartedCommand | None = None
+        self._starting = Lock()
+
+    def close(self) -> None:
+        self._checker.stop()
+        if self._command is not None:
+            self._command.end()
+
+    def read(self, _: Any) -> dict[str, Any]:
+        """The file as it is now, for a page that begins or begins again."""
+        return self._as_read(self._read())
+
+    def part(self, asked: Any) -> bytes:
+        return part_answer(self._file(asked).design)
+
+    def shape(self, asked: Any) -> bytes:
+        return shape_answer(self._file(asked).with_changes(asked["changes"]))
+
+    def cavity(self, asked: Any) -> bytes:
+        file = self._file(asked)
+        file.with_changes(asked["changes"])  # its message comes at once
+        number, answer = self._checker.cavity(file.changed_text(asked["changes"]))
+        return number.to_bytes(4, "little") + answer
+
+    def reach(self, asked: Any) -> bytes:
+        return self._checker.reach(int(asked["number"]))
+
+    def pick(self, asked: Any) -> dict[str, Any]:
+        design = self._file(asked).with_changes(asked["changes"])
+        triangle, crease = int(asked["triangle"]), float(asked["crease_deg"])
+        if not 0.1 <= crease <= 180.0:
+            raise InputError(f"crease angle: given {crease:g}; allowed: from 0.1 to 180 degrees")
+        if asked["act"] == "down":
+            return self._picker.face_down(design, triangle, crease)
+        alike, add = bool(asked["alike"]), asked["act"] == "add"
+        if asked["act"] == "face":
+            return {"faces": [self._picker.face(design, triangle, crease, alike)]}
+        return self._picker.with_face(design, asked["table"], triangle, crease, alike, add)
+
+    def save(self, asked: Any) -> dict[str, Any]:
+        self._file(asked).save(asked["changes"])
+        return self.read(None)
+
+    def _read(self) -> EditedFile:
+        file = EditedFile(self._path, self._trusted)
+        if len(self._files) > MOST_FILES:
+            self._files.clear()
+        self._files[file.digest] = file
+        return file
+
+    def _file(self, asked: Any) -> EditedFile:
+        """The file as the page that asks read it."""
+        file = self._files.get(str(asked["read"]))
+        if file is None:
+            raise InputError("this page has read an older file: reload it")
+        return file
+
+    def _as_read(self, file: EditedFile) -> dict[str, Any]:
+        design = file.design
+        surfaces = {"part.target": "target"}
+        surfaces |= {f"zones.{k}.target": f"zone {z.name}" for k, z in enumerate(design.zones)}
+        return {
+            "read": file.digest,
+            "file": file.path.name,
+            "folder": str(file.folder),
+            "fields": design_fields(file),
+            "surfaces": surfaces,
+            "target": design.part.target.model_dump(mode="json", exclude_defaults=True),
+            "is_drawn": design.chamber.setup() is not None,
+            "files": _files_beside(file.path),
+        }
+
+    def study(self, asked: Any) -> dict[str, Any]:
+        """Write a study beside the design; it must load."""
+        name, evaluations = str(asked["name"]), float(asked["evaluations"])
+        if not STUDY_NAME.fullmatch(name):
+            raise InputError(f"{name!r}: give a name of letters and digits that ends in .toml")
+        if not evaluations.is_integer():
+            raise InputError(f"evaluations: given {evaluations:g}; give a whole number")
+        file, path = self._file(asked), check_new_file(self.inside(name))
+        bounds = {key: {"low": low, "high": high} for key, (low, high) in asked["vary"].items()}
+        if not bounds:
+            raise InputError("nothing varies: tick the numbers that the search may change")
+        start = {key: f"now {file.design.value(key):g}" for key in bounds}
+        write_text(path, study_lines(file.path.name, bounds, start, int(evaluations)))
+        try:
+            load_study(path)
+        except InputError:
+            remove_file(path)
+            raise
+        return {"study": path.name}
+
+    def start(self, asked: Any) -> dict[str, Any]:
+        """Start a command on the saved design, a study beside it or a result below it."""
+        command, what = str(asked["command"]), self.inside(str(asked["of"]))
+        if command not in COMMANDS:
+            raise InputError(f"{command}: not a command of this page: {', '.join(COMMANDS)}")
+        name = f"./{what.relative_to(self._path.parent).as_posix()}"
+        if command in ("report", "sheet"):
+            arguments = ["report", name, *(["--sheet"] if command == "sheet" else [])]
+        else:
+            self._refuse_shape(what)
+            sweeps = ["--sobol", str(int(asked["points"]))] if command == "sweep" else []
+            folder = self._free_folder(f"{what.stem}-sweep" if sweeps else what.stem)
+            arguments = [command, name, *sweeps, "--out", folder]
+        with self._starting:
+            if self._command is not None and self._command.status()["exit"] is None:
+                raise InputError("a command is running; stop it first, or wait for its end")
+            self._command = StartedCommand(arguments, self._path.parent)
+            return self._command.status()
+
+    def _refuse_shape(self, file: Path) -> None:
+        """Raise InputError for a design, or a study of one, whose shape is run and not trusted."""
+        data = read_toml(file, "design")[1]
+        if is_study(data) and isinstance(data.get("design"), str):
+            data = read_toml(file.parent / data["design"], "design")[1]
+        shape = custom_shape(data)
+        if shape and not self._trusted:
+            raise InputError(
+                f"{file.name}: runs the Python file {shape}, which may do anything; start it from "
+                "the command line, or begin again with --trust-shape"
+            )
+
+    def status(self, _: Any) -> dict[str, Any]:
+        return self._command.status() if self._command else {}
+
+    def stop(self, _: Any) -> dict[str, Any]:
+        if self._command:
+            self._command.stop()
+        return self.status(None)
+
+    def results(self, _: Any) -> list[dict[str, Any]]:
+        return list_results(self._path.parent)
+
+    def shown(self, asked: Any) -> dict[str, Any]:
+        return shown([self.inside(str(one)) for one in asked["folders"][:2]])
+
+    def inside(self, name: str) -> Path:
+        """A path that is inside the design's folder; InputError otherwise."""
+        path = (self._path.parent / name).resolve()
+        if not path.is_relative_to(self._path.parent):
+            raise InputError(f"{name}: outside the design's folder")
+        return path
+
+    def _free_folder(self, name: str) -> str:
+        """The first of results/NAME, NAME-2 ... that is free."""
+        folders = (Path("results", f"{name}-{k}" if k > 1 else name) for k in count(1))
+        self.inside("results")  # which may be a link to elsewhere
+        return next(one for one in folders if is_new_or_empty(self._path.parent / one)).as_posix()
+
+
+def _files_beside(design: Path) -> list[dict[str, str]]:
+    """The designs and studies in a design's folder, itself first, as far as they can be read."""
+    rows = []
+    for path in sorted(design.parent.glob("*.toml"), key=lambda one: (one != design, one.name)):
+        with suppress(InputError):
+            kind = "study" if is_study(read_toml(path, "design")[1]) else "design"
+            rows.append({"name": path.name, "kind": kind})
+    return rows

@@ -1,0 +1,126 @@
+"""What the page draws and says of a design: the part, its shape, the cavity, what is reached."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+
+from chamberopt.chamber.build import build_chamber
+from chamberopt.chamber.checks.check import (
+    describe,
+    first_facts,
+    first_warnings,
+    notes,
+    shot_reach,
+    with_clearance,
+)
+from chamberopt.chamber.part import preview_part
+from chamberopt.chamber.reach import reached_part_share
+from chamberopt.chamber.scene import chamber_mesh
+from chamberopt.design.design import Design
+from chamberopt.design.shapes import TAG_PART, is_sonotrode
+from chamberopt.geometry.triangles import areas, sharp_edges
+
+# What a triangle of the part is, for its colour; see scene.js.
+REST, TARGET, OUTSIDE, MISSED, ZONE = range(5)
+# Three.js takes single precision (about 1e-5 mm) and unsigned numbers of points.
+KINDS = {"f": "<f4", "i": "<u4", "u": "<u4", "b": "u1"}
+
+
+def part_answer(design: Design) -> bytes:
+    """The part in its file's frame [mm], and the names of the file with their areas [mm²]."""
+    mesh = preview_part(design).mesh
+    size = areas(mesh.vertices, mesh.triangles)
+    names = [
+        {
+            "name": name,
+            "triangles": int(own.sum()),
+            "area_mm2": round(1e6 * float(size[own].sum()), 2),
+        }
+        for name, own in mesh.groups.items()
+    ]
+    box = [round(1e3 * float(side), 4) for side in mesh.size]
+    head = {"names": names, "box_mm": box, "unit": mesh.unit, "notes": list(mesh.notes)}
+    return packed(head, points=1e3 * mesh.vertices, triangles=mesh.triangles)
+
+
+def shape_answer(design: Design) -> bytes:
+    """The chamber's shape without the part [mm], the part's place, and its target."""
+    part = preview_part(design)
+    shape = design.chamber.surface(part.vertices, part.mesh.triangles)
+    state = _state(part.target, part.zones)
+    low, high = shape.vertices.min(axis=0), shape.vertices.max(axis=0)
+    own = part.vertices
+    head = {
+        "rotation": part.rotation.ravel().tolist(),
+        "shift": (1e3 * part.shift).tolist(),
+        "shape_mm": [(1e3 * low).tolist(), (1e3 * high).tolist()],
+        "part_mm": [(1e3 * own.min(axis=0)).tolist(), (1e3 * own.max(axis=0)).tolist()],
+        "target_triangles": int(part.target.sum()),
+        "balls": design.shot.count,
+    }
+    return packed(head, **_surface(shape.vertices, shape.triangles, shape.tags), state=state)
+
+
+def check_answers(design: Design) -> Iterator[bytes]:
+    """As `check` says: first the cavity with facts and warnings at once, then what is reached."""
+    chamber = build_chamber(design)
+    mesh = chamber_mesh(chamber)
+    head: dict[str, Any] = {
+        "facts": with_clearance(first_facts(design, chamber), mesh),
+        "notes": notes(design, chamber),
+        "warnings": first_warnings(design, chamber, mesh),
+    }
+    part = chamber.part
+    state = _state(part.target, part.zones)
+    state[part.target & (chamber.exposed_area <= 0.0)] = OUTSIDE
+    remeshed = part.file is not None and part.file.original is not None
+    own = {"part_points": 1e3 * part.vertices, "part_triangles": part.triangles} if remeshed else {}
+    surface = _surface(chamber.vertices, chamber.triangles, chamber.tags)
+    yield packed(head, **surface, state=state, **own)
+
+    reach = shot_reach(design, chamber)
+    facts = describe(design, chamber, reach)
+    share = reached_part_share(reach, chamber.source, len(part.triangles))
+    state[part.target & (chamber.exposed_area > 0.0) & (share <= 0.5)] = MISSED
+    head = {name: facts.pop(name) for name in ("notes", "warnings")}
+    yield packed({"facts": facts, **head}, state=state)
+
+
+def _state(target: np.ndarray, zones: dict[str, np.ndarray]) -> np.ndarray:
+    """REST, TARGET or ZONE of each triangle of the part (m,)."""
+    state = np.where(target, TARGET, REST).astype(np.uint8)
+    for zone in zones.values():
+        state[zone] = ZONE
+    return state
+
+
+def _surface(
+    vertices: np.ndarray, triangles: np.ndarray, tags: np.ndarray
+) -> dict[str, np.ndarray]:
+    """Walls and sonotrode of a closed surface, and its sharp edges, in mm."""
+    ends, moving = sharp_edges(vertices, triangles), is_sonotrode(tags)
+    return {
+        "points": 1e3 * vertices,
+        "walls": triangles[~moving & (tags != TAG_PART)],
+        "sonotrode": triangles[moving],
+        "edges": 1e3 * vertices[ends],
+    }
+
+
+def packed(head: Mapping[str, Any], **arrays: np.ndarray) -> bytes:
+    """Length of the head (4 bytes), the head with kind and length of each array, the arrays; each
+    begins at a multiple of 4 bytes."""
+    blocks = []
+    for values in arrays.values():
+        flat = np.ascontiguousarray(values).ravel()
+        kind = "u1" if flat.dtype == np.uint8 else KINDS[flat.dtype.kind]
+        blocks.append((kind, len(flat), flat.astype(kind).tobytes()))
+    layout = {name: block[:2] for name, block in zip(arrays, blocks, strict=True)}
+    text = json.dumps({**head, "arrays": layout}).encode()
+    text += b" " * (-len(text) % 4)
+    content = b"".join(data + b"\0" * (-len(data) % 4) for *_, data in blocks)
+    return len(text).to_bytes(4, "little") + text + content

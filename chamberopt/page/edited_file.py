@@ -1,0 +1,271 @@
+"""The design file being edited: its text with changes, and saving it line by line."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+import stat
+import time
+import tomllib
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from pydantic.fields import FieldInfo
+
+from chamberopt.common.errors import InputError
+from chamberopt.common.files import claim_file, open_plain, write_bytes
+from chamberopt.common.limits import MAX_TEXT_BYTES
+from chamberopt.common.toml_errors import numeric_fields, text_choices
+from chamberopt.common.toml_fields import read_toml
+from chamberopt.design.design import Design, validate
+from chamberopt.design.shapes.base import is_custom
+
+# By dotted name, in the file's units; None takes a key out of the file.
+Changes = Mapping[str, Any]
+LONGEST_SAVE_S = 5.0  # of another page, which takes a tenth of a second
+LATE_WRITE_S = 0.05  # from an editor's opening of the file to its writing, by far
+# What is changed beside the fields of the page: a target or zone, and what it chooses.
+PICKED = re.compile(
+    r"(part\.target|zones\.\d+\.target)\.(surface|faces|direction|angle_deg|box_mm|radius_mm)"
+    r"|zones\.\d+"
+)
+
+
+class EditedFile:
+    """A design file as one page read it.
+
+    Args:
+        trusted: whether its shape may be a Python file, which is run.
+
+    Raises:
+        InputError: it is a link, does not load, or has a shape of the user's that is not trusted.
+    """
+
+    def __init__(self, path: Path, trusted: bool) -> None:
+        if path.is_symlink():
+            raise InputError(f"{path}: is a link; give the file that it leads to: {path.resolve()}")
+        self.path = path.resolve()
+        self.text, data = read_toml(self.path, "design")
+        self._shape = custom_shape(data)
+        if self._shape and not trusted:
+            raise InputError(
+                f"{path.name}: runs the Python file {self._shape}, which may do anything; read it, "
+                "and begin again with --trust-shape if you trust it"
+            )
+        self.design = validate(Design, data, self.path, self.text)
+
+    @property
+    def folder(self) -> Path:
+        return self.path.parent
+
+    @property
+    def digest(self) -> str:
+        """By which a page says what it read."""
+        return hashlib.sha256(self.text.encode()).hexdigest()
+
+    def with_changes(self, changes: Changes) -> Design:
+        """The design that the file would hold; InputError names every problem."""
+        text = self.changed_text(changes)
+        return validate(Design, tomllib.loads(text), self.path, text)
+
+    def changed_text(self, changes: Changes) -> str:
+        """The text of the file with changes; comments, order and other lines stay.
+
+        Raises:
+            InputError: a name is not one that the page may change, or the file says it in a way
+                that cannot be changed by itself.
+        """
+        import tomlkit
+        from tomlkit.exceptions import TOMLKitError
+
+        document, known = tomlkit.parse(self.text), field_names(self.design)
+        for name, value in changes.items():
+            if name not in known and not PICKED.fullmatch(name):
+                raise InputError(f"{name}: not changed on the page; change it in the file")
+            try:
+                self._change(document, name, value)
+            except (TOMLKitError, ValueError, TypeError, AttributeError, IndexError) as error:
+                raise InputError(
+                    f"{name}: the page cannot change it where the file says it ({error}); write "
+                    "its table with a header of its own, as [part.target]"
+                ) from None
+        return tomlkit.dumps(document) if changes else self.text
+
+    def save(self, changes: Changes) -> None:
+        """Write the file; InputError, and nothing written, if it was changed elsewhere meanwhile,
+        may not be written, or would not load."""
+        text = self.changed_text(changes)
+        self.with_changes(changes)
+        if not self.path.stat().st_mode & stat.S_IWUSR:
+            raise InputError(f"{self.path.name}: is read-only; allow writing, or save a copy")
+        with claim_file(self.path, wait=LONGEST_SAVE_S):
+            self._require_unchanged(self.path)
+            write_bytes(self.path, text.encode(), self._look_at_replaced)
+
+    def _look_at_replaced(self, path: Path) -> None:
+        """Raise InputError unless what was replaced is what was read, and stays so."""
+        time.sleep(LATE_WRITE_S)  # an editor that had opened it before may write to it now
+        self._require_unchanged(path)
+
+    def _require_unchanged(self, path: Path) -> None:
+        try:
+            with open_plain(path) as file:
+                content = file.read(MAX_TEXT_BYTES)
+        except FileNotFoundError:
+            content = b""
+        if content.decode("utf-8-sig", errors="replace") != self.text:
+            raise InputError(
+                f"{self.path.name}: changed on disk since this page read it, so it is not "
+                "replaced; reload the page to go on from what it says now"
+            )
+
+    def is_fixed(self, name: str) -> bool:
+        """Whether a number is not the file's own, as of a metal that it takes by its name."""
+        inner: Any = tomllib.loads(self.text)
+        for step in name.split(".")[:-1]:
+            inner = inner.get(step, {}) if isinstance(inner, dict) else {}
+            if isinstance(inner, str):
+                return True
+        return False
+
+    def _change(self, document: Any, name: str, value: Any) -> None:
+        """Set or remove one key, making the tables and lists on the way to it."""
+        import tomlkit
+
+        steps, table = name.split("."), document
+        for k, step in enumerate(steps[:-1]):
+            if isinstance(table, list):
+                table = table[int(step)]
+                continue
+            if step not in table:
+                if value is None:
+                    return
+                if steps[k + 1].isdecimal():  # a list that the file leaves at its default
+                    present = list(self._present(steps[: k + 1]))
+                    table[step] = present or tomlkit.aot()
+                else:
+                    table.append(step, tomlkit.table())
+            table = table[step]
+            if not isinstance(table, dict | list):
+                text = f"given {table!r}, which is no table; change it in the file"
+                raise InputError(f"{'.'.join(steps[: k + 1])}: {text}")
+        last = steps[-1]
+        if value is None:
+            if isinstance(table, list):
+                raise InputError(f"{name}: nothing given; give a number")
+            if last in table:
+                del table[last]
+        elif not isinstance(table, list):
+            table[last] = _inline(value)
+        elif int(last) < len(table):
+            table[int(last)] = value
+        else:  # a further table, such as a zone
+            table.append(_table(value))
+
+    def _present(self, steps: list[str]) -> Any:
+        """The value of the design at the end of a path."""
+        value: Any = self.design
+        for step in steps:
+            value = getattr(value, step)
+        return value
+
+
+def custom_shape(data: Mapping[str, Any]) -> str:
+    """The Python file that is the shape of a design's values; "" if it is none."""
+    chamber = data.get("chamber")
+    shape = chamber.get("shape") if isinstance(chamber, Mapping) else None
+    return str(shape) if is_custom(shape) else ""
+
+
+def _inline(value: Any) -> Any:
+    """A list of tables with each on one line; other values as they are."""
+    import tomlkit
+
+    if isinstance(value, dict):
+        row = tomlkit.inline_table()
+        row.update({key: _inline(inner) for key, inner in value.items()})
+        return row
+    if not (isinstance(value, list) and value and isinstance(value[0], dict)):
+        return value
+    rows = tomlkit.array()
+    for one in value:
+        rows.append(_inline(one))
+    return rows.multiline(len(value) > 1)
+
+
+def _table(value: dict[str, Any]) -> Any:
+    import tomlkit
+
+    table = tomlkit.table()
+    table.update({key: _inline(inner) for key, inner in value.items()})
+    return table
+
+
+# What the page asks of a design: each number and choice with unit, bounds and description.
+
+# Tables whose numbers are measured, not chosen; those that the page changes by picking; and what
+# the part is meshed by, which would make it another part.
+NOT_SHOWN = ("calibration.", "part.target.", "zones.", "tolerances.", "part.tessellation.")
+
+
+def design_fields(file: EditedFile) -> list[dict[str, Any]]:
+    """Every number and choice of the design, in the order of its tables."""
+    design, varied = file.design, set(file.design.numbers())
+    rows: list[dict[str, Any]] = []
+    for name, field in _numbers(design):
+        row: dict[str, Any] = {"name": name, "value": _value(design, name), **_bounds(field)}
+        extra = field.json_schema_extra if isinstance(field.json_schema_extra, dict) else {}
+        row |= {"unit": extra.get("unit", "") or _unit(name), "text": field.description or ""}
+        row |= {"whole": field.annotation is int, "varies": name in varied}
+        rows.append(row | {"fixed": file.is_fixed(name)})
+    for name, allowed in _choices(design).items():
+        table, key = name.split(".")
+        text = type(getattr(design, table)).model_fields[key].description or ""
+        row = {"name": name, "value": design.setting(name), "choices": allowed, "text": text}
+        rows.append(row)
+    return rows
+
+
+def field_names(design: Design) -> set[str]:
+    """The names of these numbers and choices: nothing else is a field of the page."""
+    return {*(name for name, _ in _numbers(design)), *_choices(design)}
+
+
+def _numbers(design: Design) -> Iterator[tuple[str, FieldInfo]]:
+    """Every number, but for parts of a list in a table that the design does not have."""
+    for name, field in numeric_fields(design):
+        in_list = name.rpartition(".")[2].isdecimal()
+        if not name.startswith(NOT_SHOWN) and (not in_list or _value(design, name) is not None):
+            yield name, field
+
+
+def _choices(design: Design) -> dict[str, tuple[str, ...]]:
+    """Texts to choose from; a shape is none of them, because it has keys of its own."""
+    tables = {"chamber": design.chamber, "sonotrode": design.sonotrode}
+    found = (one for name, table in tables.items() for one in text_choices(table, name))
+    return {name: texts for name, texts in found if name not in ("chamber.unit", "chamber.shape")}
+
+
+def _value(design: Design, name: str) -> float | None:
+    """The number of a design, None where it is not set."""
+    value: Any = design
+    for step in name.split("."):
+        value = value[int(step)] if isinstance(value, tuple) else getattr(value, step, None)
+    return value
+
+
+def _bounds(field: FieldInfo) -> dict[str, float]:
+    """Least and largest value that the schema allows, as far as it has them."""
+    found: dict[str, float] = {}
+    for constraint in field.metadata:
+        for key, name in (("ge", "least"), ("le", "most")):
+            if (value := getattr(constraint, key, None)) is not None:
+                found[name] = float(value)
+    return found
+
+
+def _unit(name: str) -> str:
+    """The unit that the name of a list ends in."""
+    key = name.rstrip("0123456789.").rpartition(".")[2]
+    return {"mm": "mm", "deg": "degrees", "um": "µm", "s": "s"}.get(key.rpartition("_")[2], "")

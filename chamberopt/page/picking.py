@@ -1,0 +1,136 @@
+"""Choose target, zones and pose by clicking on the part: changes of the design's keys."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from chamberopt.chamber.part import preview_part
+from chamberopt.chamber.propose.pose import turns_down
+from chamberopt.common.errors import InputError
+from chamberopt.design.design import Design
+from chamberopt.design.part import MAX_FACES, FaceAt, Selection
+from chamberopt.geometry.faces import Faces
+from chamberopt.geometry.meshes.part_mesh import PartMesh
+
+DIGITS = 4  # of a place in mm: a tenth of a micrometre
+TARGET_TABLE = "part.target"
+OTHER_WAYS = ("surface", "direction", "angle_deg", "box_mm", "radius_mm")
+Row = dict[str, Any]  # an item of `faces` in a target's table
+
+
+class Picker:
+    """Faces of the part, found once for each crease angle."""
+
+    def __init__(self) -> None:
+        self._known: dict[tuple[int, float], tuple[PartMesh, Faces]] = {}
+
+    def with_face(
+        self, design: Design, table: str, triangle: int, crease_deg: float, alike: bool, add: bool
+    ) -> dict[str, Any]:
+        """Changes that add the face of a triangle to a target, or take it away.
+
+        A target that is chosen in another way becomes the list of its faces.
+
+        Args:
+            table: dotted name of the target, e.g. part.target.
+            triangle: of the part, in the file's order.
+            alike: with all faces that are congruent with it.
+
+        Raises:
+            InputError: nothing would change or be left, or the target's border follows no faces.
+        """
+        preview = preview_part(design)
+        mesh, faces = preview.mesh, self._faces(preview.mesh, crease_deg)
+        selection, chosen = _selection(design, table, preview.target, preview.zones)
+        default = Selection()
+        ways = [key for key in OTHER_WAYS if getattr(selection, key) != getattr(default, key)]
+        if not ways and not selection.faces and add:  # the whole surface, which the first replaces
+            chosen = np.zeros_like(chosen)
+        face = _face_of(faces, triangle)
+        row = _row(faces, face, crease_deg, alike)
+        picked = self._mask(row, mesh)
+        wanted = chosen | picked if add else chosen & ~picked
+        if (wanted == chosen).all():
+            raise InputError(f"{table}: this face is {'already' if add else 'not'} in it")
+        if not wanted.any():
+            raise InputError(f"{table}: nothing would be left; add another face first")
+        rows = (
+            []
+            if ways
+            else [one.model_dump(mode="json", exclude_defaults=True) for one in selection.faces]
+        )
+        rows = [old for old in rows if not (add and self._within(old, mesh, picked))]
+        rows = [*(old for old in rows if self._within(old, mesh, wanted)), *([row] if add else [])]
+        left = wanted.copy()
+        for one in rows:
+            left &= ~self._mask(one, mesh)
+        for lacking in np.unique(faces.of_triangle[left]):
+            if not wanted[faces.of_triangle == lacking].all():
+                raise InputError(
+                    f"{table}: its border does not follow faces at {crease_deg:g} degrees; take "
+                    "another crease angle, or clear it first"
+                )
+            rows.append(_row(faces, int(lacking), crease_deg))
+        if len(rows) > MAX_FACES:
+            raise InputError(f"{table}: {len(rows)} faces, more than {MAX_FACES}; take all alike")
+        return {f"{table}.faces": rows, **{f"{table}.{key}": None for key in ways}}
+
+    def face(self, design: Design, triangle: int, crease_deg: float, alike: bool) -> Row:
+        """The face of a triangle, as an item of `faces`."""
+        faces = self._faces(preview_part(design).mesh, crease_deg)
+        return _row(faces, _face_of(faces, triangle), crease_deg, alike)
+
+    def face_down(self, design: Design, triangle: int, crease_deg: float) -> dict[str, Any]:
+        """Changes that turn the part so that the face of a triangle faces the sonotrode."""
+        faces = self._faces(preview_part(design).mesh, crease_deg)
+        normal = faces.normal(_face_of(faces, triangle))
+        if not normal.any():
+            raise InputError("this face bends all round and faces no way; click another one")
+        return {f"part.rotate_deg.{k}": turn for k, turn in enumerate(turns_down(normal))}
+
+    def _faces(self, mesh: PartMesh, crease_deg: float) -> Faces:
+        key = id(mesh), crease_deg
+        if key not in self._known:
+            if len(self._known) > 8:
+                self._known.clear()
+            faces = Faces(mesh.vertices, mesh.triangles, crease_deg)
+            self._known[key] = mesh, faces  # which keeps the mesh, and so its id
+        return self._known[key][1]
+
+    def _mask(self, row: Row, mesh: PartMesh) -> np.ndarray:
+        """The triangles (m,) that an item of `faces` chooses."""
+        faces = self._faces(mesh, row.get("crease_deg", 30.0))
+        face, _ = faces.at(1e-3 * np.array(row["at_mm"]))
+        if row.get("alike"):
+            return faces.alike(face)[faces.of_triangle]
+        return np.asarray(faces.of_triangle == face)
+
+    def _within(self, row: Row, mesh: PartMesh, mask: np.ndarray) -> bool:
+        return not (self._mask(row, mesh) & ~mask).any()
+
+
+def _selection(
+    design: Design, table: str, target: np.ndarray, zones: dict[str, np.ndarray]
+) -> tuple[Selection, np.ndarray]:
+    """A target's table, and the triangles (m,) that it chooses."""
+    if table == TARGET_TABLE:
+        return design.part.target, target
+    places = {f"zones.{k}.target": zone for k, zone in enumerate(design.zones)}
+    if table not in places:
+        raise InputError(f"{table}: no target; there are {', '.join([TARGET_TABLE, *places])}")
+    return places[table].target, zones[places[table].name]
+
+
+def _face_of(faces: Faces, triangle: int) -> int:
+    if not 0 <= triangle < len(faces.of_triangle):
+        raise InputError(f"triangle {triangle}: the part has {len(faces.of_triangle)}")
+    return int(faces.of_triangle[triangle])
+
+
+def _row(faces: Faces, face: int, crease_deg: float, alike: bool = False) -> Row:
+    x, y, z = (round(1e3 * float(x), DIGITS) + 0.0 for x in faces.place(face))
+    return FaceAt(at_mm=(x, y, z), crease_deg=crease_deg, alike=alike).model_dump(
+        mode="json", exclude_defaults=True
+    )

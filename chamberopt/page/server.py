@@ -1,0 +1,230 @@
+"""The page's server: what is at each of its addresses, on this machine only."""
+
+from __future__ import annotations
+
+import hmac
+import json
+import os
+import secrets
+import socket
+from collections.abc import Callable
+from pathlib import Path
+from urllib.parse import parse_qs
+
+import uvicorn
+from starlette.applications import Starlette
+from starlette.concurrency import run_in_threadpool
+from starlette.requests import ClientDisconnect, Request
+from starlette.responses import (
+    FileResponse,
+    JSONResponse,
+    PlainTextResponse,
+    RedirectResponse,
+    Response,
+)
+from starlette.routing import Mount, Route
+from starlette.staticfiles import StaticFiles
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from chamberopt.common.errors import InputError
+from chamberopt.page.acts import Acts
+from chamberopt.page.checker import SupersededError
+from chamberopt.printers.report_page import POLICY
+from sim_core import SceneError
+
+# Who may talk to the page's server: one person's browser on this machine, and no other page in it.
+#
+# The server listens on the loopback address only. The printed address holds a token, which
+# becomes a cookie that scripts cannot read and other sites cannot send; the names of hosts are
+# checked against rebinding of DNS, and the origin of what changes anything. See OWASP, "Cross-
+# Site Request Forgery Prevention" and "DNS rebinding".
+
+EDITOR_POLICY = (
+    "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data: "
+    "blob:; connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+)
+UNKNOWN = "open the address that chamberopt edit printed, with its token"
+# Browsers send cookies to every port of a host, so that another server on this machine could learn
+# the cookie. What asks or changes anything takes a key too, which the page alone keeps.
+KEY, OPEN = "x-chamberopt-key", ("/browser/", "/files/")
+HEADERS = {
+    "X-Content-Type-Options": "nosniff",
+    "Referrer-Policy": "no-referrer",
+    "Cache-Control": "no-store",
+    "Cross-Origin-Resource-Policy": "same-origin",
+}
+
+
+class OnePerson:
+    """Refuse every request that does not come from the person who started the server."""
+
+    def __init__(self, app: ASGIApp, port: int) -> None:
+        self._app, self._cookie = app, f"chamberopt-{port}"
+        self._hosts = {f"127.0.0.1:{port}", f"localhost:{port}"}
+        self._origins = {f"http://{host}" for host in self._hosts}
+        self.token, self._key = secrets.token_urlsafe(32), secrets.token_urlsafe(32)
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] != "http":
+            await self._app(scope, receive, send)
+            return
+        response = self._refusal(Request(scope))
+        if response is not None:
+            await response(scope, receive, send)
+            return
+
+        async def send_with_headers(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                named = {key for key, _ in message["headers"]}
+                added = {**HEADERS, "Content-Security-Policy": EDITOR_POLICY}
+                message["headers"] += [
+                    (key.lower().encode(), value.encode())
+                    for key, value in added.items()
+                    if key.lower().encode() not in named
+                ]
+            await send(message)
+
+        await self._app(scope, receive, send_with_headers)
+
+    def _refusal(self, request: Request) -> Response | None:
+        """Why a request is not served, or how a browser that knows the token gets its cookie."""
+        if request.headers.get("host") not in self._hosts:
+            return _refused("this server is for this machine only")
+        origin = request.headers.get("origin")
+        if origin is not None and origin not in self._origins:
+            return _refused("another page may not use this one")
+        if request.method not in ("GET", "HEAD") and origin is None:
+            return _refused("only the page itself may change anything")
+        given = parse_qs(request.url.query).get("token", [""])[0]
+        if request.url.path == "/" and given and self._is_token(given):
+            response = RedirectResponse(f"/#{self._key}", 303, HEADERS)
+            response.set_cookie(self._cookie, self.token, httponly=True, samesite="strict")
+            return response
+        if not self._is_token(request.cookies.get(self._cookie, "")):
+            return _refused(UNKNOWN)
+        is_open = request.url.path == "/" or request.url.path.startswith(OPEN)
+        if not is_open and not _same(request.headers.get(KEY, ""), self._key):
+            return _refused(UNKNOWN)
+        return None
+
+    def _is_token(self, given: str) -> bool:
+        return _same(given, self.token)
+
+
+def _same(given: str, wanted: str) -> bool:
+    return hmac.compare_digest(given.encode(), wanted.encode())
+
+
+def _refused(why: str) -> Response:
+    return PlainTextResponse(f"refused: {why}\n", 403, HEADERS)
+
+
+BROWSER = Path(__file__).parent / "browser"
+# A report runs scripts of its own: it is shown as a page of nobody, which cannot use this server.
+FILE_POLICY = "sandbox allow-scripts allow-modals allow-popups allow-downloads"
+SHOWN_FILES = {".html": "text/html", ".pdf": "application/pdf", ".png": "image/png"}
+# Names of acts; those that need no question are asked by GET.
+QUESTIONS = ("read", "part", "shape", "cavity", "reach", "pick")
+ACTS = ("save", "study", "start", "stop", "shown")
+LOOKS = "status", "results"
+NONSENSE = (
+    LookupError,
+    TypeError,
+    ValueError,
+    AttributeError,
+    ArithmeticError,
+    RecursionError,
+    OSError,
+)
+MOST_BYTES = 2_000_000  # of a question
+TOO_LONG = f"this question has more than {1e-6 * MOST_BYTES:g} MB; ask for less at a time"
+
+
+def make_app(acts: Acts, port: int) -> OnePerson:
+    """The server's application."""
+
+    def route(name: str, method: str) -> Route:
+        act = getattr(acts, name)
+
+        async def answer(request: Request) -> Response:
+            try:
+                body = await _body(request) if method == "POST" else b"{}"
+                if body is None:
+                    return JSONResponse({"error": TOO_LONG}, 413, {"Connection": "close"})
+                found = await run_in_threadpool(act, json.loads(body or b"{}"))
+            except ClientDisconnect:  # nobody waits for an answer
+                return Response(status_code=400)
+            except SupersededError:
+                return JSONResponse({"superseded": True})
+            except (InputError, SceneError) as error:
+                return JSONResponse({"error": str(error)})
+            except NONSENSE as error:
+                return JSONResponse({"error": f"not a question of this page: {error!r}"}, 400)
+            if isinstance(found, bytes):
+                return Response(found, media_type="application/octet-stream")
+            return JSONResponse(found)
+
+        return Route(f"/{name}", answer, methods=[method])
+
+    async def page(_: Request) -> Response:
+        return FileResponse(BROWSER / "index.html")
+
+    async def file(request: Request) -> Response:
+        try:
+            path = acts.inside(request.path_params["name"])
+            kind = SHOWN_FILES.get(path.suffix) if path.is_file() else None
+        except (InputError, *NONSENSE) as error:
+            return JSONResponse({"error": str(error)}, 404)
+        if kind is None:
+            return JSONResponse({"error": "no report, sheet or picture"}, 404)
+        policy = f"{POLICY}; {FILE_POLICY}" if kind == "text/html" else FILE_POLICY
+        return FileResponse(path, media_type=kind, headers={"Content-Security-Policy": policy})
+
+    routes = [
+        Route("/", page),
+        *(route(name, "POST") for name in (*QUESTIONS, *ACTS)),
+        *(route(name, "GET") for name in LOOKS),
+        Route("/files/{name:path}", file),
+        Mount("/browser", StaticFiles(directory=BROWSER)),
+    ]
+    return OnePerson(Starlette(routes=routes), port)
+
+
+async def _body(request: Request) -> bytes | None:
+    """The body of a request; None as soon as it is, or says that it will be, too long."""
+    if int(request.headers.get("content-length", 0)) > MOST_BYTES:
+        return None
+    body = bytearray()
+    async for part in request.stream():
+        body += part
+        if len(body) > MOST_BYTES:
+            return None
+    return bytes(body)
+
+
+def serve(path: Path, port: int, trusted: bool, tell: Callable[[str], None]) -> None:
+    """Serve the page of a design until Ctrl-C.
+
+    Args:
+        trusted: whether designs may have a Python file as their shape.
+        port: of the loopback address; 0 for a free one.
+        tell: called with the address once the server answers there.
+    """
+    acts = Acts(path, trusted)
+    listening = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+    if os.name == "posix":  # a port that was just left; elsewhere this shares one that is in use
+        listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
+        try:
+            listening.bind(("127.0.0.1", port))
+        except (OSError, OverflowError) as error:
+            why = getattr(error, "strerror", None) or "not from 0 to 65535"
+            raise InputError(f"--port: {port}: {why}; give another, or none") from None
+        listening.listen()
+        port = listening.getsockname()[1]
+        app = make_app(acts, port)
+        tell(f"http://127.0.0.1:{port}/?token={app.token}")
+        uvicorn.Server(uvicorn.Config(app, log_level="warning", lifespan="off")).run([listening])
+    finally:
+        acts.close()
+        listening.close()

@@ -1,0 +1,102 @@
+"""Commands that the page starts: the same as those of the command line, in processes of theirs.
+
+Each has a pipe from the server as its standard input, and ends when that is closed: with the
+server, however the server ends.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from threading import Thread
+from typing import Any
+
+from chamberopt.common.lifetime import GRACE_S
+
+MOST_LINES = 200  # of a command's remarks that the page shows
+BEGIN = (
+    "import sys; from chamberopt.common.lifetime import interrupt_with_stdin; "
+    "interrupt_with_stdin(); from chamberopt.cli import main; sys.exit(main())"
+)
+
+
+class StartedCommand:
+    """A command in a folder, with what it has printed."""
+
+    def __init__(self, arguments: Sequence[str], folder: Path) -> None:
+        self.arguments = list(arguments)
+        self._lines: list[str] = []
+        self._steps: dict[str, dict[str, Any]] = {}
+        self._process = subprocess.Popen(
+            # -P: a file json.py in the folder of a design is no module of the command
+            [sys.executable, "-P", "-c", BEGIN, *arguments, "--progress", "jsonl"],
+            cwd=folder,
+            start_new_session=True,  # Ctrl-C is for the server, which tells it once
+            stdin=subprocess.PIPE,  # it is closed when this process ends, however it ends
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            encoding="utf-8",
+            errors="replace",
+        )
+        self._reader = Thread(target=self._read, daemon=True)
+        self._reader.start()
+
+    def status(self) -> dict[str, Any]:
+        """What the page shows; `exit` is None while the command runs."""
+        code = self._process.poll()
+        if code is not None:
+            self._reader.join(5.0)
+        return {
+            "command": f"chamberopt {' '.join(self.arguments)}",
+            "steps": [] if code is not None else list(self._steps.values()),
+            "lines": self._lines[-MOST_LINES:],
+            "exit": code,
+        }
+
+    def stop(self) -> None:
+        """As Ctrl-C: what was done is kept where the command keeps it."""
+        if self._process.poll() is None:
+            if os.name == "posix":
+                self._process.send_signal(signal.SIGINT)
+            else:
+                self._close_pipe()
+
+    def end(self) -> None:
+        """End the command and all that it started, within seconds; what is on the disk stays."""
+        self._close_pipe()
+        try:
+            self._process.wait(2.0 * GRACE_S)
+        except subprocess.TimeoutExpired:
+            if os.name == "posix":
+                os.killpg(self._process.pid, signal.SIGKILL)
+            self._process.kill()
+
+    def _close_pipe(self) -> None:
+        if self._process.stdin is not None:
+            self._process.stdin.close()
+
+    def _read(self) -> None:
+        for line in self._process.stdout or ():
+            step = _step(line)
+            if step is None:
+                self._lines.append(line.rstrip("\n"))
+            elif step.get("ended"):
+                self._steps.pop(step["step"], None)
+            else:
+                self._steps[step["step"]] = step
+
+
+def _step(line: str) -> dict[str, Any] | None:
+    """What a line says of a step (see common/progress.py); None for any other line."""
+    if not line.startswith('{"step"'):
+        return None
+    try:
+        return dict(json.loads(line))
+    except ValueError:
+        return None

@@ -1,0 +1,119 @@
+"""What is known of a calibrated design's figures, and which measurement would tell most more."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from chamberopt.design.calibration import PARAMETERS
+from chamberopt.peening.calibrate import Calibrated
+from chamberopt.peening.posterior import Model
+from chamberopt.peening.setups import DropModel, amplitude_model
+
+# Figure, its name in words, and the parameters without which it has no value.
+PREDICTED = (
+    ("intensity", "Almen intensity"),
+    ("saturation_time", "saturation time T"),
+    ("coverage_rate", "coverage rate"),
+)
+FAST_DROP = 3.0  # m/s, at which e shows v0; half of v0 shows C0
+SET_SD = 0.015, 0.12  # of ln S and ln T from five arc heights, each read to 3 %
+COVERAGE_SD = 0.07  # of the rate, from coverages of 30 and 60 % read to 3 points
+DENTS_SD, DROP_SD, LASER_SD, IMPACTS_SD = 0.04, 0.015, 0.03, 0.05
+GAIN = 0.9  # of a standard deviation: what leaves more than that is not worth naming
+
+
+class Candidate(NamedTuple):
+    """A measurement that could be made next: its slopes J+ and errors R+.
+
+    Where the model does not explain those of its kind, errors are as much larger as theirs.
+    """
+
+    name: str
+    slopes: np.ndarray
+    errors: np.ndarray
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """A figure of the design.
+
+    Attributes:
+        sd_before, sd: of its logarithm before measuring and now.
+        noise: of its logarithm, by the noise of simulations.
+        next_name, next_sd: the measurement that would leave least; "" where none helps.
+    """
+
+    name: str
+    words: str
+    value: float
+    sd_before: float
+    sd: float
+    noise: float
+    next_name: str
+    next_sd: float
+
+
+def predict(found: Calibrated) -> list[Prediction]:
+    """The figures of the design that the calibration is for."""
+    posterior, candidates = found.posterior, _candidates(found)
+    before = np.diag(posterior.prior.sd**2)
+    predictions = []
+    for name, words in PREDICTED:
+        if name != "coverage_rate" and not found.table.has_strips:
+            continue
+        model = found.figures[name]
+        at = model(posterior.values)
+        row = posterior.slopes(model)
+        left = {one.name: _sd(row, posterior.after(one.slopes, one.errors)) for one in candidates}
+        best = min(left, key=lambda one: left[one])
+        sd = _sd(row, posterior.covariance)
+        helps = left[best] < GAIN * sd
+        predictions.append(
+            Prediction(
+                name, words, float(np.exp(at.values[0])), _sd(row, before), sd,
+                float(np.sqrt(at.noise[0, 0])), best if helps else "", left[best],
+            )
+        )  # fmt: skip
+    return predictions
+
+
+def _sd(row: np.ndarray, covariance: np.ndarray) -> float:
+    return float(np.sqrt(max(0.0, (row @ covariance @ row.T)[0, 0])))
+
+
+def _candidates(found: Calibrated) -> list[Candidate]:
+    materials, figures, posterior = found.design.materials, found.figures, found.posterior
+    scales = {one.kind: one.error_scale for one in posterior.misfits}
+    models: list[tuple[str, str, Model, float]] = [
+        ("dent diameters", "dents of a coupon (30)", figures["mean_dent"], DENTS_SD),
+        ("coverage", "coverage of a coupon at 30 and 60 %", figures["coverage_rate"], COVERAGE_SD),
+        ("amplitude", "the amplitude by laser", amplitude_model, LASER_SD),
+        ("impact rates", "impacts on the part a second, by microphone", figures["impacts"],
+         IMPACTS_SD),
+        ("ball drops", f"a ball drop on the part at {FAST_DROP:g} m/s",
+         DropModel(materials.part, FAST_DROP), DROP_SD),
+    ]  # fmt: skip
+    if materials.wall.v0_m_s is not None:
+        speed = 0.5 * materials.wall.v0_m_s
+        name = f"a slow ball drop on the wall, at {speed:.2g} m/s"
+        models.append(("ball drops", name, DropModel(materials.wall, speed), DROP_SD))
+    made = [
+        Candidate(name, posterior.slopes(model), _diagonal([sd], scales.get(kind, 1.0)))
+        for kind, name, model, sd in models
+    ]
+    # K and beta are no parameters before the first strip.
+    if set(PARAMETERS[-2:]) <= set(posterior.prior.names):
+        both = [posterior.slopes(figures[name]) for name in ("intensity", "saturation_time")]
+        made.insert(
+            0, Candidate("another set of strips, at this design's amplitude",
+                         np.concatenate(both), _diagonal(SET_SD, scales.get("arc heights", 1.0)))
+        )  # fmt: skip
+    return made
+
+
+def _diagonal(sds: Sequence[float], scale: float) -> np.ndarray:
+    return np.diag(np.square(sds)) * scale**2

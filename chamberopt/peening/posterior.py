@@ -1,0 +1,320 @@
+"""What measurements tell of the parameters: the most probable values and their covariance.
+
+Notation
+    theta   natural logarithms of the parameters, (p,)
+    m, P    mean and covariance of theta before measuring: independent, log-normal
+    y, R    logarithms of measured figures and the covariance of their errors
+    f       what the model gives for y; N its error by the noise of simulations
+    J       df/dtheta at the most probable theta
+    C       covariance of theta after measuring
+
+The most probable theta makes (y - f)' (R + N)^-1 (y - f) + (theta - m)' P^-1 (theta - m) least, and
+C = (J' (R + N)^-1 J + P^-1)^-1, Laplace's approximation. A figure g of theta then has the standard
+deviation sqrt(g' C g), and a further measurement with J+ and R+ leaves
+C - C J+' (J+ C J+' + R+)^-1 J+ C, whatever it gives.
+
+Where the model does not explain the figures of one kind, neither they nor the model can be trusted
+to their errors: these are multiplied by sqrt(chi² / nu) (R. T. Birge, Phys. Rev. 40 (1932) 207)
+and all is fitted again, until chi² of every kind is one that chance allows. nu is the number of
+the kind's values less what the fit has taken of them, the trace of (R + N)^-1 J C J', and 1 at
+least. Parameters may explain all and be nothing that was expected: the least sum above has as many
+degrees of freedom as y has values, and where it is too large C is multiplied by their ratio.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations_with_replacement
+from typing import NamedTuple
+
+import numpy as np
+
+from chamberopt.design.calibration import Misfit, Parameter
+from chamberopt.peening.probes import Probe, Reading
+
+# Simulated figures as a smooth function of the parameters that a simulation takes.
+#
+# Notation
+#     x     logarithms of those parameters, less those of the centre, (k,)
+#     X     of all runs, (r, k)
+#     f     figures of a run, logarithms too, (n,); Y of all runs, (r, n)
+#     p(x)  1, x_i, x_i x_j: the terms of a quadratic polynomial, (q,)
+#     s     standard deviation of a figure by the noise of one run
+#     f(x) = p(x) M Y,  with error covariance c(x) times that of one run
+#
+# Coefficients have priors, wide but for the curvatures, so that few runs do. A run far from the
+# centre counts less, by what cubic terms may be: every run that was made serves, near ones most.
+
+CONSTANT, SLOPE, CURVATURE = 10.0, 3.0, 0.3  # prior standard deviations of coefficients
+CUBIC = 0.1  # of a cubic term
+
+
+class Surface(NamedTuple):
+    """Weights of the runs at any place near the centre.
+
+    Attributes:
+        centre: logarithms of the parameters, (k,).
+        matrix: M, (q, r).
+        spread: covariance of the coefficients over that of a run's figure, (q, q).
+    """
+
+    centre: np.ndarray
+    matrix: np.ndarray
+    spread: np.ndarray
+
+    def weights(self, place: np.ndarray) -> np.ndarray:
+        """How much each run counts at a place (k,), (r,)."""
+        return np.asarray(_terms(place - self.centre)[0] @ self.matrix)
+
+    def noise(self, place: np.ndarray) -> float:
+        """c(x) at a place (k,)."""
+        terms = _terms(place - self.centre)[0]
+        return float(terms @ self.spread @ terms)
+
+
+def fit_surface(places: np.ndarray, centre: np.ndarray, noise: float) -> Surface:
+    """The surface of figures of runs.
+
+    Args:
+        places: logarithms of the parameters of each run, (r, k).
+        noise: s.
+    """
+    x = places - centre
+    terms = _terms(x)
+    distance = np.linalg.norm(x, axis=1)
+    weight = noise**2 / (noise**2 + (CUBIC * distance**3) ** 2)
+    count = x.shape[1]
+    prior = np.array([CONSTANT] + [SLOPE] * count + [CURVATURE] * (terms.shape[1] - count - 1))
+    spread = np.linalg.inv((terms.T * weight) @ terms + np.diag((noise / prior) ** 2))
+    return Surface(centre, spread @ (terms.T * weight), spread)
+
+
+def _terms(x: np.ndarray) -> np.ndarray:
+    """p of each row, (r, q)."""
+    x = np.atleast_2d(x)
+    pairs = combinations_with_replacement(range(x.shape[1]), 2)
+    return np.column_stack([np.ones(len(x)), x, *(x[:, i] * x[:, j] for i, j in pairs)])
+
+
+DIFFERENCE = 1e-4  # of theta, for slopes
+PASSES = 2  # with the noise of simulations at the place found before
+TOGETHER = "measurements and priors"  # the kind of a Misfit that is of all
+BY_CHANCE = 0.05  # of a true model's fits have a larger chi²: below, errors are multiplied
+
+
+class Figures(NamedTuple):
+    """f and N."""
+
+    values: np.ndarray
+    noise: np.ndarray
+
+
+class Prior(NamedTuple):
+    """What is known of the parameters before measuring.
+
+    Attributes:
+        names: of the parameters, (p,).
+        mean: m, (p,).
+        sd: square roots of P's diagonal, (p,).
+    """
+
+    names: tuple[Parameter, ...]
+    mean: np.ndarray
+    sd: np.ndarray
+
+    def values(self, theta: np.ndarray) -> dict[Parameter, float]:
+        """The logarithms by name."""
+        return dict(zip(self.names, map(float, theta), strict=True))
+
+
+Model = Callable[[Mapping[Parameter, float]], Figures]
+"""Gives f and N from the logarithms by name."""
+
+
+class SimulatedModel:
+    """The figures of a probe from all runs of one set-up.
+
+    `simulated` names the parameters that a simulation takes; `places` has their logarithms in each
+    run, (r, k), and `readings` what the probe read there.
+    """
+
+    def __init__(self, probe: Probe, simulated: Sequence[Parameter]) -> None:
+        self._slopes = probe.slopes
+        self._simulated = tuple(simulated)
+        self._readings: list[Reading] = []
+        self._places: list[np.ndarray] = []
+        self._surface: Surface | None = None
+        self._noise = np.zeros((0, 0))
+
+    def add(self, place: np.ndarray, reading: Reading) -> None:
+        """One more run."""
+        self._places.append(place)
+        self._readings.append(reading)
+
+    def centre_at(self, centre: np.ndarray) -> None:
+        """Fit the surface round a place (k,)."""
+        self._noise = np.mean([one.noise for one in self._readings], axis=0)
+        sd = float(np.sqrt(np.diag(self._noise).mean()))
+        self._surface = fit_surface(np.array(self._places), centre, max(sd, 1e-6))
+
+    def __call__(self, theta: Mapping[Parameter, float]) -> Figures:
+        assert self._surface is not None
+        place = np.array([theta[name] for name in self._simulated])
+        log_beta = theta.get("beta", 0.0)
+        rows = np.array([one.at(log_beta) for one in self._readings])
+        values = self._surface.weights(place) @ rows
+        exact = [
+            sum(slope * theta.get(name, 0.0) for name, slope in slopes.items())
+            for slopes in self._slopes
+        ]
+        return Figures(values + np.array(exact), self._surface.noise(place) * self._noise)
+
+
+@dataclass(frozen=True)
+class Data:
+    """Measured figures of one kind.
+
+    Args:
+        kind: such as "arc heights", in words that a message can use.
+        label: which of several.
+        at: times [s], or other positions, that a picture shows them at, (n,).
+        y: logarithms of what was measured, (n,).
+        covariance: R, (n, n).
+        model: f of them.
+        drawn: further times and their figures, for a picture.
+    """
+
+    kind: str
+    label: str
+    at: np.ndarray
+    y: np.ndarray
+    covariance: np.ndarray
+    model: Model
+    drawn: tuple[np.ndarray, Model] | None = None
+
+
+@dataclass(frozen=True)
+class Posterior:
+    """What is known of the parameters after measuring."""
+
+    prior: Prior
+    mean: np.ndarray  # most probable theta, (p,)
+    covariance: np.ndarray  # C, (p, p)
+    misfits: tuple[Misfit, ...] = ()
+
+    @property
+    def values(self) -> dict[Parameter, float]:
+        """The logarithms by name."""
+        return self.prior.values(self.mean)
+
+    def slopes(self, model: Model) -> np.ndarray:
+        """J of a model's figures at the mean, (n, p)."""
+        return slopes(model, self.prior, self.mean)
+
+    def sd(self, model: Model, covariance: np.ndarray | None = None) -> np.ndarray:
+        """Standard deviations of figures, (n,), by C or another covariance, without noise."""
+        rows = self.slopes(model)
+        spread = self.covariance if covariance is None else covariance
+        return np.sqrt(np.einsum("ij,jk,ik->i", rows, spread, rows))
+
+    def after(self, rows: np.ndarray, errors: np.ndarray) -> np.ndarray:
+        """C after a further measurement with J+ (n, p) and R+ (n, n)."""
+        gain = self.covariance @ rows.T @ np.linalg.inv(rows @ self.covariance @ rows.T + errors)
+        return np.asarray(self.covariance - gain @ rows @ self.covariance)
+
+
+def slopes(model: Model, prior: Prior, theta: np.ndarray) -> np.ndarray:
+    """J of a model's figures, (n, p)."""
+    columns = []
+    for k in range(len(theta)):
+        step = np.zeros(len(theta))
+        step[k] = DIFFERENCE
+        up, down = (model(prior.values(theta + sign * step)).values for sign in (1.0, -1.0))
+        columns.append((up - down) / (2.0 * DIFFERENCE))
+    return np.array(columns).T
+
+
+def find_posterior(
+    data: Sequence[Data],
+    prior: Prior,
+    start: np.ndarray,
+    bounds: tuple[np.ndarray, np.ndarray],
+    scales: Mapping[str, float] | None = None,
+) -> Posterior:
+    """The most probable theta within bounds, C there, and how well each kind of data is explained.
+
+    Args:
+        start: theta from which to look, (p,).
+        scales: factors on the errors of each kind of data; absent: 1.
+    """
+    from scipy.linalg import block_diag, solve_triangular
+    from scipy.optimize import least_squares
+
+    y = np.concatenate([one.y for one in data])
+    theta = np.clip(start, *bounds)
+    scales = scales or dict.fromkeys((one.kind for one in data), 1.0)
+    for _ in range(PASSES):
+        values = prior.values(theta)
+        errors = block_diag(
+            *(scales[one.kind] ** 2 * (one.covariance + one.model(values).noise) for one in data)
+        )
+        whiten = np.linalg.cholesky(errors)
+
+        def residuals(x: np.ndarray, whiten: np.ndarray = whiten) -> np.ndarray:
+            values = prior.values(x)
+            f = np.concatenate([one.model(values).values for one in data])
+            of_data = solve_triangular(whiten, y - f, lower=True)
+            return np.concatenate([of_data, (x - prior.mean) / prior.sd])
+
+        theta = least_squares(residuals, theta, bounds=bounds, x_scale=prior.sd).x
+    rows = np.concatenate([slopes(one.model, prior, theta) for one in data])
+    information = rows.T @ np.linalg.solve(errors, rows) + np.diag(prior.sd**-2.0)
+    covariance = np.linalg.inv(information)
+    found = Posterior(prior, theta, 0.5 * (covariance + covariance.T))
+    return replace(found, misfits=_misfits(data, found, scales))
+
+
+def explaining_posterior(
+    data: Sequence[Data], prior: Prior, start: np.ndarray, bounds: tuple[np.ndarray, np.ndarray]
+) -> Posterior:
+    """As `find_posterior`, with errors so large that the model explains all that is known."""
+    from scipy.special import chdtrc
+
+    found = find_posterior(data, prior, start, bounds)
+    scales = dict.fromkeys((one.kind for one in data), 1.0)
+    while (wanted := {one.kind: one.error_scale for one in found.misfits}) != scales:
+        scales = wanted
+        found = find_posterior(data, prior, found.mean, bounds, scales)
+    chi2 = float((((found.mean - prior.mean) / prior.sd) ** 2).sum())
+    chi2 += sum(one.chi2 / one.error_scale**2 for one in found.misfits)
+    values = sum(one.values for one in found.misfits)
+    scale = math.sqrt(chi2 / values) if chdtrc(values, chi2) < BY_CHANCE else 1.0
+    all_of_it = Misfit(kind=TOGETHER, chi2=chi2, values=values, error_scale=scale)
+    return replace(
+        found, covariance=scale**2 * found.covariance, misfits=(*found.misfits, all_of_it)
+    )
+
+
+def _misfits(
+    data: Sequence[Data], found: Posterior, scales: Mapping[str, float]
+) -> tuple[Misfit, ...]:
+    """chi² of each kind of data by the errors given, and the factor on these that is wanted."""
+    from scipy.special import chdtrc
+
+    misfits = []
+    for kind, scale in scales.items():
+        chi2, freedom, count = 0.0, 0.0, 0
+        for one in (some for some in data if some.kind == kind):
+            f, rows = one.model(found.values), found.slopes(one.model)
+            left, errors = one.y - f.values, one.covariance + f.noise
+            chi2 += float(left @ np.linalg.solve(errors, left))
+            taken = np.linalg.solve(scale**2 * errors, rows @ found.covariance @ rows.T)
+            freedom += len(left) - float(np.trace(taken))
+            count += len(left)
+        freedom = max(freedom, 1.0)
+        if chdtrc(freedom, chi2 / scale**2) < BY_CHANCE:
+            scale = math.sqrt(chi2 / freedom)
+        misfits.append(Misfit(kind=kind, chi2=chi2, values=count, error_scale=scale))
+    return tuple(misfits)

@@ -1,0 +1,182 @@
+"""What is read off simulated impacts, as a measurement would: logarithms of figures.
+
+Notation
+    h     arc strength of a strip [m], see simulation/peening/strip.py
+    x     dented area of the part over its area, a second [1/s]; coverage is 1 - exp(-x t)
+    d     diameter of a dent on the part [m], as B^(-1/4) with its hardness
+    K, B, beta   as in design/peening/calibration.py: their slopes are exact, but that of arcs by
+                 beta, for which h is taken at other times
+
+Figures and their slopes are those of logarithms: ln(K h(beta t)), ln x, ln d, ln T, and that of the
+rate of impacts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from chamberopt.common.errors import InputError
+from chamberopt.common.estimate import Estimate, jackknife
+from chamberopt.design.calibration import Parameter
+from chamberopt.peening.kirk_fit import heights, strip_saturation
+from chamberopt.peening.strip import Cells, StripDents, count_dents, strip_curve
+
+if TYPE_CHECKING:
+    from chamberopt.coverage.part_impacts import Hits
+    from chamberopt.design.materials import PartMaterial
+
+NOTHING = (
+    "process.accuracy: hardly anything that was measured is dented in the simulation; raise "
+    "simulated_time_s or replicas"
+)
+
+
+class Impacts(NamedTuple):
+    """Simulated impacts on the part.
+
+    Attributes:
+        replicas: impacts of each, on the whole part.
+        seconds: simulated time of each.
+        density: of the balls [kg/m³].
+        strip: metal of a strip, with the restitution that was simulated.
+    """
+
+    replicas: Sequence[Hits]
+    seconds: float
+    density: float
+    strip: PartMaterial
+
+    def strip_dents(self, cells: Cells) -> StripDents:
+        """Dents in cells of a strip."""
+        return count_dents(self.replicas, self.seconds, cells, self.density, self.strip)
+
+
+class Reading(NamedTuple):
+    """The figures of a probe in one run.
+
+    Attributes:
+        at: function of ln beta that gives them, (n,).
+        noise: covariance of their error by the number of impacts, (n, n).
+    """
+
+    at: Callable[[float], np.ndarray]
+    noise: np.ndarray
+
+
+@dataclass(frozen=True)
+class ArcProbe:
+    """Arc heights after some times [s]."""
+
+    cells: Cells
+    times: tuple[float, ...]
+
+    @property
+    def slopes(self) -> tuple[Mapping[Parameter, float], ...]:
+        of_one: Mapping[Parameter, float] = {"K": 1.0}
+        return (of_one,) * len(self.times)
+
+    def read(self, impacts: Impacts) -> Reading:
+        """ln of arc height [mm] at K = 1."""
+        times = np.array(self.times)
+        dents = impacts.strip_dents(self.cells)
+        curve, found = strip_curve(dents), heights(dents, times)
+        more = _logs(found) - np.log(curve.at(times))  # for what few dents lack
+
+        def at(log_beta: float) -> np.ndarray:
+            return np.asarray(np.log(1e3 * curve.at(times * np.exp(log_beta))) + more)
+
+        return Reading(at, _noise(found))
+
+
+@dataclass(frozen=True)
+class SaturationProbe:
+    """Strength S and saturation time T of a strip; K S is the intensity [mmA]."""
+
+    cells: Cells
+
+    slopes: tuple[Mapping[Parameter, float], ...] = ({"K": 1.0}, {"beta": -1.0})
+
+    def read(self, impacts: Impacts) -> Reading:
+        """ln of S [mm] and T [s]."""
+        strength, time = strip_saturation(impacts.strip_dents(self.cells))
+        found = strength.times(1e3), time
+        values = _logs(found)
+        return Reading(lambda _: values, _noise(found))
+
+
+@dataclass(frozen=True)
+class PartProbe:
+    """Figures of dents and impacts on the part, in the order of `names`.
+
+    Args:
+        names: of NAMES.
+        target: triangles of the part that are looked at, (m,) bool.
+        area: of these [m²].
+    """
+
+    names: tuple[str, ...]
+    target: np.ndarray
+    area: float
+
+    SLOPES = {"rate": -0.5, "mean": -0.25, "p90": -0.25, "impacts": 0.0}  # noqa: RUF012  # by ln B
+
+    @property
+    def slopes(self) -> tuple[Mapping[Parameter, float], ...]:
+        return tuple({"hardness": self.SLOPES[name]} for name in self.names)
+
+    def read(self, impacts: Impacts) -> Reading:
+        """ln of x [1/s], of mean and 90th percentile of d [mm], and of impacts on the part a s."""
+        dents = [hits.on(self.target).dent.astype(float) for hits in impacts.replicas]
+        dents = [one[one > 0.0] for one in dents]
+        counts = np.array([len(hits) for hits in impacts.replicas])
+
+        def figures(some: np.ndarray) -> np.ndarray:
+            d = np.concatenate([one for one, used in zip(dents, some, strict=True) if used])
+            seconds = impacts.seconds * some.sum()
+            if not len(d):
+                return np.zeros(len(self.names))
+            rate = np.pi / 4.0 * float((d**2).sum()) / (self.area * seconds)
+            every = {
+                "rate": rate,
+                "mean": 1e3 * float(d.mean()),
+                "p90": 1e3 * float(np.quantile(d, 0.9)),
+                "impacts": float(counts[some].sum()) / seconds,
+            }
+            return np.array([every[name] for name in self.names])
+
+        count = len(counts)
+        whole = figures(np.ones(count, dtype=bool))
+        without = np.array([figures(one) for one in ~np.eye(count, dtype=bool)])
+        found = [
+            Estimate(value, 0.0, tuple(jackknife(np.array([value, *rest])).tolist()))
+            for value, rest in zip(whole, without.T, strict=True)
+        ]
+        values = _logs(found)
+        return Reading(lambda _: values, _noise(found))
+
+
+Probe = ArcProbe | SaturationProbe | PartProbe
+
+
+def whole_target(target: np.ndarray, area: float) -> Cells:
+    """A strip as large as the target of a part."""
+    return Cells(np.array([area]), np.ones(1), lambda hits: np.where(target[hits.triangle], 0, -1))
+
+
+def _logs(found: Sequence[Estimate]) -> np.ndarray:
+    values = np.array([one.value for one in found])
+    if not (values > 0.0).all():
+        raise InputError(NOTHING)
+    return np.log(values)
+
+
+def _noise(found: Sequence[Estimate]) -> np.ndarray:
+    """Covariance (n, n) of the logarithms, from the pseudo-values of the replicas."""
+    relative = np.array([np.array(one.pseudovalues) / one.value for one in found])
+    scatter = np.atleast_2d(np.cov(relative)) / relative.shape[1]
+    # What the correction for few dents may be wrong by.
+    return np.asarray(scatter + np.diag([(one.bias / one.value) ** 2 for one in found]))

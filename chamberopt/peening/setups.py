@@ -1,0 +1,128 @@
+"""The chambers in which measurements were made, simulated at any values of the parameters."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from chamberopt.chamber.scene import chamber_mesh
+from chamberopt.common.executor import share
+from chamberopt.coverage.metrics import exposed_target, require_target
+from chamberopt.design.calibration import (
+    PARAMETERS,
+    Calibration,
+    Parameter,
+    calibrated_strip,
+    scaled_restitution,
+)
+from chamberopt.peening.posterior import Figures, Model, SimulatedModel
+from chamberopt.peening.probes import Impacts, Probe
+from chamberopt.simulation.replicas import ReplicaSetting, simulate_replicas
+
+if TYPE_CHECKING:
+    from chamberopt.chamber.build import Chamber
+    from chamberopt.design.load import Design
+    from chamberopt.design.materials import RestitutionTable
+
+SIMULATED: tuple[Parameter, ...] = ("amplitude", "C0", "v0", "mu")  # what takes a simulation
+
+
+@dataclass
+class Setup:
+    """A design as it was set, without a calibration, and what is read off its impacts."""
+
+    design: Design
+    chamber: Chamber
+    simulated: tuple[Parameter, ...]
+    models: list[tuple[Probe, SimulatedModel]] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        require_target(self.chamber)
+        self.target = exposed_target(self.chamber)
+        self.area = float(self.chamber.exposed_area[self.target].sum())
+        self.mesh = chamber_mesh(self.chamber)
+
+    def model(self, probe: Probe) -> SimulatedModel:
+        """The figures of one more probe, in all runs that follow."""
+        made = SimulatedModel(probe, self.simulated)
+        self.models.append((probe, made))
+        return made
+
+    def add_run(self, place: np.ndarray, impacts: Impacts) -> None:
+        """Read all probes in one run at the logarithms `place` (k,)."""
+        for probe, model in self.models:
+            model.add(place, probe.read(impacts))
+
+
+def simulate_setup(
+    setup: Setup, values: Mapping[Parameter, float], executor: Executor, seed: int
+) -> Impacts:
+    """Impacts at these logarithms of parameters, in the replicas of the design.
+
+    Args:
+        seed: of the run; runs of one seed start alike.
+    """
+    design = setup.design
+    calibration = exact_calibration(design, values)
+    tried = design.model_copy(update={"calibration": calibration})
+    setting = share(executor, ReplicaSetting(tried, setup.chamber, setup.mesh))
+    numbers = range(design.process.accuracy.replicas)
+    found = simulate_replicas(setting, seed, executor, "search", numbers)
+    return Impacts(
+        [one.hits for one in found],
+        design.process.recorded_time,
+        design.shot.density,
+        calibrated_strip(design.shot, calibration),
+    )
+
+
+def exact_calibration(design: Design, values: Mapping[Parameter, float]) -> Calibration:
+    """A calibration to these logarithms of parameters, known exactly."""
+    names = tuple(name for name in PARAMETERS if name in values)
+    count, balls = len(names), sorted(design.shot.diameters)
+    return Calibration(
+        program="",
+        parameters=names,
+        log_mean=tuple(float(values[name]) for name in names),
+        log_covariance=((0.0,) * count,) * count,
+        amplitude_um=(design.sonotrode.amplitude * 1e6,) * 2,
+        ball_diameter_mm=(1e3 * balls[0], 1e3 * balls[-1]),
+        ball_density_kg_m3=design.shot.density,
+    )
+
+
+@dataclass(frozen=True)
+class DropModel:
+    """ln of the restitution of one ball on a surface, e = C0 (v / v0)^(-1/4) as a rule."""
+
+    law: RestitutionTable
+    speed: float  # [m/s]
+
+    def __call__(self, theta: Mapping[Parameter, float]) -> Figures:
+        from sim_core import restitution_at
+
+        c0, v0 = (math.exp(theta.get(name, 0.0)) for name in ("C0", "v0"))
+        law = scaled_restitution(self.law, c0, v0)
+        e = restitution_at(np.array([self.speed]), law.restitution)
+        return Figures(np.log(e), np.zeros((1, 1)))
+
+
+def amplitude_model(theta: Mapping[Parameter, float]) -> Figures:
+    """ln of the real amplitude over the one that is set."""
+    return Figures(np.array([theta["amplitude"]]), np.zeros((1, 1)))
+
+
+def rows_of(model: Model, rows: Sequence[int]) -> Model:
+    """A model of some of another's figures, of which one may come twice."""
+    at = list(rows)
+
+    def some(theta: Mapping[Parameter, float]) -> Figures:
+        found = model(theta)
+        return Figures(found.values[at], found.noise[np.ix_(at, at)])
+
+    return some

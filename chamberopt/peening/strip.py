@@ -1,0 +1,262 @@
+"""Arc height of a virtual Almen strip against peening time, before a calibration's K and beta.
+
+Notation: as in coverage/strength.py, and
+    x, y      along the strip and across it, from its middle [m]
+    a, b      half distances of the gauge's balls along x and y [m]            (GAUGE)
+    k_x, k_y  curvatures of the strip [1/m], in proportion to the local h
+    w         share of a place in the arc height; its integral over the strip is 1
+
+    arc height = 1/2 integral of (a - |x|) k_x dx + 1/2 integral of (b - |y|) k_y dy
+
+The gauge's four balls stand at (± a, ± b), and its tip measures the middle against them. A strip
+bends along x as a whole, so that k_x goes with the mean of h over its width, and k_y with that over
+the length between the balls: x counts for a² / (a² + b²) = 80 %. Discs, strips of other sizes
+and zones of a part count evenly: how their gauge weighs them is not known here.
+
+h follows in cells of the strip from the dents in each, and is summed with their w. Few dents make
+h of a cell saturate too early, so neighbouring cells are put together until they have ENOUGH_DENTS;
+within them the dents count by their w.
+
+Source: the gauge of SAE J442: balls 31.75 mm and 15.87 mm apart.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from chamberopt.coverage.field.surface_points import morton
+from chamberopt.coverage.strength import SATURATED, strip_dents
+from chamberopt.design.almen_strip import STRIPS
+from chamberopt.design.calibration import WHOLE_STRIP
+
+if TYPE_CHECKING:
+    from chamberopt.coverage.part_impacts import Hits
+    from chamberopt.design.materials import PartMaterial
+
+GAUGE = 15.875e-3, 7.94e-3  # a, b [m]
+LENGTH, WIDTH = STRIPS["A"].length, STRIPS["A"].width
+CELLS = 4, 4  # along and across, or rings times sectors / 4 of a disc
+ENOUGH_DENTS = 400  # in a cell on average
+LEVELS = 64  # of strength; twice as many change S by less than 0.1 %
+SCANNED = 200  # times among which the largest root is looked for
+
+
+@dataclass(frozen=True)
+class StripSize:
+    """Length and width [m] of a strip, both the diameter of a disc."""
+
+    length: float = LENGTH
+    width: float = WIDTH
+    is_disc: bool = False
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether it is a standard strip, whose gauge is known."""
+        return not self.is_disc and (self.length, self.width) == (LENGTH, WIDTH)
+
+    @property
+    def calibrated_as(self) -> str:
+        """What a calibration with such strips calls them."""
+        if self.is_whole:
+            return WHOLE_STRIP
+        return f"{self}" if self.is_disc else f"{self} strip"
+
+    def __str__(self) -> str:
+        if self.is_disc:
+            return f"disc of {1e3 * self.length:g} mm"
+        return f"{1e3 * self.length:g} x {1e3 * self.width:g} mm"
+
+
+class Cells(NamedTuple):
+    """Pieces of a strip in which dents are counted.
+
+    Attributes:
+        area: [m²], (c,).
+        weight: w of each, (c,); their sum is 1.
+        of: function of impacts that gives the cell of each, (k,); -1 outside.
+    """
+
+    area: np.ndarray
+    weight: np.ndarray
+    of: Callable[[Hits], np.ndarray]
+
+
+class StripDents(NamedTuple):
+    """Dents in cells of a strip by level of strength.
+
+    Attributes:
+        parts: dented area over area, of each replica in each cell, (g, c, LEVELS).
+        strength: mean s of the dents of each level [m], ascending, (LEVELS,).
+        weight: w of each cell, (c,).
+        number: of dents in each cell in all replicas, (c,).
+        seconds: simulated time of each replica [s].
+    """
+
+    parts: np.ndarray
+    strength: np.ndarray
+    weight: np.ndarray
+    number: np.ndarray
+    seconds: float
+
+
+class StripCurve(NamedTuple):
+    """h(t) = sum of height (1 - exp(-rate t)).
+
+    Attributes:
+        height: [m], (n,).
+        rate: [1/s], (n,).
+    """
+
+    height: np.ndarray
+    rate: np.ndarray
+
+    def at(self, times: np.ndarray | float) -> np.ndarray:
+        """h [m] after these times [s], of the same shape."""
+        gone = -np.expm1(-np.multiply.outer(np.asarray(times, dtype=float), self.rate))
+        return np.asarray(gone @ self.height)
+
+    def growth(self, times: np.ndarray | float) -> np.ndarray:
+        """Slope of h by the logarithm of the time [m], of the shape of the times."""
+        exposure = np.multiply.outer(np.asarray(times, dtype=float), self.rate)
+        return np.asarray((exposure * np.exp(-exposure)) @ self.height)
+
+    def saturation_time(self) -> float:
+        """T [s], the largest root of h(2 T) = 1.1 h(T); 0 without dents."""
+        from scipy.optimize import brentq
+
+        rates = self.rate[self.rate > 0.0]
+        if not len(rates):
+            return 0.0
+
+        # Above the largest root twice the time gives less than a tenth more.
+        times = np.geomspace(0.1 / rates.max(), 5.0 / rates.min(), SCANNED)
+        last = int(np.flatnonzero(self._gain(times) > 0.0)[-1])
+        return float(brentq(self._gain, times[last], times[last + 1], rtol=1e-10))
+
+    def _gain(self, times: np.ndarray) -> np.ndarray:
+        return np.asarray(self.at(2.0 * times) - SATURATED * self.at(times))
+
+
+def strip_cells(size: StripSize) -> Cells:
+    """Cells of a strip whose middle is at x = y = 0."""
+    if size.is_disc:
+        return _disc_cells(0.5 * size.length)
+    a, b = GAUGE
+    along = np.linspace(-1.0, 1.0, CELLS[0] + 1) * min(a, 0.5 * size.length)
+    across = np.linspace(-0.5, 0.5, CELLS[1] + 1) * size.width
+    area = np.outer(np.diff(along), np.diff(across))
+    weight = area / area.sum()
+    if size.is_whole:
+        share = a**2 / (a**2 + b**2)
+        by_x = np.outer(_leverage(along, a), np.diff(across) / size.width)
+        by_y = np.outer(np.diff(along) / (2.0 * a), _leverage(across, b))
+        weight = share * by_x + (1.0 - share) * by_y
+
+    def of(hits: Hits) -> np.ndarray:
+        i, j = (
+            np.searchsorted(edges, hits.place[:, axis], "right") - 1
+            for axis, edges in enumerate((along, across))
+        )
+        inside = (i >= 0) & (i < CELLS[0]) & (j >= 0) & (j < CELLS[1])
+        return np.where(inside, i * CELLS[1] + j, -1)
+
+    return Cells(area.ravel(), weight.ravel(), of)
+
+
+def _leverage(edges: np.ndarray, half: float) -> np.ndarray:
+    """Share of each interval in the integral of half - |x| from -half to half."""
+    x = np.clip(edges, -half, half)
+    return np.asarray(np.diff(x * (2.0 * half - np.abs(x))) / (2.0 * half**2))
+
+
+def _disc_cells(radius: float) -> Cells:
+    """Sectors of rings, all of one area."""
+    rings, sectors = CELLS[0], 4
+    count = rings * sectors
+
+    def of(hits: Hits) -> np.ndarray:
+        x, y = hits.place[:, 0].astype(float), hits.place[:, 1].astype(float)
+        ring = (rings * (x * x + y * y) / radius**2).astype(int)
+        sector = ((np.arctan2(y, x) / (2.0 * np.pi) + 0.5) * sectors).astype(int) % sectors
+        return np.where(ring < rings, ring * sectors + sector, -1)
+
+    area = np.full(count, np.pi * radius**2 / count)
+    return Cells(area, area / area.sum(), of)
+
+
+def surface_cells(vertices: np.ndarray, triangles: np.ndarray, area: np.ndarray) -> Cells:
+    """Cells of a surface that counts evenly: neighbouring triangles of about a sixteenth of it.
+
+    Args:
+        vertices: of the part [m], (n, 3).
+        triangles: of the part, (m, 3).
+        area: of the triangles of the surface [m²], (m,); 0 for others.
+    """
+    own = np.flatnonzero(area > 0.0)
+    own = own[np.argsort(morton(vertices[triangles[own]].mean(axis=1)), kind="stable")]
+    middle = (np.cumsum(area[own]) - 0.5 * area[own]) / area.sum()
+    number = np.unique((CELLS[0] * CELLS[1] * middle).astype(int), return_inverse=True)[1]
+    cell = np.full(len(area), -1)
+    cell[own] = number
+    areas = np.bincount(number, area[own])
+    return Cells(areas, areas / areas.sum(), lambda hits: cell[hits.triangle])
+
+
+def count_dents(
+    replicas: Sequence[Hits], seconds: float, cells: Cells, density: float, strip: PartMaterial
+) -> StripDents:
+    """Dents of replicas in cells of a strip.
+
+    Args:
+        replicas: impacts of each on the strip, or on more than it.
+        seconds: simulated time of each replica.
+        density: of the balls [kg/m³].
+        strip: the metal of a strip.
+    """
+    found = []
+    for hits in replicas:
+        dent, s = strip_dents(hits, density, strip)
+        cell = cells.of(hits)
+        rows = np.flatnonzero((cell >= 0) & (s > 0.0))
+        found.append((cell[rows], np.pi / 4.0 * dent[rows] ** 2, s[rows]))
+    highest = max((float(s.max(initial=0.0)) for _, _, s in found), default=0.0)
+    parts, count = np.zeros((len(found), len(cells.area), LEVELS)), np.zeros(len(cells.area))
+    sums = np.zeros((2, LEVELS))  # dented area, and that times s
+    for part, (cell, dented, s) in zip(parts, found, strict=True):
+        count += np.bincount(cell, minlength=len(count))
+        level = np.minimum((LEVELS * s / max(highest, 1e-300)).astype(int), LEVELS - 1)
+        part += np.bincount(cell * LEVELS + level, dented, part.size).reshape(part.shape)
+        sums += [np.bincount(level, dented * power, LEVELS) for power in (1.0, s)]
+    middle = (np.arange(LEVELS) + 0.5) * highest / LEVELS
+    strength = np.divide(sums[1], sums[0], out=middle, where=sums[0] > 0.0)
+    whole = StripDents(parts / cells.area[:, None], strength, cells.weight, count, seconds)
+    return _put_together(whole)
+
+
+def _put_together(dents: StripDents) -> StripDents:
+    """Fewer cells, 4 or 1, where there are too few dents for all."""
+    cells, total = len(dents.weight), dents.number.sum()
+    groups = next((k for k in (cells, 4) if total >= ENOUGH_DENTS * k), 1)
+    if groups >= cells:
+        return dents
+    member = np.arange(cells) * groups // cells == np.arange(groups)[:, None]
+    weight = member @ dents.weight
+    share = member * dents.weight / weight[:, None]
+    parts = np.einsum("kc,gcl->gkl", share, dents.parts)
+    return StripDents(parts, dents.strength, weight, member @ dents.number, dents.seconds)
+
+
+def strip_curve(dents: StripDents, some: np.ndarray | slice = slice(None)) -> StripCurve:
+    """Arc strength against time from some replicas, all by default.
+
+    Almen's arc height is K times that at beta times the time.
+    """
+    parts = dents.parts[some]
+    density = parts.sum(axis=0) / (dents.seconds * len(parts))
+    rate = np.cumsum(density[:, ::-1], axis=1)[:, ::-1]
+    height = np.outer(dents.weight, np.diff(dents.strength, prepend=0.0))
+    return StripCurve(height.ravel(), rate.ravel())

@@ -1,0 +1,159 @@
+"""The design in which a virtual strip is peened: its holder closes the chamber like a lid.
+
+           ________________
+    ______|_____strip______|______  z = distance
+    |                             |
+    |            shot             |    the chamber of the design, without its part
+    |_____________________________|
+               sonotrode
+
+The strip is flush with its holder, which is of the strip's steel too.
+"""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from chamberopt.common.errors import InputError
+from chamberopt.common.files import write_text
+from chamberopt.design.almen_strip import strip_material
+from chamberopt.design.design import validate
+from chamberopt.design.load import Design
+from chamberopt.design.shapes.base import ParametricChamber, PolygonChamber
+from chamberopt.design.shapes.straight import Cylinder
+from chamberopt.geometry.triangles import area_vectors
+
+if TYPE_CHECKING:
+    from chamberopt.peening.strip import StripSize
+
+HOLDER_FILE = "strip_holder.obj"
+STRIP_GROUP = "strip"
+SIDES = 64  # of a disc
+MARGIN_MM = 5.0  # of the holder beyond the walls
+FIT_MM = 1e-6
+
+
+def strip_design(
+    design: Design, size: StripSize, folder: Path, distance_mm: float | None = None
+) -> Design:
+    """The design with a strip in a flush lid in place of its part; the lid is written as a mesh.
+
+    Args:
+        folder: of the mesh.
+        distance_mm: from the sonotrode to the strip; None for that of the part.
+
+    Raises:
+        InputError: the chamber is of another shape, or the strip does not fit into it.
+    """
+    chamber = design.chamber
+    if not isinstance(chamber, PolygonChamber | Cylinder):
+        raise InputError(
+            f'chamber.shape: given "{chamber.shape}"; not supported: a strip in the lid needs a '
+            "cylinder, box or prism; use --at ZONE with a zone of the part"
+        )
+    distance = chamber.sonotrode_distance_mm if distance_mm is None else distance_mm
+    if not 0.0 < distance < chamber.height_mm:
+        raise InputError(
+            f"--distance-mm: given {distance:g}; allowed: above 0 and below chamber.height_mm = "
+            f"{chamber.height_mm:g}"
+        )
+    outline = _outline_mm(chamber, distance)
+    _require_room(size, outline)
+    thickness = chamber.height_mm - distance + MARGIN_MM
+    half_sides = np.abs(outline).max(axis=0) + abs(chamber.slope) * thickness + MARGIN_MM
+    path = folder / HOLDER_FILE
+    write_text(path, _holder_obj(_edge_mm(size), half_sides, thickness))
+    data = design.model_dump()
+    data["part"] = {"mesh": str(path), "unit": "mm", "target": {"surface": [STRIP_GROUP]}}
+    data["chamber"]["sonotrode_distance_mm"] = float(distance)
+    data["materials"]["part"] = strip_material(design.shot).model_dump()
+    data["effects"]["part_turn"] = None
+    for of_the_part in ("zones", "tolerances"):
+        data.pop(of_the_part, None)
+    return validate(Design, data)
+
+
+def _outline_mm(chamber: ParametricChamber, height: float) -> np.ndarray:
+    """The convex outline (n, 2) [mm] of a chamber at a height [mm], counter-clockwise."""
+    import trimesh
+    from scipy.spatial import ConvexHull
+
+    shape = chamber.surface(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int32))
+    mesh = trimesh.Trimesh(1e3 * shape.vertices, shape.triangles, process=False)
+    cut = trimesh.intersections.mesh_plane(mesh, (0.0, 0.0, 1.0), (0.0, 0.0, height))
+    points = cut.reshape(-1, 3)[:, :2]
+    return np.asarray(points[ConvexHull(points).vertices])
+
+
+def _require_room(size: StripSize, outline: np.ndarray) -> None:
+    """Raise InputError, which says what fits, unless the strip is inside the outline [mm]."""
+    along = np.roll(outline, -1, axis=0) - outline
+    normal = np.c_[along[:, 1], -along[:, 0]] / np.linalg.norm(along, axis=1)[:, None]
+    reach = (normal * outline).sum(axis=1)  # of each side from the middle
+
+    def share(edge: np.ndarray) -> float:
+        """How many times as large the strip may be."""
+        return float((reach / (edge @ normal.T).max(axis=0)).min())
+
+    if share(_edge_mm(size)) >= 1.0 - FIT_MM:
+        return
+    rectangle = 500.0 * np.array([[size.length, size.width], [size.length, -size.width]])
+    fits = 0.1 * math.floor(10.0 * share(np.r_[rectangle, -rectangle]) * 1e3 * size.length)
+    disc = 0.1 * math.floor(10.0 * 2.0 * float(reach.min()))
+    given = f"a {size}" if size.is_disc else f"a strip of {size}"
+    offers = f"--disc-mm {disc:g}"
+    if not size.is_disc:
+        offers += (
+            f" or --size-mm {fits:g} {math.floor(10.0 * fits * size.width / size.length) / 10:g}"
+        )
+    raise InputError(
+        f"{given} does not fit into the chamber there; there is room for {offers}: give the size "
+        "of a small strip that you have, or use --at ZONE"
+    )
+
+
+def _edge_mm(size: StripSize) -> np.ndarray:
+    """Corners of the strip [mm], (n, 2), counter-clockwise."""
+    if size.is_disc:
+        angle = 2.0 * np.pi * (np.arange(SIDES) + 0.5) / SIDES
+        return 500.0 * size.length * np.c_[np.cos(angle), np.sin(angle)]
+    corners = np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]])
+    return 500.0 * corners * [size.length, size.width]
+
+
+def _holder_obj(edge: np.ndarray, half_sides: np.ndarray, thickness: float) -> str:
+    """A plate [mm] whose lower face, at z = 0, has the strip as a group of its own.
+
+    Args:
+        edge: of the strip, (n, 2).
+        half_sides: of the plate along x and y, (2,).
+    """
+    from scipy.spatial import Delaunay
+
+    n = len(edge)
+    corners = half_sides * np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]])
+    points = np.r_[edge, corners]
+    # The corners of the strip are on a circle without others inside, so that Delaunay's triangles
+    # do not cross its edge.
+    lower = Delaunay(points).simplices
+    vertices = np.r_[np.c_[points, np.zeros(n + 4)], np.c_[corners, np.full(4, thickness)]]
+    down = area_vectors(vertices, lower)[:, 2] < 0.0
+    lower = np.where(down[:, None], lower, lower[:, ::-1])
+    is_strip = (lower < n).all(axis=1)
+    low, top = np.arange(n, n + 4), np.arange(n + 4, n + 8)
+    sides = [
+        triangle
+        for k in range(4)
+        for j in [(k + 1) % 4]
+        for triangle in ((low[k], low[j], top[j]), (low[k], top[j], top[k]))
+    ]
+    rest = np.r_[lower[~is_strip], sides, [[top[0], top[1], top[2]], [top[0], top[2], top[3]]]]
+    lines = ["# The holder of a virtual Almen strip, in mm, written by chamberopt."]
+    lines += [f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in vertices]
+    for name, faces in ((STRIP_GROUP, lower[is_strip]), ("holder", rest)):
+        lines += [f"g {name}", *(f"f {a} {b} {c}" for a, b, c in faces + 1)]
+    return "\n".join(lines) + "\n"

@@ -1,0 +1,432 @@
+"""What the tolerances of a design do to its figures: to first order, from 1 + k paired runs.
+
+Notation
+    x_i    a number with a tolerance, see tolerated_numbers.py
+    u_i    how far it is moved
+    L      a figure on its scale, see responses.py
+    g_i    dL/du_i, from one run in which x_i alone is changed
+    L(u) = L(0) + sum of g_i u_i
+
+The slope of a quantile of L over g_i is the mean of u_i where L has that quantile, because the
+share of the box below the quantile stays. So a quantile is a weighted sum of the runs, and has an
+interval like any other. An effect in the noise counts with its estimate, which makes the box look
+wider rather than narrower.
+
+One more run in the worst corner, on the same seeds, tells whether first order is enough.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import Executor
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from chamberopt.chamber.build import build_chamber
+from chamberopt.common.errors import InputError, UnreadableError
+from chamberopt.common.estimate import (
+    CONFIDENCE,
+    FIRST_OF_CALIBRATION,
+    ZERO_TOLERANCE,
+    Estimate,
+    paired_difference,
+)
+from chamberopt.coverage.metrics import find_metric
+from chamberopt.design.tolerances import require_tolerances, tolerance_box
+from chamberopt.peening.responses import (
+    TREATMENT_TIME,
+    PairedRuns,
+    back_from_scale,
+    combine,
+    on_scale,
+    scale_of,
+    with_errors_of,
+)
+
+if TYPE_CHECKING:
+    from chamberopt.chamber.build import Chamber
+    from chamberopt.common.progress import Progress
+    from chamberopt.design.load import Design
+    from chamberopt.simulation.evaluation import Evaluation
+
+# The numbers of a design that have tolerances: their ranges, and how far each is moved in its run.
+#
+# Notation
+#     x    a number with a tolerance; any value from low to high is as likely (ToleratedNumber)
+#     u    ln(x / nominal) where the number is positive, x - nominal otherwise         (moved)
+
+# A change of five times the tolerance has a fifth of the noise, at the price of curvature. Beyond
+# a third of the number, curvature would be the larger error (benchmarks/response_steps.py).
+STRETCH, MOST = 5.0, 0.3
+MASS = "shot.mass_g"
+SAMPLE_EXPONENT = 12  # the box has 2^12 points
+
+
+@dataclass(frozen=True)
+class ToleratedNumber:
+    """A number of a design with its range, in the unit of the file, and the run that moves it."""
+
+    name: str
+    low: float
+    nominal: float
+    high: float
+    changed: Design  # with this number alone changed
+    step: float  # u of that change, of what is really there
+
+    def moved(self, value: float) -> float:
+        """u of a value."""
+        return _moved(self.nominal, self.low, value)
+
+
+def plan_tolerances(design: Design) -> tuple[ToleratedNumber, ...]:
+    """The numbers of a design that have tolerances, each with the change that is simulated.
+
+    InputError if there are none, or the design cannot have one end of a range.
+    """
+    box = tolerance_box(design)
+    if not box:
+        remedy = 'add a table [tolerances], such as "shot.mass_g" = "2 %"'
+        raise InputError(f"tolerances: the design has none; {remedy}")
+    require_tolerances(design)
+    return tuple(_planned(design, name, *ends) for name, ends in box.items())
+
+
+def effective_move(design: Design, number: ToleratedNumber) -> float:
+    """u of a number in a design; of the shot's mass it is that of its whole balls."""
+    if number.name != MASS:
+        return number.moved(design.value(number.name))
+    return number.moved(1e3 * design.shot.count * design.shot.ball_mass)
+
+
+def box_points(numbers: tuple[ToleratedNumber, ...]) -> np.ndarray:
+    """u at points spread evenly over the box, (n, k)."""
+    from scipy.stats.qmc import Sobol
+
+    sample = Sobol(len(numbers), seed=0).random_base2(SAMPLE_EXPONENT)
+    columns = []
+    for x, share in zip(numbers, sample.T, strict=True):
+        values = x.low + share * (x.high - x.low)
+        is_log = _is_logarithmic(x.nominal, x.low)
+        columns.append(np.log(values / x.nominal) if is_log else values - x.nominal)
+    return np.array(columns).T
+
+
+def ball_notes(design: Design, numbers: tuple[ToleratedNumber, ...]) -> list[str]:
+    """How many whole balls the range of the shot's mass is."""
+    for one in numbers:
+        if one.name == MASS:
+            ends = ({MASS: end, "tolerances": None} for end in (one.low, one.high))
+            few, many = (design.changed(end).shot.count for end in ends)
+            return [
+                f"{MASS} from {one.low:.4g} to {one.high:.4g} is {few} to {many} whole balls; its "
+                "effects are those of the mass that is really there"
+            ]
+    return []
+
+
+def _planned(design: Design, name: str, low: float, high: float) -> ToleratedNumber:
+    """The change of one number: the widest allowed of those wanted, to the wider side if it can."""
+    nominal = design.value(name)
+    logarithmic = _is_logarithmic(nominal, low)
+    sides = sorted((_moved(nominal, low, end) for end in (low, high)), key=abs)
+    least = abs(sides[1])
+    most = max(least, min(MOST, STRETCH * least)) if logarithmic else STRETCH * least
+    if name == MASS:  # by one ball at least
+        most = max(most, 1.0 / design.shot.count)
+    sizes = (most, 0.5 * most, 0.25 * most, least)
+    for size in (one for one in sizes if one >= least):
+        for sign in (math.copysign(1.0, sides[1]), -math.copysign(1.0, sides[1])):
+            value = nominal * math.exp(sign * size) if logarithmic else nominal + sign * size
+            try:
+                changed = design.changed({name: value, "tolerances": None})
+            except InputError:
+                continue
+            number = ToleratedNumber(name, low, nominal, high, changed, sign * size)
+            step = effective_move(changed, number) - effective_move(design, number)
+            if step:
+                return ToleratedNumber(name, low, nominal, high, changed, step)
+    text = "no change of this number can be simulated; leave it out"
+    raise InputError(f"tolerances.{name}: {text}")
+
+
+def _moved(nominal: float, low: float, value: float) -> float:
+    return math.log(value / nominal) if _is_logarithmic(nominal, low) else value - nominal
+
+
+def _is_logarithmic(nominal: float, low: float) -> bool:
+    """Whether u is a logarithm, see above."""
+    return nominal > 0.0 and low > 0.0
+
+
+NOMINAL = "nominal design"
+QUANTILES = (0.05, 0.95)
+BENT = 0.1  # of the change in the worst corner: as much curvature is no fault of first order
+NEAR = 0.02  # share of the points that are nearest to a quantile, for its slopes
+NAMED = 3  # more figures that are not resolved are counted
+# The corner is the worst for the first of these that is resolved.
+DECIDING = ("p05_coverage", "mean_coverage", "impacts_per_mm2_s")
+
+
+@dataclass(frozen=True)
+class ToleratedFigure:
+    """One figure over the box.
+
+    lowest and highest: in those corners of the box that are extreme to first order.
+    effects: change at the low and at the high end of each number alone.
+    predicted, simulated: in the worst corner; None where it could not be simulated.
+    agrees: whether these two differ by no more than noise, or than BENT of the change.
+    """
+
+    nominal: Estimate
+    q05: Estimate
+    q95: Estimate
+    lowest: Estimate
+    highest: Estimate
+    effects: dict[str, tuple[Estimate, Estimate]]
+    predicted: Estimate | None = None
+    simulated: Estimate | None = None
+    agrees: bool = True
+
+
+@dataclass(frozen=True)
+class ToleranceResult:
+    """Figures over the box of tolerances.
+
+    worst_for: the figure that is lowest in `corner`; empty where none is resolved.
+    corner: value of each number there.
+    """
+
+    numbers: tuple[ToleratedNumber, ...]
+    figures: dict[str, ToleratedFigure]
+    worst_for: str
+    corner: dict[str, float]
+    notes: tuple[str, ...]
+
+
+def simulate_tolerances(
+    design: Design,
+    chamber: Chamber,
+    executor: Executor,
+    progress: Progress | None = None,
+    analytic: bool = False,
+) -> tuple[Evaluation, ToleranceResult]:
+    """Simulate a design and its tolerances.
+
+    Raises:
+        InputError: as `plan_tolerances`, or a changed chamber cannot be built.
+        sim_core.SimulationError: a run must stop.
+    """
+    numbers = plan_tolerances(design)
+    target = chamber.part.target if design.part.target.reachable else None
+    for one in numbers:  # before the design itself is simulated
+        with _run_named(one):
+            build_chamber(one.changed, target)
+    runs = PairedRuns(design, chamber, executor, progress, analytic, runs=len(numbers) + 2)
+    return runs.nominal, find_tolerances(design, numbers, runs.nominal, runs.evaluate)
+
+
+@contextmanager
+def _run_named(number: ToleratedNumber) -> Iterator[None]:
+    """Add to an error in which run it is."""
+    try:
+        yield
+    except Exception as error:
+        error.add_note(f"in the run with {number.name} = {number.changed.value(number.name):g}")
+        raise
+
+
+def find_tolerances(
+    design: Design,
+    numbers: tuple[ToleratedNumber, ...],
+    nominal: Evaluation,
+    evaluate: Callable[[Design], Evaluation],
+) -> ToleranceResult:
+    """Run each change, then the worst corner, and work out the figures over the box.
+
+    Args:
+        evaluate: evaluates a changed design in the replicas and on the seeds of `nominal`.
+    """
+    changed = {}
+    for one in numbers:
+        with _run_named(one):
+            changed[one.name] = evaluate(one.changed)
+    figures = {
+        name: _Figure(name, numbers, on)
+        for name in nominal.metrics
+        if (on := _resolved(name, nominal, changed))
+    }
+    unknown = [
+        name
+        for name, one in nominal.metrics.items()
+        if name not in figures and one.half_width and one.in_words != "never"
+    ]
+    notes = []
+    if unknown:
+        which = ", ".join(unknown) if len(unknown) <= NAMED else f"{len(unknown)} figures"
+        notes.append(
+            f"not resolved over the tolerances: {which}; raise process.accuracy.simulated_time_s "
+            "or replicas"
+        )
+    notes += ball_notes(design, numbers)
+    worst_for = next((name for name in DECIDING if name in figures), "")
+    found = {name: one.over_the_box() for name, one in figures.items()}
+    if not worst_for:
+        return ToleranceResult(numbers, found, "", {}, tuple(notes))
+    signs = figures[worst_for].signs()
+    corner = {
+        one.name: one.low if sign > 0.0 else one.high
+        for one, sign in zip(numbers, signs, strict=True)
+    }
+    try:
+        there = design.changed({**corner, "tolerances": None})  # which would lie about the corner
+        simulated = evaluate(there)
+    except UnreadableError:
+        raise
+    except InputError as error:
+        notes.append(f"the worst corner cannot be simulated, so first order is unchecked: {error}")
+        return ToleranceResult(numbers, found, worst_for, corner, tuple(notes))
+    at = np.array([effective_move(there, one) - effective_move(design, one) for one in numbers])
+    confidence = 1.0 - (1.0 - CONFIDENCE) / len(figures)  # of all figures together (Bonferroni)
+    found = {
+        name: figures[name].with_corner(one, at, simulated.metrics[name], confidence)
+        for name, one in found.items()
+    }
+    bent = [name for name, one in found.items() if not one.agrees]
+    if bent:
+        notes.append(
+            f"in the worst corner {', '.join(bent)}: not as first order in the tolerances says, by "
+            f"more than noise and {BENT:.0%} of the change; what is simulated there counts, and "
+            "q05 and q95 are rough"
+        )
+    return ToleranceResult(numbers, found, worst_for, corner, tuple(notes))
+
+
+class _Figure:
+    """One figure on its scale, of all runs."""
+
+    def __init__(
+        self, name: str, numbers: tuple[ToleratedNumber, ...], runs: dict[str, Estimate]
+    ) -> None:
+        """`runs` are of the nominal design and of each changed number."""
+        metric, self._scale = find_metric(name), scale_of(name)
+        if name.rpartition(".")[2] == "time_to_98_s" and TREATMENT_TIME in runs:
+            # Estimated after another part of the treatment, of which it does not know.
+            runs = runs | {TREATMENT_TIME: runs[NOMINAL]}
+        self._range = (metric.lowest, metric.highest) if metric else (-math.inf, math.inf)
+        self._numbers, self._nominal = numbers, runs[NOMINAL]
+        nominal = on_scale(self._nominal, self._scale)
+        self._on = {NOMINAL: nominal}
+        for x in numbers:
+            self._on[x.name] = with_errors_of(nominal, on_scale(runs[x.name], self._scale))
+        at_nominal = nominal.value
+        self._slopes = np.array([(self._on[x.name].value - at_nominal) / x.step for x in numbers])
+
+    def signs(self) -> np.ndarray:
+        """Signs of the responses, (k,)."""
+        return np.sign(self._slopes)
+
+    def over_the_box(self) -> ToleratedFigure:
+        """The figure over the box, without its worst corner."""
+        ends = np.array([[x.moved(x.low), x.moved(x.high)] for x in self._numbers])
+        points = box_points(self._numbers)
+        order = np.argsort(points @ self._slopes, kind="stable")
+        quantiles = []
+        for share in QUANTILES:
+            first = round(len(points) * (share - 0.5 * NEAR))
+            near = order[first : first + round(len(points) * NEAR)]
+            quantiles.append(self._possible(self._at(points[near].mean(axis=0))))
+        lowest = np.where(self._slopes > 0.0, *ends.T)
+        highest = np.where(self._slopes > 0.0, *ends.T[::-1])
+        extremes = [self._possible(self._at(corner)) for corner in (lowest, highest)]
+        effects = {
+            x.name: (self._change(k, ends[k, 0]), self._change(k, ends[k, 1]))
+            for k, x in enumerate(self._numbers)
+        }
+        return ToleratedFigure(
+            nominal=_without_replicas(self._nominal),
+            q05=quantiles[0],
+            q95=quantiles[1],
+            lowest=extremes[0],
+            highest=extremes[1],
+            effects=effects,
+        )
+
+    def with_corner(
+        self, found: ToleratedFigure, u: np.ndarray, simulated: Estimate, confidence: float
+    ) -> ToleratedFigure:
+        """The figure with what first order and a run say at u (k,)."""
+        predicted = self._at(u)
+        there, shown = on_scale(simulated, self._scale), self._back(predicted)
+        found = replace(found, predicted=shown, simulated=_without_replicas(simulated))
+        if not _is_resolved(there):
+            return found
+        if self._on[NOMINAL].shared[FIRST_OF_CALIBRATION:]:
+            there = with_errors_of(self._on[NOMINAL], there)
+            found = replace(found, simulated=self._back(there))
+        gap = paired_difference(there, predicted, confidence)
+        change = abs(predicted.value - self._on[NOMINAL].value)
+        return replace(found, agrees=abs(gap.value) <= max(gap.half_width, BENT * change))
+
+    def _at(self, u: np.ndarray) -> Estimate:
+        """L at u (k,), to first order."""
+        shares = [float(one) / x.step for one, x in zip(u, self._numbers, strict=True)]
+        weights = {x.name: share for x, share in zip(self._numbers, shares, strict=True)}
+        return combine(self._on, {NOMINAL: 1.0 - sum(shares), **weights})
+
+    def _change(self, number: int, u: float) -> Estimate:
+        """Change of the figure when one number alone moves by u.
+
+        It is known as well as the change on the scale, and as the place on it where it starts.
+        """
+        x, nominal = self._numbers[number], self._on[NOMINAL]
+        share, changed = u / x.step, self._on[x.name]
+        change = combine(self._on, {x.name: share, NOMINAL: -share})
+        reach = change.half_width
+        if x.name == TREATMENT_TIME:  # the same impacts, whose biases go one way
+            reach -= 2.0 * abs(share) * min(nominal.beyond_scatter, changed.beyond_scatter)
+        there = self._back(Estimate(nominal.value + change.value, max(0.0, reach)))
+
+        def moved(start: float) -> float:
+            return self._scale.inverse(start + change.value) - self._scale.inverse(start)
+
+        value = moved(nominal.value)
+        half_width = there.half_width + max(
+            abs(moved(start) - value) for start in (nominal.low, nominal.high)
+        )
+        rounding = ZERO_TOLERANCE * abs(there.value)
+        return (
+            Estimate(0.0, 0.0)
+            if abs(value) + half_width < rounding
+            else Estimate(value, half_width)
+        )
+
+    def _possible(self, value: Estimate) -> Estimate:
+        """The figure itself, within its range."""
+        found = self._back(value)
+        return replace(found, value=min(max(found.value, self._range[0]), self._range[1]))
+
+    def _back(self, value: Estimate) -> Estimate:
+        return back_from_scale(value, self._scale)
+
+
+def _resolved(
+    name: str, nominal: Evaluation, changed: Mapping[str, Evaluation]
+) -> dict[str, Estimate]:
+    """A figure of all runs; empty where one does not resolve it, or nothing in it is random."""
+    runs = {NOMINAL: nominal, **changed}
+    figures = {run: one.metrics[name] for run, one in runs.items() if name in one.metrics}
+    known = all(_is_resolved(on_scale(one, scale_of(name))) for one in figures.values())
+    is_random = any(one.half_width for one in figures.values())
+    return figures if known and is_random and len(figures) == len(runs) else {}
+
+
+def _without_replicas(figure: Estimate) -> Estimate:
+    return Estimate(figure.value, figure.half_width, in_words=figure.in_words)
+
+
+def _is_resolved(figure: Estimate) -> bool:
+    return math.isfinite(figure.half_width) and not figure.in_words

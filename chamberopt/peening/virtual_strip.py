@@ -1,0 +1,324 @@
+"""Peen a virtual strip, and give what a shop would read off it.
+
+Notation: as in strip.py, and
+    K, beta   arc height over h [mm/mm], dents on a real strip over those simulated; 1 where the
+              design is not calibrated
+    H(t)      arc height of a real strip, K h(beta t); its saturation time is T / beta
+
+Slopes of a figure by the logarithms of amplitude, restitution, yield speed and friction come from
+runs on the same seeds (calibration_errors.py), those by K and beta from the formula.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from chamberopt.chamber.scene import chamber_mesh
+from chamberopt.common.errors import InputError
+from chamberopt.common.estimate import FIRST_OF_CALIBRATION
+from chamberopt.common.executor import share
+from chamberopt.common.number_text import plain
+from chamberopt.design.almen_strip import OVER_A, USED_FOR
+from chamberopt.design.calibration import TIME_ERROR, calibrated_strip, why_no_intensity
+from chamberopt.peening.calibration_errors import moved_parameters, step_of, with_moved
+from chamberopt.peening.kirk_fit import MULTIPLES, KirkFit, heights, kirk_fits, strip_saturation
+from chamberopt.peening.strip import (
+    ENOUGH_DENTS,
+    Cells,
+    StripDents,
+    StripSize,
+    count_dents,
+    strip_cells,
+    strip_curve,
+    surface_cells,
+)
+from chamberopt.peening.strip_holder import HOLDER_FILE, strip_design
+from chamberopt.simulation.replicas import Replica, ReplicaSetting, simulate_replicas
+from chamberopt.simulation.resting_balls import bouncing_notes, resting_notes
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from chamberopt.chamber.build import Chamber
+    from chamberopt.common.estimate import Estimate
+    from chamberopt.common.progress import Progress
+    from chamberopt.design.almen_strip import StripType
+    from chamberopt.design.calibration import Parameter
+    from chamberopt.design.load import Design
+
+DRAWN = np.linspace(0.0, 4.5, 46)[1:]  # times of the curve, in units of T
+MICROMETRES = 1e6
+MIN_OPEN = 0.999  # share of the strip
+ONLY_RATIOS = (
+    "arc heights are strengths in micrometres before the machine's constant: only ratios between "
+    "designs mean something"
+)
+GAUGED = (
+    "places are weighed as a gauge with balls 31.75 mm and 15.87 mm apart does: bending along the "
+    "strip counts for 80 %"
+)
+EVEN = "all places count evenly: how the gauge for this size weighs them is not known"
+FITS = (
+    "curves fitted to five points find the intensity better than the saturation time: trust the "
+    "intensity, not the time"
+)
+OF_A_ZONE = (
+    "the part stays as it is, with its own restitution; the dents are those that a strip would get"
+)
+
+
+class StripSetting(NamedTuple):
+    """A strip in its place.
+
+    Attributes:
+        design: in which it is peened.
+        type: of the strip.
+        place: where it is, in words.
+        cells: of the strip.
+        notes: on how it is looked at.
+    """
+
+    design: Design
+    type: StripType
+    place: str
+    cells: Cells
+    notes: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class VirtualStrip:
+    """A peened strip; arc heights and the intensity are in `unit`."""
+
+    setting: StripSetting
+    unit: str
+    intensity: Estimate  # the arc height at the saturation time
+    time: Estimate  # saturation time [s]
+    at: np.ndarray  # times of `heights` [s], (5,)
+    heights: list[Estimate]  # after MULTIPLES of the saturation time
+    drawn_at: np.ndarray  # times of `drawn` [s], ascending
+    drawn: list[Estimate]  # the saturation curve
+    fits: tuple[KirkFit, KirkFit]  # of two and of three parameters, through `heights`
+    notes: tuple[str, ...]
+
+    @property
+    def is_calibrated(self) -> bool:
+        """Whether arc heights are in mm of a real strip."""
+        return bool(self.of)
+
+    @property
+    def of(self) -> str:
+        """The real strip that arc heights are those of; "" if the design is not calibrated."""
+        calibration = self.setting.design.calibration
+        return calibration.strips if calibration and calibration.has_strips else ""
+
+
+def strip_in_lid(
+    design: Design,
+    strip_type: StripType,
+    size: StripSize,
+    folder: Path,
+    distance_mm: float | None = None,
+) -> StripSetting:
+    """A strip in a flush lid; arguments and errors as strip_design has them."""
+    changed = strip_design(design, size, folder, distance_mm)
+    distance = changed.chamber.sonotrode_distance_mm
+    place = f"{size}, flush in a lid {distance:g} mm over the sonotrode"
+    notes = (GAUGED if size.is_whole else EVEN,)
+    return StripSetting(changed, strip_type, place, strip_cells(size), notes)
+
+
+def strip_in_zone(
+    design: Design, strip_type: StripType, zone: str, chamber: Chamber
+) -> StripSetting:
+    """A strip in the place of a zone of the part, which stays as it is.
+
+    Args:
+        chamber: of the design.
+    """
+    part = chamber.part
+    cells = surface_cells(
+        part.vertices, part.triangles, np.where(part.zones[zone], chamber.exposed_area, 0.0)
+    )
+    return StripSetting(design, strip_type, f"in the place of {zone}", cells, (EVEN, OF_A_ZONE))
+
+
+def peen_strip(
+    setting: StripSetting, chamber: Chamber, executor: Executor, progress: Progress | None = None
+) -> VirtualStrip:
+    """Simulate the replicas of the design, and give arc heights with their intervals.
+
+    Args:
+        chamber: of the setting's design.
+
+    Raises:
+        InputError: no impact dents the strip, or something in the chamber covers a part of it.
+        sim_core.SimulationError: a replica cannot be simulated.
+    """
+    design = setting.design
+    _require_bare(chamber)
+    mesh = chamber_mesh(chamber)
+    names = [name for name in moved_parameters(design) if name != "hardness"]
+    total = (1 + len(names)) * design.process.accuracy.replicas
+    finished = iter(range(1, total + 1))
+
+    def peened(one: Design) -> tuple[list[Replica], StripDents]:
+        replicas = []
+        for replica in _simulated(ReplicaSetting(one, chamber, mesh), executor):
+            replicas.append(replica)
+            if progress:
+                progress(next(finished), total, None)
+        return replicas, _dents(setting, one, replicas)
+
+    replicas, dents = peened(design)
+    first = strip_saturation(dents)
+    if first.time.value <= 0.0:
+        raise _without_dents(design, replicas)
+    at, drawn_at = (np.multiply(one, first.time.value) for one in (MULTIPLES, DRAWN))
+    found = [*first, *heights(dents, [*at, *drawn_at])]
+    slopes: list[dict[Parameter, float]] = [{} for _ in found]
+    for name in names:
+        assert design.calibration is not None
+        step = step_of(name, design.calibration.log_sd(name))
+        other_dents = peened(with_moved(design, name, step))[1]
+        moved = [*strip_saturation(other_dents), *heights(other_dents, [*at, *drawn_at])]
+        for slope, one, other in zip(slopes, found, moved, strict=True):
+            slope[name] = (other.value - one.value) / step
+    intensity, time, *rest = _as_measured(setting, dents, found, slopes, [*at, *drawn_at])
+    points, drawn = rest[: len(at)], rest[len(at) :]
+    slower = time.value / first.time.value
+    why_not = why_no_intensity(design.calibration)
+    return VirtualStrip(
+        setting=setting,
+        unit=_unit(setting),
+        intensity=intensity,
+        time=time,
+        at=slower * at,
+        heights=points,
+        drawn_at=slower * drawn_at,
+        drawn=drawn,
+        fits=kirk_fits(slower * at, np.array([one.value for one in points])),
+        notes=(
+            *((why_not, ONLY_RATIOS) if why_not else _calibrated_notes(setting, intensity.value)),
+            *setting.notes,
+            FITS,
+            *_few_dents(dents),
+            *resting_notes([one.resting for one in replicas if one.resting], len(replicas)),
+            *bouncing_notes([one.bouncing_share for one in replicas]),
+        ),
+    )
+
+
+def _require_bare(chamber: Chamber) -> None:
+    """Raise InputError if something covers a part of the strip in a lid."""
+    part = chamber.part
+    if part.name != HOLDER_FILE:
+        return
+    open_area = float(chamber.exposed_area[part.target].sum() / part.area[part.target].sum())
+    if open_area < MIN_OPEN:
+        raise InputError(
+            f"chamber: only {open_area:.0%} of the strip face the shot; move the deflectors away "
+            "from the lid, or give --distance-mm"
+        )
+
+
+def _simulated(setting: ReplicaSetting, executor: Executor) -> Iterator[Replica]:
+    process, shared = setting.design.process, share(executor, setting)
+    numbers = range(process.accuracy.replicas)
+    yield from simulate_replicas(shared, process.seed, executor, "search", numbers)
+
+
+def _dents(setting: StripSetting, design: Design, replicas: list[Replica]) -> StripDents:
+    shot = design.shot.density, calibrated_strip(design.shot, design.calibration)
+    hits = [one.hits for one in replicas]
+    return count_dents(hits, design.process.recorded_time, setting.cells, *shot)
+
+
+def _as_measured(
+    setting: StripSetting,
+    dents: StripDents,
+    found: list[Estimate],
+    slopes: list[dict[Parameter, float]],
+    times: list[float],
+) -> list[Estimate]:
+    """Figures of a real strip from those simulated, with the errors of the calibration.
+
+    Args:
+        found: S, T, and h after some times.
+        slopes: of each by what was moved in simulations.
+        times: [s].
+    """
+    calibration = setting.design.calibration
+    scale, slower = MICROMETRES, 1.0
+    if calibration is not None and calibration.has_strips:
+        scale = OVER_A[setting.type] * calibration.intensity_mmA(MICROMETRES)
+        slower = 1.0 / calibration.factor("beta")
+    scales = [scale, slower, *[scale] * len(times)]
+    figures = [one.times(by) for one, by in zip(found, scales, strict=True)]
+    if calibration is None:
+        return figures
+    growth = scale * strip_curve(dents).growth(np.array(times))
+    by_beta = [0.0, -figures[1].value, *growth.tolist()]
+    by_k = [1.0, 0.0, *[1.0] * len(times)]
+    measured = []
+    for k, (figure, slope) in enumerate(zip(figures, slopes, strict=True)):
+        whole: dict[Parameter, float] = {name: scales[k] * one for name, one in slope.items()}
+        whole |= {"K": by_k[k] * figure.value, "beta": by_beta[k]}
+        of_model = TIME_ERROR * figure.value if k == 1 else 0.0
+        measured.append(
+            figure.with_shared(FIRST_OF_CALIBRATION, calibration.errors(whole, of_model))
+        )
+    return measured
+
+
+def _unit(setting: StripSetting) -> str:
+    """Of arc heights: mmA is that of whole strips alone."""
+    calibration = setting.design.calibration
+    if calibration is None or not calibration.has_strips:
+        return "µm"
+    return "mm" if calibration.not_mmA else f"mm{setting.type}"
+
+
+def _calibrated_notes(setting: StripSetting, height: float) -> tuple[str, ...]:
+    """What the arc heights belong to; and whether shops use another type at this intensity.
+
+    Args:
+        height: [mm of the type].
+    """
+    calibration, strip_type = setting.design.calibration, setting.type
+    assert calibration is not None
+    text = f"arc heights are those of a {calibration.strips} that is peened like this"
+    if calibration.not_mmA:
+        return (f"{text}, with which the machine was calibrated: mm, not mm{strip_type}",)
+    on_a = height / OVER_A[strip_type]
+    better = next(name for name, (low, high) in USED_FOR.items() if low <= on_a < high)
+    if better == strip_type:
+        return (text,)
+    return (
+        text,
+        f"the intensity is about {plain(on_a, 2)} mmA, where {better} strips are used: N below "
+        "0.10 mmA (0.004 in), C above 0.61 mmA (0.024 in)",
+    )
+
+
+def _few_dents(dents: StripDents) -> tuple[str, ...]:
+    total = int(dents.number.sum())
+    if total >= 4 * ENOUGH_DENTS:
+        return ()
+    return (
+        f"only {total} dents: below some {4 * ENOUGH_DENTS} intervals may be too narrow, and "
+        "places of the strip are not told apart; raise process.accuracy.simulated_time_s",
+    )
+
+
+def _without_dents(design: Design, replicas: list[Replica]) -> InputError:
+    fastest = max((float(one.hits.speed.max(initial=0.0)) for one in replicas), default=0.0)
+    slowest = calibrated_strip(design.shot, design.calibration).v0_m_s
+    return InputError(
+        f"the shot leaves no dent on the strip: its fastest impact has {fastest:.2g} m/s, and "
+        f"dents begin at {slowest:.2g} m/s; raise the amplitude of [sonotrode]"
+    )

@@ -1,0 +1,194 @@
+"""What is put into a plotter: the part, the chamber as glass, discs, colour bars."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from chamberopt.design.shapes import TAG_WALL, is_sonotrode
+from chamberopt.pictures.charts.colours import FEW_DENTS, OUTSIDE, UNREACHED, zone_colour
+from chamberopt.pictures.drawn_part import DrawnPart
+from chamberopt.results.vtp_files import Surface, pyvista
+
+GREY, DARK, GLASS, SONOTRODE, BACKGROUND = "#b9bec4", "#2b3440", "#9db7cc", "#e08a2e", "white"
+FAULT, PALE = "#d01c1c", "#eceff2"
+SHARP_EDGE = 30  # degrees between the triangles at an edge that is drawn
+ROUND_STEPS = (1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0)  # of colour bars, times powers of ten
+LIFT = 0.1  # of discs off the surface, in their radii: the facets of a round edge do not hide them
+DISC_SIDES = 24
+SCATTER = "counted dents scatter: single places look less even than they are"
+NO_RENDER = {"render": False, "reset_camera": False}  # until everything is in the plotter
+
+
+def light(plotter: Any) -> None:
+    """Make the background white and put a light beside the camera."""
+    plotter.set_background(BACKGROUND)
+    plotter.remove_all_lights()
+    plotter.add_light(pyvista().Light(light_type="headlight"))
+
+
+def colour_meanings(parts: Sequence[DrawnPart]) -> list[tuple[str, str]]:
+    """Colours that stand for no value and what they mean, those that there are."""
+    entries = (
+        (any(part.rest.n_cells for part in parts), GREY, "not in the target"),
+        (any(not np.all(part.target["resolved"]) for part in parts), FEW_DENTS, "too few dents"),
+        (any(part.unreached.n_cells for part in parts), UNREACHED, "out of the shot's reach"),
+        (any(part.outside.n_cells for part in parts), OUTSIDE, "target outside the chamber"),
+    )
+    return [(colour, meaning) for there, colour, meaning in entries if there]
+
+
+def add_part(
+    plotter: Any, part: DrawnPart, limits: tuple[float, float], pale: np.ndarray | None = None
+) -> list[Any]:
+    """Add the target, coloured by its quantity where that is resolved, and the rest of the part.
+
+    Args:
+        pale: triangles of `part.target`, bool, that are drawn pale instead.
+
+    Returns:
+        The actors; the mapper of the first has the colours.
+    """
+    if part.quantity.name == "zones":
+        return _add_zones(plotter, part)
+    pale = np.zeros(part.target.n_cells, dtype=bool) if pale is None else pale
+    resolved = np.asarray(part.target["resolved"])
+    style = {"ambient": 0.7, "diffuse": 0.3, **NO_RENDER}
+    coloured = np.flatnonzero(resolved & ~pale)
+    actors = [
+        plotter.add_mesh(
+            part.target.extract_cells(coloured) if len(coloured) else part.whole.extract_cells([0]),
+            scalars="shown" if len(coloured) else np.zeros(3), cmap=part.quantity.colours,
+            clim=limits, nan_color=FEW_DENTS, show_scalar_bar=False, **style,
+        )
+    ]  # fmt: skip
+    actors[0].visibility = bool(len(coloured))  # the colour bar needs an actor all the same
+    for surface, colour in (
+        (part.target.extract_cells(np.flatnonzero(pale)), PALE),
+        (part.target.extract_cells(np.flatnonzero(~resolved & ~pale)), FEW_DENTS),
+        (part.unreached, UNREACHED),
+        (part.outside, OUTSIDE),
+        (part.rest, GREY),
+    ):
+        if surface.n_cells:
+            style |= {"ambient": 0.75, "diffuse": 0.25} if colour == GREY else {}
+            actors.append(plotter.add_mesh(surface, color=colour, **style))
+    for actor in actors:
+        actor.prop.interpolation = "Phong"  # by the normals of the surface, not of its triangles
+    return actors
+
+
+def _add_zones(plotter: Any, part: DrawnPart) -> list[Any]:
+    """Add the part with each zone in its colour; without values, there is no colour bar."""
+    actors = []
+    for number, surface in part.zones.items():
+        colour = zone_colour(number - 1) if number else GREY
+        actors.append(
+            plotter.add_mesh(surface, color=colour, ambient=0.6, diffuse=0.4, **NO_RENDER)
+        )
+        actors[-1].prop.interpolation = "Phong"
+    return actors
+
+
+def add_chamber(plotter: Any, chamber: Surface) -> tuple[dict[int, Any], list[Any]]:
+    """Add the sonotrodes, and the walls as glass with their edges; clicks pass through them.
+
+    Returns:
+        The actors of the sonotrodes by tag, and those of the walls.
+    """
+    tags = np.asarray(chamber["tag"])
+    style = {"pickable": False, **NO_RENDER}
+    faces = {}
+    for tag in np.unique(tags[is_sonotrode(tags)]):
+        face = chamber.extract_cells(tags == tag).extract_surface(algorithm="dataset_surface")
+        faces[int(tag)] = plotter.add_mesh(face, color=SONOTRODE, lighting=False, **style)
+    wall = chamber.extract_cells(tags == TAG_WALL).extract_surface(algorithm="dataset_surface")
+    edges = wall.extract_feature_edges(SHARP_EDGE, non_manifold_edges=False, manifold_edges=False)
+    return faces, [
+        plotter.add_mesh(wall, color=GLASS, opacity=0.16, specular=0.3, **style),
+        plotter.add_mesh(edges, color=DARK, line_width=2, opacity=0.6, **style),
+    ]
+
+
+def add_edges(plotter: Any, part: Surface) -> None:
+    """Add the sharp edges of a part as thin lines."""
+    whole = pyvista().PolyData(part.points, part.faces).clean()
+    edges = whole.extract_feature_edges(
+        SHARP_EDGE, boundary_edges=False, non_manifold_edges=False, manifold_edges=False
+    )
+    if edges.n_cells:
+        mapper = plotter.add_mesh(edges, color=DARK, line_width=3, opacity=0.6, **NO_RENDER).mapper
+        mapper.SetResolveCoincidentTopologyToPolygonOffset()  # in front of the part's surface
+        mapper.SetRelativeCoincidentTopologyLineOffsetParameters(-2.0, -4.0)
+
+
+class Discs(NamedTuple):
+    """Flat discs on a surface, one a row.
+
+    place: centres [mm], shape (k, 3).
+    normal: unit vectors away from the surface, shape (k, 3).
+    radius: [mm], shape (k,).
+    colour: red, green, blue, uint8, shape (k, 3).
+    """
+
+    place: np.ndarray
+    normal: np.ndarray
+    radius: np.ndarray
+    colour: np.ndarray
+
+    def only(self, rows: np.ndarray) -> Discs:
+        """A copy of some rows."""
+        return Discs(*(column[rows] for column in self))
+
+
+def disc_actor(discs: Discs, ambient: float = 1.0) -> Any:
+    """Return an actor that shows discs, later ones over earlier ones.
+
+    ambient: brightness of a disc seen edge on, as a share of one seen face on.
+    """
+    import vtk
+
+    points = pyvista().PolyData(discs.place + LIFT * discs.radius[:, None] * discs.normal)
+    points["normal"], points["diameter"] = discs.normal, 2.0 * discs.radius
+    points["colour"] = discs.colour
+    # A regular polygon with the area of the circle of diameter 1.
+    angle = 2.0 * np.pi / DISC_SIDES
+    radius = 0.5 * np.sqrt(angle / np.sin(angle))
+    # The mapper turns the x axis of its source into the normal.
+    polygon = pyvista().Disc(inner=0.0, outer=radius, normal=(1.0, 0.0, 0.0), c_res=DISC_SIDES)
+    mapper = vtk.vtkGlyph3DMapper()
+    mapper.SetInputData(points)
+    mapper.SetSourceData(polygon)
+    mapper.SetScaleArray("diameter")
+    mapper.SetScaleModeToScaleByMagnitude()
+    mapper.SetOrientationArray("normal")
+    mapper.SetOrientationModeToDirection()
+    mapper.SetScalarModeToUsePointFieldData()
+    mapper.SelectColorArray("colour")
+    mapper.SetColorModeToDirectScalars()
+    actor = vtk.vtkActor()
+    actor.SetMapper(mapper)
+    actor.GetProperty().SetAmbient(ambient)
+    actor.GetProperty().SetDiffuse(1.0 - ambient)
+    # VTK draws translucent actors after all others and without writing their depth: each disc is
+    # hidden by surfaces in front of it, and covers those drawn before it.
+    actor.ForceTranslucentOn()
+    return actor
+
+
+def escape_dollars(text: str) -> str:
+    """Escape `$`, so that VTK does not typeset a folder's name as a formula."""
+    return text.replace("$", r"\$")
+
+
+def colour_bar_ticks(limits: tuple[float, float]) -> tuple[int, str]:
+    """Return into how many round steps a colour bar is divided, and the format of its labels."""
+    span = limits[1] - limits[0]
+    for steps in (5, 4, 6, 7, 8, 9, 10, 3):
+        step = span / steps
+        if any(np.isclose(step / 10.0 ** np.floor(np.log10(step)), one) for one in ROUND_STEPS):
+            exact = (n for n in range(9) if np.isclose(round(step, n), step, rtol=1e-6))
+            return steps, f"%.{next(exact, 9)}f"
+    return 5, f"%.{max(0, int(np.ceil(1.0 - np.log10(span)))) if span > 0.0 else 2}f"

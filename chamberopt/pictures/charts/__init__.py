@@ -1,0 +1,1 @@
+"""Charts of studies, sweeps, accuracy and coverage, drawn with matplotlib."""

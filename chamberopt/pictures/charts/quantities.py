@@ -1,0 +1,55 @@
+"""The quantities that viewer and report show on the part, with their colour maps."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from chamberopt.pictures.charts.colours import COUNT_MAP, COVERAGE_MAP, WIDTH_MAP
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A number that can be shown at each place of the part."""
+
+    name: str
+    label: str
+    unit: str
+    column: str  # its field in coverage.vtp and part.vtp
+    factor: float = 1.0  # from that field to the unit that is shown
+    colours: str = COVERAGE_MAP
+    grows: bool = False  # whether it is proportional to the peening time
+
+    @property
+    def title(self) -> str:
+        return f"{self.label} [{self.unit}]"
+
+
+OTHER_NAMES = {"intensity": "strength", "p90": "p90-speed"}  # what one may call them
+QUANTITIES = {
+    one.name: one
+    for one in (
+        Quantity("coverage", "coverage", "%", "coverage", 100.0),
+        Quantity("impacts", "impacts per area", "1/mm²", "impacts_per_mm2", 1.0, COUNT_MAP, True),
+        Quantity("speed", "mean normal speed", "m/s", "mean_normal_speed"),
+        Quantity("p90-speed", "normal speed, 90th percentile", "m/s", "p90_normal_speed"),
+        Quantity("angle", "mean impact angle, 90° is head on", "°", "mean_angle_deg"),
+        Quantity("dent", "mean dent diameter", "µm", "mean_dent_um"),
+        Quantity(
+            "energy", "energy of impacts per area", "mJ/mm²", "energy_per_mm2", 1.0, COUNT_MAP, True
+        ),
+        Quantity(
+            "interval",
+            "width of coverage's 95 % interval",
+            "%",
+            "coverage_interval",
+            100.0,
+            WIDTH_MAP,
+        ),
+        Quantity("strength", "peening strength", "µm", "strength_um"),
+        Quantity("almen", "Almen intensity", "mmA", "almen_intensity_mmA"),
+        Quantity("saturation", "saturation time of a strip", "s", "saturation_time_s"),
+        Quantity("depth", "estimated depth of compression", "µm", "compression_depth_um"),
+        Quantity("moved", "surface from the file's facets", "µm", "moved_um", 1.0, WIDTH_MAP),
+        Quantity("zones", "zone", "", "zone"),
+    )
+}

@@ -1,0 +1,302 @@
+"""Charts of a study: its search, slices through its best design, and the Pareto front."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from chamberopt.common.estimate import Estimate
+from chamberopt.common.number_text import estimate_text, plain
+from chamberopt.pictures.charts.colours import BLUE, GREEN, GREY, ORANGE
+from chamberopt.pictures.charts.figure_style import (
+    SMALL,
+    TITLE,
+    name_choices,
+    new_figure,
+    readable,
+    save_picture,
+    style_axes,
+    value_range,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from chamberopt.search.run_study import StudyResult
+    from chamberopt.search.sensitivity import Sensitivity, Slice
+
+MAX_COLUMNS = 4  # panels side by side
+
+
+@dataclass(frozen=True)
+class EvaluatedCandidate:
+    """One evaluation of a study as its chart shows it.
+
+    Args:
+        number: place in the order of evaluations, from 1.
+        stage: "search" or "confirm".
+        objective: None when the candidate was not simulated.
+        feasible: whether it meets the constraints.
+        parameters: values by dotted name.
+    """
+
+    number: int
+    stage: str
+    objective: Estimate | None
+    feasible: bool
+    parameters: Mapping[str, float | str] = field(default_factory=dict)
+
+
+def convergence_picture(path: Path, result: StudyResult) -> None:
+    """Write the objective against evaluation and against each parameter, as .png."""
+    candidates = [
+        EvaluatedCandidate(t.number + 1, t.stage, t.objective, t.feasible, t.parameters)
+        for t in result.trials
+    ]
+    y_label = readable(result.study.objective.goals[0])
+    names = list(result.study.vary)
+    columns = min(len(names), MAX_COLUMNS)
+    rows = -(-len(names) // columns)
+    figure = new_figure(11.0, 4.2 + 3.0 * rows)
+    grid = figure.add_gridspec(rows + 1, columns, height_ratios=[1.35, *[1.0] * rows])
+    axes = figure.add_subplot(grid[0, :])
+    draw_convergence(axes, candidates, y_label)
+    start, best = (one.evaluation.objective for one in (result.start, result.best))
+    axes.axhline(start.value, color=ORANGE, lw=1.2, ls="--", label="start, as confirmed")
+    axes.set_title(
+        f"best {estimate_text(best)}, start {estimate_text(start)}: "
+        f"gain {estimate_text(result.gain, sign=True)}   ({result.algorithm})",
+        loc="left",
+        fontsize=TITLE,
+    )
+    handles, labels = axes.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower left", ncols=4, fontsize=SMALL, frameon=False,
+                  title="lower panels: the later in the search, the darker",
+                  title_fontsize=SMALL, alignment="left")  # fmt: skip
+    first: Axes | None = None
+    for i, name in enumerate(names):
+        axes = figure.add_subplot(grid[1 + i // columns, i % columns], sharey=first)
+        _draw_parameter(axes, result, candidates, name)
+        if i % columns == 0:
+            axes.set_ylabel(y_label)
+        else:
+            axes.tick_params(labelleft=False)
+        first = first or axes
+    save_picture(figure, path)
+
+
+def draw_convergence(
+    axes: Axes,
+    candidates: Sequence[EvaluatedCandidate],
+    y_label: str,
+    smaller_is_better: bool = False,
+) -> dict[str, list[str]]:
+    """Draw every evaluation in its order with 95 % intervals, the best so far, and confirmations.
+
+    Returns:
+        Tooltips for svg_text: value and parameters of each point, by gid of its line.
+    """
+    from matplotlib.ticker import MaxNLocator
+
+    search = [one for one in candidates if one.stage == "search"]
+    evaluated = [one for one in search if one.objective]
+    confirmed = [one for one in candidates if one.stage == "confirm" and one.objective]
+    feasible = [one for one in evaluated if one.feasible]
+    infeasible = [one for one in evaluated if not one.feasible]
+    failed = [one.number for one in search if not one.objective]
+    last = max((one.number for one in candidates), default=1) + 0.5
+    tooltips = {}
+    for group, colour, marker, label in (
+        (feasible, BLUE, "o", "evaluation, 95 % interval"),
+        (infeasible, GREY, "x", "misses a constraint"),
+        (confirmed, GREEN, "o", "confirmed on fresh seeds"),
+    ):
+        if group:
+            x, y, half_width = zip(*map(_point, group), strict=True)
+            axes.errorbar(x, y, yerr=half_width, fmt=marker, ms=5, lw=1, color=colour, label=label,
+                          gid=label)  # fmt: skip
+            tooltips[label] = [_tooltip(one) for one in group]
+    if failed:
+        axes.plot(failed, np.full(len(failed), 0.02), "|", color=GREY, clip_on=False,
+                  label="not simulated", transform=axes.get_xaxis_transform())  # fmt: skip
+    if feasible:
+        best = np.minimum if smaller_is_better else np.maximum
+        values = best.accumulate([one.objective.value for one in feasible if one.objective])
+        numbers = [one.number for one in feasible]
+        axes.step([*numbers, search[-1].number], [*values, values[-1]], where="post", color=BLUE,
+                  alpha=0.5, label="best so far (as searched)")  # fmt: skip
+    if confirmed:
+        axes.axvspan(len(search) + 0.5, last, color=GREEN, alpha=0.08, lw=0)
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    axes.set_xlim(0.5, last)
+    if shown := [one.objective for one in (*evaluated, *confirmed) if one.objective]:
+        axes.set_ylim(*value_range(shown))
+    style_axes(axes, "evaluation", y_label)
+    return tooltips
+
+
+def _point(candidate: EvaluatedCandidate) -> tuple[int, float, float]:
+    assert candidate.objective is not None
+    return candidate.number, candidate.objective.value, candidate.objective.half_width
+
+
+def _tooltip(candidate: EvaluatedCandidate) -> str:
+    assert candidate.objective is not None
+    rows = [f"{name} = {plain(one)}" for name, one in candidate.parameters.items()]
+    first = f"evaluation {candidate.number}: {estimate_text(candidate.objective)}"
+    return "\n".join([first, *rows])
+
+
+def _draw_parameter(
+    axes: Axes, result: StudyResult, candidates: Sequence[EvaluatedCandidate], name: str
+) -> None:
+    """Draw the search over one parameter, later ones darker, and start and best as confirmed."""
+    varied = result.study.vary[name]
+    search = [one for one in candidates if one.stage == "search"]
+    shown = [
+        one for one in search if one.objective and is_there(one.parameters[name], varied.texts)
+    ]
+    axes.scatter(
+        [varied.place(one.parameters[name]) for one in shown],
+        [one.objective.value for one in shown if one.objective],
+        c=[one.number for one in shown],
+        cmap="Blues",
+        vmin=-0.6 * max(1, len(search)),
+        s=26,
+        edgecolors="none",
+    )
+    for confirmed, colour, marker, size, label in (
+        (result.start, ORANGE, "o", 8, "start"),
+        (result.best, GREEN, "*", 13, "best"),
+    ):
+        if not is_there(confirmed.parameters[name], varied.texts):
+            continue
+        value = confirmed.evaluation.objective.value
+        place = varied.place(confirmed.parameters[name])
+        axes.plot(place, value, marker, color=colour, label=label, ms=size, mec="white")
+    low, high = varied.bounds
+    margin = (0.2 if varied.texts else 0.03) * (high - low)
+    axes.set_xlim(low - margin, high + margin)
+    name_choices(axes.xaxis, varied.texts)
+    style_axes(axes, name)
+    if axes.get_legend_handles_labels()[0]:
+        axes.legend(fontsize=SMALL, frameon=False)
+
+
+def is_there(value: float | str, texts: Sequence[str]) -> bool:
+    """Whether a candidate has a parameter, whose value is else the text of parameters.NONE."""
+    return not isinstance(value, str) or value in texts
+
+
+def slices_picture(path: Path, result: StudyResult, sensitivity: Sensitivity) -> None:
+    """Write the model's objective over each parameter, as .png."""
+    figure = slices_figure(
+        sensitivity.slices,
+        result.start.parameters,
+        result.best.parameters,
+        f"loses no more than {sensitivity.noise:.2g}",
+        readable(result.study.objective.goals[0]),
+    )
+    save_picture(figure, path)
+
+
+def slices_figure(
+    slices: Sequence[Slice],
+    start: Mapping[str, float | str],
+    best: Mapping[str, float | str],
+    flat_label: str,
+    y_label: str,
+) -> Figure:
+    """The model's objective over each parameter: slice with its interval, main effect, flat range.
+
+    Args:
+        start, best: parameter values of these two designs.
+        flat_label: what the shaded range of a parameter means.
+    """
+    columns = min(len(slices), MAX_COLUMNS)
+    rows = -(-len(slices) // columns)
+    figure = new_figure(3.4 * max(columns, 2), 3.3 * rows + 0.5)
+    panels = figure.subplots(rows, columns, sharey=True, squeeze=False).ravel()
+    for axes, one in zip(panels, slices, strict=False):
+        of_slice = "the others as in the best, 95 % interval; without a band: or worse"
+        width = np.where(one.or_worse, np.nan, one.half_width)  # no band there
+        of_mean = "mean over the others; above, its share of the variance over the bounds"
+        if one.texts:
+            for text in one.flat:
+                place = _place(one, text)
+                axes.axvspan(
+                    place - 0.2, place + 0.2, color=GREEN, alpha=0.12, lw=0, label=flat_label
+                )
+            axes.errorbar(one.values, one.mean, width, fmt="o", color=BLUE, label=of_slice)
+            axes.plot(one.values, one.effect, "D", mfc="none", color=GREY, label=of_mean)
+            name_choices(axes.xaxis, one.texts)
+        else:
+            low, high = one.mean - width, one.mean + width
+            axes.axvspan(*one.flat, color=GREEN, alpha=0.12, lw=0, label=flat_label)
+            axes.fill_between(one.values, low, high, color=BLUE, alpha=0.15, lw=0)
+            axes.plot(one.values, one.mean, color=BLUE, label=of_slice)
+            axes.plot(one.values, one.effect, color=GREY, ls="--", label=of_mean)
+        axes.axvline(_place(one, best[one.name]), color=GREEN, lw=1.2, label="best")
+        if is_there(start[one.name], one.texts):
+            axes.axvline(_place(one, start[one.name]), color=ORANGE, lw=1.0, ls=":", label="start")
+        axes.set_title(f"alone {one.share:.0%} of the variance", loc="left", fontsize=SMALL)
+        style_axes(axes, one.name)
+    for axes in panels[len(slices) :]:
+        axes.set_visible(False)
+    panels[0].set_ylabel(y_label)
+    found = [axes.get_legend_handles_labels() for axes in panels[: len(slices)]]
+    legend = {label: one for pair in found for one, label in zip(*pair, strict=True)}
+    figure.legend(legend.values(), legend.keys(), loc="outside upper center",
+                  ncols=2 if columns > 2 else 1, fontsize=SMALL, frameon=False)  # fmt: skip
+    return figure
+
+
+def _place(of: Slice, value: float | str) -> float:
+    return float(of.texts.index(value) if isinstance(value, str) else value)
+
+
+def pareto_picture(path: Path, result: StudyResult) -> None:
+    """Write both objectives of every candidate, with the confirmed Pareto front, as .png."""
+    from chamberopt.search.pareto import pareto_points
+
+    figure = new_figure(8.0, 6.0)
+    axes = figure.subplots()
+    candidates = pareto_points(result)
+    groups = (
+        ("search", False, GREY, "o", "searched"),
+        ("search", True, BLUE, "o", "searched, on the front of the search"),
+        ("confirm", False, ORANGE, "s", "confirmed on fresh seeds, beaten in both"),
+        ("confirm", True, GREEN, "s", "confirmed on fresh seeds, on the front"),
+    )
+    for stage, on_front, colour, marker, label in groups:
+        shown = sorted(
+            (one.goals for one in candidates if (one.stage, one.on_front) == (stage, on_front)),
+            key=lambda goals: goals[0].value,
+        )
+        x, y = ([goals[k].value for goals in shown] for k in (0, 1))
+        bars: dict[str, Any] = {}
+        if stage == "confirm":
+            x_error, y_error = ([goals[k].half_width for goals in shown] for k in (0, 1))
+            bars = {"xerr": x_error, "yerr": y_error}
+        axes.errorbar(x, y, **bars, fmt=marker, ls="--" if bars and on_front else "", lw=1,
+                      ms=5 if bars else 3, color=colour, label=label)  # fmt: skip
+    # Intervals are drawn for confirmed candidates only.
+    x_goals, y_goals = (
+        [
+            one.goals[k] if one.stage == "confirm" else Estimate(one.goals[k].value, 0.0)
+            for one in candidates
+        ]
+        for k in (0, 1)
+    )
+    axes.set_xlim(*value_range(x_goals))
+    axes.set_ylim(*value_range(y_goals))
+    x_name, y_name = map(readable, result.study.objective.goals)
+    style_axes(axes, f"{x_name}, better to the right", f"{y_name}, better upwards")
+    axes.legend(fontsize=SMALL, frameon=False)
+    save_picture(figure, path)

@@ -1,0 +1,165 @@
+"""The map of a sweep: its objective over one, two or more parameters."""
+
+from __future__ import annotations
+
+from itertools import combinations
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from chamberopt.common.number_text import estimate_text
+from chamberopt.pictures.charts.colours import BLUE, COVERAGE_MAP, GREY, ORANGE
+from chamberopt.pictures.charts.figure_style import (
+    SMALL,
+    TITLE,
+    name_choices,
+    new_figure,
+    readable,
+    save_picture,
+    style_axes,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from chamberopt.search.run_sweep import SweepResult
+    from chamberopt.search.trial_log import Trial
+
+MAX_PAIRS = 15  # panels of a picture: the pairs of six parameters
+
+
+def sweep_map(path: Path, sweep: SweepResult) -> list[str]:
+    """Write the map of a sweep as .png.
+
+    One parameter gives a curve with intervals, two give a map, and more give one map a pair, in
+    which the other parameters vary too.
+
+    Returns:
+        Remarks: a sentence when pairs are left out.
+    """
+    names = list(sweep.study.vary)
+    pairs = list(combinations(names, 2))
+    shown, remarks = pairs[:MAX_PAIRS], []
+    if len(pairs) > MAX_PAIRS:
+        remarks.append(
+            f"map.png: shows {MAX_PAIRS} of the {len(pairs)} pairs of parameters; "
+            "all are in history.csv"
+        )
+    columns = min(3, len(shown)) or 1
+    rows = -(-len(shown) // columns) or 1
+    size = (9.0, 5.6) if len(names) < 3 else (4.6 * columns, 3.9 * rows + 0.8)
+    figure = new_figure(*size)
+    if len(names) == 1:
+        _draw_curve(figure.add_subplot(), sweep, names[0])
+    else:
+        _draw_maps(figure, sweep, shown, (rows, columns))
+    figure.suptitle(_title(sweep), fontsize=TITLE)
+    save_picture(figure, path)
+    return remarks
+
+
+def _title(sweep: SweepResult) -> str:
+    count, best = f"{len(sweep.trials)} candidates", sweep.best
+    if best is None or best.objective is None:
+        return f"{count}, none of them feasible"
+    return f"{count}; the best as simulated: {estimate_text(best.objective)}, luck included"
+
+
+def _draw_curve(axes: Axes, sweep: SweepResult, name: str) -> None:
+    """Draw the objective against the only parameter, with 95 % intervals."""
+    for feasible, colour, line, label in (
+        (True, BLUE, "-o", "95 % interval"),
+        (False, GREY, "x", "misses a constraint"),
+    ):
+        rows = [
+            (*_places(sweep, [trial], name), trial.objective.value, trial.objective.half_width)
+            for trial in sweep.trials
+            if trial.objective and trial.feasible == feasible
+        ]
+        if rows:
+            x, y, half_width = zip(*sorted(rows), strict=True)
+            axes.errorbar(x, y, yerr=half_width, fmt=line, ms=5, lw=1, color=colour, label=label)
+    axes.axvline(_start(sweep, name), color=ORANGE, lw=1, ls="--", label="the design as it is")
+    name_choices(axes.xaxis, sweep.study.vary[name].texts)
+    style_axes(axes, name, readable(sweep.study.objective.goals[0]))
+    axes.legend(fontsize=SMALL, frameon=False)
+
+
+def _draw_maps(
+    figure: Figure, sweep: SweepResult, pairs: list[tuple[str, str]], shape: tuple[int, int]
+) -> None:
+    """Draw one map a pair of parameters, with one colour bar and one legend."""
+    is_grid = sweep.plan.method == "grid" and len(sweep.study.vary) == 2
+    panels, colours = [], None
+    for i, pair in enumerate(pairs):
+        axes = figure.add_subplot(*shape, i + 1)
+        panels.append(axes)
+        colours = (_draw_squares if is_grid else _draw_points)(axes, sweep, pair)
+        _draw_marks(axes, sweep, pair)
+        for axis, name in zip((axes.xaxis, axes.yaxis), pair, strict=True):
+            name_choices(axis, sweep.study.vary[name].texts)
+        axes.set_xlabel(pair[0])
+        axes.set_ylabel(pair[1])
+    if colours is not None:
+        figure.colorbar(colours, ax=panels, label=readable(sweep.study.objective.goals[0]))
+    figure.legend(
+        *panels[0].get_legend_handles_labels(),
+        loc="outside lower center",
+        ncols=4,
+        fontsize=SMALL,
+        frameon=False,
+    )
+
+
+def _draw_squares(axes: Axes, sweep: SweepResult, pair: tuple[str, str]) -> Any:
+    """Draw a grid of two parameters; candidates that could not be simulated stay white."""
+    x, y = (np.unique(_places(sweep, sweep.trials, name)) for name in pair)
+    objective = [trial.objective.value if trial.objective else np.nan for trial in sweep.trials]
+    values = np.array(objective).reshape(len(x), len(y))  # the second parameter runs fastest
+    return axes.pcolormesh(x, y, values.T, cmap=COVERAGE_MAP, shading="nearest")
+
+
+def _draw_points(axes: Axes, sweep: SweepResult, pair: tuple[str, str]) -> Any:
+    # Good candidates are drawn last, so that the best of those on one spot is visible.
+    evaluated = sorted(
+        ((trial.objective.value, trial) for trial in sweep.trials if trial.objective),
+        key=lambda row: row[0],
+    )
+    x, y = (_places(sweep, [trial for _, trial in evaluated], name) for name in pair)
+    colours = [value for value, _ in evaluated]
+    return axes.scatter(x, y, c=colours, cmap=COVERAGE_MAP, s=34, edgecolors="none")
+
+
+def _draw_marks(axes: Axes, sweep: SweepResult, pair: tuple[str, str]) -> None:
+    """Mark the design as it is, the best candidate, and candidates that failed."""
+    infeasible = [trial for trial in sweep.trials if trial.objective and not trial.feasible]
+    failed = [trial for trial in sweep.trials if not trial.objective]
+
+    for trials, label, colour in (
+        (infeasible, "misses a constraint", "black"),
+        (failed, "could not be simulated", GREY),
+    ):
+        if trials:
+            x, y = (_places(sweep, trials, name) for name in pair)
+            axes.scatter(x, y, marker="x", s=22, lw=1, color=colour, label=label)
+    # Open marks: what lies below them keeps its colour.
+    start = (_start(sweep, name) for name in pair)
+    axes.plot(*start, "o", color=ORANGE, mfc="none", mew=2.2, ms=13, label="the design as it is")
+    if sweep.best is not None:
+        place = [_places(sweep, [sweep.best], name) for name in pair]
+        for colour, width, label in (("white", 4.0, ""), ("black", 1.6, "best as simulated")):
+            axes.plot(*place, "s", color=colour, mfc="none", mew=width, ms=13,
+                      label=label)  # fmt: skip
+
+
+def _places(sweep: SweepResult, trials: Sequence[Trial], name: str) -> list[float]:
+    """Values of a parameter; positions of texts."""
+    return [sweep.study.vary[name].place(trial.parameters[name]) for trial in trials]
+
+
+def _start(sweep: SweepResult, name: str) -> float:
+    return sweep.study.vary[name].place(sweep.study.design.setting(name))

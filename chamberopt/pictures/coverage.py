@@ -1,0 +1,72 @@
+"""Coverage of one result, or of several below one another on one colour scale, as a .png."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from chamberopt.pictures.actors import SCATTER, SONOTRODE, add_edges, add_part, colour_meanings
+from chamberopt.pictures.camera import target_in_chamber
+from chamberopt.pictures.drawn_part import DrawnPart, colour_range
+from chamberopt.pictures.panels import choose_views, part_panels
+from chamberopt.pictures.picture_page import ColourBar, Row, write_page
+from chamberopt.pictures.subprocess_drawing import draw_in_subprocess
+from chamberopt.results.vtp_files import CHAMBER, COVERAGE, PART, read_surface, size_text
+
+
+def draw_coverage(
+    folders: Sequence[str | Path], titles: Sequence[str], picture: str | Path
+) -> str | None:
+    """Draw the coverage of one result, or of several below one another on one colour scale.
+
+    Args:
+        folders: each with coverage.vtp and chamber.vtp.
+        titles: of the results.
+        picture: file to write, .png.
+
+    Returns:
+        None, or one line that says why there is no picture.
+    """
+    job = {"draw": "coverage", "folders": [str(one) for one in folders], "titles": list(titles)}
+    return draw_in_subprocess(job, picture)
+
+
+def render_coverage(job: dict[str, Any]) -> None:
+    """Draw each result in its chamber and its target from near, in the drawing process."""
+    folders, titles = [Path(folder) for folder in job["folders"]], job["titles"]
+    chambers = [read_surface(folder / CHAMBER) for folder in folders]
+    parts = [
+        DrawnPart(read_surface(folder / COVERAGE), chamber=chamber)
+        for folder, chamber in zip(folders, chambers, strict=True)
+    ]
+    limits = colour_range(parts)
+    targets = [target_in_chamber(read_surface(folder / PART)) for folder in folders]
+    views = choose_views(targets, chambers)
+    rows = []
+    for part, chamber, title in zip(parts, chambers, titles, strict=True):
+
+        def add(plotter: Any, part: DrawnPart = part) -> None:
+            add_part(plotter, part, limits)
+            add_edges(plotter, part.surface)
+
+        panels = part_panels(add, part.inside, part.surface, chamber, views)
+        rows.append(Row(title, panels))
+    legend = [(SONOTRODE, "sonotrode"), *colour_meanings(parts)]
+    remarks = [f"part {size_text(parts[0].surface)}", SCATTER]
+    write_page(job["picture"], rows, legend, coverage_bar(parts, limits), remarks)
+
+
+def coverage_bar(parts: Sequence[DrawnPart], limits: tuple[float, float]) -> ColourBar:
+    """The colours of the quantity, and its scale where that is not all of 0 to 100 %."""
+    quantity = parts[0].quantity
+    shown = np.concatenate([part.target["shown"] for part in parts])
+    shown = shown[np.isfinite(shown)]
+    low, high = bool((shown < limits[0]).any()), bool((shown > limits[1]).any())
+    beyond = {(True, True): "both", (True, False): "min", (False, True): "max"}
+    label = quantity.title
+    if quantity.unit == "%" and limits != (0.0, 100.0):
+        label += f", scale from {limits[0]:g} to {limits[1]:g} %"
+    return ColourBar(label, quantity.colours, limits, beyond.get((low, high), "neither"))

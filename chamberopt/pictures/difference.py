@@ -1,0 +1,107 @@
+"""Where later candidates cover more or less than the first one, as a .png."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from chamberopt.pictures.actors import NO_RENDER
+from chamberopt.pictures.camera import cells_of, near_directions, near_views, seen_area
+from chamberopt.pictures.charts.colours import DIFFERENCE_MAP
+from chamberopt.pictures.panels import near_panels
+from chamberopt.pictures.picture_page import ColourBar, Row, write_page
+from chamberopt.pictures.subprocess_drawing import draw_in_subprocess
+from chamberopt.results.vtp_files import read_surface, save_surface
+
+# Brown (less) over white to violet (more), for colour-blind readers too, and unlike either grey.
+PALE, NO_TARGET = "#e6e9ec", "#a9b0b7"
+
+
+def write_differences(
+    path: Path, field: Path, columns: Sequence[tuple[np.ndarray, np.ndarray]]
+) -> None:
+    """Write a part with the differences of later candidates from the first.
+
+    Candidate k = 1, 2, ... has point data difference_k [percentage points] and real_k, and the
+    triangles have cell data target.
+
+    Args:
+        path: .vtp file to write.
+        field: the first candidate's coverage.vtp.
+        columns: for each later candidate the difference, -1..1, at the vertices of the target in
+            their order, shape (v,), and whether it is real, bool, shape (v,).
+    """
+    surface = read_surface(field)
+    target = np.asarray(surface["target"])
+    used = np.unique(np.asarray(surface.regular_faces)[target > 0])
+    normal = np.asarray(surface.point_data.active_normals)
+    surface.clear_data()
+    surface.cell_data["target"] = target
+    surface.point_data.active_normals = normal
+    for k, (value, real) in enumerate(columns, start=1):
+        for name, column in ((f"difference_{k}", 100.0 * value), (f"real_{k}", real)):
+            surface.point_data[name] = np.zeros(surface.n_points, dtype=np.float32)
+            surface.point_data[name][used] = column
+    save_surface(path, surface)
+
+
+def draw_difference(surface: str | Path, titles: Sequence[str], picture: str | Path) -> str | None:
+    """Draw what write_differences wrote, all candidates on one scale.
+
+    Returns:
+        None, or one line that says why there is no picture.
+    """
+    job = {"draw": "difference", "surface": str(surface), "titles": list(titles)}
+    return draw_in_subprocess(job, picture)
+
+
+def render_difference(job: dict[str, Any]) -> None:
+    """Draw each candidate in the drawing process, from where most of the target is seen."""
+    surface, titles = read_surface(Path(job["surface"])), job["titles"]
+    limit = _scale_limit(surface, len(titles))
+    on_target = np.asarray(surface["target"]) > 0
+    target, rest = cells_of(surface, on_target), cells_of(surface, ~on_target)
+    eyes = near_directions(target)
+    views = near_views(seen_area(target, [rest], eyes), eyes)
+    rows = []
+    for k, title in enumerate(titles, start=1):
+
+        def add(plotter: Any, k: int = k) -> None:
+            _add_difference(plotter, target, rest, k, limit)
+
+        rows.append(Row(title, near_panels(add, target, surface, views)))
+    legend = [(PALE, "within the noise"), (NO_TARGET, "not in the target")]
+    bar = ColourBar("difference of coverage [%-points]", DIFFERENCE_MAP, (-limit, limit), "both")
+    write_page(job["picture"], rows, legend, bar)
+
+
+def _add_difference(plotter: Any, target: Any, rest: Any, k: int, limit: float) -> None:
+    look: dict[str, Any] = {"ambient": 0.7, "diffuse": 0.3, **NO_RENDER}
+    if rest.n_cells:
+        plotter.add_mesh(rest, color=NO_TARGET, **look)
+    # The border is half way between a vertex where the difference is real and one where it is not.
+    noise, shown = target.clip_scalar(scalars=f"real_{k}", value=0.5, both=True)
+    if noise.n_cells:
+        plotter.add_mesh(noise, color=PALE, **look)
+    if shown.n_cells:
+        plotter.add_mesh(
+            shown, scalars=f"difference_{k}", cmap=DIFFERENCE_MAP, clim=(-limit, limit),
+            nan_color=PALE, show_scalar_bar=False, **look,
+        )  # fmt: skip
+
+
+def _scale_limit(surface: Any, count: int) -> float:
+    """Return a round limit that holds nearly all real differences [percentage points]."""
+    real = [
+        np.abs(surface[f"difference_{k}"])[np.asarray(surface[f"real_{k}"]) > 0]
+        for k in range(1, count + 1)
+    ]
+    values = np.concatenate(real)
+    if not len(values):
+        return 5.0
+    most = float(np.percentile(values, 99.0))
+    step = 1.0 if most <= 5.0 else 5.0
+    return max(1.0, step * float(np.ceil(most / step)))

@@ -1,0 +1,184 @@
+"""The part of a result, ready to be drawn: its target coloured by one quantity, and the rest."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from chamberopt.common.errors import InputError
+from chamberopt.coverage.coverage_from_impacts import coverage_from_dent_density
+from chamberopt.design.shapes import TAG_PART
+from chamberopt.geometry.triangles import area_vectors
+from chamberopt.pictures.charts.quantities import QUANTITIES, Quantity
+from chamberopt.results.vtp_files import ZONE, Surface, pyvista
+
+NEARLY_ALL = (0.01, 0.985)  # shares of the area at the ends of the colour scale
+ON_BOUNDARY = 1e-4  # of the length of the part's surface: what is nearer than that is on it
+ROUNDS = 12  # of averages over neighbours, before which a place counts as resolved or not
+
+
+class DrawnPart:
+    """The target of a part with the values of one quantity, and the rest of the part.
+
+    whole: the target.
+    target: where a ball can touch it, with point data "shown" in the quantity's unit and cell data
+        "resolved": whether the simulated dents are enough to tell.
+    unreached: where no ball can touch it, in the chamber.
+    outside: where it is outside the chamber; empty if the chamber is not given.
+    inside: target and unreached together.
+    surface: all of the part.
+    rest: the part beside the target.
+    zones: the surface of each zone by its number, from 1; 0 is what is in none. Empty without any.
+    quantity: the one in "shown".
+
+    A triangle belongs to what most of its corners are. All have cell data "triangle", the number of
+    the part's triangle, and "area" [mm²].
+    """
+
+    def __init__(
+        self,
+        field: Surface,
+        quantity: Quantity = QUANTITIES["coverage"],
+        chamber: Surface | None = None,
+    ) -> None:
+        corners = np.asarray(field.regular_faces)
+        vectors = area_vectors(np.asarray(field.points, dtype=float), corners)
+        field.cell_data["area"] = np.linalg.norm(vectors, axis=1)
+        on_target = np.asarray(field["target"]) > 0
+        is_reached = np.asarray(field["reachable"]) > 0.5
+        is_resolved = _majority(np.asarray(field["resolved"]) > 0.5, is_reached, corners)
+        reached, resolved = (one[corners].sum(axis=1) > 1 for one in (is_reached, is_resolved))
+        for name in [one.column for one in QUANTITIES.values()] + ["dent_density"]:
+            if name in field.point_data:
+                _fill_from_neighbours(field.point_data, name, is_reached, corners)
+
+        def cells(chosen: np.ndarray) -> Surface:
+            if not chosen.any():  # PyVista would drop the columns
+                empty = pyvista().PolyData()
+                for there, columns in (
+                    (empty.point_data, field.point_data),
+                    (empty.cell_data, field.cell_data),
+                ):
+                    there.update({k: one[:0] for k, one in columns.items() if one.ndim == 1})
+                return empty
+            return field.extract_cells(chosen).extract_surface(algorithm="dataset_surface")
+
+        self.surface, self.whole, self.rest = field, cells(on_target), cells(~on_target)
+        field.cell_data["resolved"] = resolved
+        self.target = cells(on_target & reached)
+        outside = on_target & ~reached
+        if chamber is not None:
+            outside[outside] = _is_outside(field.extract_cells(outside), chamber)
+        else:
+            outside[:] = False
+        self.unreached, self.outside = cells(on_target & ~reached & ~outside), cells(outside)
+        self.inside = cells(on_target & ~outside) if outside.any() else self.whole
+        zone = np.asarray(field[ZONE]) if ZONE in field.cell_data else np.zeros(0)
+        self.zones = {int(number): cells(zone == number) for number in np.unique(zone)}
+        self.show(quantity)
+
+    def show(self, quantity: Quantity, times: float = 1.0) -> None:
+        """Put a quantity into "shown".
+
+        times: the peening time over the treatment time; scales coverage and what grows with time.
+        """
+        self.quantity = quantity
+        if quantity.column == ZONE:  # drawn by `zones`
+            return
+        self.target["shown"] = self.values(quantity, times)
+
+    def values(self, quantity: Quantity, times: float = 1.0) -> np.ndarray:
+        """Values at the points of `target` in the quantity's unit; `times` as in show."""
+        if quantity.name == "coverage":
+            return 100.0 * coverage_from_dent_density(times * self.target["dent_density"])
+        if quantity.column not in self.target.point_data:
+            raise InputError(
+                f"coverage.vtp has no {quantity.column}: an older result; simulate again"
+            )
+        scale = quantity.factor * (times if quantity.grows else 1.0)
+        return scale * np.asarray(self.target[quantity.column])
+
+    def covered_to(self, share: float, times: float = 1.0) -> np.ndarray:
+        """Which triangles of `target` have at least a coverage [%]; `times` as in show."""
+        values = self.values(QUANTITIES["coverage"], times)
+        return np.asarray(values[self.target.regular_faces].mean(axis=1) >= share)
+
+
+def _is_outside(surface: Surface, chamber: Surface) -> np.ndarray:
+    """Which triangles (c,) of a part's surface are no boundary of its chamber."""
+    of_part = np.asarray(chamber["tag"]) == TAG_PART
+    if not surface.n_cells or not of_part.any():
+        return np.zeros(surface.n_cells, dtype=bool)
+    boundary = chamber.extract_cells(of_part).extract_surface(algorithm="dataset_surface")
+    middle = surface.cell_centers().points
+    _, nearest = boundary.find_closest_cell(middle, return_closest_point=True)
+    away = np.linalg.norm(nearest - middle, axis=1)
+    return np.asarray(away > ON_BOUNDARY * boundary.length)
+
+
+def _majority(marked: np.ndarray, among: np.ndarray, corners: np.ndarray) -> np.ndarray:
+    """What most neighbours of each point are, so that single dents make no specks.
+
+    Args:
+        marked: (v,) bool.
+        among: points that count, (v,) bool.
+        corners: of the triangles, (c, 3).
+    """
+    of, to = _neighbours(corners)
+    of, to = of[among[to]], to[among[to]]
+    share, weight = marked.astype(float), np.maximum(np.bincount(of, minlength=len(marked)), 1)
+    for _ in range(ROUNDS):
+        share = np.bincount(of, share[to], len(share)) / weight
+    return np.asarray(share > 0.5)
+
+
+def _neighbours(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Points and their neighbours along each side of each triangle, both ways, (6 c,) each."""
+    sides = corners[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    return np.concatenate([sides[:, 0], sides[:, 1]]), np.concatenate([sides[:, 1], sides[:, 0]])
+
+
+def _fill_from_neighbours(
+    columns: dict[str, np.ndarray], name: str, known: np.ndarray, corners: np.ndarray
+) -> None:
+    """Give points out of reach the mean of their neighbours, so that colours do not fade there."""
+    values = np.asarray(columns[name])
+    known = known & np.isfinite(values)
+    of, to = _neighbours(corners)
+    use = known[to] & ~known[of]
+    count = np.bincount(of[use], minlength=len(values))
+    sums = np.bincount(of[use], values[to[use]], len(values))
+    columns[name] = np.where(count > 0, sums / np.maximum(count, 1), values)
+
+
+def point_areas(surface: Surface) -> np.ndarray:
+    """Area that each point of a surface stands for [mm²], from the cell data "area"."""
+    corners = np.asarray(surface.regular_faces)
+    return np.bincount(corners.ravel(), np.repeat(surface["area"] / 3.0, 3), surface.n_points)
+
+
+def colour_range(parts: Sequence[DrawnPart]) -> tuple[float, float]:
+    """Return round limits that hold nearly all of the area of all parts by the values shown."""
+    values = np.concatenate([part.target["shown"] for part in parts])
+    area = np.concatenate([point_areas(part.target) for part in parts])
+    known = np.isfinite(values) & (area > 0.0)
+    is_share = parts[0].quantity.unit == "%"
+    if not known.any():
+        return (0.0, 100.0) if is_share else (0.0, 1.0)
+    order = np.argsort(values[known])
+    upto = np.cumsum(area[known][order])
+    low, high = np.interp(np.multiply(NEARLY_ALL, upto[-1]), upto, values[known][order])
+    if not is_share:
+        return _round_range(low, high)
+    step = 5.0 if high - low < 20.0 else 10.0
+    low = max(0.0, step * np.floor(low / step))
+    return low, min(100.0, max(low + step, step * np.ceil(high / step)))
+
+
+def _round_range(low: float, high: float) -> tuple[float, float]:
+    """Widen limits to round numbers, and down to 0 if that is near."""
+    span = high - low if high > low else max(abs(high), 1e-12)
+    step = 10.0 ** np.floor(np.log10(span)) / 2.0
+    low = 0.0 if 0.0 <= low < 0.4 * high else step * np.floor(low / step)
+    return float(low), float(max(step * np.ceil(high / step), low + step))

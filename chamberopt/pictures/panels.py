@@ -1,0 +1,144 @@
+"""The views of a part: in its chamber with dimensions, and its target from near."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from chamberopt.design.shapes import TAG_PART, is_sonotrode
+from chamberopt.pictures.actors import add_chamber
+from chamberopt.pictures.camera import (
+    cells_of,
+    chamber_view,
+    directions,
+    near_directions,
+    near_views,
+    seen_area,
+    view_frame,
+)
+from chamberopt.pictures.picture_page import Dimension, Panel
+from chamberopt.pictures.view import render_view
+from chamberopt.results.vtp_files import Surface
+
+ROUND = (
+    0.02  # a chamber is round whose vertices are this close to a circle, as shares of its radius
+)
+
+
+SIZE = 620, 620  # pixels of a view, at most
+BORDER, BORDER_OF_CHAMBER = 25, 95  # pixels; the larger one has room for dimensions
+WHOLE = 1.3  # of a part that is at most so much longer than its target all is shown
+NEAR_CAPTIONS = "the target", "what is hidden there"
+
+Add = Callable[[Any], None]
+"""Puts something into a plotter."""
+
+
+def choose_views(
+    parts: Sequence[tuple[Surface, Surface]], chambers: Sequence[Surface]
+) -> tuple[np.ndarray, list[np.ndarray]]:
+    """Directions to the eyes, the same for several results.
+
+    Args:
+        parts: the target, and what may hide it.
+        chambers: with cell data "tag".
+
+    Returns:
+        The direction that shows chambers, and one or two that show targets from near.
+    """
+    near, far = near_directions(parts[0][0]), directions(steep=False)
+    seen = [seen_area(target, [rest], near) for target, rest in parts]
+    seen_far = [
+        seen_area(target, [rest, cells_of(chamber, is_sonotrode(np.asarray(chamber["tag"])))], far)
+        for (target, rest), chamber in zip(parts, chambers, strict=True)
+    ]
+    return chamber_view(np.hstack(seen_far), far), near_views(np.hstack(seen), near)
+
+
+def part_panels(
+    add: Add,
+    target: Surface,
+    part: Surface,
+    chamber: Surface,
+    views: tuple[np.ndarray, Sequence[np.ndarray]],
+) -> list[Panel]:
+    """The part in its chamber, with dimensions, and its target from near; `add` adds the part."""
+
+    def add_both(plotter: Any) -> None:
+        add(plotter)
+        add_chamber(plotter, chamber)
+
+    eye, near = views
+    points = np.concatenate([part.points, chamber.points])
+    view = render_view(add_both, eye, points, SIZE, BORDER_OF_CHAMBER)
+    dimensions = chamber_dimensions(chamber, eye)
+    return [
+        Panel(view, "in the chamber", dimensions, points),
+        *near_panels(add, target, part, near),
+    ]
+
+
+def near_panels(
+    add: Add, target: Surface, part: Surface, eyes: Sequence[np.ndarray]
+) -> list[Panel]:
+    """The target from near, from one or two directions."""
+    length, whole = (np.linalg.norm(np.ptp(one.points, axis=0)) for one in (target, part))
+    is_cut = bool(whole > WHOLE * length)
+    points = np.asarray((target if is_cut else part).points)
+    return [
+        Panel(render_view(add, eye, points, SIZE, BORDER), caption, is_cut=is_cut)
+        for eye, caption in zip(eyes, NEAR_CAPTIONS, strict=False)
+    ]
+
+
+def chamber_dimensions(chamber: Surface, eye: np.ndarray) -> list[Dimension]:
+    """Size of a chamber, and the distance from the sonotrode to the part's lowest point.
+
+    Args:
+        chamber: with cell data "tag".
+        eye: direction to the eye.
+    """
+    frame = view_frame(eye)
+    low, high = np.reshape(chamber.bounds, (3, 2)).T
+    middle, size = 0.5 * (low + high), high - low
+    points = np.asarray(chamber.points, dtype=float)
+    found, left = [], False
+    radius = np.linalg.norm((points - middle)[:, :2], axis=1).max()
+    if abs(size[:2] / (2.0 * radius) - 1.0).max() < ROUND:
+        side = np.array([frame[0, 0], frame[0, 1], 0.0]) / np.linalg.norm(frame[0, :2])
+        bottom = np.array([middle[0], middle[1], low[2]])
+        feet = np.array([bottom - radius * side, bottom + radius * side])
+        found.append(Dimension(feet, f"⌀ {2.0 * radius:.4g} mm"))
+    else:
+        for k in (0, 1):
+            one = np.array([low, low])
+            one[1, k] = high[k]
+            if frame[1, 1 - k] < 0.0:  # the edge that is lower in the view
+                one[:, 1 - k] = high[1 - k]
+            found.append(Dimension(one, f"{size[k]:.4g} mm"))
+            slope = (one[1] - one[0]) @ frame[:2].T
+            # The nearly upright one of the two is on this side, and heights on the other.
+            if abs(slope[1]) > abs(slope[0]):
+                left = bool((one.mean(axis=0) - middle) @ frame[0] > 0.0)
+        feet = middle + 0.5 * size * np.array([(x, y, -1.0) for x in (-1, 1) for y in (-1, 1)])
+    across = feet @ frame[0]
+    foot = feet[across.argmin() if left else across.argmax()]
+    found.append(_upright(foot, low[2], high[2], 1))
+    part = np.asarray(chamber["tag"]) == TAG_PART
+    if part.any():
+        own = points[np.unique(np.asarray(chamber.regular_faces)[part])]
+        lowest = float(own[:, 2].min())
+        if low[2] < lowest < high[2] - 1e-6 * size[2]:
+            found.append(_upright(foot, low[2], lowest, 0))
+        else:
+            found[-1] = found[-1]._replace(row=0)
+    return found
+
+
+def _upright(foot: np.ndarray, low: float, high: float, row: int) -> Dimension:
+    """The height between two levels, at the place of a foot."""
+    ends = np.array([foot, foot])
+    ends[:, 2] = low, high
+    return Dimension(ends, f"{high - low:.4g} mm", row)

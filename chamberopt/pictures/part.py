@@ -1,0 +1,142 @@
+"""A part as its file has it, as a .png: its target in the chamber, or what is wrong with it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from chamberopt.common.files import private_folder
+from chamberopt.common.npz_files import save_arrays
+from chamberopt.pictures.actors import FAULT, GREY, NO_RENDER, SONOTRODE, add_edges
+from chamberopt.pictures.camera import cells_of, near_directions, near_views, pushed_back, seen_area
+from chamberopt.pictures.charts.colours import BLUE, OUTSIDE
+from chamberopt.pictures.panels import BORDER, SIZE, choose_views, near_panels, part_panels
+from chamberopt.pictures.picture_page import Panel, Row, write_page
+from chamberopt.pictures.subprocess_drawing import draw_in_subprocess, picture_path
+from chamberopt.pictures.view import render_view
+from chamberopt.results.vtp_files import (
+    CHAMBER,
+    MM,
+    pyvista,
+    read_surface,
+    size_text,
+    write_chamber,
+)
+
+if TYPE_CHECKING:
+    from chamberopt.chamber.build import Chamber
+
+
+PLAIN, MARKED, MISSED, BEYOND = range(4)
+COLOURS = {
+    PLAIN: (GREY, "not in the target"),
+    MARKED: (BLUE, "target"),
+    MISSED: (FAULT, "target that hardly a ball can touch"),
+    BEYOND: (OUTSIDE, "target outside the chamber"),
+}
+ALL = 0.999  # of the target's area: in the chamber as a whole
+OPPOSITE = np.array([(1.0, -1.6, 0.7), (-1.0, 1.6, -0.7)])
+
+
+def draw_part(
+    corners: np.ndarray,
+    title: str,
+    picture: str | Path,
+    marked: np.ndarray | None = None,
+    edges: np.ndarray | None = None,
+    missed: np.ndarray | None = None,
+    chamber: Chamber | None = None,
+) -> str | None:
+    """Draw a part with its target in its chamber, or with its faults.
+
+    Args:
+        corners: of its triangles [m], shape (n, 3, 3).
+        title: written above the picture.
+        picture: file to write, .png.
+        marked: triangles of the target, bool, shape (n,).
+        edges: drawn red and seen through the part [m], shape (k, 2, 3).
+        missed: triangles of the target that hardly a ball can touch, bool, shape (n,).
+        chamber: drawn as glass round the part in a further view, with dimensions.
+
+    Returns:
+        None, or one line that says why there is no picture.
+
+    Raises:
+        InputError: `picture` cannot be written.
+    """
+    path = picture_path(picture)
+    none = np.zeros(len(corners), dtype=bool)
+    marked, missed = (none if chosen is None else chosen for chosen in (marked, missed))
+    edges = np.zeros((0, 2, 3)) if edges is None else edges
+    with private_folder() as folder:
+        part = Path(folder) / "part.npz"
+        save_arrays(
+            part, corners=corners * MM, marked=marked & ~missed, missed=missed, edges=edges * MM
+        )
+        job = {"draw": "part", "part": str(part), "title": title}
+        if chamber is not None:
+            write_chamber(Path(folder), chamber)
+            job["chamber"] = str(Path(folder) / CHAMBER)
+        return draw_in_subprocess(job, path)
+
+
+def render_part(job: dict[str, Any]) -> None:
+    """Draw the part in the drawing process: in its chamber, and its target or its faults."""
+    with np.load(job["part"]) as data:
+        corners, marked, missed, edges = (
+            data[name] for name in ("corners", "marked", "missed", "edges")
+        )
+    part = pyvista().PolyData.from_regular_faces(
+        corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3)
+    )
+    chamber = read_surface(Path(job["chamber"])) if "chamber" in job else None
+    kinds = np.select([missed, marked], [MISSED, MARKED], PLAIN)
+    shown = [(part, kinds)]
+    if chamber is not None:  # what is in it is drawn over the part
+        source = np.asarray(chamber["source"])
+        inside, own = cells_of(chamber, source >= 0), kinds[source[source >= 0]]
+        inside = pyvista().PolyData.from_regular_faces(  # with its normals out of the part
+            inside.points, np.asarray(inside.regular_faces)[:, ::-1]
+        )
+        whole, there = (
+            cells_of(one, kind != PLAIN).area for one, kind in ((part, kinds), (inside, own))
+        )
+        beyond = BEYOND if there < ALL * whole else MARKED
+        shown = [(part, np.where(kinds == PLAIN, PLAIN, beyond)), (inside, own)]
+    lines = pyvista().line_segments_from_points(edges.reshape(-1, 3)) if len(edges) else None
+
+    def add(plotter: Any) -> None:
+        for level, (surface, kind) in enumerate(shown):
+            for k in np.unique(kind):
+                actor = plotter.add_mesh(
+                    cells_of(surface, kind == k), color=COLOURS[k][0], ambient=0.45, diffuse=0.6,
+                    opacity=1.0 if lines is None else 0.35, **NO_RENDER,
+                )  # fmt: skip
+                if level == 0:
+                    pushed_back(actor)
+        if lines is not None:
+            plotter.add_mesh(lines, color=FAULT, line_width=6, lighting=False, **NO_RENDER)
+        else:
+            add_edges(plotter, part)
+
+    surface, kind = shown[-1]
+    target, rest = cells_of(surface, kind != PLAIN), [part]
+    if not target.n_cells:  # faults, or a chamber that the part misses
+        points = np.concatenate([part.points, edges.reshape(-1, 3)])
+        panels = [
+            Panel(render_view(add, eye, points, SIZE, BORDER), caption)
+            for eye, caption in zip(OPPOSITE, ("from one side", "from the other"), strict=True)
+        ]
+    elif chamber is None:
+        eyes = near_directions(target)
+        panels = near_panels(add, target, part, near_views(seen_area(target, rest, eyes), eyes))
+    else:
+        panels = part_panels(add, target, part, chamber, choose_views([(target, part)], [chamber]))
+    legend = [COLOURS[k] for k in np.unique(np.concatenate([kind for _, kind in shown]))]
+    legend = [(SONOTRODE, "sonotrode"), *legend] if chamber is not None else legend
+    legend = legend if lines is None else [(FAULT, "what the message tells of")]
+    write_page(
+        job["picture"], [Row(job["title"], panels)], legend, remarks=[f"part {size_text(part)}"]
+    )

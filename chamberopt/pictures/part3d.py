@@ -1,0 +1,199 @@
+"""The part in its chamber in 3D: its surfaces, and the numbers by which the page colours it.
+
+Colours are made in the browser (part.js). The page carries the numbers at each point of the target
+once, in single precision, and shows any of them, or the coverage at any time:
+1 - exp(-dent density · time / treatment time).
+"""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from chamberopt.design.shapes import TAG_PART, TAG_WALL, is_sonotrode
+from chamberopt.pictures.charts.colours import FEW_DENTS, UNREACHED
+from chamberopt.pictures.charts.quantities import QUANTITIES
+from chamberopt.pictures.drawn_part import DrawnPart, point_areas
+from chamberopt.results.load import Result, load_cavity, load_field, load_part
+from chamberopt.results.vtp_files import Surface
+
+# A triangle takes about 80 bytes of the page: up to this number it stays below 60 MB and opens.
+MAX_TRIANGLES = 600_000
+USUAL = np.array([0.55, -0.9, 0.62])  # direction to the camera from the middle of the cavity
+DISTANCE = 1.8  # of the camera, in lengths of the cavity's diagonal
+EDGE_ANGLE = 30.0  # degrees; edges of the chamber that are sharper are drawn
+PART_GREY, SONOTRODE, GLASS, EDGES = "#b9bec4", "#c58b52", "#9fc3dd", "#6f8796"
+
+
+@dataclass(frozen=True)
+class PartScene:
+    """One result for the page.
+
+    Args:
+        data: for part.js; None for a part that is too large.
+        remarks: sentences on what is not shown.
+        coverage: at points of the target, 0..1, 0 out of reach, shape (k,); None where too few
+            dents were simulated to tell single places apart.
+        area: that each point stands for [mm²], shape (k,).
+    """
+
+    data: dict[str, Any] | None
+    remarks: tuple[str, ...]
+    coverage: np.ndarray | None
+    area: np.ndarray
+
+
+def part_scene(result: Result, title: str, max_triangles: int = MAX_TRIANGLES) -> PartScene:
+    """Part and chamber of a result.
+
+    Args:
+        max_triangles: of a larger part only the target is drawn, and nothing if even the target
+            has more.
+
+    Raises:
+        InputError: a surface is missing, damaged or of another result.
+    """
+    own = load_part(result)
+    part = DrawnPart(load_field(result, own))
+    whole, target = part.whole, part.target
+    reached = np.asarray(whole["reachable"]) > 0.5
+    coverage = np.where(reached, whole["coverage"], 0.0) if result.resolves_places else None
+    area = point_areas(whole)
+    remarks = []
+    count = whole.n_cells
+    too_many = f"triangles, more than the {max_triangles:,} that a page"
+    if count > max_triangles:
+        remarks.append(
+            f"The target is drawn with {count:,} {too_many} can draw, so there is no picture here; "
+            "chamberopt inspect shows it."
+        )
+        return PartScene(None, tuple(remarks), coverage, area)
+    rest = part.rest
+    if count + rest.n_cells > max_triangles:
+        remarks.append(
+            f"The part is drawn with {count + rest.n_cells:,} {too_many} can draw: only its target "
+            "is drawn."
+        )
+        rest = None
+    chamber = load_cavity(result)
+    eye = _eye(np.asarray(whole.face_normals) * np.asarray(whole["area"])[:, None])
+    # Of the part's triangles: the one in which each point lies, and what is known of each of them.
+    triangles, row = np.unique(target["triangle"], return_inverse=True)
+    of_point = np.zeros(target.n_points, dtype=int)
+    of_point[np.asarray(target.regular_faces)] = row.reshape(-1, 1)
+    data = {
+        "title": title,
+        "treatment": result.design.process.treatment_time,
+        "curve": [
+            [row.time_s, row.mean_coverage, row.half_width]
+            for row in result.record.coverage_against_time
+        ],
+        "columns": {
+            **{
+                one.name: _packed(one.factor * target[one.column])
+                for one in QUANTITIES.values()
+                if one.column in target.point_data
+            },
+            "density": _packed(target["dent_density"]),  # gives the coverage at any time
+        },
+        "own": {
+            "coverage": _packed(100.0 * own["coverage"][triangles]),
+            "interval": _packed(100.0 * own["coverage_interval"][triangles]),
+        },
+        "triangle": _packed(of_point, "<i4"),
+        "number": _packed(triangles, "<i4"),
+        "element": _packed(own["element"][triangles], "<i4"),
+        "impacts": _packed(own["impacts"][triangles], "<i4"),
+        "surfaces": _surfaces(part, rest, chamber, eye),
+        "edges": {"ends": _packed(_edges(chamber, np.asarray(chamber["tag"]))), "colour": EDGES},
+        "view": _view(chamber, eye),
+    }
+    return PartScene(data, tuple(remarks), coverage, area)
+
+
+def quantities_in_all(scenes: Sequence[dict[str, Any]]) -> list[dict[str, str]]:
+    """The quantities that all of the scenes have."""
+    keys = ("name", "label", "unit", "title", "colours")
+    return [
+        {key: getattr(one, key) for key in keys}
+        for one in QUANTITIES.values()
+        if all(one.name in scene["columns"] for scene in scenes)
+    ]
+
+
+def _surfaces(part: DrawnPart, rest: Surface | None, chamber: Any, eye: np.ndarray) -> Any:
+    """What view3d.js draws, by names: part, few, unreached, rest, sonotrode, glass."""
+    tags = np.asarray(chamber["tag"])
+    target, resolved = part.target, np.asarray(part.target["resolved"])
+    corners = target.regular_faces
+    found: dict[str, dict[str, Any]] = {
+        "part": {"points": _packed(target.points), "triangles": _packed(corners[resolved], "<i4")},
+        # On the points of the part, which the page need not carry twice.
+        "few": {"triangles": _packed(corners[~resolved], "<i4"), "colour": FEW_DENTS},
+    }
+    walls = {
+        "sonotrode": (is_sonotrode(tags), SONOTRODE, 0.55 if eye[2] > 0.0 else 0.08),
+        "glass": (tags == TAG_WALL, GLASS, 0.13),
+    }
+    others = [("unreached", part.unreached, UNREACHED, 1.0), ("rest", rest, PART_GREY, 1.0)]
+    others += [
+        (name, chamber.extract_cells(here).extract_surface(algorithm="dataset_surface"), *look)
+        for name, (here, *look) in walls.items()
+    ]
+    for name, surface, colour, opacity in others:
+        if surface is not None and surface.n_cells:
+            shape = _packed(surface.points), _packed(surface.regular_faces, "<i4")
+            look = {"colour": colour, "opacity": opacity}
+            found[name] = {"points": shape[0], "triangles": shape[1], **look}
+    return found
+
+
+def _eye(normal: np.ndarray) -> np.ndarray:
+    """The direction to the camera from which most of the target faces it, a little aside.
+
+    From above, where the border of the chamber hides least, unless twice as much faces down; and
+    where much the same is seen from all sides, as of a gear, from USUAL.
+
+    Args:
+        normal: of the target's triangles, any length, shape (k, 3).
+    """
+    turn = np.arctan2(USUAL[1], USUAL[0]) + np.radians(np.arange(0.0, 360.0, 30.0))
+    around = np.hypot(*USUAL[:2]) * np.column_stack([np.cos(turn), np.sin(turn)])
+    best, seen = {}, {}
+    for height in (USUAL[2], -USUAL[2]):
+        ways = np.column_stack([around, np.full(len(turn), height)])
+        faces = np.maximum(normal @ ways.T, 0.0).sum(axis=0)
+        k = 0 if faces[0] > 0.9 * faces.max() else int(faces.argmax())
+        best[height], seen[height] = ways[k], faces[k]
+    eye = best[-USUAL[2] if seen[-USUAL[2]] > 2.0 * seen[USUAL[2]] else USUAL[2]]
+    aside = 1.1 * eye[:2] + 0.5 * USUAL[:2]
+    return np.r_[aside * np.hypot(*USUAL[:2]) / np.hypot(*aside), eye[2]]
+
+
+def _view(chamber: Any, eye: np.ndarray) -> dict[str, Any]:
+    """Middle of the cavity, place of the eye, and size of what must fill the view [mm]."""
+    around = np.asarray(chamber.points, dtype=float)
+    size = float(np.linalg.norm(np.ptp(around, axis=0)))
+    middle = 0.5 * (around.min(axis=0) + around.max(axis=0))
+    return {
+        "middle": middle.tolist(),
+        "eye": (middle + DISTANCE * size * eye).tolist(),
+        "size": size,
+    }
+
+
+def _edges(chamber: Any, tags: np.ndarray) -> np.ndarray:
+    """The ends of the sharp edges of the cavity, one after the other, (2 n, 3)."""
+    around = chamber.extract_cells(tags != TAG_PART).extract_surface(algorithm="dataset_surface")
+    lines = around.extract_feature_edges(
+        feature_angle=EDGE_ANGLE, manifold_edges=False, non_manifold_edges=False
+    )
+    return np.asarray(lines.points)[np.asarray(lines.lines).reshape(-1, 3)[:, 1:]]
+
+
+def _packed(values: np.ndarray, kind: str = "<f4") -> str:
+    return base64.b64encode(np.asarray(values).astype(kind).tobytes()).decode()

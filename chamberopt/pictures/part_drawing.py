@@ -1,0 +1,272 @@
+"""The chamber with its dimensions, to scale: a section through its axis, and a plan from above."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from chamberopt.common.number_text import plain, typeset
+from chamberopt.design.shapes import TAG_PART, TAG_SONOTRODE, TAG_WALL
+from chamberopt.geometry.triangles import border_edges
+from chamberopt.pictures.charts.colours import BLACK, BLUE, DARK_GREY, ORANGE
+from chamberopt.pictures.section import SAME, cut, face_size_mm, inside
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.patches import Rectangle
+
+    from chamberopt.chamber.build import Chamber
+
+# Dimension lines with arrows, and the dash-dotted lines of axes and sections. All in page mm.
+
+Point = tuple[float, float]
+SIZE, WIDTH = 7.0, 0.4  # pt, of the text and of the lines
+SHORT = 9.0  # mm: a shorter dimension has its arrows and its text outside
+STUB = 3.5  # mm, of arrows outside
+
+
+def dimension(
+    axes: Axes, start: Point, end: Point, away: float, text: str, upright: bool = False
+) -> None:
+    """A dimension between two points, beside one another or, upright, one above the other.
+
+    Args:
+        away: how far below the points, or left of them if upright, its line is drawn.
+    """
+    turn = (lambda x, y: (y, x)) if upright else (lambda x, y: (x, y))
+    (x1, y1), (x2, y2) = turn(*start), turn(*end)
+    line, past = y1 - away, 1.0 if away > 0 else -1.0
+    for x, y in ((x1, y1), (x2, y2)):
+        axes.plot(
+            *zip(turn(x, y - 0.5 * past), turn(x, line - past), strict=True),
+            color=DARK_GREY,
+            lw=WIDTH,
+        )
+    arrow = {"lw": WIDTH, "color": DARK_GREY, "shrinkA": 0.0, "shrinkB": 0.0, "mutation_scale": 5.0}
+    if x2 - x1 >= SHORT:
+        ends = [(x1, x2, "<|-|>")]
+        place = 0.5 * (x1 + x2)
+    else:
+        ends = [(x1 - STUB, x1, "-|>"), (x2 + STUB, x2, "-|>"), (x1, x2, "-")]
+        place = x2 + STUB + 1.0
+    for a, b, style in ends:
+        arrowed = {**arrow, "arrowstyle": style}
+        axes.annotate("", turn(b, line), turn(a, line), arrowprops=arrowed, annotation_clip=False)
+    inline = {"fc": "white", "ec": "none", "pad": 0.6}
+    middle = x2 - x1 >= SHORT
+    x, y = turn(place, line)
+    ha = "center" if middle or upright else "left"
+    va = "bottom" if upright and not middle else "center"
+    rotation = 90.0 if upright else 0.0
+    axes.text(x, y, text, size=SIZE, ha=ha, va=va, rotation=rotation, bbox=inline, parse_math=False)
+
+
+def across_line(axes: Axes, start: Point, end: Point, name: str = "") -> None:
+    """The line of an axis, or of a section with its name at both ends."""
+    axes.plot(*zip(start, end, strict=True), color=DARK_GREY, lw=0.5, ls=(0, (9, 2, 1.5, 2)))
+    if name:
+        length = math.dist(start, end)
+        for (x, y), (from_x, from_y) in ((start, end), (end, start)):
+            x, y = x + 2.0 * (x - from_x) / length, y + 2.0 * (y - from_y) / length
+            axes.text(x, y, name, size=8.0, ha="center", va="center", weight="bold")
+
+
+_STEPS = np.outer(10.0 ** np.arange(4), (1.0, 1.25, 1.5, 2.0, 2.5, 4.0, 5.0)).ravel()
+SCALES = np.concatenate([_STEPS[::-1], 1.0 / _STEPS[1:]])  # from large to small
+# Room on paper [mm] round a view for its dimensions: left and right, above, below.
+BESIDE, ABOVE, BELOW = 11.0, 9.0, 12.0
+WIDER = 0.1  # mm: what a cavity is wider than its sonotrode to have a dimension of its own
+FACE = 2.5  # mm on paper: how thick the sonotrode is drawn
+MOST_OUTSIDE = 6.0  # mm on paper that are drawn of the part outside the chamber
+ROOM, PART, TARGET = "#e8f1f7", "#c9ced3", "#f0a860"
+RASTER = 200  # dots an inch, of what the plan shows of the part
+LEGEND = (
+    "dimensions in mm. Orange: target, in the plan also where it is hidden. Hatched or grey: part. "
+    "Blue: sonotrode."
+)
+
+
+@dataclass(frozen=True)
+class View:
+    """One view of the chamber on the page, whose lower left corner is that of the cavity.
+
+    right: axis of the chamber (0, 1, 2) that points to the right.
+    corner: of the cavity on the page [mm].
+    low, high: corners of the cavity in the chamber, (2,) [mm].
+    outside: what is drawn of the part beyond them, [left and right, above] on the page [mm].
+    """
+
+    right: int
+    scale: float
+    corner: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+    outside: np.ndarray
+
+    def place(self, points: Any) -> np.ndarray:
+        """Points (..., 2) [mm] of the chamber on the page [mm]."""
+        return self.corner + self.scale * (np.asarray(points) - self.low)
+
+    def window(self, axes: Axes) -> Rectangle:
+        """What is drawn, as a patch to clip with."""
+        from matplotlib.patches import Rectangle
+
+        sides, above = self.outside
+        size = self.scale * (self.high - self.low) + np.array([2.0 * sides, above])
+        return Rectangle(
+            tuple(self.corner - np.array([sides, 0.0])), *size, transform=axes.transData
+        )
+
+
+def draw_chamber(axes: Axes, chamber: Chamber, left: float, top: float, size: Any) -> str:
+    """Draw both views into a place on the page, and return the scale, such as "1:2".
+
+    Args:
+        axes: of the whole page, in mm.
+        left, top: corner of the place.
+        size: its width and height.
+    """
+    mm = 1e3 * chamber.vertices
+    low, high = mm.min(axis=0), mm.max(axis=0)
+    across = int(high[1] - low[1] > high[0] - low[0] + SAME)  # the section's axis to the right
+    axis = np.array([across, 2])
+    part = 1e3 * chamber.part.vertices
+    beyond = np.array([
+        max(0.0, low[across] - part[:, across].min(), part[:, across].max() - high[across]),
+        max(0.0, part[:, 2].max() - high[2]),
+    ])  # fmt: skip
+    scale, outside, needs = _fit(high - low, across, beyond, np.asarray(size))
+    middle = top - 0.5 * size[1]
+    start = left + 0.5 * (size[0] - needs)
+    tall, deep = (scale * (high - low)[k] for k in (2, 1))
+    corner = np.array([start + BESIDE + outside[0], middle - 0.5 * (tall + outside[1]) + 1.0])
+    section = View(across, scale, corner, low[axis], high[axis], outside)
+    beside = corner[0] + scale * (high - low)[across] + outside[0] + 2.0 * BESIDE
+    corner = np.array([beside, middle - 0.5 * deep + 1.0])
+    plan = View(0, scale, corner, low[:2], high[:2], np.zeros(2))
+    at = _place_of_section(chamber, 1 - across)
+    _draw_section(axes, chamber, section, at)
+    _draw_plan(axes, chamber, plan, across, at)
+    return typeset(f"{plain(scale)}:1" if scale >= 1.0 else f"1:{plain(1.0 / scale)}")
+
+
+def _fit(
+    cavity: np.ndarray, across: int, beyond: np.ndarray, size: np.ndarray
+) -> tuple[float, np.ndarray, float]:
+    """The largest scale at which both views fit, what is drawn outside, and the width they take."""
+    for scale in SCALES:
+        outside = np.minimum(MOST_OUTSIDE, scale * beyond)
+        wide = scale * (cavity[across] + cavity[0]) + 2.0 * outside[0] + 4.0 * BESIDE
+        tall = max(scale * cavity[2] + outside[1] + FACE, scale * cavity[1]) + ABOVE + BELOW
+        if (np.array([wide, tall]) <= size).all():
+            break
+    return float(scale), outside, float(wide)
+
+
+def _place_of_section(chamber: Chamber, axis: int) -> float:
+    """Where the section is [mm]: through the chamber's axis if that meets the part.
+
+    Else it goes through the middle of what of the part is in the chamber.
+    """
+    own = np.unique(chamber.triangles[chamber.tags == TAG_PART])
+    side = 1e3 * chamber.vertices[own, axis]
+    low, high = float(side.min()), float(side.max())
+    return 0.0 if low < 0.0 < high else 0.5 * (low + high)
+
+
+def _draw_section(axes: Axes, chamber: Chamber, view: View, at: float) -> None:
+    other = 1 - view.right
+    lines, row = cut(chamber.vertices, chamber.triangles, other, 1e-3 * at)
+    own, _ = cut(chamber.part.vertices, chamber.part.triangles, other, 1e-3 * at)
+    window = view.window(axes)
+    _fill(axes, view, lines, window, facecolor=ROOM, lw=0.0)
+    _fill(axes, view, own, window, facecolor=PART, edgecolor=DARK_GREY, hatch="////", lw=0.5)
+    tags, target = chamber.tags[row], _on_target(chamber)[row]
+    _lines(axes, view, lines[tags == TAG_WALL], BLACK, 1.1)
+    _lines(axes, view, lines[tags > TAG_WALL], BLUE, 2.5)
+    _lines(axes, view, lines[target], ORANGE, 2.0)
+    (axis_at, y), (_, top) = view.place([[0.0, 0.0], [0.0, view.high[1]]])
+    above = top + view.outside[1]
+    across_line(axes, (axis_at, y - FACE - 1.0), (axis_at, above + 1.0))
+    _label(axes, view.corner[0], above + 2.5, f"A–A: {'xy'[view.right]} to the right, z up")
+    # The sonotrode: a band below its mean face, at z = 0.
+    face = 1e3 * lines[tags == TAG_SONOTRODE][..., 0]
+    if face.size:
+        x1, x2 = view.place([[face.min(), 0.0], [face.max(), 0.0]])[:, 0]
+        look: Any = {"facecolor": "white", "edgecolor": BLUE, "hatch": "xxxx", "lw": 1.0}
+        axes.fill_between([x1, x2], y - FACE, y, **look)
+        size = face_size_mm(chamber)
+        text = typeset(f"Ø {plain(size[0])}" if len(size) == 1 else plain(float(np.ptp(face))))
+        dimension(axes, (x1, y - FACE), (x2, y - FACE), 4.0, text)
+    wide = float((view.high - view.low)[0])
+    if not face.size or wide > np.ptp(face) + WIDER:
+        low, high = view.place([[view.low[0], 0.0], [view.high[0], 0.0]])[:, 0]
+        dimension(axes, (low, y - FACE), (high, y - FACE), 8.5, typeset(plain(wide)))
+    own = chamber.vertices[np.unique(chamber.triangles[chamber.tags == TAG_PART]), 2]
+    lowest = 1e3 * float(own.min())
+    left, low_at = view.place([view.low[0], lowest]) - np.array([view.outside[0], 0.0])
+    right = view.place(view.high)[0] + view.outside[0]
+    dimension(axes, (left, y), (left, low_at), 4.5, plain(lowest), upright=True)
+    dimension(axes, (right, y), (right, top), -4.5, plain(view.high[1]), upright=True)
+
+
+def _draw_plan(axes: Axes, chamber: Chamber, view: View, across: int, at: float) -> None:
+    from matplotlib.collections import PolyCollection
+
+    part, target = chamber.tags == TAG_PART, _on_target(chamber)
+    for colour, rows in ((PART, part & ~target), (TARGET, target)):
+        corners = view.place(1e3 * chamber.vertices[chamber.triangles[rows]][:, :, :2])
+        seen = PolyCollection(list(corners), facecolors=colour, edgecolors=colour, lw=0.4)
+        seen.set_rasterized(True)
+        axes.add_collection(seen)
+    halfway, row = cut(chamber.vertices, chamber.triangles, 2, 0.5 * chamber.height)
+    _lines(axes, view, halfway[chamber.tags[row] == TAG_WALL], BLACK, 0.7)
+    face = chamber.triangles[chamber.tags == TAG_SONOTRODE]
+    _lines(axes, view, chamber.vertices[border_edges(face)][:, :, :2], BLUE, 1.1)
+    (left, bottom), (right, top) = view.place([view.low, view.high])
+    x, y = view.place([0.0, 0.0])
+    at_x, at_y = view.place([at, at])
+    wide, deep = map(plain, view.high - view.low)
+    is_round = len(face_size_mm(chamber)) == 1
+    if across == 0:
+        across_line(axes, (x, bottom - 1.0), (x, top + 1.0))
+        across_line(axes, (left - 3.0, at_y), (right + 3.0, at_y), name="A")
+        if not is_round:
+            dimension(axes, (right, bottom), (right, top), -9.5, deep, upright=True)
+    else:
+        across_line(axes, (left - 1.0, y), (right + 1.0, y))
+        across_line(axes, (at_x, bottom - 3.0), (at_x, top + 3.0), name="A")
+        if not is_round:
+            dimension(axes, (left, bottom), (right, bottom), 9.5, wide)
+    _label(axes, left, top + (2.5 if across == 0 else 6.5), "plan: x to the right, y up")
+
+
+def _on_target(chamber: Chamber) -> np.ndarray:
+    """Which triangles of the cavity are of the target."""
+    return (chamber.source >= 0) & chamber.part.target[chamber.source]
+
+
+def _fill(axes: Axes, view: View, lines: np.ndarray, window: Any, **look: Any) -> None:
+    from matplotlib.patches import PathPatch
+
+    area = inside(1e3 * lines)
+    if area is not None:
+        patch = PathPatch(type(area)(view.place(area.vertices), area.codes), **look)
+        axes.add_patch(patch)
+        patch.set_clip_path(window)
+
+
+def _lines(axes: Axes, view: View, lines: np.ndarray, colour: str, width: float) -> None:
+    from matplotlib.collections import LineCollection
+
+    if len(lines):
+        drawn = LineCollection(list(view.place(1e3 * lines)), colors=colour, linewidths=width)
+        drawn.set_capstyle("round")
+        axes.add_collection(drawn)
+
+
+def _label(axes: Axes, x: float, y: float, text: str) -> None:
+    axes.text(x, y, text, size=6.5, color=DARK_GREY, va="bottom")

@@ -1,0 +1,76 @@
+"""One view of surfaces along parallel lines of sight, so that lengths are the same all over it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from chamberopt.pictures.actors import light
+from chamberopt.pictures.camera import view_frame
+from chamberopt.results.vtp_files import pyvista
+
+NARROWEST = 0.6  # a side of an image, as a share of the largest
+
+
+class View(NamedTuple):
+    """An image and what its pixels are.
+
+    image: uint8, shape (rows, columns, 3).
+    frame: unit vectors to the right, upwards and to the eye, (3, 3).
+    corner: of the image, upper left, along the first two of them [mm].
+    pixel_mm: size of a pixel [mm].
+    """
+
+    image: np.ndarray
+    frame: np.ndarray
+    corner: np.ndarray
+    pixel_mm: float
+
+    def pixels(self, points: np.ndarray) -> np.ndarray:
+        """Columns and rows of points [mm], (k, 3), shape (k, 2)."""
+        flat = np.asarray(points, dtype=float) @ self.frame[:2].T
+        return (flat - self.corner) * [1.0, -1.0] / self.pixel_mm
+
+
+def render_view(
+    add: Callable[[Any], None],
+    eye: np.ndarray,
+    points: np.ndarray,
+    size: tuple[int, int],
+    border: int,
+) -> View:
+    """Render what `add` puts into a plotter.
+
+    Args:
+        eye: direction to the eye.
+        points: that fill the image [mm], (k, 3).
+        size: largest width and height [pixels]; a side that is not needed is made shorter.
+        border: round them [pixels].
+    """
+    frame = view_frame(eye)
+    flat = np.asarray(points, dtype=float) @ frame.T
+    low, high = flat.min(axis=0), flat.max(axis=0)
+    sides = np.maximum(high - low, 1e-9)[:2]
+    pixel_mm = float((sides / (np.array(size) - 2 * border)).max())
+    needed = np.ceil(sides / pixel_mm) + 2 * border
+    columns, rows = np.maximum(needed, NARROWEST * np.array(size)).astype(int)
+    plotter = pyvista().Plotter(off_screen=True, window_size=[int(columns), int(rows)])
+    plotter.enable_anti_aliasing("ssaa")
+    light(plotter)
+    add(plotter)
+    aim_along(plotter, frame, 0.5 * (low + high) @ frame, 0.5 * rows * pixel_mm)
+    image = np.asarray(plotter.screenshot(None, return_img=True))[..., :3]
+    plotter.close()
+    corner = 0.5 * (low + high)[:2] + 0.5 * pixel_mm * np.array([-columns, rows])
+    return View(image, frame, corner, pixel_mm)
+
+
+def aim_along(plotter: Any, frame: np.ndarray, middle: np.ndarray, half_height: float) -> None:
+    """Look at a point along parallel lines; half_height: of the image [mm]."""
+    distance = 2.0 * np.linalg.norm(np.ptp(np.reshape(plotter.bounds, (3, 2)), axis=1)) + 1.0
+    plotter.camera_position = [middle + distance * frame[2], middle, frame[1]]
+    plotter.camera.parallel_projection = True
+    plotter.camera.parallel_scale = half_height
+    plotter.renderer.ResetCameraClippingRange()

@@ -1,0 +1,241 @@
+"""The HTML pages of results: one file each, which no part of is fetched from anywhere."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+from functools import cache
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from chamberopt.common.errors import InputError
+from chamberopt.common.files import claim_file, read_file, require_place, write_text
+from chamberopt.documents.report_data import read_design_file, report_contents
+from chamberopt.documents.sections import sections
+from chamberopt.pictures.charts.colours import hex_colours
+from chamberopt.pictures.part3d import PartScene, part_scene, quantities_in_all
+from chamberopt.printers import html
+from chamberopt.results.load import START, Result, load_result, load_start, summary
+
+REPORT = "report.html"
+GENERATOR = '<meta name="generator" content="chamberopt'
+# The browser enforces that nothing is fetched, even if a text of the result held markup.
+POLICY = (
+    "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; "
+    "img-src data: blob:; worker-src blob:; font-src data:; base-uri 'none'; form-action 'none'"
+)
+SCRIPTS = "three/three.min.js", "view3d.js", "part.js"
+HELP = (
+    "Drag to turn, use the wheel to zoom, point at the target to see its numbers there. "
+    "Grey: not in the target. Brown: out of the reach of the shot. "
+    "Dark grey: too few dents were simulated to tell."
+)
+SUBTITLES = {
+    "study": "Report of a study: the best chamber found",
+    "simulation": "Report of one simulated chamber",
+}
+
+
+@dataclass(frozen=True)
+class PageFile:
+    """A kind of file that replaces older ones of its kind, and no others.
+
+    endings: of its name, the usual one first.
+    is_one: whether the content of a file is of this kind.
+    """
+
+    name: str
+    endings: tuple[str, ...]
+    is_one: Callable[[bytes], bool]
+
+
+REPORT_FILE = PageFile(
+    "report", (".html", ".htm"), lambda content: GENERATOR.encode() in content[:2000]
+)
+
+
+def write_report(result: str | Path, path: str | Path | None = None) -> tuple[Path, dict[str, Any]]:
+    """Write the report of a results folder.
+
+    Args:
+        path: of the page; RESULT/report.html if left out.
+
+    Returns:
+        Path of the page, and what it says as plain JSON values.
+
+    Raises:
+        InputError: the folder is no finished result, or the path holds anything but a report.
+    """
+    loaded = load_result(result)
+    path = require_free_page(loaded.folder / REPORT if path is None else path)
+    with claim_file(path):
+        contents = report_contents(result)
+        scene = _write_report(path, contents, loaded)
+    return path, {**contents, "remarks": list(scene.remarks)}
+
+
+def _write_report(path: Path, contents: dict[str, Any], loaded: Result) -> PartScene:
+    is_study = contents["kind"] == "study"
+    scene = part_scene(loaded, contents["name"])
+    scenes = {"best" if is_study else "result": scene}
+    if is_study:
+        start = load_start(loaded)
+        scenes = {START: part_scene(start, START, max_triangles=0), **scenes}
+    made = f"simulated {contents['made'][:10]}, " if contents["made"] else ""
+    subtitle = (
+        f"{SUBTITLES.get(contents['kind'], '')}; "
+        f"{made}report made {datetime.now(UTC).date()} by chamberopt"
+    )
+    head = (
+        f"<header><h1>{html.text(contents['name'])}</h1>{html.paragraph(subtitle, 'soft')}</header>"
+    )
+    body = sections(contents, viewer([scene]), scenes, read_design_file(loaded))
+    write_page(path, f"{contents['name']}: report", head + body, [scene])
+    return scene
+
+
+def write_part_page(results: Sequence[Path], path: Path) -> list[str]:
+    """Write a page of parts in three dimensions only, side by side, which turn together.
+
+    Returns:
+        Remarks, such as triangles left out.
+
+    Raises:
+        InputError: as write_report, and for a part that is too large for a page.
+    """
+    with claim_file(require_free_page(path)):
+        return _write_part_page([load_result(one) for one in results], path)
+
+
+def _write_part_page(loaded: Sequence[Result], path: Path) -> list[str]:
+    names, scenes = _scenes(loaded)
+    summaries = [f"{name}: {summary(one)}" for name, one in zip(names, loaded, strict=True)]
+    title = ", ".join(names)
+    content = html.section("Part in its chamber", html.items(summaries), viewer(scenes))
+    write_page(path, title, f"<header><h1>{html.text(title)}</h1></header>{content}", scenes)
+    return [remark for scene in scenes for remark in scene.remarks]
+
+
+def parts_content(results: Sequence[Path]) -> tuple[str, dict[str, Any]]:
+    """HTML of the parts of results in 3D, and what `showParts` of part.js fills it with.
+
+    Raises:
+        InputError: as write_part_page.
+    """
+    _, scenes = _scenes([load_result(one) for one in results])
+    return viewer(scenes), _content([scene.data for scene in scenes if scene.data])
+
+
+def _scenes(loaded: Sequence[Result]) -> tuple[list[str], list[PartScene]]:
+    """Names of results, and their parts, each remark with the name where there are several."""
+    names = _unique_names([one.folder.resolve() for one in loaded])
+    scenes = [part_scene(one, name) for one, name in zip(loaded, names, strict=True)]
+    for scene, one in zip(scenes, loaded, strict=True):
+        if scene.data is None:
+            raise InputError(f"{one.folder}: {scene.remarks[-1]}")
+    if len(scenes) > 1:
+        scenes = [
+            replace(scene, remarks=tuple(f"{name}: {remark}" for remark in scene.remarks))
+            for name, scene in zip(names, scenes, strict=True)
+        ]
+    return names, scenes
+
+
+def _unique_names(folders: Sequence[Path]) -> list[str]:
+    """The folders' names; with the folder above if two are the same or one is a study's start."""
+    names = [folder.name for folder in folders]
+    unique = len(set(names)) == len(names) and START not in names
+    return names if unique else ["/".join(folder.parts[-2:]) for folder in folders]
+
+
+def require_free_page(path: str | Path, file: PageFile = REPORT_FILE) -> Path:
+    """Return the path; raise InputError unless it is free or holds an older page of the kind."""
+    path, first = Path(path), file.endings[0]
+    remedy = f"give another name (--out FILE{first})"
+    if path.suffix.lower() not in file.endings:
+        raise InputError(
+            f"{path}: a {file.name} is one {first} file; give such a name (--out FILE{first})"
+        )
+    try:
+        is_own = path.is_file() and file.is_one(read_file(path))
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror}; {remedy}") from None
+    if os.path.lexists(path) and not is_own:
+        raise InputError(
+            f"{path}: this file exists and is no {file.name}, so it is not replaced; {remedy}"
+        )
+    require_place(path)
+    return path
+
+
+def viewer(scenes: Sequence[PartScene]) -> str:
+    """HTML for the parts in 3D and their controls, which part.js fills."""
+    drawn = [scene.data for scene in scenes if scene.data]
+    remarks = "".join(
+        html.paragraph(remark, "soft") for scene in scenes for remark in scene.remarks
+    )
+    if not drawn:
+        return remarks
+    options = "".join(
+        f"<option>{html.text(one['label'])}</option>" for one in quantities_in_all(drawn)
+    )
+    last = max(
+        time for one in drawn for time in (one["treatment"], *(row[0] for row in one["curve"]))
+    )
+    now = max(one["treatment"] for one in drawn)
+    panels = ""
+    for i, one in enumerate(drawn):
+        title = html.text(one["title"])
+        description = (
+            f"{title}: the part in its chamber in three dimensions, coloured by the chosen quantity"
+        )
+        caption = f"<figcaption>{title}</figcaption>" if len(drawn) > 1 else ""
+        panels += (
+            f'<figure><div class="part" id="part-{i}" role="img" aria-label="{description}"></div>'
+            f"{caption}</figure>"
+        )
+    return (
+        f'<div class="controls"><label>Colour by <select id="quantity">{options}</select></label>'
+        '<label><input type="checkbox" id="glass" checked> show the chamber</label>'
+        '<label><input type="checkbox" id="fit"> fit the colours to the values shown</label>'
+        '<span id="times"><label for="time">after</label>'
+        f'<input type="range" id="time" min="0" max="{last:g}" step="{now / 60.0:.15g}" '
+        f'value="{now:g}"><output id="at" for="time"></output></span></div>'
+        f'<div class="panels">{panels}</div><div id="label" role="status" hidden></div>'
+        f"{html.paragraph(HELP, 'soft')}{remarks}"
+        "<noscript><p>A script draws the part in 3D; this browser does not run it.</p></noscript>"
+    )
+
+
+def write_page(path: Path, title: str, body: str, scenes: Sequence[PartScene]) -> None:
+    """Put a page together and write it, whole or not at all."""
+    data = ""
+    if drawn := [scene.data for scene in scenes if scene.data]:
+        data = html.embedded_json(_content(drawn), "parts")
+    scripts = "</script><script>".join(map(_asset, SCRIPTS))
+    page = (
+        '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
+        f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">'
+        f'{GENERATOR} {html.text(version("chamberopt"))}">'
+        '<meta name="viewport" content="width=device-width">'
+        f"<title>{html.text(title)}</title><style>{_asset('style.css')}</style></head>\n"
+        f"<body><main>{body}</main>\n{data}\n"
+        f"<script>{scripts}</script></body></html>\n"
+    )
+    write_text(path, page)
+
+
+def _content(drawn: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """The scenes, their quantities and the colours of these, for part.js."""
+    quantities = quantities_in_all(drawn)
+    scales = {name: hex_colours(name) for name in {one["colours"] for one in quantities}}
+    return {"quantities": quantities, "scenes": drawn, "scales": scales}
+
+
+@cache
+def _asset(name: str) -> str:
+    """Text of a script or style sheet of the pages."""
+    return read_file(Path(__file__).parents[1] / "page" / "browser" / name, follow=True).decode()

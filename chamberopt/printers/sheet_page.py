@@ -1,0 +1,285 @@
+"""Lay the process sheet out on one A4 page and write it as PDF."""
+
+from __future__ import annotations
+
+import io
+import re
+from collections.abc import Sequence
+from dataclasses import asdict
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from chamberopt.common.files import claim_file, write_bytes
+from chamberopt.documents.report_data import report_contents
+from chamberopt.documents.sheet import Block, Sheet, calibrated_to, first_checks, setting_blocks
+from chamberopt.pictures.charts.colours import BLACK, DARK_GREY, GREY
+from chamberopt.pictures.charts.figure_style import ignore_settings_here
+from chamberopt.pictures.part_drawing import LEGEND, RASTER, draw_chamber
+from chamberopt.pictures.section import face_size_mm
+from chamberopt.printers.report_page import PageFile, require_free_page
+from chamberopt.results.chamber_file import load_chamber
+from chamberopt.results.load import load_result
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from matplotlib.font_manager import FontProperties
+
+    from chamberopt.chamber.build import Chamber
+
+# Text on a page: lines broken to a width, and blocks of names and values in two columns.
+
+MM_PER_PT = 25.4 / 72.0
+LEADING = 1.25  # height of a line over the size of its letters
+NAMES = 0.52  # share of a column's width that names may take at most
+MOST_LINES = 4  # of one text: more end in an ellipsis
+
+
+class Writer:
+    """Writes text from its top left corner, in page mm; without axes it only measures."""
+
+    def __init__(self, axes: Axes | None, size: float) -> None:
+        """size: of the letters [pt]."""
+        self.axes, self.size = axes, size
+
+    @property
+    def line(self) -> float:
+        """Height of a line [mm]."""
+        return self.size * LEADING * MM_PER_PT
+
+    def write(
+        self, text: str, x: float, top: float, width: float, bold: bool = False, grey: bool = False
+    ) -> float:
+        """Write a text in lines no wider than a width; return where its bottom is."""
+        lines = broken(text, width, self.size, bold)
+        for number, one in enumerate(lines):
+            if self.axes is not None:
+                self.axes.text(
+                    x,
+                    top - number * self.line,
+                    one,
+                    size=self.size,
+                    weight="bold" if bold else "normal",
+                    color=DARK_GREY if grey else BLACK,
+                    va="top",
+                    parse_math=False,
+                )
+        return top - len(lines) * self.line
+
+    def block(self, block: Block, x: float, top: float, width: float) -> float:
+        """Write a block; return where its bottom is."""
+        y = self.write(block.title, x, top, width, bold=True) - 0.1 * self.line
+        if self.axes is not None:
+            self.axes.plot([x, x + width], [y, y], color=GREY, lw=0.5)
+        y -= 0.25 * self.line
+        longest = max(text_width(name, self.size) for name, _ in block.rows)
+        names = min(NAMES * width, longest + 2.0)
+        for name, value in block.rows:
+            if name:
+                low = self.write(name, x, y, names - 1.5, grey=True)
+                y = min(low, self.write(value, x + names, y, width - names))
+            else:
+                y = self.write(value, x, y - 0.15 * self.line, width)
+        return y
+
+    def columns(
+        self, blocks: Sequence[Block], x: float, top: float, sizes: tuple[float, float]
+    ) -> float:
+        """Write blocks in two columns as even as can be; return where the longer one ends.
+
+        Args:
+            sizes: width of a column, and the gap between them.
+        """
+        width, gap = sizes
+        measure = Writer(None, self.size)
+        heights = [0.8 * self.line - measure.block(one, 0.0, 0.0, width) for one in blocks]
+        split = min(range(len(blocks) + 1), key=lambda k: max(sum(heights[:k]), sum(heights[k:])))
+        for column, chosen in enumerate((blocks[:split], blocks[split:])):
+            y = top
+            for one in chosen:
+                y = self.block(one, x + column * (width + gap), y, width) - 0.8 * self.line
+        return top - max(sum(heights[:split]), sum(heights[split:]))
+
+
+def broken(text: str, width: float, size: float, bold: bool = False) -> list[str]:
+    """Lines of a text that are no wider than a width [mm]; words that are wider are cut.
+
+    A number stays on one line with its interval and its unit. A letter that the font lacks is "?".
+    """
+    lines, line = [], ""
+    known = "".join(one if ord(one) in _letters(bold) else "?" for one in " ".join(text.split()))
+    text = re.sub(r" (?=±|%)|(?<=±) ", "\u00a0", known)
+    for word in text.split(" "):
+        while text_width(word, size, bold) > width:
+            room = next(
+                k
+                for k in range(len(word) - 1, 0, -1)
+                if k == 1 or text_width(word[:k], size, bold) <= width
+            )
+            if line:
+                lines.append(line)
+            lines.append(word[:room])
+            line, word = "", word[room:]
+        longer = f"{line} {word}".strip()
+        if text_width(longer, size, bold) <= width:
+            line = longer
+        else:
+            lines.append(line)
+            line = word
+    lines.append(line)
+    if len(lines) <= MOST_LINES:
+        return lines
+    last = lines[MOST_LINES - 1]
+    while last and text_width(f"{last} …", size, bold) > width:
+        last = last[:-1]
+    return [*lines[: MOST_LINES - 1], f"{last} …"]
+
+
+def text_width(text: str, size: float, bold: bool = False) -> float:
+    """Width of a line of text [mm]."""
+    return _width_over_size(text, bold) * size * MM_PER_PT
+
+
+@cache
+def _width_over_size(text: str, bold: bool) -> float:
+    """Width of a line of text over the size of its letters: the same for all sizes."""
+    from matplotlib.textpath import TextToPath
+
+    font = _font(bold)
+    return float(TextToPath().get_text_width_height_descent(text, font, ismath=False)[0])
+
+
+@cache
+def _letters(bold: bool) -> frozenset[int]:
+    """The characters that the font has."""
+    from matplotlib.font_manager import findfont, get_font
+
+    return frozenset(get_font(findfont(_font(bold))).get_charmap())
+
+
+def _font(bold: bool) -> FontProperties:
+    """The font of the page, 1 pt high."""
+    from matplotlib.font_manager import FontProperties
+
+    return FontProperties(size=1.0, weight="bold" if bold else "normal")
+
+
+SHEET = "process_sheet.pdf"
+CREATOR = "chamberopt process sheet"  # by which an older sheet is known
+SHEET_FILE = PageFile("process sheet", (".pdf",), lambda content: CREATOR.encode() in content)
+WIDTH, HEIGHT, MARGIN, GAP = 210.0, 297.0, 12.0, 6.0  # mm
+INNER = WIDTH - 2.0 * MARGIN
+SIZES = (8.0, 7.5, 7.0, 6.5, 6.0, 5.5, 5.0)  # pt of the text; the largest with which all fits
+# Height of the drawing with its caption [mm]: at least, for each pt of the text; and at most.
+DRAWING_PER_PT, MOST_DRAWING = 13.0, 125.0
+CAPTION, SIGNATURES = 7.0, 14.0  # mm
+SIGNED = ("Set up by", "Date", "Checked by", "Date")
+EXPECTED, MEASURED = 88.0, 150.0  # mm from the margin: columns of what to measure first
+KINDS = {
+    "study": "The best chamber of a study, confirmed on fresh seeds",
+    "simulation": "One simulated chamber",
+}
+
+
+def write_sheet(result: str | Path, path: str | Path | None = None) -> tuple[Path, dict[str, Any]]:
+    """Write the process sheet of a results folder.
+
+    Args:
+        path: of the page; RESULT/process_sheet.pdf if left out.
+
+    Returns:
+        Path of the page, and what it says as plain JSON values.
+
+    Raises:
+        InputError: the folder is no finished result, or the path holds anything but a sheet.
+    """
+    loaded = load_result(result)
+    path = require_free_page(loaded.folder / SHEET if path is None else path, SHEET_FILE)
+    with claim_file(path):
+        contents, chamber = report_contents(result), load_chamber(loaded)
+        kind = f"{KINDS[loaded.record.kind]}; simulated {contents['made'][:10]}"
+        sheet = Sheet(
+            f"{contents['question']['part']}: {contents['name']}",
+            kind,
+            contents["answer"],
+            setting_blocks(loaded, contents, face_size_mm(chamber)),
+            first_checks(loaded),
+            calibrated_to(loaded),
+        )
+        _save(path, draw_sheet(sheet, chamber), sheet.name)
+    return path, asdict(sheet)
+
+
+def draw_sheet(sheet: Sheet, chamber: Chamber) -> Figure:
+    """The page: heading, drawing, blocks in two columns, what to measure first, signatures."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    ignore_settings_here()
+    figure = Figure(figsize=(WIDTH / 25.4, HEIGHT / 25.4), dpi=RASTER)
+    FigureCanvasAgg(figure)
+    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0), xlim=(0.0, WIDTH), ylim=(0.0, HEIGHT))
+    axes.axis("off")
+    top, foot = _heading(axes, sheet), MARGIN + SIGNATURES
+    for size in SIZES:
+        room = top - foot + _text(Writer(None, size), sheet, 0.0)
+        if room >= DRAWING_PER_PT * size:
+            break
+    tall = min(MOST_DRAWING, room) - CAPTION
+    scale = draw_chamber(axes, chamber, MARGIN, top, (INNER, tall))
+    caption = f"Section A–A and plan, scale {scale}, {LEGEND}"
+    Writer(axes, 6.0).write(caption, MARGIN, top - tall, INNER, grey=True)
+    _text(Writer(axes, size), sheet, top - tall - CAPTION)
+    _signatures(axes)
+    return figure
+
+
+def _heading(axes: Axes, sheet: Sheet) -> float:
+    """Title, name and answer; returns where they end."""
+    y = Writer(axes, 15.0).write("Process sheet", MARGIN, HEIGHT - MARGIN, 60.0, bold=True)
+    beside, width = MARGIN + 62.0, INNER - 62.0
+    name = Writer(axes, 9.0).write(sheet.name, beside, HEIGHT - MARGIN, width, bold=True)
+    y = min(y, Writer(axes, 7.0).write(sheet.kind, beside, name, width, grey=True)) - 1.5
+    y = Writer(axes, 8.0).write(sheet.answer, MARGIN, y, INNER) - 1.5
+    axes.plot([MARGIN, WIDTH - MARGIN], [y, y], color=BLACK, lw=0.8)
+    return y
+
+
+def _text(write: Writer, sheet: Sheet, top: float) -> float:
+    """The blocks, and the table of what to measure first; returns where they end."""
+    column = 0.5 * (INNER - GAP)
+    y = write.columns(sheet.blocks, MARGIN, top, (column, GAP)) - 0.3 * write.line
+    head = ("Measure first", "expected", "measured")
+    places, widths = (0.0, EXPECTED, MEASURED), (EXPECTED - 2.0, MEASURED - EXPECTED - 2.0, 36.0)
+    for number, row in enumerate([head, *((c.what, c.expected, "") for c in sheet.measure_first)]):
+        ends = [
+            write.write(text, MARGIN + place, y, width, bold=number == 0)
+            for text, place, width in zip(row, places, widths, strict=True)
+        ]
+        y = min(ends) - 0.35 * write.line
+        if write.axes is not None:
+            write.axes.plot([MARGIN, WIDTH - MARGIN], [y, y], color=GREY, lw=0.4)
+        y -= 0.35 * write.line
+    return write.write(sheet.calibration, MARGIN, y, INNER) if sheet.calibration else y
+
+
+def _signatures(axes: Axes) -> None:
+    """Lines to sign on at the foot of the page."""
+    width = (INNER - 3.0 * GAP) / len(SIGNED)
+    for number, what in enumerate(SIGNED):
+        x = MARGIN + number * (width + GAP)
+        axes.plot([x, x + width], [MARGIN + 3.5] * 2, color=BLACK, lw=0.6)
+        Writer(axes, 7.0).write(what, x, MARGIN + 3.0, width, grey=True)
+
+
+def _save(path: Path, figure: Figure, title: str) -> None:
+    """Write the page, with text that can be selected, whole or not at all."""
+    from matplotlib import rc_context
+
+    content = io.BytesIO()
+    with rc_context({"pdf.fonttype": 42}):
+        title = title.encode(errors="replace").decode()  # of a folder's name, which may be no text
+        about = {"Creator": CREATOR, "Title": f"{title}: process sheet"}
+        figure.savefig(content, format="pdf", metadata=about)
+    write_bytes(path, content.getvalue())

@@ -1,0 +1,287 @@
+"""Compare results: what differs in the designs, and how the figures differ."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from chamberopt.common.errors import InputError
+from chamberopt.common.estimate import Estimate
+from chamberopt.design.shapes.base import is_custom
+from chamberopt.results.compare.difference import Difference, confidence_of_each, difference
+from chamberopt.results.load import Result, load_result
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from chamberopt.design.design import Design
+
+# Checks that candidates can be compared: the same surface, peened for the same time.
+
+
+def require_several(paths: Sequence[Path]) -> None:
+    """Raise InputError for fewer than two candidates, or for one given twice."""
+    if len(paths) < 2:
+        raise InputError(
+            f"compare: {len(paths)} candidate given; give two or more designs (.toml) or "
+            "results folders"
+        )
+    seen: dict[Path, Path] = {}
+    for path in paths:
+        place = path.resolve()
+        if place in seen:
+            raise InputError(f"{path}: given twice (as {seen[place]}); leave one out")
+        seen[place] = path
+
+
+def require_same_time(paths: Sequence[Path], designs: Sequence[Design]) -> None:
+    """Raise InputError if treatment times differ."""
+    first = designs[0].process.treatment_time_s
+    for path, design in zip(paths, designs, strict=True):
+        seconds = design.process.treatment_time_s
+        if seconds != first:
+            raise InputError(
+                f"{path}: peened for {seconds:g} s, {paths[0]} for {first:g} s: coverage after "
+                "different times cannot be compared; give --treatment-time-s S to simulate the "
+                "others again for S seconds"
+            )
+
+
+def require_same_gauge(paths: Sequence[Path], designs: Sequence[Design]) -> None:
+    """Raise InputError if coverage is looked at through windows of different areas."""
+    first = designs[0].process.accuracy.gauge_mm2
+    for path, design in zip(paths, designs, strict=True):
+        gauge = design.process.accuracy.gauge_mm2
+        if gauge != first:
+            raise InputError(
+                f"{path}: process.accuracy.gauge_mm2 is {gauge:g}, in {paths[0]} {first:g}: "
+                "figures of windows of different areas cannot be compared; simulate both with one"
+            )
+
+
+def require_same_machine(paths: Sequence[Path], designs: Sequence[Design]) -> None:
+    """Raise InputError if designs have calibrations of different machines.
+
+    What a calibration leaves open is common to the designs that have it, and cancels.
+    """
+    calibrated = [pair for pair in zip(paths, designs, strict=True) if pair[1].calibration]
+    for path, design in calibrated[1:]:
+        if design.calibration != calibrated[0][1].calibration:
+            raise InputError(
+                f"{path}: another calibration than in {calibrated[0][0]}: what two calibrations "
+                "leave open cannot be subtracted; simulate both designs with one"
+            )
+
+
+def require_same_part(
+    paths: Sequence[Path], designs: Sequence[Design], meshes: Sequence[tuple[str, str]]
+) -> None:
+    """Raise InputError if part, unit or target differ from the first's; poses may differ.
+
+    Args:
+        paths: of the candidates.
+        designs: of the candidates.
+        meshes: for each candidate the sha256 of the part's file, and the unit it was read in.
+    """
+    for path, design, mesh in zip(paths[1:], designs[1:], meshes[1:], strict=True):
+        if mesh[0] != meshes[0][0]:
+            raise InputError(
+                f"{path}: another part ({design.part.mesh_path.name}) than in {paths[0]} "
+                f"({designs[0].part.mesh_path.name}); give candidates for the same part mesh"
+            )
+        pairs = {
+            "unit": (meshes[0][1], mesh[1]),
+            "target": (designs[0].part.target, design.part.target),
+        }
+        ours, others = ({one.name: one.target for one in x.zones} for x in (designs[0], design))
+        pairs |= {f"zone {k}": (ours[k], others[k]) for k in ours.keys() & others.keys()}
+        for name, (mine, theirs) in pairs.items():
+            if mine != theirs:
+                raise InputError(
+                    f"{path}: part.{name} differs from {paths[0]} ({theirs} and {mine}), so the "
+                    "figures are of different surfaces; simulate both with the same one"
+                )
+
+
+def require_same_triangles(path: Path, target: np.ndarray, first: Path, wanted: np.ndarray) -> None:
+    """Raise InputError if two targets, shape (m,) bool, are not the same triangles.
+
+    This can happen with part.target.reachable, which depends on the chamber.
+    """
+    if len(target) != len(wanted) or (target != wanted).any():
+        raise InputError(
+            f"{path}: its target of {target.sum()} triangles is not that of {first}, of "
+            f"{wanted.sum()} triangles (part.target.reachable depends on the chamber); give its "
+            "design instead of the result, which is then simulated with the target of the first"
+        )
+
+
+TIME = "time_to_98_s"
+# The number of replicas tells more than the rule that decided it.
+REPLICAS = "process.accuracy.replicas"
+STOPPING_RULES = ("process.accuracy.objective_half_width", "process.accuracy.max_replicas")
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Two or more results of the same part.
+
+    Args:
+        results: the results.
+        labels: their short names.
+        parameters: dotted design values that differ, one for each result.
+        metrics: the objective, then every metric; one Estimate for each result.
+        differences: each later result minus the first, by metric.
+        confidence: of the interval of each difference, chosen so that the intervals of one figure
+            hold together with 95 %.
+    """
+
+    results: tuple[Result, ...]
+    labels: tuple[str, ...]
+    parameters: dict[str, tuple[Any, ...]]
+    metrics: dict[str, tuple[Estimate, ...]]
+    differences: dict[str, tuple[Difference, ...]]
+    confidence: float
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the comparison as plain JSON values."""
+        return {
+            "results": [str(result.folder) for result in self.results],
+            "labels": list(self.labels),
+            "parameters": {name: list(values) for name, values in self.parameters.items()},
+            "metrics": {
+                name: [one.interval_json() for one in values]
+                for name, values in self.metrics.items()
+            },
+            "confidence_of_each_difference": self.confidence,
+            "differences_to_first": {
+                name: [gap.as_json() for gap in gaps] for name, gaps in self.differences.items()
+            },
+            "coverage_against_time": [
+                [row.as_json() for row in result.record.coverage_against_time]
+                for result in self.results
+            ],
+        }
+
+
+def compare(paths: Sequence[str | Path]) -> Comparison:
+    """Compare results folders of the same part and target with the first of them.
+
+    Raises:
+        InputError: there are fewer than two, one is given twice, one is not a result, or parts,
+            targets or treatment times differ.
+    """
+    folders = [Path(path) for path in paths]
+    require_several(folders)
+    return comparison_of([load_result(folder) for folder in folders], labels(folders))
+
+
+def comparison_of(results: Sequence[Result], names: Sequence[str]) -> Comparison:
+    """Compare results under these names; raises InputError as `compare` does.
+
+    Results on the same seeds are compared replica by replica, others as independent (Welch).
+    """
+    first, folders = results[0], [result.folder for result in results]
+    designs = [result.design for result in results]
+    require_same_part(
+        folders, designs, [(result.record.part_sha256, part_unit(result)) for result in results]
+    )
+    require_same_time(folders, designs)
+    require_same_gauge(folders, designs)
+    require_same_machine(folders, designs)
+    same_goal = all(result.objective_name == first.objective_name for result in results)
+    metrics = (
+        {first.objective_name: tuple(result.objective for result in results)} if same_goal else {}
+    )
+    shared = [name for name in first.metrics if all(name in result.metrics for result in results)]
+    metrics |= {name: tuple(result.metrics[name] for result in results) for name in shared}
+    confidence = confidence_of_each(len(results) - 1)
+    return Comparison(
+        results=tuple(results),
+        labels=tuple(names),
+        parameters=_differing_values(results),
+        metrics=metrics,
+        differences={
+            name: tuple(_difference(name, first, other, confidence) for other in results[1:])
+            for name in metrics
+        },
+        confidence=confidence,
+    )
+
+
+def part_unit(result: Result) -> str:
+    """Return the unit in which the part's file was read."""
+    return result.record.part_unit or result.design.part.unit
+
+
+def _difference(name: str, first: Result, other: Result, confidence: float) -> Difference:
+    of_goal = name == first.objective_name
+    after, before = (one.objective if of_goal else one.metrics[name] for one in (other, first))
+    if _metal(other.design) != _metal(first.design):
+        after = after.of_another_metal()
+    found = difference(after, before, other.seeds == first.seeds, confidence)
+    if found.time_ratio is None:
+        return found
+    # An estimate knows batches of replicas, not how many replicas there were.
+    return replace(found, replicas=math.ceil(found.time_ratio * other.record.replicas))
+
+
+def _metal(design: Design) -> tuple[Any, ...]:
+    """What an error in Estimate.shared of the part's metal belongs to."""
+    return design.materials.part, design.shot.density, set(design.shot.diameters)
+
+
+def labels(paths: Sequence[Path]) -> tuple[str, ...]:
+    """Return the last part of each path, with as much of what precedes it as makes it unique."""
+    resolved = [path.resolve() for path in paths]
+    for depth in range(1, max(len(path.parts) for path in resolved) + 1):
+        names = tuple("/".join(path.parts[-depth:]) for path in resolved)
+        if len(set(names)) == len(names):
+            return names
+    return tuple(f"{path.name} ({i})" for i, path in enumerate(resolved, start=1))
+
+
+def _differing_values(results: Sequence[Result]) -> dict[str, tuple[Any, ...]]:
+    """Return the dotted design values that are not the same in all results; None where missing."""
+    designs = [_design_values(result) for result in results]
+    # v0_for repeats what v0_m_s, the ball, the hardness and C0 say.
+    all_names = (name for design in designs for name in design)
+    names = dict.fromkeys(name for name in all_names if not name.endswith(".v0_for"))
+    rows = {name: tuple(design.get(name) for design in designs) for name in names}
+    found = {name: values for name, values in rows.items() if len(set(map(str, values))) > 1}
+    if "chamber.shape" in found:  # which says it already
+        found.pop("shape_sha256", None)
+    return found
+
+
+def _design_values(result: Result) -> dict[str, Any]:
+    """Return all values of a result's design, and those that a design does not contain."""
+    values = _flattened(result.design.model_dump(mode="json", exclude={"part": {"mesh", "unit"}}))
+    for name in STOPPING_RULES:
+        values.pop(name, None)
+    if is_custom(values["chamber.shape"]):
+        values["chamber.shape"] = Path(values["chamber.shape"]).name  # its content is shape_sha256
+    return {
+        **values,
+        REPLICAS: result.record.replicas,
+        "shape_sha256": result.record.shape_sha256[:12],
+        "analytic": result.record.analytic,
+    }
+
+
+def _flattened(table: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+    """Return nested tables, and lists of tables, as one table with dotted names."""
+    flat: dict[str, Any] = {}
+    for name, value in table.items():
+        if isinstance(value, list | tuple) and any(isinstance(one, Mapping) for one in value):
+            value = {str(place): one for place, one in enumerate(value)}
+        if isinstance(value, Mapping):
+            flat |= _flattened(value, f"{prefix}{name}.")
+        else:
+            flat[prefix + name] = value
+    return flat

@@ -1,0 +1,105 @@
+"""Histograms of coverage, impact speed and impact angle over the target, in common bins."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from chamberopt.results.compare.local_difference import TargetSurface
+
+BINS = 40
+
+
+@dataclass(frozen=True)
+class Histogram:
+    """A histogram of several results.
+
+    Args:
+        unit: of the edges.
+        edges: of the bins, shape (n + 1,).
+        shares: for each result the share of its area or impacts in each bin, shape (n,).
+    """
+
+    unit: str
+    edges: np.ndarray
+    shares: tuple[np.ndarray, ...]
+
+    def as_json(self) -> dict[str, Any]:
+        """Return plain JSON values."""
+        shares = [one.tolist() for one in self.shares]
+        return {"unit": self.unit, "edges": self.edges.tolist(), "shares": shares}
+
+
+@dataclass(frozen=True)
+class Distributions:
+    """Distributions of several results over one target.
+
+    Args:
+        coverage: shares of the target's area; what no ball can touch has coverage 0.
+        speed: shares of the impacts by normal speed.
+        angle: shares of the impacts by angle.
+        impacts: number of impacts of each result.
+        mean_speed: [m/s], of each result, or None if nothing was hit.
+        mean_angle: [degrees], of each result, or None if nothing was hit.
+    """
+
+    coverage: Histogram
+    speed: Histogram
+    angle: Histogram
+    impacts: tuple[int, ...]
+    mean_speed: tuple[float | None, ...]
+    mean_angle: tuple[float | None, ...]
+
+    def as_json(self) -> dict[str, Any]:
+        """Return plain JSON values."""
+        return {
+            "coverage": self.coverage.as_json(),
+            "normal_speed": self.speed.as_json(),
+            "angle": self.angle.as_json(),
+            "impacts": list(self.impacts),
+            "mean_normal_speed_m_s": list(self.mean_speed),
+            "mean_angle_deg": list(self.mean_angle),
+        }
+
+
+def distributions(candidates: Sequence[TargetSurface]) -> Distributions:
+    """Compute the distributions of results of one part and target."""
+    speeds = [one.hits.speed.astype(float) for one in candidates]
+    angles = [one.hits.angle.astype(float) for one in candidates]
+    top_speed = max([0.1, *(float(np.quantile(one, 0.999)) for one in speeds if len(one))])
+    return Distributions(
+        coverage=_coverage_histogram(candidates),
+        speed=_impact_histogram("m/s", np.linspace(0.0, top_speed, BINS + 1), speeds),
+        angle=_impact_histogram("degrees", np.linspace(0.0, 90.0, BINS - 4 + 1), angles),
+        impacts=tuple(map(len, speeds)),
+        mean_speed=tuple(map(_mean, speeds)),
+        mean_angle=tuple(map(_mean, angles)),
+    )
+
+
+def _coverage_histogram(candidates: Sequence[TargetSurface]) -> Histogram:
+    """Shares of area by coverage in per cent."""
+    values = [100.0 * one.coverage for one in candidates]
+    low = 5.0 * np.floor(min(one.min() for one in values) / 5.0)
+    high = 5.0 * np.ceil(max(one.max() for one in values) / 5.0)
+    edges = np.linspace(low, max(high, low + 5.0), BINS + 1)
+    shares = [
+        np.histogram(value, edges, weights=one.area)[0]
+        for value, one in zip(values, candidates, strict=True)
+    ]
+    return Histogram("%", edges, tuple(shares))
+
+
+def _impact_histogram(unit: str, edges: np.ndarray, columns: Sequence[np.ndarray]) -> Histogram:
+    """Shares of impacts; values beyond the last edge are in the last bin."""
+    shares = [
+        np.histogram(np.minimum(one, edges[-1]), edges)[0] / max(1, len(one)) for one in columns
+    ]
+    return Histogram(unit, edges, tuple(shares))
+
+
+def _mean(values: np.ndarray) -> float | None:
+    return float(values.mean()) if len(values) else None

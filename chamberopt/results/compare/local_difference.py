@@ -1,0 +1,179 @@
+"""Where one candidate covers more than another, and where the difference is not noise."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from chamberopt.coverage.part_impacts import HITS_FILE, Hits, load_matching_hits
+from chamberopt.geometry.triangles import areas
+from chamberopt.results.load import Result, load_field, load_part
+
+# The target of one result as stored in its folder: its field, and the impacts on it.
+
+MIN_COSINE = 0.7  # between normals of places that count as near each other
+NEIGHBOURS = 8  # vertices that are looked at for a place
+NEAREST = 3  # of these, facing the same way, give its value
+
+
+@dataclass(frozen=True)
+class TargetSurface:
+    """The field of a result on the target.
+
+    Args:
+        corners: of the part's triangles in the chamber [mm], shape (m, 3, 3).
+        target: which triangles of the part belong to the target, shape (m,) bool.
+        place: vertices of the display mesh on the target [mm], shape (v, 3).
+        normal: unit vectors there, shape (v, 3).
+        area: share of the target's area that each vertex stands for, shape (v,).
+        coverage: 0 to 1, 0 out of reach, shape (v,).
+        interval: width of its 95 % interval, 0 out of reach, shape (v,).
+        resolved: whether the dents there are enough to tell; so they are out of reach, shape (v,).
+        window_radius: of the windows [mm].
+        dents: simulated, in the median window.
+        hits: single impacts on the target.
+    """
+
+    corners: np.ndarray
+    target: np.ndarray
+    place: np.ndarray
+    normal: np.ndarray
+    area: np.ndarray
+    coverage: np.ndarray
+    interval: np.ndarray
+    resolved: np.ndarray
+    window_radius: float
+    dents: float
+    hits: Hits
+
+    def at(self, other: TargetSurface) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Coverage, interval and whether it is resolved at the vertices of another result."""
+        from scipy.spatial import cKDTree
+
+        place, normal = self._moved(other)
+        count = min(NEIGHBOURS, len(self.place))
+        distance, vertex = cKDTree(self.place).query(place, k=count)
+        distance, vertex = distance.reshape(-1, count), vertex.reshape(-1, count)
+        cosine = np.einsum("ij,ikj->ik", normal, self.normal[vertex])
+        weight = np.where(cosine > MIN_COSINE, 1.0 / np.maximum(distance, 1e-9), 0.0)
+        weight *= np.cumsum(weight > 0.0, axis=1) <= NEAREST
+        weight[weight.sum(axis=1) == 0.0, 0] = 1.0
+        weight /= weight.sum(axis=1, keepdims=True)
+        coverage, interval, resolved = (
+            (weight * column[vertex]).sum(axis=1)
+            for column in (self.coverage, self.interval, self.resolved)
+        )
+        return coverage, interval, resolved > 0.5
+
+    def _moved(self, other: TargetSurface) -> tuple[np.ndarray, np.ndarray]:
+        """Vertices and normals of another result as its part stands here.
+
+        The rotation fits its triangles to those here (W. Kabsch, Acta Cryst. A32 (1976) 922).
+        """
+        here, there = (one.corners.reshape(-1, 3) for one in (self, other))
+        u, _, v = np.linalg.svd((there - there.mean(axis=0)).T @ (here - here.mean(axis=0)))
+        u[:, 2] *= np.sign(np.linalg.det(u @ v))
+        rotation = u @ v
+        place = (other.place - there.mean(axis=0)) @ rotation + here.mean(axis=0)
+        return place, other.normal @ rotation
+
+
+def read_target_surface(result: Result) -> TargetSurface:
+    """Read the target of a results folder; InputError if files are missing or damaged."""
+    part = load_part(result)
+    field = load_field(result, part)
+    triangles = np.asarray(field.regular_faces)[np.asarray(field["target"]) > 0]
+    used, corner = np.unique(triangles, return_inverse=True)
+    points = np.asarray(field.points, dtype=float)
+    area = np.repeat(areas(points, triangles) / 3.0, 3)
+    share = np.bincount(corner.ravel(), area, len(used)) / area.sum()
+    reached = np.asarray(field["reachable"])[used] > 0.5
+    target = np.asarray(part["target"]) > 0
+    hits = load_matching_hits(result.path(HITS_FILE), np.asarray(part["impacts"]))
+    return TargetSurface(
+        corners=np.asarray(part.points, dtype=float)[np.asarray(part.regular_faces)],
+        target=target,
+        place=points[used],
+        normal=np.asarray(field.point_data.active_normals, dtype=float)[used],
+        area=share,
+        coverage=np.where(reached, field["coverage"][used], 0.0).astype(float),
+        interval=np.where(reached, field["coverage_interval"][used], 0.0).astype(float),
+        resolved=~reached | (np.asarray(field["resolved"])[used] > 0.5),
+        window_radius=math.sqrt(result.design.process.accuracy.gauge_mm2 / math.pi),
+        dents=result.record.field.dents_in_median_window,
+        hits=hits.on(target & (np.asarray(part["exposed_area_mm2"]) > 0.0)),
+    )
+
+
+# A difference is smaller than either coverage and has more noise: discs hold as many dents.
+DENTS = 60.0
+# Upper limit of their radius, as a share of the target's size: a wider disc could hide a pattern.
+MAX_RADIUS_SHARE = 0.06
+
+
+@dataclass(frozen=True)
+class LocalDifference:
+    """Coverage of a later candidate minus that of the first, at places of the target.
+
+    Args:
+        value: the difference, -1 to 1, at the vertices of the first candidate's field, shape (v,).
+        radius: both are averaged over discs of this radius [mm]; 0 if they are not averaged.
+        real: whether it exceeds its 95 % interval, shape (v,) bool. The intervals hold for each
+            place alone, so one place in twenty exceeds its own by chance.
+        more: share of the target's area where the later candidate really covers more.
+        less: share of the target's area where it really covers less.
+    """
+
+    value: np.ndarray
+    real: np.ndarray
+    radius: float
+    more: float
+    less: float
+
+    def as_json(self) -> dict[str, float]:
+        """Return the figures of the whole target as plain JSON values."""
+        return {"share_more": self.more, "share_less": self.less, "averaged_over_mm": self.radius}
+
+
+def local_difference(first: TargetSurface, other: TargetSurface) -> LocalDifference:
+    """Compute other - first for two results of one part and target.
+
+    Both are averaged over the same discs, wide enough for DENTS dents. The interval of the
+    difference follows from those of the two coverages, which assume independent dents: averages of
+    windows of radius l over discs of radius R scatter as in windows of radius sqrt(l² + R²). Where
+    either has too few dents, no difference is real.
+
+    Source: G. Y. Zou and A. Donner, "Construction of confidence limits about effect measures",
+    Statistics in Medicine 27 (2008) 1693.
+    """
+    coverage, interval, resolved = other.at(first)
+    window, dents = first.window_radius, max(min(first.dents, other.dents), 1.0)
+    size = float(np.linalg.norm(np.ptp(first.place, axis=0)))
+    radius = min(window * math.sqrt(max(0.0, DENTS / dents - 1.0)), MAX_RADIUS_SHARE * size)
+    average = _averages(first, radius)
+    value = average(coverage - first.coverage)
+    width = average(np.hypot(interval, first.interval)) * window / math.hypot(window, radius)
+    real = np.abs(value) > 0.5 * width
+    real &= resolved & first.resolved
+    more, less = (float(first.area[real & sign].sum()) for sign in (value > 0.0, value < 0.0))
+    return LocalDifference(value, real, radius, more, less)
+
+
+def _averages(surface: TargetSurface, radius: float) -> Callable[[np.ndarray], np.ndarray]:
+    """A function that averages values (v,) over the disc round each place that faces its way."""
+    if radius == 0.0:
+        return np.asarray
+    from scipy.spatial import cKDTree
+
+    pairs = cKDTree(surface.place).query_pairs(radius, output_type="ndarray")
+    cosine = np.einsum("ij,ij->i", surface.normal[pairs[:, 0]], surface.normal[pairs[:, 1]])
+    i, j = pairs[cosine > MIN_COSINE].T
+
+    def sums(own: np.ndarray) -> np.ndarray:
+        return np.asarray(own + np.bincount(i, own[j], len(own)) + np.bincount(j, own[i], len(own)))
+
+    total = sums(surface.area)
+    return lambda values: sums(values * surface.area) / total

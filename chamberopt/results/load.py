@@ -1,0 +1,302 @@
+"""Read results folders."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import shlex
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from chamberopt.common.errors import InputError
+from chamberopt.common.estimate import Estimate
+from chamberopt.common.files import RESULT, open_plain, require_plain_folder
+from chamberopt.common.limits import MAX_RESULT_BYTES, parse_json, read_limited
+from chamberopt.common.number_text import estimate_text, plain
+from chamberopt.coverage.metrics import find_metric
+from chamberopt.design.design import validate
+from chamberopt.design.load import Design
+from chamberopt.geometry.triangles import areas
+from chamberopt.results.records import (
+    FORMAT,
+    CandidateRecord,
+    ResultRecord,
+    StudyRecord,
+    read_record,
+)
+from chamberopt.results.vtp_files import (
+    CHAMBER,
+    COVERAGE,
+    ELEMENT_COLUMNS,
+    FIELD_COLUMNS,
+    OF_ELEMENT,
+    PART,
+    Surface,
+    read_surface,
+)
+from chamberopt.search.study_folder import is_study_folder
+from chamberopt.search.trial_log import HISTORY, TIMINGS, read_trials
+
+if TYPE_CHECKING:
+    from chamberopt.simulation.evaluation import Evaluation
+
+START = "start"
+# Folders of other commands, by the file that each has: what they are, and where that can be seen.
+OTHER_FOLDERS = {
+    "calibration.json": "a calibration: see calibration.txt and calibration.png in it; designs "
+    "take its machine.toml",
+    "strip.json": "a virtual strip: see strip.png and strip.csv in it",
+    "accuracy.json": "an accuracy study: see accuracy.png and accuracy.csv in it",
+    "compare.json": "a comparison: see compare.txt in it",
+    "check.json": "a check of a design: see check.json in it",
+}
+RESTORE = "restore the folder from where it came, or simulate again"
+
+
+@dataclass(frozen=True)
+class Result:
+    """A results folder that has been read; a study stands for its best design as confirmed.
+
+    design: the candidate that the figures belong to.
+    record: everything in result.json.
+    """
+
+    folder: Path
+    design: Design
+    record: CandidateRecord
+
+    @property
+    def study(self) -> StudyRecord | None:
+        """The record of the study; None for a simulation."""
+        return self.record.study
+
+    @property
+    def objective_name(self) -> str:
+        return self.record.objective.name
+
+    @property
+    def objective(self) -> Estimate:
+        return self.record.objective.estimate
+
+    @cached_property
+    def metrics(self) -> dict[str, Estimate]:
+        """The metrics that this version of the program knows."""
+        return {name: one for name, one in self.record.metrics.items() if find_metric(name)}
+
+    @property
+    def seeds(self) -> tuple[int, str]:
+        """The number process.seed and the name of the random stream."""
+        return self.record.seed, self.record.stream
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        return tuple(self.record.notes)
+
+    @property
+    def gauge_mm2(self) -> float:
+        """Area of the windows in which coverage is measured."""
+        return self.design.process.accuracy.gauge_mm2
+
+    @property
+    def resolves_places(self) -> bool:
+        """Whether the windows have the dents that figures of single places take."""
+        field = self.record.field
+        return field.dents_in_median_window >= (field.dents_needed.p05_times_intensity or 0.0)
+
+    def path(self, name: str) -> Path:
+        """Path of a data file of the result; InputError unless it is the file that was written."""
+        return unchanged_file(self.folder, name, self.record.files)
+
+
+def load_result(path: str | Path) -> Result:
+    """Read a results folder, given itself or its result.json.
+
+    Raises:
+        InputError: it is not a results folder, or unfinished, or damaged.
+    """
+    path = Path(path)
+    if path.name != RESULT and path.is_symlink():
+        try:
+            path = path.resolve()  # who asks for it gave the link, and learns where results are
+        except (OSError, RuntimeError):  # RuntimeError before Python 3.13
+            raise InputError(f"{path}: a link that leads back to itself; remove it") from None
+    file = path if path.name == RESULT else path / RESULT
+    folder = file.parent
+    if not file.is_file():
+        if is_study_folder(folder) or (folder / HISTORY).is_file():
+            raise InputError(
+                f"{folder}: this study or sweep has not finished, {RESULT} is missing; continue it "
+                "with the command that began it, such as: "
+                f"chamberopt run STUDY.toml --out {shlex.quote(str(folder))}"
+            )
+        is_other = (text for name, text in OTHER_FOLDERS.items() if (folder / name).is_file())
+        what = next(is_other, f"not a results folder, {RESULT} is missing")
+        raise InputError(f"{folder}: {what}; here a folder made by simulate or run is needed")
+    with _damage_explained(file):
+        record = _read_record(file)
+        if not isinstance(record, CandidateRecord):
+            raise InputError(
+                f"{folder}: a sweep is a map of many candidates, not the result of one; simulate "
+                "the design that you want from it, such as its best.toml"
+            )
+        design = validate(Design, record.design, file, recorded=True)
+        if record.seed != design.process.seed:
+            raise ValueError(f"seed: given {record.seed}, its design has {design.process.seed}")
+        return Result(folder, design, record)
+
+
+def load_start(study: Result) -> Result:
+    """Read the results folder of a study's start, which is inside that of the study."""
+    with _damage_explained(study.folder / START):
+        return load_result(require_plain_folder(study.folder / START, RESTORE))
+
+
+def load_trials(folder: Path) -> list[dict[str, Any]]:
+    """The trial log of a study or sweep, finished or not; InputError where there is none.
+
+    If it is finished, its files must be those that were written with its result.
+    """
+    file = folder / RESULT
+    if file.is_file():
+        with _damage_explained(file):
+            sha256 = _read_record(file).files
+        for name in sorted({HISTORY, TIMINGS} & sha256.keys()):
+            unchanged_file(folder, name, sha256)
+    return read_trials(folder)
+
+
+def unchanged_file(folder: Path, name: str, sha256: Mapping[str, str]) -> Path:
+    """Path of a data file in a results folder; InputError unless it has its digest in result.json.
+
+    Args:
+        sha256: of each data file by its name, as in result.json.
+    """
+    path = folder / name
+    if name not in sha256:
+        raise InputError(f"{folder / RESULT}: names no {name}; {RESTORE}")
+    if not path.is_file():
+        raise InputError(f"{path}: not there, {RESULT} names it; {RESTORE}")
+    found = file_sha256(path)
+    if found != sha256[name]:
+        raise InputError(
+            f"{path}: not the file that was written with {RESULT}: its sha256 is {found[:16]}, "
+            f"expected {sha256[name][:16]}; {RESTORE}"
+        )
+    return path
+
+
+def file_sha256(path: Path) -> str:
+    """Digest of a file; InputError if it cannot be read."""
+    try:
+        with open_plain(path) as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+    except OSError as error:
+        raise InputError(
+            f"{path}: cannot be read: {error.strerror}; check its permissions"
+        ) from None
+
+
+def load_part(result: Result) -> Surface:
+    """Read the part.vtp of a result; InputError if missing, damaged or another result's."""
+    return read_part(result.path(PART))
+
+
+def load_field(result: Result, part: Surface) -> Surface:
+    """Read coverage.vtp; InputError as load_part."""
+    return read_field(result.path(COVERAGE), part)
+
+
+def load_cavity(result: Result) -> Surface:
+    """Read chamber.vtp; InputError as load_part."""
+    return read_surface(result.path(CHAMBER), ("tag",))
+
+
+def read_part(path: Path) -> Surface:
+    """Read part.vtp; InputError unless it has values wherever the shot can come."""
+    part = read_surface(path, ELEMENT_COLUMNS)
+    exposed = np.asarray(part["exposed_area_mm2"])
+    if not np.isfinite(exposed).all() or np.isnan(part["coverage"][exposed > 0.0]).any():
+        raise InputError(f"{path}: damaged (an exposed triangle has no coverage); {RESTORE}")
+    if not (np.asarray(part["target"])[exposed > 0.0] > 0).any():
+        raise InputError(f"{path}: damaged (nothing of its target is exposed); {RESTORE}")
+    return part
+
+
+def read_field(path: Path, part: Surface) -> Surface:
+    """Read coverage.vtp; InputError unless it belongs to this part.vtp."""
+    field = read_surface(path, ("triangle", *OF_ELEMENT), FIELD_COLUMNS)
+    triangle = np.asarray(field["triangle"])
+    covers_all = np.array_equal(np.unique(triangle), np.arange(part.n_cells))
+    if not covers_all or (part["impacts"][triangle] != field["element_impacts"]).any():
+        raise InputError(f"{path}: of another result than the part.vtp beside it; simulate again")
+    points = field.point_data
+    reached = np.asarray(points["reachable"]) > 0.5
+    known = [points["coverage"], points["reachable"], points["resolved"]]
+    known += [points[name][reached] for name in ("dent_density", "coverage_interval")]
+    if points.active_normals is None or any(np.isnan(column).any() for column in known):
+        raise InputError(f"{path}: damaged (a place on it has no coverage); {RESTORE}")
+    target = np.asarray(field.regular_faces)[np.asarray(field["target"]) > 0]
+    if not areas(np.asarray(field.points, dtype=float), target).sum() > 0.0:
+        raise InputError(f"{path}: damaged (its target has no area); {RESTORE}")
+    return field
+
+
+def summary(evaluation: Evaluation | Result) -> str:
+    """Return one line with the objective and its interval, and mean and spread of coverage."""
+    mean, spread = (evaluation.metrics[name] for name in ("mean_coverage", "std_coverage"))
+    name = evaluation.objective_name.replace("_", " ")
+    shares = f"mean {estimate_text(mean, 100.0, '%')}   std {estimate_text(spread, 100.0, '%')}"
+    windows = f"in windows of {plain(evaluation.gauge_mm2)} mm²"
+    return f"{name} {estimate_text(evaluation.objective)}   {shares}   {windows}"
+
+
+@contextmanager
+def _damage_explained(file: Path) -> Iterator[None]:
+    """Report what is wrong with a result.json as InputError."""
+    try:
+        yield
+    except OSError as error:
+        raise InputError(
+            f"{file}: cannot be read: {error.strerror}; check its permissions"
+        ) from None
+    except (ValueError, LookupError, TypeError, AttributeError, RecursionError) as error:
+        raise InputError(
+            f"{file}: damaged ({type(error).__name__}: {error}); simulate again"
+        ) from None
+
+
+def _read_record(file: Path) -> ResultRecord:
+    """The content of a result.json that this version of the program reads whole; or InputError."""
+    content = read_limited(file, MAX_RESULT_BYTES, "file of a result")
+    data = parse_json(content)
+    if not isinstance(data, dict):
+        raise ValueError("it holds no table")
+    if data["format"] != FORMAT:
+        raise _of_another_format(file, data)
+    if data.get("sha256") != content_sha256(data):
+        raise InputError(f"{file}: not as it was written: its sha256 is another; {RESTORE}")
+    return read_record(data)
+
+
+def _of_another_format(file: Path, data: dict[str, Any]) -> InputError:
+    found, versions = data["format"], data.get("versions")
+    versions = versions if isinstance(versions, dict) else {}
+    made_by = versions.get("chamberopt", "an unknown version")
+    newer = isinstance(found, int) and found > FORMAT
+    remedy = "read it with that version" if newer else "simulate again, or read it with that one"
+    return InputError(
+        f"{file}: in format {found!r}, expected {FORMAT}: written by chamberopt {made_by}, another "
+        f"version than this; {remedy}"
+    )
+
+
+def content_sha256(data: Mapping[str, Any]) -> str:
+    """sha256 of the content of a result.json but for its own key, in whatever order it stands."""
+    rest = {name: value for name, value in data.items() if name != "sha256"}
+    return hashlib.sha256(json.dumps(rest, sort_keys=True).encode()).hexdigest()

@@ -1,0 +1,109 @@
+"""The replicas of a result, ready to be simulated again exactly as they were."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from chamberopt.chamber.analytic import analytic_cavity, impacts_on_chamber
+from chamberopt.chamber.part import turning_axis
+from chamberopt.chamber.scene import build_scene, chamber_mesh, replica_seed
+from chamberopt.common.errors import InputError
+from chamberopt.coverage.part_impacts import HITS_FILE, load_hits
+from chamberopt.results.chamber_file import load_chamber
+
+if TYPE_CHECKING:
+    from chamberopt.chamber.build import Chamber
+    from chamberopt.design.load import Design
+    from chamberopt.results.load import Result
+    from sim_core import AnalyticCavity, ImpactLog, Scene
+
+REMEDY = "simulate the design again, and use that result"
+
+
+@dataclass(frozen=True)
+class RebuiltChamber:
+    """Chamber of a result.
+
+    cavity: the analytical cavity that was simulated in place of the chamber's mesh, if it was.
+    """
+
+    chamber: Chamber
+    cavity: AnalyticCavity | None
+
+
+@dataclass(frozen=True)
+class RebuiltReplica:
+    """One replica of a result, ready to be simulated again; cavity as in RebuiltChamber."""
+
+    result: Result
+    chamber: Chamber
+    cavity: AnalyticCavity | None
+    scene: Scene
+
+    @property
+    def design(self) -> Design:
+        return self.result.design
+
+    def on_chamber(self, impacts: ImpactLog) -> ImpactLog:
+        """Impacts with the triangles of the chamber, also where an analytical cavity has others.
+
+        InputError unless each on the part, within the recorded time, is one of the result's own:
+        triangle and speed tell, to the last bit.
+        """
+        impacts = impacts_on_chamber(impacts, self.chamber) if self.cavity else impacts
+        source = self.chamber.source[impacts.triangle]
+        mine = (source >= 0) & (impacts.time < self.scene.duration)
+        hits = load_hits(self.result.path(HITS_FILE)).hits
+        own = np.isin(
+            _identity(source[mine], np.asarray(impacts.normal_speed)[mine]),
+            _identity(hits.triangle, hits.speed),
+        )
+        if not own.all():
+            raise InputError(
+                f"{self.result.folder}: this program on this machine does not simulate it again "
+                f"bit for bit: {(~own).sum()} of {len(own)} impacts are not the result's (made by "
+                f"{made_by(self.result)}); {REMEDY}"
+            )
+        return impacts
+
+
+def rebuild_chamber(result: Result) -> RebuiltChamber:
+    """The chamber of a result from its own folder; InputError if its file is not as it was."""
+    chamber = load_chamber(result)
+    return RebuiltChamber(
+        chamber, analytic_cavity(result.design, chamber) if result.record.analytic else None
+    )
+
+
+def rebuild_replica(result: Result, number: int = 0) -> RebuiltReplica:
+    """Build one replica of a result again, numbered from 0.
+
+    Raises:
+        InputError: the result has no such replica, or its chamber's file is not as it was.
+    """
+    there = result.record.replicas
+    if not 0 <= number < there:
+        raise InputError(
+            f"--replica: given {number}; the result has {there}, give 0 to {there - 1}"
+        )
+    rebuilt, (seed, stream) = rebuild_chamber(result), result.seeds
+    mesh = rebuilt.cavity or chamber_mesh(rebuilt.chamber)
+    axis = turning_axis(result.design, rebuilt.chamber.part)
+    scene = build_scene(result.design, mesh, replica_seed(seed, number, stream), axis)
+    return RebuiltReplica(result, rebuilt.chamber, rebuilt.cavity, scene)
+
+
+def _identity(triangle: np.ndarray, speed: np.ndarray) -> np.ndarray:
+    """One number for each impact, (n,) int64, from its triangle and the bits of its speed."""
+    bits = speed.astype(np.float32).view(np.int32).astype(np.int64)
+    return np.asarray((triangle.astype(np.int64) << 32) + bits)
+
+
+def made_by(result: Result) -> str:
+    """Versions of the programs that made a result, for messages."""
+    made = result.record.versions
+    names = ("chamberopt", "manifold3d", "numba", "numpy", "system")
+    return ", ".join(f"{name} {made[name]}" for name in names if name in made)

@@ -1,0 +1,412 @@
+"""Write the data files of a result. Every file appears whole or not at all."""
+
+from __future__ import annotations
+
+import json
+import math
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from chamberopt.common.files import RESULT, make_folder, write_text
+from chamberopt.common.npz_files import save_record
+from chamberopt.common.versions import versions
+from chamberopt.coverage.metrics import exposed_target
+from chamberopt.coverage.part_impacts import HITS_FILE, save_hits, sort_hits_by_triangle
+from chamberopt.design.load import Design, save_design, with_paths_from
+from chamberopt.results.chamber_file import CHAMBER_FILE
+from chamberopt.results.load import START, content_sha256, file_sha256
+from chamberopt.results.records import (
+    FORMAT,
+    Accuracies,
+    AccuracyRecord,
+    AdviceRecord,
+    BestRecord,
+    CandidateRecord,
+    ChamberRecord,
+    ConfirmedRecord,
+    CoverageAtTime,
+    EffectEnds,
+    FieldRecord,
+    FrontPoint,
+    InCorner,
+    ModelRecord,
+    Needed,
+    Objective,
+    ResultRecord,
+    SliceRecord,
+    StartRecord,
+    StudyRecord,
+    SweepFacts,
+    SweepRecord,
+    TolerancesRecord,
+    ToleratedFigureRecord,
+    ToleratedRange,
+    ViolationRecord,
+    ZoneLimit,
+    ZoneRecord,
+)
+from chamberopt.results.vtp_files import write_chamber, write_coverage
+from chamberopt.search import pareto
+from chamberopt.search.study.constraints import judge_zones
+from chamberopt.search.trial_log import read_trials, trials_as_csv
+from chamberopt.simulation.field_values import CandidateResult
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from chamberopt.chamber.build import Chamber
+    from chamberopt.peening.tolerances import ToleranceResult, ToleratedFigure
+    from chamberopt.search.run_study import StudyResult
+    from chamberopt.search.run_sweep import SweepResult
+    from chamberopt.search.sensitivity import Sensitivity
+    from chamberopt.search.trial_log import Trial
+    from chamberopt.simulation.effect_pilot import Advice
+    from chamberopt.simulation.evaluation import Evaluation
+
+
+def write_simulation(
+    folder: Path, candidate: CandidateResult, tolerances: ToleranceResult | None = None
+) -> CandidateRecord:
+    """Write the data files of a simulation into its empty folder; return its record."""
+    save_design(candidate.design, folder / "design.toml")
+    more = {"tolerances": _about_tolerances(tolerances)} if tolerances else {}
+    return _write_candidate(folder, candidate, kind="simulation", **more)
+
+
+def write_study(
+    folder: Path, study_result: StudyResult, start: CandidateResult, best: CandidateResult
+) -> CandidateRecord:
+    """Add the data files of a study that has ended to its folder.
+
+    run_study has written design.toml, study.toml and history.jsonl. This adds best.toml,
+    history.csv, pareto.csv (of two objectives), the best design's coverage.vtp, part.vtp, hits.npz,
+    chamber.npz, chamber.stl and chamber.vtp, and start/, a results folder of the start as confirmed
+    on the same seeds.
+
+    Returns:
+        The study's record, which `write_result` writes.
+    """
+    save_design(best.design, folder / "best.toml")
+    write_text(folder / "history.csv", trials_as_csv(read_trials(folder)))
+    own = make_folder(folder / START)
+    write_result(own, write_simulation(own, start))
+    if study_result.study.objective.pareto:
+        write_text(folder / "pareto.csv", pareto.as_csv(study_result))
+    return _write_candidate(folder, best, kind="study", study=study_record(study_result))
+
+
+def write_sweep(folder: Path, sweep: SweepResult) -> SweepRecord:
+    """Add the data files of a sweep that has ended to its folder; return its record.
+
+    run_sweep has written design.toml, study.toml and history.jsonl. This adds history.csv and,
+    unless no candidate is feasible, best.toml.
+    """
+    write_text(folder / "history.csv", trials_as_csv(read_trials(folder)))
+    if sweep.best is not None:
+        save_design(sweep.study.design.changed(sweep.best.parameters), folder / "best.toml")
+    return _about_sweep(sweep)
+
+
+def best_row_note(sweep: SweepResult) -> str:
+    """Explain what the best row of a sweep is worth."""
+    if sweep.best is None:
+        return (
+            "no candidate meets the constraints, so there is no best.toml: loosen the constraints "
+            "or widen [vary]"
+        )
+    return (
+        f"the best of {len(sweep.trials)} candidates is also the luckiest, so its figures are too "
+        "good; for figures without this bias simulate best.toml with another process.seed, or "
+        "search with chamberopt run"
+    )
+
+
+def write_result(
+    folder: Path,
+    record: ResultRecord,
+    advice: Sequence[Advice] = (),
+    warned: Sequence[str] | None = None,
+) -> None:
+    """Write result.json, the file that makes a folder a finished result.
+
+    Args:
+        folder: of the result.
+        record: what write_simulation, write_study or write_sweep returned.
+        advice: why effects were chosen, if the design left the choice to the program.
+        warned: warnings of `chamberopt check`; None if it was not run.
+    """
+    more: dict[str, Any] = {"files": data_digests(folder)}
+    if advice:
+        more["effects"] = [advice_record(one) for one in advice]
+    if warned is not None:
+        more["warnings"] = list(warned)
+    data = record.model_copy(update=more).as_json()
+    data["sha256"] = content_sha256(data)
+    write_text(folder / RESULT, json.dumps(data, indent=2, allow_nan=False) + "\n")
+
+
+def advice_record(advice: Advice) -> AdviceRecord:
+    """The record of why an effect was chosen."""
+    return AdviceRecord(
+        effect=advice.effect,
+        on=advice.on,
+        verdict=advice.verdict,
+        said=str(advice),
+        changes=advice.changes,
+    )
+
+
+def data_digests(folder: Path) -> dict[str, str]:
+    """sha256 of each data file of a results folder; pictures, which nothing reads, are left out."""
+    files = (one for one in sorted(folder.iterdir()) if one.is_file())
+    skipped = RESULT, ".png"
+    return {
+        one.name: file_sha256(one)
+        for one in files
+        if not one.name.startswith(".") and not one.name.endswith(skipped)
+    }
+
+
+def _write_candidate(folder: Path, candidate: CandidateResult, **more: Any) -> CandidateRecord:
+    """Write the surfaces and impacts of one candidate; return the record, with `more` of it."""
+    design, chamber, evaluation = candidate.design, candidate.chamber, candidate.evaluation
+    write_coverage(folder, chamber, candidate.element_values, candidate.display)
+    hits = sort_hits_by_triangle(evaluation.hits, len(chamber.part.triangles))
+    save_hits(folder / HITS_FILE, hits)
+    write_chamber(folder, chamber)
+    save_record(folder / CHAMBER_FILE, chamber)
+    target = exposed_target(chamber)
+    if design.zones:
+        more["zones"] = _about_zones(design, chamber, evaluation)
+    if chamber.shape_sha256:
+        more["shape_sha256"] = chamber.shape_sha256
+    return CandidateRecord(
+        format=FORMAT,
+        created=datetime.now(UTC).isoformat(timespec="seconds"),
+        objective=Objective(name=evaluation.objective_name, estimate=evaluation.objective),
+        metrics=evaluation.metrics,
+        field=_about_field(design, evaluation),
+        coverage_against_time=[CoverageAtTime(**row) for row in candidate.time_curve],
+        seed=design.process.seed,
+        stream=evaluation.stream,
+        replicas=evaluation.replicas,
+        stopped_by=evaluation.stopped_by,
+        analytic=evaluation.analytic,
+        simulated_time_s=evaluation.simulated_time,
+        collisions=evaluation.collisions,
+        timings_s={step: round(seconds, 3) for step, seconds in evaluation.timings.items()},
+        chamber=ChamberRecord(
+            volume_mm3=chamber.volume * 1e9,
+            target_exposed_area_mm2=float(chamber.exposed_area[target].sum() * 1e6),
+            target_triangles=int(target.sum()),
+        ),
+        notes=[*chamber.notes, *evaluation.notes],
+        design=_design_values(design, folder),
+        part_sha256=chamber.part.sha256,
+        part_unit=chamber.part.unit,
+        files={},  # known when all are written
+        versions=versions(),
+        **more,
+    )
+
+
+def _about_zones(design: Design, chamber: Chamber, evaluation: Evaluation) -> list[ZoneRecord]:
+    """Each zone, and whether its figures meet its limits; the figures are among the metrics."""
+    judged = judge_zones(design, evaluation.metrics)
+    return [
+        ZoneRecord(
+            name=name,
+            triangles=int(zone.sum()),
+            exposed_area_mm2=float(chamber.exposed_area[zone].sum() * 1e6),
+            reachable_share=evaluation.zones[name],
+            limits=[ZoneLimit(**row) for row in judged[name]],
+        )
+        for name, zone in chamber.part.zones.items()
+    ]
+
+
+def _about_field(design: Design, evaluation: Evaluation) -> FieldRecord:
+    """The windows that the figures of coverage belong to, and the figures of twice the radius."""
+    found = evaluation.resolution
+    return FieldRecord(
+        gauge_mm2=design.process.accuracy.gauge_mm2,
+        points=design.process.accuracy.points,
+        dents_in_median_window=found.dents,
+        dents_needed=Needed(
+            mean_and_std=found.needed_for_mean, p05_times_intensity=found.needed_for_places
+        ),
+        simulated_s_needed=Needed(
+            mean_and_std=_number(found.time_for(found.needed_for_mean)),
+            p05_times_intensity=_number(found.time_for(found.needed_for_places)),
+        ),
+        reachable_share=evaluation.reachable,
+        crease_share=evaluation.crease_share,
+        alike_places=evaluation.alike,
+        double_gauge=evaluation.metrics_of_wide,
+    )
+
+
+def _number(value: float) -> float | None:
+    """None in the place of infinity, which JSON does not have."""
+    return value if math.isfinite(value) else None
+
+
+def study_record(result: StudyResult) -> StudyRecord:
+    """The record of a study that has ended."""
+    study, replicas = result.study, result.best.evaluation.replicas
+    search = [trial for trial in result.trials if trial.stage == "search"]
+    more: dict[str, Any] = {}
+    if result.sensitivity:
+        more["model"] = _about_model(result.sensitivity)
+    if study.objective.pareto:
+        more["front"] = _about_front(result)
+    accuracy = Accuracies(
+        search=_accuracy(study.at_search_accuracy(study.design)),
+        confirm=_accuracy(study.design).model_copy(update={"replicas": replicas}),
+    )
+    return StudyRecord(
+        algorithm=result.algorithm,
+        vary={name: list(one.ends) for name, one in study.vary.items()},
+        evaluations=len(search),
+        given_up=result.given_up,
+        accuracy=accuracy,
+        failed=sum(trial.objective is None for trial in search),
+        missing_a_constraint=_missing_a_constraint(search),
+        gain=result.gain,
+        improved=result.improved,
+        notes=list(result.notes),
+        best=BestRecord(searched_as=result.best.searched, parameters=result.best.parameters),
+        start=StartRecord(
+            parameters=result.start.parameters,
+            objective=result.start.evaluation.objective,
+            metrics=result.start.evaluation.metrics,
+        ),
+        confirmed=[
+            ConfirmedRecord(
+                searched_as=candidate.searched,
+                parameters=candidate.parameters,
+                objective=candidate.evaluation.objective,
+                feasible=candidate.feasible,
+                standing=candidate.feasibility,
+                violations=[ViolationRecord(**one._asdict()) for one in candidate.violations],
+            )
+            for candidate in result.confirmed
+        ],
+        seconds=round(result.seconds, 3),
+        **more,
+    )
+
+
+def _about_model(found: Sensitivity) -> ModelRecord:
+    return ModelRecord(
+        noise=found.noise,
+        expected=found.expected,
+        together=found.together,
+        parameters={
+            one.name: SliceRecord(
+                flat=list(one.flat),
+                share_of_variance=one.share,
+                values=one.values.tolist(),
+                mean=one.mean.tolist(),
+                half_width=one.half_width.tolist(),
+                or_worse=one.or_worse.tolist(),
+                main_effect=one.effect.tolist(),
+                **({"choices": list(one.texts)} if one.texts else {}),
+            )
+            for one in found.slices
+        },
+    )
+
+
+def _about_front(result: StudyResult) -> list[FrontPoint]:
+    """The confirmed front, from the best by the first objective to the best by the second."""
+    names = result.study.objective.goals
+    points = pareto.pareto_points(result)
+    front = [one for one in points if one.on_front and one.stage == "confirm"]
+    return [
+        FrontPoint(
+            parameters=one.parameters,
+            standing=one.feasibility,
+            objectives=dict(zip(names, one.goals, strict=True)),
+        )
+        for one in sorted(front, key=lambda one: -one.goals[0].value)
+    ]
+
+
+def _about_tolerances(found: ToleranceResult) -> TolerancesRecord:
+    return TolerancesRecord(
+        box={
+            one.name: ToleratedRange(
+                low=one.low,
+                nominal=one.nominal,
+                high=one.high,
+                changed_to=one.changed.value(one.name),
+            )
+            for one in found.numbers
+        },
+        worst_for=found.worst_for,
+        corner=found.corner,
+        figures={name: _about_tolerated(one) for name, one in found.figures.items()},
+        notes=list(found.notes),
+    )
+
+
+def _about_tolerated(figure: ToleratedFigure) -> ToleratedFigureRecord:
+    corner = None
+    if figure.predicted and figure.simulated:
+        corner = InCorner(
+            predicted=figure.predicted, simulated=figure.simulated, agrees=figure.agrees
+        )
+    return ToleratedFigureRecord(
+        nominal=figure.nominal,
+        q05=figure.q05,
+        q95=figure.q95,
+        lowest=figure.lowest,
+        highest=figure.highest,
+        effects={
+            name: EffectEnds(low=low, high=high) for name, (low, high) in figure.effects.items()
+        },
+        corner=corner,
+    )
+
+
+def _about_sweep(sweep: SweepResult) -> SweepRecord:
+    plan, study, best = sweep.plan, sweep.study, sweep.best
+    return SweepRecord(
+        kind="sweep",
+        format=FORMAT,
+        created=datetime.now(UTC).isoformat(timespec="seconds"),
+        sweep=SweepFacts(
+            objective=study.objective.goals[0],
+            vary={name: list(one.ends) for name, one in study.vary.items()},
+            method=plan.method,
+            count=plan.count,
+            seed=plan.seed,
+            candidates=len(sweep.trials),
+            failed=sum(trial.objective is None for trial in sweep.trials),
+            missing_a_constraint=_missing_a_constraint(sweep.trials),
+            accuracy=_accuracy(study.at_search_accuracy(study.design)),
+            best=best.row() if best else None,
+            seconds=round(sweep.seconds, 3),
+        ),
+        notes=[best_row_note(sweep)],
+        files={},
+        versions=versions(),
+    )
+
+
+def _missing_a_constraint(trials: Sequence[Trial]) -> int:
+    return sum(one.objective is not None and not one.feasible for one in trials)
+
+
+def _accuracy(design: Design) -> AccuracyRecord:
+    return AccuracyRecord.model_validate(design.process.accuracy.model_dump(exclude_none=True))
+
+
+def _design_values(design: Design, folder: Path) -> dict[str, Any]:
+    """Values of the design as in its file, with paths relative to the folder."""
+    values: dict[str, Any] = with_paths_from(
+        folder.resolve(), design.model_dump(mode="json", exclude_none=True)
+    )
+    return values

@@ -1,0 +1,224 @@
+"""A Gaussian process as a smooth model of noisy scores.
+
+Source: C. E. Rasmussen and C. K. I. Williams, "Gaussian Processes for Machine Learning", MIT Press
+2006. scikit-learn fits the hyperparameters. Notation (shape, name in the code):
+
+    X      points of the unit cube with scores           (n, d)  points
+    y      scores, less their mean, scaled               (n,)    values
+    x      points where the model is evaluated           (k, d)  at
+    s2     noise of each score, from its replicas        (n,)    variances
+    a      signal variance                               scalar  _signal
+    l      length scale of each parameter                (d,)    _lengths
+    w      noise beyond s2, fitted                       scalar  noise_level
+
+    kernel (Matérn 5/2)   k(p, q) = a (1 + r + r²/3) exp(-r),  r = sqrt(5) |(p - q) / l|
+    variance of the mean  b, so large that the scores alone say where it is      TREND
+    covariance of y       K = b + k(X, X) + diag(s2) + w I = L Lᵀ                _inverse: L⁻¹
+    mean at x             m(x) = (b + k(x, X)) K⁻¹ y                             _weights: K⁻¹ y
+    covariance at x, x'   c(x, x') = b + k(x, x') - (b + k(x, X)) K⁻¹ (b + k(X, x'))
+
+Far from all points the mean is thus not that of the scores, which gather where the search finds it
+good, but their generalised least squares mean, where many near points count little more than one
+(section 2.7 there).
+
+While a point's evaluation still runs, the model takes its own mean there for the score, with the
+usual noise: its mean is then the same everywhere, but it is surer near the point, so that the next
+proposal goes elsewhere (the "kriging believer": D. Ginsbourger, R. Le Riche and L. Carraro,
+"Kriging is well-suited to parallelize optimization", in "Computational Intelligence in Expensive
+Optimization Problems", Springer 2010).
+
+The hyperparameters are the most probable ones, not the likeliest: log a, log l and log w have a
+normal prior, which keeps the model from reading too much into 20 points (mean regret 0.027 with
+it, 0.032 without, on noisy test functions with 40 evaluations; benchmarks/optimizers.py).
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from chamberopt.search.optimiser.domain import Axis, Domain
+
+# The cost of a fit grows with the cube of the number of points: 0.05 s at 80, 1 s at 300.
+MAX_POINTS = 300
+TREND = 100.0  # in squared standard deviations of the scores
+# Prior of each hyperparameter: median, and standard deviation of the logarithm; then its bounds.
+# Length scales are shares of the bounds.
+SIGNAL, LENGTH, NOISE = (1.0, 1.5), (0.8, 1.0), (0.01, 1.5)
+SIGNAL_BOUNDS, LENGTH_BOUNDS, NOISE_BOUNDS = (0.02, 50.0), (0.05, 5.0), (1e-6, 7.0)
+
+MAX_PRIOR = 1e3  # half the degrees of freedom of a variance that is common to all
+MIN_NOISE = 1e-8  # variance that keeps the covariance matrix invertible
+
+Misfit = Callable[[np.ndarray], tuple[float, np.ndarray]]  # and its gradient
+
+
+class GaussianProcess:
+    """Scores as a smooth function of points of the unit cube, fitted when it is made.
+
+    Its attribute `noise` is the variance of one evaluation's score.
+
+    Args:
+        points: points with scores (n,), shape (n, d); only the best MAX_POINTS are used.
+        variances: squared standard errors of the scores, (n,), see moderate_variances; 0 where
+            unknown.
+        domain: which values each parameter can have; by default any.
+        length_factor: multiplies the fitted length scales. Below 1 the model is less certain away
+            from its points.
+        running: points whose scores are not there yet, shape (m, d); they become the last of
+            `points`.
+    """
+
+    def __init__(
+        self,
+        points: np.ndarray,
+        scores: np.ndarray,
+        variances: np.ndarray | None = None,
+        length_factor: float = 1.0,
+        running: np.ndarray | None = None,
+        domain: Domain | None = None,
+    ) -> None:
+        self._domain = domain or Domain([Axis()] * points.shape[1])
+        keep = np.sort(np.argsort(-scores, kind="stable")[:MAX_POINTS])
+        known = np.zeros(len(scores)) if variances is None else variances
+        self.points, scores, known = points[keep], scores[keep], known[keep]
+        self._centre, self._spread = float(scores.mean()), float(scores.std()) or 1.0
+        values = (scores - self._centre) / self._spread
+        with one_thread():
+            noise = known / self._spread**2
+            self._features = self._domain.features(self.points)
+            process = _fit(self._features, values, noise, length_factor)
+            if running is not None and len(running):
+                features = self._domain.features(running)
+                values = np.append(values, process.predict(features))
+                noise = np.append(noise, np.full(len(running), noise.mean()))
+                self.points = np.vstack([self.points, running])
+                self._features = np.vstack([self._features, features])
+                process = _fit_with(process.kernel_, self._features, values, noise)
+            self._inverse = np.linalg.inv(process.L_)
+        varying = process.kernel_.k1.k2
+        self._signal, self._lengths = varying.k1.constant_value, varying.k2.length_scale
+        self._weights = process.alpha_
+        self.noise = float(known.mean() + process.kernel_.k2.noise_level * self._spread**2)
+
+    def __call__(self, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Mean and standard deviation of the true score at points (k, d): two arrays (k,)."""
+        kernel = self._kernel(self._domain.features(at), self._features)
+        explained = ((kernel @ self._inverse.T) ** 2).sum(axis=1)
+        variance = np.maximum(TREND + self._signal - explained, 1e-12)
+        mean = self._centre + self._spread * (kernel @ self._weights)
+        return mean, self._spread * np.sqrt(variance)
+
+    def covariance(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        """Covariance of the true scores at points a (k, d) and b (m, d), shape (k, m)."""
+        a, b = self._domain.features(a), self._domain.features(b)
+        from_a, from_b = (self._kernel(x, self._features) @ self._inverse.T for x in (a, b))
+        explained = from_a @ from_b.T
+        covariance: np.ndarray = self._spread**2 * (self._kernel(a, b) - explained)
+        return covariance
+
+    def _kernel(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        from scipy.spatial.distance import cdist
+
+        distance = np.sqrt(5.0) * cdist(a / self._lengths, b / self._lengths)
+        matern: np.ndarray = self._signal * (1.0 + distance + distance**2 / 3.0) * np.exp(-distance)
+        return TREND + matern
+
+
+def moderate_variances(spreads: np.ndarray, replicas: np.ndarray) -> np.ndarray:
+    """Squared standard errors of means over replicas, each drawn towards those of all candidates.
+
+    A few replicas estimate a candidate's own variance badly. How far the true ones differ shows in
+    how much more the estimates scatter than chance lets them; the less, the more they are pooled.
+
+    Source: G. K. Smyth, "Linear models and empirical Bayes methods", Stat. Appl. Genet. Mol. Biol.
+    3 (2004) 3, section 6.2.
+
+    Args:
+        spreads: variance of one replica of each candidate, shape (n,); NaN where unknown.
+        replicas: number of replicas of each candidate, shape (n,).
+    """
+    from scipy.optimize import brentq
+    from scipy.special import digamma, polygamma
+
+    known = np.isfinite(spreads) & (spreads > 0.0) & (replicas > 1)
+    if not known.any():
+        return np.zeros(len(spreads))
+    own = 0.5 * (replicas[known] - 1.0)  # half the degrees of freedom
+    logs = np.log(spreads[known]) - digamma(own) + np.log(own)
+    beyond_chance = (logs.var(ddof=1) if len(logs) > 1 else 0.0) - polygamma(1, own).mean()
+    if beyond_chance <= float(polygamma(1, MAX_PRIOR)):
+        prior, common = MAX_PRIOR, float(spreads[known].mean())
+    else:
+        prior = brentq(lambda x: float(polygamma(1, x)) - beyond_chance, 1e-3, MAX_PRIOR)
+        common = float(np.exp(logs.mean() + digamma(prior) - np.log(prior)))
+    moderated = np.full(len(spreads), common)
+    moderated[known] = (prior * common + own * spreads[known]) / (prior + own)
+    return moderated / replicas
+
+
+def _fit(points: np.ndarray, values: np.ndarray, noise: np.ndarray, length_factor: float) -> Any:
+    """Fit scikit-learn's process to values of mean 0 and size 1, with noise variances (n,)."""
+    from sklearn.exceptions import ConvergenceWarning
+    from sklearn.gaussian_process import GaussianProcessRegressor
+    from sklearn.gaussian_process.kernels import ConstantKernel, Matern, WhiteKernel
+
+    dimensions = points.shape[1]
+    priors = [SIGNAL, *[LENGTH] * dimensions, NOISE]
+    middle = np.array([np.log(median) for median, _ in priors])
+    width = np.array([deviation for _, deviation in priors])
+
+    def most_probable(
+        misfit: Misfit, begin: np.ndarray, bounds: np.ndarray
+    ) -> tuple[np.ndarray, float]:
+        from scipy.optimize import minimize
+
+        def with_prior(logs: np.ndarray) -> tuple[float, np.ndarray]:
+            value, gradient = misfit(logs)
+            away = (logs - middle) / width
+            return value + 0.5 * float(away @ away), gradient + away / width
+
+        result = minimize(with_prior, begin, jac=True, method="L-BFGS-B", bounds=bounds)
+        return result.x, float(result.fun)
+
+    lengths = Matern(np.full(dimensions, LENGTH[0]), LENGTH_BOUNDS, nu=2.5)
+    kernel = ConstantKernel(SIGNAL[0], SIGNAL_BOUNDS) * lengths
+    kernel = ConstantKernel(TREND, "fixed") + kernel + WhiteKernel(NOISE[0], NOISE_BOUNDS)
+    alpha = np.maximum(noise, MIN_NOISE)
+    process = GaussianProcessRegressor(kernel, alpha=alpha, optimizer=most_probable)
+    with warnings.catch_warnings():
+        # A length scale at its bound belongs to a parameter without effect.
+        warnings.simplefilter("ignore", ConvergenceWarning)
+        process.fit(points, values)
+    if length_factor == 1.0:
+        return process
+    logs = process.kernel_.theta + np.log([1.0, *[length_factor] * dimensions, 1.0])
+    return _fit_with(kernel.clone_with_theta(logs), points, values, noise)
+
+
+def _fit_with(kernel: Any, points: np.ndarray, values: np.ndarray, noise: np.ndarray) -> Any:
+    """scikit-learn's process with hyperparameters that are known."""
+    from sklearn.gaussian_process import GaussianProcessRegressor
+
+    alpha = np.maximum(noise, MIN_NOISE)
+    return GaussianProcessRegressor(kernel, alpha=alpha, optimizer=None).fit(points, values)
+
+
+def one_thread() -> Any:
+    """Context in which linear algebra runs on one thread.
+
+    The results are then the same on any number of cores, and for such small arrays it is faster.
+    """
+    return _threads().limit(limits=1)
+
+
+@cache
+def _threads() -> Any:
+    import scipy.linalg  # noqa: F401  its libraries can only be limited once they are loaded
+    from threadpoolctl import ThreadpoolController
+
+    return ThreadpoolController()

@@ -1,0 +1,151 @@
+"""What a search knows: a model of the score, of each limited figure, and of what can be simulated.
+
+Source for constraints with models of their own: J. R. Gardner et al., "Bayesian optimization with
+inequality constraints", ICML 2014.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from chamberopt.search.optimiser.domain import Domain
+from chamberopt.search.optimiser.gaussian_process import GaussianProcess
+
+# Scores are raised to at least the median minus 3 times the distance from median to maximum.
+# Otherwise those of bad candidates would bend the model.
+MAX_DEPTH = 3.0
+# Of 1 where a candidate could be simulated and 0 where it could not.
+LEAST_SIMULATED = 0.5
+
+
+@dataclass(frozen=True)
+class LimitedFigure:
+    """A figure of each candidate that must stay within limits.
+
+    values: (n,).
+    variances: their squared standard errors, (n,).
+    low: least value allowed, or -inf.
+    high: largest value allowed, or inf.
+    """
+
+    values: np.ndarray
+    variances: np.ndarray
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Observations:
+    """What the candidates of a search have shown, in the order in which they began.
+
+    scores: to be maximised, (n,).
+    variances: their squared standard errors, (n,).
+    simulated: which candidates were simulated, (n,) bool; the figures of the others are not looked
+        at.
+    figures: those with limits.
+    spared: which candidates were not simulated because geometry shows them to be no better, (n,)
+        bool; their scores are the largest that they can have. Of the others that were not
+        simulated nothing is known but that.
+    """
+
+    scores: np.ndarray
+    variances: np.ndarray
+    simulated: np.ndarray
+    figures: tuple[LimitedFigure, ...] = ()
+    spared: np.ndarray | None = None
+
+
+class SearchModel:
+    """The models of one search.
+
+    Args:
+        points: all that began, shape (m, d); the first n are those of `seen`, the others run.
+        length_factor: as of GaussianProcess.
+        learns_bounds: whether the model of the score learns the bounds of what was spared, for
+            pictures. A search does better where it does not: a cliff bends a smooth model, also on
+            the side that is good. It learns where candidates are spared, as where they fail.
+    """
+
+    def __init__(
+        self,
+        domain: Domain,
+        points: np.ndarray,
+        seen: Observations,
+        length_factor: float = 1.0,
+        learns_bounds: bool = False,
+    ) -> None:
+        self.domain, count, there = domain, len(seen.scores), seen.simulated
+        running = points[count:]
+
+        def model(values: np.ndarray, variances: np.ndarray, of: np.ndarray) -> GaussianProcess:
+            at = points[:count][of]
+            return GaussianProcess(at, values[of], variances[of], length_factor, running, domain)
+
+        known = there if seen.spared is None or not learns_bounds else there | seen.spared
+        middle, top = float(np.median(seen.scores[there])), float(seen.scores[there].max())
+        raised = middle - MAX_DEPTH * (top - middle)
+        scores = np.maximum(seen.scores, raised)
+        # [score] at and below which the model says no more than that it is no better
+        self.floor = raised if (seen.scores[known] < raised).any() else -np.inf
+        self.score = model(scores, seen.variances, known)
+        self.points = points
+        self.lowest = float(scores[known].min())
+        self._limits = [
+            (model(one.values, one.variances, there), one.low, one.high)
+            for one in seen.figures
+            if np.ptp(one.values[there]) > 0.0
+        ]
+        if not known.all():
+            everywhere = model(known.astype(float), np.zeros(count), np.ones(count, dtype=bool))
+            self._limits.append((everywhere, LEAST_SIMULATED, np.inf))
+
+    def expected(self, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Mean and standard deviation of the score of a shop that aims at points (k, d): (k,).
+
+        It is the mean over where the shop may end, and the standard deviation the mean one there;
+        or both are of the worst of these places, by the model.
+        """
+        if self.domain.counts_worst:
+            return self.score(self._worst(at))
+        mean, deviation = np.mean([self.score(one) for one in self.domain.around(at)], axis=0)
+        return mean, deviation
+
+    def _worst(self, aims: np.ndarray) -> np.ndarray:
+        """Where a shop that aims at points (k, d) may end worst, (k, d)."""
+        around = self.domain.around(aims)
+        worst = np.argmin([self.score(one)[0] for one in around], axis=0)
+        places: np.ndarray = around[worst, np.arange(len(aims))]
+        return places
+
+    def covariance(self, at: np.ndarray, aims: np.ndarray) -> np.ndarray:
+        """Covariance of the scores at points (k, d) and of a shop that aims at (m, d): (k, m)."""
+        if self.domain.counts_worst:
+            return self.score.covariance(at, self._worst(aims))
+        around = self.domain.around(aims)
+        whole: np.ndarray = np.mean([self.score.covariance(at, one) for one in around], axis=0)
+        return whole
+
+    def feasible(self, at: np.ndarray, margin: float = 0.0) -> np.ndarray:
+        """Probability that a shop that aims at points (k, d) is within all limits, shape (k,).
+
+        Args:
+            margin: standard errors of an evaluation by which a figure must be inside.
+        """
+        around = self.domain.around(at)
+        worst: np.ndarray = np.min([self._feasible(one, margin) for one in around], axis=0)
+        return worst
+
+    def _feasible(self, at: np.ndarray, margin: float) -> np.ndarray:
+        from scipy.special import ndtr
+
+        probability = np.ones(len(at))
+        for model, low, high in self._limits:
+            mean, deviation = model(at)
+            inside = min(margin * np.sqrt(model.noise), 0.25 * (high - low))  # of a narrow band
+            probability *= np.maximum(
+                ndtr((high - inside - mean) / deviation) - ndtr((low + inside - mean) / deviation),
+                1e-12,
+            )
+        return probability

@@ -1,0 +1,267 @@
+"""Run a study: search for a better design, then confirm the best candidates with new seeds."""
+
+from __future__ import annotations
+
+import threading
+import time
+from concurrent.futures import Executor
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from chamberopt.chamber.scene import chamber_mesh
+from chamberopt.common.errors import InputError
+from chamberopt.common.estimate import Estimate, estimate, paired_difference
+from chamberopt.common.files import write_text
+from chamberopt.common.progress import Progress
+from chamberopt.design.load import save_design
+from chamberopt.peening.calibration_errors import evaluate_calibrated
+from chamberopt.search.candidates import Candidates, ConfirmedCandidate, Stop
+from chamberopt.search.evaluate_candidate import Simulator
+from chamberopt.search.optimiser.gaussian_process import one_thread
+from chamberopt.search.optimiser.maximise import PARETO_PHASES, maximise
+from chamberopt.search.sensitivity import Sensitivity, analyse_sensitivity
+from chamberopt.search.study.constraints import NOT_KNOWN
+from chamberopt.search.study_folder import STUDY, StudyFolder
+from chamberopt.search.trial_log import HISTORY, Trial
+from chamberopt.simulation.evaluate import ReplicaPlan, evaluate, prepare_target
+from chamberopt.simulation.evaluation import Evaluation
+
+if TYPE_CHECKING:
+    from chamberopt.chamber.build import Chamber
+    from chamberopt.coverage.field.target_field import TargetField
+    from chamberopt.design.design import Design
+    from chamberopt.search.study import Study
+    from chamberopt.simulation.replicas import Replica
+
+
+TOLERANCES = (
+    "what the [tolerances] do to the best design: chamberopt simulate best.toml --tolerances"
+)
+MAXIMISED = (
+    "the search maximised the {which} of the objective over the [tolerances] of what it varies; at "
+    "the best design it is {lost:.2g} {side} the value without them, by its model"
+)
+
+
+@dataclass(frozen=True)
+class StudyResult:
+    """The result of a study."""
+
+    study: Study
+    folder: Path
+    algorithm: str  # the phases of the search that ran
+    trials: tuple[Trial, ...]  # of search and confirmation, in order
+    # Start, confirmed and best are confirmed with the same new seeds; confirmed begins with the
+    # start. With two objectives, best is the best by the first.
+    start: ConfirmedCandidate
+    confirmed: tuple[ConfirmedCandidate, ...]
+    best: ConfirmedCandidate
+    gain: Estimate  # objective of best minus start, from these paired replicas
+    seconds: float  # wall-clock time of all evaluations, earlier runs included
+    # Target of all candidates, shape (m,) bool, if the start determines it; None if each design
+    # has its own.
+    target: np.ndarray | None = None
+    sensitivity: Sensitivity | None = None  # None if there are too few points for a model
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What tolerances did to the search, and each parameter whose best value is on a bound."""
+        lost = self.best.lost_to_tolerances
+        which = "mean" if self.study.objective.over_tolerances == "mean" else "worst value"
+        sentences = tolerance_notes(lost, which) if self.study.design.tolerances else []
+        numbers = {name: one for name, one in self.study.vary.items() if not one.texts}
+        for name, varied in numbers.items():
+            low, high = varied.bounds
+            value = self.best.parameters[name]
+            if isinstance(value, str):
+                continue
+            for bound, side in ((low, "lower"), (high, "upper")):
+                if abs(value - bound) < 1e-3 * (high - low):
+                    place = f"{name} = {value:g} lies on its {side} bound"
+                    sentences.append(f"{place}: a better design may lie beyond; widen [vary]")
+        return tuple(sentences)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """A sentence if it is not known whether the best design meets the constraints."""
+        if self.best.feasibility != NOT_KNOWN:
+            return ()
+        return (f"constraints: {self.best.reason}",)
+
+    @property
+    def given_up(self) -> int:
+        """Number of candidates of the search that got no more replicas than a first look."""
+        few = self.study.first_look
+        search = (one for one in self.trials if one.stage == "search")
+        return sum(one.replicas == few for one in search) if few else 0
+
+    @property
+    def improved(self) -> bool:
+        """Whether the best beats the start by more than the interval of the gain."""
+        return self.gain.low > 0.0
+
+
+def run_study(
+    study: Study,
+    folder: StudyFolder,
+    executor: Executor,
+    progress: Progress | None = None,
+    simulator: Simulator | None = None,
+    stop: Stop | None = None,
+    at_once: int | None = None,
+) -> StudyResult:
+    """Search for a better design within the budget, then confirm the best and the start.
+
+    All candidates of the search are simulated with the same seeds. The best of them and the start
+    are then simulated with more replicas and new seeds, because the search's own figures favour
+    lucky candidates. The answer is the best of those. (Picking it by its reported figures favours
+    it a little, too.)
+
+    Args:
+        study: the study of the folder, with its effects resolved.
+        folder: if this very study was interrupted in it, it is resumed, and the result is the same,
+            bit for bit, as without the interruption.
+        progress: called as progress(done, total, best) after each evaluation.
+        simulator: replaces the simulation, e.g. in tests.
+        stop: called before each evaluation; the study stops with KeyboardInterrupt if it is True.
+        at_once: evaluations for which there is memory, by default all of optimizer.batch.
+    Raises:
+        InputError: the start cannot be simulated, or no candidate meets the constraints.
+        OSError: a trial cannot be written.
+    """
+    folder.begin()
+    save_inputs(study, folder.path)
+    target = fixed_target(study)
+    simulator = simulator or ChamberSimulator(study, executor, target)
+    settings = study.optimizer
+    if study.objective.pareto and settings.algorithm == "auto" and not settings.phases:
+        settings = settings.model_copy(update={"phases": PARETO_PHASES})
+    # The model's threads are limited during all evaluations: a limit is one of the whole process.
+    with one_thread(), Candidates(study, folder, simulator, progress, stop, at_once) as candidates:
+        search = candidates.begin, candidates.start, settings, candidates.observations
+        space = candidates.space
+        first = [space.domain.snap(space.point_of(one)[None])[0] for one in study.begin_with]
+        algorithm = maximise(*search, space.domain, first)
+        confirmed = candidates.confirm()
+    folder.recorded.require_end(len(candidates.trials))
+    if not confirmed or confirmed[0].searched != 0:
+        reason = next(one.reason for one in candidates.trials if one.stage == "confirm")
+        text = "the start could not be simulated with the seeds of the confirmation"
+        raise InputError(f"{text}: {reason}")
+    start = confirmed[0]
+    unknown = [one for one in confirmed if one.feasibility == NOT_KNOWN]
+    winners = [one for one in confirmed if one.feasible] or unknown
+    if not winners:
+        raise InputError(
+            f"constraints: no candidate meets them (the start: {start.reason}); loosen them, "
+            "widen [vary] or raise optimizer.evaluations; every evaluation is in "
+            f"{folder.path / HISTORY}"
+        )
+    best = max(winners, key=lambda one: one.goals[0].value - one.lost_to_tolerances)
+    is_gain = best is not start
+    gain = paired_difference(best.goals[0], start.goals[0]) if is_gain else Estimate(0.0, 0.0)
+    if is_gain and not (best.goals[0].has_number and start.goals[0].has_number):
+        gain = gain.not_known(NOT_KNOWN)
+    model = candidates.objective_model
+    noise = estimate(best.evaluation.objective.pseudovalues).half_width
+    sensitivity = analyse_sensitivity(model, space, best.parameters, noise) if model else None
+    return StudyResult(
+        study=study,
+        folder=folder.path,
+        algorithm=algorithm,
+        trials=tuple(candidates.trials),
+        start=start,
+        confirmed=tuple(confirmed),
+        best=best,
+        gain=gain,
+        seconds=folder.seconds,
+        target=target,
+        sensitivity=sensitivity,
+    )
+
+
+def tolerance_notes(lost: float, which: str = "mean") -> list[str]:
+    """What a search with tolerances has maximised; a loss of 0 is that without a model."""
+    side = "below" if lost > 0.0 else "above"
+    maximised = [MAXIMISED.format(which=which, lost=abs(lost), side=side)] if lost else []
+    return [*maximised, TOLERANCES]
+
+
+def fixed_target(study: Study) -> np.ndarray | None:
+    """The target of all candidates, shape (m,) bool, if it is what the shot reaches; else None.
+
+    It is found once, in the chamber of the start. Otherwise a search could shrink the area that it
+    has to cover.
+    """
+    from chamberopt.chamber.build import build_chamber
+
+    if not study.design.part.target.reachable:
+        return None
+    return build_chamber(study.design).part.target
+
+
+def save_inputs(study: Study, folder: Path) -> None:
+    """Write design.toml and study.toml, to be read and run again."""
+    import tomlkit
+
+    if (folder / STUDY).is_file():
+        return
+    save_design(study.design, folder / "design.toml")
+    values = study.model_dump(mode="json", exclude={"design"}, exclude_none=True)
+    write_text(folder / STUDY, tomlkit.dumps({"design": "design.toml", **values}))
+
+
+@dataclass
+class _Simulated:
+    """What is kept of a candidate."""
+
+    chamber: Chamber
+    replicas: list[Replica] = field(default_factory=list)
+    target: TargetField | None = None
+
+
+class ChamberSimulator:
+    """The simulator of a study: chamber, replicas, coverage.
+
+    Asked for more replicas of a candidate, it adds them to those it has. Several threads may call
+    it at a time.
+    """
+
+    def __init__(self, study: Study, executor: Executor, target: np.ndarray | None) -> None:
+        self._study, self._executor, self._target = study, executor, target
+        self._confirmed: dict[str, _Simulated] = {}
+        self._searched = threading.local()  # each thread's last candidate of the search
+
+    def __call__(self, design: Design, stream: str, replicas: int | None) -> Evaluation:
+        began = time.perf_counter()
+        one = self._candidate(design, stream)
+        seconds = time.perf_counter() - began
+        plan = ReplicaPlan(replicas, stream, self._study.objective.goals[0])
+        settings: dict[str, Any] = {"plan": plan, "done": one.replicas}
+        if stream == "confirm":
+            evaluation = evaluate_calibrated(design, one.chamber, self._executor, **settings)
+        else:
+            settings["target"] = one.target
+            evaluation = evaluate(design, one.chamber, self._executor, **settings)
+        return replace(evaluation, timings={"chamber": seconds, **evaluation.timings})
+
+    def reachable(self, design: Design) -> float:
+        """The largest share of the target that the balls may touch, without any simulation."""
+        one = self._candidate(design, "search")
+        one.target = prepare_target(design, one.chamber, chamber_mesh(one.chamber))
+        return one.target.reach.largest
+
+    def _candidate(self, design: Design, stream: str) -> _Simulated:
+        from chamberopt.chamber.build import build_chamber
+
+        key = design.model_dump_json()
+        known = self._confirmed if stream == "confirm" else vars(self._searched)
+        if key not in known:
+            if stream != "confirm":
+                known.clear()
+            known[key] = _Simulated(build_chamber(design, self._target))
+        found: _Simulated = known[key]
+        return found

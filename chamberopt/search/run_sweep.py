@@ -1,0 +1,218 @@
+"""Run a sweep: evaluate candidates on a grid, or spread evenly, over the bounds of a study.
+
+Each candidate is one task: a worker builds its chamber, simulates its replicas and returns a row
+of figures.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+import warnings
+from collections.abc import Iterator
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from itertools import product
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from chamberopt.common.errors import InputError, WorkerLostError
+from chamberopt.common.executor import SerialExecutor, share
+from chamberopt.common.progress import Progress
+from chamberopt.design.design import SHAPE
+from chamberopt.search.evaluate_candidate import CandidateEvaluator, Simulator
+from chamberopt.search.run_study import ChamberSimulator, fixed_target, save_inputs
+from chamberopt.search.study.parameters import ParameterSpace
+from chamberopt.search.trial_log import HISTORY, Trial
+
+if TYPE_CHECKING:
+    from chamberopt.search.study import Study
+    from chamberopt.search.study_folder import StudyFolder
+    from chamberopt.simulation.evaluation import Evaluation
+
+MAX_CANDIDATES = 100_000
+
+
+@dataclass(frozen=True)
+class SweepPlan:
+    """The candidates of a sweep."""
+
+    method: str  # "grid" or "sobol"
+    count: int  # values of each parameter, or number of points
+    points: np.ndarray  # in the unit cube, shape (n, d)
+    seed: int | None  # of the points; None for a grid
+
+    def as_json(self) -> dict[str, Any]:
+        """Plain JSON values; the points follow from them."""
+        return {"method": self.method, "count": self.count, "seed": self.seed}
+
+
+@dataclass(frozen=True)
+class SweepResult:
+    """The trials in the order of the plan, and their wall-clock time [s]."""
+
+    study: Study
+    plan: SweepPlan
+    folder: Path
+    trials: tuple[Trial, ...]
+    seconds: float
+
+    @property
+    def best(self) -> Trial | None:
+        """The feasible candidate with the largest objective; partly the luckiest one.
+
+        One whose objective is not resolved counts only where there is no other.
+        """
+        feasible = [trial for trial in self.trials if trial.feasible]
+        resolved = [one for one in feasible if one.objective and one.objective.has_number]
+        return max(resolved or feasible, key=lambda one: one.score, default=None)
+
+
+def plan_sweep(
+    study: Study, grid: int | None, sobol: int | None, seed: int | None = None
+) -> SweepPlan:
+    """Plan a sweep of `grid` values of each parameter, bounds included, or `sobol` points in all.
+
+    `seed` is that of the Sobol points, by default the study's optimizer's. InputError if not one of
+    grid and sobol is given, or a number is out of range.
+
+    Source: the Sobol points are scrambled as in A. B. Owen, "Scrambling Sobol' and
+    Niederreiter-Xing points", J. Complexity 14, 1998 (scipy.stats.qmc.Sobol).
+    """
+    from scipy.stats.qmc import Sobol
+
+    if SHAPE in study.vary:
+        text = "not supported in a sweep; sweep each shape by itself"
+        raise InputError(f"vary.{SHAPE}: {text}")
+    domain, dimensions = ParameterSpace(study.design, study.vary).domain, len(study.vary)
+    if (grid is None) == (sobol is None):
+        given = "neither" if grid is None else "both"
+        raise InputError(
+            f"--grid, --sobol: {given} given; give one: --grid for the number of values of each "
+            "parameter, or --sobol for the number of candidates"
+        )
+    if grid is not None:
+        if seed is not None:
+            text = "but a grid is not random; remove it, or use --sobol"
+            raise InputError(f"--seed: given {seed}, {text}")
+        if grid < 2:
+            raise InputError(f"--grid: given {grid}; give at least 2 values of each parameter")
+        counts = [min(grid, one.levels) if one.levels else grid for one in domain.axes]
+        _require_few(math.prod(counts), f"--grid: {grid} values of {dimensions} parameters")
+        axes = domain.snap(np.repeat(np.linspace(0.0, 1.0, grid)[:, None], dimensions, axis=1)).T
+        each = [  # of few levels each once, and all choices
+            np.unique(line) if axis.ordered else np.linspace(0.0, 1.0, axis.levels)
+            for line, axis in zip(axes, domain.axes, strict=True)
+        ]
+        points = np.array(list(product(*each)))
+        return SweepPlan("grid", grid, points, None)
+    assert sobol is not None
+    if sobol < 1:
+        raise InputError(f"--sobol: given {sobol}; give at least 1 point")
+    _require_few(sobol, "--sobol")
+    seed = study.optimizer.seed if seed is None else seed
+    if seed < 0:
+        raise InputError(f"--seed: given {seed}; give 0 or more")
+    with warnings.catch_warnings():
+        # A count that is not a power of 2 is spread a little less evenly, which is no error.
+        warnings.simplefilter("ignore", UserWarning)
+        points = domain.snap(Sobol(dimensions, scramble=True, seed=seed).random(sobol))
+    firsts = np.unique(points, axis=0, return_index=True)[1]  # of few levels each once
+    return SweepPlan("sobol", sobol, points[np.sort(firsts)], seed)
+
+
+def run_sweep(
+    study: Study,
+    plan: SweepPlan,
+    folder: StudyFolder,
+    executor: Executor,
+    progress: Progress | None = None,
+    simulator: Simulator | None = None,
+) -> SweepResult:
+    """Evaluate every candidate of a plan, with the accuracy and the seeds of a search.
+
+    A candidate that fails is a row with its reason.
+
+    Args:
+        study: the study of the folder, with its effects resolved.
+        folder: if this very sweep was interrupted in it, it is resumed. It receives design.toml,
+            study.toml and history.jsonl, whose rows are in the order of the plan for any number of
+            workers.
+        simulator: replaces the simulation; it is sent to the workers.
+    Raises:
+        InputError: all candidates fail.
+    """
+    folder.begin()
+    save_inputs(study, folder.path)
+    trials: list[Trial] = []
+    for number, point in enumerate(plan.points):
+        recorded = folder.recorded.find(number, "sweep", point.tolist())
+        if recorded is None:
+            break
+        trials.append(recorded)
+    best = max((one.score for one in trials if one.feasible), default=-np.inf)
+    for trial, seconds in _evaluate_from(study, plan, len(trials), executor, simulator):
+        folder.append(trial, None, seconds)
+        trials.append(trial)
+        best = max(best, trial.score) if trial.feasible else best
+        if progress:
+            progress(len(trials), len(plan.points), best if best > -np.inf else None)
+    if all(trial.objective is None for trial in trials):
+        raise InputError(
+            "no candidate of the sweep could be simulated, the first because: "
+            f"{trials[0].reason}; change [vary] or the design; every candidate is in "
+            f"{folder.path / HISTORY}"
+        )
+    return SweepResult(study, plan, folder.path, tuple(trials), folder.seconds)
+
+
+def _evaluate_from(
+    study: Study, plan: SweepPlan, first: int, executor: Executor, simulator: Simulator | None
+) -> Iterator[tuple[Trial, float]]:
+    """The trials from number `first` on, in the order of the plan, and the seconds of each.
+
+    All tasks are submitted at once, so that no worker waits for another.
+    """
+    target = share(executor, fixed_target(study) if simulator is None else None)
+    tasks = list(enumerate(plan.points))[first:]
+    futures = [executor.submit(evaluate_point, study, *one, target, simulator) for one in tasks]
+    try:
+        for task, future in zip(tasks, futures, strict=True):
+            try:
+                yield future.result()
+            except WorkerLostError as error:  # a row with this reason
+                lost = _failing_simulator(str(error))
+                yield evaluate_point(study, *task, None, lost)[0], 0.0
+    finally:
+        for future in futures:
+            future.cancel()
+
+
+def evaluate_point(
+    study: Study,
+    number: int,
+    point: np.ndarray,
+    target: np.ndarray | None = None,
+    simulator: Simulator | None = None,
+) -> tuple[Trial, float]:
+    """Evaluate one candidate on one worker; the trial, and its wall-clock time [s]."""
+    began = time.perf_counter()
+    simulator = simulator or ChamberSimulator(study, SerialExecutor(), target)
+    evaluator = CandidateEvaluator(study, simulator)
+    evaluation = evaluator.evaluate(number, point, "sweep")
+    trial = evaluator.trial(number, point, "sweep", evaluation)
+    return trial, time.perf_counter() - began
+
+
+def _failing_simulator(reason: str) -> Simulator:
+    def fail(*_: object) -> Evaluation:
+        raise InputError(reason)
+
+    return fail
+
+
+def _require_few(count: int, what: str) -> None:
+    if count > MAX_CANDIDATES:
+        raise InputError(f"{what}: {count:,} candidates, more than {MAX_CANDIDATES:,}; give fewer")

@@ -1,0 +1,161 @@
+"""How the score depends on each parameter near the best design, by the model of the search.
+
+The model gives main effects (means over the other parameters), slices through the best design,
+and the range in which each parameter may change without loss.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from chamberopt.common.estimate import Estimate
+from chamberopt.common.number_text import plain
+from chamberopt.design.design import SHAPE
+from chamberopt.search.optimiser.gaussian_process import GaussianProcess, one_thread
+from chamberopt.search.optimiser.search_model import SearchModel
+from chamberopt.search.study.parameters import NONE, ParameterSpace
+
+NORMAL_95 = 1.96  # standard deviations of a 95 % interval
+SLICE_POINTS = 41
+SAMPLE_EXPONENT = 9  # main effects are means over 2^9 points of the other parameters
+RANGE_POINTS = 201
+
+
+@dataclass(frozen=True)
+class Slice:
+    """The score over one parameter, by the model; arrays have the shape (k,).
+
+    A parameter that is chosen among texts has one entry in the arrays for each.
+    """
+
+    name: str
+    values: np.ndarray  # of the parameter in the unit of the file; positions of texts
+    mean: np.ndarray  # score with the other parameters as in the best design
+    half_width: np.ndarray  # half-width of its 95 % interval
+    or_worse: np.ndarray  # bool, where the model has no more than an upper limit
+    effect: np.ndarray  # score averaged over all values of the other parameters
+    share: float  # of this effect in the variance of the score over the bounds
+    # Values for which the best design, with this parameter alone changed, loses no more than noise:
+    # from, to; or all of these texts.
+    flat: tuple[float | str, ...]
+    texts: tuple[str, ...] = ()  # that it may be
+
+
+@dataclass(frozen=True)
+class Sensitivity:
+    """One slice for each parameter."""
+
+    slices: tuple[Slice, ...]
+    noise: float  # loss that counts as none
+    expected: Estimate  # the model's score of the best design
+    together: float  # share of the designs within all flat ranges that lose no more than the noise
+
+    def sentences(self) -> list[str]:
+        """What a designer may change: one sentence for each parameter, and one for all."""
+        loss = f"without losing more than the noise, {self.noise:.2g}"
+        ranges = []
+        for one in self.slices:
+            first, last = plain(one.flat[0], 5), plain(one.flat[-1], 5)
+            may = " or ".join(map(str, one.flat)) if one.texts else f"go from {first} to {last}"
+            ranges.append(f"{one.name} may {'be ' if one.texts else ''}{may} {loss}")
+        share = f"{self.together:.0%}"
+        return [*ranges, f"of all designs within these ranges {share} lose no more than that"]
+
+
+def analyse_sensitivity(
+    search: SearchModel, space: ParameterSpace, best: Mapping[str, float | str], noise: float
+) -> Sensitivity:
+    """Sensitivity of the model's score near the best design.
+
+    The best values are in the units of the file. A loss below `noise`, or below what the model
+    can tell there, is none. Ranges end where the limits are probably not met.
+    """
+    from scipy.stats.qmc import Sobol
+
+    model, at = search.score, space.point_of(best)
+    sample = Sobol(len(at), seed=1).random_base2(SAMPLE_EXPONENT)
+    slices, within = [], np.empty_like(sample)
+    with one_thread():
+        top, deviation_at_top = (float(one[0]) for one in model(at[None]))
+        noise = max(noise, NORMAL_95 * deviation_at_top)  # less, the model cannot tell
+        whole_variance = float(model(sample)[0].var())
+        for i, name in enumerate(space.names):
+            if best[name] == NONE:
+                continue
+            texts = space.varied[i].texts
+            steps = np.linspace(0.0, 1.0, len(texts) or SLICE_POINTS)
+            # The ends of numbers stand for half a step each; with whole ones, effects would have a
+            # larger variance than all parameters together.
+            inside = (steps > 0.0) & (steps < 1.0)
+            weights = np.where(inside | bool(texts), 1.0, 0.5)
+            line = np.repeat(at[None], len(steps), axis=0)
+            line[:, i] = steps
+            if name == SHAPE:
+                line = _with_best_of_its_own(search, line, at, sample)
+            mean, deviation = model(line)
+            effect = _main_effect(model, sample, i, steps)
+            main = float(np.cov(effect, ddof=0, aweights=weights))
+            share = main / whole_variance if whole_variance > 0.0 else 0.0
+            values, width = space.values_on(i, steps), NORMAL_95 * deviation
+            if texts:
+                good = steps[(mean >= top - noise) & (search.feasible(line) >= 0.5)]
+                within[:, i] = good[np.floor(sample[:, i] * len(good)).astype(int)]
+                flat = tuple(texts[round(place)] for place in space.values_on(i, good))
+            else:
+                begin, end = _flat_range(search, at, i, top - noise)
+                within[:, i] = begin + sample[:, i] * (end - begin)
+                flat = tuple(space.values_on(i, np.array([begin, end])).tolist())
+            worse = mean - width < search.floor
+            slices.append(
+                Slice(name, values, mean, width, worse, effect, min(1.0, share), flat, texts)
+            )
+        within = space.domain.snap(within)
+        together = float((model(within)[0] >= top - noise).mean())
+    expected = Estimate(top, NORMAL_95 * deviation_at_top)
+    return Sensitivity(tuple(slices), noise, expected, together)
+
+
+def _with_best_of_its_own(
+    search: SearchModel, line: np.ndarray, at: np.ndarray, sample: np.ndarray
+) -> np.ndarray:
+    """Points (k, d) of a shape each; what `at` (d,) does not have is the best by the model.
+
+    Args:
+        sample: places of which the best is taken, (n, d).
+    """
+    domain, found = search.domain, []
+    own = domain.has(domain.snap(at[None]))[0]
+    for point in line:
+        tried = domain.snap(np.where(own, point, sample))
+        found.append(tried[int(np.argmax(search.score(tried)[0]))])
+    return np.array(found)
+
+
+def _main_effect(
+    model: GaussianProcess, sample: np.ndarray, i: int, steps: np.ndarray
+) -> np.ndarray:
+    """Mean score over the other parameters at each step of parameter i."""
+    moved, means = sample.copy(), []
+    for step in steps:
+        moved[:, i] = step
+        means.append(float(model(moved)[0].mean()))
+    return np.array(means)
+
+
+def _flat_range(
+    search: SearchModel, at: np.ndarray, i: int, threshold: float
+) -> tuple[float, float]:
+    """How far parameter i may go down and up, in shares of the bounds, above the threshold and
+    within the limits.
+    """
+    ends = []
+    for bound in (0.0, 1.0):
+        line = np.repeat(at[None], RANGE_POINTS, axis=0)
+        line[:, i] = np.linspace(at[i], bound, RANGE_POINTS)
+        line = search.domain.snap(line)
+        below = np.flatnonzero((search.score(line)[0] < threshold) | (search.feasible(line) < 0.5))
+        ends.append(float(line[max(0, below[0] - 1) if len(below) else -1, i]))
+    return ends[0], ends[1]

@@ -1,0 +1,106 @@
+"""Load study files; all problems of a file and of the design it names are reported in one error."""
+
+import os
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from chamberopt.common import toml_errors
+from chamberopt.common.errors import InputError
+from chamberopt.common.toml_errors import Problem
+from chamberopt.design.design import Design, validate
+from chamberopt.design.load import is_study, load_design, read_toml
+from chamberopt.search.study.parameters import Varied
+from chamberopt.search.study.schema import Study
+
+
+def load_study(path: str | Path) -> Study:
+    """Load a study file and its design; InputError names every problem with file and line."""
+    path = Path(path)
+    source, data = read_toml(path, "study")
+    if not is_study(data):
+        text = "this is a design file; a study file is wanted: one with design = ... and [vary]"
+        raise InputError(f"{path}: {text}")
+    return _study(path, source, data)
+
+
+def load(path: str | Path) -> Design | Study:
+    """Load a design or study file; a study names a design or has [vary]."""
+    path = Path(path)
+    source, data = read_toml(path, "design or study")
+    return _study(path, source, data) if is_study(data) else validate(Design, data, path, source)
+
+
+def _study(path: Path, source: str, data: dict[str, Any]) -> Study:
+    named = data.get("design")
+    if not isinstance(named, str):
+        given = "missing" if named is None else f"given {named!r}"
+        text = f"{given}; give the path of a design file, relative to this file: "
+        problem = Problem("design", f'{text}design = "../designs/gear.toml"')
+        raise InputError(toml_errors.format_problems([problem], path, source))
+    try:
+        data = _with_dotted_names(data)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+    try:
+        design = load_design(Path(os.path.normpath(path.parent / named)))
+    except InputError as error:
+        problem = Problem("design", f"given {named!r}, which cannot be used:")
+        lines = [toml_errors.format_problems([problem], path, source), str(error)]
+        raise InputError("\n".join([*lines, *_other_problems(data, path, source)])) from None
+    return validate(Study, {**data, "design": design}, path, source)
+
+
+def _with_dotted_names(data: dict[str, Any]) -> dict[str, Any]:
+    """The tables whose keys are numbers of the design or metrics, with their whole names."""
+    if isinstance(data.get("vary"), Mapping):
+        data = {**data, "vary": _flatten(data["vary"], is_table=_varies)}
+    if isinstance(data.get("constraints"), Mapping):
+        data = {**data, "constraints": _flatten(data["constraints"], is_table=_limits)}
+    objective = data.get("objective")
+    if isinstance(objective, Mapping) and isinstance(objective.get("sum"), Mapping):
+        data = {**data, "objective": {**objective, "sum": _flatten(objective["sum"])}}
+    return data
+
+
+def _other_problems(data: Mapping[str, Any], path: Path, source: str) -> list[str]:
+    """Problems of a study file whose design cannot be loaded."""
+    try:
+        Study.model_validate({**data, "design": None}, context={"folder": path.parent})
+    except ValidationError as error:
+        problems = toml_errors.explain_validation_error(error, Study)
+        others = [problem for problem in problems if problem.field != "design"]
+        return [toml_errors.format_problems(others, path, source)] if others else []
+    return []
+
+
+def _flatten(
+    table: Mapping[str, Any],
+    prefix: str = "",
+    is_table: Callable[[Mapping[str, Any]], bool] = lambda _: False,
+) -> dict[str, Any]:
+    """Dotted names, however they are written: as quoted keys, dotted keys or nested tables.
+
+    Args:
+        is_table: whether a mapping is what is named, such as { min = 0.9 }, not a part of a name.
+    """
+    flat: dict[str, Any] = {}
+    for name, value in table.items():
+        is_prefix = isinstance(value, Mapping) and not is_table(value)
+        inner = _flatten(value, f"{prefix}{name}.", is_table) if is_prefix else {}
+        found = inner if is_prefix else {prefix + name: value}
+        if twice := flat.keys() & found.keys():
+            text = f"{min(twice)} is given twice, in quotes and without; leave one out"
+            raise InputError(text)
+        flat |= found
+    return flat
+
+
+def _limits(table: Mapping[str, Any]) -> bool:
+    return not table or not all(isinstance(one, Mapping) for one in table.values())
+
+
+def _varies(table: Mapping[str, Any]) -> bool:
+    return bool(Varied.model_fields.keys() & table.keys())

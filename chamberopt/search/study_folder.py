@@ -1,0 +1,353 @@
+"""The folder of a study while it runs: inputs, effects, trials and confirmed evaluations."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from pydantic import TypeAdapter, ValidationError
+
+from chamberopt.common.errors import InputError, first_wrong_value
+from chamberopt.common.files import (
+    INPUTS,
+    RESULT,
+    claim_folder,
+    make_folder,
+    open_plain,
+    remove_file,
+    remove_leftovers,
+    write_text,
+)
+from chamberopt.common.limits import MAX_RESULT_BYTES, read_limited
+from chamberopt.common.versions import program_versions
+from chamberopt.coverage.metrics import metric_names
+from chamberopt.design.design import Design
+from chamberopt.search.study.parameters import ParameterSpace
+from chamberopt.search.trial_log import DAMAGED, HISTORY, TIMINGS, JsonLines, Trial, read_seconds
+from chamberopt.simulation.effect_pilot import Advice
+from chamberopt.simulation.evaluation import Evaluation, load_evaluation, save_evaluation
+
+if TYPE_CHECKING:
+    from chamberopt.design.design import Design
+    from chamberopt.search.study import Study
+
+# Resuming a study: the trials that its folder holds already.
+#
+# The search is deterministic: after an interruption it runs again from its first candidate and asks
+# for the same candidates in the same order. A recorded trial is returned instead of simulating the
+# candidate again. Where the record ends, simulation continues; the result is the same, bit for bit,
+# as that of an uninterrupted run.
+
+
+class RecordedTrials:
+    """The trials of a log, read once; a last line cut off by a crash is removed.
+
+    InputError for a row that is none of this study.
+    """
+
+    def __init__(self, log: JsonLines, study: Study) -> None:
+        self._log, self._objectives = log, len(study.objective.goals)
+        self._space = ParameterSpace(study.design, study.vary)
+        self._metrics = set(metric_names(study.design))
+        log.repair()
+        self.trials = [self._trial(number, row) for number, row in enumerate(log.rows())]
+
+    def find(self, number: int, stage: str, point: Sequence[float]) -> Trial | None:
+        """The recorded trial of a candidate, or None if the record has ended.
+
+        InputError if the record has another candidate at this number, by as little as a bit.
+        """
+        if number >= len(self.trials):
+            return None
+        trial = self.trials[number]
+        wanted, recorded = f"{stage} of {_exact(point)}", f"{trial.stage} of {_exact(trial.point)}"
+        if wanted != recorded:
+            what = f"recorded is the {recorded}, but the search now asks for the {wanted}"
+            raise self._mismatch(number, what)
+        if trial.parameters != self._space.values_at(np.array(point)):
+            raise self._log.damaged(number + 1)
+        return trial
+
+    def require_end(self, number: int) -> None:
+        """Raise InputError if there are more trials than the finished study asked for."""
+        if len(self.trials) > number:
+            raise self._mismatch(number, "the study has ended before this row")
+
+    def _trial(self, number: int, row: dict[str, object]) -> Trial:
+        try:
+            trial = Trial.from_row(row)
+            if trial.number != number or not self._is_possible(trial):
+                raise ValueError
+        except DAMAGED:
+            raise self._log.damaged(number + 1) from None
+        return trial
+
+    def _is_possible(self, trial: Trial) -> bool:
+        """Whether a trial has the figures of this study, or failed, which its start never does."""
+        if not trial.goals:
+            return trial.number > 0 or trial.stage != "search"
+        return (
+            len(trial.goals) == self._objectives
+            and all(math.isfinite(goal.value) for goal in trial.goals)
+            and all(one.half_width >= 0.0 for one in (*trial.goals, *trial.metrics.values()))
+            and trial.metrics.keys() == self._metrics
+            and (trial.replicas or 0) > 0
+            and trial.highest is None
+        )
+
+    def _mismatch(self, number: int, what: str) -> InputError:
+        return InputError(
+            f"{self._log.path}:{number + 1}: {what}. The file was edited, or written by another "
+            "version of the program or another kind of machine; resume the study where it was "
+            "begun, or run it in a new folder (--out)"
+        )
+
+
+def _exact(point: Sequence[float]) -> str:
+    """The numbers of a point, so exactly that different numbers have different texts."""
+    return "[" + ", ".join(repr(float(share)) for share in point) + "]"
+
+
+# The inputs of a study: what its results depend on, stored and compared before it is resumed.
+
+FORMAT = 1
+MAX_DIFFERENCES = 12  # in one message
+
+
+def study_inputs(study: Study, plan: Mapping[str, Any] | None = None) -> dict[str, Any]:
+    """Everything that the trials depend on, as plain JSON: values, not the text of the files.
+
+    A file that the design names, such as the part's mesh, is stored as its name and the sha256 of
+    its content, so that it may be moved. The plan is that of a sweep.
+    """
+    values = study.model_dump(mode="json", exclude={"design"})
+    values["design"] = _with_digests(study.design.model_dump(mode="json"))
+    inputs = {"format": FORMAT, "study": values, "sweep": plan, "program": program_versions()}
+    plain = json.loads(json.dumps(inputs))
+    assert isinstance(plain, dict)
+    return plain
+
+
+def require_same_inputs(folder: Path, before: Mapping[str, Any], now: Mapping[str, Any]) -> None:
+    """Raise InputError if the study in the folder was begun with other inputs."""
+    title = f"{folder}: the study in this folder began otherwise:"
+    remedy = "to resume it, restore these inputs; to run the new study, give another folder (--out)"
+    _require_same(before, now, title, remedy)
+
+
+def require_same_files(design: Design, before: Mapping[str, Any], folder: Path) -> None:
+    """Raise InputError if a file that the design names has changed since the study began."""
+    title = f"{folder}: changed while the study ran, so the running evaluations are not kept:"
+    remedy = "to resume, restore the file and run the study again on this folder"
+    now = _with_digests(design.model_dump(mode="json"))
+    _require_same(before["study"]["design"], now, title, remedy)
+
+
+def _require_same(
+    before: Mapping[str, Any], now: Mapping[str, Any], title: str, remedy: str
+) -> None:
+    """Raise InputError that lists differences: `study.design.shot.mass_g: was 5.0, is 6.0`."""
+    old, new = _flatten(before), _flatten(now)
+    changed = [
+        f"{name}: was {_format(old, name)}, is {_format(new, name)}"
+        for name in {**old, **new}
+        if name not in old or name not in new or old[name] != new[name]
+    ]
+    if len(changed) > MAX_DIFFERENCES:
+        hidden = len(changed) - MAX_DIFFERENCES
+        changed = [*changed[:MAX_DIFFERENCES], f"and {hidden} more"]
+    if changed:
+        raise InputError("\n  ".join([title, *changed]) + f"\n{remedy}")
+
+
+def _with_digests(value: Any) -> Any:
+    """The value with each path of a file replaced by the file's name and sha256."""
+    if isinstance(value, dict):
+        return {name: _with_digests(item) for name, item in value.items()}
+    if isinstance(value, list):
+        return [_with_digests(item) for item in value]
+    if isinstance(value, str) and Path(value).suffix and Path(value).is_file():
+        with open_plain(Path(value), follow=True) as file:
+            digest = hashlib.file_digest(file, "sha256").hexdigest()
+        return {"file": Path(value).name, "sha256": digest}
+    return value
+
+
+def _flatten(value: Any, prefix: str = "") -> dict[str, Any]:
+    """The values of nested tables by dotted name."""
+    if not isinstance(value, Mapping) or not value:
+        return {prefix: value}
+    flat: dict[str, Any] = {}
+    for name, item in value.items():
+        flat |= _flatten(item, f"{prefix}.{name}" if prefix else str(name))
+    return flat
+
+
+def _format(flat: Mapping[str, Any], name: str) -> str:
+    value = json.dumps(flat[name], ensure_ascii=False) if name in flat else "absent"
+    return value if len(value) <= 80 else value[:77] + "..."
+
+
+INPUTS_0_1 = "asked.json"
+EFFECTS = "effects.json"
+STUDY = "study.toml"
+CONFIRMED = "confirm"
+
+
+@contextmanager
+def open_study_folder(
+    study: Study, folder: str | Path, plan: Mapping[str, Any] | None = None
+) -> Iterator[StudyFolder]:
+    """Open the folder of a study, and hold it against other processes.
+
+    Args:
+        folder: new, empty, or where this very study was begun.
+        plan: the plan of a sweep.
+    Raises:
+        InputError: the folder holds something else, another process writes to it, or the study,
+            the part or the program have changed since the study began.
+    """
+    folder = Path(folder)
+    if (folder / INPUTS_0_1).is_file():
+        text = "this study was run by version 0.1, which cannot be resumed"
+        raise InputError(f"{folder}: {text}; give another folder (--out)")
+    with claim_folder(folder, is_study_folder):
+        yield StudyFolder(study, folder, plan)
+
+
+def is_study_folder(folder: Path) -> bool:
+    """Whether a study was begun in the folder; it may be finished or not."""
+    return (folder / INPUTS).is_file()
+
+
+def is_finished(folder: Path) -> bool:
+    """Whether the study of the folder has its result, which is written last."""
+    return (folder / RESULT).is_file()
+
+
+class StudyFolder:
+    """An open study folder, see open_study_folder; `recorded` are the trials that it held then."""
+
+    def __init__(self, study: Study, path: Path, plan: Mapping[str, Any] | None = None) -> None:
+        self.path, self._study, self._inputs = path, study, study_inputs(study, plan)
+        self._history = JsonLines(path / HISTORY)
+        self._timings = JsonLines(path / TIMINGS, survives_power_cut=False)
+        if self.begun:
+            before, now = _read_json(path / INPUTS), self._inputs
+            if self.finished:  # a result stays valid when the program changes
+                before, now = ({k: one.get(k) for k in ("study", "sweep")} for one in (before, now))
+            require_same_inputs(path, before, now)
+        self.recorded = RecordedTrials(self._history, study)
+        self._timings.repair()
+
+    @property
+    def finished(self) -> bool:
+        return is_finished(self.path)
+
+    @property
+    def begun(self) -> bool:
+        """Whether there are trials to resume from."""
+        return self._history.path.exists()
+
+    @property
+    def seconds(self) -> float:
+        """Wall-clock time of all evaluations, earlier runs included [s]."""
+        return sum(read_seconds(self.path).values())
+
+    def begin(self) -> None:
+        """Write the inputs before the first trial; inputs of a run without trials are replaced."""
+        remove_leftovers(self.path)
+        path = self.path / INPUTS
+        if path.is_file() and (self.begun or _read_json(path) == self._inputs):
+            return
+        for name in (EFFECTS, STUDY):
+            remove_file(self.path / name)
+        write_text(path, json.dumps(self._inputs, indent=2) + "\n")
+
+    def with_effects_resolved(
+        self, resolve: Callable[[Design], tuple[Design, list[Advice]]]
+    ) -> tuple[Study, list[Advice]]:
+        """The study with effects instead of "auto", and the advice of the pilot runs.
+
+        `resolve` is called once and its answer is stored, because a pilot run takes minutes.
+        """
+        design = self._study.design
+        if not design.effects.auto:
+            return self._study, []
+        self.begin()
+        path = self.path / EFFECTS
+        if not path.is_file():
+            resolved, advice = resolve(design)
+            effects = resolved.effects.model_dump(mode="json")
+            values = {"effects": effects, "advice": [asdict(one) for one in advice]}
+            write_text(path, json.dumps(values, indent=2) + "\n")
+        stored = _read_json(path)
+        try:
+            resolved = design.changed({"effects": stored["effects"]})
+            advice = TypeAdapter(list[Advice]).validate_python(stored["advice"])
+            if not all(one.changes for one in advice):
+                raise ValueError("advice without changes")
+        except ValidationError as error:
+            raise _damaged(path, first_wrong_value(error)) from None
+        except (KeyError, TypeError, ValueError, InputError) as error:
+            raise _damaged(path, error) from None
+        return self._study.model_copy(update={"design": resolved}), advice
+
+    def evaluation(self, trial: Trial) -> Evaluation:
+        """The evaluation of a recorded confirmation; InputError unless its file has its figures."""
+        path = self._evaluation_path(trial.number)
+        found = load_evaluation(path)
+        metrics = {name: one.interval_json() for name, one in found.metrics.items()}
+        if (
+            found.objective.to_json() != trial.goals[0].to_json()
+            or metrics != {name: one.interval_json() for name, one in trial.metrics.items()}
+            or found.replicas != trial.replicas
+        ):
+            raise InputError(
+                f"{path}: not the evaluation that row {trial.number + 1} of {HISTORY} tells of; "
+                "restore the file or run the study in a new folder (--out)"
+            )
+        return found
+
+    def append(
+        self, trial: Trial, evaluation: Evaluation | Exception | None, seconds: float
+    ) -> None:
+        """Store a trial, and the whole evaluation of a confirmation; both are then on the disk.
+
+        OSError if they cannot be written, InputError if a file that the design names has changed.
+        """
+        require_same_files(self._study.design, self._inputs, self.path)
+        if trial.stage == "confirm" and isinstance(evaluation, Evaluation):
+            path = self._evaluation_path(trial.number)
+            make_folder(path.parent)
+            save_evaluation(path, evaluation)  # before the row, which says that this file exists
+        self._history.append(trial.row())
+        self._timings.append({"number": trial.number, "seconds": round(seconds, 3)})
+
+    def _evaluation_path(self, number: int) -> Path:
+        return self.path / CONFIRMED / f"{number:03d}.npz"
+
+
+def _read_json(path: Path) -> dict[str, Any]:
+    try:
+        data = json.loads(read_limited(path, MAX_RESULT_BYTES, "file of a study"))
+        if not isinstance(data, dict):
+            raise TypeError("not a table")
+    except OSError as error:
+        text = f"cannot be read: {error.strerror}; check its permissions"
+        raise InputError(f"{path}: {text}") from None
+    except (ValueError, TypeError) as error:
+        raise _damaged(path, error) from None
+    return data
+
+
+def _damaged(path: Path, error: object) -> InputError:
+    remedy = "restore the file or run the study in a new folder (--out)"
+    return InputError(f"{path}: damaged ({error}); {remedy}")

@@ -1,1 +1,0 @@
-"""Convergence study of `chamberopt accuracy`: the cost of accuracy, and what to set."""

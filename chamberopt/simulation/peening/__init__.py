@@ -1,1 +1,0 @@
-"""What a shop asks of a simulated design beyond its figures."""

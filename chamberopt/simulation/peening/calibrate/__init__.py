@@ -1,1 +1,0 @@
-"""Calibrate the model to one machine, from what was measured on it."""

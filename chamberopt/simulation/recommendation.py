@@ -1,0 +1,117 @@
+"""Which settings a convergence study recommends for an accuracy, and what they should cost."""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_left
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from chamberopt.common.estimate import student_quantile
+from chamberopt.simulation.convergence import (
+    GAUGE,
+    REFERENCE,
+    TIME,
+    WARM_UP,
+    ConvergenceStudy,
+    setting_text,
+)
+
+ACCURACIES = (0.05, 0.01, 0.001)  # half-width of the objective, absolute
+BIAS_SHARE = 1.0 / 3.0  # of the accuracy, that the bias of one parameter may be
+MAX_REPLICAS = 100_000  # that a design may have
+TABLE = "process.accuracy."
+
+
+@dataclass(frozen=True)
+class Recommendation:
+    """Settings for one accuracy."""
+
+    accuracy: float
+    settings: dict[str, Any]  # by numerical parameter
+    replicas: int  # 0 if the accuracy is out of reach
+    cpu_s: float  # predicted
+    remarks: tuple[str, ...]  # sentences on what limits the recommendation
+
+    @property
+    def lines(self) -> tuple[str, ...]:
+        """Lines to paste into a design file; other tables' settings are written as comments."""
+        remarks = tuple(f"# {text}" for text in self.remarks)
+        if not self.replicas:
+            return f"# ± {self.accuracy:g}: not reachable with these settings", *remarks
+        seconds = f"{self.cpu_s:,.0f}" if self.cpu_s >= 10.0 else f"{self.cpu_s:.2g}"
+        lines = [
+            f'{name} = "{value}"' if isinstance(value, str) else f"{name} = {setting_text(value)}"
+            for name, value in self.settings.items()
+        ]
+        return (
+            f"# ± {self.accuracy:g}: about {seconds} CPU seconds",
+            f"# with {', '.join(line for line in lines if not line.startswith(TABLE))}",
+            "[process.accuracy]",
+            f"replicas = {self.replicas}",
+            *(line.removeprefix(TABLE) for line in lines if line.startswith(TABLE)),
+            *remarks,
+        )
+
+
+def recommend(study: ConvergenceStudy, accuracy: float) -> Recommendation:
+    """For each parameter the cheapest setting whose bias is certainly within a third of `accuracy`.
+
+    A coarser setting is taken only if its CPU time is significantly less. Savings of several
+    parameters multiply. The simulated time is the cheapest for this accuracy.
+    """
+    settings, remarks = dict(study.settings), []
+    reference = study.reference.cpu.value
+    factor, warm_up_saving = 1.0, 0.0
+    for name in settings:
+        if name in (TIME, GAUGE):  # the gauge is what is measured, not how well
+            continue
+        # Cheaper than the reference by more than the intervals.
+        tried = [run for run in study.runs if run.parameter == name]
+        cheaper = [run for run in tried if run.cpu.high < study.reference.cpu.low]
+        if good := [run for run in cheaper if run.max_bias <= BIAS_SHARE * accuracy]:
+            best = min(good, key=lambda run: run.cpu.value)
+            settings[name] = type(study.settings[name])(best.setting)
+            if name == WARM_UP:  # the same for every simulated time
+                warm_up_saving = reference - best.cpu.value
+            else:
+                factor *= best.cpu.value / reference
+        elif not all(run.is_biased for run in cheaper):
+            text = "cheaper settings may do, but their bias is not known well enough"
+            remarks.append(f"{name}: {text}; raise --budget-s")
+    options = []
+    for run in (study.reference, *study.runs):
+        if run.parameter in (REFERENCE, TIME):
+            seconds = float(run.setting or study.settings[TIME])
+            count = replicas_for(study, accuracy, seconds)
+            options.append((count * factor * (run.cpu.value - warm_up_saving), count, seconds))
+    cpu_s, replicas, settings[TIME] = min(options)
+    if replicas > MAX_REPLICAS:
+        remarks.append(f"this would need more than {MAX_REPLICAS:,} replicas, the largest number")
+        replicas, cpu_s = 0, math.inf
+    return Recommendation(accuracy, settings, replicas, cpu_s, tuple(remarks))
+
+
+def replicas_for(study: ConvergenceStudy, accuracy: float, seconds: float) -> int:
+    """Number of replicas of this simulated time whose interval is within the accuracy.
+
+    Their variance is proportional to 1/seconds. With few replicas the intervals are wider than
+    that; so the intervals of the batches count as well.
+    """
+    time_ratio = float(study.settings[TIME]) / seconds
+    reference = study.reference
+    pseudovalues = reference.objective.pseudovalues  # of batches, if there are many replicas
+    variance = np.var(pseudovalues, ddof=1) * time_ratio * reference.replicas / len(pseudovalues)
+    counts = range(3, MAX_REPLICAS + 1)
+    needed = 3 + bisect_left(
+        counts, -accuracy, key=lambda n: -student_quantile(n - 1) * math.sqrt(variance / n)
+    )
+    sizes = study.sizes
+    if accuracy < sizes[-1].half_width:
+        return needed
+    negative_logs = np.maximum.accumulate([-math.log(size.half_width) for size in sizes])
+    logs = [math.log(size.replicas) for size in sizes]
+    batch = math.exp(np.interp(-math.log(accuracy), negative_logs, logs))
+    return max(needed, math.ceil(round(batch * time_ratio, 6)))

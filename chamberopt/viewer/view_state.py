@@ -1,0 +1,145 @@
+"""What `inspect` shows: every option and every key changes one ViewState."""
+
+from __future__ import annotations
+
+import difflib
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+from chamberopt.common.errors import InputError
+from chamberopt.pictures.camera import Vector
+from chamberopt.pictures.charts.quantities import OTHER_NAMES, QUANTITIES
+
+Plane = tuple[Vector, Vector | None]
+"""Normal of a cutting plane, towards what is cut away, and a point of it [mm]; None: the middle."""
+
+# Normals of the cutting planes: what is cut away is the side towards the default view.
+CUT_NORMALS: dict[str, Vector] = {"X": (1.0, 0.0, 0.0), "Y": (0.0, -1.0, 0.0), "Z": (0.0, 0.0, 1.0)}
+DEFAULT_VIEW: Vector = (1.0, -1.6, 0.35)
+MIN_LENGTH = 1e-6  # of a view direction; with a shorter or a very long one the picture is empty
+THRESHOLDS = (98.0, 90.0, 75.0, 50.0)  # % of coverage, which key b shows one after the other
+
+KEYS = f"""1 to {len(QUANTITIES)}   the quantity
+click    a triangle's numbers and its impact speeds
+u        deselect the triangle
+b        only coverage below {", ".join(f"{one:g}" for one in THRESHOLDS)} %; all
+c        cut the chamber open; drag the plane
+x        cut the part too
+g        chamber on, off
+r        reset to the first view
+h        these keys on, off
+q        quit"""
+
+
+@dataclass(frozen=True)
+class ViewState:
+    """What is shown, and how.
+
+    quantity: name in QUANTITIES.
+    time_s: peening time of what grows with time; None for each result's treatment time.
+    below: coverage [%] from which triangles are pale; None for no threshold.
+    cut: plane that cuts the chamber open; None for no cut.
+    cut_part: whether the part is cut too.
+    chamber: whether the chamber is drawn.
+    triangle: its numbers are shown; None for none.
+    view: number of the result whose triangle it is; None for all.
+    eye: direction from the part to the eye; None to choose one that shows the target.
+    keys: whether the list of keys is shown.
+    """
+
+    quantity: str = "coverage"
+    time_s: float | None = None
+    below: float | None = None
+    cut: Plane | None = None
+    cut_part: bool = False
+    chamber: bool = True
+    triangle: int | None = None
+    view: int | None = None
+    eye: Vector | None = None
+    keys: bool = False
+
+    def __post_init__(self) -> None:
+        if self.quantity not in QUANTITIES:
+            close = difflib.get_close_matches(self.quantity, QUANTITIES, 1, 0.5)
+            close = [OTHER_NAMES[self.quantity]] if self.quantity in OTHER_NAMES else close
+            hint = f"did you mean {close[0]}?" if close else f"there are {', '.join(QUANTITIES)}"
+            raise InputError(f"--quantity {self.quantity}: not known; {hint}")
+        if self.time_s is not None and not 0.0 <= self.time_s < math.inf:
+            raise InputError(f"--time-s {self.time_s:g}: give a time in s, 0 or more")
+        if self.below is not None and not 0.0 < self.below <= 100.0:
+            raise InputError(f"--below {self.below:g}: give a coverage above 0 and up to 100 %")
+        if self.time_s is not None and self.quantity == "interval":
+            raise InputError(
+                "--time-s: not supported for the interval, which is known at the treatment time "
+                "only; leave --time-s out"
+            )
+        if self.cut_part and self.cut is None:
+            raise InputError("--cut-part: add --clip X, Y or Z to say where")
+
+    @staticmethod
+    def from_json(values: dict[str, Any]) -> ViewState:
+        """Read the state from a drawing job, whose lists are vectors."""
+        return ViewState(**{one.name: _as_tuples(values[one.name]) for one in fields(ViewState)})
+
+
+def parse_clip(text: str) -> Plane:
+    """Read --clip: X, Y or Z, and if wanted a place on that axis in mm, as in Z=12.5."""
+    found = re.fullmatch(r"([xyzXYZ])(?:=([-+]?\d*\.?\d+))?", text.strip())
+    if not found:
+        raise InputError(
+            f"--clip {text}: give an axis and, if not the chamber's middle, a place in mm: X, Y=3 "
+            "or Z=12.5"
+        )
+    axis, place = found.groups()
+    normal = CUT_NORMALS[axis.upper()]
+    if place is None:
+        return normal, None
+    x, y, z = (float(place) * abs(one) for one in normal)
+    return normal, (x, y, z)
+
+
+def parse_view(text: str) -> Vector:
+    """Read --view: three numbers, the direction from the part to the eye."""
+    try:
+        x, y, z = (float(number) for number in text.split(","))
+    except ValueError:
+        x = y = z = 0.0
+    if not MIN_LENGTH < math.hypot(x, y, z) < 1.0 / MIN_LENGTH:
+        raise InputError(
+            f"--view {text}: give the direction from the part to the eye as X,Y,Z, such as "
+            "1,-1.4,-0.8"
+        )
+    return x, y, z
+
+
+def state_after_key(
+    state: ViewState, key: str, first: ViewState, quantities: Sequence[str]
+) -> ViewState:
+    """Return the state after a key; `first` is the one that r returns to, quantities are shown."""
+    names = list(QUANTITIES)
+    if key.isdigit() and 0 < int(key) <= len(names) and names[int(key) - 1] in quantities:
+        name = names[int(key) - 1]
+        return replace(state, quantity=name, time_s=None if name == "interval" else state.time_s)
+    if key == "b":
+        lower = [one for one in THRESHOLDS if state.below is None or one < state.below]
+        return replace(state, below=lower[0] if lower else None)
+    if key == "c":
+        opened = (CUT_NORMALS["Y"], None) if state.cut is None else None
+        return replace(state, cut=opened, cut_part=False)
+    if key == "x":
+        cut = state.cut or (CUT_NORMALS["Y"], None)
+        return replace(state, cut=cut, cut_part=not state.cut_part)
+    if key == "g":
+        return replace(state, chamber=not state.chamber)
+    if key == "u":
+        return replace(state, triangle=None, view=None)
+    if key == "h":
+        return replace(state, keys=not state.keys)
+    return first if key == "r" else state
+
+
+def _as_tuples(value: Any) -> Any:
+    return tuple(_as_tuples(one) for one in value) if isinstance(value, list) else value

@@ -1,0 +1,236 @@
+"""The candidates of `compare`: designs, which are simulated, and results."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from chamberopt.chamber.analytic import analytic_cavity
+from chamberopt.chamber.build import build_chamber
+from chamberopt.common.progress import step
+from chamberopt.design.design import Design
+from chamberopt.design.load import load_design
+from chamberopt.peening.calibration_errors import evaluate_calibrated
+from chamberopt.results.chamber_file import load_chamber
+from chamberopt.results.compare.comparison import (
+    labels,
+    part_unit,
+    require_same_gauge,
+    require_same_machine,
+    require_same_part,
+    require_same_time,
+    require_same_triangles,
+    require_several,
+)
+from chamberopt.results.load import Result, load_part, load_result
+from chamberopt.simulation.evaluate import ReplicaPlan
+from chamberopt.workflows.save_run import save_simulation
+
+if TYPE_CHECKING:
+    from chamberopt.chamber.build import Chamber
+    from chamberopt.simulation.effect_pilot import Advice
+    from sim_core import AnalyticCavity
+
+Prepare = Callable[[Design, "Chamber", "AnalyticCavity | None"], "tuple[Design, list[Advice]]"]
+"""Chooses the effects of a design with effects = "auto", and compiles the simulator."""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One argument of `compare`.
+
+    Args:
+        label: short name, unique among the candidates.
+        path: as given.
+        design: the design to compare.
+        result: as read from the folder; None for a design.
+        missing: whether it has to be simulated.
+        chamber: built where it has to be simulated.
+    """
+
+    label: str
+    path: Path
+    design: Design
+    result: Result | None
+    missing: bool
+    chamber: Chamber | None = None
+
+
+@dataclass(frozen=True)
+class SeedSettings:
+    """Random numbers and objective of a simulation.
+
+    Args:
+        seed: of the design's process.
+        plan: replicas, stream of random numbers and objective.
+    """
+
+    seed: int
+    plan: ReplicaPlan
+
+
+def read_candidates(
+    paths: Sequence[str | Path], treatment_time_s: float | None = None
+) -> list[Candidate]:
+    """Read the candidates, without simulating anything.
+
+    Args:
+        paths: design files and results folders.
+        treatment_time_s: peening time of all candidates; results of another time are marked to be
+            simulated again.
+
+    Raises:
+        InputError: a candidate cannot be read, built or compared with the first.
+    """
+    files = [Path(path) for path in paths]
+    require_several([file.parent if file.name == "result.json" else file for file in files])
+    found = [_read(file) for file in files]
+    if treatment_time_s is not None:
+        found = [_with_treatment_time(one, treatment_time_s) for one in found]
+    designs = [one.design for one in found]
+    require_same_time(files, designs)
+    require_same_gauge(files, designs)
+    require_same_machine(files, designs)
+    target: np.ndarray | None = None
+    built = []
+    for one, label in zip(found, labels([_named(file) for file in files]), strict=True):
+        own, chamber = None, None
+        if one.design.part.target.reachable:
+            own = target if one.result is None else _target(one.result)
+        if one.missing:
+            chamber = load_chamber(one.result) if one.result else build_chamber(one.design, own)
+            own = chamber.part.target if one.design.part.target.reachable else None
+        if own is not None:
+            target = own if target is None else target
+            require_same_triangles(one.path, own, files[0], target)
+        built.append(replace(one, label=label, chamber=chamber))
+    require_same_part(files, designs, [_mesh(one) for one in built])
+    return built
+
+
+def simulate_missing(
+    candidates: Sequence[Candidate], folder: Path, executor: Executor, prepare: Prepare
+) -> tuple[list[Result], list[str]]:
+    """Return the result of each candidate, and remarks for the user.
+
+    Designs are simulated with seed, stream and number of replicas of the first candidate. Results
+    of another treatment time keep their own. New results are written to folders inside `folder`.
+    """
+    results: list[Result] = []
+    remarks: list[str] = []
+    names = _folder_names(candidates)
+    for one, name in zip(candidates, names, strict=True):
+        if one.result is not None and not one.missing:
+            results.append(one.result)
+            continue
+        if one.result is not None:
+            settings = _seed_settings(one.result)
+            seconds = one.design.process.treatment_time_s
+            remarks.append(f"{one.label}: simulated again for {seconds:g} s, on its own seeds")
+        else:
+            settings = (
+                _seed_settings(results[0])
+                if results
+                else SeedSettings(one.design.process.seed, ReplicaPlan())
+            )
+            remarks += _overridden(one, settings)
+        new, more = _simulate(one, settings, folder / name, executor, prepare)
+        results.append(new)
+        remarks += more
+    return results, remarks
+
+
+def _simulate(
+    one: Candidate, settings: SeedSettings, folder: Path, executor: Executor, prepare: Prepare
+) -> tuple[Result, list[str]]:
+    assert one.chamber is not None
+    design = _with_seeds(one.design, settings)
+    analytic = one.result is not None and one.result.record.analytic
+    cavity = analytic_cavity(design, one.chamber) if analytic else None
+    design, advice = prepare(design, one.chamber, cavity)
+    with step(f"{one.label}: replicas", design.process.accuracy.replicas) as progress:
+        evaluation = evaluate_calibrated(
+            design, one.chamber, executor, progress, settings.plan, cavity
+        )
+    remarks = save_simulation(folder, design, one.chamber, evaluation, advice)
+    return load_result(folder), [f"{one.label}: {text}" for text in (*map(str, advice), *remarks)]
+
+
+def _with_seeds(design: Design, settings: SeedSettings) -> Design:
+    """Return the design with these settings, so that its file tells what was simulated."""
+    values: dict[str, Any] = {"process.seed": settings.seed}
+    if settings.plan.count is not None:
+        values["process.accuracy.replicas"] = settings.plan.count
+        values["process.accuracy.objective_half_width"] = None
+    return design.changed(values)
+
+
+def _overridden(one: Candidate, settings: SeedSettings) -> list[str]:
+    """Remarks on values of a design that the first candidate's settings replace."""
+    process, accuracy = one.design.process, one.design.process.accuracy
+    changes = []
+    if process.seed != settings.seed:
+        changes.append(f"seed = {settings.seed} instead of {process.seed}")
+    if settings.plan.count is not None and accuracy.objective_half_width is not None:
+        changes.append(
+            f"{settings.plan.count} replicas instead of as many as give "
+            f"± {accuracy.objective_half_width:g}"
+        )
+    elif settings.plan.count not in (None, accuracy.replicas):
+        changes.append(f"{settings.plan.count} replicas instead of {accuracy.replicas}")
+    return [f"{one.label}: {' and '.join(changes)}, as the first candidate"] if changes else []
+
+
+def _read(path: Path) -> Candidate:
+    if path.suffix == ".toml" or (path.is_file() and path.name != "result.json"):
+        return Candidate("", path, load_design(path), None, missing=True)
+    result = load_result(path)
+    return Candidate("", path, result.design, result, missing=False)
+
+
+def _with_treatment_time(one: Candidate, seconds: float) -> Candidate:
+    if one.design.process.treatment_time_s == seconds:
+        return one
+    return replace(
+        one, design=one.design.changed({"process.treatment_time_s": seconds}), missing=True
+    )
+
+
+def _named(path: Path) -> Path:
+    """Return the path that names a candidate: a design without .toml, the folder of a result."""
+    if path.suffix == ".toml":
+        return path.with_suffix("")
+    return path.parent if path.name == "result.json" else path
+
+
+def _mesh(one: Candidate) -> tuple[str, str]:
+    if one.chamber is not None:
+        return one.chamber.part.sha256, one.chamber.part.unit
+    assert one.result is not None
+    return one.result.record.part_sha256, part_unit(one.result)
+
+
+def _target(result: Result) -> np.ndarray:
+    return np.asarray(load_part(result)["target"]) > 0
+
+
+def _seed_settings(result: Result) -> SeedSettings:
+    seed, stream = result.seeds
+    plan = ReplicaPlan(result.record.replicas, stream, result.objective_name)
+    return SeedSettings(seed, plan)
+
+
+def _folder_names(candidates: Sequence[Candidate]) -> list[str]:
+    """Return the last name of each path, with a number where two are the same."""
+    names: list[str] = []
+    for one in candidates:
+        name, number = _named(one.path).resolve().name, 1
+        while (numbered := name if number == 1 else f"{name}-{number}") in names:
+            number += 1
+        names.append(numbered)
+    return names

@@ -1,0 +1,143 @@
+"""Save a finished simulation, study or sweep: data, pictures and, last of all, result.json."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from concurrent.futures import Executor, ThreadPoolExecutor
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from chamberopt.chamber.build import build_chamber
+from chamberopt.common.files import make_output_folder, whole_or_nothing
+from chamberopt.pictures.charts.study import convergence_picture, pareto_picture, slices_picture
+from chamberopt.pictures.charts.sweep import sweep_map
+from chamberopt.pictures.coverage import draw_coverage
+from chamberopt.results.load import START, summary
+from chamberopt.results.write import write_result, write_simulation, write_study, write_sweep
+from chamberopt.simulation.field_values import CandidateResult, complete_result
+
+if TYPE_CHECKING:
+    from chamberopt.chamber.build import Chamber
+    from chamberopt.design.load import Design
+    from chamberopt.peening.tolerances import ToleranceResult
+    from chamberopt.search.candidates import ConfirmedCandidate
+    from chamberopt.search.run_study import StudyResult
+    from chamberopt.search.run_sweep import SweepResult
+    from chamberopt.simulation.effect_pilot import Advice
+    from chamberopt.simulation.evaluation import Evaluation
+
+
+def save_simulation(
+    folder: str | Path,
+    design: Design,
+    chamber: Chamber,
+    evaluation: Evaluation,
+    advice: Sequence[Advice] = (),
+    warned: Sequence[str] | None = None,
+    tolerances: ToleranceResult | None = None,
+) -> list[str]:
+    """Save a simulation in a new or empty folder.
+
+    Writes design.toml, coverage.vtp, part.vtp, hits.npz, chamber.npz, chamber.stl, chamber.vtp,
+    result.json and coverage.png.
+
+    Args:
+        folder: must be new or empty.
+        design: as simulated, its effects chosen.
+        chamber: of the design.
+        evaluation: of the design.
+        advice: why effects were chosen, if the design left the choice to the program.
+        warned: warnings of `chamberopt check`; None if it was not run.
+        tolerances: what its tolerances do, if that was simulated.
+
+    Returns:
+        Remarks for the user, such as why a picture was skipped.
+    """
+    folder = make_output_folder(folder)
+    with whole_or_nothing(folder):  # without its result.json, what was written is of no use
+        completed = complete_result(design, chamber, evaluation)
+        write_result(folder, write_simulation(folder, completed, tolerances), advice, warned)
+    return _draw_coverage([folder], [evaluation], [folder.resolve().name], folder / "coverage.png")
+
+
+def save_study(
+    folder: str | Path,
+    study_result: StudyResult,
+    advice: Sequence[Advice] = (),
+    warned: Sequence[str] | None = None,
+) -> list[str]:
+    """Complete the folder of a study that has ended.
+
+    Adds the files of results.write.write_study and the pictures coverage.png (the best design),
+    before_after.png, convergence.png, slices.png (if a model could be fitted) and pareto.png (of
+    two objectives). result.json is written last, so a study that is stopped while it is being saved
+    counts as unfinished and is saved again when it is resumed.
+
+    Args:
+        folder: the study's folder.
+        study_result: of the study.
+        advice: why effects were chosen, if the design left the choice to the program.
+        warned: warnings of `chamberopt check` on the best design; None if it was not run.
+
+    Returns:
+        Remarks for the user, such as why a picture was skipped.
+    """
+    folder = Path(folder)
+
+    def complete(one: ConfirmedCandidate) -> CandidateResult:
+        chamber = build_chamber(one.design, study_result.target)
+        return complete_result(one.design, chamber, one.evaluation)
+
+    # The search keeps all cores busy; so that its end does too, start and best are worked out in
+    # threads beside the diagrams.
+    with ThreadPoolExecutor(2) as threads:
+        results = threads.map(complete, (study_result.start, study_result.best))
+        _draw_diagrams(folder, study_result)
+        start, best = results
+        record = write_study(folder, study_result, start, best)
+        remarks = _draw_start_and_best(folder, study_result, threads)
+    write_result(folder, record, advice, warned)
+    return remarks
+
+
+def save_sweep(folder: str | Path, sweep: SweepResult) -> list[str]:
+    """Complete the folder of a sweep that has ended; return remarks for the user.
+
+    Adds the files of results.write.write_sweep, map.png and, last of all, result.json.
+    """
+    folder = Path(folder)
+    record = write_sweep(folder, sweep)
+    remarks = sweep_map(folder / "map.png", sweep)
+    write_result(folder, record)
+    return remarks
+
+
+def _draw_diagrams(folder: Path, study_result: StudyResult) -> None:
+    """Draw what the trials and the model of a study give."""
+    convergence_picture(folder / "convergence.png", study_result)
+    if study_result.sensitivity:
+        slices_picture(folder / "slices.png", study_result, study_result.sensitivity)
+    if study_result.study.objective.pareto:
+        pareto_picture(folder / "pareto.png", study_result)
+
+
+def _draw_start_and_best(folder: Path, study_result: StudyResult, threads: Executor) -> list[str]:
+    """Draw the coverage of a study whose data is written; return remarks on skipped pictures."""
+    start, best = study_result.start.evaluation, study_result.best.evaluation
+    folders, names = [folder / START, folder], ["start", "best design"]
+    pictures = [
+        threads.submit(_draw_coverage, *one)
+        for one in (
+            ([folder], [best], ["best design"], folder / "coverage.png"),
+            (folders, [start, best], names, folder / "before_after.png"),
+        )
+    ]
+    return list(dict.fromkeys(remark for one in pictures for remark in one.result()))
+
+
+def _draw_coverage(
+    folders: Sequence[Path], evaluations: Sequence[Evaluation], names: Sequence[str], picture: Path
+) -> list[str]:
+    titles = [f"{name}\n{summary(one)}" for name, one in zip(names, evaluations, strict=True)]
+    skipped = draw_coverage(folders, titles, picture)
+    return [skipped] if skipped else []

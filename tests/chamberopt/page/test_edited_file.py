@@ -1,0 +1,137 @@
+"""Saving a design from the page: one line differs, and nothing is written that would not load."""
+
+import difflib
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from chamberopt.common.errors import InputError
+from chamberopt.page.edited_file import EditedFile, design_fields
+from tests.hunt.base import write_base
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> EditedFile:
+    write_base(tmp_path)
+    design = tmp_path / "design.toml"
+    design.write_text(design.read_text().replace("height_mm = 30", "height_mm = 30   # to try"))
+    return EditedFile(design, trusted=False)
+
+
+def differing(before: str, after: str) -> list[str]:
+    lines = difflib.unified_diff(before.splitlines(), after.splitlines(), lineterm="", n=0)
+    return [line for line in lines if line[0] in "+-" and line[:3] not in ("+++", "---")]
+
+
+def test_one_number_is_one_line(file: EditedFile) -> None:
+    before = file.path.read_text()
+    changed = file.with_changes({"chamber.height_mm": 31.5})
+    file.save({"chamber.height_mm": 31.5})
+    after = ["-height_mm = 30   # to try", "+height_mm = 31.5   # to try"]
+    assert differing(before, file.path.read_text()) == after
+    assert changed.value("chamber.height_mm") == 31.5
+    assert EditedFile(file.path, False).design == changed
+
+
+@pytest.mark.parametrize(
+    ("changes", "written"),
+    [
+        ({"part.rotate_deg.2": 12.5}, ["-rotate_deg = [0, 0, 10]", "+rotate_deg = [0, 0, 12.5]"]),
+        ({"sonotrode.phase_deg": 3}, None),
+        ({"chamber.shape": "shape.py"}, None),
+        ({"part.mesh": "/etc/hosts"}, None),
+        ({"calibration": "/etc/hosts"}, None),
+        ({"part.rotate_deg.-1": 3}, None),
+        ({"part.rotate_deg.1": None}, None),
+        ({"zones.0.name": "x"}, None),
+        ({"process.accuracy.max_replicas": 9}, ["+max_replicas = 9"]),
+        ({"effects.friction.mu": 0.2, "effects.friction.beta0": 0.3},
+         ["+[effects.friction]", "+mu = 0.2", "+beta0 = 0.3"]),
+        ({"part.target.direction": None, "part.target.angle_deg": None},
+         ["-direction = [0, 0, -1]", "-angle_deg = [0, 10]"]),
+        ({"part.target.faces": [{"at_mm": [0, 0, -8]}]}, ["+faces = [{at_mm = [0, 0, -8]}]"]),
+        ({"zones.0": {"name": "side", "target": {"faces": [{"at_mm": [8, 0, 0]}]}}},
+         ["+", "+[[zones]]", '+name = "side"', "+target = {faces = [{at_mm = [8, 0, 0]}]}"]),
+    ],
+)  # fmt: skip
+def test_keys_are_changed_added_and_taken_out(
+    file: EditedFile, changes: dict[str, Any], written: list[str] | None
+) -> None:
+    before = file.path.read_text()
+    if written is None:  # not a number or choice of the page
+        with pytest.raises(InputError, match=f"{next(iter(changes))}: (not changed on|nothing)"):
+            file.save(changes)
+        assert file.path.read_text() == before
+        return
+    file.save(changes)
+    assert [one for one in differing(before, file.path.read_text()) if one != "+"] == [
+        one for one in written if one != "+"
+    ]
+
+
+def test_what_would_not_load_is_not_written(file: EditedFile) -> None:
+    before = file.path.read_text()
+    with pytest.raises(InputError, match=r"design.toml:15: chamber.height_mm: given -3"):
+        file.save({"chamber.height_mm": -3})
+    assert file.path.read_text() == before
+
+
+def test_a_file_changed_elsewhere_is_not_replaced(file: EditedFile) -> None:
+    other = file.path.read_text().replace("mass_g = 3", "mass_g = 2.5")
+    file.path.write_text(other)
+    with pytest.raises(InputError, match="changed on disk since this page read it"):
+        file.save({"chamber.height_mm": 31})
+    assert file.path.read_text() == other
+    fresh = EditedFile(file.path, False)
+    fresh.save({"chamber.height_mm": 31})
+    assert EditedFile(file.path, False).design.value("shot.mass_g") == 2.5
+
+
+def test_numbers_of_a_catalogues_metal_are_shown_and_not_changed(file: EditedFile) -> None:
+    text = file.path.read_text().replace("wall = { C0 = 0.91, v0_m_s = 0.44 }", 'wall = "42CrMo4"')
+    file.path.write_text(text)
+    file = EditedFile(file.path, False)
+    rows = {row["name"]: row for row in design_fields(file)}
+    assert rows["materials.wall.C0"]["fixed"]
+    assert not rows["materials.part.C0"]["fixed"]
+    with pytest.raises(InputError, match=r"materials\.wall: given '42CrMo4'"):
+        file.save({"materials.wall.C0": 0.8})
+
+
+def test_every_number_has_its_bounds_unit_and_description(file: EditedFile) -> None:
+    rows = {row["name"]: row for row in design_fields(file)}
+    assert rows["chamber.height_mm"] == {
+        "name": "chamber.height_mm", "value": 30.0, "least": 2.0, "most": 2000.0, "unit": "mm",
+        "text": "inner height, sonotrode to ceiling", "whole": False, "varies": True,
+        "fixed": False,
+    }  # fmt: skip
+    assert rows["part.offset_mm.0"]["value"] == 1.0
+    assert rows["sonotrode.motion"]["choices"] == ("sinusoidal", "random_phase")
+    for name in file.design.numbers():
+        absent = name.startswith("effects.part_turn") and name[-1].isdecimal()
+        if not absent and not name.startswith(("part.target", "zones", "tolerances")):
+            assert name in rows
+
+
+def test_how_the_file_says_it_is_kept_or_refused_in_words(file: EditedFile) -> None:
+    """Dotted keys, inline tables and lists of them are TOML too."""
+    text = file.path.read_text()
+    friction = {"effects.friction.mu": 0.2, "effects.friction.beta0": 0.3}
+    for old, new in (
+        ("[effects]\ngravity = true\nrest = false", "effects = { gravity = true, rest = false }"),
+        ("[effects]\ngravity = true\nrest = false", 'effects = "auto"'),
+    ):
+        head, _, rest = text.partition("[part]")
+        file.path.write_text(new + "\n" + (head + "[part]" + rest).replace(old, ""))
+        with pytest.raises(InputError, match=r"the page cannot change it|no table"):
+            EditedFile(file.path, False).save(friction)
+
+
+def test_a_file_keeps_its_mode(file: EditedFile) -> None:
+    file.path.chmod(0o600)
+    file.save({"chamber.height_mm": 31})
+    assert file.path.stat().st_mode & 0o777 == 0o600
+    file.path.chmod(0o400)
+    with pytest.raises(InputError, match="read-only"):
+        EditedFile(file.path, False).save({"chamber.height_mm": 32})

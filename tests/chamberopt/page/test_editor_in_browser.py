@@ -1,0 +1,201 @@
+"""The editor page in a real browser: numbers, target, pose, runs, results, no foreign request."""
+
+import json
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+from chamberopt.cli import main
+from chamberopt.design.load import load_design
+from tests.chamberopt.page.conftest import Served
+from tests.helpers.results.browser import WAIT, chromium, expect, needs_chromium
+
+pytestmark = needs_chromium
+
+
+# Number of a triangle and the place of its middle on the screen.
+FIND = """async (wanted) => {
+  const { view } = await import("/browser/scene.js"), mesh = view.get("part");
+  const corners = mesh.geometry.getAttribute("position");
+  const box = view.renderer.domElement.getBoundingClientRect();
+  mesh.updateWorldMatrix(true, false);
+  for (let k = wanted ?? 0; k < corners.count / 3; k++) {
+    const at = new THREE.Vector3();
+    for (let i = 0; i < 3; i++) at.add(new THREE.Vector3().fromBufferAttribute(corners, 3 * k + i));
+    at.divideScalar(3).applyMatrix4(mesh.matrixWorld).project(view.camera);
+    const clientX = box.left + (at.x + 1) / 2 * box.width;
+    const clientY = box.top + (1 - at.y) / 2 * box.height;
+    if (view.at({ clientX, clientY }, ["part"])?.triangle === k) return [k, clientX, clientY];
+  }
+}"""
+
+
+class Page:
+    """The page of a served design, opened, with its errors and requests."""
+
+    def __init__(self, browser: Any, served: Served) -> None:
+        self.served = served
+        self.errors: list[str] = []
+        self.requests: list[str] = []
+        context = browser.new_context(viewport={"width": 1300, "height": 800})
+        self.page = context.new_page()
+        self.page.on("pageerror", lambda error: self.errors.append(str(error)))
+        self.page.on("request", lambda request: self.requests.append(request.url))
+        self.open(served.address)
+
+    def open(self, address: str) -> None:
+        self.page.goto(address)
+        self.wait("data-ready=yes")
+
+    def wait(self, state: str) -> None:
+        self.page.wait_for_selector(f"body[{state}]", timeout=WAIT)
+
+    def put(self, name: str, value: float) -> None:
+        field = self.page.locator(f'[id="{name}"]')
+        field.evaluate(
+            "one => { const fold = one.closest('details'); if (fold) fold.open = true; }"
+        )
+        field.fill(f"{value:g}")
+        field.press("Tab")
+
+    def tab(self, name: str) -> None:
+        self.page.click(f"nav [data-tab={name}]")
+
+    def facts(self) -> dict[str, str]:
+        names = self.page.locator("#facts dt").all_text_contents()
+        return dict(zip(names, self.page.locator("#facts dd").all_text_contents(), strict=True))
+
+    def saved(self) -> Any:
+        self.page.click("#save")
+        expect(self.page.locator("#message")).to_contain_text("saved in design.toml", timeout=WAIT)
+        return load_design(self.served.folder / "design.toml")
+
+    def click_side(self, triangle: int | None = None) -> int:
+        """Click the middle of a triangle of the part, by default of one that can be seen."""
+        found, x, y = self.page.evaluate(FIND, triangle)
+        self.page.mouse.click(x, y)
+        return int(found)
+
+
+@pytest.fixture(scope="module")
+def opened(served: Served) -> Iterator[Page]:
+    with chromium() as browser:
+        yield Page(browser, served)
+
+
+def test_a_number_changes_the_shape_the_facts_and_one_line(opened: Page) -> None:
+    opened.wait("data-checked=reach")
+    before = (opened.served.folder / "design.toml").read_text()
+    opened.put("chamber.height_mm", 36)
+    opened.wait("data-checked=reach")
+    assert opened.page.locator("#unsaved").text_content() == "not saved yet"
+    said = opened.facts()
+    opened.saved()
+    after = (opened.served.folder / "design.toml").read_text()
+    assert [one for one in after.splitlines() if one not in before.splitlines()] == [
+        "height_mm = 36"
+    ]
+    report = opened.served.folder / "checked"
+    assert main(["check", str(opened.served.folder / "design.toml"), "--out", str(report)]) == 0
+    facts = json.loads((report / "check.json").read_text())
+    for table, name in (("chamber", "free_volume_cm3"), ("reach", "target_reachable_mm2")):
+        assert float(said[f"{table}.{name}"]) == facts[table][name]
+
+
+def test_a_slider_moves_and_is_undone_as_one(opened: Page) -> None:
+    slider = opened.page.locator(".field", has=opened.page.locator('[id="shot.mass_g"]'))
+    slider = slider.locator("input[type=range]")
+    slider.scroll_into_view_if_needed()
+    box = slider.bounding_box()
+    opened.page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+    opened.page.mouse.down()
+    for across in (0.6, 0.7, 0.8):
+        opened.page.mouse.move(box["x"] + across * box["width"], box["y"] + box["height"] / 2)
+    opened.page.mouse.up()
+    slider.press("ArrowRight")  # another move
+    opened.page.click("#undo")
+    assert float(opened.page.locator('[id="shot.mass_g"]').input_value()) > 3
+    opened.page.click("#undo")
+    assert float(opened.page.locator('[id="shot.mass_g"]').input_value()) == 3
+    assert opened.page.locator("#undo").is_disabled()
+
+
+def test_what_is_refused_is_said_and_the_newest_counts(opened: Page) -> None:
+    opened.put("chamber.height_mm", 4)
+    expect(opened.page.locator("#error")).to_contain_text("not below chamber.height_mm = 4")
+    opened.page.click("#save")
+    expect(opened.page.locator("#message")).to_contain_text("chamber.sonotrode_distance_mm")
+    assert "height_mm = 36" in (opened.served.folder / "design.toml").read_text()
+    opened.page.click("#undo")
+    expect(opened.page.locator("#error")).to_be_hidden()
+
+
+def test_a_click_picks_the_face_and_turns_it_down(opened: Page) -> None:
+    opened.tab("target")
+    opened.page.click("#whole")
+    opened.wait("data-checked=reach")
+    side = opened.click_side()
+    expect(opened.page.locator("#chosen")).to_contain_text("faces = [")
+    assert int(opened.page.evaluate("document.body.dataset.picked")) == side
+    opened.tab("pose")
+    opened.page.click("#down")
+    opened.click_side(side)
+    opened.wait("data-checked=reach")
+    design = opened.saved()
+    assert len(design.part.target.faces) == 1
+    assert design.part.target.direction is None
+    assert max(map(abs, design.part.rotate_deg)) > 80
+
+
+def test_a_study_of_the_sliders_is_run_and_seen(opened: Page) -> None:
+    page, folder = opened.page, opened.served.folder
+    opened.tab("numbers")
+    row = page.locator(".field", has=page.locator('[id="shot.mass_g"]'))
+    row.hover()
+    row.locator("input[type=checkbox]").check()
+    opened.tab("run")
+    page.fill("#evaluations", "2")
+    page.click("#write-study")
+    expect(page.locator("#message")).to_contain_text("written: study-of-sliders.toml")
+    page.select_option("#of", "design.toml")
+    page.click("[data-command=simulate]")
+    expect(page.locator("#progress")).to_contain_text("finished", timeout=WAIT)
+    result = json.loads((folder / "results" / "design" / "result.json").read_text())
+    out = folder / "by-command"
+    assert main(["simulate", str(folder / "design.toml"), "--out", str(out)]) == 0
+    assert result["metrics"] == json.loads((out / "result.json").read_text())["metrics"]
+    opened.tab("results")
+    page.locator("#result-list input").first.check()
+    page.click("#show-results")
+    opened.wait("data-drawn=yes")
+    assert page.locator("#shown #part-0 canvas").count() == 1
+    page.click("#close-results")
+
+
+@pytest.mark.long
+def test_a_study_run_on_the_page_is_that_of_the_command(opened: Page) -> None:
+    page, folder = opened.page, opened.served.folder
+    opened.tab("run")
+    page.select_option("#of", "study-of-sliders.toml")
+    page.click("[data-command=run]")
+    expect(page.locator("#progress")).to_contain_text("finished", timeout=10 * WAIT)
+    out = folder / "results" / "study-by-command"  # as deep as its own: best.toml names the part
+    assert main(["run", str(folder / "study-of-sliders.toml"), "--out", str(out)]) == 0
+    own = folder / "results" / "study-of-sliders"
+    assert (own / "history.jsonl").read_bytes() == (out / "history.jsonl").read_bytes()
+    assert (own / "best.toml").read_text() == (out / "best.toml").read_text()
+
+
+def test_nothing_foreign_is_asked_and_nothing_failed(opened: Page) -> None:
+    assert opened.errors == []
+    assert all(url.startswith((opened.served.origin, "data:", "blob:")) for url in opened.requests)
+    opened.open(opened.served.origin)  # reloaded, it goes on from the file
+    assert not opened.page.locator("#unsaved").text_content()
+
+
+def test_it_says_that_the_server_has_ended(opened: Page) -> None:
+    opened.served.process.kill()
+    opened.served.process.wait()
+    opened.put("chamber.height_mm", 37)
+    expect(opened.page.locator("#error")).to_contain_text("the server has ended", timeout=WAIT)

@@ -1,0 +1,111 @@
+"""Clicks on a part: faces are added and taken away, and a face is turned down."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from chamberopt.chamber.part import posed_part, preview_part
+from chamberopt.common.errors import InputError
+from chamberopt.design.design import Design
+from chamberopt.geometry.triangles import area_vectors
+from chamberopt.page.edited_file import EditedFile
+from chamberopt.page.picking import Picker
+from tests.chamberopt.design.test_shipped_parts import PARTS
+from tests.hunt.base import write_base
+
+TARGET = "part.target"
+
+
+class Edited:
+    """A design file with changes that the page would hold."""
+
+    def __init__(self, path: Path, changes: dict[str, Any] | None = None) -> None:
+        self.file, self.changes, self.picker = (
+            EditedFile(path, trusted=False),
+            changes or {},
+            Picker(),
+        )
+
+    @property
+    def design(self) -> Design:
+        return self.file.with_changes(self.changes)
+
+    def click(self, triangle: int, *, add: bool = True, alike: bool = False) -> None:
+        design = self.design
+        self.changes |= self.picker.with_face(design, TARGET, triangle, 30.0, alike, add)
+
+
+@pytest.fixture
+def gear() -> Edited:
+    keys = (f"{TARGET}.{key}" for key in ("direction", "angle_deg", "box_mm"))
+    return Edited(PARTS.parent / "gear.toml", dict.fromkeys(keys))
+
+
+def side(design: Design) -> int:
+    """A triangle of the tip of a tooth, which is as far from the axis as any."""
+    mesh = preview_part(design).mesh
+    middle = mesh.vertices[mesh.triangles].mean(axis=1)
+    return int(np.hypot(*middle.T[:2]).argmax())
+
+
+def chosen(design: Design) -> np.ndarray:
+    return preview_part(design).target
+
+
+def test_a_face_and_all_alike_are_added_and_taken_away(gear: Edited) -> None:
+    triangle = side(gear.design)
+    gear.click(triangle)
+    tip = chosen(gear.design)
+    assert len(gear.design.part.target.faces) == 1
+    assert 0 < tip.sum() < 200
+    gear.click(triangle, alike=True)
+    every = chosen(gear.design)
+    (row,) = gear.design.part.target.faces  # the one tip is among all that are alike
+    assert row.alike
+    assert every.sum() == 20 * tip.sum()
+    gear.click(triangle, add=False)
+    assert len(gear.design.part.target.faces) == 19
+    assert (chosen(gear.design) == (every & ~tip)).all()
+    part = posed_part(gear.design)[0]  # as commands choose
+    assert (np.unique(part.elements[part.target]) == np.flatnonzero(chosen(gear.design)) + 1).all()
+
+
+def test_what_changes_nothing_or_leaves_nothing_is_refused(gear: Edited) -> None:
+    triangle = side(gear.design)
+    gear.click(triangle)
+    with pytest.raises(InputError, match="already in it"):
+        gear.click(triangle)
+    with pytest.raises(InputError, match="nothing would be left"):
+        gear.click(triangle, add=False)
+    with pytest.raises(InputError, match="the part has 9920"):
+        gear.click(9920)
+    with pytest.raises(InputError, match="no target; there are "):
+        gear.picker.with_face(gear.design, "zones.0.target", 0, 30.0, alike=False, add=True)
+
+
+def test_a_target_chosen_by_a_direction_becomes_its_faces(tmp_path: Path) -> None:
+    write_base(tmp_path)
+    below = Edited(tmp_path / "design.toml")  # the face of the box that looks down
+    mesh = preview_part(below.design).mesh
+    top = int(area_vectors(mesh.vertices, mesh.triangles)[:, 2].argmax())
+    half = Edited(tmp_path / "design.toml", {f"{TARGET}.box_mm": [[-8, -8, -9], [1, 8, 9]]})
+    assert chosen(half.design).sum() == 1  # of the two triangles of the face
+    with pytest.raises(InputError, match="does not follow faces at 30 degrees"):
+        half.click(top)
+    below.click(top)
+    assert below.changes[f"{TARGET}.direction"] is None
+    assert len(below.design.part.target.faces) == 2
+    assert chosen(below.design).sum() == 4
+
+
+def test_a_face_is_turned_down(tmp_path: Path) -> None:
+    write_base(tmp_path)
+    box = Edited(tmp_path / "design.toml")
+    mesh = preview_part(box.design).mesh
+    for triangle in range(len(mesh.triangles)):
+        box.changes |= box.picker.face_down(box.design, triangle, 30.0)
+        turn = preview_part(box.design).rotation
+        normal = turn @ area_vectors(mesh.vertices, mesh.triangles)[triangle]
+        assert normal / np.linalg.norm(normal) == pytest.approx([0, 0, -1], abs=2e-3)

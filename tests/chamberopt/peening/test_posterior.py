@@ -1,0 +1,65 @@
+"""What measurements tell, with straight lines for models: true ones, and one that is wrong."""
+
+import numpy as np
+
+from chamberopt.design.calibration import Parameter
+from chamberopt.peening.posterior import (
+    Data,
+    Figures,
+    Model,
+    Prior,
+    explaining_posterior,
+    find_posterior,
+)
+
+NAMES: tuple[Parameter, ...] = ("amplitude", "v0", "K")
+PRIOR = Prior(NAMES, np.zeros(3), np.array([0.1, 0.7, 0.9]))
+SLOPES = {"arc heights": [[1.0, -0.1, 1.0]] * 5, "coverage": [[1.5, 0.3, 0.0]] * 8}
+ERROR, ANYWHERE = 0.03, (np.full(3, -np.inf), np.full(3, np.inf))
+CASES = 100
+
+
+def line(rows: np.ndarray) -> Model:
+    noise = np.zeros((len(rows), len(rows)))
+    return lambda theta: Figures(rows @ np.array([theta[name] for name in NAMES]), noise)
+
+
+def shares(wrong: float) -> tuple[float, float, float]:
+    """Of cases: intervals that hold with larger errors and without, and coverage not explained.
+
+    Args:
+        wrong: by how much the coverage scatters more than its errors.
+    """
+    rng, cases = np.random.default_rng(0), []
+    for _ in range(CASES):
+        truth, data = PRIOR.sd * rng.standard_normal(3), []
+        for kind, slopes in SLOPES.items():
+            rows = np.array(slopes)
+            sd = ERROR + (wrong if kind == "coverage" else 0.0)
+            y = rows @ truth + sd * rng.standard_normal(len(rows))
+            errors = ERROR**2 * np.eye(len(rows))
+            data.append(Data(kind, "", np.arange(len(rows)), y, errors, line(rows)))
+        wider, plain = (
+            find(data, PRIOR, PRIOR.mean, ANYWHERE)
+            for find in (explaining_posterior, find_posterior)
+        )
+        rate = line(np.array(SLOPES["coverage"][:1]))
+        held = [
+            abs(rate(one.values).values[0] - SLOPES["coverage"][0] @ truth) < 1.96 * one.sd(rate)[0]
+            for one in (wider, plain)
+        ]
+        cases.append((*held, wider.misfits[1].error_scale > 1.0))
+    return tuple(np.mean(cases, axis=0).tolist())
+
+
+def test_a_true_model_is_hardly_ever_called_wrong() -> None:
+    wider, _, unexplained = shares(wrong=0.0)
+    assert wider >= 0.9  # one time in 75 fewer of 100 hold
+    assert unexplained <= 0.12  # one time in 200 more
+
+
+def test_intervals_hold_where_data_scatter_more_than_their_errors() -> None:
+    wider, plain, unexplained = shares(wrong=0.12)
+    assert wider > 0.82  # of 4 values, whose scatter tells less, fewer
+    assert plain < 0.6
+    assert unexplained > 0.9

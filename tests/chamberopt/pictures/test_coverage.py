@@ -1,0 +1,36 @@
+"""The picture of coverage shows part, sonotrode and colours, of one result or several."""
+
+from pathlib import Path
+
+import numpy as np
+from matplotlib.image import imread
+
+from chamberopt.pictures.coverage import draw_coverage
+from tests.helpers.opengl import needs_opengl
+
+
+@needs_opengl
+def test_picture_shows_part_sonotrode_and_scale(case: tuple, tmp_path: Path) -> None:
+    picture = tmp_path / "coverage.png"
+    assert draw_coverage([case[0]], ["plate"], picture) is None
+    image = imread(picture)[..., :3]
+    assert 0.2 < (image > 0.99).all(axis=2).mean() < 0.9  # background, and not only background
+    orange = np.array([0xE0, 0x8A, 0x2E]) / 255
+    assert (np.abs(image[:, :600] - orange).max(axis=2) < 0.08).mean() > 0.01  # the sonotrode
+    assert (
+        len(np.unique((image * 32).astype(int).reshape(-1, 3), axis=0)) > 60
+    )  # a scale of colours
+    assert [path.name for path in tmp_path.iterdir()] == ["coverage.png"]
+
+
+@needs_opengl
+def test_one_below_the_other(case: tuple, tmp_path: Path) -> None:
+    assert draw_coverage([case[0]], ["one"], tmp_path / "one.png") is None
+    one_row = imread(tmp_path / "one.png").shape[0]
+    assert draw_coverage([case[0]] * 2, ["one", "two"], tmp_path / "both.png") is None
+    image = imread(tmp_path / "both.png")
+    assert image.shape[0] > 1.4 * one_row
+    near = image[:, 600:-160, :3]  # of the targets, without the colour bar
+    upper, lower = near[: len(near) // 2], near[len(near) // 2 :]
+    amounts = [((half > 0.97).all(axis=2)).mean() for half in (upper, lower)]
+    assert abs(amounts[0] - amounts[1]) < 0.1  # the same part on the same scale

@@ -1,0 +1,36 @@
+"""A part is drawn with its target, or with what is wrong with it."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from matplotlib.image import imread
+
+from chamberopt.common.errors import InputError
+from chamberopt.pictures.part import draw_part
+from tests.helpers.opengl import needs_opengl
+
+
+@needs_opengl
+def test_a_part_is_drawn_with_its_target_or_with_its_fault_in_red(tmp_path: Path) -> None:
+    ball = trimesh.creation.icosphere(subdivisions=2, radius=0.01)
+    corners, upper = ball.triangles, ball.triangles_center[:, 2] > 0.0
+    edges = corners[:80, [0, 1, 1, 2]].reshape(-1, 2, 3)
+
+    assert draw_part(corners, "a ball", tmp_path / "target.png", marked=upper) is None
+    assert draw_part(corners, "a hole", tmp_path / "fault.png", edges=edges) is None
+
+    target, fault = (imread(tmp_path / f"{name}.png")[..., :3] for name in ("target", "fault"))
+    red = [
+        (picture[..., 0] - picture[..., 1:].max(axis=2) > 0.5).mean() for picture in (target, fault)
+    ]
+    blue = [(picture[..., 2] - picture[..., 0] > 0.3).mean() for picture in (target, fault)]
+    assert red[1] > 5e-4 > 10 * red[0]
+    assert blue[0] > 0.05 > 10 * blue[1]
+
+
+def test_a_part_is_drawn_only_where_there_can_be_such_a_file(tmp_path: Path) -> None:
+    for name, said in (("part.jpg", r"\.png"), ("nowhere/part.png", "does not exist")):
+        with pytest.raises(InputError, match=said):
+            draw_part(np.zeros((1, 3, 3)), "a part", tmp_path / name)

@@ -1,0 +1,105 @@
+"""Charts of the report hold every value, as text that can be searched."""
+
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+from matplotlib.axes import Axes
+
+from chamberopt.common.estimate import Estimate
+from chamberopt.pictures.charts import result_charts
+from chamberopt.pictures.charts.coverage import HistogramData, draw_histogram
+from chamberopt.pictures.charts.figure_style import SVG, new_figure
+from chamberopt.pictures.charts.study import EvaluatedCandidate, draw_convergence
+
+
+def evaluation(number: int, value: float | None, stage: str = "search", feasible: bool = True):
+    return {
+        "number": number,
+        "stage": stage,
+        "value": value,
+        "half_width": None if value is None else 1.0,
+        "feasible": feasible,
+        "parameters": {"shot.mass_g": 2.5 * number},
+    }
+
+
+ROWS = [
+    evaluation(1, 900.0),
+    evaluation(2, None),
+    evaluation(3, 400.0),
+    evaluation(4, 100.0, feasible=False),
+    evaluation(5, 600.0),
+    evaluation(6, 410.0, "confirm"),
+]
+
+
+def best_so_far(axes: Axes) -> list[float]:
+    (line,) = (line for line in axes.lines if str(line.get_label()).startswith("best so far"))
+    return list(line.get_ydata())
+
+
+@pytest.mark.parametrize(
+    ("smaller_is_better", "best"), [(True, [900.0, 400.0, 400.0, 400.0]), (False, [900.0] * 4)]
+)
+def test_best_so_far_counts_feasible_candidates_only(smaller_is_better, best) -> None:
+    axes = new_figure(4.0, 3.0).subplots()
+    candidates = [
+        EvaluatedCandidate(
+            row["number"],
+            row["stage"],
+            None if row["value"] is None else Estimate(row["value"], 1.0),
+            row["feasible"],
+        )
+        for row in ROWS
+    ]
+    draw_convergence(axes, candidates, "time [s]", smaller_is_better)
+    assert best_so_far(axes) == best
+
+
+def test_failed_infeasible_and_confirmed_candidates_are_marked() -> None:
+    root = ElementTree.fromstring(result_charts.convergence_chart(ROWS, "time [s]", True))
+    texts = ["".join(element.itertext()).strip() for element in root.iter(f"{{{SVG}}}text")]
+    for label in (
+        "time [s]",
+        "evaluation",
+        "not simulated",
+        "misses a constraint",
+        "confirmed on fresh seeds",
+        "best so far (as searched)",
+    ):
+        assert label in texts
+    tooltips = [element.text for element in root.iter(f"{{{SVG}}}title")]
+    assert sorted(tooltips) == [
+        "evaluation 1: 900.0 ± 1.0\nshot.mass_g = 2.5",
+        "evaluation 3: 400.0 ± 1.0\nshot.mass_g = 7.5",
+        "evaluation 4: 100.0 ± 1.0\nshot.mass_g = 10",
+        "evaluation 5: 600.0 ± 1.0\nshot.mass_g = 12.5",
+        "evaluation 6: 410.0 ± 1.0\nshot.mass_g = 15",
+    ]
+
+
+def test_a_search_in_which_all_failed_is_drawn() -> None:
+    assert "not simulated" in result_charts.convergence_chart(
+        [evaluation(1, None), evaluation(2, None)], "goal", False
+    )
+
+
+def test_ids_are_unique_on_a_page_with_several_charts() -> None:
+    coverage = {"result": (np.array([0.0, 0.5, 1.0]), np.array([1.0, 2.0, 1.0]))}
+    first, second = (
+        result_charts.histogram_chart(coverage),
+        result_charts.convergence_chart(ROWS, "goal", False),
+    )
+    ids = [
+        {e.get("id") for e in ElementTree.fromstring(s).iter()} - {None} for s in (first, second)
+    ]
+    assert not ids[0] & ids[1]
+
+
+def test_a_histogram_holds_all_of_the_area() -> None:
+    shares = np.histogram([0.0, 50.0, 100.0], result_charts.BIN_EDGES, weights=[0.25, 0.5, 0.25])[0]
+    axes = new_figure(4.0, 3.0).subplots()
+    draw_histogram(axes, HistogramData(result_charts.BIN_EDGES, [shares], [""], [{}], "", ""))
+    (steps,) = axes.patches
+    assert sum(steps.get_data().values) == pytest.approx(100.0)

@@ -1,0 +1,153 @@
+"""What the report says about parameters follows from the model's curves and their intervals."""
+
+import math
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from chamberopt.common.estimate import Estimate
+from chamberopt.documents.conclusions import answer, answer_lines, influence
+from chamberopt.documents.wording import Label, objective_label
+from chamberopt.results.records import (
+    BestRecord,
+    ConfirmedRecord,
+    ModelRecord,
+    SliceRecord,
+    StartRecord,
+    StudyRecord,
+    ViolationRecord,
+)
+
+
+def a_study(model: ModelRecord | None = None, **other: object) -> StudyRecord:
+    """The record of a study of one parameter x in 0 .. 2, best at 0 and begun at 1."""
+    values: dict[str, Any] = {
+        "evaluations": 20,
+        "failed": 0,
+        "vary": {"x": [0.0, 2.0]},
+        "start": StartRecord.model_construct(parameters={"x": 1.0}),
+        "best": BestRecord(parameters={"x": 0.0}),
+        "model": model,
+        "confirmed": [],
+    }
+    return StudyRecord.model_construct(**values | other)
+
+
+def a_model(mean: list[float], half_width: list[float]) -> ModelRecord:
+    """The model of such a study."""
+    curve = SliceRecord(
+        flat=[0.0, 0.1],
+        share_of_variance=1.0,
+        values=[0.0, 1.0, 2.0],
+        mean=mean,
+        half_width=half_width,
+        main_effect=mean,
+        or_worse=[False] * len(mean),
+    )
+    expected = Estimate(mean[0], half_width[0])
+    return ModelRecord(noise=0.01, expected=expected, together=1.0, parameters={"x": curve})
+
+
+def test_the_cost_of_moving_a_parameter_has_an_interval() -> None:
+    """It costs 0.5 ± 0.5 at its far end, but 0.4 ± 0.05 in the middle: certainly 0.35."""
+    found = influence(a_study(a_model([1.0, 0.6, 0.5], [0.03, 0.04, 0.5])), Label("goal"))
+    (one,) = found["parameters"]
+    assert (one["loss"], one["loss_half_width"]) == pytest.approx((0.5, math.hypot(0.5, 0.03)))
+    assert one["surely"] == pytest.approx(0.35)
+    assert found["said"][0].startswith("x mattered most")
+    assert "0.5 ± 0.5" in found["said"][0]
+    assert "0.35 or more" in found["said"][0]
+
+
+def test_too_few_evaluations_are_reported() -> None:
+    unsure = influence(a_study(a_model([1.0, 0.9, 0.8], [0.2, 0.2, 0.2])), Label("goal"))
+    assert unsure["parameters"][0]["surely"] == 0.0
+    assert "20 evaluations are too few to show an influence of x" in unsure["said"][0]
+    none = influence(a_study(evaluations=3, failed=1), Label("goal"))
+    assert none["parameters"] == []
+    assert none["said"] == [
+        "3 evaluations, 1 of them not simulated, are too few to tell what each parameter does: "
+        "4 or more are needed for a model of them."
+    ]
+
+
+def test_a_time_to_minimise_is_shown_as_a_time() -> None:
+    study = a_study(a_model([-400.0, -900.0, -2000.0], [10.0] * 3))
+    found = influence(study, objective_label("minus_time_to_98_s"))["parameters"][0]
+    assert found["mean"] == [400.0, 900.0, 2000.0]
+    assert found["loss"] == pytest.approx(1600.0)
+
+
+def test_constraints_that_are_not_certainly_met_are_in_the_answer() -> None:
+    metric, limit = "root.almen_intensity_p05", "intensity_mmA ≥ 0.1"
+    band = {"text": limit, "unit": "mmA", "figure": Estimate(0.12, 0.03), "standing": "not known"}
+    mean = Estimate(90.0, 2.0)
+    zones = {
+        "zones": [
+            {"name": "root", "limits": [band], "mean_coverage": mean},
+            {"name": "tip", "limits": [], "mean_coverage": mean},
+        ]
+    }
+    many = ViolationRecord(figure="shot_count", text="shot_count 33 may be > max 30")
+    weak = ViolationRecord(figure=metric, text=f"{metric} 0.12 may be < min 0.1")
+    too_many = ViolationRecord(figure="shot_count", text="shot_count 50 > max 30")
+    other = ViolationRecord(figure="speed", text="faster")
+    confirmed = [
+        ConfirmedRecord(
+            parameters={"x": x},
+            searched_as=None,
+            objective=Estimate(-seconds, 20.0),
+            feasible=False,
+            standing=standing,
+            violations=violations,
+        )
+        for x, seconds, standing, violations in (
+            (2, 300, "infeasible", [too_many]),
+            (1, 200, "not known", [many, weak]),
+            (3, 100, "not known", [other]),
+            (4, 400, "not known", [other]),
+        )
+    ]
+    misfit = SimpleNamespace(kind="dent diameters", error_scale=2.0)
+    study = a_study(
+        best=BestRecord(parameters={"x": 1}),
+        start=StartRecord.model_construct(parameters={"x": 2}),
+        confirmed=confirmed,
+    )
+    design = SimpleNamespace(calibration=SimpleNamespace(misfits=[misfit], not_mmA=""))
+    limited = SimpleNamespace(limits=[SimpleNamespace(metric=metric)])
+    result: Any = SimpleNamespace(
+        study=study,
+        record=SimpleNamespace(zones=[limited]),
+        design=design,
+        objective_name="minus_time_to_98_s",
+        objective=Estimate(-200.0, 20.0),
+    )
+    lines = answer_lines(result, zones)
+    assert [one.text for one in lines] == [
+        "Zone root: intensity_mmA ≥ 0.1 is not known (0.12 ± 0.03 mmA).",
+        "Zone tip: no limits; mean coverage 90.0 ± 2.0 %.",
+        "The start: constraints not met: shot_count 50 > max 30.",
+        "The best chamber found: constraints not known: shot_count 33 may be > max 30.",
+        "Another chamber, whose time until 95 % of the target's area is 98 % covered is 100 ± 20 "
+        "s: constraints not known: faster.",
+        "Calibration: the model explains your dent diameters only with errors 2 times as "
+        "large, as intervals have them: look at the picture of the calibration.",
+    ]
+    assert [one.warns for one in lines] == [True, False, True, True, True, True]
+
+
+def test_what_is_not_resolved_is_not_in_the_answer_as_a_number() -> None:
+    unknown = Estimate(0.4, 0.1).not_known("not resolved")
+    result: Any = SimpleNamespace(
+        objective_name="uniform_coverage",
+        objective=unknown,
+        metrics={"mean_coverage": unknown},
+        design=SimpleNamespace(process=SimpleNamespace(treatment_time=120.0)),
+        study=a_study(),
+    )
+    assert answer(result, None, None) == (
+        "Too few dents were simulated to tell how much of the target is covered after 120 s."
+    )
+    assert answer(result, result, unknown).startswith("Too few dents were simulated to tell wheth")

@@ -1,0 +1,62 @@
+"""Numbers of the report have the digits that their intervals allow, and the metrics' labels."""
+
+import math
+
+import pytest
+
+from chamberopt.documents.wording import Label, objective_label, plain, with_interval
+
+
+@pytest.mark.parametrize(
+    ("value", "half_width", "text"),
+    [
+        (0.80934, 0.00407, "0.809 ± 0.004"),
+        (0.2301, 0.0132, "0.230 ± 0.013"),
+        (0.577, 0.00996, "0.577 ± 0.010"),
+        (5e-18, 1e-18, "0"),
+        (5e-18, 0.02, "0.000 ± 0.020"),
+        (-0.0001, 0.02, "0.000 ± 0.020"),
+        (2166.9, 1678.4, "2200 ± 1700"),
+        (3708.0, 497781.0, "4000 ± 500\u202f000"),
+        (363.0, 0.0, "363"),
+        (-9.96, 0.5, "−10.0 ± 0.5"),
+        (1.5, math.inf, "1.5 ± not known"),
+        (math.nan, 1.0, "not known"),
+    ],
+)
+def test_an_interval_has_one_or_two_digits_and_its_value_the_same_decimals(
+    value, half_width, text
+) -> None:
+    assert with_interval(value, half_width) == text
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (33.9552, "33.96"),
+        (5e-18, "0"),
+        (4311860.0, "4\u202f311\u202f860"),
+        (1e-7, "1e-07"),
+        (120.0, "120"),
+    ],
+)
+def test_a_number_alone_has_four_digits_that_count(value: float, text: str) -> None:
+    assert plain(value) == text
+
+
+def test_an_objective_that_is_a_metric_has_its_label() -> None:
+    assert objective_label("minus_time_to_98_s") == Label(
+        "time until 95 % of the target's area is 98 % covered", "s", -1.0
+    )
+    assert objective_label("p05_coverage").unit == "%"
+    assert (
+        objective_label("uniform_coverage").meaning == "mean minus standard deviation of coverage"
+    )
+    seconds = objective_label("-0.001 root.time_to_98_s")
+    assert seconds.text == "time until 95 % of zone root's area is 98 % covered"
+    assert (seconds.unit, seconds.factor) == ("s", -1000.0)
+    assert objective_label("1 uniform_coverage + -0.001 time_to_98_s").in_full == (
+        "weighted sum (mean coverage of the target − standard deviation of coverage over the "
+        "target − 0.001 × time until 95 % of the target's area is 98 % covered [s])"
+    )
+    assert objective_label("of a later version").text == "of a later version"

@@ -1,0 +1,149 @@
+"""The page in a real browser without a display: it draws, reacts, and fetches nothing."""
+
+import io
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from matplotlib.image import imread
+
+from chamberopt.printers.report_page import write_part_page, write_report
+from tests.helpers.results.browser import WAIT, chromium, expect, needs_chromium
+from tests.helpers.results.report_folders import studied
+
+pytestmark = needs_chromium
+DRAWN = "body[data-drawn=yes]"
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("chamberopt.workflows.save_run.draw_coverage", lambda *_: None)
+        return studied(tmp_path_factory.mktemp("report") / "study")
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    with chromium() as browser:
+        yield browser
+
+
+class OpenPage:
+    """An open page, with its errors and requests."""
+
+    def __init__(self, browser: Any, path: Path, width: int = 1280) -> None:
+        self.errors: list[str] = []
+        self.requests: list[str] = []
+        self.page = browser.new_page(viewport={"width": width, "height": 800})
+        self.page.on("pageerror", lambda error: self.errors.append(str(error)))
+        self.page.on(
+            "console",
+            lambda message: self.errors.append(message.text) if message.type == "error" else None,
+        )
+        self.page.on("request", lambda request: self.requests.append(request.url))
+        self.page.goto(path.as_uri())
+        self.page.wait_for_selector(DRAWN, timeout=WAIT)
+
+    def pixels(self, place: str = "#part-0") -> np.ndarray:
+        """What is on the screen there, (rows, columns, 3) in 0..1."""
+        self.page.wait_for_timeout(600)  # drawn in the next frame
+        return imread(io.BytesIO(self.page.locator(place).first.screenshot()), format="png")[
+            ..., :3
+        ]
+
+
+@pytest.fixture(scope="module")
+def shown(browser: Any, study: Path, tmp_path_factory: pytest.TempPathFactory) -> OpenPage:
+    path, _ = write_report(study, tmp_path_factory.mktemp("page") / "report.html")
+    return OpenPage(browser, path)
+
+
+def coloured(pixels: np.ndarray) -> float:
+    """Share of pixels with a strong colour; only the part's map and its colour bar have any."""
+    return float((np.ptp(pixels, axis=2) > 0.25).mean())
+
+
+def test_the_page_is_drawn_and_fetches_nothing(shown: OpenPage, tmp_path: Path) -> None:
+    shown.page.screenshot(path=tmp_path / "report.png", full_page=True)
+    assert (tmp_path / "report.png").stat().st_size > 50_000
+    assert shown.errors == []
+    assert all(url.startswith(("file:", "data:", "blob:")) for url in shown.requests)
+    assert len([url for url in shown.requests if url.startswith("file:")]) == 1
+    assert coloured(shown.pixels()) > 0.02
+    for name in ("convergence", "slices", "histogram", "against-time"):
+        assert shown.page.locator(f"#{name} svg text").count() > 5
+    assert shown.page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+
+
+def test_another_quantity_has_its_own_bar(shown: OpenPage) -> None:
+    bar = shown.page.locator("#part-0 .bar")
+    assert "coverage [%]" in bar.text_content()
+    before = shown.pixels()
+    shown.page.select_option("#quantity", label="impacts per area")
+    expect(bar).to_contain_text("1/mm²")
+    assert "coverage [%]" not in bar.text_content()
+    assert not shown.page.locator("#times").is_visible()
+    assert np.abs(shown.pixels() - before).max() > 0.2
+    shown.page.select_option("#quantity", label="coverage")
+    expect(bar).to_contain_text("coverage [%]")
+
+
+def test_the_slider_shows_coverage_at_other_times(shown: OpenPage) -> None:
+    before = shown.pixels()
+    slider = shown.page.locator("#time")
+    slider.focus()
+    slider.press("Home")
+    begun = "0 s: the target is covered to 0.0 ± 0.0 %"
+    expect(shown.page.locator("#at")).to_contain_text(begun)
+    after = shown.pixels()
+    assert np.abs(after - before).max() > 0.2
+    slider.press("End")
+    expect(shown.page.locator("#at")).not_to_contain_text(begun)
+    assert np.abs(shown.pixels() - after).max() > 0.2
+
+
+def test_pointing_at_the_target_shows_its_numbers_and_the_triangles(shown: OpenPage) -> None:
+    shown.page.evaluate("document.getElementById('part-0').scrollIntoView({block: 'center'})")
+    box = shown.page.locator("#part-0").bounding_box()
+    label = shown.page.locator("#label")
+    for across in np.linspace(0.35, 0.6, 6):
+        for down in np.linspace(0.3, 0.6, 4):
+            shown.page.mouse.move(box["x"] + across * box["width"], box["y"] + down * box["height"])
+            shown.page.wait_for_timeout(150)
+            if label.is_visible():
+                told = label.inner_text()
+                assert "element" in told
+                assert "simulated impacts on the triangle" in told
+                for unit in ("%", "1/mm²", "m/s", "°"):
+                    assert unit in told
+                return
+    pytest.fail("no triangle of the target answered to the pointer")
+
+
+def test_the_chamber_can_be_hidden_and_folded_text_opens(shown: OpenPage) -> None:
+    before = shown.pixels()
+    shown.page.uncheck("#glass")
+    assert np.abs(shown.pixels() - before).max() > 0.05
+    fold = shown.page.locator("details", has_text="best.toml").last
+    assert not fold.locator("pre").is_visible()
+    fold.locator("summary").click()
+    assert "[sonotrode]" in fold.locator("pre").inner_text()
+
+
+def test_a_narrow_window_needs_no_scrolling_sideways(
+    browser: Any, study: Path, tmp_path: Path
+) -> None:
+    """Two parts, side by side where there is room, turn together."""
+    write_part_page([study / "start", study], tmp_path / "parts.html")
+    narrow = OpenPage(browser, tmp_path / "parts.html", 800)
+    assert narrow.page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+    first, second = (narrow.pixels(f"#part-{i}") for i in range(2))
+    narrow.page.locator("#part-0").hover(position={"x": 200, "y": 200})
+    narrow.page.mouse.down()
+    narrow.page.locator("#part-0").hover(position={"x": 300, "y": 150})
+    narrow.page.mouse.up()
+    assert np.abs(narrow.pixels("#part-0") - first).max() > 0.2
+    assert np.abs(narrow.pixels("#part-1") - second).max() > 0.2
+    assert narrow.errors == []

@@ -1,0 +1,269 @@
+"""Results side by side: differing parameters are named and differences have intervals.
+
+The number of replicas that would make a difference clear is foretold correctly.
+"""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from chamberopt.chamber.build import build_chamber
+from chamberopt.common.errors import InputError
+from chamberopt.common.estimate import Estimate, estimate
+from chamberopt.coverage.compression import ERROR
+from chamberopt.coverage.metrics import NEVER, find_metric
+from chamberopt.design.load import load_design
+from chamberopt.documents.comparison import comparison_text
+from chamberopt.results.compare.comparison import compare
+from chamberopt.results.compare.difference import MAX_TIME_RATIO, confidence_of_each, difference
+from chamberopt.results.vtp_files import read_surface
+from chamberopt.workflows import comparison_folder
+from chamberopt.workflows.comparison_folder import write_comparison
+from chamberopt.workflows.save_run import save_simulation
+from tests.helpers.results.digests import accept_changes
+from tests.helpers.synthetic import DESIGNS, machine_values, plate_design, poisson_evaluation
+
+PLATE = plate_design()
+CHAMBER = build_chamber(PLATE)
+
+
+@pytest.fixture(autouse=True)
+def no_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("chamberopt.workflows.save_run.draw_coverage", lambda *_: "skipped")
+    for name in ("draw_coverage", "draw_difference"):
+        monkeypatch.setattr(comparison_folder, name, lambda *_: "skipped")
+
+
+def left(folder: Path, per_mm2: float, seed: int = 0, design=PLATE, **changes: object) -> Path:
+    evaluation = poisson_evaluation(design, CHAMBER, per_mm2, 6, seed)
+    save_simulation(folder, design, CHAMBER, replace(evaluation, **changes))
+    return folder
+
+
+def row(text: str, name: str) -> str:
+    return next(line for line in text.splitlines() if line.startswith(name))
+
+
+def test_the_same_twice(tmp_path: Path) -> None:
+    both = compare([left(tmp_path / "a", 60), left(tmp_path / "b", 60)])
+    assert both.parameters == {}
+    for name, (gap,) in both.differences.items():
+        assert gap.value == 0.0
+        assert gap.paired
+        assert not gap.real
+        assert gap.time_ratio is None
+        # The bias of these knows nothing of pairs.
+        metric = find_metric(name)
+        if metric is None or not metric.of_places:
+            assert gap.half_width == 0.0, name
+    depth, (gap,) = (both.metrics["compression_depth_um"][0],
+                     both.differences["compression_depth_um"])  # fmt: skip
+    assert gap.half_width < 0.5 * ERROR * depth.value  # which is common to both
+    text = comparison_text(both)
+    assert "the designs do not differ" in text
+    assert row(text, "mean_coverage").endswith("exact")
+    assert "b - a: paired" in text
+
+
+def test_the_error_of_the_depth_is_not_common_to_two_metals(tmp_path: Path) -> None:
+    other = plate_design(materials__part__tensile_MPa=500.0)
+    both = compare([left(tmp_path / "a", 10), left(tmp_path / "other", 10, design=other)])
+    (apart,) = both.differences["compression_depth_um"]
+    assert apart.half_width > np.sqrt(2.0) * ERROR * both.metrics["compression_depth_um"][0].value
+
+
+def test_what_differs_is_named_and_measured(tmp_path: Path) -> None:
+    heavier = plate_design(shot__mass_g=6.0, process__seed=2)
+    both = compare([left(tmp_path / "light", 10), left(tmp_path / "heavy", 30, 1, heavier)])
+    assert both.parameters["shot.mass_g"] == (PLATE.shot.mass_g, 6.0)
+    assert set(both.parameters) == {"shot.mass_g", "process.seed"}
+    assert both.labels == ("light", "heavy")
+    first, second = both.metrics["mean_coverage"]
+    (gap,) = both.differences["mean_coverage"]
+    assert gap.value == pytest.approx(second.value - first.value)
+    assert gap.real  # three times the dents
+    # Other seeds: independent, so the variances add.
+    assert not gap.paired
+    assert gap.half_width == pytest.approx(np.hypot(first.half_width, second.half_width), rel=0.3)
+    assert row(comparison_text(both), "mean_coverage").endswith("yes")
+    assert "heavy - light: independent, on other seeds" in comparison_text(both)
+
+
+def test_pairs_by_hand() -> None:
+    """Six differences from 1 to 6 have mean 3.5 and variance 3.5.
+
+    The 97.5 % quantile of Student's t with 5 degrees of freedom is 2.5706.
+    """
+    before = estimate([10.0, 20.0, 30.0, 40.0, 50.0, 60.0])
+    after = estimate([11.0, 22.0, 33.0, 44.0, 55.0, 66.0])
+    gap = difference(after, before, same_seeds=True)
+    assert gap.value == pytest.approx(3.5)
+    assert gap.half_width == pytest.approx(2.5706 * np.sqrt(3.5 / 6.0), rel=1e-4)
+    assert gap.real
+    apart = difference(after, before, same_seeds=False)
+    assert (apart.paired, apart.real) == (False, False)
+    expected = stats.ttest_ind(
+        after.pseudovalues, before.pseudovalues, equal_var=False
+    ).confidence_interval(0.95)
+    assert (apart.value - apart.half_width, apart.value + apart.half_width) == pytest.approx(
+        tuple(expected)
+    )
+    assert not difference(estimate([1.0, 2.0, 3.0, 4.0, 5.0]), before, same_seeds=True).paired
+
+
+def test_several_later_candidates_widen_each_interval() -> None:
+    """Bonferroni: with four the two-sided error of each is 1.25 %."""
+    before, after = estimate([1.0, 2.0, 4.0, 8.0]), estimate([2.0, 2.5, 7.0, 9.0])
+    confidence = confidence_of_each(4)
+    assert confidence == pytest.approx(0.9875)
+    one, four = (difference(after, before, True, c).half_width for c in (0.95, confidence))
+    assert four / one == pytest.approx(stats.t.ppf(1 - 0.0125 / 2, 3) / stats.t.ppf(0.975, 3))
+
+
+@pytest.mark.parametrize("paired", [True, False])
+def test_simulated_so_much_longer_the_difference_shows_in_half_of_the_cases(paired: bool) -> None:
+    rng = np.random.default_rng(1)
+    count, true_gap, spread = 8, 0.3, 1.0
+    noise = stats.zscore(rng.normal(size=(2, count)), axis=1, ddof=1) * spread
+    if paired:  # the pairs' own scatter is the spread
+        noise[0] = 0.0
+    gap = difference(estimate(true_gap + noise[1]), estimate(noise[0]), same_seeds=paired)
+    assert not gap.real
+    assert gap.replicas is not None
+    assert gap.time_ratio == pytest.approx(gap.replicas / count)
+    # With many replicas the limit is 1.96 standard errors. The foretold number is not far above it,
+    # because Student's t of more replicas is close to 1.96.
+    limit = (1.96 * spread / true_gap) ** 2 * (1 if paired else 2)
+    assert limit < gap.replicas < 1.2 * limit
+    drawn = (
+        rng.normal(0.0, spread, (2, 4000, gap.replicas)) + np.array([0.0, true_gap])[:, None, None]
+    )
+    if paired:
+        found = stats.ttest_1samp(drawn[1], 0.0, axis=1).pvalue < 0.05
+    else:
+        found = stats.ttest_ind(drawn[1], drawn[0], axis=1, equal_var=False).pvalue < 0.05
+    assert found.mean() == pytest.approx(0.5, abs=0.04)
+
+
+def test_what_would_take_for_ever_is_not_foretold(tmp_path: Path) -> None:
+    values = np.array([1.0, 2.0, 3.0, 4.0])
+    tiny = difference(estimate(values[::-1] + 1e-4), estimate(values), same_seeds=True)
+    assert (tiny.real, tiny.time_ratio, tiny.replicas) == (False, None, None)
+    both = compare([left(tmp_path / "a", 20), left(tmp_path / "b", 20)])
+    text = comparison_text(replace(both, differences={name: (tiny,) for name in both.differences}))
+    assert row(text, "mean_coverage").endswith(f"more than {MAX_TIME_RATIO} × as long")
+
+
+@pytest.mark.parametrize("words", ["never", "more than 2,300 s", "not resolved"])
+def test_a_figure_without_a_number_is_written_in_words_and_not_ranked(
+    tmp_path: Path, words: str
+) -> None:
+    evaluation = poisson_evaluation(PLATE, CHAMBER, 60, 6)
+    without = Estimate(NEVER, 0.0, (NEVER,) * 6, in_words=words)
+    metrics = {**evaluation.metrics, "time_to_98_s": without}
+    both = compare([left(tmp_path / "a", 60), left(tmp_path / "b", 60, metrics=metrics)])
+    (gap,) = both.differences["time_to_98_s"]
+    assert not gap.real
+    line = row(comparison_text(both), "time_to_98_s")
+    assert words in line
+    assert line.split()[-3:] == ["not", "known", "no"]
+    assert "1000000" not in line
+    assert both.as_json()["metrics"]["time_to_98_s"][1]["in_words"] == words
+    assert gap.as_json()["half_width"] is None
+
+
+def test_three_results_and_what_is_written(tmp_path: Path) -> None:
+    folders = [left(tmp_path / name / "result", 60 + 60 * i, i) for i, name in enumerate("abc")]
+    three = compare(folders)
+    assert three.labels == ("a/result", "b/result", "c/result")
+    assert len(three.differences["mean_coverage"]) == 2
+    assert three.confidence == pytest.approx(0.975)
+    assert "hold together with 95 % (Bonferroni)" in comparison_text(three)
+    assert write_comparison(tmp_path / "out", three) == ["skipped"] * 2
+    assert (tmp_path / "out" / "compare.txt").read_text() == comparison_text(three) + "\n"
+    about = json.loads((tmp_path / "out" / "compare.json").read_text())
+    assert [gap["real"] for gap in about["differences_to_first"]["mean_coverage"]] == [True, True]
+    assert len(about["coverage_against_time"][2]) > 5
+    assert about["metrics"]["time_to_98_s"][0]["half_width"] > 0
+    for name in ("coverage", "normal_speed", "angle"):
+        histogram = about["distributions"][name]
+        for shares in histogram["shares"]:
+            assert len(shares) == len(histogram["edges"]) - 1
+            assert sum(shares) == pytest.approx(1.0)
+    # All synthetic impacts have 3 m/s and 70 degrees. The mean of the coverage's histogram is the
+    # mean coverage.
+    assert about["distributions"]["mean_normal_speed_m_s"] == pytest.approx([3.0] * 3)
+    assert about["distributions"]["mean_angle_deg"] == pytest.approx([70.0] * 3)
+    edges = np.array(about["distributions"]["coverage"]["edges"])
+    for shares, mean in zip(
+        about["distributions"]["coverage"]["shares"], three.metrics["mean_coverage"], strict=True
+    ):
+        assert 0.5 * (edges[1:] + edges[:-1]) @ shares == pytest.approx(
+            100.0 * mean.value, abs=edges[1] - edges[0]
+        )
+    assert (tmp_path / "out" / "distributions.png").stat().st_size > 50_000
+    with pytest.raises(InputError, match="nothing is ever overwritten"):
+        write_comparison(tmp_path / "out", three)
+
+
+def test_single_impacts_of_another_result_are_refused(tmp_path: Path) -> None:
+    both = compare([left(tmp_path / "a", 20), left(tmp_path / "b", 30)])
+    (tmp_path / "b" / "hits.npz").write_bytes((tmp_path / "a" / "hits.npz").read_bytes())
+    with pytest.raises(InputError, match=r"b/hits\.npz: not the file that was written"):
+        write_comparison(tmp_path / "out", both)
+    accept_changes(tmp_path / "b")
+    both = compare([tmp_path / "a", tmp_path / "b"])
+    with pytest.raises(
+        InputError, match=r"hits\.npz: its impacts are not those of the part\.vtp beside it"
+    ):
+        write_comparison(tmp_path / "out", both)
+    assert not (tmp_path / "out").exists()
+
+
+def test_targets_of_other_triangles_are_refused(tmp_path: Path) -> None:
+    both = compare([left(tmp_path / "a", 20), left(tmp_path / "b", 30)])
+    surface = read_surface(tmp_path / "b" / "part.vtp")
+    surface["target"][np.flatnonzero(surface["target"])[:3]] = 0
+    surface.save(tmp_path / "b" / "part.vtp")
+    accept_changes(tmp_path / "b")
+    both = compare([tmp_path / "a", tmp_path / "b"])
+    with pytest.raises(InputError, match="its target of 333 triangles is not that of"):
+        write_comparison(tmp_path / "out", both)
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.long
+def test_what_cannot_be_compared(tmp_path: Path) -> None:
+    one = left(tmp_path / "one", 20)
+    with pytest.raises(InputError, match="two or more"):
+        compare([one])
+    with pytest.raises(InputError, match="given twice"):
+        compare([one, one / ".." / "one"])
+    with pytest.raises(InputError, match="not a results folder"):
+        compare([one, tmp_path])
+    blade = load_design(DESIGNS / "blade.toml")
+    other = build_chamber(blade)
+    save_simulation(tmp_path / "blade", blade, other, poisson_evaluation(blade, other))
+    with pytest.raises(InputError, match=r"another part \(blade.stl\).*plate.stl"):
+        compare([one, tmp_path / "blade"])
+    part = PLATE.part.model_copy(update={"target": type(PLATE.part.target)()})
+    elsewhere = left(tmp_path / "all", 20, 0, PLATE.model_copy(update={"part": part}))
+    with pytest.raises(InputError, match=r"part\.target differs"):
+        compare([one, elsewhere])
+    longer = left(tmp_path / "longer", 20, 0, plate_design(process__treatment_time_s=10))
+    with pytest.raises(InputError, match=r"peened for 10 s.*for 5 s.*--treatment-time-s"):
+        compare([one, longer])
+    wider = left(tmp_path / "wider", 20, 0, plate_design(process__accuracy__gauge_mm2=4))
+    with pytest.raises(InputError, match=r"gauge_mm2 is 4, in .* 1: .* different areas"):
+        compare([one, wider])
+    machines = [
+        left(tmp_path / name, 20, 0, plate_design(calibration=machine_values(v0=sd)))
+        for name, sd in (("mine", 0.1), ("yours", 0.2))
+    ]
+    with pytest.raises(InputError, match="another calibration than in"):
+        compare(machines)
+    compare([one, machines[0]])

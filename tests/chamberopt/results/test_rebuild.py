@@ -1,0 +1,32 @@
+"""A result's chamber and replicas are those that were simulated."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from chamberopt.chamber.build import build_chamber
+from chamberopt.chamber.scene import build_scene, chamber_mesh, replica_seed
+from chamberopt.common.errors import InputError
+from chamberopt.results.load import Result
+from chamberopt.results.rebuild import rebuild_replica
+from tests.helpers.results.short_plate import plate_result
+
+
+@pytest.fixture(scope="module")
+def result(tmp_path_factory: pytest.TempPathFactory) -> Result:
+    return plate_result(tmp_path_factory.mktemp("rebuild") / "plate")
+
+
+def test_a_replica_has_the_scene_of_the_chamber_that_is_built(result: Result) -> None:
+    replica, design = rebuild_replica(result, 2), result.design
+    built = build_scene(design, chamber_mesh(build_chamber(design)), replica_seed(1, 2))
+    np.testing.assert_array_equal(replica.scene.mesh.vertices, built.mesh.vertices)
+    np.testing.assert_array_equal(replica.scene.mesh.triangles, built.mesh.triangles)
+    np.testing.assert_array_equal(replica.scene.balls.positions, built.balls.positions)
+    assert replica.scene.physics == built.physics
+
+
+def test_a_replica_that_is_not_there_is_refused(result: Result, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="--replica: given 3; the result has 3, give 0 to 2"):
+        rebuild_replica(result, 3)

@@ -1,0 +1,422 @@
+"""What can go wrong while a study runs.
+
+Nothing on record is lost, the message says what happened, and the study can continue.
+"""
+
+import errno
+import math
+import multiprocessing
+import os
+import signal
+import threading
+import time
+from collections.abc import Callable
+from concurrent.futures import BrokenExecutor, ProcessPoolExecutor
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+import chamberopt
+from chamberopt.chamber.build import build_chamber
+from chamberopt.cli import main
+from chamberopt.cli.interrupt import EARLY, FIRST, SECOND
+from chamberopt.common.estimate import Estimate
+from chamberopt.results.load import load_result
+from chamberopt.search.evaluate_candidate import FAILURE_PENALTY
+from chamberopt.search.study import load_study
+from tests.helpers.results.resumable_study import calls, history, logged, run, study
+from tests.helpers.synthetic import DESIGNS, plate_design, poisson_evaluation
+
+fork = (
+    multiprocessing.get_context("fork")
+    if "fork" in multiprocessing.get_all_start_methods()
+    else None
+)
+needs_fork = pytest.mark.skipif(fork is None, reason="needs fork")
+
+
+@pytest.fixture
+def expected(tmp_path: Path) -> bytes:
+    """The history of the study when nothing goes wrong."""
+    run(study(), tmp_path / "whole")
+    return history(tmp_path / "whole")
+
+
+def failing(folder: Path, at: int, error: Callable[[], BaseException], times: int = 1):
+    """The simulator of a folder; its call number `at` and the next raise."""
+    good, left = logged(folder.with_name(f"{folder.name}-calls.log")), [times]
+
+    def simulator(design, stream, replicas):
+        if len(calls(folder)) >= at and left[0]:
+            left[0] -= 1
+            raise error()
+        return good(design, stream, replicas)
+
+    return simulator
+
+
+class TestFullDisk:
+    @pytest.mark.long
+    def test_no_room_for_a_row(
+        self, tmp_path: Path, expected: bytes, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        """Wherever in a study the disk fills up: search, confirmation's file, its row."""
+        for full_after in (0, 1, 5, 21, 25, 27):
+            folder, synced = tmp_path / str(full_after), [0]
+
+            def sync(file: int, full_after: int = full_after, synced: list[int] = synced) -> None:
+                synced[0] += 1
+                if synced[0] > full_after:
+                    raise OSError(errno.ENOSPC, "No space left on device")
+
+            with monkeypatch.context() as patch:
+                patch.setattr("os.fsync", sync)
+                with pytest.raises(OSError, match="No space left"):
+                    run(study(), folder)
+            kept = history(folder) if (folder / "history.jsonl").exists() else b""
+            assert expected.startswith(kept)
+            assert kept.endswith(b"\n") or not kept
+            run(study(), folder)
+            assert history(folder) == expected
+
+    @needs_fork
+    def test_a_row_that_fits_in_part(self, tmp_path: Path, expected: bytes) -> None:
+        """The system's own refusal, in the middle of a row: a limit on the size of files."""
+        import resource
+
+        folder, room = tmp_path / "out", len(expected) // 2
+
+        def limited() -> None:
+            resource.setrlimit(resource.RLIMIT_FSIZE, (room, room))
+            run(study(), folder)
+
+        child = fork.Process(target=limited)
+        child.start()
+        child.join(60)
+        assert child.exitcode == 1
+        kept = history(folder)
+        assert expected.startswith(kept)
+        assert room - 2000 < len(kept) <= room
+        assert kept.endswith(b"\n")  # what had been written of the next was taken back
+        run(study(), folder)
+        assert history(folder) == expected
+
+
+@pytest.mark.parametrize("error", [ZeroDivisionError, MemoryError, KeyboardInterrupt])
+@pytest.mark.parametrize("at", [5, 17])
+def test_a_fault_of_ours_stops_the_study_not_the_candidate(
+    error: type[BaseException], at: int, tmp_path: Path, expected: bytes
+) -> None:
+    folder = tmp_path / "out"
+    with pytest.raises(error) as raised:
+        run(study(), folder, simulator=failing(folder, at, error))
+    assert history(folder).count(b"\n") == at
+    if issubclass(error, Exception):
+        (note,) = raised.value.__notes__
+        assert note.startswith(
+            f"in evaluation {at + 1} ({'search' if at < 16 else 'confirm'}): chamber.height_mm = "
+        )
+    run(study(), folder)
+    assert history(folder) == expected
+    assert len(calls(folder)) == len(calls(tmp_path / "whole"))
+
+
+def test_no_number_is_no_score(tmp_path: Path) -> None:
+    folder = tmp_path / "out"
+    good = logged(folder.with_name("out-calls.log"))
+
+    def simulator(design, stream, replicas):
+        evaluation = good(design, stream, replicas)
+        return (
+            replace(evaluation, objective=Estimate(math.nan, math.nan))
+            if len(calls(folder)) == 4
+            else evaluation
+        )
+
+    result = run(study(), folder, simulator=simulator)
+    assert (result.trials[3].objective, result.trials[3].score) == (
+        None,
+        result.trials[0].score - FAILURE_PENALTY,
+    )
+    assert "nan" in result.trials[3].reason
+    assert run(study(), folder).trials == result.trials
+
+
+def _die() -> None:
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+class TestWorkerThatDies:
+    """A real worker process is killed from outside, in a pool that must then be replaced."""
+
+    def simulator(self, folder: Path, deaths: list[int]):
+        good = logged(folder.with_name(f"{folder.name}-calls.log"))
+
+        def simulator(design, stream, replicas):
+            if len(calls(folder)) == 5 and deaths[0]:
+                deaths[0] -= 1
+                with ProcessPoolExecutor(1, fork) as pool:
+                    pool.submit(_die).result()
+            return good(design, stream, replicas)
+
+        return simulator
+
+    @needs_fork
+    def test_once_is_made_good(self, tmp_path: Path, expected: bytes) -> None:
+        run(study(), tmp_path / "out", simulator=self.simulator(tmp_path / "out", [1]))
+        assert history(tmp_path / "out") == expected
+
+    @needs_fork
+    def test_twice_is_said(self, tmp_path: Path, expected: bytes) -> None:
+        folder = tmp_path / "out"
+        with pytest.raises(BrokenExecutor) as raised:
+            run(study(), folder, simulator=self.simulator(folder, [2]))
+        assert "in evaluation 6 (search): chamber.height_mm" in raised.value.__notes__[0]
+        assert history(folder).count(b"\n") == 5
+        run(study(), folder)
+        assert history(folder) == expected
+
+
+STUDY = f"""
+design = "{(DESIGNS / "plate.toml").as_posix()}"
+[vary]
+"shot.mass_g" = [1.5, 8.0]
+[optimizer]
+batch = 1
+first_replicas = 0
+confirm_rounds = 1
+evaluations = 5
+confirm = 1
+confirm_replicas = 3
+"""
+ROWS = 7  # five searched, then the start and the best confirmed
+
+
+class TestCommandLine:
+    """`chamberopt run` with an simulator of milliseconds; all around it is real."""
+
+    @pytest.fixture
+    def evaluated(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list:
+        """Every evaluation, as (stream, mass).
+
+        A function under the key "at" + its number is called during that evaluation.
+        """
+        monkeypatch.chdir(tmp_path)
+        Path("small.toml").write_text(STUDY)
+        chamber = build_chamber(plate_design())
+        done: list = []
+
+        def simulator(design, stream, replicas):
+            done.append((stream, design.shot.mass_g))
+            self.at.get(len(done), lambda: None)()
+            return poisson_evaluation(
+                design, chamber, 4.0 * design.shot.mass_g, 3, seed=len(stream)
+            )
+
+        self.at: dict[int, Callable[[], None]] = {}
+        monkeypatch.setattr("chamberopt.search.run_study.ChamberSimulator", lambda *_: simulator)
+        monkeypatch.setattr("chamberopt.cli.commands.run.compile_with_message", lambda *_: None)
+        monkeypatch.setattr("chamberopt.pictures.coverage.draw_coverage", lambda *_: None)
+        return done
+
+    def rows(self, folder: str = "out") -> int:
+        return Path(folder, "history.jsonl").read_text().count("\n")
+
+    def test_ctrl_c_once_finishes_the_evaluation(
+        self, evaluated: list, capfd: pytest.CaptureFixture[str]
+    ) -> None:
+        self.at[3] = lambda: os.kill(os.getpid(), signal.SIGINT)
+        before = signal.getsignal(signal.SIGINT)
+        assert main(["run", "small.toml", "--out", "out"]) == 130
+        err = capfd.readouterr().err
+        assert FIRST in err
+        assert err.splitlines()[-1] == "to resume: chamberopt run small.toml --out out"
+        assert (self.rows(), len(evaluated)) == (3, 3)
+        assert signal.getsignal(signal.SIGINT) is before
+        assert main(["run", "small.toml", "--out", "out"]) == 0
+        out, err = capfd.readouterr()
+        assert "out: resuming after 3 evaluations" in err
+        assert "gain" in out
+        assert len(evaluated) == len(set(evaluated)) == self.rows() == ROWS
+
+    def test_ctrl_c_finishes_all_that_runs(self, evaluated: list) -> None:
+        """The third and the fourth run when it comes, and the third ends last."""
+        study, at_a_time = Path("small.toml"), threading.Barrier(2)
+
+        def interrupt() -> None:
+            at_a_time.wait(20)
+            os.kill(os.getpid(), signal.SIGINT)
+            time.sleep(0.2)
+
+        self.at.update({3: interrupt, 4: lambda: at_a_time.wait(20)})
+        study.write_text(STUDY.replace("batch = 1", "batch = 2"))
+        assert main(["run", "small.toml", "--out", "out"]) == 130
+        assert (self.rows(), len(evaluated)) == (4, 4)
+        assert main(["run", "small.toml", "--out", "out"]) == 0
+        assert len(evaluated) == len(set(evaluated)) == self.rows() == ROWS
+
+    @needs_fork
+    def test_ctrl_c_twice_stops_at_once(
+        self, evaluated: list, capfd: pytest.CaptureFixture[str]
+    ) -> None:
+        def twice() -> None:
+            for seconds in (1.0, 20.0):  # the main thread takes one signal at a time
+                os.kill(os.getpid(), signal.SIGINT)
+                time.sleep(seconds)
+            raise AssertionError("went on after the second Ctrl-C")
+
+        self.at[3] = twice
+        child = fork.Process(target=main, args=(["run", "small.toml", "--out", "out"],))
+        child.start()
+        child.join(60)
+        err = capfd.readouterr().err
+        assert child.exitcode == 130, err
+        assert (
+            err.index(FIRST)
+            < err.index(SECOND)
+            < err.index("to resume: chamberopt run small.toml --out out")
+        )
+        assert self.rows() == 2
+        self.at.clear()
+        assert main(["run", "small.toml", "--out", "out"]) == 0
+        assert len(evaluated) == ROWS - 2
+
+    @needs_fork
+    def test_ctrl_c_before_the_first_evaluation_leaves_nothing(
+        self, evaluated: list, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        """The signal may come at any moment.
+
+        An exception would be dropped during an import, and would crash the compiler.
+        """
+        monkeypatch.setattr(
+            "chamberopt.cli.commands.run.compile_with_message",
+            lambda *_: os.kill(os.getpid(), signal.SIGINT),
+        )
+        child = fork.Process(target=main, args=(["run", "small.toml"],))
+        child.start()
+        child.join(60)
+        assert (child.exitcode, EARLY in capfd.readouterr().err) == (130, True)
+        monkeypatch.setattr("chamberopt.cli.commands.run.compile_with_message", lambda *_: None)
+        assert main(["run", "small.toml"]) == 0
+        assert [path.name for path in Path("results").iterdir()] == ["small"]
+
+    def test_a_full_disk(
+        self, evaluated: list, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        def full(_: int) -> None:
+            raise OSError(errno.ENOSPC, "No space left on device")
+
+        self.at[4] = lambda: monkeypatch.setattr("os.fsync", full)
+        assert main(["run", "small.toml", "--out", "out"]) == 1
+        *_, what, how = capfd.readouterr().err.splitlines()
+        assert what == f"{Path('out/history.jsonl')}: No space left on device"
+        assert how == "to resume: chamberopt run small.toml --out out"
+        assert self.rows() == 3
+
+    @pytest.mark.parametrize(
+        ("error", "said"), [(MemoryError, "out of memory"), (BrokenExecutor, "worker process died")]
+    )
+    def test_the_machines_faults_are_one_message(
+        self, error: type[Exception], said: str, evaluated: list, capfd: pytest.CaptureFixture[str]
+    ) -> None:
+        def fail() -> None:
+            raise error
+
+        self.at = {4: fail, 5: fail}
+        assert main(["run", "small.toml", "--out", "out"]) == 1
+        what, which, how = capfd.readouterr().err.splitlines()[-3:]
+        assert said in what
+        assert which.startswith("in evaluation 4 (search): shot.mass_g = ")
+        assert how == "to resume: chamberopt run small.toml --out out"
+
+    def test_a_bug_shows_where_it_was_and_how_to_go_on(self, evaluated: list) -> None:
+        def fail() -> None:
+            raise ZeroDivisionError
+
+        self.at[2] = fail
+        with pytest.raises(ZeroDivisionError) as raised:
+            main(["run", "small.toml", "--out", "out"])
+        assert raised.value.__notes__[1] == "to resume: chamberopt run small.toml --out out"
+
+    @pytest.mark.parametrize(
+        "step",
+        [
+            "results.write.write_coverage",
+            pytest.param("results.write.write_chamber", marks=pytest.mark.long),
+            pytest.param("workflows.save_run.draw_coverage", marks=pytest.mark.long),
+        ],
+    )
+    def test_stopped_while_it_writes_its_results(
+        self, step: str, evaluated: list, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        def full(*_: object) -> None:
+            raise OSError(errno.ENOSPC, "No space left on device")
+
+        with monkeypatch.context() as patch:
+            patch.setattr(f"chamberopt.{step}", full)
+            assert main(["run", "small.toml", "--out", "out"]) == 1
+        assert len(evaluated) == ROWS
+        assert not Path("out/result.json").exists()
+        assert main(["run", "small.toml", "--out", "out"]) == 0
+        assert len(evaluated) == ROWS
+        assert load_result("out").record.kind == "study"
+
+    def test_a_finished_study_is_shown_not_run(
+        self, evaluated: list, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        assert main(["run", "small.toml", "--out", "out"]) == 0
+        before = {path: path.read_bytes() for path in Path("out").rglob("*") if path.is_file()}
+        capfd.readouterr()
+        monkeypatch.setattr(
+            "chamberopt.common.versions.sources_digest", lambda: "another"
+        )  # its result stands
+        assert main(["run", "small.toml", "--out", "out"]) == 0
+        out, err = capfd.readouterr()
+        assert (
+            "out: this study is finished, nothing was run; to run it again, give another folder "
+            "(--out)" in err
+        )
+        assert "uniform coverage" in out
+        assert len(evaluated) == ROWS
+        assert {
+            path: path.read_bytes() for path in Path("out").rglob("*") if path.is_file()
+        } == before
+        Path("small.toml").write_text(STUDY.replace("evaluations = 5", "evaluations = 6"))
+        assert main(["run", "small.toml", "--out", "out"]) == 2
+        assert "study.optimizer.evaluations: was 5, is 6" in capfd.readouterr().err
+
+    @pytest.mark.long
+    def test_comments_change_nothing(self, evaluated: list) -> None:
+        self.at[3] = lambda: os.kill(os.getpid(), signal.SIGINT)
+        assert main(["run", "small.toml", "--out", "out"]) == 130
+        Path("small.toml").write_text("# as before\n" + STUDY.replace("8.0]", "8]  # g"))
+        assert main(["run", "small.toml", "--out", "out"]) == 0
+        assert load_study("out/study.toml") == load_study("small.toml")
+
+    def test_without_out_it_begins_anew_and_says_what_is_unfinished(
+        self, evaluated: list, capfd: pytest.CaptureFixture[str]
+    ) -> None:
+        self.at[3] = lambda: os.kill(os.getpid(), signal.SIGINT)
+        assert main(["run", "small.toml"]) == 130
+        first = Path("results", "small")
+        assert f"to resume: chamberopt run small.toml --out {first}" in capfd.readouterr().err
+        assert main(["run", "small.toml"]) == 0
+        assert (
+            f"{first}: not finished; to resume it: chamberopt run small.toml --out {first}"
+            in capfd.readouterr().err
+        )
+        assert self.rows("results/small") == 3
+        assert self.rows("results/small-2") == ROWS
+
+    @pytest.mark.long
+    def test_from_python_too(self, evaluated: list) -> None:
+        self.at[3] = lambda: signal.raise_signal(signal.SIGINT)  # no handler of ours there
+        with pytest.raises(KeyboardInterrupt):
+            chamberopt.optimise(load_study("small.toml"), "out", workers=1)
+        self.at.clear()
+        evaluated.pop()
+        first = chamberopt.optimise(load_study("small.toml"), "out", workers=1)
+        assert chamberopt.optimise(load_study("small.toml"), "out", workers=1) == first
+        assert len(evaluated) == len(set(evaluated)) == ROWS
