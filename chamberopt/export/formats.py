@@ -102,13 +102,13 @@ FORMATS = {
         "tolerances.csv",
         "what each tolerance does to each figure",
         (".csv",),
-        "tolerance_table.write_tolerance_table",
+        "tables.write_tolerance_table",
     ),
     STUDY: ExportFormat(
         "study.csv",
         "the evaluations of a study or sweep, finished or not",
         (".csv",),
-        "study_table.write_study_table",
+        "tables.write_study_table",
     ),
 }
 

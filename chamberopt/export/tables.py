@@ -1,4 +1,4 @@
-"""What the tolerances of a result do, as a table."""
+"""Tables for spreadsheets: the effects of tolerances, and the evaluations of a study or sweep."""
 
 from __future__ import annotations
 
@@ -13,11 +13,12 @@ from chamberopt.search.trial_log import trials_as_csv
 if TYPE_CHECKING:
     from chamberopt.common.estimate import Estimate
 
-# The evaluations of a study or sweep as a table; NAME_pm is the 95 % half-width of NAME.
-
-
 def write_study_table(folder: Path, file: Path) -> None:
-    """Write the evaluations recorded so far as .csv; InputError where there are none."""
+    """Write the evaluations recorded so far as .csv; NAME_pm is the 95 % half-width of NAME.
+
+    Raises:
+        InputError: there are none.
+    """
     write_text(file, trials_as_csv(load_trials(folder)))
 
 
