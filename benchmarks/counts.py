@@ -7,9 +7,9 @@ chamberopt and sim_core:
 
     tokens       of Python, without comments, docstrings and white space
     chain        files of the longest chain of imports that happen when a file is loaded
-    tolerances   files outside peening/ and design/ that name the tolerances of a result
-    crease share files outside coverage/ and simulation/ that name the share of the target in creases
-    estimates    types and literal dictionaries that hold an estimate: a value with the ends low and high
+    tolerances   files, outside peening/ and design/, that name the tolerances of a result
+    crease share files, outside the packages that compute it, that name the share of sharp edges
+    estimates    types and literal dictionaries with both ends of an interval, low and high
     Any          share of the arguments and returns of functions that are of type Any
 """
 
@@ -22,11 +22,11 @@ from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(ROOT))
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from benchmarks.table import print_table
 
+ROOT = Path(__file__).resolve().parents[1]
 PACKAGES = ("chamberopt", "sim_core")
 SPACE = {
     tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT,
@@ -153,8 +153,13 @@ def _estimate_forms(tree: ast.Module) -> int:
 def main() -> None:
     folders = [Path(one).resolve() for one in sys.argv[1:]] or [ROOT]
     columns = [Sources(folder).counts() for folder in folders]
-    rows = [(name, *(column[name] for column in columns)) for name in columns[0]]
-    print_table(["", *(folder.name for folder in folders)], rows)
+    names = [str(folder) for folder in folders]
+    print_table(
+        [
+            {"count": name, **dict(zip(names, (one[name] for one in columns), strict=True))}
+            for name in columns[0]
+        ]
+    )
 
 
 if __name__ == "__main__":

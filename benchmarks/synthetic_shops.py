@@ -32,9 +32,8 @@ from chamberopt.peening.calibration_errors import evaluate_calibrated
 from chamberopt.peening.measured import Measured, MeasuredDents, dent_errors, with_amplitude
 from chamberopt.peening.next_measurement import predict
 from chamberopt.peening.posterior import Model
-from chamberopt.peening.setups import SIMULATED
 from chamberopt.peening.probes import ArcProbe, PartProbe, SaturationProbe, whole_target
-from chamberopt.peening.setups import DropModel, Setup, exact_calibration, simulate_setup
+from chamberopt.peening.setups import SIMULATED, DropModel, Setup, exact_calibration, simulate_setup
 from chamberopt.peening.strip import StripSize, strip_cells
 from chamberopt.peening.strip_holder import strip_design
 from chamberopt.simulation.evaluate import evaluate

@@ -15,7 +15,7 @@ ROOT = Path(__file__).resolve().parents[1]
 ORDER = {
     "chamberopt": (
         "common geometry design chamber coverage simulation peening search results pictures "
-        "documents+printers viewer workflows export page api cli __main__"
+        "documents printers viewer workflows export page api cli __main__"
     ),
     "chamberopt/geometry": "triangles faces+solids+remesh meshes slivers+smoothing",
     "chamberopt/geometry/smoothing": "rounds normals divide smooth part",
@@ -38,7 +38,9 @@ ORDER = {
     "virtual_strip measured probes posterior setups calibrate next_measurement",
     "chamberopt/search": "study+optimiser trial_log study_folder "
     "sensitivity+evaluate_candidate candidates run_study pareto+run_sweep",
-    "chamberopt/results": "vtp_files records load chamber_file write rebuild flight+impacts compare",
+    "chamberopt/results": (
+        "vtp_files records load chamber_file write rebuild flight+impacts compare"
+    ),
     "chamberopt/pictures": "charts camera drawn_part actors+overlay+subprocess_drawing "
     "view picture_page panels coverage+dents+difference+film+part+part3d "
     "section part_drawing comparison",

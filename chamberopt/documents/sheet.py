@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any
@@ -14,8 +14,12 @@ from chamberopt.common.estimate import Estimate
 from chamberopt.common.number_text import estimate_text
 from chamberopt.design.calibration import why_no_intensity
 from chamberopt.design.tolerances import tolerance_box
-from chamberopt.documents.sections import LIMITS_OF_CALIBRATED, LIMITS_OF_INTERVALS
-from chamberopt.documents.wording import interval_text, metric_label, per_cent, plain
+from chamberopt.documents.answer import answer, answer_lines
+from chamberopt.documents.coverage import change, figures
+from chamberopt.documents.report import limits_of_intervals, notes_of, seed_text
+from chamberopt.documents.tolerances import tolerated_figures
+from chamberopt.documents.wording import metric_label, per_cent, plain
+from chamberopt.results.load import load_start
 
 if TYPE_CHECKING:
     from chamberopt.design.sonotrode import VibratingFace
@@ -27,30 +31,30 @@ if TYPE_CHECKING:
 TIME = "time_to_98_s"
 
 
-def cautions(result: Result, contents: Mapping[str, Any]) -> Iterator[str]:
+def cautions(result: Result) -> Iterator[str]:
     """Sentences on what is simulated otherwise than it is done, and on what is not reached."""
-    yield from _time(result, contents)
+    yield from _time(result)
     if result.design.effects.friction is None:
         yield (
             "Simulated without friction. With it the shot was 22 to 47 % slower in a cylinder (mu "
             "0.1 to 0.5), and coverage takes longer: rely on these times only once the coverage "
             "measured first agrees."
         )
-    if any(note.startswith(LEFT) for note in contents["notes"]):
+    if any(note.startswith(LEFT) for note in notes_of(result)):
         yield (
             "The part's file has coarse facets in the place of its rounds, which were not divided: "
             "coverage and times are those of the facets."
         )
-    if any("without a holder" in note for note in contents["notes"]):
+    if any("without a holder" in note for note in notes_of(result)):
         yield "The part is held in the air: its holder is neither designed nor simulated."
-    ends = [note.partition(" = ")[0] for note in contents["notes"] if " lies on its " in note]
+    ends = [note.partition(" = ")[0] for note in notes_of(result) if " lies on its " in note]
     if ends:
         yield (
             f"The search ended on its bounds of {', '.join(ends)}: a better chamber may lie beyond."
         )
 
 
-def _time(result: Result, contents: Mapping[str, Any]) -> Iterator[str]:
+def _time(result: Result) -> Iterator[str]:
     """Whether the peening time is shorter than what covers the target."""
     time, planned = result.metrics.get(TIME), result.design.process.treatment_time
     if time is None or time.in_words == "not resolved" or time.value <= planned:
@@ -58,8 +62,7 @@ def _time(result: Result, contents: Mapping[str, Any]) -> Iterator[str]:
     if time.in_words == "never":
         yield "95 % of the target's area is never 98 % covered, however long it is peened."
         return
-    row = next(one["result"] for one in contents["metrics"] if one["name"] == TIME)
-    needed = time.in_words or f"{interval_text(row)} s"
+    needed = time.in_words or metric_label(TIME).format(time)
     yield (
         f"The peening time of {plain(planned)} s is too short: 95 % of the target's area is 98 % "
         f"covered after {needed}."
@@ -83,10 +86,13 @@ EXPECTED = (
     "compression_depth_um",
 )
 DROP_SPEED = 3.0  # m/s, as of a ball that falls 0.46 m; docs/peening.md
+SHEETS_OF = {
+    "study": "The best chamber of a study, confirmed on fresh seeds",
+    "simulation": "One simulated chamber",
+}
 KINDS = ("arc heights", "coverage", "dent diameters", "ball drops", "amplitude", "impact rates")
 
 Row = tuple[str, str]  # a name and its value; with the name "" a sentence
-Contents = Mapping[str, Any]  # of report_contents
 
 
 @dataclass(frozen=True)
@@ -123,30 +129,49 @@ class Sheet:
     calibration: str
 
 
-def setting_blocks(result: Result, contents: Contents, face_mm: tuple[float, ...]) -> list[Block]:
+def process_sheet(result: Result, face_mm: tuple[float, ...]) -> Sheet:
+    """The process sheet of a result.
+
+    Args:
+        face_mm: size of the sonotrode, as face_size_mm gives it.
+    """
+    record = result.record
+    start = load_start(result) if result.study else None
+    gain = None if start is None else change(result.objective, start.objective, result, start)
+    return Sheet(
+        f"{result.design.part.mesh_path.name}: {result.folder.resolve().name}",
+        f"{SHEETS_OF[record.kind]}; simulated {record.created[:10]}",
+        answer(result, start, gain),
+        setting_blocks(result, face_mm),
+        first_checks(result),
+        calibrated_to(result),
+    )
+
+
+def setting_blocks(result: Result, face_mm: tuple[float, ...]) -> list[Block]:
     """What is built and set, expected and allowed.
 
     Args:
         face_mm: size of the sonotrode, as face_size_mm gives it.
     """
     found = (
-        ("Part and pose", _part(result, contents)),
+        ("Part and pose", _part(result)),
         ("Chamber", _chamber(result)),
         ("Sonotrode", _sonotrode(result, face_mm)),
         ("Shot", _shot(result)),
-        ("Made with", _identity(result, contents)),
-        ("Peening, and what to expect", _expected(result, contents)),
-        ("Zones and limits", _zones(contents)),
-        ("Tolerances", _tolerances(result, contents)),
-        ("Not in these figures", (("", text) for text in cautions(result, contents))),
-        ("Warnings", _warnings(contents)),
+        ("Made with", _identity(result)),
+        ("Peening, and what to expect", _expected(result)),
+        ("Zones and limits", _zones(result)),
+        ("Tolerances", _tolerances(result)),
+        ("Not in these figures", (("", text) for text in cautions(result))),
+        ("Warnings", _warnings(result)),
     )
     return [Block(title, tuple(rows)) for title, rows in ((t, [*r]) for t, r in found) if rows]
 
 
-def _part(result: Result, contents: Contents) -> Iterator[Row]:
+def _part(result: Result) -> Iterator[Row]:
     part, turn = result.design.part, result.design.effects.part_turn
-    yield "part", contents["question"]["part"]
+    yield "part", part.mesh_path.name
     metal = result.design.materials.part
     yield "metal", f"{metal.alloy or 'not named'}, {plain(metal.hardness_HB)} HB"
     if result.design.chamber.shape == "imported":
@@ -169,9 +194,8 @@ def _part(result: Result, contents: Contents) -> Iterator[Row]:
         axis = ", ".join(plain(one) for one in turn.axis)
         speed = swing if turn.rpm is None else f"{plain(turn.rpm)} turns a minute"
         yield "turns", f"{speed} about the file's axis ({axis})"
-    area = contents["question"]["target"]["target_exposed_area_mm2"]
-    share = per_cent(contents["field"]["reachable_share"])
-    if area:
+    share = per_cent(result.record.field.reachable_share)
+    if area := result.record.chamber.target_exposed_area_mm2:
         yield "target", f"{plain(area)} mm² in the chamber; the shot can reach {share} of it"
 
 
@@ -244,60 +268,56 @@ def _weighed_g(result: Result) -> float:
     return 1e3 * result.design.shot.ball_mass * result.design.shot.count
 
 
-def _expected(result: Result, contents: Contents) -> Iterator[Row]:
+def _expected(result: Result) -> Iterator[Row]:
     """Peening time and figures; where the design is not calibrated, why there is no mmA."""
     yield "peening time", f"{plain(result.design.process.treatment_time)} s"
-    objective, *others = contents["metrics"]
+    objective, *others = figures(result, None)
     calibration = result.design.calibration
     has_intensity = calibration is not None and calibration.has_strips
     for row in (objective, *others):
-        if row is objective or row["name"] in EXPECTED:
-            if row["name"] == "strength_um" and has_intensity:
+        if row is objective or row.name in EXPECTED:
+            if row.name == "strength_um" and has_intensity:
                 continue
-            yield row["label"], interval_text(row["result"], row["unit"])
+            yield row.label.text, row.label.format(row.result)
     if reason := why_no_intensity(calibration):
         yield "", f"{reason[0].upper()}{reason[1:]}."
-    for one in contents["answer_lines"]:
+    for one in answer_lines(result):
         if one.about in ("best", "calibration"):  # zones have a block of their own
             yield "", one.text
-    limits = LIMITS_OF_CALIBRATED if contents["calibrated"] else LIMITS_OF_INTERVALS
-    yield "", f"± 95 % intervals. {limits}"
+    yield "", f"± 95 % intervals. {limits_of_intervals(result)}"
 
 
-def _zones(contents: Contents) -> Iterator[Row]:
+def _zones(result: Result) -> Iterator[Row]:
     """A sentence for each zone, those whose limits are not met first."""
-    lines = [one for one in contents["answer_lines"] if one.about == "zone"]
+    lines = [one for one in answer_lines(result) if one.about == "zone"]
     lines.sort(key=lambda line: not line.warns)
     for one in lines[:MOST_ROWS]:
         yield "", one.text
     yield from _more(lines, MOST_ROWS, "more zones")
 
 
-def _tolerances(result: Result, contents: Contents) -> Iterator[Row]:
+def _tolerances(result: Result) -> Iterator[Row]:
     """Ranges, and what they cost if the result holds that."""
     box = tolerance_box(result.design)
     for name, (low, high) in [*box.items()][:MOST_ROWS]:
         yield name, f"{plain(low)} to {plain(high)}, as designed {plain(result.design.value(name))}"
     yield from _more(box, MOST_ROWS, "more tolerances")
-    found = contents["tolerances"]
+    found = result.record.tolerances
     if not box:
         yield "", "The design has no [tolerances]: how far its numbers may be off is not known."
     elif found is None:
         yield "", "What they cost was not simulated: chamberopt simulate --tolerances tells it."
     else:
-        wanted = [metric_label(name).text for name in ("almen_intensity", "mean_coverage")]
-        figures = found["figures"]
-        chosen = [figures[0], *(one for one in figures[1:] if one["label"] in wanted)]
-        for one in chosen[:3]:
-            q05, q95 = (interval_text(one[end]) for end in ("q05", "q95"))
-            corner = one["corner"]
-            worst = f"; worst {interval_text(corner['simulated'])}" if corner else ""
-            unit = f" [{one['unit']}]" if one["unit"] else ""
-            yield f"{one['label']}{unit}", f"5 % below {q05}; 5 % above {q95}{worst}"
+        wanted = [metric_label(name) for name in ("almen_intensity", "mean_coverage")]
+        first, *others = tolerated_figures(found)
+        for label, one in [first, *(pair for pair in others if pair[0] in wanted)][:3]:
+            worst = f"; worst {label.number(one.corner.simulated)}" if one.corner else ""
+            ends = f"5 % below {label.number(one.q05)}; 5 % above {label.number(one.q95)}"
+            yield label.with_unit, f"{ends}{worst}"
 
 
-def _warnings(contents: Contents) -> Iterator[Row]:
-    warnings = contents["warnings"]
+def _warnings(result: Result) -> Iterator[Row]:
+    warnings = result.record.warnings
     if warnings is None:
         yield "", "The design was not checked: chamberopt check lists its warnings."
     elif not warnings:
@@ -305,15 +325,15 @@ def _warnings(contents: Contents) -> Iterator[Row]:
     for text in (warnings or ())[:MOST_WARNINGS]:
         yield "", text
     yield from _more(warnings or (), MOST_WARNINGS, "more warnings")
-    if contents["notes"]:
-        yield "", f"Notes in the report: {len(contents['notes'])}."
+    if notes_of(result):
+        yield "", f"Notes in the report: {len(notes_of(result))}."
 
 
-def _identity(result: Result, contents: Contents) -> Iterator[Row]:
+def _identity(result: Result) -> Iterator[Row]:
     record = result.record
     yield "program", f"chamberopt {record.versions['chamberopt']}"
-    yield "simulated", f"{contents['made'][:10]}, {record.replicas} replicas"
-    yield "seed", contents["identity"]["seed"]
+    yield "simulated", f"{record.created[:10]}, {record.replicas} replicas"
+    yield "seed", seed_text(result)
     yield "part, sha256", record.part_sha256
     if record.shape_sha256:
         yield "shape, sha256", record.shape_sha256

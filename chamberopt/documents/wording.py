@@ -4,27 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
 
 from chamberopt.common import number_text
 from chamberopt.common.errors import InputError
 from chamberopt.common.estimate import Estimate
 from chamberopt.coverage.metrics import OBJECTIVES, find_metric, parse_objective
-
-# Sentences of an answer, with what they speak of.
-
-
-@dataclass(frozen=True)
-class AnswerLine:
-    """A sentence that belongs to the answer.
-
-    about: of which candidate or thing it speaks; "best" is the result itself.
-    warns: whether a limit is not certainly met, or the calibration has something to know.
-    """
-
-    about: Literal["zone", "best", "start", "other", "calibration"]
-    text: str
-    warns: bool
 
 
 @dataclass(frozen=True)
@@ -58,6 +42,10 @@ class Label:
         return number_text.typeset(
             number_text.estimate_text(estimate, self.factor, self.unit, sign)
         )
+
+    def number(self, estimate: Estimate, sign: bool = False) -> str:
+        """The estimate with its interval, in the unit shown but without its name."""
+        return number_text.typeset(number_text.estimate_text(estimate, self.factor, sign=sign))
 
     def scale(self, estimate: Estimate) -> Estimate:
         """The interval in the unit shown."""

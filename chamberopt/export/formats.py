@@ -6,15 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
-
-import numpy as np
+from typing import Literal
 
 from chamberopt.common.errors import InputError
-from chamberopt.geometry.meshes.units import METRES_PER
-
-if TYPE_CHECKING:
-    from chamberopt.chamber.part import Part
 
 FrameName = Literal["part", "chamber"]
 
@@ -152,46 +146,3 @@ def is_file(out: Path, formats: dict[str, ExportFormat]) -> bool:
 
 def _has_ending(path: Path, endings: Sequence[str]) -> bool:
     return path.name.lower().endswith(tuple(endings)) if endings else False
-
-
-# Coordinate frames of exported positions and directions: of the part's file, or of the chamber.
-
-MEANING = {
-    "part": "of the part's file: its axes, its origin, its unit",
-    "chamber": "of the chamber: z up, the sonotrode's mean face at z = 0, "
-    "the chamber's axis at x = y = 0",
-}
-
-
-@dataclass(frozen=True)
-class Frame:
-    """A frame, and how it lies in the chamber's frame.
-
-    Args:
-        name: "part" or "chamber".
-        unit: unit of its lengths.
-        rotation: applied first on the way to the chamber's frame, shape (3, 3).
-        shift: applied second [m], shape (3,).
-    """
-
-    name: FrameName
-    unit: str
-    rotation: np.ndarray
-    shift: np.ndarray
-
-    def positions(self, metres: np.ndarray) -> np.ndarray:
-        """Convert positions in the chamber's frame [m], shape (n, 3), to this frame and unit."""
-        moved: np.ndarray = (metres - self.shift) @ self.rotation / METRES_PER[self.unit]
-        return moved
-
-    def directions(self, vectors: np.ndarray) -> np.ndarray:
-        """Rotate vectors of the chamber's frame, shape (n, 3), to this frame."""
-        turned: np.ndarray = vectors @ self.rotation
-        return turned
-
-
-def frame_of(name: FrameName, part: Part) -> Frame:
-    """Return the frame of that name; lengths in the chamber's frame are in mm."""
-    if name == "chamber" or part.file is None:
-        return Frame(name, "mm", np.eye(3), np.zeros(3))
-    return Frame(name, part.unit, part.file.rotation, part.file.shift)

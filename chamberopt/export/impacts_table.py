@@ -16,7 +16,8 @@ from chamberopt.common.errors import InputError
 from chamberopt.common.files import check_new_file, new_file, remove_file, write_text
 from chamberopt.common.versions import versions
 from chamberopt.coverage.dents import dent_diameters, impact_angle_deg
-from chamberopt.export.formats import MEANING, Frame, FrameName, frame_of
+from chamberopt.export.formats import FrameName
+from chamberopt.export.frame import MEANING, Frame, frame_of
 from chamberopt.geometry.triangles import closest_on_each
 from chamberopt.results.impacts import RebuiltChamber, replica_count, simulate_impacts
 
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
     from chamberopt.common.progress import Progress
     from chamberopt.design.load import Design
-    from chamberopt.export.formats import Frame
+    from chamberopt.export.frame import Frame
     from chamberopt.results.impacts import ReplicaImpacts
     from chamberopt.results.load import Result
     from sim_core import ImpactLog

@@ -13,6 +13,7 @@ from chamberopt.search.trial_log import trials_as_csv
 if TYPE_CHECKING:
     from chamberopt.common.estimate import Estimate
 
+
 def write_study_table(folder: Path, file: Path) -> None:
     """Write the evaluations recorded so far as .csv; NAME_pm is the 95 % half-width of NAME.
 

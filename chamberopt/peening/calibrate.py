@@ -38,9 +38,15 @@ from chamberopt.peening.posterior import (
     explaining_posterior,
     find_posterior,
 )
-from chamberopt.peening.setups import SIMULATED
 from chamberopt.peening.probes import ArcProbe, Impacts, PartProbe, SaturationProbe, whole_target
-from chamberopt.peening.setups import DropModel, Setup, amplitude_model, rows_of, simulate_setup
+from chamberopt.peening.setups import (
+    SIMULATED,
+    DropModel,
+    Setup,
+    amplitude_model,
+    rows_of,
+    simulate_setup,
+)
 from chamberopt.peening.strip import strip_cells
 from chamberopt.peening.strip_holder import strip_design
 

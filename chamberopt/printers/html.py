@@ -1,11 +1,29 @@
-"""Pieces of HTML. All text is escaped here, because names of folders and files may hold markup."""
+"""A document as HTML. All text is escaped here: names of folders and files may hold markup."""
 
 from __future__ import annotations
 
+import base64
 import html
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
+
+from chamberopt.documents.document import (
+    Beside,
+    Block,
+    Chart,
+    Fold,
+    Items,
+    PartView,
+    Section,
+    Sentence,
+    Table,
+    TextFile,
+    Tile,
+    Tiles,
+)
+from chamberopt.pictures.charts.figure_style import svg_text
+from chamberopt.pictures.part3d import PartScene
 
 NUMBER = ' class="number"'
 
@@ -25,46 +43,78 @@ def items(values: Iterable[object]) -> str:
     return f"<ul>{rows}</ul>" if rows else ""
 
 
-def table(
-    caption: str, head: Sequence[object], rows: Iterable[Sequence[object]], numbers: bool = True
-) -> str:
-    """A table whose first column heads its row.
+def section(printed: Section, view: Callable[[Sequence[PartScene]], str]) -> str:
+    """A section with its title.
 
     Args:
-        numbers: whether the other columns are numbers, set to the right.
+        view: HTML of parts in 3D.
     """
-    kind = NUMBER if numbers else ""
+    kind = "answer" if printed.is_answer else ""
+    content = "".join(block(one, view) for one in printed.content)
+    return f"<section{_class(kind)}><h2>{text(printed.title)}</h2>{content}</section>"
+
+
+def block(printed: Block, view: Callable[[Sequence[PartScene]], str]) -> str:
+    """Any block of a section."""
+    match printed:
+        case Sentence():
+            return paragraph(printed.text, printed.kind)
+        case Items():
+            return items(printed.texts)
+        case Table():
+            return _table(printed)
+        case Chart():
+            return _chart(printed)
+        case Tiles():
+            return f'<dl class="tiles">{"".join(map(_tile, printed.tiles))}</dl>'
+        case TextFile():
+            return _text_file(printed)
+        case PartView():
+            return view(printed.scenes)
+        case Beside():
+            columns = ("".join(block(one, view) for one in column) for column in printed.columns)
+            return f'<div class="pair">{"".join(f"<div>{one}</div>" for one in columns)}</div>'
+        case Fold():
+            inside = "".join(block(one, view) for one in printed.content)
+            kind = _class("print" if printed.printed else "")
+            return f"<details{kind}><summary>{text(printed.title)}</summary>{inside}</details>"
+
+
+def _table(printed: Table) -> str:
+    kind = NUMBER if printed.numbers else ""
     top = "".join(
-        f'<th scope="col"{kind if i else ""}>{text(cell)}</th>' for i, cell in enumerate(head)
+        f'<th scope="col"{kind if i else ""}>{text(cell)}</th>'
+        for i, cell in enumerate(printed.head)
     )
     body = "".join(
         f'<tr><th scope="row">{text(first)}</th>'
         f"{''.join(f'<td{kind}>{text(cell)}</td>' for cell in rest)}</tr>"
-        for first, *rest in rows
+        for first, *rest in printed.rows
     )
-    named = f"<caption>{text(caption)}</caption>" if caption else ""
-    columns = f"<thead><tr>{top}</tr></thead>" if head else ""
+    named = f"<caption>{text(printed.caption)}</caption>" if printed.caption else ""
+    columns = f"<thead><tr>{top}</tr></thead>" if printed.head else ""
     return f'<div class="wide"><table>{named}{columns}<tbody>{body}</tbody></table></div>'
 
 
-def section(title: str, *content: str) -> str:
-    return f"<section><h2>{text(title)}</h2>{''.join(content)}</section>"
+def _tile(printed: Tile) -> str:
+    start = f'<dd class="start">start: {text(printed.start)}</dd>' if printed.start else ""
+    return f"<div><dt>{text(printed.label)}</dt><dd>{text(printed.value)}</dd>{start}</div>"
 
 
-def pair(*content: str) -> str:
-    """Pieces side by side where the page is wide enough."""
-    return f'<div class="pair">{"".join(f"<div>{one}</div>" for one in content)}</div>'
+def _text_file(printed: TextFile) -> str:
+    content = base64.b64encode(printed.text.encode()).decode()
+    link = f"data:text/plain;charset=utf-8;base64,{content}"
+    name = text(printed.name)
+    save = f'<p><a download="{name}" href="{link}">Save {name}</a></p>'
+    return f"{save}<pre>{text(printed.text)}</pre>"
 
 
-def fold(title: str, content: str, kind: str = "") -> str:
-    """Content that is hidden until its title is clicked."""
-    return f"<details{_class(kind)}><summary>{text(title)}</summary>{content}</details>"
-
-
-def chart(name: str, svg: str, caption: str) -> str:
-    """A chart with a caption, which is also its description for screen readers."""
-    place = f'<div id="{text(name)}" class="chart" role="img" aria-label="{text(caption)}">{svg}'
-    return f"<figure>{place}</div><figcaption>{text(caption)}</figcaption></figure>"
+def _chart(printed: Chart) -> str:
+    """A chart whose caption is also its description for screen readers."""
+    name, caption = text(printed.name), text(printed.caption)
+    svg = svg_text(printed.figure, printed.name, printed.tooltips)
+    place = f'<div id="{name}" class="chart" role="img" aria-label="{caption}">{svg}'
+    return f"<figure>{place}</div><figcaption>{caption}</figcaption></figure>"
 
 
 def embedded_json(value: Any, name: str) -> str:

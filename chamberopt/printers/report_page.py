@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from datetime import UTC, datetime
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
@@ -13,12 +12,12 @@ from typing import Any
 
 from chamberopt.common.errors import InputError
 from chamberopt.common.files import claim_file, read_file, require_place, write_text
-from chamberopt.documents.report_data import read_design_file, report_contents
-from chamberopt.documents.sections import sections
+from chamberopt.documents.document import Document, Items, PartView, Section
+from chamberopt.documents.report import report
 from chamberopt.pictures.charts.colours import hex_colours
 from chamberopt.pictures.part3d import PartScene, part_scene, quantities_in_all
 from chamberopt.printers import html
-from chamberopt.results.load import START, Result, load_result, load_start, summary
+from chamberopt.results.load import START, Result, load_result, summary
 
 REPORT = "report.html"
 GENERATOR = '<meta name="generator" content="chamberopt'
@@ -33,10 +32,6 @@ HELP = (
     "Grey: not in the target. Brown: out of the reach of the shot. "
     "Dark grey: too few dents were simulated to tell."
 )
-SUBTITLES = {
-    "study": "Report of a study: the best chamber found",
-    "simulation": "Report of one simulated chamber",
-}
 
 
 @dataclass(frozen=True)
@@ -57,14 +52,14 @@ REPORT_FILE = PageFile(
 )
 
 
-def write_report(result: str | Path, path: str | Path | None = None) -> tuple[Path, dict[str, Any]]:
+def write_report(result: str | Path, path: str | Path | None = None) -> tuple[Path, Document]:
     """Write the report of a results folder.
 
     Args:
         path: of the page; RESULT/report.html if left out.
 
     Returns:
-        Path of the page, and what it says as plain JSON values.
+        Path of the page, and the document on it.
 
     Raises:
         InputError: the folder is no finished result, or the path holds anything but a report.
@@ -72,29 +67,18 @@ def write_report(result: str | Path, path: str | Path | None = None) -> tuple[Pa
     loaded = load_result(result)
     path = require_free_page(loaded.folder / REPORT if path is None else path)
     with claim_file(path):
-        contents = report_contents(result)
-        scene = _write_report(path, contents, loaded)
-    return path, {**contents, "remarks": list(scene.remarks)}
+        document = report(result)
+        _write_document(path, document)
+    return path, document
 
 
-def _write_report(path: Path, contents: dict[str, Any], loaded: Result) -> PartScene:
-    is_study = contents["kind"] == "study"
-    scene = part_scene(loaded, contents["name"])
-    scenes = {"best" if is_study else "result": scene}
-    if is_study:
-        start = load_start(loaded)
-        scenes = {START: part_scene(start, START, max_triangles=0), **scenes}
-    made = f"simulated {contents['made'][:10]}, " if contents["made"] else ""
-    subtitle = (
-        f"{SUBTITLES.get(contents['kind'], '')}; "
-        f"{made}report made {datetime.now(UTC).date()} by chamberopt"
-    )
+def _write_document(path: Path, document: Document) -> None:
     head = (
-        f"<header><h1>{html.text(contents['name'])}</h1>{html.paragraph(subtitle, 'soft')}</header>"
+        f"<header><h1>{html.text(document.name)}</h1>"
+        f"{html.paragraph(document.subtitle, 'soft')}</header>"
     )
-    body = sections(contents, viewer([scene]), scenes, read_design_file(loaded))
-    write_page(path, f"{contents['name']}: report", head + body, [scene])
-    return scene
+    body = "".join(html.section(one, viewer) for one in document.sections)
+    write_page(path, f"{document.name}: report", head + body, document.scenes)
 
 
 def write_part_page(results: Sequence[Path], path: Path) -> list[str]:
@@ -114,7 +98,8 @@ def _write_part_page(loaded: Sequence[Result], path: Path) -> list[str]:
     names, scenes = _scenes(loaded)
     summaries = [f"{name}: {summary(one)}" for name, one in zip(names, loaded, strict=True)]
     title = ", ".join(names)
-    content = html.section("Part in its chamber", html.items(summaries), viewer(scenes))
+    parts = Section("Part in its chamber", [Items(summaries), PartView(scenes)])
+    content = html.section(parts, viewer)
     write_page(path, title, f"<header><h1>{html.text(title)}</h1></header>{content}", scenes)
     return [remark for scene in scenes for remark in scene.remarks]
 

@@ -5,14 +5,12 @@ from __future__ import annotations
 import io
 import re
 from collections.abc import Sequence
-from dataclasses import asdict
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from chamberopt.common.files import claim_file, write_bytes
-from chamberopt.documents.report_data import report_contents
-from chamberopt.documents.sheet import Block, Sheet, calibrated_to, first_checks, setting_blocks
+from chamberopt.documents.sheet import Block, Sheet, process_sheet
 from chamberopt.pictures.charts.colours import BLACK, DARK_GREY, GREY
 from chamberopt.pictures.charts.figure_style import ignore_settings_here
 from chamberopt.pictures.part_drawing import LEGEND, RASTER, draw_chamber
@@ -176,20 +174,16 @@ DRAWING_PER_PT, MOST_DRAWING = 13.0, 125.0
 CAPTION, SIGNATURES = 7.0, 14.0  # mm
 SIGNED = ("Set up by", "Date", "Checked by", "Date")
 EXPECTED, MEASURED = 88.0, 150.0  # mm from the margin: columns of what to measure first
-KINDS = {
-    "study": "The best chamber of a study, confirmed on fresh seeds",
-    "simulation": "One simulated chamber",
-}
 
 
-def write_sheet(result: str | Path, path: str | Path | None = None) -> tuple[Path, dict[str, Any]]:
+def write_sheet(result: str | Path, path: str | Path | None = None) -> tuple[Path, Sheet]:
     """Write the process sheet of a results folder.
 
     Args:
         path: of the page; RESULT/process_sheet.pdf if left out.
 
     Returns:
-        Path of the page, and what it says as plain JSON values.
+        Path of the page, and what it says.
 
     Raises:
         InputError: the folder is no finished result, or the path holds anything but a sheet.
@@ -197,18 +191,10 @@ def write_sheet(result: str | Path, path: str | Path | None = None) -> tuple[Pat
     loaded = load_result(result)
     path = require_free_page(loaded.folder / SHEET if path is None else path, SHEET_FILE)
     with claim_file(path):
-        contents, chamber = report_contents(result), load_chamber(loaded)
-        kind = f"{KINDS[loaded.record.kind]}; simulated {contents['made'][:10]}"
-        sheet = Sheet(
-            f"{contents['question']['part']}: {contents['name']}",
-            kind,
-            contents["answer"],
-            setting_blocks(loaded, contents, face_size_mm(chamber)),
-            first_checks(loaded),
-            calibrated_to(loaded),
-        )
+        chamber = load_chamber(loaded)
+        sheet = process_sheet(loaded, face_size_mm(chamber))
         _save(path, draw_sheet(sheet, chamber), sheet.name)
-    return path, asdict(sheet)
+    return path, sheet
 
 
 def draw_sheet(sheet: Sheet, chamber: Chamber) -> Figure:

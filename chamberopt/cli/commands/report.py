@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
@@ -36,16 +37,18 @@ def report(result: Path, /, *, sheet: bool = False, json: Json = False, out: Pag
         _write_sheet(result, json, out)
         return
     from chamberopt.common.progress import step
+    from chamberopt.printers.json_values import json_values
     from chamberopt.printers.report_page import write_report
 
     with step("writing the page"):
-        path, facts = write_report(result, out)
+        path, document = write_report(result, out)
     if json:
-        print_json({**facts, "report": str(path)})
+        print_json({**json_values(document), "report": str(path)})
         return
     size = f"{path.stat().st_size / 1e6:.1f} MB"
-    lines = [one.text for one in facts["answer_lines"]]
-    show([facts["answer"], *lines, *facts["remarks"], f"report in {path}, {size}"])
+    lines = [one.text for one in document.answer_lines]
+    remarks = [remark for scene in document.scenes for remark in scene.remarks]
+    show([document.answer, *lines, *remarks, f"report in {path}, {size}"])
 
 
 def _write_sheet(result: Path, json: bool, out: Path | None) -> None:
@@ -53,8 +56,8 @@ def _write_sheet(result: Path, json: bool, out: Path | None) -> None:
     from chamberopt.printers.sheet_page import write_sheet
 
     with step("writing the sheet"):
-        path, facts = write_sheet(result, out)
+        path, printed = write_sheet(result, out)
     if json:
-        print_json({**facts, "sheet": str(path)})
+        print_json({**asdict(printed), "sheet": str(path)})
         return
-    show([facts["answer"], f"process sheet in {path}"])
+    show([printed.answer, f"process sheet in {path}"])

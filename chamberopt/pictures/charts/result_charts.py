@@ -1,14 +1,13 @@
-"""The two-dimensional charts of the report: SVG drawn by the plots package from the contents."""
+"""The two-dimensional charts of the report."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from textwrap import fill
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from chamberopt.common.estimate import Estimate
 from chamberopt.pictures.charts.colours import BLUE, GREEN, ORANGE
 from chamberopt.pictures.charts.coverage import (
     CoverageCurve,
@@ -16,12 +15,14 @@ from chamberopt.pictures.charts.coverage import (
     draw_coverage_over_time,
     draw_histogram,
 )
-from chamberopt.pictures.charts.figure_style import SMALL, new_figure, svg_text
+from chamberopt.pictures.charts.figure_style import SMALL, new_figure
 from chamberopt.pictures.charts.study import EvaluatedCandidate, draw_convergence, slices_figure
-from chamberopt.search.sensitivity import Slice
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from chamberopt.results.records import CoverageAtTime
+    from chamberopt.search.sensitivity import Slice
 
 WIDE, NARROW = (11.0, 3.8), (5.5, 4.0)  # inch
 Y_LABEL = 40  # letters of a line that fit beside a chart
@@ -33,61 +34,32 @@ STYLES = {
 }
 
 
-def convergence_chart(
-    evaluations: Sequence[Mapping[str, Any]], y_label: str, smaller_is_better: bool
-) -> str:
-    """Every evaluation in its order; pointing at one shows its parameters.
-
-    Args:
-        evaluations: "evaluations" of the contents.
-    """
-    candidates = [
-        EvaluatedCandidate(
-            row["number"],
-            row["stage"],
-            None if row["value"] is None else Estimate(row["value"], row["half_width"] or 0.0),
-            row["feasible"],
-            row["parameters"],
-        )
-        for row in evaluations
-    ]
+def convergence_figure(
+    candidates: Sequence[EvaluatedCandidate], y_label: str, smaller_is_better: bool
+) -> tuple[Figure, dict[str, list[str]]]:
+    """Every evaluation in its order, and tooltips with the parameters of each."""
     figure = new_figure(*WIDE)
     axes = figure.subplots()
     tooltips = draw_convergence(axes, candidates, fill(y_label, Y_LABEL), smaller_is_better)
     handles, labels = axes.get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper left", ncols=5, fontsize=SMALL, frameon=False)
-    return svg_text(figure, "convergence", tooltips)
+    return figure, tooltips
 
 
-def slices_chart(parameters: Sequence[Mapping[str, Any]], y_label: str) -> str:
-    """The objective over each parameter by the study's model.
-
-    Args:
-        parameters: rows of "influence" of the contents.
-    """
-    slices = [
-        Slice(
-            name=row["name"],
-            values=np.array(row["values"]),
-            mean=np.array(row["mean"]),
-            half_width=np.array(row["half_width"]),
-            or_worse=np.array(row["or_worse"]),
-            effect=np.array(row["effect"]),
-            share=row["share"],
-            flat=row["flat"],
-            texts=tuple(row["texts"]),
-        )
-        for row in parameters
-    ]
-    start, best = ({row["name"]: row[key] for row in parameters} for key in ("start", "best"))
+def influence_figure(
+    slices: Sequence[Slice],
+    start: Mapping[str, float | str],
+    best: Mapping[str, float | str],
+    y_label: str,
+) -> Figure:
+    """The objective over each parameter by the study's model."""
     label = fill(y_label, Y_LABEL)
-    figure = slices_figure(slices, start, best, "loses no more than the noise", label)
-    return svg_text(figure, "slices")
+    return slices_figure(slices, start, best, "loses no more than the noise", label)
 
 
-def coverage_over_time_chart(
+def coverage_over_time_figure(
     curves: Mapping[str, Sequence[CoverageAtTime]], treatment_time: float
-) -> str:
+) -> Figure:
     """Mean and 5th percentile of coverage over peening time [s], by name of the result."""
     figure = new_figure(*NARROW)
     axes = figure.subplots()
@@ -96,10 +68,10 @@ def coverage_over_time_chart(
     axes.set_title("thick: mean; thin: 95 % of the area has more", loc="left", fontsize=SMALL)
     if len(drawn) > 1:
         axes.legend(fontsize=SMALL, frameon=False, loc="lower right")
-    return svg_text(figure, "coverage over time")
+    return figure
 
 
-def histogram_chart(coverage_and_area: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> str:
+def histogram_figure(coverage_and_area: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> Figure:
     """Share of the target's area by its coverage.
 
     Args:
@@ -117,4 +89,4 @@ def histogram_chart(coverage_and_area: Mapping[str, tuple[np.ndarray, np.ndarray
     draw_histogram(axes, HistogramData(BIN_EDGES, shares, names, styles, *labels))
     if len(names) > 1:
         axes.legend(fontsize=SMALL, frameon=False)
-    return svg_text(figure, "histogram")
+    return figure

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 from chamberopt.pictures.charts.colours import BLUE, GREY, ORANGE
-from chamberopt.pictures.charts.figure_style import SMALL, literal, style_axes
+from chamberopt.pictures.charts.figure_style import SMALL, literal, new_figure, style_axes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
     from chamberopt.common.estimate import Estimate
 
@@ -20,6 +21,29 @@ class TornadoBar(NamedTuple):
     name: str
     low: Estimate
     high: Estimate
+
+
+class TornadoPanel(NamedTuple):
+    """The bars of one figure, by the names of the numbers."""
+
+    title: str
+    x_label: str
+    bars: Mapping[str, TornadoBar]
+
+
+def tornado_figure(panels: Sequence[TornadoPanel]) -> Figure:
+    """A tornado of each figure, one beside the other, in the order of the first."""
+
+    def size(name: str) -> float:
+        return max(abs(end.value) for end in panels[0].bars[name][1:])
+
+    names = sorted(panels[0].bars, key=size, reverse=True)
+    figure = new_figure(11.0 if len(panels) > 1 else 5.5, 1.3 + 0.35 * len(names))
+    drawn = figure.subplots(1, len(panels), squeeze=False, sharey=True)[0]
+    for axes, panel in zip(drawn, panels, strict=True):
+        draw_tornado(axes, [panel.bars[name] for name in names], panel.x_label)
+        axes.set_title(panel.title, fontsize=SMALL, loc="right")
+    return figure
 
 
 def draw_tornado(axes: Axes, bars: Sequence[TornadoBar], x_label: str) -> None:

@@ -18,7 +18,7 @@ from chamberopt.design.shapes import TAG_PART, TAG_SONOTRODE, TAG_WALL
 from chamberopt.geometry.triangles import area_vectors, areas
 from sim_core import simulate
 
-DESIGNS = Path(__file__).resolve().parents[4] / "designs"
+DESIGNS = Path(__file__).resolve().parents[3] / "designs"
 BALL = 3e-3
 R = BALL / 2.0
 

@@ -36,7 +36,7 @@ distributed = pytest.importorskip(
     "distributed", reason="Dask is not installed: pip install 'chamberopt[dask]'"
 )
 
-ROOT = Path(__file__).parents[4]
+ROOT = Path(__file__).parents[3]
 
 
 @dataclass

@@ -22,7 +22,7 @@ from scipy.ndimage import uniform_filter
 from chamberopt.pictures.subprocess_drawing import without_display
 from tests.helpers.opengl import needs_opengl
 
-REFERENCES = Path(__file__).parents[3] / "pictures"
+REFERENCES = Path(__file__).parents[2] / "pictures"
 BLOCK, TOLERANCE = 20, 0.02
 
 

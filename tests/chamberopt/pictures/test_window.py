@@ -28,7 +28,7 @@ def steps(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, Any]]
         "driven",
         str(folder),
     ]
-    subprocess.run(command, check=True, env=without_display(), cwd=Path(__file__).parents[4])
+    subprocess.run(command, check=True, env=without_display(), cwd=Path(__file__).parents[3])
     return {
         one["step"]: one for one in json.loads((folder / "steps.json").read_text(encoding="utf-8"))
     }

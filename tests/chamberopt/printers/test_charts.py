@@ -9,19 +9,21 @@ from matplotlib.axes import Axes
 from chamberopt.common.estimate import Estimate
 from chamberopt.pictures.charts import result_charts
 from chamberopt.pictures.charts.coverage import HistogramData, draw_histogram
-from chamberopt.pictures.charts.figure_style import SVG, new_figure
+from chamberopt.pictures.charts.figure_style import SVG, new_figure, svg_text
 from chamberopt.pictures.charts.study import EvaluatedCandidate, draw_convergence
 
 
-def evaluation(number: int, value: float | None, stage: str = "search", feasible: bool = True):
-    return {
-        "number": number,
-        "stage": stage,
-        "value": value,
-        "half_width": None if value is None else 1.0,
-        "feasible": feasible,
-        "parameters": {"shot.mass_g": 2.5 * number},
-    }
+def evaluation(
+    number: int, value: float | None, stage: str = "search", feasible: bool = True
+) -> EvaluatedCandidate:
+    objective = None if value is None else Estimate(value, 1.0)
+    parameters = {"shot.mass_g": 2.5 * number}
+    return EvaluatedCandidate(number, stage, objective, feasible, parameters)
+
+
+def svg_of_search(rows: list[EvaluatedCandidate], smaller_is_better: bool) -> str:
+    figure, tooltips = result_charts.convergence_figure(rows, "time [s]", smaller_is_better)
+    return svg_text(figure, "convergence", tooltips)
 
 
 ROWS = [
@@ -44,21 +46,12 @@ def best_so_far(axes: Axes) -> list[float]:
 )
 def test_best_so_far_counts_feasible_candidates_only(smaller_is_better, best) -> None:
     axes = new_figure(4.0, 3.0).subplots()
-    candidates = [
-        EvaluatedCandidate(
-            row["number"],
-            row["stage"],
-            None if row["value"] is None else Estimate(row["value"], 1.0),
-            row["feasible"],
-        )
-        for row in ROWS
-    ]
-    draw_convergence(axes, candidates, "time [s]", smaller_is_better)
+    draw_convergence(axes, ROWS, "time [s]", smaller_is_better)
     assert best_so_far(axes) == best
 
 
 def test_failed_infeasible_and_confirmed_candidates_are_marked() -> None:
-    root = ElementTree.fromstring(result_charts.convergence_chart(ROWS, "time [s]", True))
+    root = ElementTree.fromstring(svg_of_search(ROWS, True))
     texts = ["".join(element.itertext()).strip() for element in root.iter(f"{{{SVG}}}text")]
     for label in (
         "time [s]",
@@ -80,16 +73,14 @@ def test_failed_infeasible_and_confirmed_candidates_are_marked() -> None:
 
 
 def test_a_search_in_which_all_failed_is_drawn() -> None:
-    assert "not simulated" in result_charts.convergence_chart(
-        [evaluation(1, None), evaluation(2, None)], "goal", False
-    )
+    assert "not simulated" in svg_of_search([evaluation(1, None), evaluation(2, None)], False)
 
 
 def test_ids_are_unique_on_a_page_with_several_charts() -> None:
     coverage = {"result": (np.array([0.0, 0.5, 1.0]), np.array([1.0, 2.0, 1.0]))}
     first, second = (
-        result_charts.histogram_chart(coverage),
-        result_charts.convergence_chart(ROWS, "goal", False),
+        svg_text(result_charts.histogram_figure(coverage), "histogram"),
+        svg_of_search(ROWS, False),
     )
     ids = [
         {e.get("id") for e in ElementTree.fromstring(s).iter()} - {None} for s in (first, second)

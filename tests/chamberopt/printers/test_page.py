@@ -12,7 +12,8 @@ import pytest
 
 from chamberopt.cli import main
 from chamberopt.common.errors import InputError
-from chamberopt.documents.report_data import report_contents
+from chamberopt.documents.document import Document, Section, Table
+from chamberopt.documents.report import report
 from chamberopt.documents.wording import with_interval
 from chamberopt.pictures.drawn_part import DrawnPart
 from chamberopt.pictures.part3d import part_scene
@@ -89,34 +90,40 @@ def changed(folder: Path, copy: Path, change) -> Path:
     return copy
 
 
+def section_of(document: Document, title: str) -> Section:
+    (found,) = (one for one in document.sections if one.title == title)
+    return found
+
+
+def rows_of(document: Document, title: str, caption: str) -> list:
+    """The rows of a table in a section."""
+    tables = (one for one in section_of(document, title).content if isinstance(one, Table))
+    return next([*map(tuple, one.rows)] for one in tables if one.caption == caption)
+
+
 def test_a_simulation_is_answered_in_one_sentence(simulation: Path) -> None:
-    contents, result = report_contents(simulation), load_result(simulation)
+    document, result = report(simulation), load_result(simulation)
     mean = result.metrics["mean_coverage"]
-    assert with_interval(100 * mean.value, 100 * mean.half_width, "%") in contents["answer"]
-    assert contents["answer"].startswith("After 5 s the target is covered to ")
-    assert contents["influence"] is None
-    assert contents["evaluations"] == []
-    assert not contents["effects"]["pilot"]
-    assert {"effect": "gravity", "value": "on"} in contents["effects"]["effects"]
-    assert contents["identity"]["part, SHA-256"] == result.record.part_sha256
+    assert with_interval(100 * mean.value, 100 * mean.half_width, "%") in document.answer
+    assert document.answer.startswith("After 5 s the target is covered to ")
+    titles = {one.title for one in document.sections}
+    assert not titles & {"Which parameters mattered", "How the search went", "Zones", "Tolerances"}
+    assert ("gravity", "on") in rows_of(document, "Physical effects", "In this result")
+    assert ("part, SHA-256", result.record.part_sha256) in rows_of(document, "Made with", "")
 
 
-def test_a_study_is_answered_with_its_gain(study: Path) -> None:
-    contents, about = report_contents(study), load_result(study).study
+def test_a_study_is_answered_with_its_gain(study: Path, tmp_path: Path) -> None:
+    document, about = report(study), load_result(study).study
     assert about is not None
     gain = about.gain
-    assert with_interval(gain.value, gain.half_width, sign=True) in contents["answer"]
-    assert "more than noise" in contents["answer"]
-    first = contents["metrics"][0]
-    change = first["change"]
-    assert (change.value, change.half_width) == (gain.value, gain.half_width)
-    assert first["real"]
-    assert [one["name"] for one in contents["question"]["vary"]] == list(about.vary)
-    assert contents["question"]["constraints"] == ["chamber.sonotrode_distance_mm ≥ 9.5"]
-    failed = [one for one in contents["evaluations"] if one["value"] is None]
-    assert len(failed) == about.failed > 0
-    assert all(one["reason"] == "<b>not</b> this one" for one in failed)
-    changed = {row["name"] for row in contents["design"] if "start" in row}
+    assert with_interval(gain.value, gain.half_width, sign=True) in document.answer
+    assert "more than noise" in document.answer
+    first = rows_of(document, "Compared with the start", "± 95 % intervals")[0]
+    assert first[-2:] == (with_interval(gain.value, gain.half_width, sign=True), "yes")
+    text = Page(write_report(study, tmp_path / "page.html")[0]).text
+    assert "Constraints: chamber.sonotrode_distance_mm ≥ 9.5." in text
+    assert text.count("<b>not</b> this one") == about.failed > 0
+    changed = {row[0] for row in rows_of(document, "The design", "What differs from the start")}
     assert changed <= set(about.vary)
     assert changed
 
@@ -130,9 +137,10 @@ def test_no_gain_is_reported_as_none(study: Path, tmp_path: Path) -> None:
     start = json.loads((folder / "start" / "result.json").read_text())
     same = {name: best[name] for name in ("objective", "metrics")}
     replace_result(folder / "start", start | same)
-    contents = report_contents(folder)
-    assert "No better chamber than the start was found" in contents["answer"]
-    assert not contents["metrics"][0]["real"]
+    document = report(folder)
+    assert "No better chamber than the start was found" in document.answer
+    rows = rows_of(document, "Compared with the start", "± 95 % intervals")
+    assert rows[0][-1] == "exact"
 
 
 def test_a_front_of_two_objectives_is_listed(study: Path, tmp_path: Path) -> None:
@@ -243,7 +251,7 @@ def test_words_stand_where_there_is_no_number(simulation: Path, tmp_path: Path) 
             tmp_path / words,
             lambda data, words=words: data["metrics"]["time_to_98_s"].update(in_words=words),
         )
-        assert told in report_contents(folder)["answer"]
+        assert told in report(folder).answer
 
 
 def test_the_windows_and_what_they_take_are_told(simulation: Path, tmp_path: Path) -> None:
@@ -325,14 +333,14 @@ def test_the_command(study: Path, tmp_path: Path, capsys: pytest.CaptureFixture)
     assert main(["report", str(folder)]) == 0
     out = capsys.readouterr().out
     assert f"report in {folder / 'report.html'}" in out
-    assert report_contents(folder)["answer"] in out
+    assert report(folder).answer in out
     assert load_result(folder).record == load_result(study).record
     assert main(["report", str(folder), "--json", "--out", str(tmp_path / "r.html")]) == 0
     found = json.loads(capsys.readouterr().out)
     assert found["report"] == str(tmp_path / "r.html")
-    assert (
-        found["metrics"][0]["result"]["value"]
-        == report_contents(folder)["metrics"][0]["result"].value
-    )
+    assert found["answer"] == report(folder).answer
+    assert [one["title"] for one in found["sections"]] == [
+        one.title for one in report(folder).sections
+    ]
     assert main(["report", str(tmp_path)]) == 2
     assert "not a results folder" in capsys.readouterr().err

@@ -4,7 +4,6 @@ import math
 import re
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -16,10 +15,9 @@ from chamberopt.chamber.build import build_chamber
 from chamberopt.cli import main
 from chamberopt.common.errors import InputError
 from chamberopt.common.estimate import Estimate
-from chamberopt.documents.report_data import report_contents
+from chamberopt.documents.coverage import figures
 from chamberopt.documents.sheet import Block, Check, Sheet, first_checks, setting_blocks
-from chamberopt.documents.wording import interval_text, metric_label
-from chamberopt.documents.zones import zone_lines
+from chamberopt.documents.wording import metric_label
 from chamberopt.pictures.section import cut, face_size_mm, inside
 from chamberopt.printers.sheet_page import (
     HEIGHT,
@@ -31,6 +29,12 @@ from chamberopt.printers.sheet_page import (
     write_sheet,
 )
 from chamberopt.results.load import Result, load_result
+from chamberopt.results.records import (
+    TolerancesRecord,
+    ToleratedFigureRecord,
+    ZoneLimit,
+    ZoneRecord,
+)
 from tests.helpers.results.report_folders import simulated
 from tests.helpers.synthetic import machine_values, plate_design
 
@@ -45,10 +49,10 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         return simulated(tmp_path_factory.mktemp("sheet") / "plate $x_1$")[0]
 
 
-def rows_of(result: Result, contents: dict[str, Any]) -> dict[str, dict[str, str]]:
+def rows_of(result: Result) -> dict[str, dict[str, str]]:
     """What the sheet says: value by name by title; sentences under ""."""
     found: dict[str, dict[str, str]] = {}
-    for block in setting_blocks(result, contents, (50.0,)):
+    for block in setting_blocks(result, (50.0,)):
         rows = found[block.title] = {}
         for name, value in block.rows:
             rows[name] = f"{rows[name]} {value}" if name in rows else value
@@ -56,12 +60,11 @@ def rows_of(result: Result, contents: dict[str, Any]) -> dict[str, dict[str, str
 
 
 def test_its_figures_are_those_of_the_report(folder: Path) -> None:
-    contents = report_contents(folder)
-    rows = rows_of(load_result(folder), contents)
+    rows = rows_of(load_result(folder))
     expected = rows["Peening, and what to expect"]
-    for row in contents["metrics"]:
-        if row["name"] in ("mean_coverage", "time_to_98_s", "strength_um"):
-            assert expected[row["label"]] == interval_text(row["result"], row["unit"])
+    for one in figures(load_result(folder), None):
+        if one.name in ("mean_coverage", "time_to_98_s", "strength_um"):
+            assert expected[one.label.text] == one.label.format(one.result)
     assert expected["peening time"] == "5 s"
     assert "Almen intensity in mmA takes a calibration" in expected[""]
     assert rows["Part and pose"]["sonotrode to lowest point"] == "15 mm"
@@ -103,27 +106,25 @@ def test_a_calibrated_mix_with_zones_and_tolerances(folder: Path) -> None:
         "tolerances": {"amplitude_um": 2},
         "calibration": machine_values(amplitude=0.05, K=0.05, beta=0.1),
     })  # fmt: skip
-    loaded, contents = load_result(folder), report_contents(folder)
-    intensity = Estimate(0.2, 0.01)
-    result = replace(loaded, design=design)
+    loaded, intensity = load_result(folder), Estimate(0.2, 0.01)
+    limit = {"key": "coverage_min", "limit": 0.9}
+    zones = [
+        ZoneRecord(
+            name=f"z{k}",
+            limits=[ZoneLimit(**limit, metric=f"z{k}.p05_coverage", standing=standing)],
+            triangles=1,
+            exposed_area_mm2=1.0,
+            reachable_share=1.0,
+        )
+        for k, standing in enumerate(3 * ["met"] + 3 * ["not met"])
+    ]
+    result = replace(
+        loaded, design=design, record=loaded.record.model_copy(update={"zones": zones})
+    )
     result.metrics["almen_intensity"] = intensity
-    label, shown = metric_label("almen_intensity"), intensity
-    limit = {"text": "coverage_min = 0.9", "metric": "z.p05_coverage", "unit": "mmA"}
-    limits = [{**limit, "standing": one, "figure": shown} for one in ("met", "not met")]
-    figure = {"label": label.text, "unit": "mmA", "q05": shown, "q95": shown, "corner": None}
-    zones = {"zones": [
-        {"name": f"z{k}", "limits": limits[k // 3 : k // 3 + 1], "mean_coverage": shown}
-        for k in range(6)
-    ]}  # fmt: skip
-    contents |= {
-        "zones": zones,
-        "answer_lines": zone_lines(zones),
-        "metrics": [
-            *contents["metrics"],
-            {"name": "almen_intensity", "label": label.text, "unit": "mmA", "result": shown},
-        ],
-    }  # fmt: skip
-    rows = rows_of(result, contents)
+    for k in range(6):
+        result.metrics[f"z{k}.p05_coverage"] = intensity
+    rows = rows_of(result)
     assert len(re.findall(r"of Ø [23] mm, [\d.]+ g", rows["Shot"]["balls"])) == 2
     assert rows["Tolerances"]["sonotrode.amplitude_um"] == "23 to 27, as designed 25"
     assert "was not simulated" in rows["Tolerances"][""]
@@ -135,8 +136,15 @@ def test_a_calibrated_mix_with_zones_and_tolerances(folder: Path) -> None:
     checks = [check.expected for check in first_checks(result)]
     assert checks[0] == "50 (45.3 to 55.1) µm peak to valley where 50 is set"
     assert "0.200 ± 0.010 mmA" in checks
-    held = rows_of(result, contents | {"tolerances": {"figures": [figure]}})["Tolerances"]
-    assert held[f"{label.text} [mmA]"] == "5 % below 0.200 ± 0.010; 5 % above 0.200 ± 0.010"
+    ends = dict.fromkeys(("nominal", "q05", "q95", "lowest", "highest"), intensity)
+    figure = ToleratedFigureRecord(**ends, effects={}, corner=None)
+    found = TolerancesRecord.model_construct(worst_for="", figures={"almen_intensity": figure})
+    record = result.record.model_copy(update={"tolerances": found})
+    label = metric_label("almen_intensity").with_unit
+    tolerated = replace(result, record=record)
+    tolerated.metrics.update(result.metrics)
+    held = rows_of(tolerated)["Tolerances"]
+    assert held[label] == "5 % below 0.200 ± 0.010; 5 % above 0.200 ± 0.010"
 
 
 def boxes_of(sheet: Sheet, chamber: object) -> list[tuple[str, np.ndarray]]:
@@ -151,7 +159,7 @@ def boxes_of(sheet: Sheet, chamber: object) -> list[tuple[str, np.ndarray]]:
 @pytest.mark.parametrize("much", [False, True])
 def test_nothing_overlaps_or_is_cut_off(folder: Path, much: bool) -> None:
     result = load_result(folder)
-    blocks = setting_blocks(result, report_contents(folder), (50.0,))
+    blocks = setting_blocks(result, (50.0,))
     sheet = Sheet("a name", "kind", "An answer.", blocks, first_checks(result), "")
     if much:
         long = "words and_a_name_without_an_end_" + 60 * "x" + 40 * " more words"

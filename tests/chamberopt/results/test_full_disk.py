@@ -56,7 +56,7 @@ WRITERS: dict[str, Callable[[Path], None]] = {
 }
 ROOM = 20_000  # bytes
 # Other processes would read half of a file of compiled code.
-NO_BYTECODE = {"PYTHONPATH": str(Path(__file__).parents[4]), "PYTHONDONTWRITEBYTECODE": "1"}
+NO_BYTECODE = {"PYTHONPATH": str(Path(__file__).parents[3]), "PYTHONDONTWRITEBYTECODE": "1"}
 
 
 def limited(write: Callable[[Path], None], path: Path) -> None:
@@ -126,7 +126,7 @@ def test_the_drawing_process_ends_with_the_command_that_opened_it() -> None:
     reader, writer = os.pipe()
     drawing = subprocess.Popen(
         [sys.executable, "-c", "import time; import runpy, sys\n"
-         "from chamberopt.pictures.images import coverage\n"
+         "from chamberopt.pictures import coverage\n"
          "coverage.render_coverage = lambda job: time.sleep(60)\n"
          "sys.argv[1:] = ['{\"draw\": \"coverage\"}']\n"
          "runpy.run_module('chamberopt.viewer', run_name='__main__')"],

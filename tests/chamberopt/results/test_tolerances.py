@@ -11,9 +11,9 @@ from chamberopt.chamber.build import build_chamber
 from chamberopt.cli import main
 from chamberopt.common.errors import InputError
 from chamberopt.design.load import save_design
-from chamberopt.documents.report_data import report_contents
+from chamberopt.documents.report import report
+from chamberopt.export.tables import write_tolerance_table
 from chamberopt.peening.tolerances import find_tolerances, plan_tolerances
-from chamberopt.printers.csv_tables import write_tolerance_table
 from chamberopt.printers.report_page import write_report
 from chamberopt.results.load import load_result
 from chamberopt.workflows.save_run import save_simulation
@@ -51,12 +51,10 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_the_report_has_a_section_and_a_chart(folder: Path, tmp_path: Path) -> None:
-    contents = report_contents(folder)["tolerances"]
-    assert [row["name"] for row in contents["box"]] == ["sonotrode.amplitude_um", "shot.mass_g"]
-    first = contents["figures"][0]
-    assert (
-        first["label"] == contents["worst_for"] == "coverage that 95 % of the target's area exceeds"
-    )
+    (section,) = (one for one in report(folder).sections if one.title == "Tolerances")
+    _, ranges, figures, *_ = section.content
+    assert [row[0] for row in ranges.rows] == ["sonotrode.amplitude_um", "shot.mass_g"]
+    assert figures.rows[0][0] == "coverage that 95 % of the target's area exceeds [%]"
     page = write_report(folder, tmp_path / "page.html")[0].read_text(encoding="utf-8")
     for text in ("<h2>Tolerances</h2>", 'id="tolerances"', "27 to 30 whole balls"):
         assert text in page
@@ -78,7 +76,7 @@ def test_a_result_without_tolerances_has_no_table(folder: Path, tmp_path: Path) 
     try:
         del data["tolerances"]
         replace_result(folder, data)
-        assert report_contents(folder)["tolerances"] is None
+        assert "Tolerances" not in {one.title for one in report(folder).sections}
         with pytest.raises(InputError, match="without tolerances; simulate a design"):
             write_tolerance_table(folder, tmp_path / "table.csv")
     finally:

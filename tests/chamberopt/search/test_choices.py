@@ -6,13 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from chamberopt.documents.conclusions import influence
 
 from chamberopt.common.errors import InputError
 from chamberopt.common.executor import SerialExecutor
 from chamberopt.design.design import Design, validate
 from chamberopt.design.load import load_design, save_design
 from chamberopt.design.materials import ball_sizes
-from chamberopt.documents.conclusions import influence
 from chamberopt.documents.wording import Label
 from chamberopt.pictures.charts.study import convergence_picture, slices_figure, slices_picture
 from chamberopt.pictures.charts.sweep import sweep_map

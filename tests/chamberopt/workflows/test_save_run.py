@@ -11,7 +11,7 @@ from chamberopt.chamber.build import build_chamber
 from chamberopt.common.errors import InputError
 from chamberopt.common.executor import SerialExecutor
 from chamberopt.design.load import load_design
-from chamberopt.documents.report_data import report_contents
+from chamberopt.documents.report import report
 from chamberopt.results.chamber_file import load_chamber
 from chamberopt.results.compare.comparison import compare
 from chamberopt.results.load import load_part, load_result, summary
@@ -55,13 +55,14 @@ def test_zones_read_back_and_are_shown_from_the_folder_alone(tmp_path: Path) -> 
     assert load_chamber(result).part.zones["left"].sum() == found.triangles
     part = load_part(result)
     assert part["zone"].sum() == part["zone_left"].sum() == found.triangles
-    text = report_contents(moved)
-    (limit,) = text["zones"]["zones"][0]["limits"]
-    assert limit["label"] == "coverage that 95 % of the zone's area exceeds"
-    (line,) = text["answer_lines"]
+    document = report(moved)
+    tables = {one.title: one.content for one in document.sections}
+    judged = tables["Zones"][0].rows[0]
+    assert judged[2].startswith("coverage that 95 % of the zone's area exceeds: ")
+    (line,) = document.answer_lines
     assert line.text.startswith("Zone left: coverage_min = 0.999 is not met (")
     assert line.warns
-    assert not [row for row in text["metrics"] if "." in row["name"]]
+    assert not [row for row in tables["Coverage"][0].rows if "left." in row[0]]
     seen = OpenedResult(result_info(result))
     assert "zones" in seen.quantities
     assert set(seen.part.zones) == {0, 1}

@@ -27,7 +27,7 @@ from tests.helpers.mesh_files import (
 NUMBERS = (907, 3, 512, 11, 10, 77)  # of the six quadrilaterals: gaps, not rising
 
 
-PARTS = Path(__file__).resolve().parents[5] / "designs" / "parts"
+PARTS = Path(__file__).resolve().parents[4] / "designs" / "parts"
 
 
 def quads_of(part: PartMesh) -> np.ndarray:

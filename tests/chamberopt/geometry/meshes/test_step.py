@@ -13,7 +13,7 @@ import pytest
 
 from chamberopt.chamber.part import posed_part
 from chamberopt.common.errors import InputError
-from chamberopt.export.formats import frame_of
+from chamberopt.export.frame import frame_of
 from chamberopt.geometry.meshes.native_reader import LEAST_SECONDS
 from chamberopt.geometry.meshes.part_mesh import PartMesh, read_part
 from chamberopt.geometry.meshes.step import READER, StepFace, _decoded, _face_names, read_solids

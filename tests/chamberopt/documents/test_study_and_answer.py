@@ -7,7 +7,8 @@ from typing import Any
 import pytest
 
 from chamberopt.common.estimate import Estimate
-from chamberopt.documents.conclusions import answer, answer_lines, influence
+from chamberopt.documents.answer import answer, answer_lines
+from chamberopt.documents.study import influence_sentences, influences
 from chamberopt.documents.wording import Label, objective_label
 from chamberopt.results.records import (
     BestRecord,
@@ -17,6 +18,8 @@ from chamberopt.results.records import (
     StartRecord,
     StudyRecord,
     ViolationRecord,
+    ZoneLimit,
+    ZoneRecord,
 )
 
 
@@ -51,22 +54,25 @@ def a_model(mean: list[float], half_width: list[float]) -> ModelRecord:
 
 def test_the_cost_of_moving_a_parameter_has_an_interval() -> None:
     """It costs 0.5 ± 0.5 at its far end, but 0.4 ± 0.05 in the middle: certainly 0.35."""
-    found = influence(a_study(a_model([1.0, 0.6, 0.5], [0.03, 0.04, 0.5])), Label("goal"))
-    (one,) = found["parameters"]
-    assert (one["loss"], one["loss_half_width"]) == pytest.approx((0.5, math.hypot(0.5, 0.03)))
-    assert one["surely"] == pytest.approx(0.35)
-    assert found["said"][0].startswith("x mattered most")
-    assert "0.5 ± 0.5" in found["said"][0]
-    assert "0.35 or more" in found["said"][0]
+    study, label = a_study(a_model([1.0, 0.6, 0.5], [0.03, 0.04, 0.5])), Label("goal")
+    (one,) = influences(study, label)
+    assert (one.loss, one.half_width) == pytest.approx((0.5, math.hypot(0.5, 0.03)))
+    assert one.surely == pytest.approx(0.35)
+    said = influence_sentences(study, [one], label)
+    assert said[0].startswith("x mattered most")
+    assert "0.5 ± 0.5" in said[0]
+    assert "0.35 or more" in said[0]
 
 
 def test_too_few_evaluations_are_reported() -> None:
-    unsure = influence(a_study(a_model([1.0, 0.9, 0.8], [0.2, 0.2, 0.2])), Label("goal"))
-    assert unsure["parameters"][0]["surely"] == 0.0
-    assert "20 evaluations are too few to show an influence of x" in unsure["said"][0]
-    none = influence(a_study(evaluations=3, failed=1), Label("goal"))
-    assert none["parameters"] == []
-    assert none["said"] == [
+    unsure, label = a_study(a_model([1.0, 0.9, 0.8], [0.2, 0.2, 0.2])), Label("goal")
+    rows = influences(unsure, label)
+    assert rows[0].surely == 0.0
+    said = influence_sentences(unsure, rows, label)
+    assert "20 evaluations are too few to show an influence of x" in said[0]
+    none = a_study(evaluations=3, failed=1)
+    assert influences(none, label) == []
+    assert influence_sentences(none, [], label) == [
         "3 evaluations, 1 of them not simulated, are too few to tell what each parameter does: "
         "4 or more are needed for a model of them."
     ]
@@ -74,21 +80,19 @@ def test_too_few_evaluations_are_reported() -> None:
 
 def test_a_time_to_minimise_is_shown_as_a_time() -> None:
     study = a_study(a_model([-400.0, -900.0, -2000.0], [10.0] * 3))
-    found = influence(study, objective_label("minus_time_to_98_s"))["parameters"][0]
-    assert found["mean"] == [400.0, 900.0, 2000.0]
-    assert found["loss"] == pytest.approx(1600.0)
+    (found,) = influences(study, objective_label("minus_time_to_98_s"))
+    assert found.curve.mean.tolist() == [400.0, 900.0, 2000.0]
+    assert found.loss == pytest.approx(1600.0)
 
 
 def test_constraints_that_are_not_certainly_met_are_in_the_answer() -> None:
-    metric, limit = "root.almen_intensity_p05", "intensity_mmA ≥ 0.1"
-    band = {"text": limit, "unit": "mmA", "figure": Estimate(0.12, 0.03), "standing": "not known"}
-    mean = Estimate(90.0, 2.0)
-    zones = {
-        "zones": [
-            {"name": "root", "limits": [band], "mean_coverage": mean},
-            {"name": "tip", "limits": [], "mean_coverage": mean},
-        ]
-    }
+    metric = "root.almen_intensity_p05"
+    band = ZoneLimit(key="intensity_mmA", limit=0.1, metric=metric, standing="not known")
+    shares = {"triangles": 1, "exposed_area_mm2": 1.0, "reachable_share": 1.0}
+    zones = [
+        ZoneRecord(name="root", limits=[band], **shares),
+        ZoneRecord(name="tip", limits=[], **shares),
+    ]
     many = ViolationRecord(figure="shot_count", text="shot_count 33 may be > max 30")
     weak = ViolationRecord(figure=metric, text=f"{metric} 0.12 may be < min 0.1")
     too_many = ViolationRecord(figure="shot_count", text="shot_count 50 > max 30")
@@ -116,15 +120,19 @@ def test_constraints_that_are_not_certainly_met_are_in_the_answer() -> None:
         confirmed=confirmed,
     )
     design = SimpleNamespace(calibration=SimpleNamespace(misfits=[misfit], not_mmA=""))
-    limited = SimpleNamespace(limits=[SimpleNamespace(metric=metric)])
     result: Any = SimpleNamespace(
         study=study,
-        record=SimpleNamespace(zones=[limited]),
+        record=SimpleNamespace(zones=zones),
+        metrics={
+            metric: Estimate(0.12, 0.03),
+            "tip.mean_coverage": Estimate(0.9, 0.02),
+            "root.mean_coverage": Estimate(0.9, 0.02),
+        },
         design=design,
         objective_name="minus_time_to_98_s",
         objective=Estimate(-200.0, 20.0),
     )
-    lines = answer_lines(result, zones)
+    lines = answer_lines(result)
     assert [one.text for one in lines] == [
         "Zone root: intensity_mmA ≥ 0.1 is not known (0.12 ± 0.03 mmA).",
         "Zone tip: no limits; mean coverage 90.0 ± 2.0 %.",

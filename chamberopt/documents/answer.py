@@ -1,0 +1,114 @@
+"""The answer of a result in one sentence, and the sentences that belong to it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Literal
+
+from chamberopt.chamber.checks.calibration import misfit_texts
+from chamberopt.common.estimate import Estimate
+from chamberopt.coverage.coverage_intervals import NOT_RESOLVED
+from chamberopt.coverage.metrics import OBJECTIVES
+from chamberopt.documents.document import AnswerLine
+from chamberopt.documents.wording import Label, metric_label, objective_label, plain
+from chamberopt.documents.zones import zone_lines
+from chamberopt.search.study.constraints import MET
+
+if TYPE_CHECKING:
+    from chamberopt.results.load import Result
+
+
+def answer(result: Result, start: Result | None, gain: Estimate | None) -> str:
+    """The answer in one sentence, with its uncertainty.
+
+    For a study: objective of start and best, and whether the change is more than noise. For a
+    simulation: its coverage.
+    """
+    label = objective_label(result.objective_name)
+    if start is None or gain is None:
+        mean = metric_label("mean_coverage")
+        treatment_time = result.design.process.treatment_time
+        if result.metrics["mean_coverage"].in_words == NOT_RESOLVED:
+            return (
+                "Too few dents were simulated to tell how much of the target is covered after "
+                f"{plain(treatment_time)} s."
+            )
+        text = (
+            f"After {plain(treatment_time)} s the target is covered to "
+            f"{mean.format(result.metrics['mean_coverage'])} on average"
+        )
+        if label.text != mean.text:
+            text += f", and its {label.text} is {label.format(result.objective)}"
+        return f"{text} (95 % intervals); {full_coverage(result)}."
+    named = label.text if result.objective_name in OBJECTIVES else label.in_full
+    before, after = label.format(start.objective), label.format(result.objective)
+    study = result.study
+    if study is not None and study.best.parameters == study.start.parameters:
+        return (
+            f"No better chamber than the start was found: its {named} is {before} (95 % interval)."
+        )
+    if NOT_RESOLVED in (start.objective.in_words, result.objective.in_words):
+        return (
+            "Too few dents were simulated to tell whether the best chamber found is better than "
+            "the start."
+        )
+    values = f"from {before} at the start to {after}"
+    change = label.format(gain, sign=True)
+    intervals = "(95 % intervals, both simulated again with fresh seeds)"
+    if gain.low > 0.0:
+        return (
+            f"The best chamber found changes the {named} {values}: a change of {change} "
+            f"{intervals}, which is more than noise."
+        )
+    return (
+        f"No chamber was found that is certainly better: the {named} goes {values}, but the "
+        f"change of {change} is within the noise {intervals}."
+    )
+
+
+def answer_lines(result: Result) -> list[AnswerLine]:
+    """The sentences on zones, on constraints, and on doubts of a calibration."""
+    lines = [*zone_lines(result), *_constraint_lines(result)]
+    calibration = result.design.calibration
+    doubts = [*misfit_texts(calibration), calibration.not_mmA] if calibration else []
+    return lines + [
+        AnswerLine("calibration", f"{one[0].upper()}{one[1:]}.", True) for one in doubts if one
+    ]
+
+
+def _constraint_lines(result: Result) -> Iterator[AnswerLine]:
+    """Which constraints the best, the start and candidates better than the best may not meet.
+
+    The zones of the best have sentences of their own.
+    """
+    limited = {limit.metric for zone in result.record.zones for limit in zone.limits}
+    study, label = result.study, objective_label(result.objective_name)
+    if study is None:
+        return
+    for one in study.confirmed:
+        violations = one.violations
+        about: Literal["best", "start", "other"] = "other"
+        if one.parameters == study.best.parameters:
+            about, whose = "best", "The best chamber found"
+            violations = [found for found in violations if found.figure not in limited]
+        elif one.parameters == study.start.parameters:
+            about, whose = "start", "The start"
+        elif one.objective.value > result.objective.value:
+            whose = f"Another chamber, whose {label.text} is {label.format(one.objective)}"
+        else:
+            continue
+        if violations:
+            texts = ", ".join(found.text for found in violations)
+            yield AnswerLine(about, f"{whose}: constraints {MET[one.standing]}: {texts}.", True)
+
+
+def full_coverage(result: Result) -> str:
+    """Half a sentence: when 95 % of the target is covered to 98 %, as far as that is known."""
+    time = result.metrics.get("time_to_98_s")
+    if time is None:
+        return "this older result does not say when it would be covered to 98 %"
+    if time.in_words == "never":
+        return "at this rate 95 % of its area would never be covered to 98 %"
+    if time.in_words == NOT_RESOLVED:
+        return "too few dents were simulated to tell when 95 % of its area is covered to 98 %"
+    return f"95 % of its area is covered to 98 % after {Label('', 's').format(time)}"

@@ -1,0 +1,179 @@
+"""What is said of coverage: the figures of the result, and of its start, with their change."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from chamberopt.common.estimate import Estimate, independent_difference, paired_difference
+from chamberopt.documents.document import (
+    Beside,
+    Block,
+    Chart,
+    Fold,
+    Section,
+    Sentence,
+    Table,
+    Tile,
+    Tiles,
+)
+from chamberopt.documents.wording import Label, metric_label, objective_label, per_cent, plain
+from chamberopt.pictures.charts.result_charts import coverage_over_time_figure, histogram_figure
+
+if TYPE_CHECKING:
+    from chamberopt.pictures.part3d import PartScene
+    from chamberopt.results.load import Result
+    from chamberopt.results.records import CoverageAtTime, FieldRecord
+
+SHOWN_AS_TILES = ("mean_coverage", "p05_coverage", "time_to_98_s")  # beside the objective
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A figure of the result as computed, with that of the start and the change between them."""
+
+    name: str
+    label: Label
+    result: Estimate
+    start: Estimate | None = None
+    change: Estimate | None = None
+
+
+def figures(result: Result, start: Result | None) -> list[Figure]:
+    """The objective and the metrics; metrics of zones and the objective's own are left out."""
+    label = objective_label(result.objective_name)
+    before = None if start is None else start.objective
+    entries = [(result.objective_name, label, result.objective, before)]
+    entries += [
+        (name, metric_label(name), metric, start.metrics.get(name) if start else None)
+        for name, metric in result.metrics.items()
+        if metric_label(name).text != label.text and "." not in name
+    ]
+    return [
+        Figure(name, label, after, before, change(after, before, result, start))
+        if start is not None and before is not None
+        else Figure(name, label, after)
+        for name, label, after, before in entries
+    ]
+
+
+def change(after: Estimate, before: Estimate, result: Result, start: Result) -> Estimate:
+    """The difference, from pairs of replicas where both ran on the same seeds."""
+    if after == before:  # the start is the best: nothing that is shown of it is uncertain
+        return Estimate(0.0, 0.0) if after.has_number else Estimate(0.0, 0.0).not_known("not known")
+    same_seeds = result.seeds == start.seeds
+    found = (paired_difference if same_seeds else independent_difference)(after, before)
+    return found if after.has_number and before.has_number else found.not_known("not known")
+
+
+def tiles(shown: Sequence[Figure]) -> Tiles:
+    """The objective and the main metrics."""
+    chosen = [shown[0], *(one for one in shown[1:] if one.name in SHOWN_AS_TILES)]
+    return Tiles(
+        [
+            Tile(
+                one.label.text,
+                one.label.format(one.result),
+                one.label.format(one.start) if one.start is not None else "",
+            )
+            for one in chosen
+        ]
+    )
+
+
+def coverage_section(
+    shown: Sequence[Figure], of: Mapping[str, Result], scenes: Mapping[str, PartScene]
+) -> Section:
+    """Figures, the windows in which they are measured, and coverage over area and over time.
+
+    Args:
+        of: the result by its name, after its start where it has one.
+        scenes: the part of each result by the same name.
+    """
+    *_, result = of.values()
+    has_start = len(of) > 1
+    content: list[Block] = [
+        _compared(shown) if has_start else _table(shown),
+        *_windows(result.record.field),
+    ]
+    charts: list[Block] = []
+    drawn = {
+        name: (scene.coverage, scene.area)
+        for name, scene in scenes.items()
+        if scene.coverage is not None
+    }
+    if drawn:
+        caption = (
+            "How much of the target's area has which coverage at the end of the treatment, "
+            "as the picture above shows it. Both are of single windows, where counted dents "
+            "scatter: they look less even than the target is. The figures in the table are "
+            "corrected for that."
+        )
+        charts.append(Chart("histogram", histogram_figure(drawn), caption))
+    curves = {name: one.record.coverage_against_time for name, one in of.items()}
+    if any(curves.values()):
+        charts.append(_over_time(curves, result.design.process.treatment_time))
+    content.append(Beside([[chart] for chart in charts]))
+    if few := [name for name in scenes if name not in drawn]:
+        which = f" of the {' and the '.join(few)}" if has_start else ""
+        text = (
+            f"How much of the area has which coverage is not drawn{which}: too few dents were "
+            "simulated to tell single places apart."
+        )
+        content.append(Sentence(text, "soft"))
+    return Section("Compared with the start" if has_start else "Coverage", content)
+
+
+def _table(shown: Sequence[Figure]) -> Table:
+    rows = [(one.label.with_unit, one.label.number(one.result)) for one in shown]
+    return Table("± 95 % intervals", ("", "with 95 % interval"), rows)
+
+
+def _compared(shown: Sequence[Figure]) -> Table:
+    head = ("", "start", "best", "change", "more than noise")
+    rows = [
+        (
+            one.label.with_unit,
+            one.label.number(one.start),
+            one.label.number(one.result),
+            one.label.number(one.change, sign=True),
+            _standing(one.label.scale(one.change)),
+        )
+        for one in shown
+        if one.start is not None and one.change is not None
+    ]
+    return Table("± 95 % intervals", head, rows)
+
+
+def _standing(changed: Estimate) -> str:
+    """Whether a change is more than noise, in one word."""
+    if changed.half_width == 0.0 and not changed.in_words:
+        return "exact"
+    return "yes" if abs(changed.value) > changed.half_width else "no"
+
+
+def _over_time(curves: Mapping[str, Sequence[CoverageAtTime]], treatment_time: float) -> Chart:
+    curves = {name: rows for name, rows in curves.items() if rows}
+    caption = (
+        "Coverage against peening time; 98 % counts as full. Bands are 95 % intervals, and "
+        "often narrower than their line. The thin line is zero where more than 5 % of the "
+        "target is out of reach."
+    )
+    return Chart("against-time", coverage_over_time_figure(curves, treatment_time), caption)
+
+
+def _windows(field: FieldRecord) -> tuple[Sentence, Fold]:
+    """The windows in which coverage is measured, and its figures in windows of twice the radius."""
+    text = (
+        f"Coverage is the share dented in a window of {plain(field.gauge_mm2)} mm² round each "
+        f"point of the target. The median window has {plain(field.dents_in_median_window, 2)} "
+        f"simulated dents. {per_cent(field.crease_share)} of the dented area is on sharp edges."
+    )
+    labels = {name: metric_label(name) for name in field.double_gauge}
+    wide = [
+        (labels[name].with_unit, labels[name].number(one))
+        for name, one in field.double_gauge.items()
+    ]
+    caption = f"In windows of {plain(4.0 * field.gauge_mm2)} mm², twice as wide"
+    return Sentence(text), Fold(caption, [Table("", ("", "± 95 %"), wide)])

@@ -1,0 +1,319 @@
+"""The report of a result: everything that is said of it, as a document."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from chamberopt.common.files import read_file
+from chamberopt.common.number_text import estimate_text, typeset
+from chamberopt.documents.answer import answer, answer_lines
+from chamberopt.documents.coverage import change, coverage_section, figures, tiles
+from chamberopt.documents.document import (
+    Beside,
+    Block,
+    Document,
+    Fold,
+    Items,
+    PartView,
+    Section,
+    Sentence,
+    Table,
+    TextFile,
+)
+from chamberopt.documents.study import (
+    front_section,
+    influence_section,
+    question_section,
+    search_section,
+)
+from chamberopt.documents.tolerances import tolerance_section
+from chamberopt.documents.wording import metric_label, objective_label, plain
+from chamberopt.documents.zones import zones_section
+from chamberopt.pictures.part3d import part_scene
+from chamberopt.results.load import START, load_result, load_start, load_trials
+
+if TYPE_CHECKING:
+    from chamberopt.results.load import Result
+    from chamberopt.results.records import AdviceRecord, StudyRecord
+
+SUBTITLES = {
+    "study": "Report of a study: the best chamber found",
+    "simulation": "Report of one simulated chamber",
+}
+LIMITS_OF_INTERVALS = (
+    "The intervals cover random variation between simulations only. They do not include errors in "
+    "your restitution, friction and material data: calibrate those with your machine."
+)
+LIMITS_OF_CALIBRATED = (
+    "The intervals cover random variation between simulations, and what the calibration of the "
+    "machine leaves open. They do not include what the model itself leaves out."
+)
+STEPS = {
+    "chamber": "to build the chamber",
+    "simulate": "to simulate",
+    "coverage": "to compute the coverage",
+}
+STOP_REASONS = {
+    "replicas": "the requested number of replicas",
+    "accuracy": "the requested accuracy was reached",
+    "max_replicas": "the largest allowed number; the requested accuracy was not reached",
+}
+COLLISIONS = {
+    "walls": "with walls and part",
+    "balls": "between balls",
+    "sonotrode": "with the sonotrode",
+}
+
+
+def report(folder: str | Path) -> Document:
+    """The report of a results folder.
+
+    Raises:
+        InputError: the folder is no finished result.
+    """
+    result = load_result(folder)
+    study, name = result.study, result.folder.resolve().name
+    start = load_start(result) if study else None
+    trials = load_trials(result.folder) if study else []
+    of = {"result": result} if start is None else {START: start, "best": result}
+    scene = part_scene(result, name)
+    scenes = {"result" if start is None else "best": scene}
+    if start is not None:
+        scenes = {START: part_scene(start, START, max_triangles=0), **scenes}
+    shown = figures(result, start)
+    gain = None if start is None else change(result.objective, start.objective, result, start)
+    said, lines = answer(result, start, gain), answer_lines(result)
+    label = objective_label(result.objective_name)
+    sections = (
+        question_section(result),
+        Section(
+            "The answer",
+            [
+                Sentence(said, "sentence"),
+                *(Sentence(one.text, "warning" if one.warns else "") for one in lines),
+                tiles(shown),
+                Sentence(limits_of_intervals(result), "soft"),
+            ],
+            is_answer=True,
+        ),
+        Section("The best chamber" if study else "The chamber", [PartView([scene])]),
+        front_section(study) if study else None,
+        search_section(result, trials) if study else None,
+        influence_section(study, label) if study else None,
+        coverage_section(shown, of, scenes),
+        zones_section(result),
+        tolerance_section(result.record.tolerances),
+        _accuracy_and_cost(result, trials),
+        _effects(result),
+        _notes(result),
+        _design(result, start),
+        _made_with(result),
+    )
+    return Document(name, _subtitle(result), said, lines, [one for one in sections if one])
+
+
+def notes_of(result: Result) -> list[str]:
+    """The notes of the study and of the evaluation."""
+    return [*(result.study.notes if result.study else ()), *result.notes]
+
+
+def limits_of_intervals(result: Result) -> str:
+    """What the intervals of a result do not cover."""
+    return LIMITS_OF_INTERVALS if result.design.calibration is None else LIMITS_OF_CALIBRATED
+
+
+def _subtitle(result: Result) -> str:
+    created = result.record.created
+    made = f"simulated {created[:10]}, " if created else ""
+    return (
+        f"{SUBTITLES.get(result.record.kind, '')}; "
+        f"{made}report made {datetime.now(UTC).date()} by chamberopt"
+    )
+
+
+def _accuracy_and_cost(result: Result, trials: Sequence[Mapping[str, Any]]) -> Section:
+    accuracy = Table("How accurate it is", (), [*_accuracy(result).items()], numbers=False)
+    cost: list[Block] = [
+        Table("What the answer cost", (), [*_cost_of_answer(result).items()], numbers=False)
+    ]
+    if result.study:
+        rows = [*_cost_of_study(result.study, trials).items()]
+        cost.append(Table("Evaluations of the study", (), rows, numbers=False))
+    return Section("Accuracy and cost", [Beside([[accuracy], cost])])
+
+
+def _accuracy(result: Result) -> dict[str, str]:
+    """The intervals of the answer, and the replicas behind them."""
+    objective, mean = objective_label(result.objective_name), metric_label("mean_coverage")
+    record, field = result.record, result.record.field
+    needed = field.simulated_s_needed.p05_times_intensity
+    rows = {
+        f"95 % interval of the {objective.text}": objective.format(result.objective),
+        f"95 % interval of the {mean.text}": mean.format(result.metrics["mean_coverage"]),
+        "replicas, each with its own seed": f"{record.replicas}",
+        "number of replicas": STOP_REASONS.get(record.stopped_by, record.stopped_by),
+        "dents in the median window": plain(field.dents_in_median_window, 3),
+        "simulation that resolves every figure": f"{plain(needed, 2)} s of all replicas"
+        if needed and not result.resolves_places
+        else "",
+    }
+    if result.study:
+        search = result.study.accuracy.search
+        replicas = f"up to {search.replicas} replicas"
+        if half_width := search.objective_half_width:
+            replicas = f"± {half_width:g} requested"
+        time = search.simulated_time_s
+        rows["a candidate of the search"] = replicas + (f" of {plain(time)} s" if time else "")
+    rows["chamber's walls"] = "exact planes and cylinders" if record.analytic else "triangles"
+    return {name: text for name, text in rows.items() if text}
+
+
+def _cost_of_answer(result: Result) -> dict[str, str]:
+    """Simulated time, collisions and run time of the result itself."""
+    record, collisions = result.record, result.record.collisions
+    kinds = [
+        f"{_count(collisions[name])} {kind}"
+        for name, kind in COLLISIONS.items()
+        if name in collisions
+    ]
+    return {
+        "simulated time": f"{plain(record.simulated_time_s)} s",
+        "collisions": f"{_count(collisions.get('total', 0))}: {', '.join(kinds)}",
+        **{STEPS.get(name, name): f"{s:.2f} s" for name, s in record.timings_s.items()},
+    }
+
+
+def _cost_of_study(study: StudyRecord, trials: Sequence[Mapping[str, Any]]) -> dict[str, str]:
+    """Numbers of evaluations, and the run time of all."""
+    return {
+        "in the search": _count(study.evaluations),
+        "of these not simulated": _count(study.failed),
+        "of these given up after a few replicas": _count(study.given_up),
+        "of these miss a constraint": _count(study.missing_a_constraint),
+        "confirmations": _count(sum(row["stage"] == "confirm" for row in trials)),
+        "run time of all": f"{plain(study.seconds, 3)} s",
+    }
+
+
+def _count(number: float) -> str:
+    return plain(float(number), 12)
+
+
+def _effects(result: Result) -> Section:
+    """Which effects are on, and what a pilot run estimated of each where it was made."""
+    effects = result.design.effects.model_dump(mode="json", exclude={"auto"})
+    switched = [(name, _effect_text(name, value)) for name, value in effects.items()]
+    in_result = Table("In this result", (), switched, numbers=False)
+    if pilot := result.record.effects:
+        return Section("Physical effects", [in_result, *_advice(pilot)])
+    text = (
+        "No pilot run was made to estimate what each effect changes. "
+        "“chamberopt check --pilot” makes one for a design."
+    )
+    return Section("Physical effects", [in_result, Sentence(text)])
+
+
+def _advice(pilot: Sequence[AdviceRecord]) -> Iterator[Block]:
+    rows = [
+        (
+            one.effect,
+            one.verdict,
+            *(typeset(estimate_text(by, 100.0, "%", sign=True)) for by in one.changes.values()),
+        )
+        for one in pilot
+    ]
+    yield Sentence(
+        "The effects were chosen by a short pilot run, in which each was switched alone:"
+    )
+    yield Table(
+        "", ("effect", "verdict", *(f"change of {name}" for name in pilot[0].changes)), rows
+    )
+    yield Items([one.said for one in pilot])
+
+
+def _effect_text(name: str, value: Any) -> str:
+    if isinstance(value, Mapping):
+        return ", ".join(f"{key} = {_text(one)}" for key, one in value.items() if one is not None)
+    if name == "rest" and value is None:
+        return "on where a still surface faces up"
+    return "on" if value else "off"
+
+
+def _notes(result: Result) -> Section:
+    warnings = result.record.warnings
+    notes = [*(f"Warning: {text}" for text in warnings or ()), *notes_of(result)]
+    content = [Sentence(note, "warning") for note in notes]
+    if warnings is None:
+        text = "The design was not checked; “chamberopt check” lists its warnings."
+        content.append(Sentence(text))
+    elif not notes:
+        content.append(Sentence("There are no notes or warnings."))
+    return Section("Notes and warnings", content)
+
+
+def _design(result: Result, start: Result | None) -> Section:
+    """What differs from the start, every value by its dotted name, and the file."""
+    values = _design_values(result)
+    before = _design_values(start) if start else values
+    changed = [
+        (name, before.get(name, _text(None)), value)
+        for name, value in values.items()
+        if before.get(name, _text(None)) != value
+    ]
+    content: list[Block] = []
+    if changed:
+        content.append(Table("What differs from the start", ("", "start", "best"), changed))
+    every = Table("", ("", "value"), [*values.items()], numbers=False)
+    name = "best.toml" if result.study else "design.toml"
+    file = TextFile(name, read_file(result.path(name)).decode())
+    content += [
+        Fold("Every value of the design", [every], printed=True),
+        Fold(f"{name}, for chamberopt simulate", [file]),
+    ]
+    return Section("The design", content)
+
+
+def _design_values(result: Result) -> dict[str, str]:
+    """Each value of the design by its dotted name; of the mesh only the name of its file.
+
+    The folder of the mesh is private to the machine.
+    """
+    values = dict(_flatten(result.record.design))
+    values["part.mesh"] = result.design.part.mesh_path.name
+    return {name: _text(value) for name, value in values.items()}
+
+
+def _flatten(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    for name, value in table.items():
+        if isinstance(value, Mapping):
+            yield from _flatten(value, f"{prefix}{name}.")
+        elif value not in ([], None):
+            yield prefix + name, value
+
+
+def _text(value: Any) -> str:
+    if value is None:
+        return "–"
+    if isinstance(value, str):
+        return value
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return f"{value:.6g}" if isinstance(value, float) else json.dumps(value, ensure_ascii=False)
+
+
+def _made_with(result: Result) -> Section:
+    rows = {
+        "part, SHA-256": result.record.part_sha256,
+        "seed": seed_text(result),
+        **result.record.versions,
+    }
+    return Section("Made with", [Table("", (), [*rows.items()], numbers=False)])
+
+
+def seed_text(result: Result) -> str:
+    """The seed and the random stream."""
+    return f"{result.seeds[0]}, stream “{result.seeds[1]}”"

@@ -1,0 +1,314 @@
+"""What is said of a study: its question, its search, its front, and which parameters mattered."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from chamberopt.common.estimate import Estimate
+from chamberopt.common.files import read_file
+from chamberopt.documents.document import (
+    Beside,
+    Block,
+    Chart,
+    Fold,
+    Items,
+    Section,
+    Sentence,
+    Table,
+)
+from chamberopt.documents.wording import (
+    Label,
+    objective_label,
+    per_cent,
+    plain,
+    with_interval,
+    with_unit,
+)
+from chamberopt.documents.zones import limit_text
+from chamberopt.pictures.charts.result_charts import convergence_figure, influence_figure
+from chamberopt.pictures.charts.study import EvaluatedCandidate
+from chamberopt.search.candidates import POINTS_PER_PARAMETER
+from chamberopt.search.sensitivity import Slice
+from chamberopt.search.study_folder import STUDY
+
+if TYPE_CHECKING:
+    from chamberopt.results.load import Result
+    from chamberopt.results.records import ModelRecord, StudyRecord
+
+NO_CONSTRAINTS = "There were no constraints."
+
+
+def question_section(result: Result) -> Section:
+    """What was asked: of one chamber its coverage, of a study the best chamber."""
+    design, study = result.design, result.study
+    part, reach = design.part.mesh_path.name, ""
+    if area := result.record.chamber.target_exposed_area_mm2:
+        share = per_cent(result.record.field.reachable_share)
+        reach = f" ({plain(area)} mm² in the chamber; the shot can reach {share} of it)"
+    peening = (
+        f"for {plain(design.process.treatment_time)} s in a chamber of shape "
+        f"“{design.chamber.shape}”"
+    )
+    if study is None:
+        text = f"How is the target of {part}{reach} covered when it is peened {peening}?"
+        return Section("The question", [Sentence(text)])
+    label = objective_label(result.objective_name)
+    aim = "smallest" if label.factor < 0.0 else "largest"
+    text = (
+        f"Which chamber gives the {aim} {label.in_full}? "
+        f"The part is {part}; its target{reach} is peened {peening}. "
+        f"{study.evaluations} candidates were tried, chosen by: {study.algorithm}."
+    )
+    constraints = _constraints(result)
+    limits = f"Constraints: {', '.join(constraints)}." if constraints else NO_CONSTRAINTS
+    varied = [
+        (
+            name,
+            (", " if isinstance(ends[0], str) else " to ").join(map(plain, ends)),
+            plain(study.start.parameters[name]),
+            plain(study.best.parameters[name]),
+        )
+        for name, ends in study.vary.items()
+    ]
+    table = Table("What was varied", ("parameter", "bounds", "start", "best"), varied)
+    return Section("The question", [Beside([[Sentence(text), Sentence(limits)], [table]])])
+
+
+def _constraints(result: Result) -> list[str]:
+    """The limits of the study file, and those of the zones."""
+    tables: dict[str, Any] = {}
+    if STUDY in result.record.files:
+        tables = tomllib.loads(read_file(result.path(STUDY)).decode())
+    of_study = [
+        " and ".join(
+            f"{name} {'≥' if side == 'min' else '≤'} {limit:g}" for side, limit in limits.items()
+        )
+        for name, limits in tables.get("constraints", {}).items()
+    ]
+    zones = result.record.zones
+    return of_study + [
+        f"{limit_text(one)} of zone {zone.name}" for zone in zones for one in zone.limits
+    ]
+
+
+def front_section(study: StudyRecord) -> Section | None:
+    """The Pareto front; None for a study of one objective."""
+    if not study.front:
+        return None
+    labels = {name: objective_label(name) for name in study.front[0].objectives}
+    first, second = (label.with_unit for label in labels.values())
+    text = (
+        f"The study had two objectives: {first}, and {second}. Each of these candidates was "
+        "confirmed on fresh seeds, and no other is better in both objectives. "
+        "The answer above is the best by the first objective."
+    )
+    rows = [
+        (
+            str(number),
+            *(labels[name].number(value) for name, value in point.objectives.items()),
+            *map(plain, point.parameters.values()),
+        )
+        for number, point in enumerate(study.front, start=1)
+    ]
+    head = ("", first, second, *study.front[0].parameters)
+    return Section("Two objectives", [Sentence(text), Table("The Pareto front", head, rows)])
+
+
+def search_section(result: Result, trials: Sequence[Mapping[str, Any]]) -> Section | None:
+    """Every evaluation in its order, and why some were not simulated."""
+    if not trials:
+        return None
+    label = objective_label(result.objective_name)
+    candidates = [_evaluated(row, label) for row in trials]
+    figure, tooltips = convergence_figure(candidates, label.with_unit, label.factor < 0.0)
+    caption = (
+        "The objective of every evaluation in its order. The answer rests on the last ones, which "
+        "ran on fresh seeds. Point at a mark to see its parameters."
+    )
+    content: list[Block] = [Chart("convergence", figure, caption, tooltips)]
+    failed = [(str(row["number"] + 1), row["reason"]) for row in trials if row["reason"]]
+    if failed:
+        title = f"Evaluations not simulated, or that missed a constraint: {len(failed)}"
+        reasons = Table("", ("evaluation", "reason"), failed, numbers=False)
+        content.append(Fold(title, [reasons]))
+    return Section("How the search went", content)
+
+
+def _evaluated(row: Mapping[str, Any], label: Label) -> EvaluatedCandidate:
+    objective = None
+    if row["objective"] is not None:
+        objective = label.scale(Estimate(row["objective"], row["half_width"] or 0.0))
+    return EvaluatedCandidate(
+        row["number"] + 1, row["stage"], objective, bool(row["feasible"]), row["parameters"]
+    )
+
+
+@dataclass(frozen=True)
+class Influence:
+    """The cost of one parameter, by the study's model of all its evaluations.
+
+    curve: the model along the parameter, in the unit of the label.
+    loss: cost of moving the parameter alone from its best value to the worst within its bounds.
+    half_width: of the loss; None where the loss may be larger.
+    surely: cost of such a move that is certain; 0 if the intervals reach zero.
+    """
+
+    curve: Slice
+    loss: float
+    half_width: float | None
+    surely: float
+    label: Label
+
+    @property
+    def name(self) -> str:
+        return self.curve.name
+
+    @property
+    def loss_text(self) -> str:
+        if self.half_width is None:
+            return f"{with_unit(self.loss, self.label.unit)} or more"
+        return f"up to {with_interval(self.loss, self.half_width, self.label.unit)}"
+
+
+def influence_section(study: StudyRecord, label: Label) -> Section:
+    """Which parameters mattered."""
+    rows = influences(study, label)
+    content: list[Block] = [Items(influence_sentences(study, rows, label))]
+    if rows:
+        head = (
+            "parameter",
+            "moved alone costs",
+            "where surest, at least",
+            "own share of variance",
+            "no loss within",
+        )
+        table = [
+            (
+                row.name,
+                row.loss_text,
+                with_unit(row.surely, label.unit) if row.surely else "not known",
+                per_cent(row.curve.share),
+                (" or " if row.curve.texts else " to ").join(map(plain, row.curve.flat)),
+            )
+            for row in rows
+        ]
+        caption = (
+            "Each parameter alone. Band: 95 % interval of the model; without one: as bad or worse. "
+            "Shaded range: no more than the noise is lost. Above: how much of the variance over "
+            "the bounds is that of the dashed line; what is missing to 100 % is how parameters act "
+            "together."
+        )
+        figure = influence_figure(
+            [row.curve for row in rows],
+            study.start.parameters,
+            study.best.parameters,
+            label.with_unit,
+        )
+        content += [
+            Table("By a model of all evaluations", head, table),
+            Chart("slices", figure, caption),
+        ]
+    return Section("Which parameters mattered", content)
+
+
+def influences(study: StudyRecord, label: Label) -> list[Influence]:
+    """The influence of each parameter, the most important first; none without a model.
+
+    Args:
+        label: of the objective; numbers are returned in its unit.
+    """
+    if not study.model:
+        return []
+    found = [
+        _influence(name, study.model, label)
+        for name in study.vary
+        if name in study.model.parameters
+    ]
+    return sorted(found, key=lambda one: (-one.surely, -one.loss))
+
+
+def _influence(name: str, model: ModelRecord, label: Label) -> Influence:
+    one, best, size = model.parameters[name], model.expected, abs(label.factor)
+    losses = [size * (best.value - mean) for mean in one.mean]
+    half_widths = [size * math.hypot(half, best.half_width) for half in one.half_width]
+    worst = max(range(len(losses)), key=losses.__getitem__)
+    certain = [loss - half for loss, half in zip(losses, half_widths, strict=True)]
+    curve = Slice(
+        name=name,
+        values=np.array(one.values),
+        mean=np.array([label.factor * value for value in one.mean]),
+        half_width=np.array([size * value for value in one.half_width]),
+        or_worse=np.array(one.or_worse),
+        effect=np.array([label.factor * value for value in one.main_effect]),
+        share=one.share_of_variance,
+        flat=tuple(one.flat),
+        texts=tuple(one.choices),
+    )
+    half_width = None if one.or_worse[worst] else half_widths[worst]
+    return Influence(curve, max(0.0, losses[worst]), half_width, max(0.0, *certain), label)
+
+
+def influence_sentences(study: StudyRecord, rows: Sequence[Influence], label: Label) -> list[str]:
+    """What the model tells, or why there is none."""
+    model, count = study.model, study.evaluations
+    if not model:
+        return [_reason_without_model(count, study.failed, len(study.vary))]
+    said, first = [], rows[0]
+    if first.surely:
+        said.append(
+            f"{first.name} mattered most near the best design: moved alone from its best value "
+            f"to another within its bounds, it costs {first.loss_text}, and "
+            f"{with_unit(first.surely, label.unit)} or more where the model is surest."
+        )
+    if uncertain := [row.name for row in rows if not row.surely]:
+        *others, last = uncertain
+        listed = f"{', '.join(others)} and {last}" if others else last
+        said.append(
+            f"{count} evaluations are too few to show an influence of {listed}: "
+            "the intervals reach zero."
+        )
+    if len(rows) > 1:
+        said.append(_shares(rows))
+    noise = with_unit(abs(label.factor) * model.noise, label.unit)
+    said.append(
+        f"In its shaded range, each parameter alone loses no more than the noise, {noise}. "
+        f"Of all designs with every parameter in its range, {per_cent(model.together)} lose no "
+        "more than that."
+    )
+    return said
+
+
+def _shares(rows: Sequence[Influence]) -> str:
+    """How much single parameters explain of the variance over the bounds."""
+    shares, rest = sum(row.curve.share for row in rows), ""
+    if shares < 0.8:
+        rest = (
+            "; the rest is how parameters act together, so each curve below holds near the best "
+            "design"
+        )
+    widest = max(rows, key=lambda row: row.curve.share)
+    if widest is not rows[0]:
+        rest += f". Over all of the bounds {widest.name} has the largest effect of its own"
+    return (
+        f"The effects of single parameters are {per_cent(shares)} of the variance over the "
+        f"bounds{rest}."
+    )
+
+
+def _reason_without_model(count: int, failed: int, parameters: int) -> str:
+    needed = POINTS_PER_PARAMETER * parameters
+    if count - failed < needed:
+        evaluations = f"{count} evaluations" + (
+            f", {failed} of them not simulated," if failed else ""
+        )
+        return (
+            f"{evaluations} are too few to tell what each parameter does: {needed} or more are "
+            "needed for a model of them."
+        )
+    return "This result holds no model of the evaluations, so the effect of parameters is unknown."

@@ -1,0 +1,27 @@
+"""A document as JSON values; charts and views of parts are told by their names."""
+
+from __future__ import annotations
+
+from dataclasses import fields, is_dataclass
+from typing import Any
+
+from chamberopt.documents.document import Chart, Document, PartView
+
+
+def json_values(document: Document) -> dict[str, Any]:
+    """Everything that the document says, as it is shown, and remarks on its views of parts."""
+    values: dict[str, Any] = _values(document)
+    remarks = [remark for scene in document.scenes for remark in scene.remarks]
+    return {**values, "remarks": remarks}
+
+
+def _values(value: Any) -> Any:
+    if isinstance(value, Chart):
+        return {"chart": value.name, "caption": value.caption}
+    if isinstance(value, PartView):
+        return {"parts": len(value.scenes)}
+    if is_dataclass(value):
+        return {one.name: _values(getattr(value, one.name)) for one in fields(value)}
+    if isinstance(value, str | bool):
+        return value
+    return [_values(one) for one in value]
