@@ -52,30 +52,20 @@ def simulate(
         InputError: the chamber cannot be built, has no room for the shot or is not analytic.
         sim_core.SimulationError: a run must stop.
     """
-    from chamberopt.chamber.analytic import analytic_cavity
-    from chamberopt.chamber.build import build_chamber
     from chamberopt.common.executor import local_executor
     from chamberopt.common.files import claim_folder
-    from chamberopt.peening.calibration_errors import evaluate_calibrated
-    from chamberopt.peening.tolerances import plan_tolerances, simulate_tolerances
+    from chamberopt.peening.tolerances import plan_tolerances
     from chamberopt.results.load import load_result
-    from chamberopt.simulation.effect_pilot import with_effects_resolved
-    from chamberopt.workflows.save_run import save_simulation
+    from chamberopt.workflows.simulate import Teller, simulate_design
 
     _require("design", design, Design, "load_design")
     if tolerances:
         plan_tolerances(design)
     with claim_folder(out) as folder, local_executor(workers) as executor:
-        chamber = build_chamber(design)
-        cavity = analytic_cavity(design, chamber) if analytic else None
-        design, advice = with_effects_resolved(design, chamber, executor)
-        found = None
-        if tolerances:
-            evaluation, found = simulate_tolerances(design, chamber, executor, progress, analytic)
-        else:
-            evaluation = evaluate_calibrated(design, chamber, executor, progress, cavity=cavity)
-        remarks = save_simulation(folder, design, chamber, evaluation, advice, None, found)
-    _warn([*map(str, advice), *remarks])
+        done = simulate_design(
+            design, folder, executor, Teller(progress), analytic=analytic, tolerances=tolerances
+        )
+    _warn([*map(str, done.advice), *done.remarks])
     return load_result(out)
 
 

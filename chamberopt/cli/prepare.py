@@ -8,7 +8,6 @@ from chamberopt.cli.console import print_remarks
 
 if TYPE_CHECKING:
     from collections.abc import Callable
-    from concurrent.futures import Executor
     from pathlib import Path
 
     from chamberopt.chamber.build import Chamber
@@ -16,7 +15,6 @@ if TYPE_CHECKING:
     from chamberopt.design.load import Design
     from chamberopt.results.load import Result
     from chamberopt.results.rebuild import RebuiltReplica
-    from chamberopt.simulation.effect_pilot import Advice
     from sim_core import AnalyticCavity
 
 
@@ -44,21 +42,6 @@ def compile_with_message(
         sim_core.compile_simulator(*variant, lambda done, total: progress(done, total, None))
     if not sim_core.is_compiled(*variant):
         print_remarks(["compiled code cannot be kept: set NUMBA_CACHE_DIR to a folder of your own"])
-
-
-def resolve_effects(
-    design: Design, chamber: Chamber, executor: Executor
-) -> tuple[Design, list[Advice]]:
-    """Replace each effect that is "auto" by what pilot runs advise, with the advice."""
-    from chamberopt.common.progress import step
-    from chamberopt.simulation.effect_pilot import with_effects_resolved
-
-    if not design.effects.auto:
-        return design, []
-    with step("pilot runs") as progress:
-        return with_effects_resolved(
-            design, chamber, executor, progress, lambda one: compile_with_message(one, chamber)
-        )
 
 
 def advise_effects(design: Design, chamber: Chamber) -> list[dict[str, Any]]:

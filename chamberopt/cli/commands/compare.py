@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from chamberopt.cli.console import print_remarks, print_result, print_warnings, results_folder
 from chamberopt.cli.options import Cluster, Json, Out, Workers, app
-from chamberopt.cli.prepare import compile_with_message, resolve_effects
+from chamberopt.cli.prepare import compile_with_message
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
@@ -58,8 +58,10 @@ def _results(
     candidates: list[Candidate], folder: Path, workers: int | None, cluster: str | None
 ) -> list[Result]:
     """The results of all candidates; missing ones are simulated."""
+    from chamberopt.cli.teller import TerminalTeller
     from chamberopt.common.executor import open_executor
     from chamberopt.workflows.compared_candidates import simulate_missing
+    from chamberopt.workflows.simulate import resolve_effects
 
     if not any(one.missing for one in candidates):
         return [one.result for one in candidates if one.result is not None]
@@ -69,7 +71,7 @@ def _results(
             design: Design, chamber: Chamber, cavity: AnalyticCavity | None
         ) -> tuple[Design, list[Advice]]:
             print_warnings(design, chamber)
-            design, advice = resolve_effects(design, chamber, executor)
+            design, advice = resolve_effects(design, chamber, executor, TerminalTeller())
             compile_with_message(design, chamber, cavity)
             return design, advice
 

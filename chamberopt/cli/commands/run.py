@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from chamberopt.cli import console
 from chamberopt.cli.interrupt import Interrupt
 from chamberopt.cli.options import Cluster, Json, Resumable, Workers, app
-from chamberopt.cli.prepare import compile_with_message, resolve_effects
+from chamberopt.cli.prepare import compile_with_message
 from chamberopt.cli.resume import quoted, resume_command, resume_note, unfinished
 
 if TYPE_CHECKING:
@@ -84,12 +84,14 @@ def _search(
         chamber: chamber of the study's design.
     """
     from chamberopt.chamber.build import build_chamber
+    from chamberopt.cli.teller import TerminalTeller
     from chamberopt.common.progress import step
     from chamberopt.search.run_study import run_study
     from chamberopt.workflows.save_run import save_study
+    from chamberopt.workflows.simulate import resolve_effects
 
     study, advice = folder.with_effects_resolved(
-        lambda design: resolve_effects(design, chamber, executor)
+        lambda design: resolve_effects(design, chamber, executor, TerminalTeller())
     )
     at_once = _candidates_at_once(study, chamber)
     compile_with_message(study.design, chamber)

@@ -9,7 +9,7 @@ from cyclopts import Parameter
 
 from chamberopt.cli import console
 from chamberopt.cli.options import Cluster, Json, Out, Workers, app
-from chamberopt.cli.prepare import compile_with_message, resolve_effects
+from chamberopt.cli.prepare import compile_with_message
 from chamberopt.common.errors import InputError
 
 if TYPE_CHECKING:
@@ -58,6 +58,7 @@ def strip(
         Length and width of a small strip.
     """
     from chamberopt.chamber.build import build_chamber
+    from chamberopt.cli.teller import TerminalTeller
     from chamberopt.common.executor import open_executor
     from chamberopt.common.files import whole_or_nothing
     from chamberopt.common.progress import step
@@ -65,6 +66,7 @@ def strip(
     from chamberopt.design.zones import LID
     from chamberopt.peening.virtual_strip import peen_strip, strip_in_lid, strip_in_zone
     from chamberopt.workflows.save_strip import strip_text, write_strip_results
+    from chamberopt.workflows.simulate import resolve_effects
 
     size = _size(disc_mm, size_mm)
     loaded = load_design(design)
@@ -84,7 +86,7 @@ def strip(
                 chamber = build_chamber(loaded)
                 setting = strip_in_zone(loaded, strip_type, at, chamber)
             console.print_warnings(setting.design, chamber)
-        resolved, advice = resolve_effects(setting.design, chamber, executor)
+        resolved, advice = resolve_effects(setting.design, chamber, executor, TerminalTeller())
         setting = setting._replace(design=resolved)
         compile_with_message(resolved, chamber)
         with step("replicas", resolved.process.accuracy.replicas) as progress:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from chamberopt.cli import console
 from chamberopt.cli.options import Cluster, Json, Resumable, Workers, app
-from chamberopt.cli.prepare import compile_with_message, resolve_effects
+from chamberopt.cli.prepare import compile_with_message
 from chamberopt.cli.resume import resume_command, resume_note, unfinished
 
 if TYPE_CHECKING:
@@ -48,6 +48,7 @@ def sweep(
         Seed of the Sobol points, by default the study's optimizer.seed.
     """
     from chamberopt.chamber.build import build_chamber
+    from chamberopt.cli.teller import TerminalTeller
     from chamberopt.common.executor import open_executor
     from chamberopt.common.number_text import plain
     from chamberopt.common.progress import step
@@ -56,6 +57,7 @@ def sweep(
     from chamberopt.search.study import load_study
     from chamberopt.search.study_folder import open_study_folder
     from chamberopt.workflows.save_run import save_sweep
+    from chamberopt.workflows.simulate import resolve_effects
 
     loaded = load_study(study)
     plan = plan_sweep(loaded, grid, sobol, seed)
@@ -75,7 +77,7 @@ def sweep(
             workers = _workers_that_fit(loaded, chamber, workers)
         executor = workers_end.enter_context(open_executor(workers, cluster, "processes"))
         loaded, advice = folder.with_effects_resolved(
-            lambda design: resolve_effects(design, chamber, executor)
+            lambda design: resolve_effects(design, chamber, executor, TerminalTeller())
         )
         compile_with_message(loaded.design, chamber)
         with step("candidates", len(plan.points)) as progress:

@@ -34,8 +34,9 @@ def no_work(monkeypatch: pytest.MonkeyPatch) -> None:
     def work(*_: object, **__: object) -> None:
         raise AssertionError("work was begun")
 
-    for module in ("export", "replay", "dents", "simulate", "accuracy"):
+    for module in ("export", "replay", "dents", "accuracy"):
         monkeypatch.setattr(f"chamberopt.cli.commands.{module}.compile_with_message", work)
+    monkeypatch.setattr("chamberopt.cli.teller.compile_with_message", work)
     monkeypatch.setattr("chamberopt.chamber.build.build_chamber", work)
     monkeypatch.setattr("chamberopt.peening.calibrate.prepare", work)
     monkeypatch.setattr("chamberopt.pictures.subprocess_drawing.subprocess.Popen", work)

@@ -1,0 +1,120 @@
+"""Simulate a design into a folder: the one workflow of Python, of the command line and of others.
+
+A Teller hears of its steps. The one here is silent, that of the command line prints.
+"""
+
+from __future__ import annotations
+
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from chamberopt.chamber.analytic import analytic_cavity
+from chamberopt.chamber.build import build_chamber
+from chamberopt.coverage.field.memory import PROCESS, evaluation_bytes, how_many_fit
+from chamberopt.peening.calibration_errors import evaluate_calibrated
+from chamberopt.peening.tolerances import simulate_tolerances
+from chamberopt.simulation.effect_pilot import with_effects_resolved
+from chamberopt.simulation.replicas import most_replicas
+from chamberopt.workflows.save_run import save_simulation
+
+if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
+    from chamberopt.chamber.build import Chamber
+    from chamberopt.common.progress import Progress
+    from chamberopt.design.load import Design
+    from chamberopt.peening.tolerances import ToleranceResult
+    from chamberopt.simulation.effect_pilot import Advice
+    from chamberopt.simulation.evaluation import Evaluation
+    from sim_core import AnalyticCavity
+
+
+class Teller:
+    """The listener of a workflow; this one tells nothing but the progress of counted steps."""
+
+    def __init__(self, progress: Progress | None = None) -> None:
+        self._progress = progress
+
+    def step(self, what: str, total: int | None = None) -> AbstractContextManager[Progress]:
+        """Begin a named step; the context is the function that counts in it."""
+        is_counted = self._progress is not None and total is not None
+        return nullcontext(self._progress if is_counted and self._progress else _uncounted)
+
+    def compile(self, design: Design, chamber: Chamber, cavity: AnalyticCavity | None) -> None:
+        """Compile the simulator before the first replica needs it."""
+
+    def check(self, design: Design, chamber: Chamber) -> list[str] | None:
+        """Warnings on the design; None where it is not checked."""
+        return None
+
+
+def _uncounted(done: int, total: int, best: float | None) -> None:
+    """Count nothing."""
+
+
+@dataclass(frozen=True)
+class Simulated:
+    """A design that was simulated and saved.
+
+    design: with its effects chosen.
+    advice: the reasons for effects that the design left to the program.
+    remarks: of the saving, such as why a picture was skipped.
+    """
+
+    design: Design
+    chamber: Chamber
+    evaluation: Evaluation
+    tolerances: ToleranceResult | None
+    advice: list[Advice]
+    remarks: list[str]
+
+
+def simulate_design(
+    design: Design,
+    folder: Path,
+    executor: Executor,
+    teller: Teller,
+    *,
+    analytic: bool = False,
+    tolerances: bool = False,
+) -> Simulated:
+    """Build, simulate and save a design in a new or empty folder.
+
+    Args:
+        analytic: use the exact cylinder, box or prism instead of its mesh, if the chamber is one.
+        tolerances: also simulate the effect of the design's tolerances.
+
+    Raises:
+        InputError: the chamber cannot be built, has no room for the shot, is not analytic or needs
+            more memory than there is.
+    """
+    with teller.step("building the chamber"):
+        chamber = build_chamber(design)
+        cavity = analytic_cavity(design, chamber) if analytic else None
+        how_many_fit(1, evaluation_bytes(design, chamber, most_replicas(design)), PROCESS)
+        warnings = teller.check(design, chamber)
+    design, advice = resolve_effects(design, chamber, executor, teller)
+    teller.compile(design, chamber, cavity)
+    found = None
+    with teller.step("replicas", design.process.accuracy.replicas) as progress:
+        if tolerances:
+            evaluation, found = simulate_tolerances(design, chamber, executor, progress, analytic)
+        else:
+            evaluation = evaluate_calibrated(design, chamber, executor, progress, cavity=cavity)
+    with teller.step("writing and drawing"):
+        remarks = save_simulation(folder, design, chamber, evaluation, advice, warnings, found)
+    return Simulated(design, chamber, evaluation, found, advice, remarks)
+
+
+def resolve_effects(
+    design: Design, chamber: Chamber, executor: Executor, teller: Teller
+) -> tuple[Design, list[Advice]]:
+    """Replace each effect that is "auto" by what pilot runs advise, with the advice."""
+    if not design.effects.auto:
+        return design, []
+    with teller.step("pilot runs") as progress:
+        return with_effects_resolved(
+            design, chamber, executor, progress, lambda one: teller.compile(one, chamber, None)
+        )
