@@ -146,7 +146,7 @@ def _midway_points(mesh: TriangleMesh, cells: Cells, radius: float) -> np.ndarra
         away = place - found.point
         place = place + step * away / np.maximum(np.linalg.norm(away, axis=1), 1e-12)[:, None]
         step *= SHORTER
-    return best[widest >= radius]
+    return np.asarray(best[widest >= radius])
 
 
 def _links_to_spaces(
@@ -299,4 +299,4 @@ def _spacing(mesh: TriangleMesh, wanted: float) -> np.ndarray:
     on_part = mesh.tags == TAG_PART
     if MIN_POINTS * on_part.sum() <= MAX_POINTS:
         spacing[on_part] = np.minimum(spacing[on_part], np.sqrt(size[on_part] / MIN_POINTS))
-    return np.maximum(spacing, 1e-12)
+    return np.asarray(np.maximum(spacing, 1e-12))

@@ -141,7 +141,7 @@ def products_without_each(products: np.ndarray) -> np.ndarray:
     before, after = np.ones_like(products), np.ones_like(products)
     np.cumprod(products[:-1], axis=0, out=before[1:])
     after[:-1] = np.cumprod(products[:0:-1], axis=0)[::-1]
-    return before * after
+    return np.asarray(before * after)
 
 
 def mean_and_variance(uncovered: np.ndarray, reachable: float) -> tuple[np.ndarray, np.ndarray]:

@@ -74,11 +74,9 @@ def dent_diameter(
     # dent. That is so whichever law gives e.
     dents = speed > material.yield_speed
     e = np.where(dents, restitution_at(speed, material.restitution), 1.0)
-    return (
-        1.278
-        * diameter
-        * (np.maximum(1.0 - e * e, 0.0) * density * speed * speed / hardness) ** 0.25
-    )
+    loss = np.maximum(1.0 - e * e, 0.0) * density * speed * speed / hardness
+    dent: np.ndarray = 1.278 * diameter * loss**0.25
+    return dent
 
 
 def ball_diameters(impacts: ImpactLog, design: Design) -> float | np.ndarray:
@@ -105,4 +103,5 @@ def impact_angle_deg(velocity: np.ndarray, normal_speed: np.ndarray) -> np.ndarr
     """
     speed = np.linalg.norm(velocity, axis=1)
     ratio = np.divide(normal_speed, speed, out=np.ones_like(speed), where=speed > 0)
-    return np.degrees(np.arcsin(np.clip(ratio, 0.0, 1.0)))
+    angle: np.ndarray = np.degrees(np.arcsin(np.clip(ratio, 0.0, 1.0)))
+    return angle

@@ -88,7 +88,7 @@ def strength_histogram(
     sums, size = np.zeros((len(area), LEVELS)), area_of_dent(dent)
     for pair in windows.pairs(contacts):
         add_to_levels(*pair, size, level, sums)
-    return sums / area[:, None]
+    return np.asarray(sums / area[:, None])
 
 
 def saturated_strength(histogram: np.ndarray, highest: float) -> tuple[np.ndarray, np.ndarray]:
@@ -115,7 +115,7 @@ def saturation_time(rate: np.ndarray) -> np.ndarray:
         middle = np.sqrt(low * high)
         grows = _gain(rate, middle)[0] > 0.0
         low, high = np.where(grows, middle, low), np.where(grows, high, middle)
-    return low
+    return np.asarray(low)
 
 
 def time_near(rate: np.ndarray, time: np.ndarray) -> np.ndarray:

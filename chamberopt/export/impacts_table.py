@@ -19,7 +19,8 @@ from chamberopt.coverage.dents import dent_diameters, impact_angle_deg
 from chamberopt.export.formats import FrameName
 from chamberopt.export.frame import MEANING, Frame, frame_of
 from chamberopt.geometry.triangles import closest_on_each
-from chamberopt.results.impacts import RebuiltChamber, replica_count, simulate_impacts
+from chamberopt.results.impacts import replica_count, simulate_impacts
+from chamberopt.results.rebuild import RebuiltChamber
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber

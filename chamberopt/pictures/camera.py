@@ -167,7 +167,7 @@ def _worth(eyes: np.ndarray) -> np.ndarray:
     """What the same area is worth from each direction, (e,)."""
     nearness = eyes @ USUAL / np.linalg.norm(USUAL)
     is_middle = _is_middle(np.degrees(np.arcsin(eyes[:, 2])))
-    return np.where(is_middle, 1.0, STEEP) * (1.0 + NEARNESS * nearness)
+    return np.asarray(np.where(is_middle, 1.0, STEEP) * (1.0 + NEARNESS * nearness))
 
 
 def _is_middle(height: Any) -> Any:

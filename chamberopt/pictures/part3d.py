@@ -171,7 +171,7 @@ def _eye(normal: np.ndarray) -> np.ndarray:
         best[height], seen[height] = ways[k], faces[k]
     eye = best[-USUAL[2] if seen[-USUAL[2]] > 2.0 * seen[USUAL[2]] else USUAL[2]]
     aside = 1.1 * eye[:2] + 0.5 * USUAL[:2]
-    return np.r_[aside * np.hypot(*USUAL[:2]) / np.hypot(*aside), eye[2]]
+    return np.asarray(np.r_[aside * np.hypot(*USUAL[:2]) / np.hypot(*aside), eye[2]])
 
 
 def _view(chamber: Any, eye: np.ndarray) -> dict[str, Any]:
@@ -192,7 +192,7 @@ def _edges(chamber: Any, tags: np.ndarray) -> np.ndarray:
     lines = around.extract_feature_edges(
         feature_angle=EDGE_ANGLE, manifold_edges=False, non_manifold_edges=False
     )
-    return np.asarray(lines.points)[np.asarray(lines.lines).reshape(-1, 3)[:, 1:]]
+    return np.asarray(lines.points[np.asarray(lines.lines).reshape(-1, 3)[:, 1:]])
 
 
 def _packed(values: np.ndarray, kind: str = "<f4") -> str:

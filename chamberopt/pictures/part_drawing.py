@@ -36,7 +36,10 @@ def dimension(
     Args:
         away: how far below the points, or left of them if upright, its line is drawn.
     """
-    turn = (lambda x, y: (y, x)) if upright else (lambda x, y: (x, y))
+
+    def turn(x: float, y: float) -> Point:
+        return (y, x) if upright else (x, y)
+
     (x1, y1), (x2, y2) = turn(*start), turn(*end)
     line, past = y1 - away, 1.0 if away > 0 else -1.0
     for x, y in ((x1, y1), (x2, y2)):
@@ -108,7 +111,7 @@ class View:
 
     def place(self, points: Any) -> np.ndarray:
         """Points (..., 2) [mm] of the chamber on the page [mm]."""
-        return self.corner + self.scale * (np.asarray(points) - self.low)
+        return np.asarray(self.corner + self.scale * (np.asarray(points) - self.low))
 
     def window(self, axes: Axes) -> Rectangle:
         """What is drawn, as a patch to clip with."""
@@ -246,7 +249,7 @@ def _draw_plan(axes: Axes, chamber: Chamber, view: View, across: int, at: float)
 
 def _on_target(chamber: Chamber) -> np.ndarray:
     """Which triangles of the cavity are of the target."""
-    return (chamber.source >= 0) & chamber.part.target[chamber.source]
+    return np.asarray((chamber.source >= 0) & chamber.part.target[chamber.source])
 
 
 def _fill(axes: Axes, view: View, lines: np.ndarray, window: Any, **look: Any) -> None:

@@ -31,7 +31,7 @@ class View(NamedTuple):
     def pixels(self, points: np.ndarray) -> np.ndarray:
         """Columns and rows of points [mm], (k, 3), shape (k, 2)."""
         flat = np.asarray(points, dtype=float) @ self.frame[:2].T
-        return (flat - self.corner) * [1.0, -1.0] / self.pixel_mm
+        return np.asarray((flat - self.corner) * [1.0, -1.0] / self.pixel_mm)
 
 
 def render_view(

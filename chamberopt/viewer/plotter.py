@@ -12,6 +12,7 @@ from chamberopt.design.shapes import is_sonotrode
 from chamberopt.geometry.triangles import unit_normals
 from chamberopt.pictures import overlay
 from chamberopt.pictures.actors import (
+    DARK,
     GREY,
     PALE,
     SONOTRODE,
@@ -99,7 +100,7 @@ class ResultPlotter:
         self.quantities = common_quantities(results)
         for number in range(len(results)):
             self._select_view(number)
-            self.plotter.add_axes(line_width=2, viewport=TRIAD, color=overlay.DARK)
+            self.plotter.add_axes(line_width=2, viewport=TRIAD, color=DARK)
         self._seen: dict[tuple[int, bool], np.ndarray] = {}
         self._actors: list[set[str]] = [set() for _ in results]  # drawn here, by name
 
@@ -143,7 +144,7 @@ class ResultPlotter:
         first = results[0]
         if state.triangle is not None and state.triangle < first.surface.n_cells:
             corners = first.surface.points[first.surface.regular_faces[state.triangle]]
-            return unit_normals(corners) + np.array([0.2, -0.3, 0.1])
+            return np.asarray(unit_normals(corners) + np.array([0.2, -0.3, 0.1]))
         target = target_in_chamber(first.surface)[0]
         eyes = directions(steep=False) if state.chamber else near_directions(target)
         seen = np.hstack([self._seen_area(one, state.chamber, eyes) for one in results])

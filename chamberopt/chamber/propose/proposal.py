@@ -72,7 +72,7 @@ def touched_shares(
     overlap = TOLERATED_OVERLAP * 0.5 * min(diameters)
     radius = largest_balls(mesh, point, normal, 0.5 * max(diameters), overlap)[0]
     touched = [area[radius >= 0.5 * one - overlap].sum() for one in diameters]
-    return np.array(touched) / area.sum()
+    return np.asarray(np.array(touched) / area.sum())
 
 
 def fit_fillets(

@@ -49,7 +49,8 @@ class Faces(NamedTuple):
 
     def divisions(self, count: int) -> np.ndarray:
         """The division that each of so many windows sees, each angle as often, shape (count,)."""
-        return self.of_angle[(DIVISIONS * ((np.arange(count) + 0.5) * GOLDEN % 1.0)).astype(int)]
+        angle = (DIVISIONS * ((np.arange(count) + 0.5) * GOLDEN % 1.0)).astype(int)
+        return np.asarray(self.of_angle[angle])
 
     @property
     def middle(self) -> int:

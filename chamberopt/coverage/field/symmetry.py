@@ -102,7 +102,7 @@ class Symmetry:
 
 def _off(angle: np.ndarray, radius: np.ndarray) -> np.ndarray:
     """Distance from a half plane through the axis [m], at an angle to it and a radius, (k,)."""
-    return radius * np.sin(np.clip(angle, 0.0, 0.5 * np.pi))
+    return np.asarray(radius * np.sin(np.clip(angle, 0.0, 0.5 * np.pi)))
 
 
 def find_symmetry(chamber: Chamber, mesh: TriangleMesh) -> Symmetry | None:

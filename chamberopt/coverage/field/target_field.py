@@ -215,7 +215,7 @@ class TargetField:
 
     def sharpness(self, edge: np.ndarray) -> np.ndarray:
         """Share of the windows to which each of these creases is one, (k,)."""
-        return np.asarray(self.faces.shares @ (self.creases.line >= 0))[edge]
+        return np.asarray((self.faces.shares @ (self.creases.line >= 0))[edge])
 
     def places_of(self, hits: Hits, rows: np.ndarray) -> Places:
         """The contacts of some impacts."""
