@@ -1,1 +1,1 @@
-"""From a design to a closed cavity, and from the cavity to a scene of the simulator."""
+"""The closed cavity of a design, and the simulator's scene in the cavity."""

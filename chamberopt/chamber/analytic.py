@@ -1,7 +1,7 @@
 """Analytical cavity of a chamber: exact planes and a true circle for a cylinder, box or prism.
 
-It is the first of the paper's two systems: the same chamber without facets, in the same event
-loop. It is possible where the part is the lid and nothing reaches into the chamber.
+It is the first of the two systems of the paper: the same chamber without facets, in the same event
+loop. The part must be the lid, and nothing may reach into the chamber.
 """
 
 from __future__ import annotations
@@ -21,17 +21,17 @@ if TYPE_CHECKING:
     from chamberopt.design.load import Design
     from sim_core import AnalyticCavity, ImpactLog
 
-# Distance [m] within which a corner lies in a plane. CAD files round to a tenth of it; dents are a
-# thousand times as large.
+# Distance [m] within which a corner counts as in a plane. CAD files round to a tenth of this
+# distance. Dents are a thousand times as large.
 FLATNESS = 1e-7
 MAX_NORMAL_Z = 1e-6  # share of an upright side's normal along z
-VOLUME_TOLERANCE = 1e-6  # relative: how much smaller than its convex prism the chamber may be
+VOLUME_TOLERANCE = 1e-6  # relative difference allowed between the chamber and its convex prism
 MIN_AREA = 1e-15  # m²: the direction of a smaller triangle is not checked
 REMEDY = "simulate without the analytical cavity"
 
 
 def analytic_cavity(design: Design, chamber: Chamber) -> AnalyticCavity:
-    """The exact cavity of a chamber: a true circle for the shape "cylinder", otherwise its polygon.
+    """The exact cavity of a chamber: a true circle for a "cylinder", a polygon for other shapes.
 
     Raises:
         InputError: the chamber is not a cylinder, box or prism with the part as its lid, or an
@@ -56,14 +56,14 @@ def analytic_cavity(design: Design, chamber: Chamber) -> AnalyticCavity:
 
 
 def cavity_note(cavity: AnalyticCavity) -> str:
-    """A note for the result, on what was simulated in place of the chamber's triangles."""
+    """A note for the result that names the analytical cavity simulated in place of the mesh."""
     what = "cylinder" if cavity.radius is not None else f"prism of {len(cavity.outline)} sides"
     volume = f"{1e6 * cavity.volume:.5g} cm³"
     return f"simulated in an analytical cavity, an exact {what} of {volume}, not the mesh"
 
 
 def impacts_on_chamber(impacts: ImpactLog, chamber: Chamber) -> ImpactLog:
-    """Impacts on the ceiling of an analytical cavity, with the chamber's triangles there."""
+    """The impacts in an analytical cavity, with the chamber's triangles in place of its ceiling."""
     from sim_core import find_triangles
 
     ceiling = np.flatnonzero(chamber.tags == TAG_PART)
@@ -95,7 +95,7 @@ def _require_flat_or_upright(chamber: Chamber, bottom: float, top: float) -> Non
 
 
 def _outline(chamber: Chamber, bottom: float, top: float) -> np.ndarray:
-    """The convex outline (n, 2) [m] of a floor whose prism the chamber fills, or InputError."""
+    """The convex outline (n, 2) [m] of the floor. InputError if its prism is not the chamber."""
     from scipy.spatial import ConvexHull
 
     floor = np.unique(chamber.triangles[chamber.tags == TAG_SONOTRODE])

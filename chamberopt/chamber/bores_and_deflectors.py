@@ -45,8 +45,6 @@ if TYPE_CHECKING:
     from chamberopt.design.design import Design
     from chamberopt.design.shapes.hole_and_deflector_tables import Deflector, Hole
 
-# Meshes of a design's deflectors: read from their files, or made from their sizes.
-
 DEFLECTOR_SIDES = 64  # flat sides of a round rod, their corners on the circle
 
 
@@ -61,7 +59,7 @@ class DeflectorMesh(NamedTuple):
 
 
 def read_deflectors(design: Design) -> list[DeflectorMesh]:
-    """All deflectors of a design; InputError for a file that cannot be used."""
+    """All deflectors of a design. InputError if the file of a deflector cannot be used."""
     deflectors = []
     for k, one in enumerate(design.chamber.deflectors):
         name = f"chamber.deflectors.{k}"
@@ -74,7 +72,7 @@ def read_deflectors(design: Design) -> list[DeflectorMesh]:
 def _mesh_about_its_middle(
     deflector: Deflector, name: str
 ) -> tuple[np.ndarray, np.ndarray, list[str]]:
-    """Vertices [m], triangles and notes of a deflector before it is turned."""
+    """Vertices [m] and triangles of a deflector before its rotation, and notes on its file."""
     import trimesh
 
     if deflector.kind == "mesh":
@@ -111,23 +109,23 @@ def _mesh_about_its_middle(
 SIDES = 64  # flat sides of a round bore, their corners on the circle
 DEPTH_IN_ROOM = 1e-4  # m: how far a bore continues into the room
 WALL_TOLERANCE = 1e-6  # m: a point this close to a wall is on it
-AREA_TOLERANCE = 1e-6  # relative: how far a face that stays whole may change; rounding makes 1e-12
+AREA_TOLERANCE = 1e-6  # relative area change of a face that stays whole; rounding makes 1e-12
 TAG_END = 255  # tag of a bore's end, which must vanish
 
 
 class TriangleProperties(NamedTuple):
-    """What is known of each triangle of a surface."""
+    """Tag, direction, part triangle and fitting of each triangle of a surface."""
 
     tags: np.ndarray  # (k,), uint8
     facing: np.ndarray  # area vector out of the cavity [m²], (k, 3)
-    source: np.ndarray  # part triangle that it lies on, else -1; (k,)
-    fitting: np.ndarray  # its hole or deflector by the place in `fitting_names`, else -1; (k,)
+    source: np.ndarray  # part triangle under each triangle, else -1; (k,)
+    fitting: np.ndarray  # hole or deflector as an index into `fitting_names`, else -1; (k,)
 
 
 def triangle_properties(
     facing: np.ndarray, tags: np.ndarray | int, source: np.ndarray | None = None, fitting: int = -1
 ) -> TriangleProperties:
-    """Properties of triangles that have one tag or one each (k,), and belong to one fitting."""
+    """Properties of triangles of one fitting, whose tags are one number or an array (k,)."""
     count = len(facing)
     return TriangleProperties(
         np.broadcast_to(np.asarray(tags, dtype=np.uint8), count),
@@ -138,14 +136,14 @@ def triangle_properties(
 
 
 def fitting_names(design: Design) -> list[str]:
-    """The holes of a chamber, then its deflectors, as the design names them."""
+    """The names in the design of all holes, then of all deflectors."""
     counts = {"holes": len(design.chamber.holes), "deflectors": len(design.chamber.deflectors)}
     return [f"chamber.{kind}.{k}" for kind, count in counts.items() for k in range(count)]
 
 
 @dataclass(frozen=True)
 class CavitySolid:
-    """The room, and by their labels the properties of the triangles of the solids that bound it."""
+    """The room, and the triangle properties of each solid that bounds it, by the solid's label."""
 
     body: Solid
     pieces: Mapping[int, TriangleProperties]
@@ -163,7 +161,12 @@ class CavitySolid:
         return traced
 
     def without(self, body: Solid, pieces: Mapping[int, TriangleProperties]) -> CavitySolid:
-        """What is left when a body, with the properties of its own solids, is cut out."""
+        """The cavity after a body is cut out.
+
+        Args:
+            body: the solid to cut out.
+            pieces: triangle properties of the solids of the body, by label.
+        """
         return CavitySolid(subtract(self.body, body), {**self.pieces, **pieces})
 
 
@@ -174,15 +177,15 @@ class Bore(NamedTuple):
     bottom: np.ndarray  # middle of its bottom [m], shape (3,)
     axis: np.ndarray  # unit vector into the room, shape (3,)
     diameter: float  # [m]
-    tag: int  # of its bottom
-    amplitude: float = 0.0  # of its bottom if that is a sonotrode [m]
-    fitting: int = -1  # its place in `fitting_names` if it is a hole
+    tag: int  # of the bottom
+    amplitude: float = 0.0  # [m], of a bottom that is a sonotrode
+    fitting: int = -1  # index of a hole into `fitting_names`
 
 
 def cavity_solid(
     design: Design, shape: ShapeSurface, deflectors: Sequence[DeflectorMesh]
 ) -> CavitySolid:
-    """The shape with its holes, wells and deflectors; InputError for one that is out of place."""
+    """The shape with holes, wells and deflectors. InputError if any of them is out of place."""
     shell = make_solid(shape.vertices, shape.triangles, "the chamber")
     facing = area_vectors(shape.vertices, shape.triangles)
     own = triangle_properties(facing, shape.tags, shape.source)
@@ -197,7 +200,7 @@ def cavity_solid(
 
 
 def swept_faces(design: Design, cavity: CavitySolid) -> list[tuple[str, Solid]]:
-    """The room that each sonotrode's vibration sweeps, by the sonotrode's name in the design."""
+    """The room that each sonotrode's vibration sweeps, beside the name of the sonotrode."""
     surface = cavity.body.surface()
     tags, sweeps = cavity.trace(surface).tags, []
     for name, tag, axis, amplitude in (
@@ -213,7 +216,7 @@ def swept_faces(design: Design, cavity: CavitySolid) -> list[tuple[str, Solid]]:
 
 
 def _bore_of_hole(cavity: CavitySolid, hole: Hole, k: int) -> Bore:
-    """The bore of a hole, whose bottom lies its depth beyond the wall."""
+    """The bore of a hole. Its bottom lies beyond the wall by the depth of the hole."""
     name, at, out = f"chamber.holes.{k}", np.array(hole.at), np.array(hole.direction)
     distance, entering = _first_crossings(cavity.body.surface(), at[None], out, -WALL_TOLERANCE)
     if entering[0] or not np.isfinite(distance[0]):
@@ -227,7 +230,7 @@ def _bore_of_hole(cavity: CavitySolid, hole: Hole, k: int) -> Bore:
 
 
 def _with_bore(cavity: CavitySolid, bore: Bore) -> CavitySolid:
-    """The cavity united with a bore; InputError for a bore that is out of place."""
+    """The cavity united with a bore. InputError if the bore is out of place."""
     axis, bottom = bore.axis, bore.bottom
     aside = np.cross(axis, np.eye(3)[np.abs(axis).argmin()])
     aside /= np.linalg.norm(aside)
@@ -262,7 +265,7 @@ def _with_bore(cavity: CavitySolid, bore: Bore) -> CavitySolid:
 
 
 def _length_to_room(cavity: CavitySolid, bore: Bore, rim: np.ndarray) -> float:
-    """Length [m] after which a bore with this rim (p, 3) [m] has entered the room all round."""
+    """Length [m] at which a bore with this rim (p, 3) [m] is inside the room all round."""
     starts = np.r_[rim, bore.bottom[None]]
     distance, entering = _first_crossings(cavity.body.surface(), starts, bore.axis, 0.0)
     if not (entering & np.isfinite(distance) & (distance > bore.amplitude)).all():
@@ -284,7 +287,7 @@ def _length_to_room(cavity: CavitySolid, bore: Bore, rim: np.ndarray) -> float:
 def _without_deflectors(
     cavity: CavitySolid, design: Design, deflectors: Sequence[DeflectorMesh]
 ) -> CavitySolid:
-    """The cavity without all deflectors at once: one by one would refine its surface."""
+    """The cavity without all deflectors. One cut for all keeps the surface from being refined."""
     sweeps, solids, pieces = swept_faces(design, cavity), [], {}
     for k, deflector in enumerate(deflectors, start=len(design.chamber.holes)):
         own = split_bodies(deflector.vertices, deflector.triangles, deflector.name)[0]
@@ -308,14 +311,14 @@ def _without_deflectors(
 def _first_crossings(
     surface: SolidSurface, points: np.ndarray, direction: np.ndarray, beyond: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Where lines from points first cross the surface; a line along an edge crosses it.
+    """First crossing of each line with the surface. A line along an edge counts as a crossing.
 
     Args:
-        points: [m], shape (p, 3).
+        points: starts of the lines [m], shape (p, 3).
         direction: unit vector of all lines, shape (3,).
-        beyond: only crossings at a greater distance count [m].
+        beyond: smallest distance of a crossing that counts [m].
     Returns:
-        Distance [m], inf without a crossing, and whether it leads from outside in; (p,) each.
+        Distance [m], inf without a crossing, (p,), and marks of crossings from outside in, (p,).
     """
     a, b, c = (surface.vertices[surface.triangles[:, k]] for k in range(3))
     normal = 2.0 * area_vectors(surface.vertices, surface.triangles)
@@ -337,7 +340,7 @@ def _first_crossings(
 
 
 def _area_by_tag(cavity: CavitySolid) -> np.ndarray:
-    """Area [m²] of the surface with each tag from 0 to TAG_END."""
+    """Surface area [m²] with each tag from 0 to TAG_END."""
     surface = cavity.body.surface()
     tags = cavity.trace(surface).tags
     return np.bincount(tags, areas(surface.vertices, surface.triangles), TAG_END + 1)

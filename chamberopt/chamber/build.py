@@ -1,9 +1,9 @@
 """Build the chamber of a design: the closed cavity that the shot flies in.
 
-The cavity is the shape, with its bores and deflectors, without the part. One subtraction covers a
-part that hangs freely, one whose shaft goes out through the ceiling, and one that closes the
-chamber like a lid. Of what is left, only the room over the sonotrode is kept. A part that is drawn
-with its chamber may already be a piece of its surface. All files are read before solids are cut.
+The cavity is the shape with its bores and deflectors, without the part. One subtraction serves a
+part that hangs freely, a part whose shaft goes out through the ceiling, and a part that closes the
+chamber like a lid. Only the room over the sonotrode is kept. A part that is drawn with its chamber
+may already be a piece of the chamber's surface. All files are read before solids are cut.
 
 Frame: metres, z up, mean sonotrode face at z = 0, chamber axis at x = y = 0.
 """
@@ -50,7 +50,7 @@ if TYPE_CHECKING:
     from chamberopt.design.load import Design
     from chamberopt.design.shapes.surface import ShapeSurface
 
-# Rotation of a triangle by rounding [rad] that is worth a note; the facets of a round wall turn a
+# Rotation of a triangle by rounding [rad] that is worth a note. The facets of a round wall turn a
 # ball's path a hundred times as much.
 MAX_ROTATION = 1e-3
 TARGET = "the target"
@@ -63,27 +63,27 @@ class Chamber:
     vertices: np.ndarray  # [m], shape (n, 3), float64
     triangles: np.ndarray  # (k, 3) int32; closed, normals pointing out of the cavity
     tags: np.ndarray  # (k,) uint8
-    source: np.ndarray  # (k,), part triangle that a TAG_PART triangle lies on, else -1
+    source: np.ndarray  # (k,), part triangle under a TAG_PART triangle, else -1
     volume: float  # [m³]
     part: Part  # in the chamber's frame, with m triangles
     exposed_area: np.ndarray  # (m,), area of each part triangle that bounds the cavity [m²]
     notes: tuple[str, ...]  # what was assumed, repaired or left out
-    # (k,), hole or deflector that a TAG_WALL triangle belongs to, by its place in
-    # `bores_and_deflectors.fitting_names`, else -1. None where it is not known.
+    # (k,), hole or deflector of a TAG_WALL triangle as an index into
+    # `bores_and_deflectors.fitting_names`, else -1. None where the fittings are not known.
     fitting: np.ndarray | None = None
-    shape_sha256: str = ""  # of the Python file of a user's own shape, as it was run
+    shape_sha256: str = ""  # of the Python file that a user's own shape was run from
 
     @property
     def height(self) -> float:
-        """From the sonotrode to the highest point of the cavity [m]."""
+        """Height of the cavity's highest point over the sonotrode [m]."""
         return float(self.vertices[:, 2].max())
 
     def on_zone(self, zone: str) -> Chamber:
-        """The same chamber with a zone of the part as the target."""
+        """The same chamber with a zone of the part as its target."""
         return replace(self, part=replace(self.part, target=self.part.zones[zone]))
 
     def surfaces(self) -> dict[str, Chamber]:
-        """The chamber with its target, and with each zone as the target, by names for messages."""
+        """The chamber with its target, then with each zone as its target, by names for messages."""
         return {TARGET: self, **{f"zone {name}": self.on_zone(name) for name in self.part.zones}}
 
 
@@ -91,11 +91,11 @@ def build_chamber(design: Design, target: np.ndarray | None = None) -> Chamber:
     """The chamber of a design.
 
     Args:
-        target: the part triangles to cover (m,), in place of those that the design chooses: a
-            study keeps the target of its start.
+        target: part triangles to cover, (m,) bool, in place of the design's own choice. A study
+            keeps the target of its start.
     Raises:
         InputError: the part's mesh cannot be used, the part is outside the cavity or touches the
-            sonotrode, none of the target faces the shot, or there is no room over the sonotrode.
+            sonotrode, no target triangle faces the shot, or there is no room over the sonotrode.
     """
     part, notes = posed_part(design)
     deflectors = read_deflectors(design)
@@ -106,7 +106,7 @@ def build_chamber(design: Design, target: np.ndarray | None = None) -> Chamber:
 
     cavity = cavity_solid(design, shape, deflectors)
     notes += [note for one in deflectors for note in one.notes]
-    if shape.source is None:  # otherwise the part is a piece of the cavity's surface already
+    if shape.source is None:  # otherwise the part is already a piece of the cavity's surface
         solids, voids = split_bodies(part.vertices, part.triangles, part.name)
         body = unite(solids, part.name)
         if voids:
@@ -158,13 +158,13 @@ def build_chamber(design: Design, target: np.ndarray | None = None) -> Chamber:
 
 
 def _misplaced(part: Part, shape: ShapeSurface, text: str) -> SurfaceError:
-    """An error that shows the part and the edges of the chamber without it."""
+    """An error that shows the part, and the edges of the chamber without the part."""
     edges = shape.vertices[sharp_edges(shape.vertices, shape.triangles)]
     return SurfaceError(text, part.vertices[part.triangles], edges)
 
 
 def _where_to_look(is_drawn: bool) -> str:
-    """How a part comes to its place, as a remedy for one in the wrong place."""
+    """The fields that place a part, as the remedy for a part in the wrong place."""
     if is_drawn:
         return "check the groups in [chamber]"
     return (
@@ -213,7 +213,7 @@ def _refuse_misplaced_part(part: Part, shape: ShapeSurface, design: Design) -> N
 
 
 def _refuse_free_edges(design: Design, room: SolidSurface, tags: np.ndarray) -> None:
-    """Raise InputError for a sonotrode outside the room, or one with an edge without a wall."""
+    """Raise InputError for a sonotrode outside the room, or a sonotrode edge without a wall."""
     for k in range(len(design.sonotrodes)):
         if not (tags == further_sonotrode_tag(k)).any():
             raise InputError(
@@ -229,7 +229,7 @@ def _refuse_free_edges(design: Design, room: SolidSurface, tags: np.ndarray) -> 
 
 
 def _refuse_wide_swings(design: Design, room: SolidSurface, tags: np.ndarray) -> None:
-    """Raise InputError for a sonotrode that would come out of a wall beside it."""
+    """Raise InputError for a sonotrode that would vibrate out of a wall beside it."""
     from sim_core import TriangleMesh, largest_amplitude
 
     mesh, ball = TriangleMesh(room.vertices, room.triangles, tags), min(design.shot.diameters)
@@ -248,7 +248,7 @@ def _refuse_wide_swings(design: Design, room: SolidSurface, tags: np.ndarray) ->
 
 
 def _room_over_sonotrode(whole: SolidSurface, tags: np.ndarray) -> tuple[SolidSurface, list[str]]:
-    """The room that has the sonotrode for its floor, and a note on rooms that are cut off."""
+    """The room with the sonotrode as its floor, and a note on rooms that are cut off."""
     rooms = find_cavities(whole)
     floor = tags == TAG_SONOTRODE
     with_floor = [room for room in rooms if (room & floor).any()]
@@ -274,7 +274,7 @@ def _room_over_sonotrode(whole: SolidSurface, tags: np.ndarray) -> tuple[SolidSu
 
 
 def _ceiling_notes(room: SolidSurface, ceiling: float, key: str) -> list[str]:
-    """A note that the part closes the chamber below its ceiling [m], which this key sets."""
+    """A note that the part closes the chamber below its ceiling [m], the value of this key."""
     top = float(room.vertices[:, 2].max())
     if top >= ceiling - MIN_HEIGHT:
         return []
@@ -285,7 +285,7 @@ def _ceiling_notes(room: SolidSurface, ceiling: float, key: str) -> list[str]:
 def _only_reachable(
     part: Part, room: SolidSurface, traced: TriangleProperties, design: Design
 ) -> tuple[Part, str]:
-    """The part with the reachable share of its target, or InputError; and a note on the rest."""
+    """The part with the reachable share of its target, and a note. InputError if it is empty."""
     from sim_core import TriangleMesh
 
     ball = min(design.shot.diameters)
@@ -309,19 +309,18 @@ def _only_reachable(
 
 
 def selection_of(surface: str) -> str:
-    """Where a design chooses a surface of `Chamber.surfaces`, for messages."""
+    """The place in a design that chooses a surface of `Chamber.surfaces`, for messages."""
     return "[part.target]" if surface == TARGET else f"the target of {surface}"
 
 
 def hidden_share(chamber: Chamber) -> float:
-    """The share of the target's area outside the cavity."""
+    """Share of the target's area outside the cavity."""
     part = chamber.part
     return float(1.0 - chamber.exposed_area[part.target].sum() / part.area[part.target].sum())
 
 
 def _refuse_hidden_zones(part: Part, exposed: np.ndarray) -> None:
-    """Raise InputError if all of a zone is outside the cavity, where each part triangle has an area
-    in it (m,) [m²]."""
+    """Raise InputError for a zone whose triangles have no exposed area (m,) in the cavity."""
     for name, zone in part.zones.items():
         if not (exposed[zone] > 0.0).any():
             raise InputError(
@@ -331,7 +330,7 @@ def _refuse_hidden_zones(part: Part, exposed: np.ndarray) -> None:
 
 
 def _hidden_notes(chamber: Chamber) -> list[str]:
-    """Notes on the shares of the target and of zones outside the cavity."""
+    """Notes on the target and the zones that are partly outside the cavity."""
     shares = {name: hidden_share(one) for name, one in chamber.surfaces().items()}
     return [
         f"{hidden:.1%} of the area of {name} is outside the cavity and counts as not covered; "
@@ -342,7 +341,7 @@ def _hidden_notes(chamber: Chamber) -> list[str]:
 
 
 def _notes_on_room(room: SolidSurface, traced: TriangleProperties, part_name: str) -> Iterator[str]:
-    """Notes on triangles that rounding has turned, and on pieces of the part without a holder."""
+    """Notes on triangles turned by rounding, and on pieces of the part without a holder."""
     own = area_vectors(room.vertices, room.triangles)
     across = np.linalg.norm(np.cross(own, traced.facing), axis=1)
     turned = np.arctan2(across, np.einsum("ij,ij->i", own, traced.facing)) > MAX_ROTATION

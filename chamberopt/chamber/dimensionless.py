@@ -16,18 +16,18 @@ if TYPE_CHECKING:
     from chamberopt.design.load import Design
 
 STANDARD_GRAVITY = 9.80665  # m/s², CGPM 1901
-# Largest share of a solid sphere's tangential velocity that an impact turns into spin: an impact
-# that sticks, by Walton's formula.
+# Largest share of a solid sphere's tangential velocity that an impact turns into spin. It is the
+# share of an impact that sticks, by Walton's formula.
 MAX_SPIN_SHARE = 2.0 / 7.0
 
 
 def gravity_speed_change(design: Design, chamber: Chamber) -> float:
-    """g H / V²: relative change of a ball's speed over H, half that of its kinetic energy."""
+    """g H / V²: a ball's relative change of speed over H, half its change of kinetic energy."""
     return STANDARD_GRAVITY * chamber.height / design.sonotrode.peak_speed**2
 
 
 def free_path(design: Design, chamber: Chamber) -> float:
-    """Mean free path between balls over the chamber's height; infinite for one ball.
+    """Mean free path between balls over the chamber's height. It is infinite for one ball.
 
     The path is 1 / (sqrt(2) pi d² n chi) for n balls a volume, with chi = (1 - p/2)/(1 - p)³ for
     the packing fraction p.
@@ -45,9 +45,10 @@ def free_path(design: Design, chamber: Chamber) -> float:
 
 
 def drag_loss(design: Design, chamber: Chamber) -> float:
-    """3/4 Cd (rho_air / rho) (H / d): share of its speed that a ball loses to drag over H.
+    """3/4 Cd (rho_air / rho) (H / d): share of a ball's speed that drag takes over H.
 
-    Cd is the drag coefficient at speed V, rho_air and rho the densities of air and ball.
+    Cd is the drag coefficient at speed V. The densities rho_air and rho are the air's and the
+    ball's.
     """
     from sim_core import Drag, drag_coefficient
 

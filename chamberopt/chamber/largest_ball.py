@@ -1,6 +1,6 @@
-"""The largest ball that touches the cavity's surface at a point and reaches into it nowhere.
+"""The largest ball that touches the cavity's surface at a point and crosses it nowhere.
 
-A ball that touches at the point is shrunk past the closest obstacle until none is left.
+A ball that touches at the point is shrunk past the closest obstacle until no obstacle is left.
 
 Source: J. Ma, S. W. Bae, S. Choi, The Visual Computer 28 (2012) 7.
 """
@@ -23,16 +23,16 @@ SEQUENCE_STEP = np.array([0.7548776662466927, 0.5698402909980532])
 
 
 class TouchPoints(NamedTuple):
-    """Points of the surface, and the largest ball that touches at each."""
+    """Points of the surface, and the largest ball that touches at each point."""
 
-    triangle: np.ndarray  # (p,), that the point lies on
+    triangle: np.ndarray  # (p,), triangle under the point
     point: np.ndarray  # [m], (p, 3)
     normal: np.ndarray  # unit vector into the cavity, (p, 3)
-    area: np.ndarray  # that the point stands for [m²], (p,)
+    area: np.ndarray  # surface that the point stands for [m²], (p,)
     radius: np.ndarray  # of the largest ball, up to a limit [m], (p,)
     obstacle: np.ndarray  # triangle that limits the ball, else -1; (p,)
-    # Between the normal and that of the obstacle as the ball meets it, -1 where they face each
-    # other, 0 without an obstacle; (p,).
+    # Cosine between the normals of point and obstacle where the ball meets them, (p,). It is -1
+    # for surfaces that face each other, 0 without an obstacle.
     cosine: np.ndarray
 
     @property
@@ -41,20 +41,20 @@ class TouchPoints(NamedTuple):
         return np.asarray(self.point + self.radius[:, None] * self.normal)
 
     def select(self, rows: np.ndarray) -> TouchPoints:
-        """The points of these rows."""
+        """The touch points of the given rows."""
         return TouchPoints(*(column[rows] for column in self))
 
 
 def find_touch_points(
     mesh: TriangleMesh, normals: np.ndarray, spacing: np.ndarray, max_radius: float, overlap: float
 ) -> TouchPoints:
-    """Points on all triangles of a mesh, at least one on each, and the largest balls there.
+    """Points on all triangles of a mesh, at least one point on each, and their largest balls.
 
     Args:
-        normals: of the surface at the triangles' corners, unit vectors into the cavity, (m, 3, 3).
+        normals: unit vectors of the surface at the triangles' corners, into the cavity, (m, 3, 3).
         spacing: distance between the points on each triangle [m], shape (m,).
         max_radius: limit of the radius [m].
-        overlap: how far a ball may reach into a surface [m].
+        overlap: depth to which a ball may reach into a surface [m].
     """
     triangle, point, area = spread_points(mesh.vertices, mesh.triangles, spacing)
     normal = unit_vectors(interpolate(normals[triangle], mesh.corners[triangle], point))
@@ -65,12 +65,12 @@ def find_touch_points(
 def spread_points(
     vertices: np.ndarray, triangles: np.ndarray, spacing: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Points spread evenly over triangles: triangle (p,), point (p, 3) [m], and area (p,) [m²]."""
+    """Points spread evenly over triangles: triangle (p,), place (p, 3) [m] and area (p,) [m²]."""
     size = areas(vertices, triangles)
     count = np.where(size > 0.0, np.maximum(np.ceil(size / spacing**2), 1.0), 0.0).astype(np.int64)
     triangle = np.repeat(np.arange(len(triangles)), count)
-    # One sequence over all triangles: if it began again on each, the points of a row of similar
-    # triangles would lie on a few lines.
+    # One sequence runs over all triangles. If it began again on each triangle, the points of a row
+    # of similar triangles would lie on a few lines.
     u, v = ((1.0 / 3.0 + np.arange(len(triangle))[:, None] * SEQUENCE_STEP) % 1.0).T
     fold = u + v > 1.0  # the square's other half falls onto the triangle
     u, v = np.where(fold, 1.0 - u, u), np.where(fold, 1.0 - v, v)
@@ -84,8 +84,8 @@ def largest_balls(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Radius, obstacle and cosine (p,) of the largest ball at each point, as in TouchPoints.
 
-    A ball of radius R that touches at p with normal n reaches an overlap o > 0 deep into a surface
-    at q where |q - p - R n| = R - o.
+    A ball of radius R touches at p with normal n. It is o > 0 deep in a surface at q where |q - p -
+    R n| = R - o.
     """
     from sim_core import closest_points
 

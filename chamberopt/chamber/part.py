@@ -29,13 +29,17 @@ if TYPE_CHECKING:
     from chamberopt.design.part import FaceAt, Selection, SmoothingTable, Target
     from chamberopt.design.zones import Zone
 
-# Choose the triangles that must be covered, by names, faces, direction, box and radius.
-
-NEAR = 0.01  # of the part's diagonal: a place further from the surface is a mistake
+NEAR = 0.01  # share of the part's diagonal: a place further off the surface is a mistake
 
 
 def chosen_triangles(mesh: PartMesh, wanted: Selection, field: str = "part.target") -> np.ndarray:
-    """Which triangles (m,) meet all conditions; InputError, which names the field, if none does."""
+    """The triangles (m,) bool that meet all conditions of a selection.
+
+    Args:
+        field: the field of the design, for messages.
+    Raises:
+        InputError: no triangle meets all conditions.
+    """
     chosen = select_triangles(mesh.groups, wanted.surface, len(mesh.triangles), f"{field}.surface")
     if wanted.faces:
         chosen &= _on_faces(mesh, wanted.faces, field)
@@ -65,7 +69,7 @@ def chosen_triangles(mesh: PartMesh, wanted: Selection, field: str = "part.targe
 
 
 def _on_faces(mesh: PartMesh, wanted: Sequence[FaceAt], field: str) -> np.ndarray:
-    """Which triangles (m,) are on one of the faces; InputError for a place beside the surface."""
+    """Mark the triangles (m,) on one of the faces. InputError if a place is off the surface."""
     by_crease: dict[float, Faces] = {}
     chosen = np.zeros(len(mesh.triangles), dtype=bool)
     for k, one in enumerate(wanted):
@@ -91,16 +95,16 @@ def _corner(point: np.ndarray) -> str:
 
 Axis = tuple[np.ndarray, np.ndarray]
 
-LEAST_MOVED = 1e-3  # share of the target's area that is worth a word
+LEAST_MOVED = 1e-3  # share of the target's area that is worth a note
 MAX_ELEMENTS = 3e5  # makes a few minutes of meshing, and slow steps after it
 
 
 @dataclass(frozen=True)
 class PartOfFile:
-    """What a result needs of the part's file once it has been read; without groups and notes."""
+    """The part's file as a result needs it, without groups and notes."""
 
     simulated: PartMesh  # in the file's frame
-    original: PartMesh | None  # with the file's own triangles, if others are simulated
+    original: PartMesh | None  # the file's own triangles, if other triangles are simulated
     rotation: np.ndarray  # from the file's frame to the chamber's, (3, 3), applied before the shift
     shift: np.ndarray  # [m], (3,)
 
@@ -109,48 +113,48 @@ class PartOfFile:
 class Part:
     """The part in the chamber's frame.
 
-    It has the user's own triangles in the file's order, but for rounds that are divided, and unless
-    target.element_mm asks for others. It is closed, unless its file draws it as the piece that
-    bounds the room of a whole set-up.
+    Its triangles are the file's, in the file's order. Divided rounds and target.element_mm make
+    other triangles. It is closed, unless its file draws it as the piece that bounds the room of a
+    whole set-up.
     """
 
     vertices: np.ndarray  # [m], (n, 3)
     triangles: np.ndarray  # (m, 3) int32
     area: np.ndarray  # [m²], (m,)
-    target: np.ndarray  # (m,), whether a triangle must be covered
+    target: np.ndarray  # (m,), true for triangles that must be covered
     name: str
     sha256: str = ""  # of the mesh file as it was read
     unit: str = ""  # of the numbers in the file
     names: tuple[str, ...] = ()  # of the file's groups
-    file: PartOfFile | None = None  # None only in parts that no file has
+    file: PartOfFile | None = None  # None only for parts without a file
     zones: dict[str, np.ndarray] = field(default_factory=dict)  # triangles of each zone, (m,) bool
-    # Of the surface behind the triangles at their corners, unit vectors outward, (m, 3, 3) float32;
-    # None where it is the triangles.
+    # Unit normals outward of the surface behind the triangles, at their corners, (m, 3, 3) float32.
+    # None if the triangles are the surface.
     normals: np.ndarray | None = None
     hollow: np.ndarray | None = None  # largest hollow curvature of that surface [1/m], (m,)
     smoothing: SmoothingFacts | None = None  # None where there is nothing to smooth
 
     @property
     def corner_normals(self) -> np.ndarray:
-        """Unit normals of the surface at the corners of its triangles, (m, 3, 3)."""
+        """Unit normals of the surface at the corners of the triangles, (m, 3, 3)."""
         if self.normals is not None:
             return self.normals
         return np.repeat(unit_normals(self.vertices[self.triangles])[:, None], 3, axis=1)
 
     @property
     def corners_with_normals(self) -> np.ndarray:
-        """Corners [m] of its triangles and the unit normals of the surface there, (m, 3, 6)."""
+        """Corners [m] of the triangles, and unit normals of the surface there, (m, 3, 6)."""
         return np.concatenate([self.vertices[self.triangles], self.corner_normals], axis=2)
 
     def normals_in_cavity(
         self, vertices: np.ndarray, triangles: np.ndarray, source: np.ndarray
     ) -> np.ndarray:
-        """Unit normals into a cavity at the corners of its triangles, (k, 3, 3).
+        """Unit normals into a cavity at the corners of the cavity's triangles, (k, 3, 3).
 
         Args:
             vertices: of the cavity [m], shape (n, 3).
-            triangles: normals out of the cavity, shape (k, 3).
-            source: part triangle on which each one lies, else -1, shape (k,).
+            triangles: of the cavity, normals outward, shape (k, 3).
+            source: part triangle under each triangle of the cavity, else -1, shape (k,).
         """
         corners = vertices[triangles]
         normals = np.repeat(-unit_normals(corners)[:, None], 3, axis=1)
@@ -168,7 +172,7 @@ class Part:
 
     @property
     def elements(self) -> np.ndarray:
-        """The file's element that a triangle belongs to, (m,) int64, as in ElementNumbers."""
+        """Element number in the file of each triangle, (m,) int64, as in ElementNumbers."""
         if self.file is None:
             return np.arange(1, len(self.triangles) + 1)
         return self.file.simulated.elements
@@ -177,9 +181,9 @@ class Part:
 def posed_part(design: Design) -> tuple[Part, list[str]]:
     """The part in the chamber's frame, and notes on its file.
 
-    It is turned about the file's x, then y, then z, its box is centred on the axis, and it is moved
-    sideways by the offset, and up or down until its lowest point is at the sonotrode distance. A
-    part that is drawn with its chamber stays as it is drawn.
+    It is turned about the file's x, then y, then z. Its box is centred on the chamber's axis and
+    moved sideways by the offset. It is raised or lowered until its lowest point is at the sonotrode
+    distance. A part that is drawn with its chamber stays as drawn.
 
     Raises:
         InputError: the file cannot be used, or the target is empty.
@@ -218,7 +222,7 @@ def posed_part(design: Design) -> tuple[Part, list[str]]:
 
 
 def _smoothing_notes(part: Part) -> list[str]:
-    """How far the rounds were moved to the surface behind their facets."""
+    """A note on how far the rounds were moved to the surface behind their facets."""
     facts = part.smoothing
     if facts is None or facts.moved_share < LEAST_MOVED:
         return []
@@ -232,7 +236,7 @@ def _smoothing_notes(part: Part) -> list[str]:
 
 
 def _sharp_edges(count: int) -> str:
-    """What is to be known of edges that are sharp although they turn by no more than facets may."""
+    """The end of a note on edges that are taken for sharp, although facets may turn as much."""
     if not count:
         return ""
     return (
@@ -243,7 +247,7 @@ def _sharp_edges(count: int) -> str:
 
 @dataclass(frozen=True)
 class PartPreview:
-    """The part as its file has it, with the place and the target that a design gives it."""
+    """The part as its file has it, with the pose and the target of a design."""
 
     mesh: PartMesh  # with the file's own triangles (m, 3), in the file's frame
     rotation: np.ndarray  # from the file's frame to the chamber's, (3, 3), applied before the shift
@@ -253,12 +257,12 @@ class PartPreview:
 
     @property
     def vertices(self) -> np.ndarray:
-        """In the chamber's frame [m], (n, 3)."""
+        """Vertices in the chamber's frame [m], (n, 3)."""
         return np.asarray(self.mesh.vertices @ self.rotation.T + self.shift)
 
 
 def preview_part(design: Design) -> PartPreview:
-    """What `posed_part` begins with, at once: before target.element_mm and rounding.
+    """The part before the slow steps of `posed_part`: target.element_mm and rounding.
 
     Raises:
         InputError: the file cannot be used, or target or zone are empty.
@@ -273,9 +277,9 @@ def preview_part(design: Design) -> PartPreview:
 
 
 def turning_axis(design: Design, part: Part) -> Axis | None:
-    """Point [m] and direction, (3,) each, of effects.part_turn's axis in the chamber's frame.
+    """The axis of effects.part_turn in the chamber's frame: a point [m] and a direction, (3,) each.
 
-    None for a part that does not turn.
+    It is None for a part that does not turn.
     """
     turn, file = design.effects.part_turn, part.file
     if turn is None or file is None:
@@ -285,7 +289,7 @@ def turning_axis(design: Design, part: Part) -> Axis | None:
 
 
 def _part_of_file(design: Design) -> PartMesh:
-    """The part as its file has it; a file is read once, also if many chambers are built from it."""
+    """The part as its file has it. A file is read once, even if many chambers are built from it."""
     part, setup = design.part, design.chamber.setup()
     if setup is not None:
         return setup.part
@@ -293,7 +297,7 @@ def _part_of_file(design: Design) -> PartMesh:
 
 
 def _is_wall(design: Design) -> bool:
-    """Whether the part is drawn as a piece of the room's own surface, which cannot be divided."""
+    """True if the part is drawn as a piece of the room's surface. Such a part cannot be divided."""
     setup = design.chamber.setup()
     return setup is not None and setup.room.source is not None
 
@@ -304,7 +308,7 @@ def _chosen(mesh: PartMesh, wanted: Selection, field: str) -> np.ndarray:
 
 
 class _Simulated(NamedTuple):
-    """The part's mesh as it is simulated; the other columns are those of SmoothPart."""
+    """The mesh of the part as it is simulated. The other fields are the same as in SmoothPart."""
 
     mesh: PartMesh
     origin: np.ndarray
@@ -321,7 +325,7 @@ def _simulated(
     zones: tuple[Zone, ...],
     is_wall: bool,
 ) -> _Simulated:
-    """A part of a file with its rounds divided, and in triangles of the size asked for."""
+    """The part of a file with its rounds divided, in triangles of the wanted size."""
     chosen = _chosen(mesh, target, "part.target")
     rules = [
         (zone.smoothing or smoothing).rule(_chosen(mesh, zone.target, f"zones.{k}.target"))
@@ -336,7 +340,7 @@ def _simulated(
 
 
 def _remeshed(found: _Simulated, target: np.ndarray, size: float) -> _Simulated:
-    """The part with its target (m,) in triangles with sides of about a size [m]."""
+    """The part with its target (m,) in new triangles whose sides are about the size [m]."""
     mesh = found.mesh
     area = float(areas(mesh.vertices, mesh.triangles)[target].sum())
     count = area / (np.sqrt(3.0) / 4.0 * size * size)
@@ -378,12 +382,12 @@ def _remeshed(found: _Simulated, target: np.ndarray, size: float) -> _Simulated:
 
 
 def _find_origin(mesh: PartMesh, corners: np.ndarray, source: np.ndarray) -> np.ndarray:
-    """The triangle of the mesh in whose area the middle of each new triangle lies, (k,).
+    """The triangle of the mesh under the middle of each new triangle, (k,).
 
     Args:
         corners: of the new triangles [m], shape (k, 3, 3).
-        source: triangle of the mesh in the same flat face, shape (k,); already right where the new
-            triangle has its corners.
+        source: a triangle of the mesh in the same flat face, shape (k,). It is already right where
+            the new triangle has the same corners.
     """
     from sim_core import TriangleMesh, closest_points
 
@@ -396,12 +400,12 @@ def _find_origin(mesh: PartMesh, corners: np.ndarray, source: np.ndarray) -> np.
 
 
 def _pose(given: PartMesh, vertices: np.ndarray, design: Design) -> tuple[np.ndarray, np.ndarray]:
-    """From the part file's frame to the chamber's: rotation (3, 3), then shift (3,) [m].
+    """Rotation (3, 3), then shift (3,) [m], from the part file's frame to the chamber's.
 
     Args:
-        given: the part as its file has it, whose middle comes onto the axis.
-        vertices: of the part as it is simulated [m], of which the lowest counts, (n, 3): those on a
-            round may reach a little further than its facets.
+        given: the part as its file has it. Its middle comes onto the axis.
+        vertices: vertices of the simulated part [m], (n, 3). Their lowest point counts, because
+            vertices on a round may reach a little further than its facets.
     """
     setup, distance = design.chamber.setup(), design.chamber.sonotrode_distance
     if setup is not None:

@@ -1,4 +1,4 @@
-"""Where a ball can touch the cavity's surface when it comes from the sonotrode."""
+"""The places where a ball from the sonotrode can touch the cavity's surface."""
 
 from __future__ import annotations
 
@@ -15,22 +15,22 @@ if TYPE_CHECKING:
     from chamberopt.chamber.largest_ball import TouchPoints
     from sim_core import TriangleMesh
 
-# Regions in which a ball's centre can move: from where to where a ball gets in the cavity.
+# Regions in which a ball's centre can move.
 #
 # The open space is a grid of cells in which the centre may lie anywhere, refined from coarse to
-# fine. Where it is too narrow for such cells, points midway between the walls continue it: the
-# centres of the largest balls that touch the surface, and, in cells without open space nearby,
-# the point that is farthest from all walls. Two points are linked if the ball can move straight
-# from one to the other.
+# fine. Points midway between the walls continue the open space where it is too narrow for cells.
+# They are the centres of the largest balls that touch the surface, and, in cells without open
+# space nearby, the point farthest from all walls. Two points are linked if the ball can move
+# straight from the first to the second.
 
-MAX_CELLS = 3e6  # take half a second; with more, cells are made larger
+MAX_CELLS = 3e6  # they take half a second; larger cells keep their number below it
 HALVINGS = 3
 EDGE = 0.5  # of the ball's radius
 DIAGONAL = np.sqrt(3.0)
 NEIGHBOURS = 8
 NEARBY = 5  # cells: beside a plain wall, open space is two cells from where a centre can lie at all
 PUSHES, SHORTER = 12, 0.7  # the last step is a hundredth of a cell
-STEP = 0.25  # of the radius: steps in which a straight way is checked
+STEP = 0.25  # of the radius, between two checks of a straight way
 
 
 class Cells(NamedTuple):
@@ -38,12 +38,13 @@ class Cells(NamedTuple):
 
     low: np.ndarray  # lowest corner [m], (3,)
     edge: float  # of a cell [m]
-    # The open space that a cell belongs to, from 1 on; 0 where a centre may not lie anywhere in it.
+    # Number of the open space around a cell, from 1 on. It is 0 for a cell in which a centre may
+    # not lie anywhere.
     space: np.ndarray
-    unsure: np.ndarray  # whether a ball's centre may lie in some of the cell
+    unsure: np.ndarray  # true if a ball's centre may lie in a part of the cell
 
     def middles(self, chosen: np.ndarray) -> np.ndarray:
-        """Middles (n, 3) [m] of the cells that are true in (nx, ny, nz)."""
+        """Middles (n, 3) [m] of the chosen cells, (nx, ny, nz) bool."""
         return np.asarray(self.low + self.edge * (np.argwhere(chosen) + 0.5))
 
     def at(self, places: np.ndarray) -> np.ndarray:
@@ -55,15 +56,15 @@ class Cells(NamedTuple):
 
 
 def cell_edge(mesh: TriangleMesh, radius: float) -> float:
-    """Side [m] of the cells for a ball of this radius [m]; larger if there would be too many."""
+    """Side [m] of the cells for a ball of this radius [m], large enough for at most MAX_CELLS."""
     volume = float(np.prod(np.ptp(mesh.vertices, axis=0)))
     return float(max(EDGE * radius, (volume / MAX_CELLS) ** (1.0 / 3.0)))
 
 
 def open_cells(mesh: TriangleMesh, radius: float) -> Cells:
-    """Cells in which the centre of a ball of this radius [m] may lie anywhere, and open spaces.
+    """Grid of the cells in which the centre of a ball of this radius [m] may lie anywhere.
 
-    Cells outside the cavity and inside the part count too, but no ball touches the surface there.
+    Cells outside the cavity and inside the part count too. No ball touches the surface there.
     """
     from scipy.ndimage import label
 
@@ -89,12 +90,12 @@ def open_cells(mesh: TriangleMesh, radius: float) -> Cells:
 def find_regions(
     mesh: TriangleMesh, touches: TouchPoints, radius: float, spacing: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The regions in which the centre of a ball of a radius [m] can move.
+    """The regions in which the centre of a ball of this radius [m] can move.
 
     Args:
         spacing: largest distance between neighbouring touch points [m].
     Returns:
-        Region of each touch point, -1 where the ball does not fit, (p,) int; and the volume [m³] of
+        Region of each touch point, -1 where the ball does not fit, (p,) int, and the volume [m³] of
         the open space in each region.
     """
     cells = open_cells(mesh, radius)
@@ -121,10 +122,10 @@ def find_regions(
 
 
 def _midway_points(mesh: TriangleMesh, cells: Cells, radius: float) -> np.ndarray:
-    """Points (n, 3) [m] where a centre may lie in cells near no open space, or near several.
+    """Points (n, 3) [m] for a ball's centre in cells near no open space, or near several.
 
-    Each moves from the cell's middle away from the closest wall, in ever smaller steps, until it is
-    midway between the walls.
+    Each point starts at the cell's middle. It moves away from the closest wall, in ever smaller
+    steps, until it is midway between the walls.
     """
     from scipy.ndimage import maximum_filter, minimum_filter
 
@@ -152,7 +153,7 @@ def _midway_points(mesh: TriangleMesh, cells: Cells, radius: float) -> np.ndarra
 def _links_to_spaces(
     mesh: TriangleMesh, cells: Cells, centre: np.ndarray, radius: float, spacing: float
 ) -> np.ndarray:
-    """Links (k, 2) from points in narrow places (n, 3) [m] to open spaces nearby, one a pair."""
+    """Links (k, 2) from points in narrow places (n, 3) [m] to open spaces nearby, each once."""
     from scipy.ndimage import binary_erosion
     from scipy.spatial import KDTree
 
@@ -164,7 +165,7 @@ def _links_to_spaces(
     far = 3.0 * cells.edge + spacing
     most = min(NEIGHBOURS, len(border))
     away, found = KDTree(border).query(centre, k=range(1, most + 1), distance_upper_bound=far)
-    linked = np.full((len(centre), most), -1)  # the open spaces that each point is linked to
+    linked = np.full((len(centre), most), -1)  # open spaces linked to each point
     for k in range(most):
         here = np.flatnonzero(np.isfinite(away[:, k]))
         space = border_space[found[here, k]]
@@ -179,7 +180,7 @@ def _links_to_spaces(
 def _links_between(
     mesh: TriangleMesh, centre: np.ndarray, region: np.ndarray, radius: float, spacing: float
 ) -> np.ndarray:
-    """Links (k, 2) between nearby points in narrow places that are not in the same region yet."""
+    """Links (k, 2) between nearby points in narrow places of different regions."""
     from scipy.spatial import KDTree
 
     if len(centre) < 2:
@@ -198,7 +199,7 @@ def _links_between(
 def _is_way_clear(
     mesh: TriangleMesh, start: np.ndarray, end: np.ndarray, radius: float
 ) -> np.ndarray:
-    """Whether the ball can move straight from each start (n, 3) [m] to its end, (n,) bool."""
+    """Mark the pairs (n,) of start and end (n, 3) [m] between which the ball can move straight."""
     from sim_core import closest_points
 
     clear = np.ones(len(start), dtype=bool)
@@ -211,29 +212,29 @@ def _is_way_clear(
     return clear
 
 
-# Share of its radius that a ball may reach into a surface. This is what facets that turn by 8
-# degrees each take from it, or by 3 in a hollow hardly rounder than the ball. Dents are deeper, and
-# so are the tolerances of a gap.
+# Depth to which a ball may reach into a surface, over its radius. Facets that turn by 8 degrees
+# each take as much from a ball, and facets that turn by 3 degrees in a hollow hardly rounder than
+# the ball. Dents and the tolerances of gaps are deeper.
 TOLERATED_OVERLAP = 0.01
-SPACING = 1.0 / 3.0  # of the radius: distance between touch points
+SPACING = 1.0 / 3.0  # distance between touch points, over the radius
 MAX_POINTS = 100_000  # on the part, and as many on everything else
 MIN_POINTS = 4  # on a triangle of the part, unless there are too many
-MEASURED_WIDTH = 1.25  # of the largest ball: wider gaps are not measured
+MEASURED_WIDTH = 1.25  # widest gap that is measured, over the largest ball's diameter
 
 
 @dataclass(frozen=True)
 class Reach:
-    """What a ball reaches in a cavity."""
+    """The places in a cavity that a ball reaches."""
 
     mesh: TriangleMesh  # with k triangles
     diameter: float  # of the ball [m]
     touches: TouchPoints  # the p points that were checked
-    fits: np.ndarray  # (p,), whether no wall is in the ball's way at the point
-    reached: np.ndarray  # (p,), whether it fits and gets there from the sonotrode
-    region: np.ndarray  # (p,), number of the region of its centre, -1 where it does not fit
-    region_volume: np.ndarray  # of the open space in each region [m³]
+    fits: np.ndarray  # (p,), true if no wall is in the ball's way at the point
+    reached: np.ndarray  # (p,), true if the ball fits and gets there from the sonotrode
+    region: np.ndarray  # (p,), region of the ball's centre, -1 where the ball does not fit
+    region_volume: np.ndarray  # volume of the open space in each region [m³]
     spacing: float  # largest distance between touch points [m]
-    share: np.ndarray  # (k,), of each triangle of the cavity, the share that the ball can touch
+    share: np.ndarray  # (k,), share of each triangle of the cavity that the ball can touch
 
 
 def find_reach(
@@ -242,17 +243,17 @@ def find_reach(
     largest: float | None = None,
     normals: np.ndarray | None = None,
 ) -> Reach:
-    """Where a ball can touch the surface of a cavity.
+    """Find the places where a ball can touch the surface of a cavity.
 
-    The ball is taken as smaller by TOLERATED_OVERLAP. In narrow places it is followed from point to
-    point in steps of a quarter radius, so that a bent passage hardly wider than the ball may count
-    as closed.
+    The ball is taken as smaller by TOLERATED_OVERLAP. In narrow places its way is followed from
+    point to point in steps of a quarter radius. So a bent passage hardly wider than the ball may
+    count as closed.
 
     Args:
         diameter: of the smallest ball of the shot [m].
-        largest: diameter of the largest [m].
-        normals: of the surface at the corners of the cavity's triangles, unit vectors into the
-            cavity, shape (k, 3, 3); None where the triangles are the surface.
+        largest: diameter of the largest ball [m].
+        normals: unit vectors of the surface at the corners of the cavity's triangles, into the
+            cavity, shape (k, 3, 3). None if the triangles are the surface.
     """
     if normals is None:
         normals = np.repeat(-unit_normals(mesh.corners)[:, None], 3, axis=1)
@@ -273,10 +274,11 @@ def find_reach(
 
 
 def reached_part_share(reach: Reach, source: np.ndarray, count: int) -> np.ndarray:
-    """Share (count,) that the ball can touch of each part triangle in the cavity, else 0.
+    """Share (count,) of each part triangle that the ball can touch. It is 0 outside the cavity.
 
     Args:
-        source: part triangle that each triangle of the cavity lies on, else -1; shape (k,).
+        source: part triangle under each triangle of the cavity, else -1; shape (k,).
+        count: number of part triangles.
     """
     own = source >= 0
     size = areas(reach.mesh.vertices, reach.mesh.triangles)[own]
@@ -284,7 +286,7 @@ def reached_part_share(reach: Reach, source: np.ndarray, count: int) -> np.ndarr
 
 
 def _share(triangle: np.ndarray, area: np.ndarray, touched: np.ndarray, count: int) -> np.ndarray:
-    """Share (count,) of each triangle that is touched, from its pieces (p,) and their shares."""
+    """Touched share (count,) of each triangle, from the touched shares of its pieces (p,)."""
     whole = np.bincount(triangle, area, count)
     part = np.bincount(triangle, touched * area, count)
     return np.divide(part, whole, out=np.zeros(count), where=whole > 0.0)

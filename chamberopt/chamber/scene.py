@@ -1,4 +1,4 @@
-"""Make the simulator's scene for a design: its chamber, shot, effects, and duration."""
+"""Make the simulator's scene for a design: chamber, shot, effects and duration."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ import numpy as np
 from chamberopt.common.errors import InputError
 from chamberopt.design.shapes import TAG_PART, TAG_SONOTRODE, further_sonotrode_tag
 
-# A prediction compares one ball with every other. For 20,000 balls it takes about 40 µs, and every
-# ball needs about a thousand predictions a simulated second.
+# A prediction compares a ball with every other ball. It takes about 40 µs for 20,000 balls, and
+# every ball needs about a thousand predictions a simulated second.
 MAX_BALLS = 20_000
 
 if TYPE_CHECKING:
@@ -26,9 +26,9 @@ STREAMS = ("search", "confirm")
 def replica_seed(seed: int, replica: int, stream: str = "search") -> int:
     """The random seed of one replica, 128 bits.
 
-    It is the same for every candidate of a study (common random numbers), and differs between
-    replicas and between streams, so that a candidate chosen on "search" is confirmed on seeds that
-    did not select it. It comes from sha256, because hash() differs between Python processes.
+    It is the same for every candidate of a study (common random numbers). It differs between
+    replicas and between streams, so a candidate that is chosen on "search" is confirmed on other
+    seeds. It comes from sha256, because hash() differs between Python processes.
     """
     if stream not in STREAMS:
         raise ValueError(f"stream {stream!r}: one of {', '.join(STREAMS)}")
@@ -37,12 +37,12 @@ def replica_seed(seed: int, replica: int, stream: str = "search") -> int:
 
 
 def start_velocities(rng: np.random.Generator, count: int, rms_speed: float) -> np.ndarray:
-    """Isotropic Maxwell velocities [m/s], shape (count, 3), with this rms speed [m/s]."""
+    """Isotropic Maxwell velocities [m/s], shape (count, 3), of this rms speed [m/s]."""
     return rng.normal(0.0, rms_speed / np.sqrt(3.0), (count, 3))
 
 
 def chamber_mesh(chamber: Chamber) -> TriangleMesh:
-    """The chamber's surface for the simulator; make it once a chamber, because it holds a tree."""
+    """The chamber's surface for the simulator. It holds a search tree: make it once a chamber."""
     from sim_core import TriangleMesh
 
     return TriangleMesh(chamber.vertices, chamber.triangles, chamber.tags)
@@ -59,7 +59,7 @@ def require_ball_count(design: Design) -> None:
 
 
 def part_rotation(design: Design, axis: Axis | None, phase: float = 0.0) -> PartRotation | None:
-    """The rotation of the part, if it turns, with its phase [rad] at the start."""
+    """The rotation of a turning part with its phase [rad] at the start, or None."""
     from sim_core import PartRotation
 
     turn = design.effects.part_turn
@@ -74,7 +74,7 @@ def part_rotation(design: Design, axis: Axis | None, phase: float = 0.0) -> Part
 
 
 def require_turnable(design: Design, mesh: TriangleMesh, axis: Axis | None) -> None:
-    """Raise InputError if the part should turn but its chamber leaves no room for that."""
+    """Raise InputError if the part should turn but its chamber leaves no room for the turn."""
     from sim_core import SceneError, require_free_rotation
 
     turn = part_rotation(design, axis)
@@ -86,7 +86,7 @@ def require_turnable(design: Design, mesh: TriangleMesh, axis: Axis | None) -> N
 
 
 def balls_can_rest(design: Design, mesh: TriangleMesh | AnalyticCavity) -> bool:
-    """Whether balls can lie still: as the design says, or where a still surface faces up."""
+    """True if balls can lie still: by the design, or because a surface at rest faces up."""
     from sim_core import Gravity, can_rest
 
     if design.effects.rest is not None:
@@ -99,11 +99,11 @@ def balls_can_rest(design: Design, mesh: TriangleMesh | AnalyticCavity) -> bool:
 
 
 def vibrations(design: Design, phase: float) -> Vibration | tuple[Vibration, ...]:
-    """The vibration of the sonotrode, or of each of several.
+    """The vibration of the sonotrode, or of each sonotrode if there are several.
 
     Args:
         phase: of the first sonotrode at the start [rad]. The phases of the others are added to it,
-            so that at one frequency the shift in time between two sonotrodes is always the same.
+            so two sonotrodes of one frequency always keep the same shift in time.
     """
     from sim_core import Vibration
 
@@ -166,10 +166,10 @@ def build_scene(
 ) -> Scene:
     """The scene that one replica simulates. Equal arguments give bit-identical scenes.
 
-    The shot starts packed low in the chamber with the speed scale of the sonotrode, 2 pi f A: then
-    the warm-up has to forget only the arrangement, and the shot's energy need not grow or shrink by
-    orders of magnitude. The phases of the sonotrode and of a turning part are random, because a
-    part may take longer for one turn than a replica lasts.
+    The shot starts packed low in the chamber, at the speed scale of the sonotrode, 2 pi f A. So the
+    warm-up has to forget only the arrangement, and the shot's energy need not change by orders of
+    magnitude. The phases of the sonotrode and of a turning part are random, because a turn of the
+    part may take longer than a replica.
 
     Args:
         axis: of a turning part, as `turning_axis` gives it.

@@ -1,4 +1,4 @@
-"""Where a design is outside what its calibration was measured at."""
+"""Warnings about a design outside the conditions of its calibration."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ if TYPE_CHECKING:
     from chamberopt.design.calibration import Calibration
     from chamberopt.design.load import Design
 
-# Beyond these the model was tried by no measurement of the machine.
+# No measurement of the machine has tried the model beyond these limits.
 AMPLITUDE_RANGE, DIAMETER_RANGE, DENSITY_RANGE = 1.3, 1.5, 1.05
 
 
 def calibration_warnings(design: Design) -> list[str]:
-    """What of a design is outside its calibration, and what that does not explain."""
+    """Warnings about values outside the calibration, and about measurements it does not explain."""
     one = design.calibration
     if one is None:
         return []
@@ -51,7 +51,7 @@ def calibration_warnings(design: Design) -> list[str]:
 
 
 def misfit_texts(calibration: Calibration) -> list[str]:
-    """Which measurements the model does not explain."""
+    """Texts on the measurements that the model does not explain."""
     return [
         f"calibration: the model explains your {misfit.kind} only with errors "
         f"{misfit.error_scale:.2g} times as large, as intervals have them: look at the picture of "

@@ -36,20 +36,20 @@ if TYPE_CHECKING:
     from chamberopt.design.load import Design
     from sim_core import TriangleMesh
 
-# Share of the free volume above which the balls move as a dense bed rather than as a gas: few of
-# them reach the part, and event-driven simulation slows down because collisions are so frequent.
-# Near a quarter the shot finds no places to start from.
+# Share of the free volume above which the balls move as a dense bed rather than as a gas. Few balls
+# of a bed reach the part, and frequent collisions slow the simulation down. Near a quarter the shot
+# finds no places to start from.
 MAX_PACKING_FRACTION = 0.2
 MIN_AMPLITUDES = 10.0  # between part and sonotrode, as for sonotrode_distance_mm of a design
-MAX_HIDDEN_SHARE = 0.05  # of the target's area; more means that a ceiling or wall is misplaced
-MIN_FREE_PATH = 10.0  # chamber heights: beyond it, few dents come from balls that met another
+MAX_HIDDEN_SHARE = 0.05  # of the target's area; a larger share means a misplaced ceiling or wall
+MIN_FREE_PATH = 10.0  # chamber heights; on longer paths few balls meet another ball before a dent
 
 
 def describe(design: Design, chamber: Chamber, reach: Reach | None = None) -> dict[str, Any]:
-    """Facts and warnings about a design and its chamber, as plain JSON values with units in names.
+    """Facts and warnings about a design and its chamber, as JSON values with named units.
 
     Args:
-        reach: the chamber's `shot_reach`, if it is known already.
+        reach: the chamber's `shot_reach`, if it is already known.
     Raises:
         InputError: there are too many balls, or the part cannot turn.
         sim_core.SceneError: the cavity is not closed; names the place.
@@ -58,7 +58,7 @@ def describe(design: Design, chamber: Chamber, reach: Reach | None = None) -> di
     reach = shot_reach(design, chamber) if reach is None else reach
     axis = turning_axis(design, chamber.part)
     require_turnable(design, reach.mesh, axis)
-    if not design.effects.auto:  # whether the shot fits
+    if not design.effects.auto:  # a scene is built to see if the shot fits
         build_scene(design, reach.mesh, replica_seed(design.process.seed, 0), axis)
     process = design.process
     accuracy = process.accuracy
@@ -82,7 +82,7 @@ def describe(design: Design, chamber: Chamber, reach: Reach | None = None) -> di
 
 
 def first_facts(design: Design, chamber: Chamber) -> dict[str, Any]:
-    """The facts that are known at once, with the chamber."""
+    """The facts that are known as soon as the chamber is built."""
     part, shot = chamber.part, design.shot
     exposed = chamber.exposed_area > 0.0
     box, low = np.ptp(part.vertices, axis=0), part.vertices.min(axis=0)
@@ -130,7 +130,7 @@ def first_facts(design: Design, chamber: Chamber) -> dict[str, Any]:
 
 
 def _smoothing_facts(part: Part, ball: float) -> dict[str, Any]:
-    """What was done to the facets of the target's rounds, if it has any."""
+    """Facts on the smoothing of the target's rounds, if the target has rounds."""
     facts = part.smoothing
     if facts is None or not facts.facet_turn:
         return {}
@@ -147,14 +147,14 @@ def _smoothing_facts(part: Part, ball: float) -> dict[str, Any]:
 
 
 def with_clearance(facts: dict[str, Any], mesh: TriangleMesh) -> dict[str, Any]:
-    """First facts with what a chamber's mesh, which is closed, tells of it."""
+    """The first facts with the sonotrode's clearance, from the closed mesh of the chamber."""
     clearance = _rounded(sonotrode_clearance(mesh) * 1e3)
     more = {"closed": "yes", "sonotrode_clearance_mm": clearance}
     return {**facts, "chamber": facts["chamber"] | more}
 
 
 def notes(design: Design, chamber: Chamber) -> list[str]:
-    """What was assumed or left out, and what the design does without."""
+    """Notes on assumptions, and on effects that the design leaves out."""
     return [
         *chamber.notes,
         *_place_notes(design),
@@ -164,7 +164,7 @@ def notes(design: Design, chamber: Chamber) -> list[str]:
 
 
 def shot_reach(design: Design, chamber: Chamber) -> Reach:
-    """What the shot can reach, with a turning part as drawn; takes a second or two."""
+    """The reach of the shot, with a turning part as drawn. It takes a second or two."""
     return find_reach(
         chamber_mesh(chamber),
         min(design.shot.diameters),
@@ -174,7 +174,7 @@ def shot_reach(design: Design, chamber: Chamber) -> Reach:
 
 
 def warnings(design: Design, chamber: Chamber, reach: Reach | None = None) -> list[str]:
-    """Sentences about values that are allowed but probably not intended, each with a remedy."""
+    """Warnings about values that are allowed but probably not intended, each with a remedy."""
     reach = shot_reach(design, chamber) if reach is None else reach
     texts = first_warnings(design, chamber, reach.mesh)
     for name, surface in _to_be_peened(design, chamber).items():
@@ -187,7 +187,11 @@ def warnings(design: Design, chamber: Chamber, reach: Reach | None = None) -> li
 
 
 def first_warnings(design: Design, chamber: Chamber, mesh: TriangleMesh) -> list[str]:
-    """The warnings that need not know what the shot reaches; mesh is the chamber's."""
+    """The warnings that do not depend on the reach of the shot.
+
+    Args:
+        mesh: of the chamber.
+    """
     shot, texts = design.shot, []
     filled = shot.volume / chamber.volume
     if filled > MAX_PACKING_FRACTION:
@@ -228,20 +232,20 @@ def first_warnings(design: Design, chamber: Chamber, mesh: TriangleMesh) -> list
 
 
 def _to_be_peened(design: Design, chamber: Chamber) -> dict[str, Chamber]:
-    """The surfaces of the chamber but for zones that are to be spared."""
+    """The surfaces of the chamber, without zones that are to be spared."""
     spared = {f"zone {one.name}" for one in design.zones if one.is_spared}
     return {name: one for name, one in chamber.surfaces().items() if name not in spared}
 
 
 def _place_notes(design: Design) -> list[str]:
-    """Where a part stands that is not moved."""
+    """A note on the place of a part that the design does not move."""
     if design.chamber.setup() is not None or any(design.part.offset):
         return []
     return ["the middle of the part's box is on the chamber's axis; part.offset_mm moves it"]
 
 
 def friction_notes(design: Design) -> list[str]:
-    """What it means that a design has no friction; see docs/physics.md."""
+    """A note on the effect of leaving friction out of a design; see docs/physics.md."""
     if design.effects.friction is not None or design.effects.auto:
         return []
     remedy = (
@@ -257,7 +261,7 @@ def friction_notes(design: Design) -> list[str]:
 
 
 def _reach_facts(reach: Reach, chamber: Chamber) -> dict[str, Any]:
-    """The area of target and part in the chamber that the smallest balls can touch."""
+    """Area of the target and of the part in the chamber that the smallest balls can touch."""
     size = areas(chamber.vertices, chamber.triangles)
     facts: dict[str, Any] = {"ball_mm": _rounded(reach.diameter * 1e3)}
     for name, rows in (("target", on_target(chamber)), ("part", chamber.tags == TAG_PART)):
@@ -268,13 +272,13 @@ def _reach_facts(reach: Reach, chamber: Chamber) -> dict[str, Any]:
 
 
 def _reached_share(reach: Reach, rows: np.ndarray) -> float:
-    """Share of some of the cavity's triangles (k,) bool that the ball can touch."""
+    """Share of the marked triangles of the cavity (k,) that the ball can touch."""
     size = areas(reach.mesh.vertices, reach.mesh.triangles)[rows]
     return float(reach.share[rows] @ size / size.sum())
 
 
 def _zone_facts(reach: Reach, chamber: Chamber) -> dict[str, Any]:
-    """Size of each zone, and the share of it in the chamber that the smallest balls can touch."""
+    """Size of each zone, and the share of its exposed area that the smallest balls can touch."""
     part = chamber.part
     share = reached_part_share(reach, chamber.source, len(part.triangles))
     facts = {}
@@ -290,7 +294,7 @@ def _zone_facts(reach: Reach, chamber: Chamber) -> dict[str, Any]:
 
 
 def _turn_facts(design: Design, part: Part) -> dict[str, Any]:
-    """The motion of a turning part, its axis in the chamber's frame."""
+    """The motion of a turning part, with its axis in the chamber's frame."""
     turn, line = design.effects.part_turn, turning_axis(design, part)
     if turn is None or line is None:
         return {}
@@ -304,7 +308,7 @@ def _turn_facts(design: Design, part: Part) -> dict[str, Any]:
 
 
 def _tolerance_facts(design: Design) -> dict[str, Any]:
-    """The range of each number that has a tolerance; InputError if the design cannot have it."""
+    """The range of each number with a tolerance. InputError if a tolerance is out of bounds."""
     require_tolerances(design)
     box = tolerance_box(design)
     ranges = {k: {"low": a, "start": design.value(k), "high": b} for k, (a, b) in box.items()}
@@ -314,8 +318,8 @@ def _tolerance_facts(design: Design) -> dict[str, Any]:
 def _side_wall_warnings(design: Design, chamber: Chamber) -> list[str]:
     """A warning that the part is joined to the side wall.
 
-    None for a part that closes the chamber like a lid, turns (its joint is a round shaft), has a
-    hole for its fixture, or is drawn with its chamber.
+    There is no warning for a part that closes the chamber like a lid, turns (its joint is a round
+    shaft), has a hole for its fixture, or is drawn with its chamber.
     """
     turns, drawn = design.effects.part_turn is not None, design.chamber.setup() is not None
     names = surface_names(chamber)
@@ -326,7 +330,7 @@ def _side_wall_warnings(design: Design, chamber: Chamber) -> list[str]:
     height = 1e3 * chamber.vertices[sides_of(chamber.triangles)[joint], 2]
     if not height.size:
         return []
-    # In plan: the height does not move a side wall. A user's own shape has keys of its own.
+    # The height does not move a side wall. A user's own shape has keys of its own.
     keys = [key for key in design.chamber.widths_mm() if key != "height_mm"]
     named = f" ({', '.join(f'chamber.{key}' for key in keys)})" if keys else ""
     return [
@@ -337,7 +341,7 @@ def _side_wall_warnings(design: Design, chamber: Chamber) -> list[str]:
 
 
 def _sonotrode_warnings(design: Design, mesh: TriangleMesh, line: Axis | None) -> list[str]:
-    """Warnings about a sonotrode, or a ball on it, that may hit the part."""
+    """A warning about a sonotrode, or a ball on a sonotrode, that may hit the part."""
     amplitude, ball = design.sonotrode.amplitude, design.shot.diameter
     remedy = "raise chamber.sonotrode_distance_mm"
     clear, turn = sonotrode_clearance(mesh), design.effects.part_turn
@@ -359,7 +363,7 @@ def _sonotrode_warnings(design: Design, mesh: TriangleMesh, line: Axis | None) -
 
 
 def sonotrode_clearance(mesh: TriangleMesh) -> float:
-    """Least distance [m] between part and sonotrode, from a corner of either; inf without one."""
+    """Least distance [m] from a corner of the part to the sonotrode or back; inf without a part."""
     from sim_core import closest_points
 
     if not ((mesh.tags == TAG_PART).any() and (mesh.tags == TAG_SONOTRODE).any()):
@@ -374,12 +378,12 @@ def sonotrode_clearance(mesh: TriangleMesh) -> float:
 def _lowest_height(line: Axis, points: np.ndarray, amplitude: float | None) -> float:
     """The lowest height [m] that points (n, 3) [m] of the turning part reach.
 
-    At angle a of the part, a point is at the height c + r cos(a - a0) for some c, r and a0. It is
-    lowest where a is furthest from a0.
+    At angle a of the part, the height of a point is c + r cos(a - a0) for some c, r and a0. It is
+    least where a is furthest from a0.
 
     Args:
         line: axis of the rotation.
-        amplitude: largest angle to each side [rad]; None for a part that goes round.
+        amplitude: largest angle to each side [rad]; None for a part that turns all round.
     """
     point, axis = line
     axis = axis / np.linalg.norm(axis)
@@ -392,5 +396,5 @@ def _lowest_height(line: Axis, points: np.ndarray, amplitude: float | None) -> f
 
 
 def _rounded(value: float) -> float:
-    """The value to six figures, for reading."""
+    """The value to six figures, for readers."""
     return float(f"{value:.6g}")

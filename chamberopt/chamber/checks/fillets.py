@@ -1,7 +1,7 @@
 """Warnings about shot that is large for the fillets and slots of the target and the zones.
 
-Shot of more than half a fillet's radius, or a quarter of a slot's width, peens there less than
-beside it, although it may touch everything.
+Shot larger than half a fillet's radius, or a quarter of a slot's width, peens the fillet or slot
+less than the surface beside it, even if it touches everything.
 
 Source: ASTM B851, as quoted in docs/peening.md.
 """
@@ -24,18 +24,16 @@ if TYPE_CHECKING:
     from chamberopt.chamber.part import Part
     from chamberopt.chamber.reach import Reach
 
-# Warnings about facets of a part's rounds that are left as the file has them.
-
-LEAST_SHARE = 0.01  # of the target's area that is worth a word
-LEFT = "coverage is that of facets: "  # begins the warning
+LEAST_SHARE = 0.01  # share of the target's area that is worth a warning
+LEFT = "coverage is that of facets: "  # start of the warning
 
 
 def facet_warnings(part: Part, ball: float, reachable: float) -> list[str]:
-    """A warning that the figures of the target are those of its facets.
+    """A warning that the target's figures are the figures of its facets.
 
     Args:
         ball: diameter of the smallest ball [m].
-        reachable: share of the target that it can touch between the facets.
+        reachable: share of the target that the ball can touch between the facets.
     """
     facts = part.smoothing
     if facts is None or facts.coarse_share < LEAST_SHARE:
@@ -59,7 +57,7 @@ def facet_warnings(part: Part, ball: float, reachable: float) -> list[str]:
 
 
 def touched_by_curvature(part: Part, ball: float) -> float:
-    """Share of the target where no hollow is rounder than a ball of a diameter [m]."""
+    """Share of the target without a hollow rounder than a ball of this diameter [m]."""
     if part.hollow is None:
         return 1.0
     fits = part.hollow * 0.5 * ball <= 1.0 + TOLERATED_OVERLAP
@@ -67,16 +65,16 @@ def touched_by_curvature(part: Part, ball: float) -> float:
     return float(area[fits[part.target]].sum() / area.sum())
 
 
-OF_FILLET, OF_SLOT = 0.5, 0.25  # largest shot, of the fillet's radius and of the slot's width
-LEAST_TURN, SHARP = 1.0, 60.0  # degrees at an inner edge of a fillet's facets; more has no fillet
-FOLD = 15.0  # degrees: inner edges that turn by more are of a fillet, even of a single facet
-HOLLOW = 1.0 / 3.0  # share of the turning near an edge of a fillet that is inwards, less outwards
-SMALLEST = 0.05  # share of the inner edges' length, or of the slots' area, that may be smaller
-MAX_POINTS = 5000  # of the surface that slots are looked for at
+OF_FILLET, OF_SLOT = 0.5, 0.25  # largest shot, over the fillet's radius and the slot's width
+LEAST_TURN, SHARP = 1.0, 60.0  # least and largest turn at an inner edge of a fillet [degrees]
+FOLD = 15.0  # degrees: an inner edge that turns by more is a fillet, even with a single facet
+HOLLOW = 1.0 / 3.0  # least inward less outward turn near an edge of a fillet, over the whole turn
+SMALLEST = 0.05  # share of the inner edges' length, or the slots' area, that may be smaller
+MAX_POINTS = 5000  # surface points at which slots are searched
 
 
 def fillet_warnings(reach: Reach, chamber: Chamber, largest: float) -> list[str]:
-    """Warnings about fillets and slots that are small for the largest ball [m]."""
+    """Warnings about fillets and slots that are too small for the largest ball [m]."""
     part = chamber.part
     chosen = np.any([part.target, *part.zones.values()], axis=0) & (chamber.exposed_area > 0.0)
     return [*_fillets(chamber, chosen, largest), *_slots(reach, chamber, chosen, largest)]
@@ -88,19 +86,19 @@ def inner_edges(
     chosen: np.ndarray,
     hollow: np.ndarray | None = None,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The inner edges between chosen triangles: of each its middle, length and fillet radius.
+    """Middle, length and fillet radius of each inner edge between chosen triangles.
 
-    Facets of a height L that turn by an angle a at each edge touch a circle of the radius
-    L / (2 tan(a / 2)); at edges that turn by more than SHARP it is 0. Triangles of a shaft or a
-    cone turn inwards at some edges too: an edge counts only if the surface round it is HOLLOW.
-    Where the curvature behind the facets is known, its radius is taken: facets of a surface that
-    bends both ways fold inwards here and there.
+    Facets of a height L that turn by an angle a at each edge touch a circle of the radius L / (2
+    tan(a / 2)). The radius is 0 at edges that turn by more than SHARP. Triangles of a shaft or a
+    cone turn inwards at some edges too, so an edge counts only if the surface round it is HOLLOW.
+    Facets of a surface that bends both ways fold inwards here and there, so the radius comes from
+    the curvature behind the facets where it is known.
 
     Args:
         vertices: [m], shape (n, 3).
         triangles: normals out of the part, shape (m, 3).
         chosen: marks triangles, shape (m,).
-        hollow: curvature of the surface behind them [1/m], 0 where none is known, shape (m,).
+        hollow: curvature of the surface behind the triangles [1/m], 0 where unknown, shape (m,).
     Returns:
         Middles [m], shape (e, 3), lengths [m] and radii [m], shape (e,).
     """
@@ -118,7 +116,7 @@ def inner_edges(
     turn = np.arctan2(np.linalg.norm(np.cross(a, b), axis=1), np.einsum("ij,ij->i", a, b))
     ends = vertices[sides[one]]
     length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
-    # The surface turns inwards where the other triangle rises over the plane of the first.
+    # The surface turns inwards where the second triangle rises over the plane of the first.
     over = vertices[triangles[triangle[two]]].mean(axis=1) - ends[:, 0]
     inwards = np.where(np.einsum("ij,ij->i", over, a) > 0.0, turn, -turn)
     around = sides[one], ends[:, 1] - ends[:, 0]
@@ -137,23 +135,20 @@ def inner_edges(
 
 
 def _turn_across(ends: np.ndarray, way: np.ndarray, turns: np.ndarray) -> np.ndarray:
-    """How far a surface turns across each edge [m rad], with the edges that share an end with it.
-
-    Each of them counts by its turn, its length and its squared cosine to the edge. Sharp edges,
-    at which a fillet ends, do not count.
+    """Turn of the surface across each edge [m rad], summed over the edges at both its ends.
 
     Args:
         ends: vertices of each edge, shape (e, 2).
-        way: from one to the other [m], shape (e, 3).
+        way: vector from the first to the second vertex [m], shape (e, 3).
         turns: of each edge [rad], shape (e,).
     """
     length = np.maximum(np.linalg.norm(way, axis=1), 1e-300)
     along = way / length[:, None]
     turned = np.where(np.abs(turns) > np.radians(SHARP), 0.0, turns) * length
     each = turned[:, None, None] * along[:, :, None] * along[:, None, :]
-    around = np.zeros((ends.max(initial=0) + 1, 3, 3))  # of a vertex
+    around = np.zeros((ends.max(initial=0) + 1, 3, 3))  # sum at each vertex
     np.add.at(around, ends, each[:, None])
-    both = around[ends].sum(axis=1) - each  # which has the edge itself twice
+    both = around[ends].sum(axis=1) - each  # the sum has the edge itself twice
     across: np.ndarray = np.einsum("ei,eij,ej->e", along, both, along)
     return across
 
@@ -162,7 +157,7 @@ def _fillets(chamber: Chamber, chosen: np.ndarray, largest: float) -> list[str]:
     part = chamber.part
     middle, length, radius = inner_edges(part.vertices, part.triangles, chosen, part.hollow)
     small = radius * OF_FILLET < largest
-    if length[small].sum() < largest:  # what is shorter than a ball is no fillet
+    if length[small].sum() < largest:  # a fillet is longer than a ball
         return []
     smallest = _low_quantile(radius[small], length[small])
     fillet = f"fillets of about {1e3 * smallest:.2g} mm" if smallest else "inner edges without one"
@@ -199,7 +194,7 @@ def _slots(reach: Reach, chamber: Chamber, chosen: np.ndarray, largest: float) -
 
 
 def _low_quantile(values: np.ndarray, weight: np.ndarray) -> float:
-    """The value below which the smallest SMALLEST of the weight is."""
+    """The value below which the share SMALLEST of the weight lies."""
     order = np.argsort(values)
     upto = np.cumsum(weight[order])
     return float(values[order][np.searchsorted(upto, SMALLEST * upto[-1])])

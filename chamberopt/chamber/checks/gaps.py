@@ -1,7 +1,7 @@
-"""Warnings about what keeps the shot from the surface, each with its place and a remedy.
+"""Warnings about shapes that keep the shot from the surface, each with its place and a remedy.
 
-These are gaps too narrow for a ball, wedges that hold one, pockets behind a narrow mouth, and
-hollows sharper than a ball.
+Such shapes are gaps too narrow for a ball, wedges that hold a ball, pockets behind a narrow mouth,
+and hollows sharper than a ball.
 """
 
 from __future__ import annotations
@@ -31,21 +31,20 @@ if TYPE_CHECKING:
     from chamberopt.design.load import Design
 
 # Two faces hold a ball by friction, however hard it is pushed in, if the tangent of half the angle
-# between them is below the coefficient of friction, here that of dry steel. Such faces count as
-# facing each other; hollows that open wider count as roots.
+# between them is below the coefficient of friction, here the value of dry steel. Such faces count
+# as facing each other. Hollows that open wider count as roots.
 FRICTION = 0.3
 MAX_COSINE = -(1.0 - FRICTION**2) / (1.0 + FRICTION**2)  # between the normals of facing faces
 WIDTH_TOLERANCE = 0.1  # share of the ball's diameter within which a gap is as wide as the ball
 MAX_WARNINGS = 4  # of one kind
 MIN_MISSED_SHARE = 0.005  # share of the target that is worth a warning
 
-
-# The two surfaces that a gap lies between, and whether a ball can wedge in it.
+# The two surfaces beside a gap, and true if a ball can wedge in the gap.
 GapKind = tuple[str, str, bool]
 
 
 def gap_warnings(reach: Reach, chamber: Chamber, largest: float, turns: bool = False) -> list[str]:
-    """Warnings about gaps narrower than the largest ball [m], those with the largest area first."""
+    """Warnings about gaps narrower than the largest ball [m], the largest areas first."""
     touches = reach.touches
     facing = (touches.obstacle >= 0) & (touches.cosine < MAX_COSINE)
     narrow = facing & (touches.radius < 0.5 * largest)
@@ -58,7 +57,7 @@ def gap_warnings(reach: Reach, chamber: Chamber, largest: float, turns: bool = F
         if gap.area.sum() > (0.5 * largest) ** 2:
             pairs = np.sort(np.c_[names[gap.triangle], names[gap.obstacle]].astype(str), axis=1)
             sides, counts = np.unique(pairs, axis=0, return_counts=True)
-            one, two = map(str, sides[counts.argmax()])  # what most of the gap lies between
+            one, two = map(str, sides[counts.argmax()])  # the surfaces beside most of the gap
             wedge = _is_wedge(gap, entrance, largest, 2.0 * reach.spacing)
             gaps.setdefault((one, two, wedge), []).append(gap)
     kinds = sorted(gaps, key=lambda kind: -sum(gap.area.sum() for gap in gaps[kind]))[:MAX_WARNINGS]
@@ -66,7 +65,7 @@ def gap_warnings(reach: Reach, chamber: Chamber, largest: float, turns: bool = F
 
 
 def pocket_warnings(reach: Reach, chamber: Chamber) -> list[str]:
-    """Warnings about pockets that would hold a ball that cannot get in, the largest area first."""
+    """Warnings about pockets that could hold a ball but let no ball in, the largest areas first."""
     touches, closed = reach.touches, reach.fits & ~reach.reached
     target = on_target(chamber)[touches.triangle]
     found: list[tuple[float, str]] = []
@@ -91,8 +90,8 @@ def surface_warnings(
     """A warning about the share of the target that no ball can touch, for any peening time.
 
     Args:
-        chamber: with the surface of this name as its target, see `Chamber.surfaces`.
-        only_reachable: whether the design takes only what the shot reaches for the target.
+        chamber: the chamber with the named surface as its target, see `Chamber.surfaces`.
+        only_reachable: true if the design takes only the reachable surface for the target.
     """
     touches = reach.touches
     own = on_target(chamber)[touches.triangle]
@@ -118,7 +117,7 @@ def surface_warnings(
 
 
 def _clusters(centre: np.ndarray, near: float) -> list[np.ndarray]:
-    """Members of each group of points (n, 3) [m] linked by steps of at most ``near`` [m]."""
+    """Indices of the points (n, 3) [m] in each group linked by steps of at most ``near`` [m]."""
     from scipy.spatial import KDTree
 
     if not len(centre):
@@ -130,7 +129,7 @@ def _clusters(centre: np.ndarray, near: float) -> list[np.ndarray]:
 
 
 def _is_wedge(gap: TouchPoints, entrance: np.ndarray, largest: float, near: float) -> bool:
-    """Whether a gap narrows steadily from an entrance that balls reach, as wide as a ball.
+    """True if a gap narrows steadily from an entrance as wide as a ball, which balls reach.
 
     Args:
         entrance: centres (n, 3) [m] of reached balls in gaps slightly wider than the largest ball.
@@ -145,7 +144,7 @@ def _is_wedge(gap: TouchPoints, entrance: np.ndarray, largest: float, near: floa
 def _gap_warning(
     kind: GapKind, gaps: list[TouchPoints], smallest: float, largest: float, turns: bool
 ) -> str:
-    """One sentence on gaps of a kind, for balls from a smallest to a largest diameter [m]."""
+    """A sentence on all gaps of a kind, for balls between two diameters [m]."""
     one, two, wedge = kind
     biggest = max(gaps, key=lambda gap: gap.area.sum())
     radius = np.concatenate([gap.radius for gap in gaps])
@@ -187,10 +186,8 @@ def _remedy(sides: set[str]) -> str:
     return "enlarge the chamber, check part.offset_mm, or close the gap"
 
 
-# Places where balls can come to rest: surfaces that face up and neither vibrate nor turn.
-
-HEIGHT_TOLERANCE = 1e-9  # m: corners whose heights differ by less are level, except for rounding
-AREA_TOLERANCE = 1e-6  # share of a triangle's area: a smaller upward part is rounding
+HEIGHT_TOLERANCE = 1e-9  # m: corners are level if their heights differ by less
+AREA_TOLERANCE = 1e-6  # share of a triangle's area: a smaller upward component is rounding
 REMEDY = {
     TAG_PART: "turn it (effects.part_turn), tilt it (part.rotate_deg), or lower chamber.{key} to "
     "its top side",
@@ -199,14 +196,17 @@ REMEDY = {
 
 
 class Ledge(NamedTuple):
-    """Surfaces of part or wall that face up."""
+    """A place on part or wall where balls can come to rest: surfaces that face up."""
 
     message: str
-    level: bool  # whether enough of them is level for a ball to lie on
+    level: bool  # true if enough of the surface is level for a ball to lie on
 
 
 def find_ledges(design: Design, chamber: Chamber) -> list[Ledge]:
-    """The places on part and wall where balls can come to rest."""
+    """The places on part and wall where balls can come to rest.
+
+    Such surfaces face up, and neither vibrate nor turn.
+    """
     from sim_core import Rest
 
     if not design.effects.gravity:
@@ -223,7 +223,7 @@ def find_ledges(design: Design, chamber: Chamber) -> list[Ledge]:
         if not faces.any() or (tag == TAG_PART and design.effects.part_turn is not None):
             continue
         level = bool(area[faces & flat].sum() >= cross_section)
-        # balls stay here and do not roll off
+        # balls do not roll off these faces
         shown = faces & flat if level else faces & _in_hollows(chamber, upward, downward)
         if not shown.any():
             continue
@@ -244,10 +244,10 @@ def find_ledges(design: Design, chamber: Chamber) -> list[Ledge]:
 
 
 def _in_hollows(chamber: Chamber, upward: np.ndarray, downward: np.ndarray) -> np.ndarray:
-    """Which upward faces are at the bottom of a hollow, from where every way leads up; (k,) bool.
+    """Mark the upward faces (k,) at the bottom of a hollow, where every way leads up.
 
-    A wall that leans out is not a hollow: its lowest points are on the sonotrode. A face beside one
-    that faces down is not one either, because a ball falls off there.
+    A wall that leans out is not a hollow: its lowest points are on the sonotrode. A face beside a
+    downward face is not a hollow either, because a ball falls off there.
     """
     count, height = len(chamber.vertices), chamber.vertices[:, 2]
     one, two = sides_of(chamber.triangles).T

@@ -17,7 +17,7 @@ CEILING, SIDE_WALL, SONOTRODE = "the ceiling", "the wall", "the sonotrode"
 
 
 def surface_names(chamber: Chamber) -> np.ndarray:
-    """The name of the surface that each triangle belongs to, (k,) of str."""
+    """Name of the surface of each triangle, (k,) of str."""
     up = -unit_vectors(area_vectors(chamber.vertices, chamber.triangles))[:, 2]
     faces = [up > MIN_UPWARD, up < -MIN_UPWARD]
     sides = ["the part's upper side", "the part's underside"]
@@ -31,7 +31,7 @@ def surface_names(chamber: Chamber) -> np.ndarray:
 
 
 def around(points: np.ndarray, weights: np.ndarray | None = None) -> str:
-    """The mean of points (n, 3) [m] with weights (n,): "(x, y, z) mm", in the chamber's frame."""
+    """Mean of points (n, 3) [m] with weights (n,) as text, e.g. "(1.0, 2.0, 3.0) mm"."""
     middle = np.average(1e3 * points, axis=0, weights=weights)
     return f"({', '.join(f'{x:.1f}' for x in np.round(middle, 1) + 0.0)}) mm"
 
@@ -42,12 +42,12 @@ def mm2(area: float) -> str:
 
 
 def one_of(points: np.ndarray, weights: np.ndarray) -> str:
-    """The point of (n, 3) [m] closest to their mean, as text; the mean of a ring is far from it."""
+    """The point of (n, 3) [m] closest to their mean, as text. A ring's mean lies off the ring."""
     middle = np.average(points, axis=0, weights=weights)
     return around(points[[np.linalg.norm(points - middle, axis=1).argmin()]])
 
 
 def on_target(chamber: Chamber) -> np.ndarray:
-    """Which of the cavity's triangles (k,) lie on the target."""
+    """Mark the cavity's triangles on the target, (k,) bool."""
     in_target = chamber.part.target[np.maximum(chamber.source, 0)]
     return np.asarray((chamber.tags == TAG_PART) & in_target)

@@ -1,10 +1,10 @@
-"""Propose how a part stands over the sonotrode: its target down, and evenly exposed.
+"""Propose a pose of a part over the sonotrode: its target down, and evenly exposed.
 
-Balls come from below, so a place is taken as exposed by (1 + cosine) / 2 of the angle between its
+Balls come from below. So the exposure of a place is (1 + cosine) / 2 of the angle between its
 normal and the way down: 1 where it faces the sonotrode, 1/2 on upright walls, 0 where it faces up.
-The pose has the highest mean less standard deviation of it over the target's area, which is the
-form of the objective (coverage/metrics.py). Upright walls all round are better than a shaft that
-lies, which is hit below and not above. This is a rule for a first pose, not a simulation.
+The pose has the highest mean less standard deviation of the exposure over the target's area, the
+form of the objective (coverage/metrics.py). Upright walls all round are better than a lying shaft,
+which is hit below and not above. This rule gives a first pose and is no simulation.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from chamberopt.geometry.triangles import area_vectors, rotation_matrix, unit_ve
 
 Turns = tuple[float, float, float]
 
-# Advantage of the pose as drawn over the others along the file's axes, and of these over the rest.
+# Advantage of the pose as drawn and of other poses along the file's axes, over all other poses.
 AS_DRAWN, ALONG_AXIS = 0.10, 0.08
-LOW = 0.05  # advantage of a target at the part's lower end over one at its upper end
+LOW = 0.05  # advantage of a target at the part's lower end over a target at its upper end
 
 
 def propose_pose(
@@ -60,7 +60,7 @@ def propose_pose(
 
 
 def square_to_walls(vertices: np.ndarray, turns: Turns) -> Turns:
-    """The turns with the long side of the part along x, as seen from above."""
+    """The turns that also bring the long side of the part along x, as seen from above."""
     from shapely import MultiPoint
 
     plan = (vertices @ rotation_matrix(turns).T)[:, :2]
@@ -73,7 +73,7 @@ def square_to_walls(vertices: np.ndarray, turns: Turns) -> Turns:
 
 
 def _downs(normal: np.ndarray, weight: np.ndarray) -> Iterator[tuple[np.ndarray, float]]:
-    """Directions (3,) of the file that may point down, with the advantage that each has."""
+    """Directions (3,) in the file's frame that may point down, and the advantage of each."""
     for axis in (2, 0, 1):
         for sign in (-1.0, 1.0):
             yield sign * np.eye(3)[axis], AS_DRAWN if (axis, sign) == (2, -1.0) else ALONG_AXIS
@@ -86,7 +86,7 @@ def _downs(normal: np.ndarray, weight: np.ndarray) -> Iterator[tuple[np.ndarray,
 
 
 def turns_down(down: np.ndarray) -> Turns:
-    """Turns about x, then y [degrees, to a tenth], that make a direction point down."""
+    """Turns about x, then y [degrees, to a tenth], that turn a direction down."""
     x, y, z = down
     across = float(np.hypot(y, z))
     about_x = np.degrees(np.arctan2(-y, -z)) if across > 1e-9 else 0.0

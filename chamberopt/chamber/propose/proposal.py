@@ -1,6 +1,6 @@
-"""Propose a whole design for a part, and improve it until its own check finds nothing to say.
+"""Propose a whole design for a part, and improve it until its own check has no warnings.
 
-Every number is a rule of thumb with its reason beside it; a study then varies them.
+Every number is a rule of thumb with its reason beside it. A study then varies the numbers.
 """
 
 from __future__ import annotations
@@ -42,10 +42,6 @@ from chamberopt.geometry.meshes.surface_error import format_box
 from chamberopt.geometry.meshes.units import GUESSED
 from chamberopt.geometry.triangles import area_vectors, areas, rotation_matrix, unit_vectors
 
-# Propose a ball: the largest sold that touches nearly all that the smallest would.
-#
-# If there are such balls of at most half the radius of the target's fillets, it is one of those.
-
 POINTS = 20_000  # on the target
 MISSED = 0.05  # share of the target's area that a larger ball may leave out
 
@@ -53,14 +49,14 @@ MISSED = 0.05  # share of the target's area that a larger ball may leave out
 def touched_shares(
     vertices: np.ndarray, triangles: np.ndarray, target: np.ndarray, diameters: Sequence[float]
 ) -> np.ndarray:
-    """Share of a part's target that balls of these diameters [m] can touch, from any side.
+    """Share of a part's target that balls of each diameter [m] can touch, from any side.
 
     Args:
         vertices: of the part [m], shape (n, 3).
         triangles: normals out of the part, shape (m, 3).
         target: marks triangles, shape (m,).
     Returns:
-        One share for each diameter.
+        The share for each diameter.
     """
     from sim_core import TriangleMesh
 
@@ -78,9 +74,10 @@ def touched_shares(
 def fit_fillets(
     vertices: np.ndarray, triangles: np.ndarray, target: np.ndarray, diameters: Sequence[float]
 ) -> np.ndarray:
-    """Whether each of the diameters [m] is small enough for the fillets of a part's target.
+    """Mark the diameters [m] that are small enough for the fillets of a part's target.
 
-    Arguments as in `touched_shares`. Inner edges without a fillet are left out: no ball fits there.
+    Arguments as in `touched_shares`. Inner edges without a fillet are left out, because no ball
+    fits.
     """
     _, length, radius = inner_edges(vertices, triangles, target)
     small = [(radius > 0.0) & (OF_FILLET * radius < one) for one in diameters]
@@ -90,10 +87,14 @@ def fit_fillets(
 def propose_ball(
     shares: np.ndarray, fits: np.ndarray, diameters: Sequence[float]
 ) -> tuple[float, str]:
-    """The diameter [m] of the ball, and the reason.
+    """The diameter [m] of the proposed ball, and the reason.
+
+    It is the largest ball that touches nearly as much as the smallest, and that is small enough for
+    the fillets if there is such a ball.
 
     Args:
-        shares, fits: of `touched_shares` and `fit_fillets`.
+        shares: from `touched_shares`.
+        fits: from `fit_fillets`.
         diameters: [m], in ascending order.
     """
     touching = shares >= shares[0] - MISSED
@@ -108,18 +109,16 @@ def propose_ball(
     return diameters[chosen], reason
 
 
-# Propose the mass of the charge, and the numbers that the study varies, in steps of a shop.
-
-LAYER, PACKED = 0.25, 0.9069  # the charge, in layers of balls; share of a plane that one covers
+LAYER, PACKED = 0.25, 0.9069  # layers of balls in the charge; share of a plane under a full layer
 LIGHTER, HEAVIER = 0.4, 2.5  # charges of the study, as shares of the first
 FINE_MM, COARSE_MM = 0.5, 1.0  # steps of lengths
-FEW_MM = 400.0  # range of a length up to which its step is fine: a study takes 999 of them
+FEW_MM = 400.0  # longest range with fine steps: a study takes at most 999 steps
 LARGEST_MM = allowed_range(ParametricChamber.model_fields["height_mm"])[1]  # side of a chamber
 HEAVIEST_G = allowed_range(ShotTable.model_fields["mass_g"])[1]
 
 
 class Range(NamedTuple):
-    """What a number of the design may be, in its unit."""
+    """The range of a number of the design, in its unit, and the step between its values."""
 
     low: float
     high: float
@@ -143,11 +142,11 @@ def propose_charge(floor: float, diameter: float, ball_mass: float) -> tuple[flo
 def propose_ranges(
     sizes: Sizes, mass_g: float, ball_mm: float, ball_mass: float
 ) -> dict[str, Range]:
-    """What the study varies, by dotted name."""
+    """The ranges of the numbers that the study varies, by dotted name."""
     distance, height = round(1e3 * sizes.distance), round(1e3 * sizes.height)
     far = round(1.25 * distance)
     near = max(round(0.4 * distance), math.ceil(2.0 * ball_mm))
-    # Above the part even when it is highest, so that no ball is caught between.
+    # The ceiling stays above the part even when the part is highest, so that no ball is caught.
     low = math.ceil(far + 1e3 * sizes.top + 2.0 * ball_mm)
     high = min(round(1.5 * height), LARGEST_MM)
     digit = _second_digit(mass_g)
@@ -161,12 +160,12 @@ def propose_ranges(
 
 
 def _lengths(low: float, high: float) -> Range:
-    """All lengths between two whole ones [mm]."""
+    """The range of lengths between two whole lengths [mm]."""
     return Range(low, high, FINE_MM if high - low <= FEW_MM else COARSE_MM)
 
 
 def _second_digit(mass: float) -> float:
-    """What a mass changes by if its second digit does so by one."""
+    """The step of the second significant digit of a mass."""
     return 10.0 ** (math.floor(math.log10(mass)) - 1)
 
 
@@ -177,8 +176,8 @@ def _heaviest_g(ball_mass: float) -> float:
     return float(f"{digit * math.floor(most / digit + 1e-9):.6g}")
 
 
-LARGEST_BALL = 3e-3  # m: larger ones are used, but are few and slow to cover
-BALLS_ACROSS = 50  # ball diameters in the part's width: with smaller balls there are thousands
+LARGEST_BALL = 3e-3  # m: larger balls are in use, but they are few and slow to cover
+BALLS_ACROSS = 50  # ball diameters across the part's width: smaller balls come in thousands
 WIDER = (1.0, 1.4, 2.0)  # factors on the room round the part that are tried
 AMPLITUDE_UM, FREQUENCY_KHZ = 40.0, 20.0
 USUAL_PART, WALL, SONOTRODE = "42CrMo4", "42CrMo4", "Ti-6Al-4V"  # of the catalogue
@@ -187,7 +186,7 @@ TREATMENT_S, HALF_WIDTH = 300.0, 0.01
 
 @dataclass(frozen=True)
 class Wanted:
-    """What the user asks for; None and empty texts leave it to the proposal."""
+    """The wishes of the user. None and empty texts leave the choice to the proposal."""
 
     unit: str = "guess"
     shape: str | None = None
@@ -198,7 +197,7 @@ class Wanted:
 
 @dataclass(frozen=True)
 class Proposal:
-    """A design with the reason for each value, and what its check says."""
+    """A design with the reason for each value, and the warnings of its check."""
 
     design: Design
     tables: dict[str, dict[str, Any]]  # the values of the design file
@@ -214,10 +213,10 @@ class Proposal:
 def propose(
     path: Path, wanted: Wanted, choose: Callable[[Sequence[Surface]], Sequence[str]]
 ) -> Proposal:
-    """A design for the part in a file.
+    """Propose a design for the part in a file.
 
     Args:
-        choose: gives the names of the surfaces to peen, of those that there are.
+        choose: function that picks the names of the surfaces to peen from all surfaces.
     Raises:
         InputError: the part cannot be used, or no chamber can be built round it.
     """
@@ -291,7 +290,7 @@ def propose(
 
 
 def _shot(name: str) -> str:
-    """The material of balls of a name; InputError if their restitution is not known."""
+    """The material of the named balls. InputError if their restitution is not known."""
     found = ball(name)
     if found.hardness_HB is None:
         known = ", ".join(one.name for one in balls() if one.hardness_HB is not None)
@@ -301,7 +300,7 @@ def _shot(name: str) -> str:
 
 
 def _read(path: Path, unit: str) -> PartMesh:
-    """The part; messages and notes name the option in the place of the design's field."""
+    """The part of a file. Messages and notes name the command's option, not the design's field."""
     try:
         mesh = read_part(path, unit)
     except InputError as error:
@@ -310,7 +309,7 @@ def _read(path: Path, unit: str) -> PartMesh:
 
 
 def _require_near_origin(path: Path, target: Target) -> None:
-    """Raise InputError if the design could not say where the target's faces are."""
+    """Raise InputError if a face of the target has larger coordinates than a design may have."""
     far = max((abs(x) for face in target.keys.get("faces", ()) for x in face["at_mm"]), default=0)
     if far > MAX_COORDINATE_MM:
         text = f"the part is {1e-3 * far:.4g} m from the origin of its file"
@@ -360,7 +359,7 @@ def _checked(
     known: Sequence[Surface],
     mesh: PartMesh,
 ) -> Proposal:
-    """The proposal of these values, with its charge, built and checked."""
+    """The proposal of these values with its charge, built and checked."""
     largest = max(size for key, size in tables["chamber"].items() if key.endswith("_mm"))
     if largest > LARGEST_MM:
         text = f"the part measures {format_box(mesh.size)}, too much for a chamber: it would need"
@@ -381,7 +380,7 @@ def _checked(
 
 
 def _nested(tables: dict[str, dict[str, Any]]) -> dict[str, Any]:
-    """Tables by dotted name as nested ones."""
+    """Nested tables from tables by dotted name."""
     nested: dict[str, Any] = {}
     for name, values in tables.items():
         table = nested

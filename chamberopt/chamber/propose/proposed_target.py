@@ -1,4 +1,4 @@
-"""Propose which surface of a part to peen: names of its file, or faces between its edges."""
+"""Propose the surface of a part to peen: names of its file, or faces between its edges."""
 
 from __future__ import annotations
 
@@ -18,43 +18,41 @@ from chamberopt.geometry.faces import Faces
 from chamberopt.geometry.meshes.part_mesh import PartMesh, select_triangles
 from chamberopt.geometry.triangles import areas, border_edges
 
-# Propose a chamber's shape and sizes from the part's box and the ball's diameter.
-
-# In ball diameters, and as a share of the part's width: room for balls to get round the part and
-# gather speed. They are starting points that a study varies.
+# Room for balls to get round the part and gather speed, in ball diameters and as a share of the
+# part's width. A study varies these starting points.
 SIDE_GAP, GAP_SHARE, MIN_GAP = 5.0, 0.15, 4e-3
 DISTANCE, DISTANCE_SHARE, MIN_DISTANCE = 6.0, 0.2, 8e-3
 ABOVE = 5.0  # ball diameters between target and ceiling
 SHAPES = ("cylinder", "box", "prism", "conformal")
-LONG = 1.6  # length over width from which the walls follow the part's sides
+LONG = 1.6  # least length over width of a part whose sides the walls follow
 SIDES = 6  # of a prism
 
 
 @dataclass(frozen=True)
 class Sizes:
-    """Sizes of a chamber, and how the part is in it."""
+    """Sizes of a chamber round a part."""
 
     shape: str
     plan: dict[str, Any]  # keys of [chamber] for its form in plan, and their values
     distance: float  # sonotrode to part [m]
     height: float  # [m]
     gap: float  # part to side wall [m]
-    through_ceiling: bool  # whether the part goes out there
-    top: float  # of what must be below the ceiling, over the part's lowest point [m]
+    through_ceiling: bool  # true if the part goes out through the ceiling
+    top: float  # height over the part's lowest point that must be below the ceiling [m]
 
 
 def shape_for(box: np.ndarray) -> str:
-    """The shape for a part whose box has these sides (3,) [m]."""
+    """The shape for a part with a box of these sides (3,) [m]."""
     return "box" if max(box[:2]) > LONG * min(box[:2]) else "cylinder"
 
 
 def propose_sizes(
     vertices: np.ndarray, target_top: float, ball: float, shape: str, wider: float = 1.0
 ) -> Sizes:
-    """The sizes of a chamber of a shape, one of SHAPES.
+    """Sizes of a chamber of a shape in SHAPES.
 
     Args:
-        vertices: of the part as it is turned, its lowest point at z = 0 [m], shape (n, 3).
+        vertices: of the turned part, with its lowest point at z = 0 [m], shape (n, 3).
         target_top: the target's highest point [m].
         ball: diameter [m].
         wider: factor on the room beside, below and above the part.
@@ -90,15 +88,15 @@ def _up_mm(length: float) -> float:
 
 
 CREASE_DEG = 30.0
-MOST = 0.5  # share of the area above which a name is what is left beside what was marked
-MAX_KINDS = 40  # of faces that are listed, those with the largest area
+MOST = 0.5  # share of the area from which a named surface counts as the rest beside marked ones
+MAX_KINDS = 40  # kinds of faces that are listed, the largest areas first
 FOR = "(?:peen|target|(?:ge)?strahl|grenaill)"
-MEANT = re.compile(FOR, re.I)  # names that say what they are for
+MEANT = re.compile(FOR, re.I)  # names that say that a surface is to be peened
 NOT, GAP = "un|not?|non|without|kein|keine|nicht|ohne|sans|pas", r"[\s_-]"
-# Names of what is left out: unpeened, DO_NOT_PEEN, nicht zu strahlen, mask.
+# Names of surfaces to leave out: unpeened, DO_NOT_PEEN, nicht zu strahlen, mask.
 LEFT_OUT = re.compile(rf"(?<![a-z])(?:(?:{NOT})(?:{GAP}+.*)?{FOR}|mask|abdeck)", re.I)
-AS_LARGE = 0.9  # of the largest face's area: such as the other side of a blade
-PATTERN = 6  # alike faces from which a face counts as a feature that repeats, such as a tooth's
+AS_LARGE = 0.9  # of the largest face's area: the target takes a face as large, e.g. a blade's back
+PATTERN = 6  # number of alike faces that make a repeated feature, such as teeth
 COLOUR, VIVID = re.compile(r"#([0-9a-f]{2})([0-9a-f]{2})([0-9a-f]{2})$", re.I), 100
 FACE = re.compile(r"face (\d+)", re.I)
 WHOLE: dict[str, Any] = {"surface": ["all"]}  # in [part.target]
@@ -106,18 +104,18 @@ WHOLE: dict[str, Any] = {"surface": ["all"]}  # in [part.target]
 
 @dataclass(frozen=True)
 class Surface:
-    """A surface that can be the target: a name of the file, or a face with all that are like it."""
+    """A surface that can be the target: a name of the file, or a face with all faces like it."""
 
-    name: str  # as --target takes it
+    name: str  # value for --target
     keys: dict[str, Any]  # of [part.target]
     triangles: np.ndarray  # (m,) bool
-    text: str  # what it is, in a few words
-    colour: str = ""  # of the file, if it is of just these triangles
+    text: str  # description in a few words
+    colour: str = ""  # colour of just these triangles in the file
 
 
 @dataclass(frozen=True)
 class Target:
-    """What is to be peened."""
+    """The surface to peen."""
 
     keys: dict[str, Any]  # of [part.target]
     triangles: np.ndarray  # (m,) bool
@@ -125,7 +123,7 @@ class Target:
 
 
 def surfaces(mesh: PartMesh) -> list[Surface]:
-    """The surfaces to choose from: the file's names, then faces, the largest first."""
+    """All surfaces to choose from: the file's names, then faces, the largest first."""
     area = areas(mesh.vertices, mesh.triangles)
     named: dict[bytes, Surface] = {}
     for name, marked in sorted(
@@ -141,7 +139,7 @@ def surfaces(mesh: PartMesh) -> list[Surface]:
 
 
 def propose_target(mesh: PartMesh, known: Sequence[Surface], wanted: Iterable[str]) -> Target:
-    """The target that is asked for by names of surfaces; without any, the likeliest.
+    """The target with the wanted surface names, or the likeliest target without names.
 
     Raises:
         InputError: there is no surface of that name.
@@ -166,7 +164,7 @@ def propose_target(mesh: PartMesh, known: Sequence[Surface], wanted: Iterable[st
         one
         for one in named
         if area[one.triangles].sum() < MOST * area.sum()
-        and len(border_edges(mesh.triangles[one.triangles]))  # otherwise it is a whole body
+        and len(border_edges(mesh.triangles[one.triangles]))  # a whole body has no border
     ]
     if special:
         return _joined(special[:1], "the largest surface that the file names, beside the rest")
@@ -184,7 +182,7 @@ def propose_target(mesh: PartMesh, known: Sequence[Surface], wanted: Iterable[st
 
 
 def _faces(mesh: PartMesh) -> list[Surface]:
-    """The kinds of faces, each with all that are alike."""
+    """The kinds of faces, each with all its alike faces."""
     faces = Faces(mesh.vertices, mesh.triangles, CREASE_DEG)
     left, found = np.ones(faces.count, dtype=bool), []
     for face in np.argsort(-faces.area, kind="stable"):
@@ -214,14 +212,14 @@ def _named(mesh: PartMesh, name: str, marked: np.ndarray) -> Surface:
 
 
 def _is_vivid(name: str) -> bool:
-    """Whether a name is a colour, and not a grey of the whole body."""
+    """True if a name is a vivid colour. A grey usually marks the whole body."""
     found = COLOUR.match(name)
     levels = [int(level, 16) for level in found.groups()] if found else [0]
     return max(levels) - min(levels) > VIVID
 
 
 def _from_red(colour: str) -> float:
-    """How far the hue of a colour is from red, the usual one of a mark, from 0 to 1/2."""
+    """Distance of a colour's hue from red, the usual mark, from 0 to 1/2."""
     hue = colorsys.rgb_to_hsv(*bytes.fromhex(colour[1:]))[0]
     return min(hue, 1.0 - hue)
 
@@ -247,7 +245,7 @@ def _find(mesh: PartMesh, known: Sequence[Surface], name: str) -> Surface:
 
 
 def _joined(chosen: Sequence[Surface], reason: str) -> Target:
-    """One target of several surfaces; InputError for names mixed with faces."""
+    """One target of several surfaces. InputError if names are mixed with faces."""
     keys: dict[str, Any] = {}
     for one in chosen:
         for key, values in one.keys.items():

@@ -1,4 +1,4 @@
-"""The files of a proposal: a design and a study, each value with its reason as a comment."""
+"""The text of a proposal's files, a design and a study, with a reason beside each value."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ EVALUATIONS, SEARCH_HALF_WIDTH = 20, 0.04
 
 
 def design_text(proposal: Proposal, folder: Path) -> str:
-    """The text of a design file in a folder, which names the part relative to it."""
+    """The text of a design file in a folder. It names the part relative to the folder."""
     tables = with_paths_from(folder.resolve(), proposal.tables)
     name = Path(tables["part"]["mesh"]).name
     rules = "proposed by `chamberopt new`: rules of thumb to vary."
@@ -33,7 +33,7 @@ def design_text(proposal: Proposal, folder: Path) -> str:
 
 
 def study_text(proposal: Proposal, design: str) -> str:
-    """The text of a study file beside the design file of a name."""
+    """The text of a study file beside the named design file."""
     bounds = {name: one._asdict() for name, one in proposal.bounds.items()}
     start = {name: f"now {proposal.design.value(name):g}" for name in proposal.bounds}
     return study_lines(design, bounds, start)
@@ -49,7 +49,7 @@ def study_lines(
 
     Args:
         bounds: keys in [vary] by dotted name, such as low and high.
-        notes: a comment on each.
+        notes: a comment on each number.
     """
     vary = {f'"{name}"': dict(one) for name, one in bounds.items()}
     lines = [
@@ -98,7 +98,7 @@ def _line(key: str, value: Any) -> str:
 
 
 def _choices(known: Sequence[Surface]) -> list[str]:
-    """Comments on the surfaces to choose from, as the keys of [part.target] that choose them."""
+    """Comments with the keys of [part.target] for each surface to choose from."""
     lines = ["# The part's surfaces, the largest first; lists of several are one target:"]
     for one in known[:MAX_LISTED]:
         keys = ", ".join(_line(key, value) for key, value in one.keys.items())
