@@ -1,1 +1,1 @@
-"""From impacts to dents, from dents to coverage, from coverage to metrics with intervals."""
+"""The way from impacts to dents, coverage, and metrics with intervals."""

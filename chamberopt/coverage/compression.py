@@ -2,19 +2,21 @@
 
 Notation
     d       diameter of a dent on the part [m]
-    L(d)    dents wider than d in a window, as a rate [1/s]: as in strength.py with s = d
+    L(d)    rate of dents wider than d in a window [1/s], as in strength.py with s = d
     z(t)    depth of compression after a time t [m]
 
     z(t) = 1.1 integral over d of 1 - exp(-L(d) t)
 
-For hard metals at 4 to 8 m/s and balls of 1.5 to 3 mm three estimates of one impact's depth agree
-with its dent's diameter to 10 %: that of S. T. S. Al-Hassani, "Mechanical aspects of residual
-stress development in shot peening", ICSP-1, 1981, with the dent of the full energy; the depth where
-the elastic stress of Hertz meets the yield stress (J. K. Li et al., "Mechanical approach to the
-residual stress field induced by shot peening", Mater. Sci. Eng. A147 (1991) 167); and D. Kirk's
-rule that the dent's size governs it. They leave 30 %, and no measured profile was compared. For a
-metal that hardens strongly, such as 316L, whose first yielding says little of its flow stress, the
-second gives 1.6 to 1.7 d: then there is no estimate.
+Three estimates of the depth under one impact agree with the dent's diameter to 10 %, for hard
+metals at 4 to 8 m/s and balls of 1.5 to 3 mm. S. T. S. Al-Hassani, "Mechanical aspects of residual
+stress development in shot peening", ICSP-1, 1981, uses the dent of the full energy. J. K. Li et
+al., "Mechanical approach to the residual stress field induced by shot peening", Mater. Sci. Eng.
+A147 (1991) 167, use the depth where the elastic stress of Hertz meets the yield stress. D. Kirk's
+rule takes the depth from the dent's size. The error left is 30 %, and no measured profile was
+compared.
+
+The second estimate gives 1.6 to 1.7 d for a metal that hardens strongly, such as 316L, because its
+first yielding says little about its flow stress. Such a metal gets no estimate.
 """
 
 from __future__ import annotations
@@ -42,12 +44,12 @@ if TYPE_CHECKING:
     from chamberopt.design.materials import PartMaterial
 
 OF_DENT = 1.1  # depth over the integral of diameters
-ERROR = 0.3  # of the estimate, the same wherever the same shot peens the same metal
-PEAK_STRESS = 0.5, 0.7  # compressive, of the tensile strength, almost whatever the intensity
+ERROR = 0.3  # relative error of the depth, equal wherever the same shot peens the same metal
+PEAK_STRESS = 0.5, 0.7  # peak compressive stress over tensile strength, at almost any intensity
 
 
 def compression_depth(histogram: np.ndarray, time_ratio: float, highest: float) -> np.ndarray:
-    """z [m] of each window (p,).
+    """Depth z [m] in each window, (p,).
 
     Args:
         histogram: dented area over area of each window, by level of d, (p, LEVELS).
@@ -61,9 +63,9 @@ def compression_depth(histogram: np.ndarray, time_ratio: float, highest: float) 
 def compression_estimate(
     field: TargetField, batches: Sequence[Sequence[Hits]], seconds: float, peening_time: float
 ) -> Estimate:
-    """Mean depth of compression over what shot can touch of the target [µm].
+    """Mean depth of compression [µm] over the target's reachable surface.
 
-    Its interval holds the error of the estimate itself, which is most of it.
+    Its interval includes the estimate's own error, which is most of the width.
 
     Args:
         batches: impacts of the replicas of each batch, in the sector of the windows.
@@ -86,7 +88,7 @@ def compression_estimate(
         for part, own in zip(found.parts, found.seconds, strict=True)
     ]
     deviations = jackknife(np.array([value, *without])) - value
-    # Windows with few dents lack the widest ones; with half of the dents twice as much.
+    # Windows with few dents lack the widest dents. Half of the dents make the lack twice as large.
     half = count // 2
     halves = [(found.parts[rows].sum(axis=0), found.seconds[rows].sum())
               for rows in (slice(half), slice(half, 2 * half))]  # fmt: skip
@@ -96,7 +98,7 @@ def compression_estimate(
 
 
 def stress_notes(metal: PartMaterial) -> tuple[str, ...]:
-    """What can be said of the stress under the surface, as notes of a result."""
+    """Notes for a result on the stress under the surface."""
     notes = []
     if metal.tensile_MPa is not None:
         low, high = (share * metal.tensile_MPa for share in PEAK_STRESS)

@@ -1,19 +1,19 @@
-"""From impacts to the coverage of windows round points of the target.
+"""Coverage of windows round points of the target, from impacts.
 
 Notation
     A  area of a window that a ball can touch [m²]                       (gauge.area, (p,))
     s  area of a dent, pi a², a its radius [m]                           (radius)
-    w  footprint: share of the window of a point that one dent takes     (weight)
+    w  footprint: share of a point's window that a dent takes            (weight)
     x  dent density: sum of w of all dents that fall within a time
-    C  coverage, 1 - exp(-x) for dents that fall independently of one another (Avrami's equation)
+    C  coverage, 1 - exp(-x) for dents that fall independently (Avrami's equation)
 
-A dent on a smooth face takes w = s / A of every window that it lies in. Convex creases collect many
-dents, in a band as narrow as a dent: spread over a window they would count as if they covered all
+A dent on a smooth face takes w = s / A of every window around it. Convex creases collect many dents
+in a band as narrow as a dent. Spread over a window, these dents would count as if they covered all
 of it. So a dent on a crease is spread along the crease alone. At a distance h < a from the crease
 
     w = 2 sqrt(a² - h²) / (length of the crease in its window)
 
-on both sides of it, which is exact across the crease.
+on both sides. This share is exact across the crease.
 """
 
 from __future__ import annotations
@@ -34,17 +34,17 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
-ON_CREASE = 1e-6  # m: contacts nearer to a crease than this are on it
-MAX_BATCHES = 40  # of replicas; more would make the intervals no better
+ON_CREASE = 1e-6  # m: a contact nearer to a crease is on the crease
+MAX_BATCHES = 40  # batches of replicas; more batches would not improve the intervals
 
 
 class Prints(Protocol):
     """Footprints of the dents of one or more replicas.
 
     Attributes:
-        area: of all dents on the target [m²].
-        area_on_creases: of those on creases [m²].
-        squares: sum of the squares of their areas [m⁴].
+        area: sum of the areas of all dents on the target [m²].
+        area_on_creases: sum of the areas of dents on creases [m²].
+        squares: sum of the squared areas of all dents [m⁴].
     """
 
     @property
@@ -55,16 +55,16 @@ class Prints(Protocol):
     def squares(self) -> float: ...
 
     def pairs(self) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        """Yield points, and the shares of their windows that dents take, in order, (k,) each."""
+        """Yield points, and the shares of their windows that dents take, (k,) each, in order."""
         ...
 
 
 class Footprints(NamedTuple):
-    """Dents in windows: pairs of a point and the share of its window that a dent takes.
+    """Pairs of a point and the share of its window that a dent takes.
 
     Attributes:
         point, weight: of each pair, shape (k,).
-        area, area_on_creases, squares: as of Prints.
+        area, area_on_creases, squares: as in Prints.
     """
 
     point: np.ndarray
@@ -78,7 +78,7 @@ class Footprints(NamedTuple):
 
 
 class JoinedFootprints(NamedTuple):
-    """The footprints of several replicas, which are not copied."""
+    """The footprints of several replicas, without a copy of them."""
 
     replicas: tuple[Prints, ...]
     area: float
@@ -91,9 +91,9 @@ class JoinedFootprints(NamedTuple):
 
 
 class FoundAgain(NamedTuple):
-    """Footprints of one replica that are found again whenever they are wanted.
+    """Footprints of one replica that are computed again at each use.
 
-    A dent takes 80 bytes, and its pairs, 60 to 340 of them, 12 bytes each.
+    They save memory: a dent takes 80 bytes, and each of its 60 to 340 pairs 12 bytes.
     """
 
     find: Callable[[], Footprints]
@@ -118,7 +118,7 @@ def coverage_from_dent_density(dent_density: np.ndarray) -> np.ndarray:
 
 
 def in_batches(replicas: Sequence[T]) -> list[Sequence[T]]:
-    """Divide replicas into at most MAX_BATCHES batches, which differ by one replica at most."""
+    """Divide replicas into at most MAX_BATCHES batches whose sizes differ by at most 1."""
     count = len(replicas)
     ends = np.linspace(0, count, min(count, MAX_BATCHES) + 1).astype(int)
     return [replicas[a:b] for a, b in pairwise(ends)]
@@ -144,7 +144,7 @@ def batches_of(replicas: Sequence[Prints]) -> list[Batch]:
 def kept_footprints(field: TargetField, gauge: Gauge, dents: LocatedDents) -> Prints:
     """The footprints of one replica, kept as long as there is memory for them.
 
-    Otherwise they are found again when they are wanted, which gives the same ones.
+    Without memory they are computed again at each use, with the same values.
     """
     found = find_footprints(field, gauge, dents)
     if MEMORY.keeps(found.point, found.weight):
@@ -156,10 +156,10 @@ class LocatedDents(NamedTuple):
     """Dents of one replica that may be in windows of the target, or of the whole part.
 
     Attributes:
-        contacts: where they are.
+        contacts: places of the dents.
         triangle: of the part, shape (k,).
         radius: [m], shape (k,).
-        edge: the crease on which each lies, -1 on a smooth face, shape (k,).
+        edge: crease under each dent, -1 on a smooth face, shape (k,).
     """
 
     contacts: Places
@@ -168,13 +168,13 @@ class LocatedDents(NamedTuple):
     edge: np.ndarray
 
     def select(self, rows: slice) -> LocatedDents:
-        """The dents of these rows."""
+        """The dents in the given rows."""
         columns = (self.triangle, self.radius, self.edge)
         return LocatedDents(self.contacts.select(rows), *(one[rows] for one in columns))
 
 
 def locate_dents(field: TargetField, in_sector: Hits) -> LocatedDents:
-    """Find the face or the crease on which each dent lies, of impacts where the windows are."""
+    """Find the face or the crease under each dent, from impacts in the sector of the windows."""
     dents = in_sector.select((in_sector.dent > 0.0) & field.has_windows[in_sector.triangle])
     contacts = field.places_of(dents, np.arange(len(dents)))
     edge = crease_of_contacts(field, contacts.place, dents.triangle)
@@ -182,7 +182,7 @@ def locate_dents(field: TargetField, in_sector: Hits) -> LocatedDents:
 
 
 def find_footprints(field: TargetField, gauge: Gauge, hits: Hits | LocatedDents) -> Footprints:
-    """The dents of one replica in windows of one size; dents off the target count nothing."""
+    """The footprints of one replica in windows of one size. Dents off the target do not count."""
     dents = hits if isinstance(hits, LocatedDents) else locate_dents(field, field.in_sector(hits))
     contacts, radius, edge = dents.contacts, dents.radius, dents.edge
     on_face, size = edge < 0, np.pi * radius**2
@@ -204,11 +204,11 @@ def find_footprints(field: TargetField, gauge: Gauge, hits: Hits | LocatedDents)
 
 
 Pairs = Iterator[tuple[np.ndarray, np.ndarray]]
-"""Points, and the shares of their windows that dents take."""
+"""Pairs of points and of the shares of their windows that dents take."""
 
 
 def _on_creases(field: TargetField, gauge: Gauge, dents: LocatedDents) -> Pairs:
-    """Dents on edges that are creases to a window, in the bands beside them."""
+    """Shares of dents on edges that are creases to a window, in the bands beside the edges."""
     band, own = gauge.band, np.flatnonzero(dents.edge >= 0)
     if band is None:
         return
@@ -221,7 +221,7 @@ def _on_creases(field: TargetField, gauge: Gauge, dents: LocatedDents) -> Pairs:
 
 
 def _on_soft_edges(field: TargetField, gauge: Gauge, dents: LocatedDents) -> Pairs:
-    """Dents on edges that are creases to some windows, in those to which the surface goes on."""
+    """Shares of dents on edges that are creases to some windows, in windows that see no crease."""
     line, windows = field.creases.line, gauge.windows
     own = np.flatnonzero((dents.edge >= 0) & (line[-1, dents.edge] < 0))
     for point, contact in windows.pairs(dents.contacts.select(own)):
@@ -233,13 +233,14 @@ def _on_soft_edges(field: TargetField, gauge: Gauge, dents: LocatedDents) -> Pai
 def in_halves(
     field: TargetField, contacts: Places, triangle: np.ndarray
 ) -> tuple[Places, np.ndarray, np.ndarray]:
-    """Contacts on creases as two, on the faces of both sides, whichever of them was hit.
+    """Divide each contact on a crease into two halves, on the faces of its two sides.
+
+    The division does not depend on the face that was hit.
 
     Args:
-        triangle: of the part, of each contact, (k,).
-
+        triangle: part triangle of each contact, (k,).
     Returns:
-        The contacts, their rows before, and the share of its dent that each has.
+        The contacts, the row of each in the given contacts, and its share of the dent.
     """
     edge = crease_of_contacts(field, contacts.place, triangle)
     on = np.flatnonzero(edge >= 0)
@@ -250,7 +251,7 @@ def in_halves(
 
 
 def crease_of_contacts(field: TargetField, place: np.ndarray, triangle: np.ndarray) -> np.ndarray:
-    """The crease on which each contact lies, (k,); -1 for contacts on a smooth face."""
+    """The crease under each contact, (k,), or -1 on a smooth face."""
     creases = field.creases
     found = np.full(len(place), -1)
     borders = np.asarray((creases.at_corner >= 0).any(axis=1))
@@ -265,7 +266,7 @@ def crease_of_contacts(field: TargetField, place: np.ndarray, triangle: np.ndarr
         )
         touches = (crease >= 0) & (away < ON_CREASE)
         found[near[touches]] = crease[touches]
-    # A corner last: whichever triangle was hit, the sharpest of its creases counts.
+    # Corners come last: the sharpest crease at a corner counts, whichever triangle was hit.
     for side in range(3):
         corner = creases.at_corner[own, side]
         touches = (corner >= 0) & (np.linalg.norm(at - corners[:, side], axis=1) < ON_CREASE)

@@ -1,9 +1,9 @@
 """Mean and standard deviation of the target's coverage, with confidence intervals.
 
 Notation
-    x        dent density of a window at the treatment time T: expected dents, by their share of it
+    x        dent density of a window at the treatment time T: expected sum of the dents' shares
     C        coverage, 1 - exp(-x)
-    n, t     number of replicas, and the time that each simulates [s]
+    n, t     number of replicas, and the simulated time of each replica [s]
     w_j      share of the window that simulated dent j takes
     k        T / (n t)                                                       (scale)
     r        share of the target that a ball can touch                       (reachable)
@@ -13,16 +13,16 @@ Notation
     mean C   = r (1 - m1)
     mean C²  = r (1 - 2 m1 + m2)
 
-k times the sum of w_j in the place of x would make exp(-x) too large, because exp is not linear,
-and the fewer dents, the worse. But B_1 has exactly exp(-x) for its mean, and B_2 exp(-2 x), for
-dents of any sizes and however short t is: B is the generating functional of a Poisson process
-(J. F. C. Kingman, "Poisson Processes", Oxford 1993, chapter 3.2). For dents of one size it is the
-estimator of I. J. Good and G. H. Toulmin, Biometrika 43 (1956) 45. It asks for about 3 dents in a
-window for each unit of x; with fewer the products scatter more than what they estimate.
+Since exp is not linear, k times the sum of w_j in the place of x would make exp(-x) too large, most
+of all with few dents. But the mean of B_1 is exactly exp(-x), and the mean of B_2 is exp(-2 x), for
+dents of any sizes and any short t: B is the generating functional of a Poisson process (J. F. C.
+Kingman, "Poisson Processes", Oxford 1993, chapter 3.2). For dents of one size B is the estimator of
+I. J. Good and G. H. Toulmin, Biometrika 43 (1956) 45. It asks for about 3 dents in a window for
+each unit of x. With fewer dents the products scatter more than the quantity that they estimate.
 
-Intervals are those of the delete-one jackknife over replicas (B. Efron and R. J. Tibshirani, "An
-Introduction to the Bootstrap", Chapman & Hall 1993, chapter 11), and of the choice of the points,
-from figures of every tenth of them.
+Intervals have two parts: the delete-one jackknife over replicas (B. Efron and R. J. Tibshirani, "An
+Introduction to the Bootstrap", Chapman & Hall 1993, chapter 11), and the choice of the points, from
+figures of every tenth point.
 """
 
 from __future__ import annotations
@@ -52,8 +52,8 @@ class Products(NamedTuple):
     """Products over the dents in each window of 1 - k w, for K time ratios.
 
     Attributes:
-        of_all: of all batches, shape (p, K).
-        of_rest: means over the windows of all batches but each, shape (g, K).
+        of_all: over all batches, shape (p, K).
+        of_rest: means over the windows, over all batches but each, shape (g, K).
     """
 
     of_all: np.ndarray
@@ -61,7 +61,7 @@ class Products(NamedTuple):
 
 
 def multiply_dents(batches: Sequence[Batch], points: int, ratios: Sequence[float]) -> Products:
-    """Multiply over the dents of all batches, and of all but each.
+    """Multiply over the dents of all batches, and of all batches but each.
 
     Args:
         points: number of windows.
@@ -71,7 +71,7 @@ def multiply_dents(batches: Sequence[Batch], points: int, ratios: Sequence[float
 
     size = np.array([one.replicas for one in batches])
     total, count, wanted = int(size.sum()), len(ratios), np.array(ratios, dtype=float)
-    # Without a batch, k belongs to the number of the other replicas; batches have two sizes.
+    # Without a batch, k follows from the number of the other replicas. Batches have two sizes.
     sizes = np.unique(size)
     scales = np.concatenate([wanted / total, *(wanted / max(total - one, 1) for one in sizes)])
     products = np.ones((len(batches), points, len(scales)))
@@ -89,10 +89,10 @@ def multiply_dents(batches: Sequence[Batch], points: int, ratios: Sequence[float
 def coverage_estimates(
     batches: Sequence[Batch], sums: DentSums, reach: Reach, time_ratio: float
 ) -> dict[str, Estimate]:
-    """Estimate mean, deviation and percentiles of coverage and exposure, by Avrami's equation.
+    """Estimate mean, deviation and percentiles of coverage and exposure by Avrami's equation.
 
     Args:
-        sums: of the batches, over each window.
+        sums: of the dents of the batches in each window.
         time_ratio: treatment time over the simulated time of one replica.
     """
     products = multiply_dents(batches, len(sums.number), [time_ratio, 2.0 * time_ratio])
@@ -116,13 +116,13 @@ def mean_and_variance_estimates(products: Products, reach: Reach) -> tuple[Estim
     """Mean and variance of coverage over the target.
 
     Args:
-        products: of the time ratio and of twice that.
+        products: for the time ratio, and for twice the time ratio.
     """
     of_all, of_rest = products
     values = mean_and_variance(np.vstack([of_all.mean(axis=0), of_rest]), reach.share)
     of_some = np.array([some.mean(axis=0) for some in sparse_points(of_all)])
     some = mean_and_variance(of_some, reach.share)
-    # Both move with the reachable share too: by their differences from one standard error more.
+    # Both depend on the reachable share too. Their change with one standard error of it counts.
     more = mean_and_variance(of_all.mean(axis=0), sum(reach))
     mean, variance = (
         estimate(
@@ -137,7 +137,7 @@ def mean_and_variance_estimates(products: Products, reach: Reach) -> tuple[Estim
 
 
 def products_without_each(products: np.ndarray) -> np.ndarray:
-    """Products over all batches but one, for each one, (g, p, k) from (g, p, k)."""
+    """Products (g, p, k) over all batches but each, from the products (g, p, k) of each batch."""
     before, after = np.ones_like(products), np.ones_like(products)
     np.cumprod(products[:-1], axis=0, out=before[1:])
     after[:-1] = np.cumprod(products[:0:-1], axis=0)[::-1]
@@ -145,7 +145,7 @@ def products_without_each(products: np.ndarray) -> np.ndarray:
 
 
 def mean_and_variance(uncovered: np.ndarray, reachable: float) -> tuple[np.ndarray, np.ndarray]:
-    """Mean and variance of coverage over the target from (m1, m2), rows (..., 2)."""
+    """Mean and variance of coverage over the target, from rows (..., 2) of m1 and m2."""
     m1, m2 = np.moveaxis(uncovered, -1, 0)
     mean = reachable * (1.0 - m1)
     return mean, reachable * (1.0 - 2.0 * m1 + m2) - mean**2
@@ -154,8 +154,8 @@ def mean_and_variance(uncovered: np.ndarray, reachable: float) -> tuple[np.ndarr
 def root_of_variance(variance: Estimate) -> Estimate:
     """Standard deviation from a variance.
 
-    The square root is steep at 0: the ends of the interval of the variance give those of the
-    standard deviation, and its longer side serves for both.
+    The square root is steep at 0. So the ends of the interval come from the ends of the variance's
+    interval, and the longer side serves for both.
     """
     value, reach, slope = math.sqrt(variance.value), variance.half_width, 0.0
     if 0.0 < reach < math.inf:
@@ -166,23 +166,22 @@ def root_of_variance(variance: Estimate) -> Estimate:
     return replace(found, half_width=slope * reach if slope else reach, shared=shared)
 
 
-# Whether the windows have the dents that figures take, and how much simulation would give them.
-
-# Dents in a window for each unit of x that the mean and the standard deviation take, in all windows
-# but LEAST_RESOLVED of them, and dents in the median window for the figures of single places.
+# Dents in a window for each unit of x that the mean and the standard deviation take. The share
+# LEAST_RESOLVED of the windows may have fewer. Figures of single places take DENTS_FOR_PLACES dents
+# in the median window.
 DENTS_FOR_MEAN, DENTS_FOR_PLACES = 3.0, 25.0
 LEAST_RESOLVED = 0.05
-ENOUGH = 1.2  # times what the dents so far foretell, which scatter themselves
+ENOUGH = 1.2  # factor on the time that the dents so far foretell, because these dents scatter
 NOT_RESOLVED = "not resolved"
 
 
 @dataclass(frozen=True)
 class Resolution:
-    """How many dents the windows of a simulation have, and how many its figures take."""
+    """The number of dents in the windows of a simulation, and the number that its figures take."""
 
     dents: float  # in the median window
     needed_for_mean: float  # dents in the median window for mean and standard deviation
-    needed_for_places: float  # for 5th percentile, times and intensity
+    needed_for_places: float  # dents in the median window for 5th percentile, times and intensity
     simulated_time: float  # of all replicas [s]
 
     @property
@@ -194,9 +193,9 @@ class Resolution:
         return self.dents >= self.needed_for_places
 
     def time_for(self, needed: float) -> float:
-        """Simulated time [s] in which the median window gets so many dents.
+        """Simulated time [s] in which the median window gets the needed dents.
 
-        With a margin where it has fewer now.
+        It has a margin if the window has fewer dents now.
         """
         if not self.dents:
             return math.inf
@@ -207,10 +206,10 @@ class Resolution:
 def find_resolution(
     batches: Sequence[Batch], sums: DentSums, gauge: Gauge, time_ratio: float, time: float
 ) -> Resolution:
-    """Compare the dents in the windows with what the figures take.
+    """Compare the dents in the windows with the number that the figures take.
 
     Args:
-        sums: of the batches, over each window.
+        sums: of the dents of the batches in each window.
         time_ratio: treatment time over the simulated time of one replica.
         time: simulated by each replica [s].
     """
@@ -218,9 +217,9 @@ def find_resolution(
     prints, dents = [one.footprints for one in batches], float(np.median(sums.number))
     if not dents:
         return Resolution(0.0, DENTS_FOR_MEAN, DENTS_FOR_PLACES, replicas * time)
-    # Area of dents that, all alike, would scatter as these do.
+    # Area of a dent such that equal dents would scatter as the given dents do.
     area = sum(one.squares for one in prints) / sum(one.area for one in prints)
-    # Dents for each unit of x; beside a crease those on the crease decide.
+    # Dents for each unit of x. Beside a crease the dents on the crease decide.
     per_unit = gauge.area / area
     if gauge.band is not None:
         chord = 0.5 * math.sqrt(math.pi * area)  # mean width of a dent across its diameter

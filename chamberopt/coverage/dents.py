@@ -40,7 +40,7 @@ class Dents:
 
 
 def dents_on_part(impacts: ImpactLog, chamber: Chamber, design: Design) -> Dents:
-    """The dents that impacts leave on the part. Impacts below its yield speed leave none."""
+    """The dents that impacts leave on the part. An impact below the yield speed leaves no dent."""
     diameter = dent_diameters(impacts, design)
     dents = np.flatnonzero((diameter > 0.0) & (chamber.source[impacts.triangle] >= 0))
     corners = chamber.vertices[chamber.triangles[impacts.triangle[dents]]]
@@ -60,7 +60,6 @@ def dent_diameter(
         diameter: D [m], (n,) or one for all.
         density: rho [kg/m³].
         material: of the part, which has e(v), v0 and B.
-
     Returns:
         Diameter [m], (n,); 0 where the normal speed is not above the yield speed v0.
 
@@ -70,8 +69,8 @@ def dent_diameter(
 
     speed = np.asarray(normal_speed, dtype=float)
     hardness = material.hardness
-    # Below v0 the contact is elastic (Kirk): what e < 1 loses there goes into waves, not into a
-    # dent. That is so whichever law gives e.
+    # Below v0 the contact is elastic (Kirk). An energy loss by e < 1 goes into waves there, not
+    # into a dent, whichever law gives e.
     dents = speed > material.yield_speed
     e = np.where(dents, restitution_at(speed, material.restitution), 1.0)
     loss = np.maximum(1.0 - e * e, 0.0) * density * speed * speed / hardness

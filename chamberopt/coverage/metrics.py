@@ -1,9 +1,9 @@
-"""The registry of metrics of a candidate, and of objectives that a study can maximise.
+"""The registry of a candidate's metrics, and of the objectives that a study can maximise.
 
-A new metric is one entry of `METRICS`, a new objective one of `OBJECTIVES`. Study files, tables,
-reports and result folders take names, units and ranges from here, by `find_metric`: the metrics of
-`METRICS` are over the target, and "ZONE.mean_coverage" is the same over a zone of the design. Not
-every design has all of them: `metric_problem` says why one is lacking.
+A new metric is an entry of `METRICS`, and a new objective is an entry of `OBJECTIVES`. Study files,
+tables, reports and result folders take names, units and ranges from `find_metric`. The metrics of
+`METRICS` are over the target, and "ZONE.mean_coverage" is the same metric over a zone of the
+design. A design may lack some metrics: `metric_problem` gives the reason.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ P95 = 0.95  # share of the target's area that may be covered less than p95_cover
 class Metric:
     """A named number of a candidate.
 
-    Those of coverage and intensity have estimators of their own, see simulation/estimates.py.
+    Metrics of coverage and intensity have their own estimators, see simulation/estimates.py.
     """
 
     name: str
@@ -42,18 +42,18 @@ class Metric:
     summary: str
     lowest: float = -math.inf
     highest: float = math.inf
-    # Function of the impacts on the target, and of the design; None for those with estimators.
+    # Function of the impacts on the target and the design; None for a metric with an estimator.
     of_impacts: Callable[[TargetImpacts, Design], float] | None = None
-    required: bool = False  # whether a results folder without it is damaged
-    of_places: bool = False  # whether it tells of single places, which takes more dents
-    of_zones: bool = True  # whether a zone of the target has it too
-    # Why a design lacks it, "" if it has it; None for metrics that all designs have.
+    required: bool = False  # true if a results folder without the metric is damaged
+    of_places: bool = False  # true for a metric of single places, which takes more dents
+    of_zones: bool = True  # true if a zone of the target has the metric too
+    # Function that gives the reason why a design lacks the metric, or "". None: no design lacks it.
     lacking: Callable[[Design], str] | None = None
 
 
 @dataclass(frozen=True)
 class ObjectiveFunction:
-    """What a study maximises: a weighted sum of metrics."""
+    """A weighted sum of metrics that a study maximises."""
 
     name: str
     summary: str
@@ -61,7 +61,7 @@ class ObjectiveFunction:
 
 
 def exposed_target(chamber: Chamber) -> np.ndarray:
-    """Which part triangles belong to the target and can be reached by the shot, (m,) bool."""
+    """Mark the part triangles of the target that bound the cavity, (m,) bool."""
     return chamber.part.target & (chamber.exposed_area > 0.0)
 
 
@@ -212,7 +212,7 @@ METRICS = {
 
 
 def find_metric(name: str) -> Metric | None:
-    """The metric of a name such as "mean_coverage" or "ZONE.mean_coverage"; None if it is none."""
+    """The metric with a name such as "mean_coverage" or "ZONE.mean_coverage", or None."""
     zone, _, of_target = name.rpartition(".")
     metric = METRICS.get(of_target)
     if metric is None or not zone:
@@ -225,7 +225,7 @@ def find_metric(name: str) -> Metric | None:
 
 
 def metric_problem(design: Design, name: str) -> str:
-    """Why a design lacks the metric of a name; "" if it has it."""
+    """The reason why a design lacks the named metric, or ""."""
     metric = find_metric(name)
     if metric is None:
         return f"not a metric; {toml_errors.did_you_mean(name, METRICS)}"
@@ -237,7 +237,7 @@ def metric_problem(design: Design, name: str) -> str:
 
 
 def metric_names(design: Design) -> tuple[str, ...]:
-    """The names of all metrics of a design, those of its zones last."""
+    """The names of all metrics of a design. The metrics of its zones come last."""
     of_target = tuple(name for name in METRICS if not metric_problem(design, name))
     of_zones = (f"{zone.name}.{name}" for zone in design.zones for name in of_target)
     return (*of_target, *(name for name in of_zones if find_metric(name)))
@@ -247,7 +247,7 @@ OBJECTIVES = {
     one.name: one
     for one in (
         ObjectiveFunction(
-            "uniform_coverage",  # 1 only if everything is covered, and covered evenly
+            "uniform_coverage",  # 1 only if the whole target is covered evenly
             "mean minus standard deviation of coverage",
             {"mean_coverage": 1.0, "std_coverage": -1.0},
         ),
@@ -270,15 +270,15 @@ RENAMED_OBJECTIVES = {"coverage_p05": "p05_coverage", "time_to_98": "minus_time_
 
 
 def renamed_objective(old: str) -> str:
-    """Message for a name that objectives had in version 0.1.0."""
+    """A message for an objective's name of version 0.1.0."""
     return f"{old!r} is now called {RENAMED_OBJECTIVES[old]!r}; change the name"
 
 
 def parse_objective(name: str) -> ObjectiveFunction:
-    """The objective of that name, or a sum such as "1 uniform_coverage + -0.001 time_to_98_s".
+    """The named objective, or a sum such as "1 uniform_coverage + -0.001 time_to_98_s".
 
     Raises:
-        InputError: it is neither.
+        InputError: the text is neither a name nor a sum.
     """
     if name in OBJECTIVES:
         return OBJECTIVES[name]
@@ -300,18 +300,18 @@ def parse_objective(name: str) -> ObjectiveFunction:
 
 
 def highest_uniform_coverage(reachable: float) -> float:
-    """The largest uniform_coverage where only a share r of the target is within reach of the balls.
+    """The largest uniform_coverage if balls reach only a share r of the target.
 
-    The rest has no coverage. If all within reach is covered alike, to c, the mean is r c and the
-    standard deviation is c sqrt(r (1 - r)).
+    The rest has no coverage. If all reachable places are covered alike, to c, the mean is r c and
+    the standard deviation is c sqrt(r (1 - r)).
     """
     return max(0.0, reachable - math.sqrt(max(0.0, reachable * (1.0 - reachable))))
 
 
 def highest_objective(name: str, reachable: float) -> float:
-    """The largest value of an objective where a share of the target is within reach of the balls.
+    """The largest value of an objective if balls reach only a share of the target, or infinity.
 
-    It is infinite where nothing is known.
+    It is infinite if no bound is known.
     """
     terms = parse_objective(name).terms
     if terms == OBJECTIVES["uniform_coverage"].terms:

@@ -1,6 +1,6 @@
-"""Single impacts on the part and their file hits.npz, for distributions and percentiles.
+"""Single impacts on the part, and their file hits.npz, for distributions and percentiles.
 
-An impact takes 32 bytes here, against a hundred in the simulator's log.
+An impact takes 32 bytes in this form, and a hundred in the simulator's log.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ HITS_FILE = "hits.npz"
 
 @dataclass(frozen=True)
 class Hits:
-    """Impacts of one or more replicas on the part, one row each."""
+    """Impacts of one or more replicas on the part, one row for each impact."""
 
     triangle: np.ndarray  # part triangle, (k,) int32
     place: (
@@ -43,11 +43,11 @@ class Hits:
         return len(self.triangle)
 
     def on(self, triangles: np.ndarray) -> Hits:
-        """The impacts on all part triangles that are marked in (m,) bool."""
+        """The impacts on the marked part triangles, (m,) bool."""
         return self.select(triangles[self.triangle])
 
     def select(self, rows: slice | np.ndarray) -> Hits:
-        """The impacts of these rows."""
+        """The impacts in the given rows."""
         return Hits(*(getattr(self, column.name)[rows] for column in fields(Hits)))
 
 
@@ -56,7 +56,7 @@ class TargetImpacts:
     """The impacts of some replicas on the exposed target."""
 
     hits: tuple[Hits, ...]  # of each replica
-    time: float  # in which they fell [s]
+    time: float  # simulated time of the impacts [s]
     area: float  # of the exposed target [m²]
 
     @property
@@ -80,7 +80,7 @@ class HitsByTriangle:
         return self.hits.select(slice(self.first[triangle], self.first[triangle + 1]))
 
     def on(self, triangles: np.ndarray) -> Hits:
-        """The impacts on all triangles that are marked in (m,) bool."""
+        """The impacts on the marked part triangles, (m,) bool."""
         return self.hits.select(np.repeat(triangles, np.diff(self.first)))
 
 
@@ -145,7 +145,7 @@ def load_hits(path: Path) -> HitsByTriangle:
 
 
 def _require_sound(first: np.ndarray, columns: dict[str, np.ndarray]) -> None:
-    """Raise ValueError unless `first` is a list of rows and the columns are those of impacts."""
+    """Raise ValueError unless `first` is a list of rows and the columns describe impacts."""
     if first.dtype != np.int64 or first.ndim != 1 or not len(first) or first[0] != 0:
         raise ValueError("first is no list of rows from 0")
     if (np.diff(first) < 0).any():
@@ -154,7 +154,7 @@ def _require_sound(first: np.ndarray, columns: dict[str, np.ndarray]) -> None:
 
 
 def require_impacts(columns: dict[str, np.ndarray], count: int) -> None:
-    """Raise ValueError unless columns of Hits have the types and ranges of so many impacts."""
+    """Raise ValueError unless `count` impacts have columns of the types and ranges of Hits."""
     for name, column in columns.items():
         shape = (count, 3) if name == "place" else (count,)
         if column.dtype != np.float32 or column.shape != shape:
@@ -165,7 +165,7 @@ def require_impacts(columns: dict[str, np.ndarray], count: int) -> None:
 
 
 def load_matching_hits(path: Path, impacts: np.ndarray) -> HitsByTriangle:
-    """The single impacts of a results folder, checked to belong to its part.vtp.
+    """The single impacts of a results folder. They are checked to belong to its part.vtp.
 
     Args:
         path: of the hits.npz.

@@ -1,14 +1,15 @@
 """Percentiles of coverage and exposure over the target, and the time until it is full.
 
-The 5th percentile of k times the sum of w_j is too low, because counts scatter. sqrt(x) scatters
-alike everywhere (M. S. Bartlett, J. Roy. Stat. Soc. Suppl. 3 (1936) 68), so the roots are drawn to
-their mean until they vary over the target as the true ones do: the variance of counting, which
-shows from replica to replica, is taken away. The result of half of the replicas shows what error
-is left; the step from it to that of all is made once more, and the interval includes it. This asks
-for about 25 dents in a window. The 95th percentile, which is too high, is found alike.
+A 5th percentile of k times the sum of w_j is too low, because counts scatter. The scatter of
+sqrt(x) is alike everywhere (M. S. Bartlett, J. Roy. Stat. Soc. Suppl. 3 (1936) 68). So the roots
+are drawn to their mean until they vary over the target as the true roots do. This takes away the
+variance of counting, which shows from replica to replica. The result of half of the replicas shows
+the remaining error. The step from this result to the result of all replicas is made once more, and
+the interval includes it. The method asks for about 25 dents in a window. The 95th percentile, which
+is too high, is corrected alike.
 
 Notation: as in coverage_intervals.py. The exposure M = x / ln 50 is the peening time over the time
-in which a place with as many dents is 98 % covered, by Avrami's equation: M = 2 is "200 %".
+in which a place with as many dents is 98 % covered by Avrami's equation: M = 2 is "200 %".
 """
 
 from __future__ import annotations
@@ -26,17 +27,17 @@ from chamberopt.coverage.field.surface_points import CERTAIN, Reach, sampling_er
 from chamberopt.coverage.metrics import FULL_COVERAGE, NEVER, P05, P95
 
 SPLITS = 6  # of the replicas into halves
-NOT_ONE = 3.0  # expected dents of which with a probability of 5 % there is not one
+NOT_ONE = 3.0  # expected number of dents at which no dent falls with a probability of 5 %
 NEARLY_FULL = 0.9  # coverage above which times come from a shorter treatment
-SHORTEST = 1e-6  # part of the treatment
+SHORTEST = 1e-6  # shortest treatment, over the whole treatment
 
 
 class Quantile(NamedTuple):
-    """A figure of single places, and the share of the target's area that has less of it."""
+    """A figure of single places, and the share of the target's area with a lower figure."""
 
     level: float
-    of_density: Callable[[np.ndarray | float], np.ndarray | float]  # the figure, from x
-    highest: float  # value of the figure
+    of_density: Callable[[np.ndarray | float], np.ndarray | float]  # gives the figure from x
+    highest: float  # largest value of the figure
 
 
 def _coverage(density: np.ndarray | float) -> np.ndarray | float:
@@ -44,7 +45,7 @@ def _coverage(density: np.ndarray | float) -> np.ndarray | float:
 
 
 def exposure_from_density(density: np.ndarray | float) -> np.ndarray | float:
-    """M from x, see above."""
+    """The exposure M from the dent density x."""
     return density / -math.log(1.0 - FULL_COVERAGE)
 
 
@@ -54,10 +55,10 @@ P95_EXPOSURE = Quantile(P95, exposure_from_density, math.inf)
 
 
 class DentSums(NamedTuple):
-    """Dents of all batches in windows of one size.
+    """Sums over the dents of all batches in windows of one size.
 
     Attributes:
-        replicas: in each batch, shape (g,).
+        replicas: number in each batch, shape (g,).
         share: sums of w over the dents in each window, shape (g, p).
         number: dents of all batches in each window, shape (p,).
     """
@@ -74,7 +75,7 @@ class DentSums(NamedTuple):
 
 
 def sum_dents(batches: Sequence[Batch], points: int) -> DentSums:
-    """Add up the dents of each batch in each of so many windows."""
+    """Add up the dents of each batch in each window, for `points` windows."""
     from chamberopt.coverage.field.windows import add_powers
 
     sums = np.zeros((len(batches), points, 3))
@@ -88,11 +89,11 @@ def sum_dents(batches: Sequence[Batch], points: int) -> DentSums:
 def quantile_estimate(
     quantile: Quantile, sums: DentSums, reach: Reach, time_ratio: float
 ) -> Estimate:
-    """A percentile over the target; what is out of reach is bare.
+    """A percentile over the target. Places out of reach are bare.
 
-    It falls to 0 where more than its level is out of reach. Where that may be, as far as the reach
-    is known, the value is the mean of both cases, so that the choice of points does not throw it
-    from one to the other, and the interval holds both.
+    The percentile is 0 where the share out of reach is more than its level. If the reach is not
+    known well enough to tell, the value is the mean of both cases, so that the choice of points
+    does not throw it to and fro. The interval then holds both cases.
 
     Args:
         quantile: such as P05_COVERAGE.
@@ -106,9 +107,9 @@ def quantile_estimate(
         return Estimate(0.0, 0.0 if batches > 1 else math.inf, (0.0,) * batches)
     if beyond >= CERTAIN:
         return _quantile_of_reached(quantile, sums, reach, time_ratio)
-    likely = float(ndtr(beyond))  # that it is above 0
+    likely = float(ndtr(beyond))  # probability that the percentile is above 0
     density = math.exp(-0.5 * beyond**2) / math.sqrt(2.0 * math.pi)
-    # The mean reach of those that are enough, and the largest.
+    # The mean of all reaches that are enough, and the largest reach.
     mean, most = (reach.error * step for step in (density / likely, CERTAIN))
     found, furthest = (
         _quantile_of_reached(quantile, sums, Reach(min(reach.share + more, 1.0)), time_ratio)
@@ -127,7 +128,7 @@ def quantile_estimate(
 def _quantile_of_reached(
     quantile: Quantile, sums: DentSums, reach: Reach, time_ratio: float
 ) -> Estimate:
-    """The same, where surely less than its level is out of reach."""
+    """A percentile over the target if the share out of reach is surely less than its level."""
     batches = len(sums.replicas)
     share, further = (
         max(0.0, (quantile.level - (1.0 - one)) / one)
@@ -147,7 +148,7 @@ def _quantile_of_reached(
     rng, value = np.random.default_rng(0), whole
     if (half := max(batches // 2, 2)) < batches:  # a single batch does not show its variance
         of_halves = [value_of(roots_of(rng.permutation(batches)[:half])) for _ in range(SPLITS)]
-        # The error that is left goes with one over the number of dents.
+        # The remaining error goes with one over the number of dents.
         correction = (whole - float(np.mean(of_halves))) / (batches / half - 1.0)
         value = min(max(whole + correction, 0.0), quantile.highest)
     rests = [roots_of(rest) for rest in ~np.eye(batches, dtype=bool)]
@@ -161,20 +162,21 @@ def _quantile_of_reached(
     )
     step, least = value - whole, 0.0
     if np.quantile(sums.share.sum(axis=0), share) == 0.0:
-        # Where no dent has fallen it may be bare, or up to 3 dents were to be expected.
+        # A place without a dent may stay bare, or up to 3 dents were expected there.
         density = NOT_ONE * sums.weight * time_ratio / float(sums.replicas.sum())
         most = float(quantile.of_density(density))
         least = max(abs(step) + value, most) if math.isfinite(sums.weight) else math.inf
     by_reach = value_of(_density_roots(sums.share, sums.replicas, min(further, 1.0))) - whole
     shared = [*sampling_errors(of_some), by_reach if reach.error else 0.0]
     found = estimate(value + deviations, 0.0, quantile.highest, shared=shared)
-    # Where counting seems to explain all of the variance, the roots are drawn to one value, which
-    # hardly moves from replica to replica. There may be more variance, by its own interval.
+    # If counting seems to explain all of the variance, the roots are drawn to a single value, which
+    # hardly moves from replica to replica. By its own interval the variance may be larger.
     variances = np.array([one.over_target - one.counting for one in (all_of_them, *rests)])
     more = estimate(jackknife(variances)).half_width
     furthest = value_of(all_of_them, more) - whole
-    # That is an alternative to the scatter, so it comes in quadrature; added it held always. The
-    # step in quadrature held in 88 % beside creases (benchmarks/interval_calibration.py).
+    # This larger variance is an alternative to the scatter, so it is added in quadrature. Added
+    # plainly, the interval always held. The step in quadrature held in 88 % of the cases beside
+    # creases (benchmarks/interval_calibration.py).
     known_to = max(
         found.half_width + max(abs(step), least),
         math.hypot(furthest, step, shared_half_width(shared)),
@@ -184,13 +186,13 @@ def _quantile_of_reached(
 
 
 def mean_exposure(sums: DentSums, reach: Reach, time_ratio: float) -> Estimate:
-    """The mean exposure M over the target, which has no bias: it is linear in the dents.
+    """The mean exposure M over the target. It has no bias, because it is linear in the dents.
 
     Args:
         sums, reach, time_ratio: as for `quantile_estimate`.
     """
     total, replicas = sums.share.sum(axis=0), sums.replicas
-    of_one_dent = float(exposure_from_density(reach.share * time_ratio))  # as wide as its window
+    of_one_dent = float(exposure_from_density(reach.share * time_ratio))  # a dent as its window
     whole = of_one_dent * float(total.mean()) / float(replicas.sum())
     if not whole or len(replicas) == 1:
         return Estimate(whole, math.inf, (whole,) * len(replicas))
@@ -201,9 +203,12 @@ def mean_exposure(sums: DentSums, reach: Reach, time_ratio: float) -> Estimate:
 
 
 def in_order(low: Estimate, high: Estimate, name: str) -> dict[str, Estimate]:
-    """The 5th and 95th percentile of a figure, by name, which has {} in the place of p05 and p95.
+    """The 5th and 95th percentile of a figure, by name, in ascending order.
 
-    Of an even surface the corrections may exchange them; then both are their middle.
+    The corrections may exchange the percentiles of an even surface. Then both are their middle.
+
+    Args:
+        name: of the figure, with {} in the place of p05 and p95.
     """
     if low.value > high.value:
         middle = 0.5 * (low.value + high.value)
@@ -218,10 +223,10 @@ class DensityRoots(NamedTuple):
     """Roots of the dent density in windows, per replica.
 
     Attributes:
-        at_share: that a share of the windows do not exceed.
+        at_share: root that a share of the windows do not exceed.
         middle: mean.
         over_target: variance over the windows.
-        counting: the part of it that comes from counting.
+        counting: part of the variance that comes from counting.
     """
 
     at_share: float
@@ -230,10 +235,10 @@ class DensityRoots(NamedTuple):
     counting: float
 
     def density(self, more: float = 0.0) -> float:
-        """The density that the share of the windows do not exceed, counting taken away.
+        """The density that the share of the windows do not exceed, with counting taken away.
 
         Args:
-            more: added to the variance that is left.
+            more: variance to add to the remaining variance.
         """
         if not self.over_target:
             return self.at_share**2
@@ -265,8 +270,8 @@ def time_to_98(
 ) -> Estimate:
     """Time [s] until the 5th percentile of coverage is FULL_COVERAGE.
 
-    A coverage near 1 hardly tells dents from twice as many. So the time comes from the coverage
-    after a part of the treatment that leaves more bare.
+    A coverage near 1 hardly changes with twice as many dents. So the time comes from the coverage
+    after a shorter part of the treatment, which leaves more bare.
 
     Args:
         p05: 5th percentile of the coverage after the treatment.
@@ -297,7 +302,7 @@ def time_to_98_estimate(p05: Estimate, seconds: float) -> Estimate:
     count, is_bound = len(p05.pseudovalues), 0.0 < p05.half_width < math.inf
     if value >= NEVER and not is_bound:
         return Estimate(NEVER, p05.half_width, (NEVER,) * count, in_words="never")
-    if latest >= min(2.0 * value, NEVER):  # as uncertain as it is long
+    if latest >= min(2.0 * value, NEVER):  # the time is as uncertain as it is long
         words = f"more than {soonest:,.0f} s" if is_bound else ""
         value = min(value, NEVER)
         return Estimate(value, math.inf, (value,) * count, in_words=words)

@@ -1,22 +1,22 @@
-"""Peening strength of a place: what an Almen strip there would show.
+"""Peening strength of a place: the reading of an Almen strip there.
 
 Notation
     d, D    diameters of a dent on the strip and of its ball [m]
     s       strength of one impact, d² / D: eight times dent volume over dent area [m]
-    L(s)    dents of more than s in a window, as a rate: sum of their areas over the window's and
-            over the time [1/s]
-    h(t)    strength that a place has after a time t, each spot keeping its strongest dent [m]
-    T       saturation time: the largest for which h(2 T) = 1.1 h(T) [s]
+    L(s)    rate of dents stronger than s in a window [1/s]: sum of their areas over window and time
+    h(t)    strength of a place after a time t, if each spot keeps its strongest dent [m]
+    T       saturation time: the largest time with h(2 T) = 1.1 h(T) [s]
     S       peening strength, h(T) [m]
 
     h(t) = integral over s of 1 - exp(-L(s) t)
 
-A strip's arc height saturates like h, and 10 % more in twice the time is what SAE J443 calls
-saturated. The arc height goes with d²/D as long as the strip's in-plane stretch, and not its
-yielding, limits it. For equal impacts h is the curve a (1 - exp(-b t)) of D. Kirk, "Almen
-saturation curve solver program", The Shot Peener, 2005. Almen intensity is S times a constant that
-a set of strips calibrates. The dents are those on the strip's steel: the impacts are the part's.
-The same sum of s = d, on the part's own metal, gives the depth of compression (compression.py).
+A strip's arc height saturates like h. SAE J443 calls it saturated if twice the time adds 10 %. The
+arc height goes with d²/D as long as the strip's in-plane stretch, and not its yielding, limits it.
+For equal impacts h is the curve a (1 - exp(-b t)) of D. Kirk, "Almen saturation curve solver
+program", The Shot Peener, 2005. The Almen intensity is S times a constant that a set of strips
+calibrates. The impacts are the part's, and the dents are the dents that they would leave in the
+strip's steel. The same sum with s = d, on the part's own metal, gives the depth of compression
+(compression.py).
 """
 
 from __future__ import annotations
@@ -32,14 +32,14 @@ if TYPE_CHECKING:
     from chamberopt.coverage.part_impacts import Hits
     from chamberopt.design.materials import PartMaterial
 
-LEVELS = 32  # of s; twice as many change S by less than 0.3 %
+LEVELS = 32  # levels of s; twice as many levels change S by less than 0.3 %
 SATURATED = 1.1  # SAE J443
-NEWTON_STEPS = 3  # S moves by a quarter of what the saturation time is wrong by
+NEWTON_STEPS = 3  # the relative error of S is a quarter of the saturation time's
 HALVINGS = 12
 
 
 def ball_diameter(hits: Hits, density: float) -> np.ndarray:
-    """Diameter [m] of the ball of each impact, (k,), from its energy; 0 where it stood still.
+    """Diameter [m] of the ball of each impact, (k,), from its energy, or 0 for a ball at rest.
 
     Args:
         density: of the balls [kg/m³].
@@ -50,9 +50,9 @@ def ball_diameter(hits: Hits, density: float) -> np.ndarray:
 
 
 def strip_dents(hits: Hits, density: float, strip: PartMaterial) -> tuple[np.ndarray, np.ndarray]:
-    """Diameter of the dent that each impact would leave on a strip, and its strength s [m], (k,).
+    """Diameter [m] of the dent of each impact on a strip, (k,), and its strength s [m], (k,).
 
-    Both are 0 where it would leave none.
+    Both are 0 if the impact leaves no dent.
 
     Args:
         density: of the balls [kg/m³].
@@ -68,7 +68,11 @@ def area_of_dent(diameter: np.ndarray) -> np.ndarray:
 
 
 def levels(values: np.ndarray, highest: float) -> np.ndarray:
-    """The level of each value, 0 to LEVELS - 1."""
+    """The level of each value, from 0 to LEVELS - 1.
+
+    >>> levels(np.array([0.0, 0.5, 1.0]), highest=1.0)
+    array([ 0, 16, 31])
+    """
     return np.minimum(LEVELS * values / max(highest, 1e-300), LEVELS - 1).astype(np.int64)
 
 
@@ -79,9 +83,9 @@ def strength_histogram(
 
     Args:
         area: of the windows [m²], (p,).
-        contacts: where the dents are.
-        dent: their diameters [m], (k,).
-        level: their levels, (k,).
+        contacts: places of the dents.
+        dent: diameter of each dent [m], (k,).
+        level: level of each dent, (k,).
     """
     from chamberopt.coverage.field.windows import add_to_levels
 
@@ -92,7 +96,7 @@ def strength_histogram(
 
 
 def saturated_strength(histogram: np.ndarray, highest: float) -> tuple[np.ndarray, np.ndarray]:
-    """S [m] and T, in units of the time of the dents, of each window, (p,); 0 where there are none.
+    """S [m] and T [time of the dents] of each window, (p,), or 0 in a window without dents.
 
     Args:
         histogram: dented area over area of each window by level, (p, LEVELS).
@@ -104,8 +108,8 @@ def saturated_strength(histogram: np.ndarray, highest: float) -> tuple[np.ndarra
 
 
 def saturation_time(rate: np.ndarray) -> np.ndarray:
-    """T in units of the time of the dents, (p,), from the rates of stronger dents (p, n)."""
-    # Between these times lies T: where all dents are alike, ln 10 over their rate.
+    """T (p,) in units of the time of the dents, from the rates of stronger dents (p, n)."""
+    # T lies between these times. For equal dents it is ln 10 over their rate.
     top = rate.max(axis=1)
     some = top > 0.0
     low = np.divide(0.1, top, out=np.zeros_like(top), where=some)
@@ -119,7 +123,7 @@ def saturation_time(rate: np.ndarray) -> np.ndarray:
 
 
 def time_near(rate: np.ndarray, time: np.ndarray) -> np.ndarray:
-    """T (p,) where it is known to be near `time` (p,)."""
+    """T (p,) if it is known to be near `time` (p,)."""
     for _ in range(NEWTON_STEPS):
         gain, slope = _gain(rate, time)
         step = np.divide(gain, slope, out=np.zeros_like(gain), where=slope < 0.0)
@@ -142,5 +146,5 @@ def _gain(rate: np.ndarray, time: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def strength_at(rate: np.ndarray, time: np.ndarray, highest: float) -> np.ndarray:
-    """h [m] of each window (p,) after a time (p,), in units of the time of the dents."""
+    """Strength h [m] of each window (p,) after a time (p,) in units of the time of the dents."""
     return np.asarray(-np.expm1(-rate * time[:, None]).sum(axis=1) * highest / LEVELS)

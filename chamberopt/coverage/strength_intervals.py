@@ -2,14 +2,14 @@
 
 Notation: as in strength.py, and
     S       strength of each window, from all batches                     (whole.strength, (p,))
-    y_j     pseudo-value of batch j of S, from all batches but it         (pseudo, (g, p))
+    y_j     pseudo-value of S for batch j, from all other batches         (pseudo, (g, p))
 
-S of a window is too small where it has few dents, because the strongest are missing, and it
+S of a window is too small if it has few dents, because the strongest dents are missing. S also
 scatters as counts do, which would add to its variance over the target. So the mean square comes
-from products of S in two disjoint halves of the batches, whose scatter is independent, percentiles
-are drawn to the mean until they vary as the true ones do, and halves and quarters of the batches
-show by how much few dents change a figure: the step from halves to all is made once more, and the
-interval includes it, as often as OF_STEP says.
+from products of S in two disjoint halves of the batches, whose scatter is independent. Percentiles
+are drawn to the mean until they vary as the true percentiles do. Halves and quarters of the batches
+show how much few dents change a figure. The step from halves to all batches is made once more, and
+the interval includes it, as often as OF_STEP says.
 """
 
 from __future__ import annotations
@@ -43,15 +43,16 @@ if TYPE_CHECKING:
     from chamberopt.coverage.part_impacts import Hits
     from chamberopt.design.materials import PartMaterial
 
-WINDOWS = 2_000  # of the target's; S varies little from one to the next
-MIN_BATCHES = 4  # for two quarters
-SPLITS = 3  # into halves, and into quarters
-# Largest step of the mean from half of the dents to all, over the mean. Where it is larger, S comes
-# from dents too rare for the windows, and the mean grows too slowly for the step to tell how far.
+WINDOWS = 2_000  # windows of the target in use; S varies little between neighbours
+MIN_BATCHES = 4  # enough for two quarters
+SPLITS = 3  # splits into halves, and into quarters
+# Largest step of the mean from half of the dents to all dents, over the mean. A larger step means
+# that S comes from dents too rare for the windows. Then the mean grows too slowly for the step to
+# show its end.
 MAX_STEP = 0.055
-# What is left of the bias, at most, over the step from half of the dents to all; 1 where not named.
-# On the gear with 182 dents in a window once the step held the 5th percentile in half of the runs,
-# three times in 89 of 100 where 15 % is out of reach.
+# Largest remaining bias over the step from half of the dents to all dents, 1 if not named here. On
+# the gear with 182 dents in a window the single step held the 5th percentile in half of the runs.
+# Three times the step held it in 89 of 100 runs with 15 % out of reach.
 OF_STEP = {"saturation_time_s": 3.0, "strength_p05_um": 4.0}
 MICROMETRES = 1e6
 
@@ -60,7 +61,7 @@ class StrengthHistograms(NamedTuple):
     """Dents in windows by level of strength.
 
     Attributes:
-        parts: dented area over area, of each batch in each window, (g, p, LEVELS).
+        parts: dented area over area, by batch, window and level, (g, p, LEVELS).
         seconds: simulated time of each batch [s], (g,).
         highest: strength at the upper end of the levels [m].
     """
@@ -71,7 +72,7 @@ class StrengthHistograms(NamedTuple):
 
 
 class Saturated(NamedTuple):
-    """What some batches give.
+    """Strength and saturation time from some batches.
 
     Attributes:
         strength: S of each window [m], (p,).
@@ -91,14 +92,13 @@ def strength_estimates(
     density: float,
     strip: PartMaterial,
 ) -> dict[str, Estimate]:
-    """Estimates by name of the metric; all but intensity_uniformity are of what shot can touch.
+    """Estimates of the strength metrics by name, over the target's reachable surface.
 
     Args:
         batches: impacts of the replicas of each batch, in the sector of the windows.
         seconds: simulated time of each replica.
         density: of the balls [kg/m³].
         strip: the metal of a strip.
-
     Returns:
         strength_um: mean of S.
         strength_p05_um, strength_p95_um: S that 95 % and 5 % of the area exceed.
@@ -130,12 +130,12 @@ def level_histograms(
     seconds: float,
     dents_of: Callable[[Hits], tuple[np.ndarray, np.ndarray]],
 ) -> StrengthHistograms:
-    """Histograms of the dents in some windows of the target.
+    """Histograms of the dents in WINDOWS windows of the target.
 
     Args:
-        batches, seconds: as above.
-        dents_of: function of impacts that gives the diameter of each dent and its strength [m],
-            (k,) each; 0 where there is none.
+        batches, seconds: as for `strength_estimates`.
+        dents_of: function of impacts that gives diameter and strength [m] of each dent, (k,) each.
+            Both are 0 for an impact without a dent.
     """
     gauge = field.gauge
     rows = np.linspace(0, len(gauge.area) - 1, min(WINDOWS, len(gauge.area))).astype(int)
@@ -157,7 +157,7 @@ def level_histograms(
 
 
 def estimates_of(found: StrengthHistograms, reach: Reach) -> dict[str, Estimate]:
-    """The estimates from histograms."""
+    """The estimates of the strength metrics from histograms."""
     reachable = reach.share
     batches, total = len(found.parts), found.parts.sum(axis=0)
     whole = _saturated(found, np.arange(batches))
@@ -196,9 +196,9 @@ def estimates_of(found: StrengthHistograms, reach: Reach) -> dict[str, Estimate]
     ]
     of_some = [_figures(Saturated(one, whole.time, whole.curve_time), _spread(one, one))
                for one in sparse_points(whole.strength)]  # fmt: skip
-    # Where counting seems to explain all of the variance, percentiles are drawn to the mean, which
-    # hardly moves from batch to batch. There may be more variance, by its own interval; twice what
-    # that makes held where once held in 83 % (benchmarks/strength_resolution.py).
+    # If counting seems to explain all of the variance, percentiles are drawn to the mean, which
+    # hardly moves from batch to batch. By its own interval the variance may be larger. Twice its
+    # effect held in cases where its single effect held in 83 % (benchmarks/strength_resolution.py).
     spread_error = estimate(jackknife(np.array([everything, *variances]))).half_width
     wider = _figures(whole, float(spreads.mean()) + reachable * spread_error)
     for name, value in plain.items():
@@ -231,7 +231,7 @@ def _saturated(found: StrengthHistograms, some: np.ndarray) -> Saturated:
 def _without(
     found: StrengthHistograms, total: np.ndarray, whole: Saturated, batch: int
 ) -> Saturated:
-    """S and T without one batch, near those of all batches.
+    """S and T without one batch, searched near the values of all batches.
 
     Args:
         total: sum of the histograms of all batches, (p, LEVELS).
@@ -255,10 +255,10 @@ def _pairs(
 
 
 def _figures(found: Saturated, spread: float) -> dict[str, float]:
-    """All figures from some batches but the evenness.
+    """All figures from some batches, except the evenness.
 
     Args:
-        spread: true mean square of S over the square of its mean, of what shot can touch.
+        spread: true mean square of S over its squared mean, on the reachable surface.
     """
     strength = found.strength
     mean, raw = float(strength.mean()), _spread(strength, strength) - 1.0
@@ -285,17 +285,17 @@ def _uniformity_estimate(
     """The evenness over the whole target.
 
     Args:
-        spreads: mean square of S over the square of its mean, as far as few dents are corrected,
-            (SPLITS,).
-        of_halves: the same, not corrected, (SPLITS,).
-        variances: relative variance of S from all batches and from all but each, (g + 1,).
+        spreads: mean square of S over its squared mean, corrected for few dents, (SPLITS,).
+        of_halves: the same without the correction, (SPLITS,).
+        variances: relative variance of S from all batches, then from all batches but each, (g +
+            1,).
     """
     reachable = reach.share
     value = _uniformity(float(spreads.mean()), reachable)
     by_reach = value - _uniformity(float(spreads.mean()), reachable - reach.error)
-    # The bias falls more slowly than that; twice the step held where once held in 3 of 4 runs, and
-    # its square added to that of the scatter in 7 of 10 on a gear with 63 dents in a window.
-    # Steps of single pairs do not cancel where their mean is near 0 by chance.
+    # The bias falls more slowly than the correction assumes. On a gear with 63 dents in a window
+    # twice the step held, the single step in 3 of 4 runs, and its sum in quadrature with the
+    # scatter in 7 of 10. Steps of single pairs do not cancel if their mean is near 0 by chance.
     steps = [
         _uniformity(corrected, reachable) - _uniformity(half, reachable)
         for corrected, half in zip(spreads, of_halves, strict=True)
@@ -321,16 +321,16 @@ def _spread(one: np.ndarray, two: np.ndarray) -> float:
 
 
 def _uniformity(spread: float, reachable: float) -> float:
-    """The uniformity over the whole target; places out of reach have S = 0."""
+    """The uniformity over the whole target. Places out of reach have S = 0."""
     return 1.0 - math.sqrt(max(0.0, spread / reachable - 1.0))
 
 
 def _relative_variance(squares: np.ndarray, means: np.ndarray, reachable: float) -> float:
-    """Variance of S over the target over the square of its mean.
+    """Variance of S over the target, divided by its squared mean.
 
     Args:
         squares: means over the windows of products of two batches, (g, g).
-        means: of the batches, (g,).
+        means: mean over the windows of each batch, (g,).
     """
     batches, mean = len(means), float(means.mean())
     if mean <= 0.0:

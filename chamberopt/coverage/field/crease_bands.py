@@ -1,4 +1,4 @@
-"""Windows along creases: points that dents on a crease reach, and the lengths of their windows."""
+"""Windows along creases: the points that dents on a crease reach, and the length of each window."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ if TYPE_CHECKING:
     from chamberopt.coverage.field.windows import Places, Windows
     from sim_core import TriangleMesh
 
-# Radii of a window. A dent takes more of a line than of an area: along creases the windows are
-# longer, so that as many dents are in them.
+# Length of a window along a crease, in radii of a window. A dent takes a larger share of a line
+# than of an area, so windows along creases are longer to hold as many dents.
 CREASE_LENGTH = 3.0
-PIECES_PER_WINDOW = 32  # of a crease, by which its length is measured
+PIECES_PER_WINDOW = 32  # pieces that measure the length of a crease in a window
 
 
 class CreasePieces(NamedTuple):
-    """Short pieces of creases that a ball can touch: their places, edges and lengths."""
+    """Short pieces of creases that a ball can touch: places, edges and lengths."""
 
     place: np.ndarray
     edge: np.ndarray
@@ -31,7 +31,7 @@ class CreasePieces(NamedTuple):
 def crease_pieces(
     creases: Creases, mesh: TriangleMesh, ball_radius: float, radius: float
 ) -> CreasePieces:
-    """Divide creases into pieces and keep those that a ball can touch.
+    """Divide creases into pieces and keep the pieces that a ball can touch.
 
     Args:
         mesh: of the chamber.
@@ -61,7 +61,7 @@ def on_lines(creases: Creases, place: np.ndarray, edge: np.ndarray) -> tuple[Pla
 
 
 class CreaseBand(NamedTuple):
-    """Points near creases, a row for each point and each line that it is near.
+    """Points near creases, with a row for each point and each line near it.
 
     Attributes:
         point: index of the point, shape (b,).
@@ -79,7 +79,7 @@ class CreaseBand(NamedTuple):
 def find_band(
     windows: Windows, creases: Creases, pieces: CreasePieces, dent_radius: float
 ) -> CreaseBand | None:
-    """The points that dents on creases reach, with radii of at most dent_radius [m]."""
+    """The points that dents on creases reach, for dents of radii up to dent_radius [m]."""
     from scipy.spatial import cKDTree
 
     from chamberopt.coverage.field.windows import Places, Windows
@@ -103,7 +103,7 @@ def find_band(
     share = ((points.place[point] - start) * along).sum(axis=1) / (along**2).sum(axis=1)
     foot = start + np.clip(share, 0.0, 1.0)[:, None] * along
     height = np.linalg.norm(points.place[point] - foot, axis=1)
-    # Of several edges of one line the nearest counts.
+    # The nearest edge of each line counts.
     line = creases.line[windows.division[point], edge]
     order = np.lexsort([height, line, point])
     key = np.column_stack([point, line])[order]

@@ -25,25 +25,25 @@ from chamberopt.coverage.field.windows import Places
 from chamberopt.geometry.triangles import areas, sides_of, unit_vectors
 
 MIN_EDGE, MAX_EDGE = 0.5, 4.0  # diameters of the gauge
-FINEST = 0.2  # the same, at the border of what a ball can touch, which may be narrow stripes
-# An edge is split where coverage at its middle is off the mean of its ends by more than BEND, or
-# where its ends differ by more than STEP.
+FINEST = 0.2  # diameters of the gauge, at the border of the touchable surface (narrow stripes)
+# An edge is split if coverage at its middle is off the mean of its ends by more than BEND, or if
+# its ends differ by more than STEP.
 BEND, STEP = 0.02, 0.05
-MAX_TRIANGLES = 400_000  # a part that has more itself keeps its own
+MAX_TRIANGLES = 400_000  # a part with more triangles keeps them undivided
 
 Values = Callable[[Places], np.ndarray]
 """Coverage at some places, (p,); NaN where there is none."""
 
 
 class DisplayMesh(NamedTuple):
-    """A mesh whose vertices belong to one smooth face each: at creases there are several.
+    """A mesh whose vertices belong to one smooth face each. At creases vertices are repeated.
 
     Attributes:
         vertices: [m], shape (v, 3).
         triangles: normals out of the part, shape (c, 3).
         normal: unit vectors out of the part, shape (v, 3).
         face: smooth face of each vertex, shape (v,).
-        part_triangle: the part's triangle in which each triangle lies, shape (c,).
+        part_triangle: part triangle around each triangle, shape (c,).
     """
 
     vertices: np.ndarray
@@ -54,10 +54,10 @@ class DisplayMesh(NamedTuple):
 
     @property
     def places(self) -> Places:
-        """The places at which fields of the vertices are read.
+        """The places at which fields are read for the vertices.
 
-        Dents on creases make a band as narrow as they are. Fields of vertices should leave it out,
-        because the drawing would smear it over whole triangles.
+        Dents on creases make a band as narrow as a dent. Fields at vertices should leave the band
+        out, because the drawing would smear it over whole triangles.
         """
         return Places(self.vertices, self.normal, self.face)
 
@@ -84,17 +84,17 @@ def display_mesh(
     Args:
         vertices: [m], shape (n, 3).
         triangles: shape (m, 3).
-        normals: of the surface at their corners, unit vectors outward, shape (m, 3, 3).
-        shown: marks the triangles on which the field is drawn, shape (m,); others are divided only
-            where they meet those.
+        normals: unit vectors of the surface at the triangles' corners, outward, shape (m, 3, 3).
+        shown: marks the triangles on which the field is drawn, shape (m,). Others are divided only
+            where they meet a shown triangle.
         face: smooth face of each triangle, shape (m,).
         gauge: area of a window [m²].
-        coverage: called once a round, with all places of the round.
+        coverage: function of places, called once a round with all places of the round.
     """
     diameter = 2.0 * float(np.sqrt(gauge / np.pi))
-    # point: of the part's surface that each vertex is, the same for all vertices at a crease.
+    # point: number of each vertex's place, equal for all vertices at one place of a crease.
     mesh, point = _with_vertices_of_faces(vertices, triangles, normals, face)
-    value = np.zeros(0)  # of the vertices, as far as it has been read
+    value = np.zeros(0)  # coverage at the vertices that have been read
     settled = np.zeros(0, dtype=np.int64)  # edges that need not be split
     while True:
         edges, of_side = _edges_of(mesh.triangles)
@@ -108,7 +108,7 @@ def display_mesh(
         )
         new, middle = np.arange(len(value), len(mesh.vertices)), _middles(mesh, edges[asked])
         read = coverage(_joined(mesh.places.select(new), middle.places))
-        read = np.where(np.isfinite(read), read, -1.0)  # no value stands out from all values
+        read = np.where(np.isfinite(read), read, -1.0)  # -1, no value, differs from all values
         value = np.concatenate([value, read[: len(new)]])
         one, two = value[a[asked]], value[b[asked]]
         mid = read[len(new) :]
@@ -133,14 +133,14 @@ def display_mesh(
 def _with_vertices_of_faces(
     vertices: np.ndarray, triangles: np.ndarray, normals: np.ndarray, face: np.ndarray
 ) -> tuple[DisplayMesh, np.ndarray]:
-    """The part with a vertex of its own for each face, and the part's vertex of each."""
+    """The part with separate vertices for each face, and the part's vertex behind each vertex."""
     faces = int(face.max()) + 1
     own, corner = np.unique(triangles * np.int64(faces) + face[:, None], return_inverse=True)
     corner = corner.reshape(-1, 3)
     vertex, face_of = np.divmod(own, faces)
     area = areas(vertices, triangles)
     normal = np.zeros((len(own), 3))
-    for k in range(3):  # by area: a plane beside a rounded edge stays as it is
+    for k in range(3):  # weighted by area, so a plane beside a rounded edge stays flat
         np.add.at(normal, corner[:, k], area[:, None] * normals[:, k])
     part_triangle = np.arange(len(triangles))
     return DisplayMesh(
@@ -149,14 +149,14 @@ def _with_vertices_of_faces(
 
 
 def _edges_of(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Edges (e, 2), the lower vertex first, and the edge at each side of each triangle (c, 3)."""
+    """Edges (e, 2), the lower vertex first, and the edge on each side of each triangle, (c, 3)."""
     sides = np.sort(sides_of(triangles), axis=1).astype(np.int64)
     key, of_side = np.unique((sides[:, 0] << 32) + sides[:, 1], return_inverse=True)
     return np.column_stack([key >> 32, key & 0xFFFFFFFF]), of_side.reshape(-1, 3)
 
 
 def _same_edge(ends: np.ndarray) -> np.ndarray:
-    """A number for each edge between points (e, 2), the same where the points are, shape (e,)."""
+    """A number for each edge between points (e, 2), equal for equal pairs of points, shape (e,)."""
     low, high = np.sort(ends, axis=1).astype(np.int64).T
     return np.unique((low << 32) + high, return_inverse=True)[1].reshape(-1)
 
@@ -164,7 +164,7 @@ def _same_edge(ends: np.ndarray) -> np.ndarray:
 def _spread_split(
     split: np.ndarray, ends: np.ndarray, of_side: np.ndarray, length: np.ndarray
 ) -> np.ndarray:
-    """Also split the same edges of neighbouring faces, and longest edges of divided triangles.
+    """Also split the same edges of neighbouring faces, and long edges of divided triangles.
 
     Args:
         split: marks the edges to split, shape (e,).
@@ -183,7 +183,7 @@ def _spread_split(
 
 
 def _middles(mesh: DisplayMesh, edges: np.ndarray) -> DisplayMesh:
-    """Vertices in the middle of edges (e, 2); the mesh has no triangles."""
+    """New vertices in the middles of edges (e, 2), as a mesh without triangles."""
     a, b = edges.T
     return DisplayMesh(
         vertices=0.5 * (mesh.vertices[a] + mesh.vertices[b]),
@@ -201,14 +201,14 @@ def _joined(one: Places, other: Places) -> Places:
 def _divide(
     mesh: DisplayMesh, edges: np.ndarray, of_side: np.ndarray, split: np.ndarray
 ) -> DisplayMesh:
-    """Divide the triangles whose edges are split, by the number of these edges."""
+    """Divide the triangles with split edges, by the number of their split edges."""
     added = _middles(mesh, edges[split])
     middle = np.full(len(edges), -1)
     middle[split] = len(mesh.vertices) + np.arange(len(added.vertices))
     new = middle[of_side]
     count = (new >= 0).sum(axis=1)
     vertices = np.concatenate([mesh.vertices, added.vertices])
-    # Turned so that of one split side it is the first, and of two the first two.
+    # Triangles are turned so that their split sides come first.
     first = np.where(count == 2, (new < 0).argmax(axis=1) + 1, (new >= 0).argmax(axis=1))
     turned = (first[:, None] + np.arange(3)) % 3
     corners, new = (np.take_along_axis(one, turned, axis=1) for one in (mesh.triangles, new))

@@ -1,9 +1,9 @@
-"""Memory that an evaluation takes, estimated from its design before it begins.
+"""Memory of an evaluation, estimated from its design before it begins.
 
-Pairs of dents and windows are not in it: they are kept only while there is room for them
-(common/parallel/memory.py). Bytes are measured ones, docs/trust.md; impacts are those of a gas of
-balls that are as fast as the sonotrode at its peak, n V A / 4 on an area A for n balls a volume,
-which is 0.7 to 2.1 times what was simulated.
+Pairs of dents and windows are not included, because they are kept only while there is room for them
+(common/parallel/memory.py). The bytes were measured, see docs/trust.md. The impacts are the impacts
+of a gas of balls as fast as the sonotrode at its peak: n V A / 4 on an area A for n balls a volume.
+This is 0.7 to 2.1 times the simulated number.
 """
 
 from __future__ import annotations
@@ -21,16 +21,16 @@ if TYPE_CHECKING:
     from chamberopt.design.load import Design
 
 PROCESS = 350e6  # bytes of a process that has loaded and compiled everything
-OF_POINT, OF_POINT_AT_WORK = 250.0, 550.0  # of each point of a field; while it is made
-OF_POINT_IN_BATCH = 110.0  # of each point and batch of replicas, while figures are estimated
-BATCHES = 40  # that replicas are divided into at most, MAX_BATCHES of coverage_from_impacts.py
-OF_PIECE = 120.0  # of the surface
-OF_TRIANGLE = 500.0  # of the chamber, with its search tree
-OF_IMPACT, OF_LOGGED = 150.0, 100.0  # that is kept of the part; of any surface, while it is run
+OF_POINT, OF_POINT_AT_WORK = 250.0, 550.0  # bytes a point of a field: kept, and while it is made
+OF_POINT_IN_BATCH = 110.0  # bytes a point and batch of replicas, while figures are estimated
+BATCHES = 40  # most batches of replicas, MAX_BATCHES of coverage_from_impacts.py
+OF_PIECE = 120.0  # bytes a piece of the surface
+OF_TRIANGLE = 500.0  # bytes a triangle of the chamber, with its search tree
+OF_IMPACT, OF_LOGGED = 150.0, 100.0  # bytes an impact: kept on the part; logged during the run
 
 
 def evaluation_bytes(design: Design, chamber: Chamber, replicas: int) -> float:
-    """Bytes that one evaluation takes, beside those of its process."""
+    """Bytes of one evaluation, beside the bytes of its process."""
     accuracy, target = design.process.accuracy, chamber.part.target
     fields = 1 + len(design.zones)
     of_points = OF_POINT * (fields - 1) + OF_POINT_AT_WORK
@@ -49,12 +49,12 @@ def evaluation_bytes(design: Design, chamber: Chamber, replicas: int) -> float:
 
 
 def how_many_fit(most: int, each: float, common: float = 0.0) -> int:
-    """How many of so many things fit into the memory that may be taken, one at least.
+    """The largest number of things, from 1 to `most`, that fit into the allowed memory.
 
     Args:
-        each: bytes of one of them.
-        common: bytes of what they have in common.
-
+        most: largest number.
+        each: bytes of one thing.
+        common: bytes that all things share.
     Raises:
         InputError: not even one fits.
     """

@@ -1,12 +1,12 @@
-"""Smooth faces of a part and the sharp edges, called creases, between them.
+"""Smooth faces of a part and the sharp edges between them, called creases.
 
-A face turns smoothly: all edges between its triangles turn by less than a crease does. So how a
-flat surface is divided into triangles makes no difference to its faces and creases.
+All edges between a face's triangles turn by less than a crease does. So the division of a flat
+surface into triangles makes no difference to its faces and creases.
 
-No single angle makes an edge sharp: a rounding error would decide where a part has just that. The
-part is divided by angles spread over a range, one DIVISIONS-th of the windows by each. An edge that
-turns by 45 degrees is sharp to three quarters of the windows beside it, so figures pass
-continuously from those of a surface that goes on to those of one that ends.
+No single angle makes an edge sharp, because a rounding error would decide for a part with just this
+angle. The part is divided by DIVISIONS angles spread over a range, and each division serves the
+same share of the windows. An edge that turns by 45 degrees is sharp to three quarters of the
+windows beside it. So figures pass continuously from a surface that goes on to a surface that ends.
 """
 
 from __future__ import annotations
@@ -23,24 +23,24 @@ from chamberopt.geometry.triangles import (
     unit_vectors,
 )
 
-# Degrees by which a surface turns at edges that are sharp to half of the windows. Facets of round
+# Turn of the surface [degrees] at edges that are sharp to half of the windows. Facets of round
 # surfaces turn by less.
 CONVEX_CREASE, HOLLOW_CREASE = 40.0, 60.0
-STRAIGHT_ON = 45.0  # degrees: where creases turn by more, a line of them ends for half of them
-RANGE = 10.0  # degrees above and below, within which these angles are spread
-DIVISIONS = 32  # by angles in the middles of as many parts of the range, never a whole number
+STRAIGHT_ON = 45.0  # degrees: a line of creases that turns by more ends for half of the windows
+RANGE = 10.0  # degrees above and below both angles, over which the divisions spread
+DIVISIONS = 32  # angles in the middles of equal parts of the range, never a whole number
 OFFSETS = RANGE * (2.0 * (np.arange(DIVISIONS) + 0.5) / DIVISIONS - 1.0)  # degrees, from the middle
-GOLDEN = 0.5 * (5.0**0.5 - 1.0)  # share of a turn: steps of it spread evenly over any range
+GOLDEN = 0.5 * (5.0**0.5 - 1.0)  # steps of this share of a range spread evenly over it
 
 
 class Faces(NamedTuple):
-    """Smooth faces of a part by the divisions that differ, the finest first.
+    """Smooth faces of a part by all divisions that differ, the finest division first.
 
     Attributes:
         of_triangle: the face of each triangle by the finest division, shape (m,).
-        joined: the face of the finest division that stands for each one together with those that
-            are joined to it, by each division, shape (d, f).
-        of_angle: which division each of the angles makes, shape (DIVISIONS,).
+        joined: for each division and each face of the finest division, the face that stands for all
+            faces joined to it, shape (d, f).
+        of_angle: number of the division by each angle, shape (DIVISIONS,).
     """
 
     of_triangle: np.ndarray
@@ -48,7 +48,7 @@ class Faces(NamedTuple):
     of_angle: np.ndarray
 
     def divisions(self, count: int) -> np.ndarray:
-        """The division that each of so many windows sees, each angle as often, shape (count,)."""
+        """The division seen by each of `count` windows, (count,). All angles serve equally many."""
         angle = (DIVISIONS * ((np.arange(count) + 0.5) * GOLDEN % 1.0)).astype(int)
         return np.asarray(self.of_angle[angle])
 
@@ -69,10 +69,10 @@ class Creases(NamedTuple):
     Attributes:
         ends: of each edge [m], shape (e, 2, 3).
         outward: unit vectors midway between the normals of the two sides, shape (e, 3).
-        line: number of the line, a chain of edges without corners, by each division, -1 where the
-            edge does not divide; no two divisions share a number, shape (d, e).
+        line: number of each edge's line, a chain of edges without corners, by each division, or -1
+            for an edge that does not divide; divisions share no numbers, shape (d, e).
         faces: the faces of the finest division on both sides, shape (e, 2).
-        of_triangle: crease at each side of each part triangle, -1 if there is none, shape (m, 3).
+        of_triangle: crease at each side of each part triangle, -1 without a crease, shape (m, 3).
         at_corner: the sharpest crease that begins or ends at each corner, else -1, shape (m, 3).
     """
 
@@ -87,7 +87,7 @@ class Creases(NamedTuple):
 def find_faces(
     vertices: np.ndarray, triangles: np.ndarray, target: np.ndarray
 ) -> tuple[Faces, Creases]:
-    """Divide a part into smooth faces; the border of the target divides faces as creases do.
+    """Divide a part into smooth faces. The border of the target divides faces as creases do.
 
     Args:
         vertices: [m], shape (n, 3).
@@ -100,7 +100,7 @@ def find_faces(
     keys = edge_keys(triangles)
     order = np.argsort(keys, kind="stable")
     paired = np.flatnonzero(keys[order[1:]] == keys[order[:-1]])
-    one, two = order[paired], order[paired + 1]  # the two sides at each edge
+    one, two = order[paired], order[paired + 1]  # the two triangle sides of each edge
     normal = unit_vectors(area_vectors(vertices, triangles))
     start, end = sides_of(triangles)[one].T
     apex = vertices[triangles[two // 3, (two % 3 + 2) % 3]]
@@ -121,7 +121,7 @@ def find_faces(
     of_triangle = np.full(3 * len(triangles), -1)
     of_triangle[one] = of_triangle[two] = np.arange(len(edge))
     of_vertex = np.full(len(vertices), -1)
-    of_vertex[start] = of_vertex[end] = np.arange(len(edge))  # the last, which is the sharpest
+    of_vertex[start] = of_vertex[end] = np.arange(len(edge))  # the last edge is the sharpest
 
     near = inside & (over > OFFSETS[0]) & (over <= OFFSETS[-1])
     links, corner = _links(vertices, start, end)
@@ -131,7 +131,7 @@ def find_faces(
     for offset in OFFSETS:
         soft, sharp = near & (over <= offset), over[edge] > offset
         goes_on = sharp[links].all(axis=1) & (corner < STRAIGHT_ON + offset)
-        now = int(soft.sum()), int(sharp.sum()), int(goes_on.sum())  # each a part of the next
+        now = int(soft.sum()), int(sharp.sum()), int(goes_on.sum())  # each set holds the next
         if now != before:
             faces_by.append(_joined_faces(beside[soft], int(face.max(initial=-1)) + 1))
             line = connected_pieces(links[goes_on, 0], links[goes_on, 1], len(edge))[1] + len(
@@ -151,7 +151,7 @@ def find_faces(
 
 
 def _joined_faces(pairs: np.ndarray, count: int) -> np.ndarray:
-    """The first of the faces that each face is joined to by pairs (k, 2), shape (count,)."""
+    """The first of all faces joined to each face by pairs (k, 2), shape (count,)."""
     piece = connected_pieces(pairs[:, 0], pairs[:, 1], count)[1]
     _, first = np.unique(piece, return_index=True)
     return np.asarray(first[piece])
@@ -160,11 +160,11 @@ def _joined_faces(pairs: np.ndarray, count: int) -> np.ndarray:
 def _links(
     vertices: np.ndarray, start: np.ndarray, end: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Pairs of edges that meet (k, 2), and the degrees by which the way over both turns (k,)."""
+    """Pairs of edges that meet (k, 2), and the turn of the way over both edges [degrees], (k,)."""
     edges = len(start)
     edge, vertex = np.tile(np.arange(edges), 2), np.concatenate([start, end])
     along = unit_vectors(vertices[end] - vertices[start])
-    away = np.concatenate([along, -along])  # direction in which the edge leaves the vertex
+    away = np.concatenate([along, -along])  # direction of each edge away from the vertex
     order = np.argsort(vertex, kind="stable")
     pairs, turns = [np.zeros((0, 2), dtype=int)], [np.zeros(0)]
     for step in range(1, int(np.bincount(vertex).max()) if edges else 0):

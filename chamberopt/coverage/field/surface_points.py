@@ -1,4 +1,4 @@
-"""Points spread evenly over a surface, and whether a ball can touch it there."""
+"""Points spread evenly over a surface, and a test for balls that fit there."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ if TYPE_CHECKING:
 
 PLASTIC_NUMBER = 1.32471795724474602596  # real root of x³ = x + 1
 SPARSE = 10
-ON_SURFACE = 1e-3  # share of its radius within which a place is on the surface
+ON_SURFACE = 1e-3  # ball radii from the surface within which a place counts as on it
 
 
 class SurfacePoints(NamedTuple):
-    """Points spread evenly over some triangles.
+    """Points spread evenly over triangles.
 
     Attributes:
         place: [m], shape (p, 3).
         normal: unit vectors out of the part, shape (p, 3).
-        triangle: shape (p,).
+        triangle: triangle under each point, shape (p,).
     """
 
     place: np.ndarray
@@ -36,10 +36,10 @@ class SurfacePoints(NamedTuple):
 def spread_points(
     vertices: np.ndarray, triangles: np.ndarray, area: np.ndarray, count: int
 ) -> SurfacePoints:
-    """Spread points evenly over the triangles that have an area, the same ones every time.
+    """Spread points evenly over all triangles with an area. Equal arguments give equal points.
 
-    The triangles are taken along a Morton curve through space, and every 1/count of their area
-    gets a point. Within a triangle the points follow the additive recurrence of the plastic number.
+    The triangles are taken along a Morton curve through space, and every 1/count of their area gets
+    a point. Within a triangle the points follow the additive recurrence of the plastic number.
 
     Args:
         area: of the triangles [m²], shape (m,); 0 where no points are wanted.
@@ -58,12 +58,12 @@ def spread_points(
 def spread_within(
     vertices: np.ndarray, triangles: np.ndarray, area: np.ndarray, share: float, most: int
 ) -> SurfacePoints:
-    """Spread points over each triangle that has an area, at least one on each.
+    """Spread points over each triangle with an area, at least one point on each.
 
     Args:
         area: of the triangles [m²], shape (m,); 0 where no points are wanted.
         share: area for each further point [m²].
-        most: limit of the number of further points.
+        most: largest number of further points.
     """
     share = max(share, float(area.sum()) / most)
     count = np.where(area > 0.0, 1 + (area / share).astype(int), 0)
@@ -75,7 +75,7 @@ def spread_within(
 def _within(
     vertices: np.ndarray, triangles: np.ndarray, triangle: np.ndarray, number: np.ndarray
 ) -> SurfacePoints:
-    """Points on triangles (p,) by their numbers (p,) in the sequence of the plastic number."""
+    """Points on triangles (p,), by their numbers (p,) in the sequence of the plastic number."""
     corners = vertices[triangles[triangle]]
     u, v = _of_sequence(number)
     place = _between(corners, u[:, None], v[:, None])
@@ -83,9 +83,9 @@ def _within(
 
 
 def within_each(corners: np.ndarray, count: int) -> np.ndarray:
-    """So many points [m] on each of some triangles (n, 3, c), shape (count, n, c).
+    """Places of `count` points [m] on each triangle (n, 3, c), shape (count, n, c).
 
-    Each triangle takes the next numbers of the sequence, so that what the points miss on one of
+    Each triangle takes the next numbers of the sequence. So a spot that the points miss on one of
     many alike triangles is not missed on all of them.
     """
     u, v = _of_sequence(np.arange(count * len(corners)).reshape(-1, count).T)
@@ -95,7 +95,7 @@ def within_each(corners: np.ndarray, count: int) -> np.ndarray:
 def _of_sequence(number: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Coordinates in a triangle of points by their numbers in the sequence of the plastic number.
 
-    The first is the middle of the triangle.
+    The first point is the middle of the triangle.
     """
     u, v = ((number / PLASTIC_NUMBER**power + 1.0 / 3.0) % 1.0 for power in (1, 2))
     folded = u + v > 1.0
@@ -109,7 +109,7 @@ def _between(corners: np.ndarray, u: np.ndarray, v: np.ndarray) -> np.ndarray:
 
 
 def morton(places: np.ndarray) -> np.ndarray:
-    """Position of places (n, 3) along a Morton curve: the bits of their coordinates in turn."""
+    """Position of places (n, 3) along a Morton curve, which interleaves the bits of coordinates."""
     low = places.min(axis=0)
     cells = ((places - low) / max(float(np.ptp(places, axis=0).max()), 1e-12) * 1023).astype(int)
     code = np.zeros(len(places), dtype=np.int64)
@@ -122,11 +122,11 @@ def morton(places: np.ndarray) -> np.ndarray:
 def ball_fits(
     mesh: TriangleMesh, place: np.ndarray, normal: np.ndarray, radius: float
 ) -> np.ndarray:
-    """Whether a ball fits at places on the surface of the cavity, (p,) bool.
+    """Mark the places on the surface of the cavity where a ball fits, (p,) bool.
 
     Args:
         mesh: the surface of the cavity.
-        place: [m], shape (p, 3); where they are not on the surface, no ball fits.
+        place: [m], shape (p, 3). No ball fits at a place off the surface.
         normal: unit vectors into the cavity, shape (p, 3).
         radius: of the ball [m].
     """
@@ -134,7 +134,7 @@ def ball_fits(
 
     found = closest_points(mesh, place + radius * normal, radius * (1.0 + 1e-6))
     fits = (found.triangle >= 0) & (found.distance >= radius * (1.0 - TOLERATED_OVERLAP))
-    # The surface may be nearer elsewhere, also to a place outside the cavity.
+    # Another spot of the surface may be nearer, also to a place outside the cavity.
     rows = np.flatnonzero(fits)
     rows = rows[np.linalg.norm(found.point[rows] - place[rows], axis=1) > ON_SURFACE * radius]
     fits[rows] = closest_points(mesh, place[rows], ON_SURFACE * radius).triangle >= 0
@@ -142,33 +142,31 @@ def ball_fits(
 
 
 def sparse_points(values: np.ndarray) -> list[np.ndarray]:
-    """Every tenth of the points (p, ...), ten times; each time they are as even over the target."""
+    """Ten subsets, each with every tenth of the points (p, ...) and as even over the target."""
     return [values[start::SPARSE] for start in range(SPARSE)]
 
 
 def sampling_errors(of_some: np.ndarray) -> list[float]:
     """Signed standard errors by the choice of points, from figures of `sparse_points`.
 
-    Figures of the same points move together: what they have in common is not in the errors of their
-    difference. The root of the sum of their squares is the standard error.
+    Figures of the same points move together, so their common error drops out of their difference.
+    The standard error is the root of the sum of the squares.
     """
     count = len(of_some)
     errors: list[float] = ((of_some - of_some.mean()) / math.sqrt(count * (count - 1))).tolist()
     return errors
 
 
-# How much of a target a ball can touch, and how well some points tell.
-
-RULE_OF_THREE = 3.0  # events that may be expected where none was seen, with a probability of 5 %
-CERTAIN = 3.0  # standard errors of the reach by which it is surely more or less than a share
+RULE_OF_THREE = 3.0  # expected number of events at which none is seen with a probability of 5 %
+CERTAIN = 3.0  # standard errors from which the reach surely is more or less than a share
 
 
 class Reach(NamedTuple):
-    """What of the target a ball can touch.
+    """The part of the target that a ball can touch.
 
     Attributes:
-        share: of its area.
-        error: standard error of it, by the choice of points.
+        share: of the target's area.
+        error: standard error of the share, by the choice of points.
     """
 
     share: float
@@ -176,20 +174,20 @@ class Reach(NamedTuple):
 
     @property
     def largest(self) -> float:
-        """The largest share that it may be."""
+        """The largest share that the reach may be."""
         return min(1.0, self.share + CERTAIN * self.error)
 
     def beyond(self, share: float) -> float:
-        """By how many standard errors it is more than a share; below 0 if less, or as much."""
+        """Standard errors from a share up to the reach. It is negative if the reach is smaller."""
         more = self.share - share
         return more / self.error if self.error else math.copysign(math.inf, more or -1.0)
 
 
 def reach_from(fits: np.ndarray) -> Reach:
-    """The reach by whether a ball fits at each of some points (p,).
+    """The reach, from marks (p,) of points where a ball fits.
 
-    Even if it fits at all of them, a share of 3 / p may be out of reach with a probability of 5 %:
-    the rule of three (J. A. Hanley and A. Lippman-Hand, J. Am. Med. Assoc. 249 (1983) 1743).
+    A ball may fit at all points although a share of 3 / p is out of reach, with a probability of 5
+    %: the rule of three (J. A. Hanley and A. Lippman-Hand, J. Am. Med. Assoc. 249 (1983) 1743).
     """
     scatter = sampling_errors(np.array([some.mean() for some in sparse_points(fits)]))
     least = RULE_OF_THREE / len(fits) / normal_quantile(CONFIDENCE)

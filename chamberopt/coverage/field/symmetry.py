@@ -1,15 +1,15 @@
-"""Turns about the chamber's axis that change nothing: what is alike is looked at together.
+"""Turns about the chamber's axis that change nothing, and the joint evaluation of alike places.
 
 Notation
     n   number of turns by 2 pi / n that leave cavity, target and sonotrode as they are  (copies)
 
-All n places that such turns bring to one another are hit equally often and equally hard, so their
-windows are looked at as one window of n times the area: n times the dents for one simulation. To
-do so, all impacts and all windows are turned into one sector of the chamber; impacts near its
-borders count again beyond them. The mean over the target stays as it was; what differs from place
-to place by chance scatters less. Nothing is lost: which of the n places a dent falls on tells
-nothing of their common rate (Rao and Blackwell; E. L. Lehmann and G. Casella, "Theory of Point
-Estimation", Springer 1998, section 1.7).
+Such turns bring n places to one another. All of them are hit equally often and equally hard, so
+their windows count as one window of n times the area, which gets n times the dents from one
+simulation. All impacts and all windows are turned into one sector of the chamber. Impacts near its
+borders count again beyond the borders. The mean over the target does not change. The scatter from
+place to place is smaller. Nothing is lost, because the choice of a dent's place among the n places
+tells nothing about their common rate (Rao and Blackwell; E. L. Lehmann and G. Casella, "Theory of
+Point Estimation", Springer 1998, section 1.7).
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ if TYPE_CHECKING:
     from sim_core import TriangleMesh
 
 MAX_COPIES = 360
-TOLERANCE = 2e-7  # m, by which surfaces that are alike may differ: a file's rounding
+TOLERANCE = 2e-7  # m, largest difference between alike surfaces, from a file's rounding
 INSIDE = 0.01  # of the way from a corner to the middle
-FEW = 40  # triangles that are tried before all
+FEW = 40  # triangles that are tried before all triangles
 
 
 @dataclass(frozen=True)
@@ -38,28 +38,28 @@ class Symmetry:
 
     copies: int
     mesh: TriangleMesh  # of the chamber
-    source: np.ndarray  # part triangle of each of its triangles, -1 for walls, (t,)
+    source: np.ndarray  # part triangle under each triangle of the mesh, -1 for walls, (t,)
 
     @property
     def step(self) -> float:
-        """The smallest of the turns [rad]."""
+        """The angle of the smallest turn [rad]."""
         return 2.0 * np.pi / self.copies
 
     def into_sector(self, place: np.ndarray, margin: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
-        """Turns by which places (k, 3) [m] come into the sector round the x axis.
+        """Turns that bring places (k, 3) [m] into the sector round the x axis.
 
         Args:
-            margin: what is nearer than this to the sector [m] counts as there too.
-
+            margin: distance from the sector [m] up to which a place counts as there too.
         Returns:
-            Rows of the places, and their turns in steps. Each row comes once, by the turn into the
-            sector itself, and after them the rows that are near it after another turn.
+            Rows of the places, and their turns in steps. Each row comes once, with the turn into
+            the
+            sector. Then come the rows that another turn brings near the sector.
         """
         angle = np.arctan2(place[:, 1], place[:, 0])
         sector = np.round(angle / self.step)
         beside, radius = angle - self.step * sector, np.hypot(place[:, 0], place[:, 1])
         rows, turns = [np.arange(len(place))], [-sector]
-        # Only what is near a border of its own sector can be near another.
+        # Only a place near a border of its own sector can be near another sector.
         close = np.flatnonzero(_off(0.5 * self.step - np.abs(beside), radius) < margin)
         for other in range(1, self.copies):
             around = np.abs((beside[close] + other * self.step + np.pi) % (2.0 * np.pi) - np.pi)
@@ -69,7 +69,7 @@ class Symmetry:
         return np.concatenate(rows), (np.concatenate(turns) % self.copies).astype(int)
 
     def on_each(self, face: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """A place in the cavity on each smooth face, of its largest triangle there.
+        """A place in the cavity on each smooth face, on the face's largest triangle there.
 
         Args:
             face: of each triangle of the part, (m,).
@@ -85,14 +85,14 @@ class Symmetry:
         return self.mesh.corners[chosen].mean(axis=1), self.source[chosen]
 
     def turned(self, place: np.ndarray, turn: np.ndarray) -> np.ndarray:
-        """Places or directions (k, 3) after so many steps, (k,)."""
+        """Places or directions (k, 3) after turns by `turn` steps, (k,)."""
         return turn_about_axis(place, turn * self.step)
 
     def triangles_at(self, place: np.ndarray, reach: float = 10.0 * TOLERANCE) -> np.ndarray:
-        """Part triangle at each place (k, 3), (k,); -1 where the part does not bound the cavity.
+        """Part triangle at each place (k, 3), (k,), or -1 off the part's exposed surface.
 
         Args:
-            reach: how far from a place it is looked for [m].
+            reach: largest distance of the triangle from the place [m].
         """
         from sim_core import closest_points
 
@@ -101,21 +101,21 @@ class Symmetry:
 
 
 def _off(angle: np.ndarray, radius: np.ndarray) -> np.ndarray:
-    """Distance from a half plane through the axis [m], at an angle to it and a radius, (k,)."""
+    """Distance [m] from a half plane through the axis, at an angle to it and a radius, (k,)."""
     return np.asarray(radius * np.sin(np.clip(angle, 0.0, 0.5 * np.pi)))
 
 
 def find_symmetry(chamber: Chamber, mesh: TriangleMesh) -> Symmetry | None:
-    """The largest number of turns that leave a chamber as it is; None if there are none.
+    """The largest number of turns that leave a chamber as it is, or None without such turns.
 
-    Corners must lie on the surface again; places just inside the corners of each triangle, on one
-    with the same tag, and of the target or not as before.
+    Turned corners must lie on the surface again. Turned places just inside the corners of a
+    triangle must lie on a triangle with the same tag, and in the target or outside it as before.
     """
     from sim_core import closest_points
 
     corners = chamber.vertices[chamber.triangles]
     inside = corners + INSIDE * (corners.mean(axis=1, keepdims=True) - corners)
-    on_target = np.append(chamber.part.target, False)[chamber.source]  # -1, a wall, is the last
+    on_target = np.append(chamber.part.target, False)[chamber.source]  # -1, a wall, reads the last
     looks = chamber.tags + 256 * on_target.astype(int)
 
     def is_kept(angle: float, triangles: np.ndarray) -> bool:
@@ -136,7 +136,7 @@ def find_symmetry(chamber: Chamber, mesh: TriangleMesh) -> Symmetry | None:
 
 
 def turn_about_axis(place: np.ndarray, angle: float | np.ndarray) -> np.ndarray:
-    """Places (k, 3) turned about the z axis by angles (k,) or one for all [rad]."""
+    """Places (k, 3) turned about the z axis by angles [rad], (k,) or a number."""
     cosine, sine = np.cos(angle), np.sin(angle)
     x, y, z = place.T.astype(float)
     return np.stack([cosine * x - sine * y, sine * x + cosine * y, z], axis=1)

@@ -1,13 +1,13 @@
-"""The target seen through windows: what of each window shot can touch.
+"""The target seen through windows, and the area of each window that the shot can touch.
 
 Notation
     p     middle of a window                                           (points, (p,))
     l     radius of the window: pi l² is the gauge [m]                 (radius)
     A     area of the window that a ball can touch [m²]                (area, (p,))
 
-Places that no ball can touch, because something is in the ball's way, count as bare and belong to
-no window. Convex creases have windows of their own, pieces of the crease. Where places are alike
-by symmetry, the windows of all are one window with an area n times as large (symmetry.py).
+A place that no ball can touch, because an obstacle is in the ball's way, counts as bare and belongs
+to no window. Convex creases have their own windows, which are pieces of the crease. If n places are
+alike by symmetry, their windows are one window with n times the area (symmetry.py).
 """
 
 from __future__ import annotations
@@ -38,26 +38,26 @@ if TYPE_CHECKING:
     from chamberopt.coverage.part_impacts import Hits
     from sim_core import TriangleMesh
 
-OF_WIDE = 0.125  # of the number of windows, for those of twice the radius, which overlap more
-# Area of all windows together [m²], or over the target's where that is more: of windows that are
-# nearly as wide as the target a few tell all.
+OF_WIDE = 0.125  # number of windows of twice the radius, which overlap more, over all windows
+# Area of all windows together [m²], or over the target's area, whichever is more. A few windows
+# nearly as wide as the target tell all.
 MOST_AREA, MOST_OVERLAP, FEWEST_WINDOWS = 0.2, 20.0, 200
-POINTS_OF_ZONE = 1000  # that are tested for a ball before any work
-POINTS_PER_CHOSEN = 2  # that are tested for a ball, for each that becomes the middle of a window
-MIN_WINDOWS = 2.0  # side by side on a target of which they show how even it is
-PIECES_PER_WINDOW = 6  # of the surface, at most, where the border of what a ball can touch is far
-MAX_PIECES, MAX_PIECES_OFF_TARGET = 3e6, 4e5  # those off the target are for pictures alone
+POINTS_OF_ZONE = 1000  # points of a zone that are tested for a ball before any work
+POINTS_PER_CHOSEN = 2  # points tested for a ball, for each middle of a window
+MIN_WINDOWS = 2.0  # windows side by side on a target, to show its evenness
+PIECES_PER_WINDOW = 6  # most pieces of surface, far from the border of the touchable surface
+MAX_PIECES, MAX_PIECES_OFF_TARGET = 3e6, 4e5  # pieces off the target are only for pictures
 
 
 class WindowSetting(NamedTuple):
-    """What windows depend on, but for the chamber.
+    """Settings of the windows that do not depend on the chamber.
 
     Attributes:
         gauge: area of a window [m²].
         points: number of windows; figures are means over them.
         ball: diameter of the smallest ball [m].
         largest_dent: diameter [m].
-        symmetric: whether all that moves keeps the symmetry of the chamber about its axis.
+        symmetric: true if all motion keeps the chamber's symmetry about its axis.
     """
 
     gauge: float
@@ -69,16 +69,16 @@ class WindowSetting(NamedTuple):
 
 @dataclass(frozen=True)
 class Gauge:
-    """The windows of one size round some points, each with those that are alike by symmetry."""
+    """The windows of one size round points, each together with its alike windows by symmetry."""
 
     windows: Windows
-    area: np.ndarray  # that a ball can touch in each window and in those alike [m²], (p,)
+    area: np.ndarray  # touchable area of each window and its alike windows [m²], (p,)
     band: CreaseBand | None  # None if no point is near a crease
 
 
 @dataclass(frozen=True)
 class TargetField:
-    """A part in its chamber, ready to be looked at through windows."""
+    """A part in its chamber, ready for a view through windows."""
 
     setting: WindowSetting
     faces: Faces
@@ -89,7 +89,7 @@ class TargetField:
     pieces: CreasePieces
     has_windows: np.ndarray  # marks the part triangles whose dents can be in a window, (m,)
     touched: Places  # points that a ball can touch, spread evenly over the target
-    surface: SurfacePieces  # of the target, or of the whole part
+    surface: SurfacePieces  # pieces of the target, or of the whole part
     reach: Reach  # share of the target's area that a ball can touch, and its error
     symmetry: Symmetry | None  # None where no two places are alike
 
@@ -110,7 +110,7 @@ class TargetField:
 
     @property
     def alike(self) -> int:
-        """How many places of the target are alike: 1 without symmetry."""
+        """Number of alike places of the target, 1 without symmetry."""
         return self.symmetry.copies if self.symmetry else 1
 
     @property
@@ -126,7 +126,7 @@ class TargetField:
 
     @property
     def is_one_window(self) -> bool:
-        """Whether windows hold most of the target each, so that they tell nothing of evenness."""
+        """True if each window holds most of the target, so that windows show no evenness."""
         of_window = float(np.median(self.gauge.area)) / self.alike
         return self.reachable * self.target_area < MIN_WINDOWS * of_window
 
@@ -141,7 +141,9 @@ class TargetField:
         return self._gauge_of(int(OF_WIDE * self.setting.points), 2.0 * self.radius)
 
     def _gauge_of(self, count: int, radius: float) -> Gauge:
-        """Windows of a radius [m], each division as often as its angles, round so many points."""
+        """Windows of a radius [m] round at most `count` points, each with a division of the
+        faces.
+        """
         gauge = math.pi * radius**2
         most = max(MOST_AREA, MOST_OVERLAP * self.target_area) / gauge
         points = self.some_points(min(count, max(int(most), FEWEST_WINDOWS)))
@@ -153,7 +155,7 @@ class TargetField:
         """Windows of a radius [m] round points of the part.
 
         Args:
-            division: of the part into faces that each window sees; None for that of pictures.
+            division: of the part into faces, for each window; None for the division of pictures.
         """
         from chamberopt.coverage.field.window_areas import window_areas
         from chamberopt.coverage.field.windows import Windows
@@ -162,22 +164,22 @@ class TargetField:
             division = np.full(len(points.place), self.faces.middle)
         windows = Windows(self._points_in_sector(points), radius, self.faces.joined, division)
         area = self.alike * window_areas(windows, self.surface)
-        area[area == 0.0] = np.inf  # nothing can be touched there, so nothing covers it
+        area[area == 0.0] = np.inf  # a window without touchable area stays bare
         band = find_band(windows, self.creases, self.pieces, 0.5 * self.setting.largest_dent)
         if band is not None:
             band = band._replace(length=self.alike * band.length)
         return Gauge(windows, area, band)
 
     def some_points(self, count: int) -> Places:
-        """So many of the points that a ball can touch, or all, spread evenly over the target."""
+        """At most `count` points that a ball can touch, spread evenly over the target."""
         there = len(self.touched.place)
         rows = np.linspace(0, there - 1, min(count, there)).round().astype(int)
         return self.touched.select(rows)
 
     def in_sector(self, hits: Hits) -> Hits:
-        """The impacts where the windows are: the same without symmetry.
+        """The impacts in the sector of the windows; all impacts without symmetry.
 
-        Those that are not in the cavity, which no simulation makes, stay where they are.
+        Impacts outside the cavity, which no simulation makes, stay in their place.
         """
         if self.symmetry is None:
             return hits
@@ -203,7 +205,7 @@ class TargetField:
         return Places(place, normal, self._faces_after(self.symmetry)[turn, points.face])
 
     def _faces_after(self, symmetry: Symmetry) -> np.ndarray:
-        """Which smooth face each one comes to be by each number of turns, (n, faces)."""
+        """The smooth face that each face becomes by each number of turns, (n, faces)."""
         after = np.tile(np.arange(int(self.face.max()) + 1), (symmetry.copies, 1))
         middles, triangles = symmetry.on_each(self.face)
         faces = self.face[triangles]
@@ -214,11 +216,11 @@ class TargetField:
         return after
 
     def sharpness(self, edge: np.ndarray) -> np.ndarray:
-        """Share of the windows to which each of these creases is one, (k,)."""
+        """Share of the windows that see each edge as a crease, (k,)."""
         return np.asarray((self.faces.shares @ (self.creases.line >= 0))[edge])
 
     def places_of(self, hits: Hits, rows: np.ndarray) -> Places:
-        """The contacts of some impacts."""
+        """The places of the impacts in the given rows."""
         from chamberopt.coverage.field.windows import Places
 
         triangle = hits.triangle[rows]
@@ -238,7 +240,7 @@ def require_wide_gauge(chamber: Chamber, setting: WindowSetting) -> None:
 
 
 def require_narrow_gauge(chamber: Chamber, setting: WindowSetting) -> None:
-    """Raise InputError if the windows are so wide that they show no differences in the target."""
+    """Raise InputError if the windows are too wide to show differences in the target."""
     area, gauge = float(chamber.part.area[chamber.part.target].sum()), setting.gauge
     if gauge * MIN_WINDOWS > area:
         raise InputError(
@@ -251,7 +253,7 @@ def require_narrow_gauge(chamber: Chamber, setting: WindowSetting) -> None:
 def require_touchable_zones(chamber: Chamber, mesh: TriangleMesh, ball: float) -> None:
     """Raise InputError for a zone of the part that no ball of a radius [m] can touch.
 
-    Of so many points on each zone: of less than a thousandth of it nothing could be told.
+    The test takes POINTS_OF_ZONE points. Less than a thousandth of a zone would give no figures.
     """
     part = chamber.part
     for name, zone in part.zones.items():
@@ -266,7 +268,7 @@ def require_touchable_zones(chamber: Chamber, mesh: TriangleMesh, ball: float) -
 
 
 def find_target_field(chamber: Chamber, mesh: TriangleMesh, setting: WindowSetting) -> TargetField:
-    """Prepare a chamber's target.
+    """Prepare the field of a chamber's target.
 
     Args:
         mesh: of the chamber.
@@ -302,7 +304,7 @@ def find_target_field(chamber: Chamber, mesh: TriangleMesh, setting: WindowSetti
 
 
 def with_whole_part(field: TargetField, chamber: Chamber, mesh: TriangleMesh) -> TargetField:
-    """The same field with the rest of the exposed part too, for pictures."""
+    """The same field extended to the rest of the exposed part, for pictures."""
     from chamberopt.coverage.field.window_areas import joined_pieces, surface_pieces
 
     rest = ~chamber.part.target & (chamber.exposed_area > 0.0)
@@ -321,7 +323,7 @@ def with_whole_part(field: TargetField, chamber: Chamber, mesh: TriangleMesh) ->
 
 
 def _longest_side(setting: WindowSetting, area: float, most: float) -> float:
-    """Side [m] of the pieces of a surface: a window or a ball wide, longer if they are too many."""
+    """Side [m] of a surface piece: a window or a ball wide, or longer to limit their number."""
     size = min(math.sqrt(setting.gauge / math.pi), 0.5 * setting.ball)
     return 2.0 * max(size, math.sqrt(PIECES_PER_WINDOW / math.pi * area / most))
 
@@ -329,7 +331,7 @@ def _longest_side(setting: WindowSetting, area: float, most: float) -> float:
 def _touched(
     chamber: Chamber, mesh: TriangleMesh, area: np.ndarray, face: np.ndarray, setting: WindowSetting
 ) -> tuple[Places, np.ndarray]:
-    """Of points spread over the part by area (m,), those that a ball can touch; and which."""
+    """Touchable points of the part, spread by area (m,), and their marks among all points."""
     from chamberopt.coverage.field.windows import Places
 
     part = chamber.part

@@ -1,8 +1,8 @@
-"""Exact areas of windows on the surface, and what of them a ball can touch.
+"""Exact areas of windows on the surface, and the part of each that a ball can touch.
 
-The surface is divided into pieces about as large as a window, finer where the border of what a
-ball can touch runs through them. A window meets the plane of a piece in a circle, so its share of
-the piece is the area that a circle and a triangle have in common.
+The surface is divided into pieces about as large as a window. Pieces are finer at the border of the
+touchable surface. A window meets the plane of a piece in a circle, so its share of the piece is the
+common area of a circle and a triangle.
 
 Notation
     p        middle of the window [m]; n_p the unit normal there
@@ -11,8 +11,8 @@ Notation
     a        height of p over the plane of the piece, (p - c).n_t [m]
     l        radius of the window [m]
 
-By the distance along the surface of windows.py, unfolding turns p about the edge between the two
-planes into the plane of the piece: the circle has the radius l about
+The distance along the surface (windows.py) unfolds the two planes. It turns p about their common
+edge into the plane of the piece. There the circle of radius l is centred on
 
     p - a n_t - a / (1 + cos theta) (n_p - cos theta n_t).
 """
@@ -31,12 +31,10 @@ from sim_core import jit
 if TYPE_CHECKING:
     from sim_core import TriangleMesh
 
-FINEST = (
-    0.5  # of the longest side, for pieces through which the border of what a ball can touch runs
-)
-NEAR_CORNERS = 0.1  # of the way to its middle: where a piece is tested for a border
-PLACES_AT_BORDER = 4  # by which the share of a piece at a border is measured
-FAR_SIDE = -0.9  # cosine of the angle beyond which a piece is the far side of something thin
+FINEST = 0.5  # share of the longest side, for pieces at the border of the touchable surface
+NEAR_CORNERS = 0.1  # share of the way from corner to middle where a piece is tested for a border
+PLACES_AT_BORDER = 4  # places that measure the touchable share of a piece at a border
+FAR_SIDE = -0.9  # cosine of the angle beyond which a piece is the far side of a thin body
 
 
 class SurfacePieces(NamedTuple):
@@ -45,9 +43,9 @@ class SurfacePieces(NamedTuple):
     Attributes:
         corners: [m], shape (c, 3, 3).
         normal: unit vectors out of the part, shape (c, 3).
-        face: smooth face of each, shape (c,).
+        face: smooth face of each piece, shape (c,).
         area: [m²], shape (c,).
-        touched: share of each that a ball can touch, shape (c,).
+        touched: share of each piece that a ball can touch, shape (c,).
     """
 
     corners: np.ndarray
@@ -60,12 +58,11 @@ class SurfacePieces(NamedTuple):
 def surface_pieces(
     corners: np.ndarray, face: np.ndarray, mesh: TriangleMesh, ball_radius: float, longest: float
 ) -> SurfacePieces:
-    """Divide triangles into pieces, and find what of them a ball can touch.
+    """Divide triangles into pieces, and find the touchable share of each piece.
 
     Args:
-        corners: of the triangles, each its place [m] and the normal there of the surface that a
-            ball touches, shape (m, 3, 6).
-        face: smooth face of each, shape (m,).
+        corners: corner [m] and normal of the surface that a ball touches there, shape (m, 3, 6).
+        face: smooth face of each triangle, shape (m,).
         mesh: of the chamber.
         ball_radius: [m].
         longest: side of a piece [m].
@@ -87,12 +84,12 @@ def surface_pieces(
 
 
 def joined_pieces(one: SurfacePieces, two: SurfacePieces) -> SurfacePieces:
-    """The pieces of both."""
+    """The pieces of two surfaces together."""
     return SurfacePieces(*(np.concatenate(both) for both in zip(one, two, strict=True)))
 
 
 def window_areas(windows: Windows, pieces: SurfacePieces) -> np.ndarray:
-    """The area [m²] of each window that a ball can touch, (p,)."""
+    """The touchable area [m²] of each window, (p,)."""
     middle = pieces.corners.mean(axis=1)
     size = float(np.linalg.norm(pieces.corners - middle[:, None], axis=2).max(initial=0.0))
     kept = pieces.touched > 0.0
@@ -110,7 +107,7 @@ def window_areas(windows: Windows, pieces: SurfacePieces) -> np.ndarray:
 def _halved_until(
     corners: np.ndarray, owner: np.ndarray, longest: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Halve triangles (m, 3, 6) across their longest sides until none is longer than that [m]."""
+    """Halve triangles (m, 3, 6) across their longest sides down to sides of `longest` [m]."""
     done, owners = [], []
     while len(corners):
         place = corners[..., :3]
@@ -131,7 +128,7 @@ def _halved_until(
 
 
 def _touched_share(places: np.ndarray, mesh: TriangleMesh, ball_radius: float) -> np.ndarray:
-    """Share of places with normals, (k, n, 6), on each of n triangles where a ball fits."""
+    """Share of the places with normals, (k, n, 6), on each of n triangles where a ball fits."""
     place, normal = np.split(places.reshape(-1, 6), 2, axis=1)
     fits = ball_fits(mesh, place, unit_vectors(normal), ball_radius)
     return np.asarray(fits.reshape(places.shape[:2]).mean(axis=0))
@@ -139,7 +136,7 @@ def _touched_share(places: np.ndarray, mesh: TriangleMesh, ball_radius: float) -
 
 @jit
 def _add_common_areas(area, point, piece, points, pieces, radius):  # type: ignore[no-untyped-def]
-    """Add to area (p,) what windows and pieces have in common, for pairs of both."""
+    """Add the common area of each pair of window and piece to area (p,)."""
     for pair in range(len(point)):
         i, t = point[pair], piece[pair]
         p, n_p, n_t = points.place[i], points.normal[i], pieces.normal[t]
@@ -182,7 +179,7 @@ def _add_common_areas(area, point, piece, points, pieces, radius):  # type: igno
 
 @jit
 def _sector(ax, ay, bx, by, radius):  # type: ignore[no-untyped-def]
-    """Signed area that a circle round 0 and the triangle (0, a, b) have in common."""
+    """Signed common area of a circle round 0 and the triangle (0, a, b)."""
     dx, dy = bx - ax, by - ay
     square = dx * dx + dy * dy
     if square == 0.0:

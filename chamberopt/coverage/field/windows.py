@@ -1,4 +1,4 @@
-"""Windows on a surface: which contacts lie in the window round a point, and products over them.
+"""Windows on a surface: the contacts in the window round each point, and products over them.
 
 Notation
     p, q      point and contact [m]
@@ -6,15 +6,15 @@ Notation
     theta     angle between the normals
     a, b      (p - q).n_q and (q - p).n_p [m]
 
-A contact is in a window if it is on the same smooth face and nearer than the window's radius along
-the surface. On two planes that meet in an edge that distance is
+A contact is in a window if it is on the same smooth face and nearer along the surface than the
+window's radius. On two planes that meet in an edge this distance is
 
     distance² = |p - q|² + 2 a b / (1 + cos theta),
 
-exact for the straight way over the edge. With h and y the distances of p and q from the edge and s
-along it, a = -h sin theta and b = -y sin theta (both + in a hollow), |p - q|² = h² + y² + 2 h y cos
-theta + s², and unfolded the distance² is (h + y)² + s². The far side of a thin blade faces the
-other way, cos theta = -1, and is infinitely far.
+exact for the straight way over the edge. Proof: let h and y be the distances of p and q from the
+edge, and s the way along it. Then a = -h sin theta and b = -y sin theta (both + in a hollow), |p -
+q|² = h² + y² + 2 h y cos theta + s², and the unfolded distance² is (h + y)² + s². The far side of a
+thin blade faces the other way, cos theta = -1, and is infinitely far.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ import numpy as np
 
 from sim_core import jit
 
-MAX_CELLS = 4e6  # of the grid in which the points near a contact are found
-CELLS = 3  # across a window; 2 to 6 measured alike
-PAIRS_AT_ONCE = 500_000  # bounds memory, and stays in the processor's cache
+MAX_CELLS = 4e6  # cells of the grid in which the points near a contact are found
+CELLS = 3  # cells across a window; 2 to 6 cells took the same time
+PAIRS_AT_ONCE = 500_000  # bounds memory, and fits in the processor's cache
 
 
 class Places(NamedTuple):
@@ -37,7 +37,7 @@ class Places(NamedTuple):
     Attributes:
         place: [m], shape (p, 3).
         normal: unit vectors out of the part, shape (p, 3); zero on lines.
-        face: smooth face, or line, that each is on, shape (p,).
+        face: smooth face, or line, under each place, shape (p,).
     """
 
     place: np.ndarray
@@ -45,7 +45,7 @@ class Places(NamedTuple):
     face: np.ndarray
 
     def select(self, rows: np.ndarray | slice) -> Places:
-        """The places of these rows."""
+        """The places in the given rows."""
         return Places(*(column[rows] for column in self))
 
 
@@ -55,8 +55,8 @@ class Windows:
     Args:
         points: the middles of the windows.
         radius: [m].
-        faces: how each division joins the faces, `Faces.joined`; None if it joins none.
-        division: that each window sees, shape (p,); None for the first.
+        faces: joins of faces by each division, `Faces.joined`; None without joins.
+        division: number of the division for each window, shape (p,); None for the first.
     """
 
     def __init__(
@@ -68,7 +68,7 @@ class Windows:
     ) -> None:
         self.points, self.radius, self.faces = points, radius, faces
         self.division = np.zeros(len(points.face), dtype=int) if division is None else division
-        # Faces that some division joins are looked through together.
+        # Faces that any division joins are searched together.
         place, face = points.place, points.face if faces is None else faces[-1][points.face]
         self._grid = grid = _grid_of_faces(place, face, radius)
         cell = ((place - grid.low[face]) / grid.edge).astype(np.int64)
@@ -86,18 +86,18 @@ class Windows:
         return Windows(self.points, radius, self.faces, self.division)
 
     def select(self, rows: np.ndarray) -> Windows:
-        """The windows of these rows."""
+        """The windows in the given rows."""
         return Windows(self.points.select(rows), self.radius, self.faces, self.division[rows])
 
     def pairs(self, contacts: Places) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        """Yield indices of points and of the contacts in their windows, some pairs at a time."""
+        """Yield indices of points and of the contacts in their windows, PAIRS_AT_ONCE at most."""
         for point, contact, rows in self._found(contacts):
             yield self._order[point], rows[contact]
 
     def shares(
         self, contacts: Places, size: np.ndarray, area: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Points, and the shares of their windows that sizes (k,) of the contacts take, (n,) each.
+        """Points, and the shares of their windows that sizes (k,) of contacts take, (n,) each.
 
         Args:
             area: of the windows, (p,).
@@ -120,7 +120,7 @@ class Windows:
         return total
 
     def _found(self, contacts: Places) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-        """Yield places of points in `_order`, and of contacts among the rows that come third."""
+        """Yield places of points in `_order`, places of contacts among rows, and the rows."""
         point, contact = np.empty((2, max(PAIRS_AT_ONCE, len(self._order))), dtype=np.int32)
         done, grid = 0, self._grid
         own = contacts.face if self.faces is None else self.faces[-1][contacts.face]
@@ -141,13 +141,13 @@ class Windows:
 
 
 class _Grid(NamedTuple):
-    """Cells in which the points near a contact are found: a grid of its own for each face.
+    """Cells in which the points near a contact are found, with a separate grid for each face.
 
     Attributes:
         edge: of a cell [m].
         low: lowest corner of each face's grid [m], shape (f, 3).
-        shape: cells of it along each axis, shape (f, 3); 0 where the face has no points.
-        offset: number of its first cell, and last of all how many cells there are, (f + 1,).
+        shape: number of cells along each axis, shape (f, 3); 0 for a face without points.
+        offset: number of the first cell of each face, then the number of all cells, (f + 1,).
     """
 
     edge: float
@@ -164,7 +164,7 @@ def _grid_of_faces(place: np.ndarray, face: np.ndarray, radius: float) -> _Grid:
     np.maximum.at(high, face, place)
     some = np.isfinite(low[:, 0])
     low[~some], high[~some] = 0.0, 0.0
-    # On a plane, 2 r / edge + 1 cells are looked through along each axis.
+    # On a plane, 2 r / edge + 1 cells are searched along each axis.
     edge = 2.0 * radius / CELLS
     while True:
         shape = ((high - low) / edge).astype(np.int64) + 1
@@ -179,14 +179,13 @@ def _grid_of_faces(place: np.ndarray, face: np.ndarray, radius: float) -> _Grid:
 def _find_pairs(grid, first, x, n_x, contacts, radius, begin, point, contact):  # type: ignore[no-untyped-def]
     """Write down all pairs until the arrays are full.
 
-    Nothing branches on whether a point is near: the processor could not foresee it.
+    The loop does not branch on the distance of a point, because the processor could not predict it.
 
     Args:
         first: points first[c] to first[c + 1] are in cell c.
         x, n_x: places and normals of the points, shape (3, p).
         begin: first contact to look at.
         point, contact: written.
-
     Returns:
         The first contact that is not done, and the number of pairs.
     """
@@ -223,7 +222,7 @@ def _find_pairs(grid, first, x, n_x, contacts, radius, begin, point, contact):  
                     a = -(dx * n_y[j, 0] + dy * n_y[j, 1] + dz * n_y[j, 2])
                     b = dx * n_x[0, i] + dy * n_x[1, i] + dz * n_x[2, i]
                     cosine = n_x[0, i] * n_y[j, 0] + n_x[1, i] * n_y[j, 1] + n_x[2, i] * n_y[j, 2]
-                    # not divided: the cosine may be -1
+                    # multiplied out, because the cosine may be -1
                     is_far = (a * b > 0.0) & (2.0 * a * b >= (reach - square) * (1.0 + cosine))
                     point[found] = i
                     contact[found] = j
@@ -233,7 +232,7 @@ def _find_pairs(grid, first, x, n_x, contacts, radius, begin, point, contact):  
 
 @jit
 def _keep_joined(faces, division, face, order, face_of_contact, rows, point, contact):  # type: ignore[no-untyped-def]
-    """Keep the pairs whose faces the window's own division joins, and return their number."""
+    """Keep the pairs whose faces the window's division joins, and return their number."""
     kept = 0
     for pair in range(len(point)):
         i, j = order[point[pair]], rows[contact[pair]]
@@ -246,7 +245,7 @@ def _keep_joined(faces, division, face, order, face_of_contact, rows, point, con
 def _divide(
     order: np.ndarray, area: np.ndarray, size: np.ndarray, place: np.ndarray, contact: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Points, and sizes over areas, of pairs as `_found` gives them."""
+    """Points, and sizes over areas, for the pairs of `_found`."""
     point, share = np.empty(len(place), dtype=np.int32), np.empty(len(place))
     _write_shares(order, area, size, place, contact, point, share)
     return point, share
@@ -261,7 +260,7 @@ def _write_shares(order, area, size, place, contact, point, share):  # type: ign
 
 @jit
 def add_powers(point, share, sums):  # type: ignore[no-untyped-def]
-    """Add 1, the share and its square of pairs to the sums (p, 3) of their points."""
+    """Add 1, share and share² of each pair to the sums (p, 3) of its point."""
     for pair in range(len(point)):
         one, w = point[pair], share[pair]
         sums[one, 0] += 1.0
@@ -271,7 +270,7 @@ def add_powers(point, share, sums):  # type: ignore[no-untyped-def]
 
 @jit
 def add_columns(point, contact, columns, sums):  # type: ignore[no-untyped-def]
-    """Add the columns (k, c) of the contacts of pairs to the sums (p, c) of their points."""
+    """Add the columns (k, c) of each pair's contact to the sums (p, c) of its point."""
     for pair in range(len(point)):
         for column in range(columns.shape[1]):
             sums[point[pair], column] += columns[contact[pair], column]
@@ -279,7 +278,7 @@ def add_columns(point, contact, columns, sums):  # type: ignore[no-untyped-def]
 
 @jit
 def add_to_levels(point, contact, size, level, histogram):  # type: ignore[no-untyped-def]
-    """Add the sizes (k,) of the contacts of pairs to their levels of a histogram (p, levels)."""
+    """Add the size (k,) of each pair's contact to its level in a histogram (p, levels)."""
     for pair in range(len(point)):
         histogram[point[pair], level[contact[pair]]] += size[contact[pair]]
 
@@ -288,8 +287,8 @@ def add_to_levels(point, contact, size, level, histogram):  # type: ignore[no-un
 def multiply_products(products, point, weight, scales):  # type: ignore[no-untyped-def]
     """Multiply products[point, k] by 1 - scales[k] weight for each pair of point and weight.
 
-    A factor is at least 0. Negative ones would leave the mean without bias, but where one dent
-    takes more than a window the product would grow beyond all bounds.
+    A factor is at least 0. Negative factors would leave the mean without bias, but if a dent takes
+    more than a window the product would grow beyond all bounds.
     """
     for pair in range(len(point)):
         for k in range(len(scales)):
