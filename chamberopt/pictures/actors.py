@@ -1,4 +1,4 @@
-"""What is put into a plotter: the part, the chamber as glass, discs, colour bars."""
+"""Actors of a plotter: the part, the chamber as glass, discs and colour bars."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ GREY, DARK, GLASS, SONOTRODE, BACKGROUND = "#b9bec4", "#2b3440", "#9db7cc", "#e0
 FAULT, PALE = "#d01c1c", "#eceff2"
 SHARP_EDGE = 30  # degrees between the triangles at an edge that is drawn
 ROUND_STEPS = (1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0)  # of colour bars, times powers of ten
-LIFT = 0.1  # of discs off the surface, in their radii: the facets of a round edge do not hide them
+LIFT = 0.1  # height of discs over the surface, in radii, so that facets of an edge hide no disc
 DISC_SIDES = 24
 SCATTER = "counted dents scatter: single places look less even than they are"
-NO_RENDER = {"render": False, "reset_camera": False}  # until everything is in the plotter
+NO_RENDER = {"render": False, "reset_camera": False}  # while actors are added to the plotter
 
 
 def light(plotter: Any) -> None:
@@ -30,7 +30,7 @@ def light(plotter: Any) -> None:
 
 
 def colour_meanings(parts: Sequence[DrawnPart]) -> list[tuple[str, str]]:
-    """Colours that stand for no value and what they mean, those that there are."""
+    """The colours on these parts that stand for no value, with their meanings."""
     entries = (
         (any(part.rest.n_cells for part in parts), GREY, "not in the target"),
         (any(not np.all(part.target["resolved"]) for part in parts), FEW_DENTS, "too few dents"),
@@ -43,13 +43,12 @@ def colour_meanings(parts: Sequence[DrawnPart]) -> list[tuple[str, str]]:
 def add_part(
     plotter: Any, part: DrawnPart, limits: tuple[float, float], pale: np.ndarray | None = None
 ) -> list[Any]:
-    """Add the target, coloured by its quantity where that is resolved, and the rest of the part.
+    """Add the target, coloured by its quantity where it is resolved, and the rest of the part.
 
     Args:
-        pale: triangles of `part.target`, bool, that are drawn pale instead.
-
+        pale: marks the triangles of `part.target` that are drawn pale instead.
     Returns:
-        The actors; the mapper of the first has the colours.
+        The actors. The mapper of the first actor has the colours.
     """
     if part.quantity.name == "zones":
         return _add_zones(plotter, part)
@@ -76,12 +75,12 @@ def add_part(
             style |= {"ambient": 0.75, "diffuse": 0.25} if colour == GREY else {}
             actors.append(plotter.add_mesh(surface, color=colour, **style))
     for actor in actors:
-        actor.prop.interpolation = "Phong"  # by the normals of the surface, not of its triangles
+        actor.prop.interpolation = "Phong"  # by the normals at the vertices
     return actors
 
 
 def _add_zones(plotter: Any, part: DrawnPart) -> list[Any]:
-    """Add the part with each zone in its colour; without values, there is no colour bar."""
+    """Add the part with each zone in its own colour, without a colour bar."""
     actors = []
     for number, surface in part.zones.items():
         colour = zone_colour(number - 1) if number else GREY
@@ -93,10 +92,10 @@ def _add_zones(plotter: Any, part: DrawnPart) -> list[Any]:
 
 
 def add_chamber(plotter: Any, chamber: Surface) -> tuple[dict[int, Any], list[Any]]:
-    """Add the sonotrodes, and the walls as glass with their edges; clicks pass through them.
+    """Add the sonotrodes, and the walls as glass with their edges. Clicks pass through them.
 
     Returns:
-        The actors of the sonotrodes by tag, and those of the walls.
+        The actors of the sonotrodes by tag, and the actors of the walls.
     """
     tags = np.asarray(chamber["tag"])
     style = {"pickable": False, **NO_RENDER}
@@ -125,12 +124,13 @@ def add_edges(plotter: Any, part: Surface) -> None:
 
 
 class Discs(NamedTuple):
-    """Flat discs on a surface, one a row.
+    """Flat discs on a surface, one disc a row.
 
-    place: centres [mm], shape (k, 3).
-    normal: unit vectors away from the surface, shape (k, 3).
-    radius: [mm], shape (k,).
-    colour: red, green, blue, uint8, shape (k, 3).
+    Attributes:
+        place: centres [mm], shape (k, 3).
+        normal: unit vectors away from the surface, shape (k, 3).
+        radius: [mm], shape (k,).
+        colour: red, green, blue, uint8, shape (k, 3).
     """
 
     place: np.ndarray
@@ -139,14 +139,15 @@ class Discs(NamedTuple):
     colour: np.ndarray
 
     def only(self, rows: np.ndarray) -> Discs:
-        """A copy of some rows."""
+        """A copy with only the given rows."""
         return Discs(*(column[rows] for column in self))
 
 
 def disc_actor(discs: Discs, ambient: float = 1.0) -> Any:
-    """Return an actor that shows discs, later ones over earlier ones.
+    """Return an actor that shows discs, later discs over earlier discs.
 
-    ambient: brightness of a disc seen edge on, as a share of one seen face on.
+    Args:
+        ambient: brightness of a disc seen edge on, as a share of a disc seen face on.
     """
     import vtk
 
@@ -172,8 +173,8 @@ def disc_actor(discs: Discs, ambient: float = 1.0) -> Any:
     actor.SetMapper(mapper)
     actor.GetProperty().SetAmbient(ambient)
     actor.GetProperty().SetDiffuse(1.0 - ambient)
-    # VTK draws translucent actors after all others and without writing their depth: each disc is
-    # hidden by surfaces in front of it, and covers those drawn before it.
+    # VTK draws translucent actors after all others and without writing their depth. So a disc is
+    # hidden by surfaces in front of it, and covers the discs drawn before it.
     actor.ForceTranslucentOn()
     return actor
 
@@ -184,7 +185,7 @@ def escape_dollars(text: str) -> str:
 
 
 def colour_bar_ticks(limits: tuple[float, float]) -> tuple[int, str]:
-    """Return into how many round steps a colour bar is divided, and the format of its labels."""
+    """Return the number of round steps of a colour bar, and the format of its labels."""
     span = limits[1] - limits[0]
     for steps in (5, 4, 6, 7, 8, 9, 10, 3):
         step = span / steps

@@ -1,7 +1,7 @@
-"""Where a camera shows most of a target: the target is drawn from some dozens of directions.
+"""Camera directions that show most of a target, found by drawing it from dozens of directions.
 
-Every patch of the target has a colour of its own, and what may hide it is white, so that the pixels
-of a small picture tell which area of each patch is seen.
+Every patch of the target has its own colour, and all that may hide it is white. So the pixels of a
+small picture tell the visible area of each patch.
 """
 
 from __future__ import annotations
@@ -16,22 +16,22 @@ from chamberopt.geometry.triangles import unit_normals
 from chamberopt.results.vtp_files import Surface, pyvista
 
 Vector = tuple[float, float, float]
-PATCHES = 20  # that a target is long
+PATCHES = 20  # along a target
 PIXELS = 240  # side of the small pictures
 AZIMUTHS = 12
 ELEVATIONS = (-60.0, -22.0, 15.0, 35.0, 60.0)  # degrees; the middle ones are preferred
 MIDDLE = (-25.0, 40.0)
-STEEP = 0.85  # a steep view shows more than a middle one by this factor, or is not taken
-FROM_BELOW = 0.6  # the same for a view from below, where the chamber is drawn too
-USUAL = np.array([1.0, -1.6, 0.5])  # of directions that show as much, the nearest to this one
-NEARNESS = 0.05  # is worth this share
-VIEW_ANGLE, FILLED = 30.0, 0.97  # degrees; of what a view has beside the room for text
+STEEP = 0.85  # weight of steep views against middle views
+FROM_BELOW = 0.6  # weight of views from below, in pictures with the chamber
+USUAL = np.array([1.0, -1.6, 0.5])  # direction that is preferred among equal views
+NEARNESS = 0.05  # weight of the nearness to the usual direction
+VIEW_ANGLE, FILLED = 30.0, 0.97  # degrees; filled share of a view beside the room for text
 FLAT = 0.95  # a target is flat if its mean unit normal is at least this long
-WORTHWHILE = 0.15  # a second view adds at least this share of what the first one shows
+WORTHWHILE = 0.15  # least area that a second view adds, over the area of the first view
 
 
 def view_frame(eye: np.ndarray) -> np.ndarray:
-    """Unit vectors (3, 3) to the right, upwards and to the eye, with z upright where it can be."""
+    """Unit vectors (3, 3) to the right, upwards and to the eye, with z upright if possible."""
     to_eye = np.asarray(eye, dtype=float) / np.linalg.norm(eye)
     upright = (0.0, 0.0, 1.0) if abs(to_eye[2]) < 0.99 else (0.0, 1.0, 0.0)
     right = np.cross(upright, to_eye)
@@ -40,7 +40,7 @@ def view_frame(eye: np.ndarray) -> np.ndarray:
 
 
 def directions(steep: bool = True) -> np.ndarray:
-    """Unit vectors to the eyes that are tried, (e, 3); those not steep show chambers well."""
+    """Unit vectors to the eyes to try, (e, 3). Without steep ones they show chambers well."""
     turn = 2.0 * np.pi * (np.arange(AZIMUTHS) + 0.5) / AZIMUTHS
     rows = [
         np.stack([np.cos(up) * np.cos(turn), np.cos(up) * np.sin(turn), np.sin(up) + 0 * turn], 1)
@@ -50,13 +50,13 @@ def directions(steep: bool = True) -> np.ndarray:
 
 
 def near_directions(target: Surface) -> np.ndarray:
-    """All directions that are tried for a target seen from near, and face on if it is flat."""
+    """Directions to try for a target seen from near. A flat target is also seen face on."""
     normal = flat_normal(target)
     return directions() if normal is None else np.vstack([directions(), normal])
 
 
 def flat_normal(target: Surface) -> np.ndarray | None:
-    """The unit vector that a flat target faces, (3,); None for others."""
+    """The unit vector that a flat target faces, (3,), or None for a target that is not flat."""
     corners = np.asarray(target.points, dtype=float)[np.asarray(target.regular_faces)]
     vectors = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     mean = vectors.sum(axis=0) / np.linalg.norm(vectors, axis=1).sum()
@@ -65,11 +65,11 @@ def flat_normal(target: Surface) -> np.ndarray | None:
 
 
 def seen_area(target: Surface, hiding: Sequence[Surface], eyes: np.ndarray) -> np.ndarray:
-    """Area of each patch that is seen from each direction, as it appears [mm²], (e, patches).
+    """Visible area of each patch from each direction, as it appears [mm²], (e, patches).
 
     Args:
-        target: at least one triangle; those beside one another that face the same way are a patch.
-        hiding: what may hide them, such as the rest of the part.
+        target: at least one triangle. Neighbouring triangles that face the same way are a patch.
+        hiding: surfaces that may hide the target, such as the rest of the part.
         eyes: unit vectors, (e, 3).
     """
     hiding = [one for one in hiding if one.n_cells]
@@ -117,14 +117,14 @@ def _patches(surface: Surface) -> np.ndarray:
 
 
 def pushed_back(actor: Any) -> None:
-    """Let an actor be hidden by others in the same place."""
+    """Draw an actor behind other actors in the same place."""
     mapper = actor.mapper
     mapper.SetResolveCoincidentTopologyToPolygonOffset()
     mapper.SetRelativeCoincidentTopologyPolygonOffsetParameters(2.0, 2.0)
 
 
 def target_in_chamber(part: Surface) -> tuple[Surface, Surface]:
-    """What is of the target in the chamber, and the rest of the part, which may hide it.
+    """The target inside the chamber, and the rest of the part, which may hide it.
 
     Args:
         part: with cell data "target" and "exposed_area_mm2".
@@ -134,17 +134,16 @@ def target_in_chamber(part: Surface) -> tuple[Surface, Surface]:
 
 
 def cells_of(surface: Surface, chosen: np.ndarray) -> Surface:
-    """Some triangles of a surface, as a surface."""
+    """The chosen triangles of a surface, as a surface."""
     return surface.extract_cells(chosen).extract_surface(algorithm="dataset_surface")
 
 
 def near_views(seen: np.ndarray, eyes: np.ndarray) -> list[np.ndarray]:
-    """The direction that shows most of a target, and one that shows what is hidden from there.
+    """The direction that shows most of a target, and a direction that shows the hidden rest.
 
     Args:
-        seen: as from seen_area; targets of several results stand beside one another.
+        seen: as from seen_area. The targets of several results stand beside one another.
         eyes: unit vectors, (e, 3).
-
     Returns:
         One direction if a second would add little, else two.
     """
@@ -158,13 +157,13 @@ def near_views(seen: np.ndarray, eyes: np.ndarray) -> list[np.ndarray]:
 
 
 def chamber_view(seen: np.ndarray, eyes: np.ndarray) -> np.ndarray:
-    """The direction that shows most of a target in its chamber; arguments as of near_views."""
+    """The direction that shows most of a target in its chamber. Arguments as for near_views."""
     worth = _worth(eyes) * np.where(eyes[:, 2] < 0.0, FROM_BELOW, 1.0)
     return np.asarray(eyes[int(np.argmax(worth * seen.sum(axis=1)))])
 
 
 def _worth(eyes: np.ndarray) -> np.ndarray:
-    """What the same area is worth from each direction, (e,)."""
+    """Weight of the same area from each direction, (e,)."""
     nearness = eyes @ USUAL / np.linalg.norm(USUAL)
     is_middle = _is_middle(np.degrees(np.arcsin(eyes[:, 2])))
     return np.asarray(np.where(is_middle, 1.0, STEEP) * (1.0 + NEARNESS * nearness))
@@ -175,7 +174,7 @@ def _is_middle(height: Any) -> Any:
 
 
 class Room(NamedTuple):
-    """Pixels at the sides of a view that are kept free for text."""
+    """Pixels at the sides of a view that stay free for text."""
 
     left: float
     right: float
@@ -186,7 +185,7 @@ class Room(NamedTuple):
 def fit_camera(
     plotter: Any, points: np.ndarray, eye: np.ndarray, size: tuple[int, int], room: Room
 ) -> None:
-    """Point the camera at points so that they fill a view but for the room at its sides.
+    """Point the camera at points so that they fill a view beside its room for text.
 
     Args:
         points: [mm], (k, 3).
@@ -197,7 +196,7 @@ def fit_camera(
     middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
     distance = 4.0 * float(np.linalg.norm(np.ptp(points, axis=0)))
     plotter.camera_position = [middle + distance * frame[2], middle, frame[1]]
-    plotter.camera.view_angle = VIEW_ANGLE  # zoom() narrows it, so it is set each time
+    plotter.camera.view_angle = VIEW_ANGLE  # set each time, because zoom() narrows it
     x, y, z = ((points - middle) @ frame.T).T
     half = np.tan(np.radians(0.5 * VIEW_ANGLE)) * (distance - z)
     # In VTK's units the view is from -1 to 1 in both directions.

@@ -1,4 +1,4 @@
-"""distributions.png of a comparison: coverage over area and time, impact speeds and angles."""
+"""The picture distributions.png of a comparison: coverage over area and time, speeds and angles."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from chamberopt.results.compare.distributions import Distributions, Histogram
 
 
 def draw_distributions(path: Path, comparison: Comparison, found: Distributions) -> None:
-    """Write the four panels as .png; their legends hold the numbers."""
+    """Write the four panels as .png. Their legends hold the numbers."""
     coverage_labels = [
         f"{label}: mean {estimate_text(mean, 100.0, '%')}"
         for label, mean in zip(comparison.labels, comparison.metrics["mean_coverage"], strict=True)
@@ -76,7 +76,7 @@ def _time_to_98(time: Estimate) -> str:
 def _impact_labels(
     comparison: Comparison, found: Distributions, means: Sequence[float | None], unit: str
 ) -> list[str]:
-    """Legend of impacts: their number and mean."""
+    """Legend texts with the number of impacts of each result and their mean."""
     labels = []
     for label, count, mean in zip(comparison.labels, found.impacts, means, strict=True):
         average = "" if mean is None else f", mean {mean:.3g} {unit}"

@@ -60,7 +60,7 @@ def render_coverage(job: dict[str, Any]) -> None:
 
 
 def coverage_bar(parts: Sequence[DrawnPart], limits: tuple[float, float]) -> ColourBar:
-    """The colours of the quantity, and its scale where that is not all of 0 to 100 %."""
+    """The colour bar of the quantity, with its limits unless they are 0 and 100 %."""
     quantity = parts[0].quantity
     shown = np.concatenate([part.target["shown"] for part in parts])
     shown = shown[np.isfinite(shown)]

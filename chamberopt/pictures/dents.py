@@ -1,8 +1,8 @@
-"""Draw every dent of one peening on the part, what is not peened black, as a .png.
+"""Draw every dent of one peening on the part as a .png, with unpeened surface black.
 
-Each dent is a flat disc of its diameter in the plane of the triangle that was hit, lifted a little
-so that the facets of a rounded edge do not hide it. Later dents are drawn over earlier ones. Sight
-lines are parallel, so lengths are the same all over the picture.
+Each dent is a flat disc of its diameter in the plane of the triangle that was hit. It is lifted a
+little so that the facets of a rounded edge do not hide it. Later dents are drawn over earlier
+dents. Sight lines are parallel, so lengths are the same all over the picture.
 """
 
 from __future__ import annotations
@@ -30,13 +30,13 @@ if TYPE_CHECKING:
 
     from chamberopt.coverage.dents import Dents
 
-MIN_PIXELS, MAX_PIXELS = 200, 4000  # of the longer side: readable, and what graphics drivers allow
-MIN_SHORTER_SIDE = 4  # pixels; below it the target is seen edge on
-MARGIN = 1.06  # of the picture's sides over the target's
-DARKEST = 0.35  # where the part of viridis begins that cannot be mistaken for black
-AMBIENT = 0.75  # brightness of a surface seen edge on, as a share of one seen face on
+MIN_PIXELS, MAX_PIXELS = 200, 4000  # longer side: still readable, and allowed by graphics drivers
+MIN_SHORTER_SIDE = 4  # pixels; a target seen edge on is narrower
+MARGIN = 1.06  # sides of the picture over sides of the target
+DARKEST = 0.35  # start of the colours of viridis that cannot be mistaken for black
+AMBIENT = 0.75  # brightness of a surface seen edge on, over its brightness face on
 INNER, RIM_SHADE = 0.8, 0.72  # a dent's darker rim: its inner radius and its brightness
-MIN_RIM_PIXELS = 12.0  # diameter of the dents from which rims are drawn
+MIN_RIM_PIXELS = 12.0  # smallest diameter of a dent with a drawn rim
 
 
 def draw_dents(
@@ -54,13 +54,11 @@ def draw_dents(
         dents: in order of time.
         title: written above the picture.
         picture: file to write, .png.
-        view: direction from the part to the eye; None shows a flat target face on, and any other
-            from where it is seen.
+        view: direction from the part to the eye. None shows a flat target face on, and any other
+            target from the direction that shows most of it.
         pixels: longer side of one view, as require_pixels accepts it.
-
     Returns:
         None, or one line that says why there is no picture.
-
     Raises:
         InputError: from `view` the target is seen edge on.
     """
@@ -98,7 +96,7 @@ def render_dents(job: dict[str, Any]) -> None:
 
 
 def dent_colours() -> Colormap:
-    """Return the light part of viridis, which colour-blind readers tell apart."""
+    """Return the light part of viridis, a colour map that colour-blind readers can read."""
     from matplotlib import colormaps
     from matplotlib.colors import ListedColormap
 
@@ -106,7 +104,7 @@ def dent_colours() -> Colormap:
 
 
 def _views(part: DrawnPart, wanted: Vector | None) -> list[np.ndarray]:
-    """Directions to the eye: as wanted, or from where the target is seen."""
+    """Directions to the eye: the wanted direction, or the directions that show the target."""
     if wanted is not None:
         return [np.array(wanted)]
     eyes = near_directions(part.whole)
@@ -116,17 +114,15 @@ def _views(part: DrawnPart, wanted: Vector | None) -> list[np.ndarray]:
 def render_side(
     part: DrawnPart, discs: Discs, view: Sequence[float] | np.ndarray, pixels: int
 ) -> View:
-    """Render the target, black, and its dents from one direction.
+    """Render the black target and its dents from one direction.
 
     Args:
-        part: its target is shown whole; the rest of it is grey.
+        part: shown with its whole target. The rest of the part is grey.
         discs: the dents, in order of time.
         view: direction to the eye.
         pixels: longer side of the image.
-
     Returns:
-        The image; its longer side has so many pixels.
-
+        The image.
     Raises:
         InputError: the target is seen edge on.
     """
@@ -155,8 +151,8 @@ def render_side(
     actor = disc_actor(_with_rims(shown, pixel_mm), AMBIENT)
     plotter.add_actor(actor, **NO_RENDER)
     dented = _screenshot(plotter)
-    # At an edge a disc reaches over the target, into the air or over the rest of the part. Pixels
-    # that do not show the target keep the colour that they have without dents.
+    # At an edge a disc reaches beyond the target. So pixels that do not show the target keep their
+    # colour without dents.
     plotter.remove_actor(actor, render=False)
     plotter.set_background("black")
     target.prop.color, rest.prop.color, rest.prop.lighting = "white", "black", False
@@ -172,7 +168,7 @@ def _screenshot(plotter: Any) -> np.ndarray:
 
 
 def _with_rims(discs: Discs, pixel_mm: float) -> Discs:
-    """Turn each large disc into a darker one and, upon it, a smaller one in its own colour."""
+    """Turn each large disc into a darker disc under a smaller disc of its own colour."""
     rimmed = 2.0 * discs.radius > MIN_RIM_PIXELS * pixel_mm
     row = np.repeat(np.arange(len(rimmed)), 1 + rimmed)
     found = discs.only(row)

@@ -1,4 +1,4 @@
-"""Where later candidates cover more or less than the first one, as a .png."""
+"""A picture, as a .png, of the places where later candidates cover more or less than the first."""
 
 from __future__ import annotations
 
@@ -16,23 +16,23 @@ from chamberopt.pictures.picture_page import ColourBar, Row, write_page
 from chamberopt.pictures.subprocess_drawing import draw_in_subprocess
 from chamberopt.results.vtp_files import read_surface, save_surface
 
-# Brown (less) over white to violet (more), for colour-blind readers too, and unlike either grey.
+# Brown (less) over white to violet (more), readable for colour-blind readers, and not grey.
 PALE, NO_TARGET = "#e6e9ec", "#a9b0b7"
 
 
 def write_differences(
     path: Path, field: Path, columns: Sequence[tuple[np.ndarray, np.ndarray]]
 ) -> None:
-    """Write a part with the differences of later candidates from the first.
+    """Write a part with the differences of later candidates from the first candidate.
 
-    Candidate k = 1, 2, ... has point data difference_k [percentage points] and real_k, and the
+    Candidate k = 1, 2, ... has point data difference_k [percentage points] and real_k. The
     triangles have cell data target.
 
     Args:
         path: .vtp file to write.
         field: the first candidate's coverage.vtp.
         columns: for each later candidate the difference, -1..1, at the vertices of the target in
-            their order, shape (v,), and whether it is real, bool, shape (v,).
+            their order, shape (v,), and marks of real differences, bool, shape (v,).
     """
     surface = read_surface(field)
     target = np.asarray(surface["target"])
@@ -49,7 +49,7 @@ def write_differences(
 
 
 def draw_difference(surface: str | Path, titles: Sequence[str], picture: str | Path) -> str | None:
-    """Draw what write_differences wrote, all candidates on one scale.
+    """Draw the file of write_differences, with all candidates on one scale.
 
     Returns:
         None, or one line that says why there is no picture.
@@ -59,7 +59,7 @@ def draw_difference(surface: str | Path, titles: Sequence[str], picture: str | P
 
 
 def render_difference(job: dict[str, Any]) -> None:
-    """Draw each candidate in the drawing process, from where most of the target is seen."""
+    """Draw each candidate in the drawing process, from the direction with the largest area."""
     surface, titles = read_surface(Path(job["surface"])), job["titles"]
     limit = _scale_limit(surface, len(titles))
     on_target = np.asarray(surface["target"]) > 0
@@ -82,7 +82,7 @@ def _add_difference(plotter: Any, target: Any, rest: Any, k: int, limit: float) 
     look: dict[str, Any] = {"ambient": 0.7, "diffuse": 0.3, **NO_RENDER}
     if rest.n_cells:
         plotter.add_mesh(rest, color=NO_TARGET, **look)
-    # The border is half way between a vertex where the difference is real and one where it is not.
+    # The border is half way between vertices with and without a real difference.
     noise, shown = target.clip_scalar(scalars=f"real_{k}", value=0.5, both=True)
     if noise.n_cells:
         plotter.add_mesh(noise, color=PALE, **look)
@@ -94,7 +94,7 @@ def _add_difference(plotter: Any, target: Any, rest: Any, k: int, limit: float) 
 
 
 def _scale_limit(surface: Any, count: int) -> float:
-    """Return a round limit that holds nearly all real differences [percentage points]."""
+    """Return a round limit above nearly all real differences [percentage points]."""
     real = [
         np.abs(surface[f"difference_{k}"])[np.asarray(surface[f"real_{k}"]) > 0]
         for k in range(1, count + 1)

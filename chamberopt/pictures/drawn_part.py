@@ -1,4 +1,4 @@
-"""The part of a result, ready to be drawn: its target coloured by one quantity, and the rest."""
+"""The part of a result, ready for drawing: its target coloured by a quantity, and the rest."""
 
 from __future__ import annotations
 
@@ -13,27 +13,29 @@ from chamberopt.geometry.triangles import area_vectors
 from chamberopt.pictures.charts.quantities import QUANTITIES, Quantity
 from chamberopt.results.vtp_files import ZONE, Surface, pyvista
 
-NEARLY_ALL = (0.01, 0.985)  # shares of the area at the ends of the colour scale
-ON_BOUNDARY = 1e-4  # of the length of the part's surface: what is nearer than that is on it
-ROUNDS = 12  # of averages over neighbours, before which a place counts as resolved or not
+NEARLY_ALL = (0.01, 0.985)  # shares of the area below the ends of the colour scale
+ON_BOUNDARY = 1e-4  # largest distance of a boundary, over the length of the part's surface
+ROUNDS = 12  # averages over neighbours before a place is taken as resolved or not
 
 
 class DrawnPart:
     """The target of a part with the values of one quantity, and the rest of the part.
 
-    whole: the target.
-    target: where a ball can touch it, with point data "shown" in the quantity's unit and cell data
-        "resolved": whether the simulated dents are enough to tell.
-    unreached: where no ball can touch it, in the chamber.
-    outside: where it is outside the chamber; empty if the chamber is not given.
-    inside: target and unreached together.
-    surface: all of the part.
-    rest: the part beside the target.
-    zones: the surface of each zone by its number, from 1; 0 is what is in none. Empty without any.
-    quantity: the one in "shown".
+    Attributes:
+        whole: the target.
+        target: its touchable surface, with point data "shown" in the quantity's unit and cell data
+            "resolved", true if the simulated dents are enough for a value.
+        unreached: the target in the chamber that no ball can touch.
+        outside: the target outside the chamber; empty if the chamber is not given.
+        inside: target and unreached together.
+        surface: all of the part.
+        rest: the part beside the target.
+        zones: the surface of each zone by its number, from 1, and the surface in no zone as 0.
+            Empty without zones.
+        quantity: the quantity in "shown".
 
-    A triangle belongs to what most of its corners are. All have cell data "triangle", the number of
-    the part's triangle, and "area" [mm²].
+    The majority of its corners decides the class of a triangle. All surfaces have cell data
+    "triangle", the number of the part's triangle, and "area" [mm²].
     """
 
     def __init__(
@@ -54,7 +56,7 @@ class DrawnPart:
                 _fill_from_neighbours(field.point_data, name, is_reached, corners)
 
         def cells(chosen: np.ndarray) -> Surface:
-            if not chosen.any():  # PyVista would drop the columns
+            if not chosen.any():  # PyVista drops the columns of an empty surface
                 empty = pyvista().PolyData()
                 for there, columns in (
                     (empty.point_data, field.point_data),
@@ -79,9 +81,11 @@ class DrawnPart:
         self.show(quantity)
 
     def show(self, quantity: Quantity, times: float = 1.0) -> None:
-        """Put a quantity into "shown".
+        """Put the values of a quantity into "shown".
 
-        times: the peening time over the treatment time; scales coverage and what grows with time.
+        Args:
+            times: peening time over treatment time. It scales coverage and all that grows with
+                time.
         """
         self.quantity = quantity
         if quantity.column == ZONE:  # drawn by `zones`
@@ -89,7 +93,7 @@ class DrawnPart:
         self.target["shown"] = self.values(quantity, times)
 
     def values(self, quantity: Quantity, times: float = 1.0) -> np.ndarray:
-        """Values at the points of `target` in the quantity's unit; `times` as in show."""
+        """Values at the points of `target` in the quantity's unit, with `times` as in show."""
         if quantity.name == "coverage":
             return 100.0 * coverage_from_dent_density(times * self.target["dent_density"])
         if quantity.column not in self.target.point_data:
@@ -100,13 +104,13 @@ class DrawnPart:
         return scale * np.asarray(self.target[quantity.column])
 
     def covered_to(self, share: float, times: float = 1.0) -> np.ndarray:
-        """Which triangles of `target` have at least a coverage [%]; `times` as in show."""
+        """Mark the triangles of `target` with at least a coverage [%], with `times` as in show."""
         values = self.values(QUANTITIES["coverage"], times)
         return np.asarray(values[self.target.regular_faces].mean(axis=1) >= share)
 
 
 def _is_outside(surface: Surface, chamber: Surface) -> np.ndarray:
-    """Which triangles (c,) of a part's surface are no boundary of its chamber."""
+    """Mark the triangles (c,) of a part's surface that are no boundary of its chamber."""
     of_part = np.asarray(chamber["tag"]) == TAG_PART
     if not surface.n_cells or not of_part.any():
         return np.zeros(surface.n_cells, dtype=bool)
@@ -118,7 +122,7 @@ def _is_outside(surface: Surface, chamber: Surface) -> np.ndarray:
 
 
 def _majority(marked: np.ndarray, among: np.ndarray, corners: np.ndarray) -> np.ndarray:
-    """What most neighbours of each point are, so that single dents make no specks.
+    """Majority of the marks among each point's neighbours, so that single dents make no specks.
 
     Args:
         marked: (v,) bool.
@@ -142,7 +146,7 @@ def _neighbours(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def _fill_from_neighbours(
     columns: dict[str, np.ndarray], name: str, known: np.ndarray, corners: np.ndarray
 ) -> None:
-    """Give points out of reach the mean of their neighbours, so that colours do not fade there."""
+    """Give unreachable points the mean of their neighbours, so that colours do not fade there."""
     values = np.asarray(columns[name])
     known = known & np.isfinite(values)
     of, to = _neighbours(corners)
@@ -153,13 +157,13 @@ def _fill_from_neighbours(
 
 
 def point_areas(surface: Surface) -> np.ndarray:
-    """Area that each point of a surface stands for [mm²], from the cell data "area"."""
+    """Surface area of each point [mm²], from the cell data "area"."""
     corners = np.asarray(surface.regular_faces)
     return np.bincount(corners.ravel(), np.repeat(surface["area"] / 3.0, 3), surface.n_points)
 
 
 def colour_range(parts: Sequence[DrawnPart]) -> tuple[float, float]:
-    """Return round limits that hold nearly all of the area of all parts by the values shown."""
+    """Return round limits around the shown values of nearly all of the area of all parts."""
     values = np.concatenate([part.target["shown"] for part in parts])
     area = np.concatenate([point_areas(part.target) for part in parts])
     known = np.isfinite(values) & (area > 0.0)
@@ -177,7 +181,7 @@ def colour_range(parts: Sequence[DrawnPart]) -> tuple[float, float]:
 
 
 def _round_range(low: float, high: float) -> tuple[float, float]:
-    """Widen limits to round numbers, and down to 0 if that is near."""
+    """Widen limits to round numbers, and the lower limit to 0 if it is near."""
     span = high - low if high > low else max(abs(high), 1e-12)
     step = 10.0 ** np.floor(np.log10(span)) / 2.0
     low = 0.0 if 0.0 <= low < 0.4 * high else step * np.floor(low / step)

@@ -1,4 +1,4 @@
-"""Write frames as a film, .gif or .mp4."""
+"""Write frames as a film, .gif or .mp4, and draw the frames of a shot flight."""
 
 from __future__ import annotations
 
@@ -23,16 +23,16 @@ from chamberopt.results.vtp_files import CHAMBER, MM, PART, pyvista, read_surfac
 if TYPE_CHECKING:
     from chamberopt.results.flight import FlightFrames
 
-COLOURS = 96  # of a GIF, the same in all frames: with palettes of their own frames would flicker
-SAMPLED_FRAMES = 12  # that the palette is chosen from
-MAX_FPS = 50  # a GIF counts in hundredths of a second, and browsers slow down what is faster
+COLOURS = 96  # of a GIF; all frames share them, because changing palettes would flicker
+SAMPLED_FRAMES = 12  # frames that the palette is chosen from
+MAX_FPS = 50  # a GIF counts in hundredths of a second, and browsers slow down faster films
 MIN_SIDE, MAX_SIDE = 64, 4096  # pixels
-MAX_PIXELS = 300_000_000  # of all frames: 0.9 GB
-BLOCK = 16  # pixels: every MP4 player shows sides that are multiples of it
+MAX_PIXELS = 300_000_000  # in all frames together, 0.9 GB
+BLOCK = 16  # pixels: every MP4 player shows sides that are multiples of 16
 
 
 def film_path(film: str | Path) -> Path:
-    """Return where a film may be written; InputError for other suffixes or unusable places."""
+    """Return the path of a film. InputError if its suffix or its place cannot be used."""
     path = file_path(film, (".gif", ".mp4"), "films are written as .gif or .mp4")
     missing = [name for name in ("imageio", "imageio_ffmpeg") if find_spec(name) is None]
     if path.suffix.lower() == ".mp4" and missing:
@@ -44,7 +44,7 @@ def film_path(film: str | Path) -> Path:
 
 
 def require_playable(fps: int, size: tuple[int, int], frames: int, path: Path) -> None:
-    """Raise InputError for a film that players do not show properly or that memory cannot hold."""
+    """Raise InputError for a film that players cannot show properly or memory cannot hold."""
     if not 1 <= fps <= MAX_FPS:
         raise InputError(f"--fps: given {fps}; 1 to {MAX_FPS} are supported")
     given = f"--size: given {size[0]} {size[1]}"
@@ -61,7 +61,7 @@ def require_playable(fps: int, size: tuple[int, int], frames: int, path: Path) -
 
 
 def write_film(path: Path, frames: Sequence[np.ndarray], fps: int) -> None:
-    """Write frames, each (rows, columns, 3) uint8, at `fps` frames a second; a GIF repeats."""
+    """Write frames, each (rows, columns, 3) uint8, at `fps` frames a second. A GIF repeats."""
     if path.suffix.lower() == ".gif":
         write_bytes(path, _gif(frames, fps))
         return
@@ -76,7 +76,7 @@ def write_film(path: Path, frames: Sequence[np.ndarray], fps: int) -> None:
             whole = count_frames_and_secs(file.name)[0] == len(frames)
         except RuntimeError:
             whole = False
-        if not whole:  # ffmpeg does not tell
+        if not whole:  # ffmpeg reports no error
             raise OSError("the film could not be written as a whole; is the disk full?")
 
 
@@ -101,8 +101,8 @@ def _gif(frames: Sequence[np.ndarray], fps: int) -> bytes:
 def _balanced_pixels(frames: Sequence[np.ndarray]) -> np.ndarray:
     """Return the colours of frames as one row of pixels, (1, n, 3) uint8.
 
-    Each colour occurs as often as the square root of its pixels, so small bright things get
-    colours of their own beside a large background.
+    Each colour occurs as often as the square root of its pixels. So small bright things get their
+    own colours beside a large background.
     """
     pixels = np.concatenate([frame.reshape(-1, 3) for frame in frames])
     codes = (pixels >> 2).astype(np.uint32) @ np.array([1, 64, 4096], dtype=np.uint32)
@@ -110,20 +110,15 @@ def _balanced_pixels(frames: Sequence[np.ndarray]) -> np.ndarray:
     return np.repeat(pixels[first], np.ceil(np.sqrt(count)).astype(int), axis=0)[None]
 
 
-# A film of some milliseconds of shot flight: balls and dents at their size and place.
-#
-# Each frame shows the simulator's own positions, and nothing is enlarged: at its true amplitude the
-# sonotrode hardly moves in the picture.
-
-# Blue of Okabe and Ito and a magenta, beside greys: colour-blind readers tell them from one another
-# and from the orange sonotrode.
+# Blue of Okabe and Ito and a magenta, beside greys. Colour-blind readers tell the colours from one
+# another and from the orange sonotrode.
 BALL, HIT, DENT, TRAIL = "#5d6b7a", "#FF2E9A", "#0072B2", "#7f8c99"
 TARGET, REST = "#e6e9ec", "#a9b0b7"
-HIT_FRAMES = 3  # for which a ball that has hit the part and its dent are coloured
+HIT_FRAMES = 3  # frames in which a ball and its dent are coloured after the hit
 TRAIL_FRAMES = 3
 FONT = 10
-MAX_FRAME_SECONDS = 10.0  # for drawing, without a graphics card
-MAX_ROUND_BALLS = 2000  # above it balls have fewer sides
+MAX_FRAME_SECONDS = 10.0  # to draw a frame, without a graphics card
+MAX_ROUND_BALLS = 2000  # with more balls each has fewer sides
 
 
 def draw_replay(
@@ -135,7 +130,10 @@ def draw_replay(
     view: Vector | None = None,
     count: Callable[[int], None] = lambda drawn: None,
 ) -> str | None:
-    """Draw a flight into a film.
+    """Draw some milliseconds of shot flight into a film, with balls and dents at their true size.
+
+    Each frame shows the simulator's own positions. At its true amplitude the sonotrode hardly
+    moves.
 
     Args:
         result: results folder with the chamber and part.
@@ -143,10 +141,9 @@ def draw_replay(
         film: file to write, as film_path accepts it.
         fps: frames a second, as require_playable accepts them.
         size: width and height [pixels], as require_playable accepts them.
-        view: direction from the chamber's middle to the eye; None to choose one that shows the
+        view: direction from the chamber's middle to the eye; None for a direction that shows the
             target.
-        count: called after each frame with how many are drawn.
-
+        count: called after each frame with the number of drawn frames.
     Returns:
         None, or one line that says why there is no film.
     """
@@ -201,7 +198,7 @@ def render_replay(job: dict[str, Any]) -> None:
 
 
 class _ReplayScene:
-    """The chamber with part, balls and dents, shown as they are in one frame after another."""
+    """The chamber with part, balls and dents, shown frame after frame."""
 
     def __init__(
         self, plotter: Any, folder: Path, flight: dict[str, np.ndarray], job: dict[str, Any]
@@ -222,7 +219,7 @@ class _ReplayScene:
         self.ball = pyvista().Sphere(radius=0.5, theta_resolution=sides, phi_resolution=sides)
         eye = job["view"] or choose_views([target_in_chamber(surface)], [chamber])[0]
         width, height = job["size"]
-        # The longest text that a frame has, two lines of clock and title.
+        # The longest text of a frame has two lines of clock and title.
         lines = wrap(f"{self._clock(-1, 10**6)}\n{self.title}", width, FONT).count("\n") + 1
         room = Room(10.0, 10.0, min(LINE_HEIGHT * FONT * (lines + 0.5), 0.3 * height), 10.0)
         fit_camera(plotter, np.asarray(chamber.points), np.array(eye), (width, height), room)
@@ -257,7 +254,7 @@ class _ReplayScene:
         self.plotter.render()
 
     def _clock(self, number: int, dents: int) -> str:
-        """A line with the time of a frame, and impacts and dents by then."""
+        """A line with the time of a frame, and the numbers of impacts and dents until then."""
         flight, now = self.flight, self.flight["time"][number]
         impacts = int((flight["hit_time"] <= now).sum())
         return (
@@ -274,7 +271,7 @@ class _ReplayScene:
         self._replace(name, mesh, color=colour, smooth_shading=True, specular=0.4)
 
     def _show_dents(self, number: int) -> int:
-        """Show the dents made so far, the recent ones coloured, and return how many there are."""
+        """Show the dents until a frame, with the recent dents coloured, and return their number."""
         flight, now = self.flight, self.flight["time"][number]
         made = flight["dent_time"] <= now
         recent = flight["dent_time"][made] > now - self.recent

@@ -20,9 +20,9 @@ FULL_WIDTH = 750
 MIN_SCALE = 0.75  # of fonts in narrower views
 LINE_HEIGHT, LETTER_WIDTH = 2.3, 1.0  # pixels for each unit of font size; the width is a mean
 MIN_LETTERS = 12  # in a line
-TITLE, NUMBERS = 0.72, 0.27  # of the width of a view, for its title and a triangle's numbers
+TITLE, NUMBERS = 0.72, 0.27  # shares of a view's width, for its title and a triangle's numbers
 EDGE = 10  # pixels between text and the edge of the view
-MARK = "#d6006c"  # of the chosen triangle; in none of the colour maps
+MARK = "#d6006c"  # colour of the chosen triangle, which no colour map has
 BINS = 20
 NUMBER = re.compile(r"\S+ \S+ ± \S+( %)?")
 
@@ -37,7 +37,7 @@ def fonts(size: Size) -> tuple[int, int]:
 
 
 def wrap(text: str, width: float, font: int) -> str:
-    """Wrap text to lines of a width [pixels]; a number stays with its interval and its unit."""
+    """Wrap text to lines of a width [pixels]. A number stays with its interval and its unit."""
     text = NUMBER.sub(lambda one: one[0].replace(" ", "\xa0"), text)
     letters = max(int(width / (LETTER_WIDTH * font)), MIN_LETTERS)
     lines = (textwrap.wrap(line, letters) for line in text.splitlines())
@@ -45,7 +45,7 @@ def wrap(text: str, width: float, font: int) -> str:
 
 
 def show_margins(plotter: Any, room: Room, size: Size) -> None:
-    """Keep the part out of the room for text, however it is turned: white at the view's sides."""
+    """Keep the part out of the room for text with white sides of the view."""
     import vtk
 
     left, right = room.left / size[0], 1.0 - room.right / size[0]
@@ -65,13 +65,13 @@ def show_margins(plotter: Any, room: Room, size: Size) -> None:
 
 
 def title_height(title: str, size: Size) -> float:
-    """Height [pixels] of what show_title writes."""
+    """Height [pixels] of the text of show_title."""
     large = fonts(size)[1]
     return 2 * EDGE + LINE_HEIGHT * large * len(wrap(title, TITLE * size[0], large).splitlines())
 
 
 def show_title(plotter: Any, title: str, lines: Sequence[str], size: Size) -> None:
-    """Write the title in the upper left, and below it the lines on a triangle, if any."""
+    """Write the title in the upper left, and below it the lines on a triangle."""
     small, large = fonts(size)
     title = wrap(title, TITLE * size[0], large)
     text = _add_text(plotter, "title", title, (EDGE, size[1] - EDGE), large)
@@ -90,7 +90,7 @@ def show_colour_bar(
     """Draw the colour bar of an actor at the right edge of the view, its title above it."""
     steps, number_format = colour_bar_ticks(limits)
     bar = plotter.add_scalar_bar(
-        title=name,  # blanks: VTK would shrink a title to the bar, so it is written below
+        title=name,  # blanks, because VTK would shrink a title to the bar: it is written below
         mapper=actor.mapper, vertical=True, fmt=number_format, n_labels=steps + 1, color=DARK,
         label_font_size=16, width=50 / size[0], height=0.46, position_x=1.0 - 100 / size[0],
         position_y=0.4, render=False,
@@ -111,7 +111,8 @@ def show_legend(
 ) -> None:
     """Draw a patch of each colour with its meaning in the lower left, and remarks above.
 
-    width: that they may take [pixels].
+    Args:
+        width: of the legend [pixels].
     """
     small, _ = fonts(size)
     line, x, row = LINE_HEIGHT * small, EDGE, 0

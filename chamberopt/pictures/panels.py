@@ -29,7 +29,7 @@ ROUND = (
 
 SIZE = 620, 620  # pixels of a view, at most
 BORDER, BORDER_OF_CHAMBER = 25, 95  # pixels; the larger one has room for dimensions
-WHOLE = 1.3  # of a part that is at most so much longer than its target all is shown
+WHOLE = 1.3  # longest part that is shown whole, over the length of its target
 NEAR_CAPTIONS = "the target", "what is hidden there"
 
 Add = Callable[[Any], None]
@@ -39,14 +39,13 @@ Add = Callable[[Any], None]
 def choose_views(
     parts: Sequence[tuple[Surface, Surface]], chambers: Sequence[Surface]
 ) -> tuple[np.ndarray, list[np.ndarray]]:
-    """Directions to the eyes, the same for several results.
+    """Directions to the eyes, common to several results.
 
     Args:
-        parts: the target, and what may hide it.
+        parts: for each result the target, and the surface that may hide it.
         chambers: with cell data "tag".
-
     Returns:
-        The direction that shows chambers, and one or two that show targets from near.
+        The direction that shows chambers, and one or two directions that show targets from near.
     """
     near, far = near_directions(parts[0][0]), directions(steep=False)
     seen = [seen_area(target, [rest], near) for target, rest in parts]
@@ -64,7 +63,7 @@ def part_panels(
     chamber: Surface,
     views: tuple[np.ndarray, Sequence[np.ndarray]],
 ) -> list[Panel]:
-    """The part in its chamber, with dimensions, and its target from near; `add` adds the part."""
+    """The part in its chamber with dimensions, and its target from near. `add` adds the part."""
 
     def add_both(plotter: Any) -> None:
         add(plotter)
@@ -115,11 +114,11 @@ def chamber_dimensions(chamber: Surface, eye: np.ndarray) -> list[Dimension]:
         for k in (0, 1):
             one = np.array([low, low])
             one[1, k] = high[k]
-            if frame[1, 1 - k] < 0.0:  # the edge that is lower in the view
+            if frame[1, 1 - k] < 0.0:  # takes the edge that is lower in the view
                 one[:, 1 - k] = high[1 - k]
             found.append(Dimension(one, f"{size[k]:.4g} mm"))
             slope = (one[1] - one[0]) @ frame[:2].T
-            # The nearly upright one of the two is on this side, and heights on the other.
+            # The nearly upright dimension is on this side, and heights are on the other side.
             if abs(slope[1]) > abs(slope[0]):
                 left = bool((one.mean(axis=0) - middle) @ frame[0] > 0.0)
         feet = middle + 0.5 * size * np.array([(x, y, -1.0) for x in (-1, 1) for y in (-1, 1)])
@@ -138,7 +137,7 @@ def chamber_dimensions(chamber: Surface, eye: np.ndarray) -> list[Dimension]:
 
 
 def _upright(foot: np.ndarray, low: float, high: float, row: int) -> Dimension:
-    """The height between two levels, at the place of a foot."""
+    """The height between two levels, drawn at the place of a foot."""
     ends = np.array([foot, foot])
     ends[:, 2] = low, high
     return Dimension(ends, f"{high - low:.4g} mm", row)

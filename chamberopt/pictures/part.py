@@ -1,4 +1,4 @@
-"""A part as its file has it, as a .png: its target in the chamber, or what is wrong with it."""
+"""A part as its file has it, as a .png: its target in the chamber, or its faults."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ COLOURS = {
     MISSED: (FAULT, "target that hardly a ball can touch"),
     BEYOND: (OUTSIDE, "target outside the chamber"),
 }
-ALL = 0.999  # of the target's area: in the chamber as a whole
+ALL = 0.999  # share of the target's area from which it is wholly in the chamber
 OPPOSITE = np.array([(1.0, -1.6, 0.7), (-1.0, 1.6, -0.7)])
 
 
@@ -55,14 +55,12 @@ def draw_part(
         corners: of its triangles [m], shape (n, 3, 3).
         title: written above the picture.
         picture: file to write, .png.
-        marked: triangles of the target, bool, shape (n,).
-        edges: drawn red and seen through the part [m], shape (k, 2, 3).
-        missed: triangles of the target that hardly a ball can touch, bool, shape (n,).
+        marked: marks the triangles of the target, shape (n,).
+        edges: lines drawn red and visible through the part [m], shape (k, 2, 3).
+        missed: marks the triangles of the target that hardly any ball can touch, shape (n,).
         chamber: drawn as glass round the part in a further view, with dimensions.
-
     Returns:
         None, or one line that says why there is no picture.
-
     Raises:
         InputError: `picture` cannot be written.
     """
@@ -94,7 +92,7 @@ def render_part(job: dict[str, Any]) -> None:
     chamber = read_surface(Path(job["chamber"])) if "chamber" in job else None
     kinds = np.select([missed, marked], [MISSED, MARKED], PLAIN)
     shown = [(part, kinds)]
-    if chamber is not None:  # what is in it is drawn over the part
+    if chamber is not None:  # surface inside the chamber is drawn over the part
         source = np.asarray(chamber["source"])
         inside, own = cells_of(chamber, source >= 0), kinds[source[source >= 0]]
         inside = pyvista().PolyData.from_regular_faces(  # with its normals out of the part
@@ -123,7 +121,7 @@ def render_part(job: dict[str, Any]) -> None:
 
     surface, kind = shown[-1]
     target, rest = cells_of(surface, kind != PLAIN), [part]
-    if not target.n_cells:  # faults, or a chamber that the part misses
+    if not target.n_cells:  # the part has faults, or lies outside the chamber
         points = np.concatenate([part.points, edges.reshape(-1, 3)])
         panels = [
             Panel(render_view(add, eye, points, SIZE, BORDER), caption)

@@ -1,8 +1,8 @@
 """The part in its chamber in 3D: its surfaces, and the numbers by which the page colours it.
 
-Colours are made in the browser (part.js). The page carries the numbers at each point of the target
-once, in single precision, and shows any of them, or the coverage at any time:
-1 - exp(-dent density · time / treatment time).
+The browser makes the colours (part.js). The page carries the numbers at each point of the target
+once, in single precision. It shows any number, or the coverage at any time: 1 - exp(-dent density ·
+time / treatment time).
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ from chamberopt.pictures.drawn_part import DrawnPart, point_areas
 from chamberopt.results.load import Result, load_cavity, load_field, load_part
 from chamberopt.results.vtp_files import Surface
 
-# A triangle takes about 80 bytes of the page: up to this number it stays below 60 MB and opens.
+# A triangle takes about 80 bytes of the page. Up to this number the page stays below 60 MB.
 MAX_TRIANGLES = 600_000
 USUAL = np.array([0.55, -0.9, 0.62])  # direction to the camera from the middle of the cavity
-DISTANCE = 1.8  # of the camera, in lengths of the cavity's diagonal
-EDGE_ANGLE = 30.0  # degrees; edges of the chamber that are sharper are drawn
+DISTANCE = 1.8  # distance of the camera, in lengths of the cavity's diagonal
+EDGE_ANGLE = 30.0  # degrees; sharper edges of the chamber are drawn
 PART_GREY, SONOTRODE, GLASS, EDGES = "#b9bec4", "#c58b52", "#9fc3dd", "#6f8796"
 
 
@@ -35,10 +35,10 @@ class PartScene:
 
     Args:
         data: for part.js; None for a part that is too large.
-        remarks: sentences on what is not shown.
-        coverage: at points of the target, 0..1, 0 out of reach, shape (k,); None where too few
-            dents were simulated to tell single places apart.
-        area: that each point stands for [mm²], shape (k,).
+        remarks: sentences on surfaces that are not shown.
+        coverage: at points of the target, 0..1, 0 out of reach, shape (k,). None if single places
+            have too few simulated dents.
+        area: of the surface around each point [mm²], shape (k,).
     """
 
     data: dict[str, Any] | None
@@ -51,9 +51,7 @@ def part_scene(result: Result, title: str, max_triangles: int = MAX_TRIANGLES) -
     """Part and chamber of a result.
 
     Args:
-        max_triangles: of a larger part only the target is drawn, and nothing if even the target
-            has more.
-
+        max_triangles: of a larger part only the target is drawn. A larger target is not drawn.
     Raises:
         InputError: a surface is missing, damaged or of another result.
     """
@@ -81,7 +79,7 @@ def part_scene(result: Result, title: str, max_triangles: int = MAX_TRIANGLES) -
         rest = None
     chamber = load_cavity(result)
     eye = _eye(np.asarray(whole.face_normals) * np.asarray(whole["area"])[:, None])
-    # Of the part's triangles: the one in which each point lies, and what is known of each of them.
+    # The part's triangle around each point, and the values of each triangle.
     triangles, row = np.unique(target["triangle"], return_inverse=True)
     of_point = np.zeros(target.n_points, dtype=int)
     of_point[np.asarray(target.regular_faces)] = row.reshape(-1, 1)
@@ -116,7 +114,7 @@ def part_scene(result: Result, title: str, max_triangles: int = MAX_TRIANGLES) -
 
 
 def quantities_in_all(scenes: Sequence[dict[str, Any]]) -> list[dict[str, str]]:
-    """The quantities that all of the scenes have."""
+    """The quantities that all scenes have."""
     keys = ("name", "label", "unit", "title", "colours")
     return [
         {key: getattr(one, key) for key in keys}
@@ -126,13 +124,13 @@ def quantities_in_all(scenes: Sequence[dict[str, Any]]) -> list[dict[str, str]]:
 
 
 def _surfaces(part: DrawnPart, rest: Surface | None, chamber: Any, eye: np.ndarray) -> Any:
-    """What view3d.js draws, by names: part, few, unreached, rest, sonotrode, glass."""
+    """The surfaces that view3d.js draws, by name: part, few, unreached, rest, sonotrode, glass."""
     tags = np.asarray(chamber["tag"])
     target, resolved = part.target, np.asarray(part.target["resolved"])
     corners = target.regular_faces
     found: dict[str, dict[str, Any]] = {
         "part": {"points": _packed(target.points), "triangles": _packed(corners[resolved], "<i4")},
-        # On the points of the part, which the page need not carry twice.
+        # These surfaces share the points of the part, which the page carries once.
         "few": {"triangles": _packed(corners[~resolved], "<i4"), "colour": FEW_DENTS},
     }
     walls = {
@@ -153,10 +151,10 @@ def _surfaces(part: DrawnPart, rest: Surface | None, chamber: Any, eye: np.ndarr
 
 
 def _eye(normal: np.ndarray) -> np.ndarray:
-    """The direction to the camera from which most of the target faces it, a little aside.
+    """Direction to the camera that most of the target faces, a little aside.
 
-    From above, where the border of the chamber hides least, unless twice as much faces down; and
-    where much the same is seen from all sides, as of a gear, from USUAL.
+    It is from above, where the border of the chamber hides least, unless twice as much faces down.
+    If all sides show about the same, as on a gear, it is USUAL.
 
     Args:
         normal: of the target's triangles, any length, shape (k, 3).
@@ -175,7 +173,7 @@ def _eye(normal: np.ndarray) -> np.ndarray:
 
 
 def _view(chamber: Any, eye: np.ndarray) -> dict[str, Any]:
-    """Middle of the cavity, place of the eye, and size of what must fill the view [mm]."""
+    """Middle of the cavity, place of the eye, and size of the scene that fills the view [mm]."""
     around = np.asarray(chamber.points, dtype=float)
     size = float(np.linalg.norm(np.ptp(around, axis=0)))
     middle = 0.5 * (around.min(axis=0) + around.max(axis=0))
@@ -187,7 +185,7 @@ def _view(chamber: Any, eye: np.ndarray) -> dict[str, Any]:
 
 
 def _edges(chamber: Any, tags: np.ndarray) -> np.ndarray:
-    """The ends of the sharp edges of the cavity, one after the other, (2 n, 3)."""
+    """Ends of the sharp edges of the cavity, edge after edge, (2 n, 3)."""
     around = chamber.extract_cells(tags != TAG_PART).extract_surface(algorithm="dataset_surface")
     lines = around.extract_feature_edges(
         feature_angle=EDGE_ANGLE, manifold_edges=False, non_manifold_edges=False

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from chamberopt.chamber.build import Chamber
 
-# Dimension lines with arrows, and the dash-dotted lines of axes and sections. All in page mm.
+# All lengths are in mm on the page.
 
 Point = tuple[float, float]
 SIZE, WIDTH = 7.0, 0.4  # pt, of the text and of the lines
@@ -31,10 +31,10 @@ STUB = 3.5  # mm, of arrows outside
 def dimension(
     axes: Axes, start: Point, end: Point, away: float, text: str, upright: bool = False
 ) -> None:
-    """A dimension between two points, beside one another or, upright, one above the other.
+    """Draw a dimension between two points: side by side, or one above the other if upright.
 
     Args:
-        away: how far below the points, or left of them if upright, its line is drawn.
+        away: distance of its line below the points, or left of the points if upright.
     """
 
     def turn(x: float, y: float) -> Point:
@@ -68,7 +68,7 @@ def dimension(
 
 
 def across_line(axes: Axes, start: Point, end: Point, name: str = "") -> None:
-    """The line of an axis, or of a section with its name at both ends."""
+    """Draw the line of an axis, or of a section with its name at both ends."""
     axes.plot(*zip(start, end, strict=True), color=DARK_GREY, lw=0.5, ls=(0, (9, 2, 1.5, 2)))
     if name:
         length = math.dist(start, end)
@@ -81,11 +81,11 @@ _STEPS = np.outer(10.0 ** np.arange(4), (1.0, 1.25, 1.5, 2.0, 2.5, 4.0, 5.0)).ra
 SCALES = np.concatenate([_STEPS[::-1], 1.0 / _STEPS[1:]])  # from large to small
 # Room on paper [mm] round a view for its dimensions: left and right, above, below.
 BESIDE, ABOVE, BELOW = 11.0, 9.0, 12.0
-WIDER = 0.1  # mm: what a cavity is wider than its sonotrode to have a dimension of its own
-FACE = 2.5  # mm on paper: how thick the sonotrode is drawn
-MOST_OUTSIDE = 6.0  # mm on paper that are drawn of the part outside the chamber
+WIDER = 0.1  # mm: a cavity that is wider than its sonotrode by more has its own dimension
+FACE = 2.5  # mm on paper, thickness of the drawn sonotrode
+MOST_OUTSIDE = 6.0  # mm on paper, most of the part that is drawn outside the chamber
 ROOM, PART, TARGET = "#e8f1f7", "#c9ced3", "#f0a860"
-RASTER = 200  # dots an inch, of what the plan shows of the part
+RASTER = 200  # dots an inch, for the part in the plan
 LEGEND = (
     "dimensions in mm. Orange: target, in the plan also where it is hidden. Hatched or grey: part. "
     "Blue: sonotrode."
@@ -94,12 +94,15 @@ LEGEND = (
 
 @dataclass(frozen=True)
 class View:
-    """One view of the chamber on the page, whose lower left corner is that of the cavity.
+    """One view of the chamber on the page.
 
-    right: axis of the chamber (0, 1, 2) that points to the right.
-    corner: of the cavity on the page [mm].
-    low, high: corners of the cavity in the chamber, (2,) [mm].
-    outside: what is drawn of the part beyond them, [left and right, above] on the page [mm].
+    Attributes:
+        right: axis of the chamber (0, 1, 2) that points to the right.
+        scale: length on the page over length in the chamber.
+        corner: lower left corner of the cavity on the page [mm].
+        low, high: corners of the cavity in the chamber, (2,) [mm].
+        outside: drawn length of the part beyond the cavity, [left and right, above] on the page
+            [mm].
     """
 
     right: int
@@ -110,11 +113,11 @@ class View:
     outside: np.ndarray
 
     def place(self, points: Any) -> np.ndarray:
-        """Points (..., 2) [mm] of the chamber on the page [mm]."""
+        """Places on the page [mm] of points (..., 2) [mm] in the chamber."""
         return np.asarray(self.corner + self.scale * (np.asarray(points) - self.low))
 
     def window(self, axes: Axes) -> Rectangle:
-        """What is drawn, as a patch to clip with."""
+        """The drawn area, as a patch to clip with."""
         from matplotlib.patches import Rectangle
 
         sides, above = self.outside
@@ -125,7 +128,7 @@ class View:
 
 
 def draw_chamber(axes: Axes, chamber: Chamber, left: float, top: float, size: Any) -> str:
-    """Draw both views into a place on the page, and return the scale, such as "1:2".
+    """Draw both views at a place on the page, and return the scale, such as "1:2".
 
     Args:
         axes: of the whole page, in mm.
@@ -134,7 +137,7 @@ def draw_chamber(axes: Axes, chamber: Chamber, left: float, top: float, size: An
     """
     mm = 1e3 * chamber.vertices
     low, high = mm.min(axis=0), mm.max(axis=0)
-    across = int(high[1] - low[1] > high[0] - low[0] + SAME)  # the section's axis to the right
+    across = int(high[1] - low[1] > high[0] - low[0] + SAME)  # axis to the right in the section
     axis = np.array([across, 2])
     part = 1e3 * chamber.part.vertices
     beyond = np.array([
@@ -159,7 +162,7 @@ def draw_chamber(axes: Axes, chamber: Chamber, left: float, top: float, size: An
 def _fit(
     cavity: np.ndarray, across: int, beyond: np.ndarray, size: np.ndarray
 ) -> tuple[float, np.ndarray, float]:
-    """The largest scale at which both views fit, what is drawn outside, and the width they take."""
+    """The largest scale at which both views fit, the drawn length outside, and their width."""
     for scale in SCALES:
         outside = np.minimum(MOST_OUTSIDE, scale * beyond)
         wide = scale * (cavity[across] + cavity[0]) + 2.0 * outside[0] + 4.0 * BESIDE
@@ -170,9 +173,9 @@ def _fit(
 
 
 def _place_of_section(chamber: Chamber, axis: int) -> float:
-    """Where the section is [mm]: through the chamber's axis if that meets the part.
+    """Place of the section [mm]: the chamber's axis if it meets the part.
 
-    Else it goes through the middle of what of the part is in the chamber.
+    Otherwise it is the middle of the part inside the chamber.
     """
     own = np.unique(chamber.triangles[chamber.tags == TAG_PART])
     side = 1e3 * chamber.vertices[own, axis]
@@ -195,7 +198,7 @@ def _draw_section(axes: Axes, chamber: Chamber, view: View, at: float) -> None:
     above = top + view.outside[1]
     across_line(axes, (axis_at, y - FACE - 1.0), (axis_at, above + 1.0))
     _label(axes, view.corner[0], above + 2.5, f"A–A: {'xy'[view.right]} to the right, z up")
-    # The sonotrode: a band below its mean face, at z = 0.
+    # The sonotrode is a band below its mean face, at z = 0.
     face = 1e3 * lines[tags == TAG_SONOTRODE][..., 0]
     if face.size:
         x1, x2 = view.place([[face.min(), 0.0], [face.max(), 0.0]])[:, 0]
@@ -248,7 +251,7 @@ def _draw_plan(axes: Axes, chamber: Chamber, view: View, across: int, at: float)
 
 
 def _on_target(chamber: Chamber) -> np.ndarray:
-    """Which triangles of the cavity are of the target."""
+    """Mark the triangles of the cavity on the target."""
     return np.asarray((chamber.source >= 0) & chamber.part.target[chamber.source])
 
 

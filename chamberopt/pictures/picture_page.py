@@ -1,7 +1,7 @@
 """A page of views with captions, dimensions, axes, a colour bar and a legend, as a .png.
 
-Only views are drawn in 3D. All else is laid out by matplotlib round them, so that nothing lies over
-the part and every text has its size whatever the picture's.
+Only the views are drawn in 3D. Matplotlib lays out all else round them, so nothing lies over the
+part, and the size of texts does not depend on the picture's size.
 """
 
 from __future__ import annotations
@@ -25,16 +25,16 @@ PER_INCH = 130  # pixels, as new_figure has them
 TITLE, TEXT, SMALL = 14, 12, 11  # font sizes
 LINE, HEADLINE = 30, 34  # pixels, height of a line of text and of a title
 EDGE, BETWEEN = 14, 30  # pixels round the page and between views
-BAR, PATCH = 130, 30  # pixels: width of a colour bar with its labels, of a colour in the legend
+BAR, PATCH = 130, 30  # pixels, width of a colour bar with labels, and of a colour in the legend
 LETTER = 1.05  # pixels, width of a letter over its font size
-GAP = 24  # pixels between what is measured and its dimension line
+GAP = 24  # pixels between a body and its dimension line
 FOOT = 74  # pixels below a view, for its axes and its scale
-TRIAD = 22  # pixels, length of its arrows
+TRIAD = 22  # pixels, length of the arrows of the axes
 AXIS_COLOURS = {"x": "#a33530", "y": "#2e7d32", "z": "#1f4e9c"}
 
 
 class Dimension(NamedTuple):
-    """A length that is written at a view: between two points [mm], (2, 3); row 1 is farther out."""
+    """A length between two points [mm], (2, 3), to write at a view. Row 1 is farther out."""
 
     ends: np.ndarray
     text: str
@@ -44,11 +44,12 @@ class Dimension(NamedTuple):
 class Panel(NamedTuple):
     """A view with its caption.
 
-    view: to show.
-    caption: above it, short.
-    dimensions: lengths that are written outside of some points.
-    outside: these points [mm], (k, 3).
-    is_cut: whether the part reaches beyond the view, which then has a frame.
+    Attributes:
+        view: to show.
+        caption: short text above the view.
+        dimensions: lengths that are written outside of the points.
+        outside: these points [mm], (k, 3).
+        is_cut: true if the part reaches beyond the view, which then has a frame.
     """
 
     view: View
@@ -59,12 +60,12 @@ class Panel(NamedTuple):
 
 
 class ColourBar(NamedTuple):
-    """Colours of a quantity between two limits."""
+    """The colours of a quantity between two limits."""
 
     label: str
     colours: str | Colormap
     limits: tuple[float, float]
-    beyond: str = "neither"  # where values lie beyond the limits: neither, min, max, both
+    beyond: str = "neither"  # limits that values exceed: neither, min, max, both
 
 
 class Row(NamedTuple):
@@ -106,7 +107,7 @@ def write_page(
     figure = new_figure(across / PER_INCH, total / PER_INCH)
 
     def place(x: float, y: float, width: float, height: float) -> tuple[float, float, float, float]:
-        """Shares of the figure; y: from its upper edge to that of the rectangle [pixels]."""
+        """Shares of the figure. The rectangle's top is y pixels below the figure's top."""
         return x / across, 1.0 - (y + height) / total, width / across, height / total
 
     top = float(EDGE)
@@ -128,13 +129,13 @@ def write_page(
 
 
 def _wrapped(text: str, pixels: float, font: int) -> str:
-    """Text in lines of at most a width."""
+    """Text in lines of at most a width [pixels]."""
     letters = max(int(pixels / (LETTER * font)), 12)
     return "\n".join(fill(line, letters) for line in text.split("\n"))
 
 
 def _draw_panel(axes: Axes, panel: Panel) -> None:
-    """Draw the view, and below it axes and a scale."""
+    """Draw the view, and its axes and its scale below."""
     from matplotlib.patches import Rectangle
 
     rows, columns = panel.view.image.shape[:2]
@@ -154,7 +155,7 @@ def _draw_panel(axes: Axes, panel: Panel) -> None:
 
 
 def draw_scale(axes: Axes, view: View, place: tuple[float, float]) -> None:
-    """Draw a bar of a round length, at most a fourth of the image's width."""
+    """Draw a bar of a round length, at most a quarter of the image's width."""
     longest = 0.25 * view.image.shape[1] * view.pixel_mm
     power = 10.0 ** np.floor(np.log10(longest))
     length = max(step * power for step in (1.0, 2.0, 5.0) if step * power <= longest)
@@ -165,7 +166,7 @@ def draw_scale(axes: Axes, view: View, place: tuple[float, float]) -> None:
 
 
 def _draw_triad(axes: Axes, frame: np.ndarray, place: tuple[float, float]) -> None:
-    """Draw the directions of x, y and z; those to the eye last."""
+    """Draw the directions of x, y and z. Directions towards the eye come last."""
     for k in np.argsort(frame[2]):
         name = "xyz"[k]
         step = TRIAD * frame[:2, k] * [1.0, -1.0]
@@ -181,7 +182,7 @@ def _draw_triad(axes: Axes, frame: np.ndarray, place: tuple[float, float]) -> No
 
 
 def _draw_dimension(axes: Axes, panel: Panel, one: Dimension) -> None:
-    """Draw a dimension line outside of everything, with its extension lines and its length."""
+    """Draw a dimension line outside of everything, with extension lines and its length."""
     assert panel.outside is not None
     around = panel.view.pixels(panel.outside)
     start, end = panel.view.pixels(one.ends)
@@ -234,7 +235,7 @@ def _legend_lines(
 def _draw_foot(
     axes: Axes, remarks: Sequence[str], lines: Sequence[Sequence[tuple[float, str, str]]]
 ) -> None:
-    """Write the legend and the remarks into axes whose units are pixels from the upper left."""
+    """Write the legend and the remarks into axes in pixels from the upper left corner."""
     from matplotlib.patches import Rectangle
 
     for row, entries in enumerate(lines):

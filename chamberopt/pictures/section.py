@@ -1,4 +1,4 @@
-"""What drawings need of meshes: plane cuts, the areas that they enclose, the sonotrode's size."""
+"""Geometry for drawings: plane cuts of meshes, the enclosed areas, and the sonotrode's size."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ if TYPE_CHECKING:
 
     from chamberopt.chamber.build import Chamber
 
-# The plane is moved by this [m], so that it goes through no corner of a mesh.
+# Shift of the plane [m], so that it goes through no corner of a mesh.
 OFF_THE_CORNERS = 1.7e-8
-SAME = 0.02  # mm: lengths that differ by less are the same
-FEWEST_CORNERS = 8  # of a face that is drawn as a round one
+SAME = 0.02  # mm: lengths that differ by less count as equal
+FEWEST_CORNERS = 8  # of a face that is drawn as round
 
 
 def cut(
@@ -29,17 +29,16 @@ def cut(
         vertices: (n, 3) [m].
         triangles: (m, 3).
         axis: 0, 1 or 2, the plane's normal.
-        at: place of the plane on that axis [m].
-
+        at: place of the plane on the axis [m].
     Returns:
-        Ends of the lines (k, 2, 2) [m], in the two other axes, which go round each body in one
-        sense; ends that meet are equal to the last bit. And the triangle of each, (k,).
+        Ends of the lines (k, 2, 2) [m] in the two other axes, and the triangle of each line, (k,).
+        Lines go round each body in one sense. Ends that meet are equal to the last bit.
     """
     height = vertices[:, axis] - (at + OFF_THE_CORNERS)
     above = (height > 0.0)[triangles]
     cut_ones = np.flatnonzero(above.any(axis=1) & ~above.all(axis=1))
     above, corners = above[cut_ones], triangles[cut_ones]
-    # The corner that is alone on its side of the plane; the plane cuts the two edges from it.
+    # The plane cuts the two edges from the corner that is alone on its side.
     alone = np.where(above.sum(axis=1) == 1, above.argmax(axis=1), above.argmin(axis=1))
     row = np.arange(len(corners))
     ends = []
@@ -55,7 +54,7 @@ def cut(
 
 
 def inside(lines: np.ndarray) -> Path | None:
-    """The areas that the lines of closed bodies, which may overlap, enclose; None without any."""
+    """The areas inside the lines of closed bodies, which may overlap, or None without lines."""
     import shapely
     from matplotlib.path import Path
 
@@ -72,7 +71,7 @@ def inside(lines: np.ndarray) -> Path | None:
 
 
 def _turns_around(lines: np.ndarray, point: Any) -> int:
-    """How often the lines go round a point: what a ray to the right crosses, up less down."""
+    """Number of turns of the lines round a point: upward less downward lines to its right."""
     (x1, y1), (x2, y2) = lines[:, 0].T, lines[:, 1].T
     way = (y2 > point.y).astype(int) - (y1 > point.y)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -81,7 +80,7 @@ def _turns_around(lines: np.ndarray, point: Any) -> int:
 
 
 def face_size_mm(chamber: Chamber) -> tuple[float, ...]:
-    """Diameter of a round sonotrode, or the lengths of another along x and y [mm]."""
+    """Diameter of a round sonotrode, or the lengths of another sonotrode along x and y [mm]."""
     face = chamber.triangles[chamber.tags == TAG_SONOTRODE]
     rim = np.unique(border_edges(face))
     rim = rim if len(rim) else np.unique(face)

@@ -1,4 +1,4 @@
-"""One view of surfaces along parallel lines of sight, so that lengths are the same all over it."""
+"""A view of surfaces along parallel lines of sight, so lengths are the same all over it."""
 
 from __future__ import annotations
 
@@ -11,16 +11,17 @@ from chamberopt.pictures.actors import light
 from chamberopt.pictures.camera import view_frame
 from chamberopt.results.vtp_files import pyvista
 
-NARROWEST = 0.6  # a side of an image, as a share of the largest
+NARROWEST = 0.6  # shortest side of an image over the largest side
 
 
 class View(NamedTuple):
-    """An image and what its pixels are.
+    """An image, and the place of its pixels in space.
 
-    image: uint8, shape (rows, columns, 3).
-    frame: unit vectors to the right, upwards and to the eye, (3, 3).
-    corner: of the image, upper left, along the first two of them [mm].
-    pixel_mm: size of a pixel [mm].
+    Attributes:
+        image: uint8, shape (rows, columns, 3).
+        frame: unit vectors to the right, upwards and to the eye, (3, 3).
+        corner: upper left corner of the image along the first two unit vectors [mm].
+        pixel_mm: size of a pixel [mm].
     """
 
     image: np.ndarray
@@ -29,7 +30,7 @@ class View(NamedTuple):
     pixel_mm: float
 
     def pixels(self, points: np.ndarray) -> np.ndarray:
-        """Columns and rows of points [mm], (k, 3), shape (k, 2)."""
+        """Columns and rows (k, 2) in the image of points [mm], (k, 3)."""
         flat = np.asarray(points, dtype=float) @ self.frame[:2].T
         return np.asarray((flat - self.corner) * [1.0, -1.0] / self.pixel_mm)
 
@@ -41,13 +42,13 @@ def render_view(
     size: tuple[int, int],
     border: int,
 ) -> View:
-    """Render what `add` puts into a plotter.
+    """Render the actors that `add` puts into a plotter.
 
     Args:
         eye: direction to the eye.
-        points: that fill the image [mm], (k, 3).
-        size: largest width and height [pixels]; a side that is not needed is made shorter.
-        border: round them [pixels].
+        points: points that fill the image [mm], (k, 3).
+        size: largest width and height [pixels]. A side that is not filled is made shorter.
+        border: round the points [pixels].
     """
     frame = view_frame(eye)
     flat = np.asarray(points, dtype=float) @ frame.T
@@ -68,7 +69,11 @@ def render_view(
 
 
 def aim_along(plotter: Any, frame: np.ndarray, middle: np.ndarray, half_height: float) -> None:
-    """Look at a point along parallel lines; half_height: of the image [mm]."""
+    """Look at a point along parallel lines.
+
+    Args:
+        half_height: of the image [mm].
+    """
     distance = 2.0 * np.linalg.norm(np.ptp(np.reshape(plotter.bounds, (3, 2)), axis=1)) + 1.0
     plotter.camera_position = [middle + distance * frame[2], middle, frame[1]]
     plotter.camera.parallel_projection = True

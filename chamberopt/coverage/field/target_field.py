@@ -141,9 +141,7 @@ class TargetField:
         return self._gauge_of(int(OF_WIDE * self.setting.points), 2.0 * self.radius)
 
     def _gauge_of(self, count: int, radius: float) -> Gauge:
-        """Windows of a radius [m] round at most `count` points, each with a division of the
-        faces.
-        """
+        """Windows of a radius [m] round at most `count` points, each with a division."""
         gauge = math.pi * radius**2
         most = max(MOST_AREA, MOST_OVERLAP * self.target_area) / gauge
         points = self.some_points(min(count, max(int(most), FEWEST_WINDOWS)))

@@ -1,4 +1,4 @@
-"""The picture of a convergence study (`chamberopt accuracy`)."""
+"""The picture of a convergence study (`chamberopt accuracy`): errors and biases over cost."""
 
 from __future__ import annotations
 
@@ -62,8 +62,8 @@ def _draw_errors(axes: Axes, study: ConvergenceStudy) -> None:
 
 
 def _draw_bias_marks(axes: Axes, study: ConvergenceStudy) -> None:
-    """Draw a filled mark for a significant bias, else an open one at its upper limit."""
-    # The gauge is what is measured, not how well.
+    """Draw a filled mark for a significant bias, else an open mark at its upper limit."""
+    # The gauge changes the measured quantity, not its accuracy.
     names = dict.fromkeys(run.parameter for run in study.runs)
     others = (name for name in names if name not in (DESIGNED, GAUGE, TIME))
     colours = (ORANGE, GREEN, PURPLE, SKY, YELLOW, GREY)
@@ -95,7 +95,7 @@ def _draw_biases(axes: Axes, study: ConvergenceStudy) -> None:
         ratio = run.cpu.value / study.reference.cpu.value
         names.append(f"{short_name(run.parameter)} {run.setting}  ({ratio:.2f}×)")
     axes.set_yticks(heights, names, fontsize=SMALL)
-    axes.set_ylim(-1.3, len(runs) - 0.5)  # leaves room for the legend below the last
+    axes.set_ylim(-1.3, len(runs) - 0.5)  # leaves room for the legend below the last run
     axes.axvline(0.0, color=GREY, lw=1)
     allowed = BIAS_SHARE * ACCURACIES[1]
     label = f"a third of {ACCURACIES[1]:g}; open: not significant"

@@ -1,4 +1,4 @@
-"""The picture of a calibration: measured points on predicted bands, a panel for each kind."""
+"""The picture of a calibration: measured points on predicted bands, a panel a kind of data."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ Z = normal_quantile(0.95)
 
 
 def calibration_picture(path: Path, found: Calibrated) -> None:
-    """Write one panel a kind of data: points with 95 % bars, bands of 95 %, as .png."""
+    """Write a panel for each kind of data, with 95 % bars of points and 95 % bands, as .png."""
     kinds = list(dict.fromkeys(one.kind for one in found.data))
     rows = -(-len(kinds) // COLUMNS)
     figure = new_figure(6.4 * min(COLUMNS, len(kinds)), 4.4 * rows)
@@ -52,7 +52,7 @@ def calibration_picture(path: Path, found: Calibrated) -> None:
 
 
 def _band(found: Calibrated, model: Model) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Middle and ends of the 95 % band of figures, not logarithms."""
+    """Middle and ends of the 95 % band, of figures and not of logarithms."""
     at = model(found.posterior.values)
     sd = np.sqrt(found.posterior.sd(model) ** 2 + at.noise.diagonal())
     low, middle, high = (np.exp(at.values + sign * Z * sd) for sign in (-1.0, 0.0, 1.0))
@@ -82,7 +82,7 @@ def _arcs(axes: Axes, found: Calibrated, some: list[Data]) -> None:
 
 
 def _coverage(axes: Axes, found: Calibrated, some: list[Data]) -> None:
-    """Coverage against time, 1 - exp(-x t)."""
+    """Draw coverage against time, 1 - exp(-x t)."""
     for one, colour in zip(some, COLOURS * len(some), strict=False):
         times = np.linspace(0.0, 1.3 * float(one.at.max()), TIMES)
         middle, low, high = (-100.0 * np.expm1(-x[0] * times) for x in _band(found, one.model))
@@ -99,7 +99,7 @@ def _coverage(axes: Axes, found: Calibrated, some: list[Data]) -> None:
 
 
 def _ratios(axes: Axes, found: Calibrated, some: list[Data]) -> None:
-    """Measured over predicted, and the band of the prediction, for single figures."""
+    """Draw measured over predicted single figures, and the band of the prediction."""
     names, place = [], 0
     for one in some:
         middle, low, high = _band(found, one.model)

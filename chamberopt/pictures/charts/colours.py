@@ -10,22 +10,22 @@ PURPLE, SKY, YELLOW, BLACK = "#CC79A7", "#56B4E9", "#E69F00", "#000000"
 DARK_GREY = "#555555"  # text and reference lines
 
 # Colour maps of the part in viewer and report, and of an objective in a map. Their lightness grows
-# in even steps, which colour-blind readers see too.
+# in even steps that colour-blind readers see too.
 COVERAGE_MAP, COUNT_MAP, WIDTH_MAP = "viridis", "cividis", "magma"
 DIFFERENCE_MAP = "PuOr"
-# On the target: where too few dents were simulated, where no ball can touch it, and where it is not
-# in the chamber.
+# Places of the target with too few simulated dents, out of the balls' reach, and outside the
+# chamber.
 FEW_DENTS, UNREACHED, OUTSIDE = "#6c737a", "#a9714f", PURPLE
 
-# Each compared result has a colour and a line style of its own.
+# Colours and line styles of compared results.
 _COLOURS = (BLUE, ORANGE, GREEN, PURPLE, BLACK, YELLOW, SKY, GREY)
 _DASHES = (6, 1, 1, 1, 1, 1), (8, 2), (2, 1), (4, 1, 1, 1)
 _LINES = ("-", "--", "-.", ":", *((0, dashes) for dashes in _DASHES))
 
 
 def zone_colour(index: int) -> str:
-    """Colour of the zone with this index; later ones begin again."""
-    return (SKY, PURPLE, GREEN, BLUE, BLACK)[index % 5]  # none like the sonotrode
+    """Colour of the zone with this index. Colours repeat for later zones."""
+    return (SKY, PURPLE, GREEN, BLUE, BLACK)[index % 5]  # unlike the sonotrode's colour
 
 
 def line_style(index: int) -> dict[str, Any]:
@@ -34,7 +34,7 @@ def line_style(index: int) -> dict[str, Any]:
 
 
 def hex_colours(colour_map: Any, count: int = 10) -> list[str]:
-    """Evenly spaced colours of a matplotlib colour map, or of the one of that name, as #rrggbb."""
+    """Evenly spaced colours of a matplotlib colour map, or of its name, as #rrggbb."""
     from matplotlib import colormaps
     from matplotlib.colors import to_hex
 

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from chamberopt.common.estimate import Estimate
     from chamberopt.results.records import CoverageAtTime
 
-MAX_HALF_WIDTH = 0.15  # a curve ends where its coverage is known no better than that
+MAX_HALF_WIDTH = 0.15  # largest half-width of an interval at which a curve is still drawn
 MAX_BANDS = 3  # results with a band around the 5th percentile; more bands would hide each other
 
 
@@ -37,9 +37,9 @@ class HistogramData:
 
     Args:
         edges: bin edges, shape (n + 1,).
-        shares: share of area or impacts in each bin, shape (n,), one a result; None if not known.
-        labels: legend, one a result.
-        styles: colour and line style, one a result.
+        shares: for each result the share of area or impacts in each bin, shape (n,), or None.
+        labels: legend text of each result.
+        styles: colour and line style of each result.
         x_label, y_label, title: texts of the axes.
     """
 
@@ -58,7 +58,7 @@ class CoverageCurve:
 
     Args:
         label: legend.
-        rows: coverage at some times, in their order.
+        rows: coverage at several times, in ascending order.
         style: colour and line style.
         time_to_98: peening time until 95 % of the area is covered to 98 % [s], if known.
     """
@@ -105,10 +105,10 @@ def distributions_picture(
 
 
 def draw_histogram(axes: Axes, data: HistogramData) -> None:
-    """Draw the outline of a histogram in per cent, one a result."""
+    """Draw the outline of a histogram in per cent for each result."""
     for shares, name, style in zip(data.shares, data.labels, data.styles, strict=True):
         label = literal(name)
-        if shares is None:  # named in the legend all the same
+        if shares is None:  # the result has only its legend
             axes.plot([], [], label=label, lw=1.6, **style)
         else:
             axes.stairs(100.0 * shares, data.edges, label=label, lw=1.6, **style)
@@ -124,7 +124,7 @@ def draw_coverage_over_time(
     treatment_time: float,
     max_half_width: float = math.inf,
 ) -> None:
-    """Draw the mean coverage as a thick line and its 5th percentile as a thin one, with bands.
+    """Draw the mean coverage as a thick line and its 5th percentile as a thin line, with bands.
 
     Args:
         treatment_time: [s].
@@ -146,7 +146,7 @@ def draw_coverage_over_time(
     axes.axvline(treatment_time, color=GREY, lw=0.8)
     axes.text(treatment_time, 1.0, " treatment", fontsize=SMALL, color=DARK_GREY)
     axes.set_xlim(0.0, 1.02 * end)
-    axes.set_ylim(-2.0, 104.0)  # a line at zero is not the axis
+    axes.set_ylim(-2.0, 104.0)  # keeps a line at zero off the axis
     style_axes(axes, "peening time [s]", "coverage [%]")
 
 
@@ -166,10 +166,10 @@ def _known_lines(rows: Sequence[CoverageAtTime], max_half_width: float) -> list[
 
 
 def _draw_time_to_98(axes: Axes, curve: CoverageCurve, end: float, height: float) -> None:
-    """Mark the time to 98 % with its interval, or draw an arrow at the edge if that is later.
+    """Mark the time to 98 % with its interval, or draw an arrow at the edge for a later time.
 
     Args:
-        height: of the mark [%]; each result has its own, so that near marks do not overlap.
+        height: of the mark [%]. Each result has its own height, so that near marks do not overlap.
     """
     assert curve.time_to_98 is not None
     time, half_width = curve.time_to_98.value, curve.time_to_98.half_width

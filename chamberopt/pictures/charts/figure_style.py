@@ -1,4 +1,4 @@
-"""What all pictures share: making a figure, saving it, plain axes and their range."""
+"""Common functions of all pictures: make a figure, save it, style axes and choose their range."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ if TYPE_CHECKING:
 
     from chamberopt.common.estimate import Estimate
 
-TITLE, SMALL = 11, 9  # of titles, and of legends and all that is small, in every figure
+TITLE, SMALL = 11, 9  # font sizes of titles, and of legends and other small text, in every figure
 SVG = "http://www.w3.org/2000/svg"
 
 
 def new_figure(width: float, height: float) -> Figure:
-    """An empty figure [inch] that needs no display."""
+    """An empty figure of this size [inch] that needs no display."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -36,7 +36,7 @@ def new_figure(width: float, height: float) -> Figure:
 
 
 def ignore_settings_here() -> None:
-    """Let no file of settings of matplotlib, which may have come with a design, run programs."""
+    """Ignore settings files of matplotlib, since a file beside a design may run programs."""
     import matplotlib
 
     if Path("matplotlibrc").exists():
@@ -51,12 +51,12 @@ def save_picture(figure: Figure, path: Path) -> None:
 
 
 def svg_text(figure: Figure, name: str, tooltips: Mapping[str, Sequence[str]] | None = None) -> str:
-    """The figure as an SVG element for an HTML page; its text can be selected and searched.
+    """The figure as an SVG element for an HTML page. Its text can be selected and searched.
 
     Args:
         name: makes the ids inside unique among the figures of a page.
-        tooltips: texts that appear when pointing at the markers of the line with this gid, in
-            the order of its points.
+        tooltips: for the gid of a line, the texts that appear when pointing at its markers, in the
+            order of its points.
     """
     from matplotlib import rc_context
 
@@ -75,7 +75,7 @@ def svg_text(figure: Figure, name: str, tooltips: Mapping[str, Sequence[str]] | 
         ):
             ElementTree.SubElement(marker, f"{{{SVG}}}title").text = tooltip
         if identity and f"#{identity}" not in text:
-            del element.attrib["id"]  # such as axes_1, the same in every figure
+            del element.attrib["id"]  # such as axes_1, which every figure has
     root.set("width", f"{100.0 * figure.get_figwidth():g}")  # pixels; the page may shrink it
     del root.attrib["height"]
     return ElementTree.tostring(root, encoding="unicode")
@@ -93,7 +93,7 @@ def style_axes(axes: Axes, x_label: str = "", y_label: str = "") -> None:
 
 
 def name_choices(axis: Axis, texts: Sequence[str]) -> None:
-    """An axis of the positions of texts, with the texts at them; as it is if there are none."""
+    """Write texts at their positions on an axis. Without texts the axis stays as it is."""
     if texts:
         axis.set_ticks(range(len(texts)), texts)
 
@@ -101,7 +101,7 @@ def name_choices(axis: Axis, texts: Sequence[str]) -> None:
 def value_range(estimates: Sequence[Estimate]) -> tuple[float, float]:
     """Axis limits that show every value, and its interval up to the span of the values.
 
-    A wider interval, such as that of a time that may be infinite, would flatten everything else.
+    A wider interval, for example of a time that may be infinite, would flatten everything else.
     """
     values = np.array([one.value for one in estimates])
     half_widths = np.array([one.half_width for one in estimates])
@@ -116,11 +116,11 @@ def value_range(estimates: Sequence[Estimate]) -> tuple[float, float]:
 
 
 def literal(text: str) -> str:
-    """Text with names as they are: for matplotlib $ begins a formula, and _ hides a label."""
+    """Text that shows names as they are: for matplotlib $ begins a formula, and _ hides a label."""
     text = text.replace("$", r"\$")
     return f" {text}" if text.startswith("_") else text
 
 
 def readable(name: str) -> str:
-    """The name of an objective as text of an axis."""
+    """The name of an objective as text for an axis."""
     return name.replace("_", " ")

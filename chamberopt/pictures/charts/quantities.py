@@ -14,17 +14,17 @@ class Quantity:
     name: str
     label: str
     unit: str
-    column: str  # its field in coverage.vtp and part.vtp
-    factor: float = 1.0  # from that field to the unit that is shown
+    column: str  # field in coverage.vtp and part.vtp
+    factor: float = 1.0  # from the field to the shown unit
     colours: str = COVERAGE_MAP
-    grows: bool = False  # whether it is proportional to the peening time
+    grows: bool = False  # true if it is proportional to the peening time
 
     @property
     def title(self) -> str:
         return f"{self.label} [{self.unit}]"
 
 
-OTHER_NAMES = {"intensity": "strength", "p90": "p90-speed"}  # what one may call them
+OTHER_NAMES = {"intensity": "strength", "p90": "p90-speed"}  # other accepted names
 QUANTITIES = {
     one.name: one
     for one in (

@@ -25,7 +25,7 @@ MULTIPLE_NAMES = "T/4", "T/2", "T", "2 T", "4 T"
 
 
 def fit_text(fit: KirkFit, strip: VirtualStrip) -> str:
-    """Intensity and saturation time of a fit, and how far they are from those of the curve."""
+    """Intensity and saturation time of a fit, and their distance from the curve's."""
     off = 100.0 * (fit.intensity / strip.intensity.value - 1.0)
     late = 100.0 * (fit.saturation_time / strip.time.value - 1.0)
     symbol = "I" if strip.is_calibrated else "S"

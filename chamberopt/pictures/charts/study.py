@@ -41,8 +41,8 @@ class EvaluatedCandidate:
     Args:
         number: place in the order of evaluations, from 1.
         stage: "search" or "confirm".
-        objective: None when the candidate was not simulated.
-        feasible: whether it meets the constraints.
+        objective: None if the candidate was not simulated.
+        feasible: true if it meets the constraints.
         parameters: values by dotted name.
     """
 
@@ -156,7 +156,7 @@ def _tooltip(candidate: EvaluatedCandidate) -> str:
 def _draw_parameter(
     axes: Axes, result: StudyResult, candidates: Sequence[EvaluatedCandidate], name: str
 ) -> None:
-    """Draw the search over one parameter, later ones darker, and start and best as confirmed."""
+    """Draw the search over one parameter, later candidates darker, and confirmed start and best."""
     varied = result.study.vary[name]
     search = [one for one in candidates if one.stage == "search"]
     shown = [
@@ -190,7 +190,7 @@ def _draw_parameter(
 
 
 def is_there(value: float | str, texts: Sequence[str]) -> bool:
-    """Whether a candidate has a parameter, whose value is else the text of parameters.NONE."""
+    """True if a candidate has a parameter. A missing parameter has the text parameters.NONE."""
     return not isinstance(value, str) or value in texts
 
 
@@ -213,11 +213,11 @@ def slices_figure(
     flat_label: str,
     y_label: str,
 ) -> Figure:
-    """The model's objective over each parameter: slice with its interval, main effect, flat range.
+    """The model's objective over each parameter, with main effect, interval and flat range.
 
     Args:
         start, best: parameter values of these two designs.
-        flat_label: what the shaded range of a parameter means.
+        flat_label: meaning of a parameter's shaded range.
     """
     columns = min(len(slices), MAX_COLUMNS)
     rows = -(-len(slices) // columns)
@@ -225,7 +225,7 @@ def slices_figure(
     panels = figure.subplots(rows, columns, sharey=True, squeeze=False).ravel()
     for axes, one in zip(panels, slices, strict=False):
         of_slice = "the others as in the best, 95 % interval; without a band: or worse"
-        width = np.where(one.or_worse, np.nan, one.half_width)  # no band there
+        width = np.where(one.or_worse, np.nan, one.half_width)  # no band for bounds
         of_mean = "mean over the others; above, its share of the variance over the bounds"
         if one.texts:
             for text in one.flat:
@@ -286,7 +286,7 @@ def pareto_picture(path: Path, result: StudyResult) -> None:
             bars = {"xerr": x_error, "yerr": y_error}
         axes.errorbar(x, y, **bars, fmt=marker, ls="--" if bars and on_front else "", lw=1,
                       ms=5 if bars else 3, color=colour, label=label)  # fmt: skip
-    # Intervals are drawn for confirmed candidates only.
+    # Only confirmed candidates have intervals.
     x_goals, y_goals = (
         [
             one.goals[k] if one.stage == "confirm" else Estimate(one.goals[k].value, 0.0)

@@ -1,4 +1,4 @@
-"""The map of a sweep: its objective over one, two or more parameters."""
+"""The map of a sweep: its objective over one or more parameters."""
 
 from __future__ import annotations
 
@@ -35,11 +35,11 @@ MAX_PAIRS = 15  # panels of a picture: the pairs of six parameters
 def sweep_map(path: Path, sweep: SweepResult) -> list[str]:
     """Write the map of a sweep as .png.
 
-    One parameter gives a curve with intervals, two give a map, and more give one map a pair, in
-    which the other parameters vary too.
+    One parameter gives a curve with intervals, and two parameters give a map. More parameters give
+    a map for each pair, over which the other parameters vary too.
 
     Returns:
-        Remarks: a sentence when pairs are left out.
+        Remarks: a sentence if pairs are left out.
     """
     names = list(sweep.study.vary)
     pairs = list(combinations(names, 2))
@@ -70,7 +70,7 @@ def _title(sweep: SweepResult) -> str:
 
 
 def _draw_curve(axes: Axes, sweep: SweepResult, name: str) -> None:
-    """Draw the objective against the only parameter, with 95 % intervals."""
+    """Draw the objective over the only parameter, with 95 % intervals."""
     for feasible, colour, line, label in (
         (True, BLUE, "-o", "95 % interval"),
         (False, GREY, "x", "misses a constraint"),
@@ -116,7 +116,7 @@ def _draw_maps(
 
 
 def _draw_squares(axes: Axes, sweep: SweepResult, pair: tuple[str, str]) -> Any:
-    """Draw a grid of two parameters; candidates that could not be simulated stay white."""
+    """Draw a grid of two parameters. Candidates that could not be simulated stay white."""
     x, y = (np.unique(_places(sweep, sweep.trials, name)) for name in pair)
     objective = [trial.objective.value if trial.objective else np.nan for trial in sweep.trials]
     values = np.array(objective).reshape(len(x), len(y))  # the second parameter runs fastest
@@ -124,7 +124,7 @@ def _draw_squares(axes: Axes, sweep: SweepResult, pair: tuple[str, str]) -> Any:
 
 
 def _draw_points(axes: Axes, sweep: SweepResult, pair: tuple[str, str]) -> Any:
-    # Good candidates are drawn last, so that the best of those on one spot is visible.
+    # Good candidates are drawn last, so that the best candidate on a spot is visible.
     evaluated = sorted(
         ((trial.objective.value, trial) for trial in sweep.trials if trial.objective),
         key=lambda row: row[0],
@@ -146,7 +146,7 @@ def _draw_marks(axes: Axes, sweep: SweepResult, pair: tuple[str, str]) -> None:
         if trials:
             x, y = (_places(sweep, trials, name) for name in pair)
             axes.scatter(x, y, marker="x", s=22, lw=1, color=colour, label=label)
-    # Open marks: what lies below them keeps its colour.
+    # Open marks show the colour below them.
     start = (_start(sweep, name) for name in pair)
     axes.plot(*start, "o", color=ORANGE, mfc="none", mew=2.2, ms=13, label="the design as it is")
     if sweep.best is not None:
@@ -157,7 +157,7 @@ def _draw_marks(axes: Axes, sweep: SweepResult, pair: tuple[str, str]) -> None:
 
 
 def _places(sweep: SweepResult, trials: Sequence[Trial], name: str) -> list[float]:
-    """Values of a parameter; positions of texts."""
+    """Values of a parameter. A text gives its position."""
     return [sweep.study.vary[name].place(trial.parameters[name]) for trial in trials]
 
 

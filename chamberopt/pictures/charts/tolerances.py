@@ -1,4 +1,4 @@
-"""A tornado chart: what each tolerance alone does to a figure."""
+"""A tornado chart: the effect of each single tolerance on a figure."""
 
 from __future__ import annotations
 
@@ -47,10 +47,7 @@ def tornado_figure(panels: Sequence[TornadoPanel]) -> Figure:
 
 
 def draw_tornado(axes: Axes, bars: Sequence[TornadoBar], x_label: str) -> None:
-    """Draw a bar for each end of each number, with its 95 % interval; grey where in the noise.
-
-    The first bar is on top.
-    """
+    """Draw a bar with its 95 % interval for each end of each number. Bars in the noise are grey."""
     for row, bar in enumerate(bars):
         for end, colour in ((bar.low, ORANGE), (bar.high, BLUE)):
             resolved = abs(end.value) > end.half_width
@@ -62,4 +59,4 @@ def draw_tornado(axes: Axes, bars: Sequence[TornadoBar], x_label: str) -> None:
     axes.set_ylim(len(bars) - 0.5, -0.5)
     style_axes(axes, x_label)
     axes.tick_params(axis="x", labelsize=SMALL)
-    axes.locator_params(axis="x", nbins=5)  # as many as fit beside each other in a report
+    axes.locator_params(axis="x", nbins=5)  # as many labels as fit in a report
