@@ -18,8 +18,8 @@ from chamberopt.results.load import Result, read_field, read_part, summary, unch
 from chamberopt.results.vtp_files import CHAMBER, COVERAGE, PART, ZONE, read_surface
 from chamberopt.viewer.view_state import ViewState
 
-FULL_SCALE = (0.0, 100.0)  # % of coverage: the same at all times
-_REMEDIES = {  # where a result lacks a quantity
+FULL_SCALE = (0.0, 100.0)  # % of coverage, fixed over time
+_REMEDIES = {  # for a quantity that a result lacks
     "almen": "give the design a calibration to strips and simulate again",
     "zones": "give the design [[zones]] and simulate again",
 }
@@ -27,12 +27,13 @@ _REMEDIES = {  # where a result lacks a quantity
 
 @dataclass(frozen=True)
 class ResultInfo:
-    """What the viewer needs from a result.json, plain enough for the drawing process.
+    """The data of a result.json for the viewer, plain enough for the drawing process.
 
-    treatment_s: peening time.
-    longest_s: end of the time slider.
-    sha256: of each data file by its name.
-    zones: names of the part's zones.
+    Attributes:
+        treatment_s: peening time.
+        longest_s: end of the time slider.
+        sha256: of each data file by its name.
+        zones: names of the part's zones.
     """
 
     folder: str
@@ -44,7 +45,7 @@ class ResultInfo:
 
 
 def result_info(result: Result) -> ResultInfo:
-    """Collect what the viewer needs from a result."""
+    """Collect the viewer's data from a result."""
     treatment = result.design.process.treatment_time
     times = [row.time_s for row in result.record.coverage_against_time]
     return ResultInfo(
@@ -58,7 +59,7 @@ def result_info(result: Result) -> ResultInfo:
 
 
 class OpenedResult:
-    """A result's surfaces and impacts; InputError if files are missing, damaged or not its own."""
+    """A result's surfaces and impacts. InputError if files are missing, damaged or another's."""
 
     def __init__(self, info: ResultInfo) -> None:
         self.info = info
@@ -78,15 +79,15 @@ class OpenedResult:
 
     @cached_property
     def hits(self) -> HitsByTriangle:
-        """Its single impacts. Read only when needed: most of a result."""
+        """The single impacts. They are read when needed, because they are most of a result."""
         return load_matching_hits(self._path(HITS_FILE), np.asarray(self.surface["impacts"]))
 
     def time_ratio(self, state: ViewState) -> float:
-        """Return the time shown over the treatment time."""
+        """Return the shown time over the treatment time."""
         return 1.0 if state.time_s is None else state.time_s / self.info.treatment_s
 
     def show(self, state: ViewState) -> None:
-        """Colour the part by the state's quantity; InputError if the result does not have it."""
+        """Colour the part by the state's quantity. InputError if the result lacks it."""
         if state.quantity not in self.quantities:
             remedy = _REMEDIES.get(state.quantity, "simulate again")
             raise InputError(
@@ -96,13 +97,13 @@ class OpenedResult:
         self.part.show(QUANTITIES[state.quantity], self.time_ratio(state))
 
     def above_threshold(self, state: ViewState) -> np.ndarray | None:
-        """Return which triangles of the drawn target are covered at least to the threshold."""
+        """Mark the triangles of the drawn target that are covered at least to the threshold."""
         if state.below is None:
             return None
         return self.part.covered_to(state.below, self.time_ratio(state))
 
     def describe_triangle(self, triangle: int, state: ViewState) -> list[str]:
-        """Return all values of a triangle, a line each; InputError if there is no such triangle."""
+        """Return all values of a triangle, one a line. InputError if there is no such triangle."""
         surface = self.surface
         if not 0 <= triangle < surface.n_cells:
             raise InputError(
@@ -127,7 +128,7 @@ class OpenedResult:
         return [*lines, f"simulated: {impacts} impacts, {dents} dents"]
 
     def _value(self, name: str, triangle: int, state: ViewState) -> float:
-        """Return the mean over the triangle."""
+        """Return the mean of a quantity over a triangle."""
         quantity, times = QUANTITIES[name], self.time_ratio(state)
         if name == "coverage" and state.time_s is not None:
             density = self.surface["dent_density"][triangle] * times
@@ -146,14 +147,14 @@ def colour_limits(results: Sequence[OpenedResult], state: ViewState) -> tuple[fl
     for one in results:
         one.show(state)
     if state.quantity == "zones":
-        return 0.0, 1.0  # each has a colour of its own
+        return 0.0, 1.0  # each zone has a fixed colour
     if state.quantity == "coverage" and state.time_s is not None:
         return FULL_SCALE
     return colour_range([one.part for one in results])
 
 
 def same_part(results: Sequence[OpenedResult]) -> bool:
-    """Whether all results have the same triangles, wherever the part stands."""
+    """True if all results have the same triangles, wherever the part stands."""
     first = results[0].surface
     return all(
         one.surface.n_cells == first.n_cells

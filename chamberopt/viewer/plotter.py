@@ -1,4 +1,4 @@
-"""The views of `inspect`, one for each result; everything in them follows from one ViewState."""
+"""The views of `inspect`, one view for each result. Everything in them follows from a ViewState."""
 
 from __future__ import annotations
 
@@ -45,22 +45,23 @@ from chamberopt.viewer.view_state import KEYS, Plane, ViewState
 
 MAX_RESULTS = 6
 VIEW_SIZES = {1: (1400, 900), 2: (1000, 900), 3: (800, 800), 4: (900, 700)}  # by number of results
-SMALLEST_VIEW = (700, 650)  # with more results
+SMALLEST_VIEW = (700, 650)  # for larger numbers of results
 SCREEN = (1500, 850)  # pixels; a window of this size fits on most screens
 LEFT, RIGHT, BELOW = 20, 150, 90  # pixels for colour bar, legend and so on
-CHART = 0.37  # of the width of a view, for the chart of a triangle
+CHART = 0.37  # share of a view's width, for the chart of a triangle
 TRIAD = 0.86, 0.0, 1.0, 0.2  # shares of a view
-LEGEND, BESIDE_CHART, BESIDE_SLIDER = 0.84, 0.6, 0.4  # of the width of a view, for its legend
-PIN_LENGTH = 0.06  # of the mark on a triangle, as a share of the target's size
+LEGEND, BESIDE_CHART, BESIDE_SLIDER = 0.84, 0.6, 0.4  # shares of a view's width, for its legend
+PIN_LENGTH = 0.06  # length of the mark on a triangle, over the target's size
 
 
 class ResultPlotter:
     """A plotter with one view for each result.
 
-    plotter: of pyvista.
-    results: opened.
-    linked: whether the views turn together, because they show the same part.
-    quantities: names of those that all results have.
+    Attributes:
+        plotter: of pyvista.
+        results: opened.
+        linked: true if the views turn together, because they show the same part.
+        quantities: names of the quantities that all results have.
     """
 
     def __init__(
@@ -74,9 +75,9 @@ class ResultPlotter:
 
         Args:
             results: at most MAX_RESULTS.
-            off_screen: whether to draw without a window.
-            size: of each view [pixels]; chosen by the number of results if left out.
-            menu: whether to list the keys of the quantities.
+            off_screen: true to draw without a window.
+            size: of each view [pixels]; by default it depends on the number of results.
+            menu: true to list the keys of the quantities.
         """
         if len(results) > MAX_RESULTS:
             raise InputError(
@@ -102,10 +103,10 @@ class ResultPlotter:
             self._select_view(number)
             self.plotter.add_axes(line_width=2, viewport=TRIAD, color=DARK)
         self._seen: dict[tuple[int, bool], np.ndarray] = {}
-        self._actors: list[set[str]] = [set() for _ in results]  # drawn here, by name
+        self._actors: list[set[str]] = [set() for _ in results]  # names of the actors in each view
 
     def draw(self, state: ViewState) -> None:
-        """Draw everything for a state, cameras excepted; InputError if a result cannot show it."""
+        """Draw everything for a state, except cameras. InputError if a result cannot show it."""
         limits = colour_limits(self.results, state)
         for number, result in enumerate(self.results):
             self._select_view(number)
@@ -117,7 +118,7 @@ class ResultPlotter:
             self._actors[0].add("keys")
 
     def aim(self, state: ViewState) -> None:
-        """Point the cameras, all the same way, at everything that is drawn."""
+        """Point all cameras the same way, at everything that is drawn."""
         groups = [self.results] * len(self.results) if self.linked else [[r] for r in self.results]
         eye = None
         for number, group in enumerate(groups):
@@ -129,7 +130,7 @@ class ResultPlotter:
             self.plotter.link_views()
 
     def _room(self, number: int, state: ViewState) -> Room:
-        """Room of a view for title, colour bar or chart, legend and a triangle's numbers."""
+        """Room in a view for title, colour bar or chart, legend and a triangle's numbers."""
         size, left, right = self.view_size(), LEFT, RIGHT
         if state.triangle is not None and state.view in (None, number):
             left, right = (int(one * size[0]) for one in (overlay.NUMBERS, CHART))
@@ -138,7 +139,7 @@ class ResultPlotter:
         return Room(left, right, BELOW, overlay.title_height(title, size))
 
     def _eye(self, results: Sequence[OpenedResult], state: ViewState) -> np.ndarray:
-        """Direction to the eye: as wanted, or to the triangle, or where targets are seen."""
+        """Direction to the eye: the wanted direction, the triangle's, or where targets are seen."""
         if state.eye is not None:
             return np.array(state.eye)
         first = results[0]
@@ -151,7 +152,7 @@ class ResultPlotter:
         return chamber_view(seen, eyes) if state.chamber else near_views(seen, eyes)[0]
 
     def _seen_area(self, result: OpenedResult, chamber: bool, eyes: np.ndarray) -> np.ndarray:
-        """What is seen of a result's target, as from seen_area; worked out once."""
+        """Visible area of a result's target, as from seen_area, computed once."""
         key = self.results.index(result), chamber
         if key not in self._seen:
             target, *hiding = target_in_chamber(result.surface)
@@ -162,7 +163,7 @@ class ResultPlotter:
         return self._seen[key]
 
     def pick_triangle(self, x: float, y: float) -> tuple[int, int] | None:
-        """Return view and triangle at a point of the window [pixels], None beside the part."""
+        """Return view and triangle at a point of the window [pixels], or None beside the part."""
         import vtk
 
         renderer = self.plotter.iren.get_poked_renderer(x, y)
@@ -186,7 +187,7 @@ class ResultPlotter:
         plotter, renderer = self.plotter, self.plotter.renderer
         if _bar_name(number) in plotter.scalar_bars:
             plotter.remove_scalar_bar(_bar_name(number), render=False)
-        for name in self._actors[number]:  # not the handles, and not what holds the charts
+        for name in self._actors[number]:  # handles and the holder of the charts stay
             renderer.remove_actor(name, reset_camera=False, render=False)
         if renderer.has_charts:
             plotter.remove_chart(0)
@@ -234,12 +235,12 @@ class ResultPlotter:
 
 
 def _bar_name(number: int) -> str:
-    """Name of a view's colour bar, which VTK also writes: blanks, of another length in each."""
+    """Name of a view's colour bar. VTK writes it, so each view has another number of blanks."""
     return " " * (number + 1)
 
 
 def _menu(names: Sequence[str], state: ViewState) -> str:
-    """List the keys of the quantities, with the one shown in brackets."""
+    """List the keys of the quantities, with the shown quantity in brackets."""
     keys = [
         f"[{key} {name}]" if name == state.quantity else f"{key} {name}"
         for key, name in enumerate(QUANTITIES, 1)
@@ -273,7 +274,7 @@ def _remarks(result: OpenedResult, state: ViewState, pale: np.ndarray | None) ->
 
 
 def _legend(result: OpenedResult, state: ViewState) -> list[tuple[str, str]]:
-    """Return (colour, meaning) of colours that stand for no value."""
+    """Return pairs of a colour that stands for no value, and its meaning."""
     if state.quantity == "zones":
         entries = [(zone_colour(k), name) for k, name in enumerate(result.info.zones)]
         entries.append((GREY, "in no zone"))
@@ -285,7 +286,7 @@ def _legend(result: OpenedResult, state: ViewState) -> list[tuple[str, str]]:
 
 
 def _cut(actors: Sequence[Any], cut: Plane, result: OpenedResult) -> None:
-    """Cut away what lies on the normal's side of a plane."""
+    """Cut away everything on the normal's side of a plane."""
     normal, origin = cut
     point = result.chamber.center if origin is None else origin
     plane = pyvista().core.utilities.helpers.generate_plane(-np.array(normal), point)
@@ -294,7 +295,7 @@ def _cut(actors: Sequence[Any], cut: Plane, result: OpenedResult) -> None:
 
 
 def _points(result: OpenedResult, state: ViewState) -> np.ndarray:
-    """Points (k, 3) [mm] of what is drawn, or of the target if the chamber is not."""
+    """Points (k, 3) [mm] of everything drawn, or of the target if the chamber is not drawn."""
     if not state.chamber:
         return np.asarray(result.part.whole.points)
     return np.concatenate([result.surface.points, result.chamber.points])

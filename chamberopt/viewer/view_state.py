@@ -1,4 +1,4 @@
-"""What `inspect` shows: every option and every key changes one ViewState."""
+"""The state of `inspect`: every option and every key changes one ViewState."""
 
 from __future__ import annotations
 
@@ -16,11 +16,13 @@ from chamberopt.pictures.charts.quantities import OTHER_NAMES, QUANTITIES
 Plane = tuple[Vector, Vector | None]
 """Normal of a cutting plane, towards what is cut away, and a point of it [mm]; None: the middle."""
 
-# Normals of the cutting planes: what is cut away is the side towards the default view.
+# Normals of the cutting planes. The side towards the default view is cut away.
 CUT_NORMALS: dict[str, Vector] = {"X": (1.0, 0.0, 0.0), "Y": (0.0, -1.0, 0.0), "Z": (0.0, 0.0, 1.0)}
 DEFAULT_VIEW: Vector = (1.0, -1.6, 0.35)
-MIN_LENGTH = 1e-6  # of a view direction; with a shorter or a very long one the picture is empty
-THRESHOLDS = (98.0, 90.0, 75.0, 50.0)  # % of coverage, which key b shows one after the other
+MIN_LENGTH = (
+    1e-6  # of a view direction; a shorter or a very long direction leaves the picture empty
+)
+THRESHOLDS = (98.0, 90.0, 75.0, 50.0)  # % of coverage, in the order of key b
 
 KEYS = f"""1 to {len(QUANTITIES)}   the quantity
 click    a triangle's numbers and its impact speeds
@@ -36,18 +38,19 @@ q        quit"""
 
 @dataclass(frozen=True)
 class ViewState:
-    """What is shown, and how.
+    """The shown quantity, time, cut and other settings of a view.
 
-    quantity: name in QUANTITIES.
-    time_s: peening time of what grows with time; None for each result's treatment time.
-    below: coverage [%] from which triangles are pale; None for no threshold.
-    cut: plane that cuts the chamber open; None for no cut.
-    cut_part: whether the part is cut too.
-    chamber: whether the chamber is drawn.
-    triangle: its numbers are shown; None for none.
-    view: number of the result whose triangle it is; None for all.
-    eye: direction from the part to the eye; None to choose one that shows the target.
-    keys: whether the list of keys is shown.
+    Attributes:
+        quantity: name in QUANTITIES.
+        time_s: peening time of quantities that grow; None for each result's treatment time.
+        below: coverage [%] from which triangles are pale; None for no threshold.
+        cut: plane that cuts the chamber open; None for no cut.
+        cut_part: true if the part is cut too.
+        chamber: true if the chamber is drawn.
+        triangle: its numbers are shown; None for no triangle.
+        view: number of the triangle's result; None for all results.
+        eye: direction from the part to the eye; None for a direction that shows the target.
+        keys: true if the list of keys is shown.
     """
 
     quantity: str = "coverage"
@@ -81,12 +84,12 @@ class ViewState:
 
     @staticmethod
     def from_json(values: dict[str, Any]) -> ViewState:
-        """Read the state from a drawing job, whose lists are vectors."""
+        """Read the state from a drawing job, in which vectors are lists."""
         return ViewState(**{one.name: _as_tuples(values[one.name]) for one in fields(ViewState)})
 
 
 def parse_clip(text: str) -> Plane:
-    """Read --clip: X, Y or Z, and if wanted a place on that axis in mm, as in Z=12.5."""
+    """Read --clip: X, Y or Z, and an optional place on the axis in mm, as in Z=12.5."""
     found = re.fullmatch(r"([xyzXYZ])(?:=([-+]?\d*\.?\d+))?", text.strip())
     if not found:
         raise InputError(
@@ -118,7 +121,12 @@ def parse_view(text: str) -> Vector:
 def state_after_key(
     state: ViewState, key: str, first: ViewState, quantities: Sequence[str]
 ) -> ViewState:
-    """Return the state after a key; `first` is the one that r returns to, quantities are shown."""
+    """Return the state after a key.
+
+    Args:
+        first: the state that key r returns to.
+        quantities: names of the quantities that all results have.
+    """
     names = list(QUANTITIES)
     if key.isdigit() and 0 < int(key) <= len(names) and names[int(key) - 1] in quantities:
         name = names[int(key) - 1]

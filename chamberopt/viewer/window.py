@@ -1,4 +1,4 @@
-"""The window of `inspect`, whose keys and handles change one ViewState; or a picture of it."""
+"""The window of `inspect`, whose keys and handles change a ViewState, or its picture."""
 
 from __future__ import annotations
 
@@ -29,16 +29,15 @@ MAX_CLICK_MOTION = 4  # pixels that the mouse may move between press and release
 def inspect(
     infos: Sequence[ResultInfo], state: ViewState, screenshot: str | Path | None = None
 ) -> None:
-    """Show results in a window, or write a picture of it.
+    """Show results in a window, or write a picture of the window.
 
     Args:
         infos: of the results.
-        state: what is shown first.
+        state: first state of the window.
         screenshot: .png file to write; no window is opened then.
-
     Raises:
-        InputError: a result's files are missing, damaged or another's, a result does not have what
-            is wanted, or there is no display.
+        InputError: a result's files are missing, damaged or another's, a result lacks a wanted
+            quantity, or there is no display.
     """
     if screenshot is not None:
         results = [asdict(one) for one in infos]
@@ -58,7 +57,7 @@ def inspect(
 
 
 def render_inspect(job: dict[str, Any]) -> None:
-    """Draw in the drawing process what the window would show."""
+    """Draw the window's content in the drawing process."""
     state = ViewState.from_json(job["state"])
     results = open_results([ResultInfo(**one) for one in job["results"]], state)
     view = ResultPlotter(results, off_screen=True)
@@ -68,7 +67,7 @@ def render_inspect(job: dict[str, Any]) -> None:
 
 
 def open_results(infos: Sequence[ResultInfo], state: ViewState) -> list[OpenedResult]:
-    """Open results; InputError if one cannot show what the state wants."""
+    """Open results. InputError if a result cannot show the state."""
     results = [OpenedResult(one) for one in infos]
     for one in results:
         one.show(state)
@@ -78,7 +77,7 @@ def open_results(infos: Sequence[ResultInfo], state: ViewState) -> list[OpenedRe
 
 
 class Window:
-    """A ResultPlotter on the screen, and the state that keys, slider, plane and clicks change."""
+    """A ResultPlotter on the screen. Keys, slider, plane and clicks change its state."""
 
     def __init__(
         self, results: Sequence[OpenedResult], state: ViewState, off_screen: bool = False
@@ -98,7 +97,7 @@ class Window:
         iren.clear_key_event_callbacks()
         for key in HANDLED_KEYS:
             plotter.add_key_event(key, lambda key=key: self.press_key(key))
-        # Of VTK's own keys only q stays: the others would act in addition to ours.
+        # Only q stays of VTK's own keys. Others would act beside the window's keys.
         iren.style.AddObserver(
             "CharEvent",
             lambda style, _: style.OnChar() if iren.interactor.GetKeySym() == "q" else 0,
@@ -108,7 +107,7 @@ class Window:
         plotter.show(title="chamberopt inspect")
 
     def change(self, state: ViewState) -> None:
-        """Show another state; if a result cannot, print why and keep the present one."""
+        """Show another state. If a result cannot show it, print why and keep the present state."""
         before, self.state = self.state, state
         try:
             self.view.draw(state)
@@ -129,7 +128,7 @@ class Window:
             self.view.plotter.render()
 
     def set_time(self, seconds: float) -> None:
-        """React to the time slider being released."""
+        """React to a release of the time slider."""
         if seconds != self._seconds():
             self.change(replace(self.state, time_s=seconds))
 
@@ -139,7 +138,7 @@ class Window:
         self.change(replace(self.state, triangle=triangle, view=view_shown))
 
     def move_plane(self, normal: Sequence[float], origin: Sequence[float]) -> None:
-        """React to the cutting plane being released."""
+        """React to a release of the cutting plane."""
         if self.state.cut is not None:
             self.change(replace(self.state, cut=(tuple(normal), tuple(origin))))  # type: ignore[arg-type]
 
@@ -155,17 +154,17 @@ class Window:
             self.select_triangle(*found)
 
     def _seconds(self) -> float:
-        """Return the time shown, of the first result if each shows its own treatment time."""
+        """Return the shown time, of the first result if each shows its own treatment time."""
         time = self.state.time_s
         return self.view.results[0].info.treatment_s if time is None else time
 
     def _update_handles(self) -> None:
-        """Show the slider where time changes what is shown, and the plane where there is a cut."""
+        """Show the slider if the picture depends on time, and the plane if there is a cut."""
         results, plotter = self.view.results, self.view.plotter
         quantity = QUANTITIES[self.state.quantity]
         timed = quantity.grows or quantity.name == "coverage"
         if timed and self.slider is None:
-            # VTK measures its place from the window's corner, so it belongs to the view there.
+            # VTK measures the slider's place from the window's corner, so the view there has it.
             plotter.subplot(self.view.shape[0] - 1, 0)
             self.slider = plotter.add_slider_widget(
                 self.set_time, (0.0, max(one.info.longest_s for one in results)),
