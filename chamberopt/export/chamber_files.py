@@ -1,7 +1,7 @@
 """The chamber for the workshop, in mm: the cavity as one closed body, or its surfaces by name.
 
 Normals point out of the cavity. The 3MF file holds one closed object. Its triangles have named base
-materials, one for each surface; programs without materials see one body.
+materials, one for each surface. Programs without materials see one body.
 
 Source: 3MF Core Specification 1.3, chapters 3.3, 4.1 and 5.1.
 """
@@ -22,18 +22,18 @@ from chamberopt.results.vtp_files import write_stl
 
 NAMES = {TAG_PART: "part", TAG_SONOTRODE: "sonotrode", TAG_WALL: "wall"}
 PART_COLOUR, WALL_COLOUR, SONOTRODE_COLOUR = "#B9BEC4", "#9DB7CC", "#E08A2E"
-ZIP_DATE = (1980, 1, 1, 0, 0, 0)  # a fixed date: the same chamber gives the same bytes
+ZIP_DATE = (1980, 1, 1, 0, 0, 0)  # fixed, so that the same chamber gives the same bytes
 CORE = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02"
 MODEL = "3D/3dmodel.model"
 
 
 class NamedSurfaces(NamedTuple):
-    """A cavity and the surfaces that it consists of.
+    """A cavity, and the surfaces that bound it.
 
     Args:
         vertices: [mm], shape (n, 3).
         triangles: closed, normals out of the cavity, shape (k, 3).
-        surfaces: by name, which triangles belong to it, shape (k,) bool.
+        surfaces: by name, marks of the surface's triangles, shape (k,) bool.
     """
 
     vertices: np.ndarray
@@ -44,8 +44,8 @@ class NamedSurfaces(NamedTuple):
 def read_cavity(folder: Path) -> NamedSurfaces:
     """Read the chamber of a results folder.
 
-    Surfaces are named part, sonotrode and wall, and as in the design sonotrodes.0, chamber.holes.0,
-    chamber.deflectors.0 and so on.
+    The surfaces are named part, sonotrode and wall, and, as in the design, sonotrodes.0,
+    chamber.holes.0, chamber.deflectors.0 and so on.
     """
     result = load_result(folder)
     chamber = load_cavity(result)

@@ -1,10 +1,13 @@
-"""Fields as Nastran pressures on shells: PLOAD4 in the large field format.
+"""Fields as decks of Abaqus and Nastran.
 
-Each quantity is a load set.
+Abaqus gets *DISTRIBUTION on elements, with one RATIO for each element. Nastran gets pressures on
+shells, PLOAD4 in the large field format, with a load set for each quantity. P1 alone is a pressure
+over the whole element, for shells of first and second order. On a solid the entry needs the grids
+of the loaded face, which are not stored.
 
-Source: MSC Nastran Quick Reference Guide, PLOAD4. P1 alone is a pressure over the whole element,
-for shells of first and second order. On a solid the entry needs the grids of the loaded face, which
-are not stored.
+Source: Abaqus Keywords Reference Guide, *DISTRIBUTION (levels: part, instance, assembly, model; its
+first line is the default), *DISTRIBUTION TABLE (level: model) and *ELSET (levels: part, instance,
+assembly). MSC Nastran Quick Reference Guide, PLOAD4.
 """
 
 from __future__ import annotations
@@ -18,19 +21,13 @@ from chamberopt.export.element_fields import ElementFields
 from chamberopt.geometry.meshes.part_mesh import PartMesh
 from chamberopt.geometry.meshes.units import METRES_PER
 
-# Fields as Abaqus distributions: *DISTRIBUTION on elements, with one RATIO for each element.
-#
-# Source: Abaqus Keywords Reference Guide, *DISTRIBUTION (levels: part, instance, assembly,
-# model; its first line is the default), *DISTRIBUTION TABLE (level: model) and *ELSET (levels:
-# part, instance, assembly).
-
 TABLE = "CHAMBEROPT_SCALAR"
 COVERAGE_BANDS = (0.0, 0.5, 0.9, 0.98, 1.0)  # 98 % counts as full coverage (SAE J2277)
 NUMBERS_PER_LINE = 16  # limit of Abaqus for the data lines of *ELSET
 
 
 def abaqus_deck(header: list[str], mesh: PartMesh, fields: ElementFields) -> dict[str, str]:
-    """Return the text of each file, by the suffix of its name.
+    """Return the text of each file by the suffix of its name.
 
     There is one file, "", unless the part's deck has an instance. Then the element sets are in a
     second file, "_sets", because distributions belong to the model and sets to the assembly.
@@ -72,7 +69,7 @@ def _abaqus_mesh(mesh: PartMesh) -> list[str]:
 
 
 def _sets(fields: ElementFields, instance: str) -> list[str]:
-    """Element sets by bands of coverage; empty bands are left out."""
+    """Element sets by bands of coverage, without empty bands."""
     lines = []
     coverage = fields.columns["coverage"]
     for low, high in pairwise(COVERAGE_BANDS):
@@ -91,7 +88,7 @@ FIRST_SID = 9001  # load set identifiers in a deck are usually smaller
 
 
 def nastran_deck(header: list[str], mesh: PartMesh, fields: ElementFields) -> dict[str, str]:
-    """Return the text of the one file, under the suffix ""; InputError for solid elements."""
+    """Return the text of the only file, with the suffix "". InputError for solid elements."""
     own = mesh.numbering.own
     if own and mesh.numbering.faces.any():
         raise InputError(

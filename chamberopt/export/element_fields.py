@@ -1,4 +1,4 @@
-"""From the values of the part's triangles to the values of the elements of the part's file."""
+"""The values of the elements of the part's file, from the values of the part's triangles."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from chamberopt.geometry.triangles import areas
 if TYPE_CHECKING:
     from chamberopt.geometry.meshes.part_mesh import PartMesh
 
-# Meaning of each column of part.vtp, and how the triangles of an element are combined: their sum,
-# or a mean weighted with exposed area, impacts or dents. Values are those of the field, which are
-# measured in windows round each place, as means over the triangle.
+# Meaning of each column of part.vtp, and the combination of an element's triangles: their sum, or
+# a mean weighted with exposed area, impacts or dents. Values of the field, which are measured in
+# windows round each place, are means over the triangle.
 COLUMNS = {
     "coverage": ("share of the surface that is dented after the treatment, 0 to 1", "area"),
     "coverage_interval": ("width of the 95 % interval of coverage at a place", "area"),
@@ -39,7 +39,7 @@ COLUMNS = {
     "reachable_area_mm2": ("area that a ball can touch, mm2", "sum"),
     "target": ("1: must be covered", "any"),
 }
-ZONE_COLUMN = "zone_"  # begins the column of each zone
+ZONE_COLUMN = "zone_"  # start of the name of each zone's column
 
 
 def combination_of(column: str) -> tuple[str, str]:
@@ -62,8 +62,8 @@ class ElementFields:
     """Values of the elements of the part's file.
 
     Args:
-        numbers: element numbers in rising order, shape (e,) int64.
-        columns: values by name of the column, shape (e,) float64; NaN where there is no value.
+        numbers: element numbers in ascending order, shape (e,) int64.
+        columns: values by name of the column, shape (e,) float64; NaN for a missing value.
     """
 
     numbers: np.ndarray
@@ -84,12 +84,7 @@ def fields_of_elements(surface: Any, number: np.ndarray) -> ElementFields:
 def fields_of_remeshed_elements(
     surface: Any, number: np.ndarray, original: PartMesh, simulated: PartMesh
 ) -> ElementFields:
-    """Combine the columns where the part was simulated in other triangles than its file has.
-
-    A triangle counts for the element that contains its centre. An element that contains no centre
-    gets the values of the triangles around the centres of its own triangles. Sums are left out,
-    because triangles reach across elements.
-    """
+    """Combine the columns of a part that was simulated in other triangles than its file has."""
     cells = np.flatnonzero(number > 0)
     small = np.flatnonzero(~np.isin(original.elements, number[cells]) & (original.elements > 0))
     share = np.ones(len(cells))
@@ -111,7 +106,14 @@ def fields_of_remeshed_elements(
 def _combined(
     surface: Any, cells: np.ndarray, number: np.ndarray, share: np.ndarray, names: tuple[str, ...]
 ) -> ElementFields:
-    """Combine triangles (cells) by element number; share (k,) is how much of a triangle counts."""
+    """Combine triangles by element number.
+
+    Args:
+        cells: rows of the triangles, (k,).
+        number: element of each triangle, (k,).
+        share: share of each triangle that counts, (k,).
+        names: columns to combine.
+    """
     numbers, element = np.unique(number, return_inverse=True)
 
     def total(values: np.ndarray) -> np.ndarray:

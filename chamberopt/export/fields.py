@@ -31,16 +31,15 @@ FIELD_FORMATS = ("vtp", "vtkhdf", *DECKS)
 
 
 def write_fields(folder: str | Path, path: str | Path, to: str) -> list[str]:
-    """Write the fields of a results folder to a file and return remarks for the user.
+    """Write the fields of a results folder to a file, and return remarks for the user.
 
     Args:
         folder: the results folder.
         path: the file to write; it is replaced.
         to: "vtp" or "vtkhdf" writes the part's triangles, posed in the chamber [mm], with their
-            values. "abaqus" or "nastran" writes values by the element numbers of the
-            part's file, to be included in its deck. Where that file numbers no elements, the
-            triangles are written too, in the file's frame and unit, numbered from 1.
-
+            values. "abaqus" or "nastran" writes values by the element numbers of the part's file,
+            to be included in its deck. If the file numbers no elements, the triangles are written
+            too, in the file's frame and unit, numbered from 1.
     Raises:
         InputError: the folder is not a result, or its files have changed since.
     """
@@ -95,7 +94,7 @@ def _write_deck(result: Result, surface: Any, to: str, path: Path) -> list[str]:
 
 
 def _elements_left_out(fields: ElementFields) -> list[str]:
-    """Remarks on elements without a value; one for each number of such elements."""
+    """Remarks on elements without a value, with a remark for each number of such elements."""
     names: dict[int, list[str]] = {}
     for name, values in fields.columns.items():
         names.setdefault(int(np.isnan(values).sum()), []).append(name)
@@ -108,7 +107,7 @@ def _elements_left_out(fields: ElementFields) -> list[str]:
 
 
 def _part_of_file(result: Result, surface: Any) -> PartOfFile:
-    """The part as it was simulated, and as its file has it; InputError if they are of another."""
+    """The part as simulated, and as its file has it. InputError if the part is another result's."""
     file = load_chamber(result).part.file
     if file is None or len(file.simulated.triangles) != surface.n_cells:
         raise InputError(
@@ -118,7 +117,7 @@ def _part_of_file(result: Result, surface: Any) -> PartOfFile:
 
 
 def _origin(result: Result) -> list[str]:
-    """Where the numbers come from, for the first lines of a deck."""
+    """The origin of the numbers, for the first lines of a deck."""
     design, version = result.design, result.record.versions["chamberopt"]
     return [
         f"chamberopt {version}: simulated ultrasonic shot peening, values of each element",

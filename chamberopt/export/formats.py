@@ -1,4 +1,4 @@
-"""The formats that `chamberopt export` can write, one entry a format."""
+"""The formats that `chamberopt export` can write, with an entry for each format."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ FrameName = Literal["part", "chamber"]
 
 @dataclass(frozen=True)
 class ExportFormat:
-    """A format and how it is written.
+    """A format and its writer.
 
     Args:
         file: name of the file in a folder of exports; a name without an ending is a folder.
         summary: a line for --help.
-        endings: endings that the user's own file name may have.
-        writer: "module.function" in this package, called with (results folder, file, *arguments);
-            it returns remarks or None. Its module is imported when it is needed. None for impacts,
+        endings: allowed endings of the user's own file name.
+        writer: "module.function" in this package, called with (results folder, file, *arguments).
+            It returns remarks or None. Its module is imported when it is needed. None for impacts,
             which are simulated again, once for all formats of impacts.
         arguments: further arguments of the writer.
     """
@@ -40,7 +40,7 @@ class ExportFormat:
         return write(folder, file, *self.arguments) or []
 
 
-STUDY = "study-csv"  # the only one for a study without a result, and for a sweep
+STUDY = "study-csv"  # the only format for a study without a result, and for a sweep
 FORMATS = {
     "impacts-parquet": ExportFormat(
         "impacts.parquet",
@@ -108,7 +108,7 @@ FORMATS = {
 
 
 def formats_by_name(names: Sequence[str]) -> dict[str, ExportFormat]:
-    """Return the formats with these names, each once.
+    """Return the formats with these names, each format once.
 
     Raises:
         InputError: a name is unknown, or there is none.
@@ -128,10 +128,11 @@ def formats_by_name(names: Sequence[str]) -> dict[str, ExportFormat]:
 
 
 def is_file(out: Path, formats: dict[str, ExportFormat]) -> bool:
-    """Return whether --out names a file rather than a folder.
+    """Return True if --out names a file, False if it names a folder.
 
     Raises:
-        InputError: it names a file, but there are several formats, or the file is of another one.
+        InputError: it names a file, but there are several formats, or its ending is another
+            format's.
     """
     if not _has_ending(out, [ending for one in FORMATS.values() for ending in one.endings]):
         return False

@@ -22,13 +22,13 @@ MEANING = {
 
 @dataclass(frozen=True)
 class Frame:
-    """A frame, and how it lies in the chamber's frame.
+    """A frame of exported positions and directions, and its pose in the chamber's frame.
 
     Args:
-        name: "part" or "chamber".
-        unit: unit of its lengths.
-        rotation: applied first on the way to the chamber's frame, shape (3, 3).
-        shift: applied second [m], shape (3,).
+        name: "part", the frame of the part's file, or "chamber".
+        unit: unit of lengths.
+        rotation: first step to the chamber's frame, shape (3, 3).
+        shift: second step [m], shape (3,).
     """
 
     name: FrameName
@@ -48,7 +48,7 @@ class Frame:
 
 
 def frame_of(name: FrameName, part: Part) -> Frame:
-    """Return the frame of that name; lengths in the chamber's frame are in mm."""
+    """Return the named frame. Lengths in the chamber's frame are in mm."""
     if name == "chamber" or part.file is None:
         return Frame(name, "mm", np.eye(3), np.zeros(3))
     return Frame(name, part.unit, part.file.rotation, part.file.shift)

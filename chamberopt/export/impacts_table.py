@@ -31,8 +31,6 @@ if TYPE_CHECKING:
     from chamberopt.results.load import Result
     from sim_core import ImpactLog
 
-# The columns of the table of impacts: to add one, add a line here.
-
 ROWS_AT_ONCE = 1 << 16  # also the rows of a Parquet row group
 
 
@@ -42,14 +40,14 @@ class ImpactRows(NamedTuple):
     Args:
         replica: number of the replica.
         log: impacts of the piece, (n,) each.
-        triangle: triangle of the part that was hit, shape (n,).
-        position: contact point in the frame of the table, shape (n, 3). A ball touches the surface
-            at the point that is nearest to its centre.
+        triangle: part triangle of the impact, shape (n,).
+        position: contact point in the frame of the table, shape (n, 3). It is the surface point
+            nearest to the centre of the ball.
         velocity: velocity before the impact [m/s], in the frame of the table, shape (n, 3). On a
             turning part position and velocity are relative to the part as its mesh stands.
         dent: diameter of the dent [m], shape (n,).
         ball: diameter of the ball [m], shape (n,).
-        element: element of the part's file that was hit, shape (n,).
+        element: element of the part's file at the contact point, shape (n,).
     """
 
     replica: int
@@ -66,11 +64,11 @@ class Column(NamedTuple):
     """A column of the table.
 
     Args:
-        name: with the unit at its end.
-        dtype: as stored.
+        name: ends with the unit.
+        dtype: type in the file.
         text: printf format in a .csv file.
         meaning: a sentence for the file's own description.
-        values: computes the column, shape (n,).
+        values: function that computes the column, shape (n,).
     """
 
     name: str
@@ -81,7 +79,7 @@ class Column(NamedTuple):
 
 
 def columns_of(frame: Frame) -> tuple[Column, ...]:
-    """Return the columns in their order."""
+    """Return the columns in their order. A new column is a line in this function."""
     unit = frame.unit
     return (
         Column(
@@ -175,8 +173,8 @@ def write_impacts(
 ) -> int:  # fmt: skip
     """Simulate a result again and write its impacts into each file, in the format of its ending.
 
-    The table has one row for each impact, replica after replica, in order of time. Its columns are
-    in impact_columns.py. Files appear complete or not at all.
+    The table has one row for each impact, replica after replica, in order of time. `columns_of`
+    lists its columns. Files appear complete or not at all.
 
     Returns:
         The number of impacts.
@@ -201,7 +199,7 @@ def write_impacts(
 
 
 def require_writable(files: Sequence[Path]) -> None:
-    """Raise InputError where a file needs pyarrow and it is missing, or where a file exists."""
+    """Raise InputError if a file exists already, or needs pyarrow and it is missing."""
     for file in files:
         if _is_parquet(file):
             _pyarrow()
@@ -222,7 +220,7 @@ def _pyarrow() -> Any:
 def _metadata(
     result: Result, rebuilt: RebuiltChamber, frame: Frame, columns: Sequence[Column], replicas: int
 ) -> dict[str, Any]:
-    """Describe the rows: their origin, their frame and unit, their columns."""
+    """Describe the rows: their origin, frame, unit and columns."""
     design = result.design
     return {
         "result": result.folder.resolve().name,
@@ -293,7 +291,7 @@ def _csv(file: Path, columns: Sequence[Column], metadata: dict[str, Any]) -> Ite
             with ExitStack() as stack:
                 out: Any = plain
                 if file.suffix.lower() == ".gz":
-                    # Without a name and a time inside, the same impacts give the same bytes.
+                    # No name and time inside, so the same impacts give the same bytes.
                     out = stack.enter_context(gzip.GzipFile("", "wb", GZIP_LEVEL, plain, 0))
                 out.write((",".join(column.name for column in columns) + "\n").encode())
 
@@ -304,7 +302,7 @@ def _csv(file: Path, columns: Sequence[Column], metadata: dict[str, Any]) -> Ite
                 yield write_rows
             write_text(beside(file), json.dumps(metadata, indent=2) + "\n")
     except BaseException:
-        remove_file(beside(file))  # a table and what describes it are one
+        remove_file(beside(file))  # a table and its description belong together
         raise
 
 

@@ -15,16 +15,16 @@ if TYPE_CHECKING:
 
 
 def write_study_table(folder: Path, file: Path) -> None:
-    """Write the evaluations recorded so far as .csv; NAME_pm is the 95 % half-width of NAME.
+    """Write the evaluations recorded so far as .csv. NAME_pm is the 95 % half-width of NAME.
 
     Raises:
-        InputError: there are none.
+        InputError: there are no evaluations.
     """
     write_text(file, trials_as_csv(load_trials(folder)))
 
 
 def write_tolerance_table(folder: Path, file: Path) -> None:
-    """Write a row for each figure and number; InputError for a result without tolerances."""
+    """Write a row for each figure and number. InputError for a result without tolerances."""
     result = load_result(folder)
     found = result.record.tolerances
     if not found:
