@@ -15,7 +15,7 @@ Notation
 
 Since exp is not linear, k times the sum of w_j in the place of x would make exp(-x) too large, most
 of all with few dents. But the mean of B_1 is exactly exp(-x), and the mean of B_2 is exp(-2 x), for
-dents of any sizes and any short t: B is the generating functional of a Poisson process (J. F. C.
+dents of any sizes and for any t: B is the generating functional of a Poisson process (J. F. C.
 Kingman, "Poisson Processes", Oxford 1993, chapter 3.2). For dents of one size B is the estimator of
 I. J. Good and G. H. Toulmin, Biometrika 43 (1956) 45. It asks for about 3 dents in a window for
 each unit of x. With fewer dents the products scatter more than the quantity that they estimate.
@@ -53,7 +53,7 @@ class Products(NamedTuple):
 
     Attributes:
         of_all: over all batches, shape (p, K).
-        of_rest: means over the windows, over all batches but each, shape (g, K).
+        of_rest: the same without each batch in turn, means over the windows, shape (g, K).
     """
 
     of_all: np.ndarray
@@ -61,7 +61,7 @@ class Products(NamedTuple):
 
 
 def multiply_dents(batches: Sequence[Batch], points: int, ratios: Sequence[float]) -> Products:
-    """Multiply over the dents of all batches, and of all batches but each.
+    """Multiply over the dents of all batches, and without the dents of each batch in turn.
 
     Args:
         points: number of windows.
@@ -137,7 +137,7 @@ def mean_and_variance_estimates(products: Products, reach: Reach) -> tuple[Estim
 
 
 def products_without_each(products: np.ndarray) -> np.ndarray:
-    """Products (g, p, k) over all batches but each, from the products (g, p, k) of each batch."""
+    """Products (g, p, k) without each batch in turn, from the products (g, p, k) of each batch."""
     before, after = np.ones_like(products), np.ones_like(products)
     np.cumprod(products[:-1], axis=0, out=before[1:])
     after[:-1] = np.cumprod(products[:0:-1], axis=0)[::-1]

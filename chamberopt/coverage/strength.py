@@ -108,7 +108,7 @@ def saturated_strength(histogram: np.ndarray, highest: float) -> tuple[np.ndarra
 
 
 def saturation_time(rate: np.ndarray) -> np.ndarray:
-    """T (p,) in units of the time of the dents, from the rates of stronger dents (p, n)."""
+    """Saturation time T (p,), from the rates of stronger dents (p, n), in units of their time."""
     # T lies between these times. For equal dents it is ln 10 over their rate.
     top = rate.max(axis=1)
     some = top > 0.0
@@ -123,7 +123,7 @@ def saturation_time(rate: np.ndarray) -> np.ndarray:
 
 
 def time_near(rate: np.ndarray, time: np.ndarray) -> np.ndarray:
-    """T (p,) if it is known to be near `time` (p,)."""
+    """Saturation time T (p,) if it is known to be near `time` (p,)."""
     for _ in range(NEWTON_STEPS):
         gain, slope = _gain(rate, time)
         step = np.divide(gain, slope, out=np.zeros_like(gain), where=slope < 0.0)

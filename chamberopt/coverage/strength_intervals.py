@@ -287,8 +287,7 @@ def _uniformity_estimate(
     Args:
         spreads: mean square of S over its squared mean, corrected for few dents, (SPLITS,).
         of_halves: the same without the correction, (SPLITS,).
-        variances: relative variance of S from all batches, then from all batches but each, (g +
-            1,).
+        variances: relative variance of S, from all batches and without each in turn, (g + 1,).
     """
     reachable = reach.share
     value = _uniformity(float(spreads.mean()), reachable)

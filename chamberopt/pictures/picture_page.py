@@ -219,7 +219,7 @@ def _draw_bar(axes: Axes, bar: ColourBar) -> None:
 def _legend_lines(
     legend: Sequence[tuple[str, str]], across: float
 ) -> list[list[tuple[float, str, str]]]:
-    """Place, colour and meaning of the entries of each line of the legend."""
+    """Place, colour and meaning of each legend entry, in lines of at most `across` pixels."""
     lines: list[list[tuple[float, str, str]]] = []
     x = across
     for colour, meaning in legend:

@@ -52,8 +52,7 @@ class Symmetry:
             margin: distance from the sector [m] up to which a place counts as there too.
         Returns:
             Rows of the places, and their turns in steps. Each row comes once, with the turn into
-            the
-            sector. Then come the rows that another turn brings near the sector.
+            the sector. Then come the rows that another turn brings near the sector.
         """
         angle = np.arctan2(place[:, 1], place[:, 0])
         sector = np.round(angle / self.step)
