@@ -15,7 +15,8 @@ from chamberopt.chamber.build import build_chamber
 from chamberopt.common.executor import local_executor
 from chamberopt.common.files import csv_text, write_text
 from chamberopt.design.load import load_design
-from chamberopt.peening.responses import PairedRuns, on_scale, response, scale_of
+from chamberopt.peening.responses import combine, on_scale, scale_of
+from chamberopt.simulation.variations import RunsProgress, Variations
 
 ROOT = Path(__file__).resolve().parents[1]
 FIGURE = "mean_coverage"
@@ -33,13 +34,15 @@ def main() -> None:
     plate = plate.changed({"process.accuracy.replicas": given.replicas})
     rows, scale = [], scale_of(FIGURE)
     with local_executor() as executor:
-        runs = PairedRuns(plate, build_chamber(plate), executor)
+        runs = Variations(plate, build_chamber(plate), executor, RunsProgress(None, 0))
         nominal = on_scale(runs.nominal.metrics[FIGURE], scale)
         for name in NUMBERS:
             for factor in FACTORS:
-                changed = runs.evaluate(plate.changed({name: factor * plate.value(name)}))
-                found = on_scale(changed.metrics[FIGURE], scale)
-                slope = response(found, nominal, math.log(factor))
+                changed = plate.changed({name: factor * plate.value(name)})
+                found = runs.run(changed, build_chamber(changed)).metrics[FIGURE]
+                pair = {"changed": on_scale(found, scale), "nominal": nominal}
+                step = math.log(factor)
+                slope = combine(pair, {"changed": 1.0 / step, "nominal": -1.0 / step})
                 rows.append(
                     {
                         "number": name,

@@ -33,7 +33,7 @@ ORDER = {
     "chamberopt/coverage": "dents part_impacts+metrics field coverage_from_impacts "
     "percentile coverage_intervals strength strength_intervals compression",
     "chamberopt/simulation": "resting_balls replicas evaluation estimates evaluate "
-    "time_curve field_values effect_pilot error_law convergence recommendation",
+    "time_curve field_values variations effect_pilot error_law convergence recommendation",
     "chamberopt/peening": "strip+calibration_errors kirk_fit+strip_holder responses tolerances "
     "virtual_strip measured probes posterior setups calibrate next_measurement",
     "chamberopt/search": "study+optimiser trial_log study_folder "

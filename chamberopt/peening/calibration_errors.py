@@ -17,24 +17,24 @@ is five standard deviations, but no more than MAX_STEP. What noise is left makes
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Sequence
 from concurrent.futures import Executor
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from chamberopt.common.estimate import FIRST_OF_CALIBRATION, Estimate
 from chamberopt.coverage.metrics import parse_objective
-from chamberopt.design.calibration import TIME_ERROR
+from chamberopt.design.calibration import TIME_ERROR, Parameter
 from chamberopt.simulation.estimates import weighted_sum
-from chamberopt.simulation.evaluate import ReplicaPlan, evaluate
+from chamberopt.simulation.variations import RunsProgress, Variations
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
     from chamberopt.common.progress import Progress
-    from chamberopt.design.calibration import Parameter
     from chamberopt.design.load import Design
+    from chamberopt.simulation.evaluate import ReplicaPlan
     from chamberopt.simulation.evaluation import Evaluation
-    from chamberopt.simulation.replicas import Replica
+    from chamberopt.simulation.replicas import Replica, ReplicaSet
     from sim_core import AnalyticCavity
 
 # C0 goes down, because no restitution is above 1.
@@ -42,6 +42,15 @@ MAX_STEP: dict[Parameter, float] = {
     "amplitude": 0.3, "C0": -0.08, "v0": 0.6, "mu": 0.6, "hardness": 0.4,
 }  # fmt: skip
 STANDARD_DEVIATIONS, MIN_STEP = 5.0, 0.02
+WIDE = ".wide."  # before the names of figures of wide windows: no zone is called so
+
+
+class Moved(NamedTuple):
+    """A design with one calibrated parameter moved by a step of its logarithm."""
+
+    name: Parameter
+    step: float
+    design: Design
 
 
 def evaluate_calibrated(
@@ -51,65 +60,68 @@ def evaluate_calibrated(
     progress: Progress | None = None,
     plan: ReplicaPlan | None = None,
     cavity: AnalyticCavity | None = None,
-    done: list[Replica] | None = None,
+    known: ReplicaSet | None = None,
 ) -> Evaluation:
     """As `evaluate`, whose arguments and errors it has, with the errors of the calibration."""
-    calibration = design.calibration
-    done = [] if done is None else done
+    of_all = RunsProgress(progress, len(simulated(moved_designs(design))))
+    return with_open_errors(
+        Variations(design, chamber, executor, of_all, plan, cavity is not None, known)
+    )
+
+
+def with_open_errors(runs: Variations) -> Evaluation:
+    """The evaluation of the nominal design, with the errors that its calibration leaves."""
+    found, calibration = runs.nominal, runs.design.calibration
     if calibration is None:
-        return evaluate(design, chamber, executor, progress, plan, cavity, done)
-    steps = {name: step_of(name, calibration.log_sd(name)) for name in moved_parameters(design)}
-    simulated = [name for name in steps if name != "hardness"]
-    runs = 0
-
-    def whole(finished: int, total: int, best: float | None) -> None:
-        if progress:
-            progress(runs * total + finished, (1 + len(simulated)) * total, best)
-
-    found = evaluate(design, chamber, executor, whole, plan, cavity, done)
-    again = ReplicaPlan(found.replicas, found.stream, found.objective_name)
-    slopes = {"metrics": _factors(found.metrics), "wide": _factors(found.metrics_of_wide)}
-    for name, step in steps.items():
-        known = _with_other_dents(done, math.exp(-0.25 * step)) if name == "hardness" else []
-        runs += not known
-        moved = with_moved(design, name, step)
-        other = evaluate(moved, chamber, executor, whole, again, cavity, known)
-        for which, one, two in (
-            ("metrics", found.metrics, other.metrics),
-            ("wide", found.metrics_of_wide, other.metrics_of_wide),
-        ):
-            for figure in one:
-                slopes[which][figure][name] = _slope(one[figure], two[figure], step)
-
-    def widened(figures: Mapping[str, Estimate], which: str) -> dict[str, Estimate]:
-        return {
-            name: one.with_shared(
-                FIRST_OF_CALIBRATION, calibration.errors(slopes[which][name], _of_model(name, one))
-            )
-            for name, one in figures.items()
-        }
-
-    metrics = widened(found.metrics, "metrics")
+        return found
+    figures, moves = _figures(found), moved_designs(runs.design)
+    slopes = {name: _factors(name, one) for name, one in figures.items()}
+    for parameter, step, moved in moves:
+        wider = math.exp(-0.25 * step)
+        dents = _with_other_dents(runs.replicas, wider) if parameter == "hardness" else []
+        others = _figures(runs.run(moved, replicas=dents))
+        for name, one in figures.items():
+            slopes[name][parameter] = slope(one, others[name], step)
+    for name, one in figures.items():
+        errors = calibration.errors(slopes[name], _of_model(name, one))
+        figures[name] = one.with_shared(FIRST_OF_CALIBRATION, errors)
+    metrics = {name: figures[name] for name in found.metrics}
     note = (
         "intervals hold the scatter of the replicas and what the calibration leaves open, by "
-        f"{len(simulated)} more runs on the same seeds"
+        f"{len(simulated(moves))} more runs on the same seeds"
     )
     return replace(
         found,
         metrics=metrics,
-        metrics_of_wide=widened(found.metrics_of_wide, "wide"),
+        metrics_of_wide={name: figures[WIDE + name] for name in found.metrics_of_wide},
         objective=weighted_sum(parse_objective(found.objective_name), metrics),
         notes=(*found.notes, note),
     )
 
 
-def moved_parameters(design: Design) -> list[Parameter]:
-    """The calibrated parameters that take a run, or other dents, and are not known exactly."""
+def moved_designs(design: Design) -> list[Moved]:
+    """The design with each calibrated parameter moved that is not known exactly.
+
+    K and beta are left out, because they are factors on figures.
+    """
     calibration = design.calibration
     if calibration is None:
         return []
-    names = [name for name in MAX_STEP if calibration.log_sd(name) > 0.0]
-    return [name for name in names if name != "mu" or design.effects.friction is not None]
+    moves = []
+    for name in MAX_STEP:
+        sd = calibration.log_sd(name)
+        if sd > 0.0 and (name != "mu" or design.effects.friction is not None):
+            means, step = list(calibration.log_mean), step_of(name, sd)
+            means[calibration.parameters.index(name)] += step
+            # Not checked again: a step may leave the limits of a design.
+            moved = calibration.model_copy(update={"log_mean": tuple(means)})
+            moves.append(Moved(name, step, design.model_copy(update={"calibration": moved})))
+    return moves
+
+
+def simulated(moves: Sequence[Moved]) -> list[Moved]:
+    """The moves that take a run: hardness has the impacts that are known."""
+    return [one for one in moves if one.name != "hardness"]
 
 
 def step_of(name: Parameter, sd: float) -> float:
@@ -118,40 +130,30 @@ def step_of(name: Parameter, sd: float) -> float:
     return math.copysign(min(max(STANDARD_DEVIATIONS * sd, MIN_STEP), abs(most)), most)
 
 
-def with_moved(design: Design, name: Parameter, step: float) -> Design:
-    """The design with the mean of one calibrated logarithm moved by a step."""
-    calibration = design.calibration
-    assert calibration is not None
-    means = list(calibration.log_mean)
-    means[calibration.parameters.index(name)] += step
-    # Not checked again: a step may leave the limits of a design.
-    moved = calibration.model_copy(update={"log_mean": tuple(means)})
-    return design.model_copy(update={"calibration": moved})
+def slope(one: Estimate, two: Estimate, step: float) -> float:
+    """Slope of a figure from one run to another; 0 where it has no number."""
+    known = all(math.isfinite(e.value) and e.has_number for e in (one, two))
+    return (two.value - one.value) / step if known else 0.0
 
 
-def _with_other_dents(done: list[Replica], factor: float) -> list[Replica]:
+def _figures(found: Evaluation) -> dict[str, Estimate]:
+    """The metrics of an evaluation, and those of wide windows after WIDE."""
+    return found.metrics | {WIDE + name: one for name, one in found.metrics_of_wide.items()}
+
+
+def _with_other_dents(replicas: list[Replica], factor: float) -> list[Replica]:
     """Replicas whose dents on the part are so many times as wide."""
-    return [replace(one, hits=replace(one.hits, dent=one.hits.dent * factor)) for one in done]
+    return [replace(one, hits=replace(one.hits, dent=one.hits.dent * factor)) for one in replicas]
 
 
-def _factors(figures: Mapping[str, Estimate]) -> dict[str, dict[Parameter, float]]:
-    """Slopes by K and beta, which are factors."""
-    slopes: dict[str, dict[Parameter, float]] = {name: {} for name in figures}
-    for name, one in figures.items():
-        figure = name.rpartition(".")[2]
-        if figure.startswith("almen_intensity"):
-            slopes[name] = {"K": one.value}
-        elif figure == "saturation_time_s":
-            slopes[name] = {"beta": -one.value}
-    return slopes
+def _factors(name: str, one: Estimate) -> dict[Parameter, float]:
+    """Slopes of a figure by K and beta, which are factors."""
+    figure = name.rpartition(".")[2]
+    if figure.startswith("almen_intensity"):
+        return {"K": one.value}
+    return {"beta": -one.value} if figure == "saturation_time_s" else {}
 
 
 def _of_model(name: str, one: Estimate) -> float:
     """Standard error of a figure by what the model leaves out."""
     return TIME_ERROR * one.value if name.rpartition(".")[2] == "saturation_time_s" else 0.0
-
-
-def _slope(one: Estimate, two: Estimate, step: float) -> float:
-    """Slope of a figure; 0 where it has no number."""
-    known = all(math.isfinite(e.value) and e.has_number for e in (one, two))
-    return (two.value - one.value) / step if known else 0.0

@@ -1,16 +1,9 @@
-"""How the figures of a design respond to changes of its numbers, from paired runs.
+"""Scales on which figures respond to changes of a design's numbers in nearly straight lines.
 
 Notation
     m    a figure, such as mean_coverage
     L    the scale on which m is nearly a straight line: ln(-ln(1 - m)) for a share of the area,
          ln m for another positive figure, m itself for the others          (FigureScale)
-    h    size of a change: ln(x / x0) of a number, or whatever the caller counts in   (step)
-    g    dL/dh, an elasticity where h is a logarithm                        (response)
-
-The nominal design and each changed one run in the same replicas on the same seeds, so that
-g = (L(changed) - L(nominal)) / h has the interval of their paired differences. A chamber is
-chaotic and pairs correlate little: the interval falls as 1/h, and curvature makes g wrong by a
-share that grows as h. benchmarks/response_steps.py measures both.
 
 Avrami's coverage is 1 - exp(-x) with the dent density x, which goes with powers of amplitude, mass
 and time: hence the scale of shares.
@@ -21,29 +14,16 @@ from __future__ import annotations
 import contextlib
 import math
 from collections.abc import Callable
-from concurrent.futures import Executor
 from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
-from chamberopt.chamber.analytic import analytic_cavity
-from chamberopt.chamber.build import build_chamber
 from chamberopt.common.estimate import FIRST_OF_CALIBRATION, Estimate
 from chamberopt.coverage.coverage_intervals import NOT_RESOLVED
 from chamberopt.coverage.metrics import ObjectiveFunction, find_metric
-from chamberopt.peening.calibration_errors import evaluate_calibrated
 from chamberopt.simulation.estimates import weighted_sum
-from chamberopt.simulation.evaluate import ReplicaPlan, evaluate
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
-
-    from chamberopt.chamber.build import Chamber
-    from chamberopt.common.progress import Progress
-    from chamberopt.design.load import Design
-    from chamberopt.simulation.evaluation import Evaluation
-    from chamberopt.simulation.replicas import Replica
-
-TREATMENT_TIME = "process.treatment_time_s"
 
 
 class FigureScale(NamedTuple):
@@ -61,73 +41,6 @@ SHARE = FigureScale(
     lambda value: -math.expm1(-math.exp(value)),
     lambda m: 1.0 / (math.log1p(-m) * (m - 1.0)),
 )
-
-
-class PairedRuns:
-    """Simulates a design, and changed ones in the same replicas on the same seeds.
-
-    What a calibration leaves open is found for the nominal design alone, see `with_errors_of`.
-
-    Attributes:
-        design, chamber: the nominal ones.
-        nominal: the evaluation of the nominal design.
-    """
-
-    def __init__(
-        self,
-        design: Design,
-        chamber: Chamber,
-        executor: Executor,
-        progress: Progress | None = None,
-        analytic: bool = False,
-        runs: int = 1,
-    ) -> None:
-        """Simulate the nominal design.
-
-        Args:
-            progress: called over all `runs`, of which this is one.
-            analytic: simulate in exact cavities instead of meshes.
-        """
-        self.design, self.chamber = design, chamber
-        self._executor, self._analytic = executor, analytic
-        self._progress, self._runs, self._done = progress, runs, 0
-        self._replicas: list[Replica] = []
-        self.nominal = self._evaluate(design, chamber, None, self._replicas)
-
-    def evaluate(self, design: Design) -> Evaluation:
-        """Evaluate a changed design. InputError or an error of sim_core if it cannot be simulated.
-
-        A design that is only peened for another time has the nominal impacts: nothing is simulated.
-        """
-        plan = ReplicaPlan(self.nominal.replicas, self.nominal.stream)
-        same = {TREATMENT_TIME: self.design.value(TREATMENT_TIME), "tolerances": None}
-        if design.changed(same) == self.design.changed(same):
-            return self._evaluate(design, self.chamber, plan, list(self._replicas))
-        return self._evaluate(design, self.build(design), plan, [])
-
-    def build(self, design: Design) -> Chamber:
-        """The chamber of a changed design; a target that the shot's reach decides is kept."""
-        keeps = self.design.part.target.reachable
-        return build_chamber(design, self.chamber.part.target if keeps else None)
-
-    def _evaluate(
-        self, design: Design, chamber: Chamber, plan: ReplicaPlan | None, done: list[Replica]
-    ) -> Evaluation:
-        cavity = analytic_cavity(design, chamber) if self._analytic else None
-        first, ended = self._done, 0
-        self._runs -= 1
-
-        def progress(finished: int, total: int, best: float | None) -> None:
-            nonlocal ended
-            ended = finished
-            if self._progress:
-                to_come = self._runs * max(len(self._replicas), design.process.accuracy.replicas)
-                self._progress(first + finished, first + total + to_come, best)
-
-        run = evaluate if plan else evaluate_calibrated
-        found = run(design, chamber, self._executor, progress, plan, cavity, done)
-        self._done = first + ended
-        return found
 
 
 def scale_of(name: str) -> FigureScale:
@@ -195,9 +108,3 @@ def combine(figures: Mapping[str, Estimate], weights: Mapping[str, float]) -> Es
     if not used:
         return Estimate(0.0, 0.0)
     return weighted_sum(ObjectiveFunction("", "", used), dict(figures))
-
-
-def response(changed: Estimate, nominal: Estimate, step: float) -> Estimate:
-    """g of one figure from its paired estimates, both on its scale, and the step h."""
-    pair = {"changed": changed, "nominal": nominal}
-    return combine(pair, {"changed": 1.0 / step, "nominal": -1.0 / step})

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from chamberopt.chamber.scene import chamber_mesh
-from chamberopt.common.executor import share
 from chamberopt.coverage.metrics import exposed_target, require_target
 from chamberopt.design.calibration import (
     PARAMETERS,
@@ -70,11 +69,9 @@ def simulate_setup(
     design = setup.design
     calibration = exact_calibration(design, values)
     tried = design.model_copy(update={"calibration": calibration})
-    setting = share(executor, ReplicaSetting(tried, setup.chamber, setup.mesh))
-    numbers = range(design.process.accuracy.replicas)
-    found = simulate_replicas(setting, seed, executor, "search", numbers)
+    setting = ReplicaSetting(tried, setup.chamber, setup.mesh)
     return Impacts(
-        [one.hits for one in found],
+        [one.hits for one in simulate_replicas(setting, executor, seed=seed)],
         design.process.recorded_time,
         design.shot.density,
         calibrated_strip(design.shot, calibration),

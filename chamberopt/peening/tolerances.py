@@ -37,15 +37,15 @@ from chamberopt.common.estimate import (
 )
 from chamberopt.coverage.metrics import find_metric
 from chamberopt.design.tolerances import require_tolerances, tolerance_box
+from chamberopt.peening.calibration_errors import moved_designs, simulated, with_open_errors
 from chamberopt.peening.responses import (
-    TREATMENT_TIME,
-    PairedRuns,
     back_from_scale,
     combine,
     on_scale,
     scale_of,
     with_errors_of,
 )
+from chamberopt.simulation.variations import RunsProgress, Variations
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
@@ -62,7 +62,7 @@ if TYPE_CHECKING:
 # A change of five times the tolerance has a fifth of the noise, at the price of curvature. Beyond
 # a third of the number, curvature would be the larger error (benchmarks/response_steps.py).
 STRETCH, MOST = 5.0, 0.3
-MASS = "shot.mass_g"
+MASS, TREATMENT_TIME = "shot.mass_g", "process.treatment_time_s"
 SAMPLE_EXPONENT = 12  # the box has 2^12 points
 
 
@@ -225,8 +225,19 @@ def simulate_tolerances(
     for one in numbers:  # before the design itself is simulated
         with _run_named(one):
             build_chamber(one.changed, target)
-    runs = PairedRuns(design, chamber, executor, progress, analytic, runs=len(numbers) + 2)
-    return runs.nominal, find_tolerances(design, numbers, runs.nominal, runs.evaluate)
+    moved = [one for one in numbers if one.name != TREATMENT_TIME]
+    to_come = len(simulated(moved_designs(design))) + len(moved) + bool(moved)
+    of_all = RunsProgress(progress, to_come)
+    runs = Variations(design, chamber, executor, of_all, analytic=analytic)
+    nominal = with_open_errors(runs)
+
+    def evaluate(changed: Design) -> Evaluation:
+        same = {TREATMENT_TIME: design.value(TREATMENT_TIME), "tolerances": None}
+        if changed.changed(same) == design.changed(same):  # another time of the same impacts
+            return runs.run(changed, replicas=runs.replicas)
+        return runs.run(changed, build_chamber(changed, target))
+
+    return nominal, find_tolerances(design, numbers, nominal, evaluate)
 
 
 @contextmanager

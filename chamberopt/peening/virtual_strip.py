@@ -11,7 +11,6 @@ runs on the same seeds (calibration_errors.py), those by K and beta from the for
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
@@ -21,11 +20,10 @@ import numpy as np
 from chamberopt.chamber.scene import chamber_mesh
 from chamberopt.common.errors import InputError
 from chamberopt.common.estimate import FIRST_OF_CALIBRATION
-from chamberopt.common.executor import share
 from chamberopt.common.number_text import plain
 from chamberopt.design.almen_strip import OVER_A, USED_FOR
 from chamberopt.design.calibration import TIME_ERROR, calibrated_strip, why_no_intensity
-from chamberopt.peening.calibration_errors import moved_parameters, step_of, with_moved
+from chamberopt.peening.calibration_errors import moved_designs, simulated, slope
 from chamberopt.peening.kirk_fit import MULTIPLES, KirkFit, heights, kirk_fits, strip_saturation
 from chamberopt.peening.strip import (
     ENOUGH_DENTS,
@@ -40,6 +38,7 @@ from chamberopt.peening.strip import (
 from chamberopt.peening.strip_holder import HOLDER_FILE, strip_design
 from chamberopt.simulation.replicas import Replica, ReplicaSetting, simulate_replicas
 from chamberopt.simulation.resting_balls import bouncing_notes, resting_notes
+from chamberopt.simulation.variations import RunsProgress
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -162,32 +161,23 @@ def peen_strip(
     design = setting.design
     _require_bare(chamber)
     mesh = chamber_mesh(chamber)
-    names = [name for name in moved_parameters(design) if name != "hardness"]
-    total = (1 + len(names)) * design.process.accuracy.replicas
-    finished = iter(range(1, total + 1))
-
-    def peened(one: Design) -> tuple[list[Replica], StripDents]:
-        replicas = []
-        for replica in _simulated(ReplicaSetting(one, chamber, mesh), executor):
-            replicas.append(replica)
-            if progress:
-                progress(next(finished), total, None)
-        return replicas, _dents(setting, one, replicas)
-
-    replicas, dents = peened(design)
+    moves = simulated(moved_designs(design))
+    of_all = RunsProgress(progress, len(moves))
+    replicas = simulate_replicas(ReplicaSetting(design, chamber, mesh), executor, of_all)
+    dents = _dents(setting, design, replicas)
     first = strip_saturation(dents)
     if first.time.value <= 0.0:
         raise _without_dents(design, replicas)
     at, drawn_at = (np.multiply(one, first.time.value) for one in (MULTIPLES, DRAWN))
     found = [*first, *heights(dents, [*at, *drawn_at])]
     slopes: list[dict[Parameter, float]] = [{} for _ in found]
-    for name in names:
-        assert design.calibration is not None
-        step = step_of(name, design.calibration.log_sd(name))
-        other_dents = peened(with_moved(design, name, step))[1]
-        moved = [*strip_saturation(other_dents), *heights(other_dents, [*at, *drawn_at])]
-        for slope, one, other in zip(slopes, found, moved, strict=True):
-            slope[name] = (other.value - one.value) / step
+    for name, step, moved in moves:
+        of_all.begin_next()
+        again = simulate_replicas(ReplicaSetting(moved, chamber, mesh), executor, of_all)
+        other_dents = _dents(setting, moved, again)
+        others = [*strip_saturation(other_dents), *heights(other_dents, [*at, *drawn_at])]
+        for of_one, one, other in zip(slopes, found, others, strict=True):
+            of_one[name] = slope(one, other, step)
     intensity, time, *rest = _as_measured(setting, dents, found, slopes, [*at, *drawn_at])
     points, drawn = rest[: len(at)], rest[len(at) :]
     slower = time.value / first.time.value
@@ -226,12 +216,6 @@ def _require_bare(chamber: Chamber) -> None:
         )
 
 
-def _simulated(setting: ReplicaSetting, executor: Executor) -> Iterator[Replica]:
-    process, shared = setting.design.process, share(executor, setting)
-    numbers = range(process.accuracy.replicas)
-    yield from simulate_replicas(shared, process.seed, executor, "search", numbers)
-
-
 def _dents(setting: StripSetting, design: Design, replicas: list[Replica]) -> StripDents:
     shot = design.shot.density, calibrated_strip(design.shot, design.calibration)
     hits = [one.hits for one in replicas]
@@ -265,8 +249,8 @@ def _as_measured(
     by_beta = [0.0, -figures[1].value, *growth.tolist()]
     by_k = [1.0, 0.0, *[1.0] * len(times)]
     measured = []
-    for k, (figure, slope) in enumerate(zip(figures, slopes, strict=True)):
-        whole: dict[Parameter, float] = {name: scales[k] * one for name, one in slope.items()}
+    for k, (figure, by_run) in enumerate(zip(figures, slopes, strict=True)):
+        whole: dict[Parameter, float] = {name: scales[k] * one for name, one in by_run.items()}
         whole |= {"K": by_k[k] * figure.value, "beta": by_beta[k]}
         of_model = TIME_ERROR * figure.value if k == 1 else 0.0
         measured.append(

@@ -7,7 +7,7 @@ import time
 from concurrent.futures import Executor
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -28,13 +28,12 @@ from chamberopt.search.study_folder import STUDY, StudyFolder
 from chamberopt.search.trial_log import HISTORY, Trial
 from chamberopt.simulation.evaluate import ReplicaPlan, evaluate, prepare_target
 from chamberopt.simulation.evaluation import Evaluation
+from chamberopt.simulation.replicas import ReplicaSet
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
-    from chamberopt.coverage.field.target_field import TargetField
     from chamberopt.design.design import Design
     from chamberopt.search.study import Study
-    from chamberopt.simulation.replicas import Replica
 
 
 TOLERANCES = (
@@ -219,8 +218,7 @@ class _Simulated:
     """What is kept of a candidate."""
 
     chamber: Chamber
-    replicas: list[Replica] = field(default_factory=list)
-    target: TargetField | None = None
+    known: ReplicaSet = field(default_factory=ReplicaSet)
 
 
 class ChamberSimulator:
@@ -240,19 +238,15 @@ class ChamberSimulator:
         one = self._candidate(design, stream)
         seconds = time.perf_counter() - began
         plan = ReplicaPlan(replicas, stream, self._study.objective.goals[0])
-        settings: dict[str, Any] = {"plan": plan, "done": one.replicas}
-        if stream == "confirm":
-            evaluation = evaluate_calibrated(design, one.chamber, self._executor, **settings)
-        else:
-            settings["target"] = one.target
-            evaluation = evaluate(design, one.chamber, self._executor, **settings)
+        run = evaluate_calibrated if stream == "confirm" else evaluate
+        evaluation = run(design, one.chamber, self._executor, plan=plan, known=one.known)
         return replace(evaluation, timings={"chamber": seconds, **evaluation.timings})
 
     def reachable(self, design: Design) -> float:
         """The largest share of the target that the balls may touch, without any simulation."""
         one = self._candidate(design, "search")
-        one.target = prepare_target(design, one.chamber, chamber_mesh(one.chamber))
-        return one.target.reach.largest
+        one.known.target = prepare_target(design, one.chamber, chamber_mesh(one.chamber))
+        return one.known.target.reach.largest
 
     def _candidate(self, design: Design, stream: str) -> _Simulated:
         from chamberopt.chamber.build import build_chamber

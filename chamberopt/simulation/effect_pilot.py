@@ -12,7 +12,7 @@ The pilot advises and changes nothing. Only a design with effects = "auto" leave
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -24,11 +24,14 @@ from chamberopt.chamber.scene import balls_can_rest, chamber_mesh
 from chamberopt.common.estimate import Estimate, estimate
 from chamberopt.coverage.coverage_from_impacts import coverage_from_dent_density
 from chamberopt.coverage.metrics import exposed_target
-from chamberopt.simulation.evaluate import evaluate
+from chamberopt.simulation.evaluate import require_figures
+from chamberopt.simulation.replicas import ReplicaSetting, simulate_replicas
+from chamberopt.simulation.variations import RunsProgress
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
     from chamberopt.common.progress import Progress
+    from chamberopt.coverage.part_impacts import Hits
     from chamberopt.design.load import Design
 
 Prepare = Callable[["Design"], None]
@@ -171,34 +174,35 @@ class _Pilot:
         progress: Progress | None,
         prepare: Prepare | None,
     ) -> None:
-        self.design, self.chamber = design, chamber
+        self.design, self.chamber, self._mesh = design, chamber, chamber_mesh(chamber)
+        require_figures(design, chamber, self._mesh)
         self.effects = _switchable(design, chamber)
-        self._executor, self._progress, self._prepare = executor, progress, prepare
-        self._begun = 0
-        first = evaluate(self._variant({}, FIRST_TIME), chamber, executor)
+        self._executor, self._prepare = executor, prepare
+        # After the short run for the time: one unchanged, one for each effect.
+        self._progress = RunsProgress(progress, 1 + len(self.effects))
         target = exposed_target(chamber)
-        hits = sum(int(target[one.triangle].sum()) for one in first.hits)
+        first = self._simulate(self._variant({}, FIRST_TIME))
+        hits = sum(int(target[one.triangle].sum()) for one in first)
         self._time = float(np.clip(FIRST_TIME * IMPACTS / max(hits, 1), FIRST_TIME, MAX_TIME))
         self.unchanged = self.measure({})
 
     def measure(self, effects: Mapping[str, bool]) -> dict[str, np.ndarray]:
         """Each of MEASURED in every replica, (REPLICAS,), with some effects switched on or off."""
-        return _measure(self._variant(effects, self._time), self.chamber, self._executor)
+        self._progress.begin_next()
+        variant = self._variant(effects, self._time)
+        return _measure(variant, self.chamber, self._simulate(variant))
 
     def _variant(self, effects: Mapping[str, bool], time: float) -> Design:
-        variant = _switched(self.design, effects).changed(
-            {
-                "process.accuracy.replicas": REPLICAS,
-                "process.accuracy.simulated_time_s": time,
-                "process.accuracy.objective_half_width": None,
-            }
-        )
-        if self._progress:  # one short run for the time, one unchanged, one for each effect
-            self._progress(self._begun, max(2 + len(self.effects), self._begun + 1), None)
-        self._begun += 1
+        accuracy = {"replicas": REPLICAS, "simulated_time_s": time, "objective_half_width": None}
+        values = {f"process.accuracy.{name}": value for name, value in accuracy.items()}
+        return _switched(self.design, effects).changed(values)
+
+    def _simulate(self, variant: Design) -> list[Hits]:
         if self._prepare is not None:
             self._prepare(variant)
-        return variant
+        setting = ReplicaSetting(variant, self.chamber, self._mesh)
+        replicas = simulate_replicas(setting, self._executor, self._progress)
+        return [one.hits for one in replicas]
 
 
 def _advise(pilot: _Pilot) -> list[Advice]:
@@ -276,9 +280,8 @@ def _switched(design: Design, effects: Mapping[str, bool]) -> Design:
     return design.changed(values)
 
 
-def _measure(design: Design, chamber: Chamber, executor: Executor) -> dict[str, np.ndarray]:
+def _measure(design: Design, chamber: Chamber, replicas: Sequence[Hits]) -> dict[str, np.ndarray]:
     """Each of MEASURED in every replica of a design."""
-    replicas = evaluate(design, chamber, executor).hits
     target = exposed_target(chamber)
     centres = chamber.part.vertices[chamber.part.triangles].mean(axis=1)
     distance = np.linalg.norm(centres, axis=1)  # from the middle of the sonotrode

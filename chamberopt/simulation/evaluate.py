@@ -40,15 +40,15 @@ from chamberopt.simulation.estimates import (
 from chamberopt.simulation.evaluation import Evaluation
 from chamberopt.simulation.replicas import (
     MIN_REPLICAS_TO_STOP,
-    Replica,
+    ReplicaSet,
     ReplicaSetting,
     next_replica_count,
-    simulate_replicas,
 )
 from chamberopt.simulation.resting_balls import bouncing_notes, resting_notes
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
+    from chamberopt.coverage.part_impacts import Hits
     from chamberopt.design.load import Design
     from sim_core import AnalyticCavity, TriangleMesh
 
@@ -76,8 +76,7 @@ def evaluate(
     progress: Progress | None = None,
     plan: ReplicaPlan | None = None,
     cavity: AnalyticCavity | None = None,
-    done: list[Replica] | None = None,
-    target: TargetField | None = None,
+    known: ReplicaSet | None = None,
 ) -> Evaluation:
     """Simulate a candidate in independent replicas and estimate its objective and metrics.
 
@@ -86,8 +85,7 @@ def evaluate(
 
     Args:
         cavity: simulate in this exact cavity instead of the chamber's mesh.
-        done: first replicas of this very candidate, already simulated; the new ones are appended.
-        target: of `prepare_target`, if that was called already.
+        known: replicas of this very candidate, to which the missing ones are added.
 
     Raises:
         InputError: the shot does not fit into the chamber, or the objective takes a metric that
@@ -95,90 +93,137 @@ def evaluate(
         sim_core.SimulationError: a replica cannot be simulated.
     """
     plan = plan or ReplicaPlan()
-    require_metrics(design, plan.objective_name)
+    run = _Run(design, chamber, executor, plan, cavity, known or ReplicaSet())
     accuracy = design.process.accuracy
     wanted = accuracy.objective_half_width if plan.count is None else None
     count = plan.count or accuracy.replicas
     if wanted is not None:
         count = min(max(count, MIN_REPLICAS_TO_STOP), accuracy.max_replicas)
-    mesh = chamber_mesh(chamber)
-    setting = share(executor, ReplicaSetting(design, chamber, cavity or mesh))
-    timings = {"simulate": 0.0, "coverage": 0.0}
+    while True:
+        run.simulate(count, progress)
+        if wanted is None:
+            return run.evaluation("replicas")
+        done, half_width = run.count, run.objective.half_width
+        count = next_replica_count(done, half_width, wanted, accuracy.max_replicas)
+        if count == done:
+            stopped_by = "accuracy" if half_width <= wanted else "max_replicas"
+            note = _accuracy_note(stopped_by, done, run.objective, wanted)
+            return run.evaluation(stopped_by, (note,))
+
+
+class _Run:
+    """The simulation of one candidate, with the estimates from its replicas so far."""
+
+    objective: Estimate
+
+    def __init__(
+        self,
+        design: Design,
+        chamber: Chamber,
+        executor: Executor,
+        plan: ReplicaPlan,
+        cavity: AnalyticCavity | None,
+        known: ReplicaSet,
+    ) -> None:
+        require_metrics(design, plan.objective_name)
+        self._design, self._chamber, self._plan, self._cavity = design, chamber, plan, cavity
+        self._executor, self._known, mesh = executor, known, chamber_mesh(chamber)
+        self._setting = share(executor, ReplicaSetting(design, chamber, cavity or mesh))
+        self._timings = {"simulate": 0.0, "coverage": 0.0}
+        window = require_figures(design, chamber, mesh)
+
+        def see() -> tuple[SeenDents, dict[str, SeenDents]]:
+            field = known.target or find_target_field(chamber, mesh, window)
+            return SeenDents.none(field), see_zones(design, chamber, mesh)
+
+        # The dents of a replica are looked at while others are simulated, so that no worker waits.
+        beside = ThreadPoolExecutor(1)
+        self._seen = beside.submit(see)
+        beside.shutdown(wait=False)
+
+    @property
+    def count(self) -> int:
+        """Number of replicas so far."""
+        return len(self._known.replicas)
+
+    def simulate(self, count: int, progress: Progress | None) -> None:
+        """Add replicas until there are so many, and estimate the objective from all."""
+        began, seed = time.perf_counter(), self._design.process.seed
+        how = self._setting, seed, self._executor, progress, self._plan.stream
+        for _ in self._known.add_up_to(count, *how):
+            self._look()
+        simulated = time.perf_counter()
+        hits, target, zones = self._look()
+        self._found = estimate_metrics(target, hits, self._chamber, self._design)
+        of_zones, self._zone_notes = estimate_zones(zones, hits, self._chamber, self._design)
+        self._metrics = self._found.metrics | of_zones
+        self.objective = weighted_sum(parse_objective(self._plan.objective_name), self._metrics)
+        self._timings["simulate"] += simulated - began
+        self._timings["coverage"] += time.perf_counter() - simulated
+
+    def _look(self) -> tuple[list[Hits], SeenDents, dict[str, SeenDents]]:
+        """The impacts of all replicas, and their dents on the target and on each zone."""
+        hits = [replica.hits for replica in self._known.replicas]
+        target, zones = self._seen.result()
+        for one in (target, *zones.values()):
+            one.add(hits)
+        return hits, target, zones
+
+    def evaluation(self, stopped_by: str, accuracy_note: tuple[str, ...] = ()) -> Evaluation:
+        """The evaluation from all replicas; `stopped_by` as Evaluation has it."""
+        hits, target, zones = self._look()
+        design, found, field = self._design, self._found, target.field
+        replicas, count = self._known.replicas, self.count
+        return Evaluation(
+            objective_name=self._plan.objective_name,
+            objective=self.objective,
+            metrics=self._metrics,
+            metrics_of_wide=found.metrics_of_wide,
+            gauge_mm2=design.process.accuracy.gauge_mm2,
+            resolution=found.resolution,
+            reachable=field.reachable,
+            crease_share=target.crease_share,
+            alike=field.alike,
+            replicas=count,
+            simulated_time=count * design.process.recorded_time,
+            hits=tuple(hits),
+            timings=self._timings,
+            collisions={
+                kind: sum(replica.collisions[kind] for replica in replicas)
+                for kind in replicas[0].collisions
+            },
+            notes=(
+                *((cavity_note(self._cavity),) if self._cavity else ()),
+                *friction_notes(design),
+                *reach_notes(field.reach),
+                *facet_warnings(self._chamber.part, min(design.shot.diameters), field.reach.share),
+                *_symmetry_note(field.alike),
+                *accuracy_note,
+                *resolution_notes(found.resolution),
+                *strength_notes(found.metrics, found.resolution),
+                *self._zone_notes,
+                *stress_notes(design.materials.part),
+                *resting_notes([one.resting for one in replicas if one.resting], count),
+                *bouncing_notes([one.bouncing_share for one in replicas]),
+            ),
+            zones={name: one.field.reachable for name, one in zones.items()},
+            stream=self._plan.stream,
+            stopped_by=stopped_by,
+            analytic=self._cavity is not None,
+        )
+
+
+def require_figures(design: Design, chamber: Chamber, mesh: TriangleMesh) -> WindowSetting:
+    """The windows for the target of a chamber.
+
+    Raises:
+        InputError: as `window_setting`, or the windows are too wide for the target, or no ball
+            touches a zone.
+    """
     window = window_setting(design, chamber)
     require_narrow_gauge(chamber, window)
     require_touchable_zones(chamber, mesh, 0.5 * window.ball)
-    # The dents of a replica are looked at while others are simulated, so that no worker waits.
-    beside = ThreadPoolExecutor(1)
-    field = beside.submit(lambda: target or find_target_field(chamber, mesh, window))
-    zones = beside.submit(see_zones, design, chamber, mesh)
-    beside.shutdown(wait=False)
-    done = [] if done is None else done
-    seen: SeenDents | None = None
-    while True:
-        started = time.perf_counter()
-        for replica in simulate_replicas(
-            setting, design.process.seed, executor, plan.stream, range(len(done), count)
-        ):
-            done.append(replica)
-            if progress:
-                progress(len(done), count, None)
-            seen = seen or SeenDents.none(field.result())
-            for one in (seen, *zones.result().values()):
-                one.add([replica.hits for replica in done])
-        simulated = time.perf_counter()
-        hits = [replica.hits for replica in done]
-        seen = seen or SeenDents.none(field.result())
-        for one in (seen, *zones.result().values()):
-            one.add(hits)
-        found = estimate_metrics(seen, hits, chamber, design)
-        of_zones, zone_notes = estimate_zones(zones.result(), hits, chamber, design)
-        metrics = found.metrics | of_zones
-        value = weighted_sum(parse_objective(plan.objective_name), metrics)
-        timings["simulate"] += simulated - started
-        timings["coverage"] += time.perf_counter() - simulated
-        if wanted is None:
-            stopped_by = "replicas"
-            break
-        count = next_replica_count(len(done), value.half_width, wanted, accuracy.max_replicas)
-        if count == len(done):
-            stopped_by = "accuracy" if value.half_width <= wanted else "max_replicas"
-            break
-    return Evaluation(
-        objective_name=plan.objective_name,
-        objective=value,
-        metrics=metrics,
-        metrics_of_wide=found.metrics_of_wide,
-        gauge_mm2=accuracy.gauge_mm2,
-        resolution=found.resolution,
-        reachable=seen.field.reachable,
-        crease_share=seen.crease_share,
-        alike=seen.field.alike,
-        replicas=len(done),
-        simulated_time=len(done) * design.process.recorded_time,
-        hits=tuple(hits),
-        timings=timings,
-        collisions={
-            kind: sum(replica.collisions[kind] for replica in done) for kind in done[0].collisions
-        },
-        notes=(
-            *((cavity_note(cavity),) if cavity else ()),
-            *friction_notes(design),
-            *reach_notes(seen.field.reach),
-            *facet_warnings(chamber.part, min(design.shot.diameters), seen.field.reach.share),
-            *_symmetry_note(seen.field.alike),
-            *_accuracy_note(stopped_by, len(done), value, wanted),
-            *resolution_notes(found.resolution),
-            *strength_notes(found.metrics, found.resolution),
-            *zone_notes,
-            *stress_notes(design.materials.part),
-            *resting_notes([replica.resting for replica in done if replica.resting], len(done)),
-            *bouncing_notes([replica.bouncing_share for replica in done]),
-        ),
-        zones={name: one.field.reachable for name, one in zones.result().items()},
-        stream=plan.stream,
-        stopped_by=stopped_by,
-        analytic=cavity is not None,
-    )
+    return window
 
 
 def prepare_target(design: Design, chamber: Chamber, mesh: TriangleMesh) -> TargetField:
@@ -230,14 +275,10 @@ def _symmetry_note(alike: int) -> tuple[str, ...]:
     )
 
 
-def _accuracy_note(
-    stopped_by: str, replicas: int, objective: Estimate, wanted: float | None
-) -> tuple[str, ...]:
+def _accuracy_note(stopped_by: str, replicas: int, objective: Estimate, wanted: float) -> str:
     """A note on whether the wanted accuracy was reached."""
-    if wanted is None:
-        return ()
     if stopped_by == "accuracy":
-        return (f"the wanted accuracy of ± {wanted:g} was reached after {replicas} replicas",)
+        return f"the wanted accuracy of ± {wanted:g} was reached after {replicas} replicas"
     needed = (
         f"about {math.ceil(replicas * (objective.half_width / wanted) ** 2)}"
         if math.isfinite(objective.half_width)
@@ -247,5 +288,5 @@ def _accuracy_note(
         f"the wanted accuracy of ± {wanted:g} was not reached: the simulation stopped at "
         f"process.accuracy.max_replicas = {replicas} with ± {objective.half_width:.2g}, and "
         f"{needed} replicas would be needed; raise process.accuracy.max_replicas or "
-        "simulated_time_s",
+        "simulated_time_s"
     )

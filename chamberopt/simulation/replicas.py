@@ -6,18 +6,21 @@ import math
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor, Future
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 from chamberopt.chamber.analytic import impacts_on_chamber
 from chamberopt.chamber.part import turning_axis
 from chamberopt.chamber.scene import build_scene, replica_seed
 from chamberopt.common.errors import WorkerLostError
+from chamberopt.common.executor import share
 from chamberopt.coverage.part_impacts import Hits, hits_on_part
 from chamberopt.simulation.resting_balls import RestingBalls, bouncing_share, find_resting_balls
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
+    from chamberopt.common.progress import Progress
+    from chamberopt.coverage.field.target_field import TargetField
     from chamberopt.design.load import Design
     from sim_core import AnalyticCavity, SimulationResult, TriangleMesh
 
@@ -48,18 +51,60 @@ class Replica:
     hits: Hits
 
 
+@dataclass
+class ReplicaSet:
+    """The replicas of one candidate so far."""
+
+    replicas: list[Replica] = field(default_factory=list)
+    target: TargetField | None = None  # by `prepare_target`; None if it was not called
+
+    def add_up_to(
+        self,
+        count: int,
+        setting: Any,
+        seed: int,
+        executor: Executor,
+        progress: Progress | None = None,
+        stream: str = "search",
+    ) -> Iterator[Replica]:
+        """Simulate the replicas that are missing, and yield each after it has been added.
+
+        The results do not depend on the number of workers.
+
+        Args:
+            count: number of replicas to reach.
+            setting: a ReplicaSetting as executor.share returns it. Keep it until the last replica,
+                because it goes to each worker once.
+            seed: of the design's process.
+            stream: stream of seeds.
+        """
+        numbers = range(len(self.replicas), count)
+        ahead = len(numbers)
+        for replica in run_in_order(
+            simulate_replica, setting, seed, executor, stream, numbers, ahead
+        ):
+            self.replicas.append(replica)
+            if progress:
+                progress(len(self.replicas), count, None)
+            yield replica
+
+
 def simulate_replicas(
-    setting: Any, seed: int, executor: Executor, stream: str, numbers: Sequence[int]
-) -> Iterator[Replica]:
-    """Simulate the replicas of these numbers; the results do not depend on the number of workers.
+    setting: ReplicaSetting,
+    executor: Executor,
+    progress: Progress | None = None,
+    seed: int | None = None,
+) -> list[Replica]:
+    """Simulate as many replicas as the design asks for.
 
     Args:
-        setting: a ReplicaSetting as executor.share returns it. Keep it until the last replica,
-            because it goes to each worker once.
-        seed: of the design's process.
-        stream: stream of seeds.
+        seed: in the place of the seed of the design's process.
     """
-    return run_in_order(simulate_replica, setting, seed, executor, stream, numbers, len(numbers))
+    process, found = setting.design.process, ReplicaSet()
+    seed, shared = process.seed if seed is None else seed, share(executor, setting)
+    for _ in found.add_up_to(process.accuracy.replicas, shared, seed, executor, progress):
+        pass
+    return found.replicas
 
 
 def run_in_order(

@@ -20,10 +20,10 @@ from chamberopt.common.estimate import (
 from chamberopt.common.executor import SerialExecutor
 from chamberopt.coverage.part_impacts import Hits
 from chamberopt.design.load import Design, load_design, save_design
-from chamberopt.peening import calibration_errors
 from chamberopt.peening.calibration_errors import evaluate_calibrated
 from chamberopt.results.load import load_result
 from chamberopt.results.vtp_files import read_arrays
+from chamberopt.simulation import variations
 from chamberopt.simulation.evaluation import Evaluation
 from chamberopt.workflows import save_run
 from chamberopt.workflows.save_run import save_simulation
@@ -62,7 +62,7 @@ def known(design: Design, *_: Any) -> Evaluation:
 
 @pytest.fixture(autouse=True)
 def _known_functions(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(calibration_errors, "evaluate", known)
+    monkeypatch.setattr(variations, "evaluate", known)
 
 
 def found(design: Design) -> Evaluation:
@@ -129,13 +129,14 @@ def test_a_harder_part_has_smaller_dents_without_a_run(monkeypatch: pytest.Monke
     runs = []
 
     def counted(design: Design, chamber: Any, *args: Any) -> Evaluation:
-        runs.append(args[-1])
+        replicas = args[-1].replicas
+        runs.append(replicas)
         if len(runs) == 1:
-            args[-1].extend(_Replica(hits) for hits in base.hits)
+            replicas.extend(_Replica(hits) for hits in base.hits)
             return base
-        return evaluation_of(design, chamber, [one.hits for one in args[-1]])
+        return evaluation_of(design, chamber, [one.hits for one in replicas])
 
-    monkeypatch.setattr(calibration_errors, "evaluate", counted)
+    monkeypatch.setattr(variations, "evaluate", counted)
     wide = evaluate_calibrated(design, chamber, SerialExecutor()).metrics["mean_coverage"]
     assert len(runs) == 2
     assert len(runs[1]) == 4

@@ -11,7 +11,7 @@ from chamberopt.common.errors import InputError
 from chamberopt.common.estimate import FIRST_OF_CALIBRATION, Estimate, estimate
 from chamberopt.common.executor import SerialExecutor
 from chamberopt.design.load import Design
-from chamberopt.peening.responses import PairedRuns, on_scale, response, scale_of
+from chamberopt.peening.responses import combine, on_scale, scale_of
 from chamberopt.peening.tolerances import (
     ToleranceResult,
     find_tolerances,
@@ -20,6 +20,7 @@ from chamberopt.peening.tolerances import (
 )
 from chamberopt.simulation.evaluate import evaluate
 from chamberopt.simulation.evaluation import Evaluation
+from chamberopt.simulation.variations import RunsProgress, Variations
 from tests.helpers.synthetic import judged, plate_design
 
 BOX = {"amplitude_um": 2, "shot.mass_g": ["-10 %", "0 %"], "process.treatment_time_s": "4 %"}
@@ -234,13 +235,16 @@ def test_a_short_real_run() -> None:
     assert done[-1] == (9, 9, None)
     assert found.corner == {"sonotrode.amplitude_um": 23.0, "process.treatment_time_s": 4.8}
     low = found.figures["mean_coverage"].effects["process.treatment_time_s"][0]
-    runs = PairedRuns(design, chamber, SerialExecutor())
-    at_low = runs.evaluate(design.changed({"process.treatment_time_s": 4.8}))
+    runs = Variations(design, chamber, SerialExecutor(), RunsProgress(None, 0))
+    changed = design.changed({"process.treatment_time_s": 4.8})
+    at_low = runs.run(changed, replicas=runs.replicas)
     gap = at_low.metrics["mean_coverage"].value - nominal.metrics["mean_coverage"].value
     assert low.value == pytest.approx(gap, abs=1e-4)
     one = nominal.metrics["mean_coverage"]
     assert low.half_width / abs(gap) == pytest.approx(one.half_width / one.value, rel=0.2)
     assert found.figures["impacts_per_mm2_s"].effects["process.treatment_time_s"][0].value == 0.0
     scale = scale_of("mean_coverage")
-    pair = (on_scale(one.metrics["mean_coverage"], scale) for one in (at_low, nominal))
-    assert response(*pair, np.log(4.8 / 5.0)).value == pytest.approx(1.0, abs=0.05)
+    ends = {"low": at_low, "nominal": nominal}
+    pair = {end: on_scale(one.metrics["mean_coverage"], scale) for end, one in ends.items()}
+    change = combine(pair, {"low": 1.0, "nominal": -1.0})
+    assert change.value / np.log(4.8 / 5.0) == pytest.approx(1.0, abs=0.05)

@@ -4,8 +4,6 @@ Equal impacts, b of their dented area per area and second: H = K s (1 - exp(-bet
 """
 
 import json
-from collections.abc import Iterator
-from concurrent.futures import Executor
 from pathlib import Path
 from typing import Any
 
@@ -40,12 +38,12 @@ Z = normal_quantile(0.95)
 MEANS = {"K": 13.0, "beta": 1.2}
 
 
-def known(setting: ReplicaSetting, _: Executor) -> Iterator[Replica]:
+def known(setting: ReplicaSetting, *_: object) -> list[Replica]:
     """So many more impacts as the amplitude is larger; their speed is the same."""
     design = setting.design
     more = design.simulated.sonotrode.amplitude_um / SHORT.sonotrode.amplitude_um
     hits = hits_at(middles(DISC, round(HITS * more)))
-    return iter([Replica({}, None, 0.0, hits)] * design.process.accuracy.replicas)
+    return [Replica({}, None, 0.0, hits)] * design.process.accuracy.replicas
 
 
 def peened(folder: Path, strip_type: Any = "A", **sds: float) -> VirtualStrip:
@@ -67,7 +65,7 @@ def exact() -> tuple[float, float]:
 
 @pytest.fixture
 def _known_impacts(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(virtual_strip, "_simulated", known)
+    monkeypatch.setattr(virtual_strip, "simulate_replicas", known)
 
 
 @pytest.mark.usefixtures("_known_impacts")
@@ -138,7 +136,7 @@ def test_a_shot_that_leaves_no_dent_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     slow = Replica({}, None, 0.0, hits_at(middles(DISC, 3), 1.0))
-    monkeypatch.setattr(virtual_strip, "_simulated", lambda *_: iter([slow] * 3))
+    monkeypatch.setattr(virtual_strip, "simulate_replicas", lambda *_: [slow] * 3)
     with pytest.raises(
         InputError, match=r"no dent .*1 m/s, .*begin at 1\.2 m/s; raise the amplitude"
     ):

@@ -23,6 +23,7 @@ from chamberopt.design.load import Design
 from chamberopt.results.write import advice_record
 from chamberopt.simulation import effect_pilot
 from chamberopt.simulation.effect_pilot import MEASURED, Advice, advise, with_effects_resolved
+from chamberopt.simulation.replicas import ReplicaSetting
 from tests.helpers.synthetic import dents_at, plate_design
 
 PLATE = plate_design()
@@ -78,7 +79,8 @@ def pretend(strength: dict[str, float], monkeypatch: pytest.MonkeyPatch) -> list
     """Replace the simulation: each effect that is on multiplies speeds and dents."""
     asked: list[Design] = []
 
-    def evaluate(design: Design, chamber: Any, executor: Executor) -> Any:
+    def simulate(setting: ReplicaSetting, executor: Executor, progress: Any) -> Any:
+        design, chamber, _ = setting
         asked.append(design)
         on = {
             "gravity": design.effects.gravity,
@@ -93,11 +95,11 @@ def pretend(strength: dict[str, float], monkeypatch: pytest.MonkeyPatch) -> list
         place = chamber.part.vertices[chamber.part.triangles[triangle, 0]]
         hits = dents_at(design, triangle, place, np.sqrt(4.0 / np.pi * area))
         speeds = [3.0 * factor * (1.0 + 1e-4 * k) for k in range(effect_pilot.REPLICAS)]
-        return SimpleNamespace(
-            hits=[replace(hits, speed=np.full(len(hits), speed)) for speed in speeds]
-        )
+        return [
+            SimpleNamespace(hits=replace(hits, speed=np.full(len(hits), speed))) for speed in speeds
+        ]
 
-    monkeypatch.setattr(effect_pilot, "evaluate", evaluate)
+    monkeypatch.setattr(effect_pilot, "simulate_replicas", simulate)
     return asked
 
 

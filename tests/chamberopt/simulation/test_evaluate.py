@@ -18,7 +18,7 @@ from chamberopt.design.design import validate
 from chamberopt.design.load import Design
 from chamberopt.simulation.estimates import SeenDents, estimate_metrics, reach_notes, weighted_sum
 from chamberopt.simulation.evaluate import MAX_SPEED, ReplicaPlan, evaluate, prepare_target
-from chamberopt.simulation.replicas import MIN_REPLICAS_TO_STOP
+from chamberopt.simulation.replicas import MIN_REPLICAS_TO_STOP, ReplicaSet
 from tests.helpers.synthetic import evaluation_of, plane_chamber, plate_design, random_dents
 
 DESIGN = plate_design(process__treatment_time_s=50.0)
@@ -155,10 +155,10 @@ def test_evaluate_gives_the_same_numbers_on_any_number_of_workers() -> None:
     assert any("process.accuracy.simulated_time_s" in note for note in serial.notes)
     assert sum(note.startswith("without effects.friction") for note in serial.notes) == 1
     # Replicas there are, are added to: the same as all at once.
-    done: list = []
-    few = evaluate(design, chamber, SerialExecutor(), plan=ReplicaPlan(3), done=done)
-    assert (few.replicas, len(few.hits), len(done)) == (3, 3, 3)
-    assert evaluate(design, chamber, SerialExecutor(), done=done).metrics == serial.metrics
+    known = ReplicaSet()
+    few = evaluate(design, chamber, SerialExecutor(), plan=ReplicaPlan(3), known=known)
+    assert (few.replicas, len(few.hits), len(known.replicas)) == (3, 3, 3)
+    assert evaluate(design, chamber, SerialExecutor(), known=known).metrics == serial.metrics
     # Fresh draws for a confirmation.
     other = evaluate(design, chamber, SerialExecutor(), plan=ReplicaPlan(3, "confirm"))
     assert other.objective.value != serial.objective.value
@@ -171,7 +171,7 @@ def test_a_gauge_too_small_for_the_target_is_refused_before_anything_is_simulate
     def nothing(*_: object) -> Callable:
         raise AssertionError("a replica was simulated")
 
-    monkeypatch.setattr("chamberopt.simulation.evaluate.simulate_replicas", nothing)
+    monkeypatch.setattr(ReplicaSet, "add_up_to", nothing)
     design = plate_design(process__accuracy__gauge_mm2=1e-3)
     chamber = build_chamber(design)
     with pytest.raises(InputError, match=r"process\.accuracy\.gauge_mm2.*give at least 0\.0013"):
