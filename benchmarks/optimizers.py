@@ -40,9 +40,8 @@ from chamberopt.common.estimate import Estimate, estimate
 from chamberopt.search.evaluate_candidate import evaluation_cost
 from chamberopt.search.optimiser.acquisition import recommend_points
 from chamberopt.search.optimiser.gaussian_process import moderate_variances
-from chamberopt.search.optimiser.maximise import maximise
+from chamberopt.search.optimiser.point_search import PointSearch, Scored, run_search
 from chamberopt.search.optimiser.search_model import LimitedFigure, Observations, SearchModel
-from chamberopt.search.optimiser.stopping import Scored
 from chamberopt.search.study import Limits, schema
 from chamberopt.search.study.constraints import (
     FEASIBLE,
@@ -165,12 +164,9 @@ Optimizer = Callable[[Record], None]
 def ours_with(**settings: Any) -> Optimizer:
     def search(record: Record) -> None:
         optimizer = schema.Optimizer(evaluations=record.evaluations, seed=record.seed, **settings)
-        maximise(
+        run_search(
+            PointSearch(record.start, optimizer, record.seen, record.problem.domain),
             lambda point: lambda: record.ask_geometry_first(point, optimizer.first_replicas),
-            record.start,
-            optimizer,
-            record.seen,
-            record.problem.domain,
         )
 
     return search

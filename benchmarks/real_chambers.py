@@ -24,7 +24,7 @@ from benchmarks.table import print_table, write_csv
 from chamberopt.common.executor import local_executor
 from chamberopt.search import run_study
 from chamberopt.search.optimiser.domain import Domain
-from chamberopt.search.optimiser.stopping import Begin
+from chamberopt.search.optimiser.point_search import PointSearch, Scored
 from chamberopt.search.study import load_study
 from chamberopt.search.study.schema import Optimizer
 from chamberopt.search.study_folder import open_study_folder
@@ -32,29 +32,36 @@ from chamberopt.search.study_folder import open_study_folder
 ROOT = Path(__file__).parents[1]
 
 
-def optuna_search(
-    begin: Begin, start: np.ndarray, settings: Optimizer, _: Any, domain: Domain, *__: Any
-) -> str:
-    """Optuna in the place of `maximise`."""
-    import optuna
+class OptunaSearch:
+    """Optuna in the place of PointSearch."""
 
-    optuna.logging.set_verbosity(optuna.logging.ERROR)
-    warnings.simplefilter("ignore", optuna.exceptions.ExperimentalWarning)
-    study = optuna.create_study(
-        direction="maximize", sampler=optuna.samplers.GPSampler(seed=settings.seed)
-    )
-    names = [f"x{k}" for k in range(len(domain))]
-    study.enqueue_trial(dict(zip(names, start.tolist(), strict=True)))
-    left = float(settings.evaluations)
-    for _ in range(4 * settings.evaluations):
-        trial = study.ask()
-        point = np.array([trial.suggest_float(name, 0.0, 1.0) for name in names])
-        scored = begin(start if not trial.number else np.round(point, 4))()
-        study.tell(trial, scored.score)
-        left -= scored.cost
-        if left < 1.0:
-            break
-    return "optuna"
+    def __init__(self, start: np.ndarray, settings: Optimizer, _: Any, domain: Domain, *__: Any):
+        import optuna
+
+        optuna.logging.set_verbosity(optuna.logging.ERROR)
+        warnings.simplefilter("ignore", optuna.exceptions.ExperimentalWarning)
+        sampler = optuna.samplers.GPSampler(seed=settings.seed)
+        self._study = optuna.create_study(direction="maximize", sampler=sampler)
+        self._names = [f"x{k}" for k in range(len(domain))]
+        self._study.enqueue_trial(dict(zip(self._names, start.tolist(), strict=True)))
+        self._start, self._left, self._most = start, settings.evaluations, 4 * settings.evaluations
+        self.points: list[np.ndarray] = []
+        self.scores: list[float] = []
+        self.phases = ["optuna"]
+
+    def ask(self) -> np.ndarray | None:
+        running = len(self.points) > len(self.scores)
+        if running or self._left < 1.0 or len(self.points) == self._most:
+            return None
+        self._trial = self._study.ask()
+        point = np.array([self._trial.suggest_float(name, 0.0, 1.0) for name in self._names])
+        self.points.append(np.round(point, 4) if self.points else self._start)
+        return self.points[-1]
+
+    def tell(self, _: np.ndarray, scored: Scored) -> None:
+        self._study.tell(self._trial, scored.score)
+        self.scores.append(scored.score)
+        self._left -= scored.cost
 
 
 def confirmed(file: Path, seed: int, evaluations: int | None, search: Any) -> dict[str, Any]:
@@ -71,7 +78,7 @@ def confirmed(file: Path, seed: int, evaluations: int | None, search: Any) -> di
     with (
         tempfile.TemporaryDirectory() as folder,
         local_executor(None) as executor,
-        patch.object(run_study, "maximise", search),
+        patch.object(run_study, "PointSearch", search),
         open_study_folder(study, Path(folder) / "study") as opened,
     ):
         result = run_study.run_study(study, opened, executor)
@@ -95,7 +102,7 @@ def main() -> None:
     asked = parser.parse_args()
     rows = []
     for seed in range(asked.seeds):
-        for name, search in (("ours", run_study.maximise), ("optuna-gp", optuna_search)):
+        for name, search in (("ours", PointSearch), ("optuna-gp", OptunaSearch)):
             found = confirmed(asked.study, seed, asked.evaluations, search)
             rows.append({"study": asked.study.stem, "seed": seed, "search": name, **found})
             print(rows[-1], flush=True)

@@ -20,9 +20,9 @@ from chamberopt.coverage.coverage_intervals import NOT_RESOLVED
 from chamberopt.search.evaluate_candidate import CandidateEvaluator, Reference, Simulator
 from chamberopt.search.optimiser.acquisition import recommend_points
 from chamberopt.search.optimiser.gaussian_process import moderate_variances
+from chamberopt.search.optimiser.point_search import Scored
 from chamberopt.search.optimiser.scalarisation import draw_weights, scalarise
 from chamberopt.search.optimiser.search_model import LimitedFigure, Observations, SearchModel
-from chamberopt.search.optimiser.stopping import Scored
 from chamberopt.search.study.constraints import (
     FEASIBLE,
     INFEASIBLE,

@@ -21,7 +21,7 @@ from chamberopt.peening.calibration_errors import evaluate_calibrated
 from chamberopt.search.candidates import Candidates, ConfirmedCandidate, Stop
 from chamberopt.search.evaluate_candidate import Simulator
 from chamberopt.search.optimiser.gaussian_process import one_thread
-from chamberopt.search.optimiser.maximise import PARETO_PHASES, maximise
+from chamberopt.search.optimiser.point_search import PARETO_PHASES, PointSearch, run_search
 from chamberopt.search.sensitivity import Sensitivity, analyse_sensitivity
 from chamberopt.search.study.constraints import NOT_KNOWN
 from chamberopt.search.study_folder import STUDY, StudyFolder
@@ -140,10 +140,10 @@ def run_study(
         settings = settings.model_copy(update={"phases": PARETO_PHASES})
     # The model's threads are limited during all evaluations: a limit is one of the whole process.
     with one_thread(), Candidates(study, folder, simulator, progress, stop, at_once) as candidates:
-        search = candidates.begin, candidates.start, settings, candidates.observations
         space = candidates.space
         first = [space.domain.snap(space.point_of(one)[None])[0] for one in study.begin_with]
-        algorithm = maximise(*search, space.domain, first)
+        points = PointSearch(space.start, settings, candidates.observations, space.domain, first)
+        run_search(points, candidates.begin)
         confirmed = candidates.confirm()
     folder.recorded.require_end(len(candidates.trials))
     if not confirmed or confirmed[0].searched != 0:
@@ -170,7 +170,7 @@ def run_study(
     return StudyResult(
         study=study,
         folder=folder.path,
-        algorithm=algorithm,
+        algorithm=", then ".join(points.phases),
         trials=tuple(candidates.trials),
         start=start,
         confirmed=tuple(confirmed),

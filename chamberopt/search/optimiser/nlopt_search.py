@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Generator
+from queue import SimpleQueue
+from threading import Thread
 from typing import Any
 
 import numpy as np
@@ -12,11 +14,56 @@ from chamberopt.common.errors import InputError
 LOCAL = "LN_BOBYQA"
 
 
-def seed_nlopt(seed: int) -> None:
-    """Seed NLopt's random numbers, which are shared by the whole process."""
-    import nlopt
+class NloptThread:
+    """NLopt in a thread of its own, so that a run can wait for a score while others go on.
 
-    nlopt.srand(seed)
+    NLopt's random numbers are those of the thread: the seed is for all of its runs.
+    """
+
+    def __init__(self, seed: int) -> None:
+        self._told: SimpleQueue[Any] = SimpleQueue()
+        self._asked: SimpleQueue[Any] = SimpleQueue()
+        Thread(target=self._work, args=(seed,), name="nlopt", daemon=True).start()
+
+    def close(self) -> None:
+        """End the thread."""
+        self._told.put(None)
+
+    def points(self, *run: Any) -> Generator[np.ndarray, float, None]:
+        """The points that a run of NLopt asks for; each is sent its score.
+
+        Args:
+            run: the arguments of run_nlopt after the function, whose errors are raised.
+        """
+        self._told.put(run)
+        while isinstance(asked := self._asked.get(), np.ndarray):
+            try:
+                score = yield asked
+            except GeneratorExit:
+                self._told.put(None)
+                self._asked.get()
+                raise
+            self._told.put(score)
+        if asked is not None:
+            raise asked
+
+    def _work(self, seed: int) -> None:
+        import nlopt
+
+        nlopt.srand(seed)
+        for run in iter(self._told.get, None):
+            try:
+                run_nlopt(self._score, *run)
+                self._asked.put(None)
+            except BaseException as error:
+                self._asked.put(error)
+
+    def _score(self, point: np.ndarray) -> float:
+        self._asked.put(point)
+        score = self._told.get()
+        if score is None:
+            raise InterruptedError("nobody waits for this run any more")
+        return float(score)
 
 
 def run_nlopt(

@@ -1,0 +1,285 @@
+"""The points of a search, asked for and told: one algorithm after another on one budget.
+
+A search ends for one of these reasons:
+
+1. The budget is spent: what is left of `optimizer.evaluations` is less than a whole evaluation
+   (BudgetSpentError). A point that got only a few replicas, as it is clearly worse than the best,
+   costs a part of one. A point that cannot be simulated, or that geometry alone shows to be no
+   better, costs nothing, until there are as many of those as the budget.
+2. All points were evaluated, where every parameter has levels.
+3. It has converged: the last phase ends because the steps of its local algorithm are below
+   `optimizer.tolerance` (nlopt_search.py), or rounds of local searches find no new point.
+4. The user stops it: `run_search` asks `stop()` before each evaluation, finishes those that run and
+   raises KeyboardInterrupt. The study can be resumed.
+5. An error ends it: the start cannot be simulated, an algorithm cannot take the parameters, the
+   disk is full, or workers are lost. A candidate that cannot be simulated does not end it.
+
+A phase ends in the same way, at its share of the budget.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Callable, Generator, Sequence
+from contextlib import closing, suppress
+from typing import Any, NamedTuple, Protocol, TypeVar
+
+import numpy as np
+
+from chamberopt.search.optimiser.acquisition import propose_point
+from chamberopt.search.optimiser.domain import Axis, Domain
+from chamberopt.search.optimiser.gaussian_process import MAX_POINTS
+from chamberopt.search.optimiser.nlopt_search import LOCAL, NloptThread
+from chamberopt.search.optimiser.search_model import Observations, SearchModel
+from chamberopt.search.study.schema import Optimizer, Phase
+
+# Two phases are not algorithms of NLopt: evenly spread points, and the model of the scores.
+SPREAD, MODEL = "sobol", "surrogate"
+AUTO = (SPREAD, MODEL, LOCAL)
+# Two objectives have no single score to climb. Each step of the model weights them differently.
+PARETO_PHASES = (Phase(algorithm="sobol", share=0.3), Phase(algorithm="surrogate", share=0.7))
+# "auto" spreads this share of the budget, or two points per parameter plus two if that is more,
+# and then follows the model. BOBYQA takes over where there are more points than the model can
+# hold. Measured in benchmarks/optimizers.py.
+SPREAD_SHARE, SPREAD_PER_PARAMETER = 0.3, 2
+# The model may have missed a peak between its points. Every 4th step therefore assumes half the
+# fitted length scales, so that the model is less certain away from its points.
+ROUGH_STEP_INTERVAL, ROUGH_LENGTH_FACTOR = 4, 0.5
+# First steps of the local searches from the best point so far, as factors of the initial step.
+LOCAL_STEP_FACTORS = (1.0, 0.5, 0.25)
+ROUNDING = 1e-9  # of a sum of costs
+
+Observe = Callable[[], Observations]
+"""Returns what the model learns from the first points, those with scores."""
+Question, Answer = TypeVar("Question"), TypeVar("Answer")
+Wait = Generator[np.ndarray | None, None, None]
+"""Yields points to evaluate, and None where it needs one more score first."""
+
+
+class Scored(NamedTuple):
+    """A score, a finite number to be maximised, and its cost: 1 for a whole evaluation, or less."""
+
+    score: float
+    cost: float = 1.0
+
+
+class BudgetSpentError(Exception):
+    """Ends a phase, or the search, from inside an algorithm."""
+
+
+class AskAndTell(Protocol[Question, Answer]):
+    """A search that proposes questions, and takes their answers in the same order."""
+
+    def ask(self) -> Question | None:
+        """The next question; None if answers are missing, or at the end."""
+
+    def tell(self, asked: Question, answer: Answer, /) -> Any:
+        """Take the answer of the first question that has none."""
+
+
+def run_search(
+    search: AskAndTell[Question, Answer],
+    begin: Callable[[Question], Callable[[], Answer]],
+    stop: Callable[[], bool] = lambda: False,
+) -> None:
+    """Ask, evaluate and tell until the search ends.
+
+    Args:
+        begin: starts an evaluation, and returns a function that waits for its answer.
+        stop: whether to stop, asked before each evaluation. Those that run are then finished and
+            told, and KeyboardInterrupt is raised.
+    """
+    running: deque[tuple[Question, Callable[[], Answer]]] = deque()
+    stopped = False
+    while True:
+        question = None if stopped else search.ask()
+        stopped = stopped or (question is not None and stop())
+        if question is not None and not stopped:
+            running.append((question, begin(question)))
+        elif running:
+            asked, wait = running.popleft()
+            search.tell(asked, wait())
+        elif stopped:
+            raise KeyboardInterrupt
+        else:
+            return
+
+
+class PointSearch:
+    """The search for the largest score over the unit cube; the first question is the start.
+
+    Each point is asked for once. Evenly spread points and those of the model may be evaluated
+    `settings.batch` at a time: the next is proposed when all but the last `batch - 1` have scores.
+    Other algorithms take one point after another. The same seed and the same scores give the same
+    search. `points` (d,) are all that were asked for; the first of them have `scores`. `phases`
+    are those that ran.
+
+    Args:
+        start: first point, shape (d,).
+        observe: what the model learns; by default the scores, with unknown noise.
+        domain: which values each parameter can have; by default any.
+        begin_with: points (d,) that are evaluated after the start.
+    """
+
+    def __init__(
+        self,
+        start: np.ndarray,
+        settings: Optimizer,
+        observe: Observe | None = None,
+        domain: Domain | None = None,
+        begin_with: Sequence[np.ndarray] = (),
+    ) -> None:
+        self._settings, self._budget = settings, settings.evaluations
+        self._domain = domain or Domain([Axis()] * len(start))
+        self._observe = observe or self._scores_without_noise
+        self._rng = np.random.default_rng(settings.seed)
+        self._numbers: dict[bytes, int] = {}  # by the exact bytes of the point
+        self._costs: list[float] = []  # of the scores
+        self.points: list[np.ndarray] = []
+        self.scores: list[float] = []
+        self.phases: list[str] = []
+        self._steps = self._search([start, *begin_with])
+
+    def ask(self) -> np.ndarray | None:
+        """The next point (d,) to evaluate; None if scores are missing, or at the end.
+
+        InputError if an algorithm cannot take these parameters.
+        """
+        return next(self._steps, None)
+
+    def tell(self, _: np.ndarray, scored: Scored) -> None:
+        """Take the score of the first point that has none."""
+        self.scores.append(scored.score)
+        self._costs.append(scored.cost)
+
+    def _search(self, first: Sequence[np.ndarray]) -> Wait:
+        settings = self._settings
+        with closing(NloptThread(settings.seed)) as nlopt, suppress(BudgetSpentError):
+            for point in first:
+                yield from self._evaluate(point, self._budget)
+            for phase, end in self._plan():
+                yield from self._run(phase, max(1, round(end * self._budget)), nlopt)
+            if settings.algorithm == "auto" and not settings.phases:
+                yield from self._repeat_climbs(nlopt)
+
+    def _repeat_climbs(self, nlopt: NloptThread) -> Wait:
+        """Repeat rounds of local searches with smaller steps until a round finds no new point."""
+        before = 0
+        while before < len(self.points):
+            before = len(self.points)
+            for factor in LOCAL_STEP_FACTORS:
+                step = factor * self._settings.initial_step
+                yield from self._climb(LOCAL, self._budget, step, nlopt)
+
+    def _plan(self) -> list[tuple[str, float]]:
+        """The phases, and the share of the budget at which each ends."""
+        phases, budget = self._settings.phases, self._budget
+        if phases:
+            ends = np.cumsum([phase.share for phase in phases]).tolist()
+            return list(zip([phase.algorithm for phase in phases], [*ends[:-1], 1.0], strict=True))
+        if self._settings.algorithm != "auto":
+            return [(self._settings.algorithm, 1.0)]
+        modelled = min(budget, MAX_POINTS)
+        spread = max(SPREAD_SHARE * modelled, SPREAD_PER_PARAMETER * len(self._domain) + 2)
+        counts = (spread, modelled, budget)
+        return [(phase, min(1.0, n / budget)) for phase, n in zip(AUTO, counts, strict=True)]
+
+    def _run(self, phase: str, limit: int, nlopt: NloptThread) -> Wait:
+        """Run one phase until it converges or the points cost `limit`."""
+        limit = min(limit, self._budget)
+        left = yield from self._left(limit)
+        if not left:
+            return
+        self.phases.append(phase)
+        if phase == SPREAD:
+            yield from self._spread(limit, left)
+        elif phase == MODEL:
+            yield from self._follow_model(limit)
+        else:
+            yield from self._climb(phase, limit, self._settings.initial_step, nlopt)
+
+    def _spread(self, limit: int, wanted: int) -> Wait:
+        from scipy.stats.qmc import Sobol
+
+        sobol = Sobol(len(self._domain), seed=self._settings.seed)
+        for point in sobol.random_base2(max(1, (wanted - 1).bit_length()))[:wanted]:
+            yield from self._evaluate(self._snapped(point), self._budget)
+
+    def _follow_model(self, limit: int) -> Wait:
+        if not self.scores:
+            yield from self._wait()
+        while True:
+            yield from self._wait(self._settings.batch - 1)
+            if not (yield from self._left(limit)):
+                return
+            seen, points = self._observe(), np.array(self.points)
+            if np.ptp(seen.scores[seen.simulated]) == 0.0:  # nothing to learn
+                point = self._snapped(self._rng.random(len(self._domain)))
+            else:
+                is_rough = len(points) % ROUGH_STEP_INTERVAL == 0
+                factor = ROUGH_LENGTH_FACTOR if is_rough else 1.0
+                point = propose_point(SearchModel(self._domain, points, seen, factor), self._rng)
+            yield from self._evaluate(point, self._budget)
+
+    def _climb(self, algorithm: str, limit: int, step: float, nlopt: NloptThread) -> Wait:
+        """Run an algorithm of NLopt from the best point so far."""
+        yield from self._wait()
+        best = self.points[int(np.argmax(self.scores))]
+        # Some algorithms keep asking for points that have scores already: 100 calls per point of
+        # the budget end them.
+        run = nlopt.points(best, algorithm, step, self._settings.tolerance, 100 * self._budget)
+        try:
+            with closing(run), suppress(StopIteration):
+                point = next(run)
+                while True:
+                    number = yield from self._evaluate(self._snapped(point), limit)
+                    yield from self._wait()
+                    point = run.send(self.scores[number])
+        except BudgetSpentError:
+            if limit >= self._budget:
+                raise
+
+    def _evaluate(self, point: np.ndarray, limit: int) -> Generator[np.ndarray | None, None, int]:
+        """Ask for a point, unless that was done; returns its place in `points`.
+
+        BudgetSpentError if it is new, and the limit or the budget has no place for it.
+        """
+        key = point.tobytes()
+        if key not in self._numbers:
+            yield from self._wait(self._settings.batch - 1)
+            if not (yield from self._left(limit)):
+                raise BudgetSpentError
+            self._numbers[key] = len(self.points)
+            self.points.append(point)
+            yield point
+        return self._numbers[key]
+
+    def _left(self, limit: int) -> Generator[np.ndarray | None, None, int]:
+        """How many more whole evaluations may begin, until they and those before cost `limit`.
+
+        Where none is left, those that run are waited for: they may turn out to cost less.
+        """
+        if len(self.points) >= self._domain.size:
+            return 0
+        for _ in range(2):
+            free = max(0, self._costs.count(0.0) - self._budget)
+            running = len(self.points) - len(self.scores)
+            left = min(limit, self._budget) - math.fsum(self._costs) - free - running
+            if left > 1.0 - ROUNDING:
+                return int(left + ROUNDING)
+            yield from self._wait()
+        return 0
+
+    def _wait(self, running: int = 0) -> Wait:
+        """Wait for the scores of all points but the last so many."""
+        while len(self.points) - len(self.scores) > running:
+            yield None
+
+    def _snapped(self, point: np.ndarray) -> np.ndarray:
+        snapped: np.ndarray = self._domain.snap(point[None])[0]
+        return snapped
+
+    def _scores_without_noise(self) -> Observations:
+        scores = np.array(self.scores)
+        return Observations(scores, np.zeros(len(scores)), np.ones(len(scores), dtype=bool))
