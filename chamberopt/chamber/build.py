@@ -78,6 +78,11 @@ class Chamber:
         """Height of the cavity's highest point over the sonotrode [m]."""
         return float(self.vertices[:, 2].max())
 
+    @property
+    def pieces_in_air(self) -> int:
+        """The number of pieces of the part that reach no wall, and so have no holder."""
+        return _pieces_in_air(self.vertices, self.triangles, self.tags)
+
     def on_zone(self, zone: str) -> Chamber:
         """The same chamber with a zone of the part as its target."""
         return replace(self, part=replace(self.part, target=self.part.zones[zone]))
@@ -340,6 +345,13 @@ def _hidden_notes(chamber: Chamber) -> list[str]:
     ]
 
 
+def _pieces_in_air(vertices: np.ndarray, triangles: np.ndarray, tags: np.ndarray) -> int:
+    """The number of pieces of the part that reach no wall."""
+    shells, volumes = find_shells(vertices, triangles)
+    on_part = tags == TAG_PART
+    return sum(bool(on_part[shells == k].all()) for k in range(len(volumes)))
+
+
 def _notes_on_room(room: SolidSurface, traced: TriangleProperties, part_name: str) -> Iterator[str]:
     """Notes on triangles turned by rounding, and on pieces of the part without a holder."""
     own = area_vectors(room.vertices, room.triangles)
@@ -352,9 +364,6 @@ def _notes_on_room(room: SolidSurface, traced: TriangleProperties, part_name: st
             "turned them: the part nearly touches a wall there; a slightly different diameter or "
             "offset avoids it"
         )
-    shells, volumes = find_shells(room.vertices, room.triangles)
-    on_part = traced.tags == TAG_PART
-    count = sum(bool(on_part[shells == k].all()) for k in range(len(volumes)))
-    if count:
+    if count := _pieces_in_air(room.vertices, room.triangles, traced.tags):
         what = "the part reaches" if count == 1 else f"{count} pieces of the part reach"
         yield f"{part_name}: {what} no wall: simulated as held in the air, without a holder"

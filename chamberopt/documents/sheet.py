@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from chamberopt.chamber.checks.fillets import LEFT
 from chamberopt.common.estimate import Estimate
 from chamberopt.common.number_text import estimate_text
 from chamberopt.design.calibration import why_no_intensity
@@ -40,15 +39,14 @@ def cautions(result: Result) -> Iterator[str]:
             "0.1 to 0.5), and coverage takes longer: rely on these times only once the coverage "
             "measured first agrees."
         )
-    if any(note.startswith(LEFT) for note in notes_of(result)):
+    if result.record.chamber.facets_left:
         yield (
             "The part's file has coarse facets in the place of its rounds, which were not divided: "
             "coverage and times are those of the facets."
         )
-    if any("without a holder" in note for note in notes_of(result)):
+    if result.record.chamber.pieces_in_air:
         yield "The part is held in the air: its holder is neither designed nor simulated."
-    ends = [note.partition(" = ")[0] for note in notes_of(result) if " lies on its " in note]
-    if ends:
+    if ends := result.study.on_bounds if result.study else []:
         yield (
             f"The search ended on its bounds of {', '.join(ends)}: a better chamber may lie beyond."
         )

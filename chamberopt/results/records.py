@@ -27,8 +27,9 @@ from pydantic import (
 from chamberopt.common.errors import InputError, first_wrong_value
 from chamberopt.common.estimate import Estimate
 from chamberopt.coverage.metrics import METRICS, find_metric, parse_objective
+from chamberopt.search.study.parameters import is_on_bound
 
-FORMAT = 6
+FORMAT = 7
 ROUNDING = 1e-9
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
 Positive = Annotated[float, Field(ge=0.0)]
@@ -185,9 +186,17 @@ class ZoneRecord(Table):
 
 
 class ChamberRecord(Table):
+    """The chamber as simulated.
+
+    pieces_in_air: pieces of the part that reach no wall.
+    facets_left: the coverage of the target is that of its coarse facets.
+    """
+
     volume_mm3: Positive
     target_exposed_area_mm2: Positive
     target_triangles: Count
+    pieces_in_air: Count
+    facets_left: bool
 
 
 class AdviceRecord(Table):
@@ -294,6 +303,15 @@ class StudyRecord(Table):
     start: StartRecord
     confirmed: list[ConfirmedRecord]
     seconds: Positive
+
+    @property
+    def on_bounds(self) -> list[str]:
+        """The numbers of the best design that lie on a bound of the search."""
+        return [
+            name
+            for name, ends in self.vary.items()
+            if is_on_bound(self.best.parameters[name], ends)
+        ]
 
     @model_validator(mode="after")
     def _has_the_same_parameters(self) -> Self:

@@ -8,6 +8,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from chamberopt.chamber.checks.fillets import facets_are_left
 from chamberopt.common.files import RESULT, make_folder, write_text
 from chamberopt.common.npz_files import save_record
 from chamberopt.common.versions import versions
@@ -200,6 +201,8 @@ def _write_candidate(folder: Path, candidate: CandidateResult, **more: Any) -> C
             volume_mm3=chamber.volume * 1e9,
             target_exposed_area_mm2=float(chamber.exposed_area[target].sum() * 1e6),
             target_triangles=int(target.sum()),
+            pieces_in_air=chamber.pieces_in_air,
+            facets_left=facets_are_left(chamber.part),
         ),
         notes=[*chamber.notes, *evaluation.notes],
         design=_design_values(design, folder),

@@ -25,7 +25,11 @@ if TYPE_CHECKING:
     from chamberopt.chamber.reach import Reach
 
 LEAST_SHARE = 0.01  # share of the target's area that is worth a warning
-LEFT = "coverage is that of facets: "  # start of the warning
+
+
+def facets_are_left(part: Part) -> bool:
+    """True if so much of the target has coarse facets that its coverage is theirs."""
+    return part.smoothing is not None and part.smoothing.coarse_share >= LEAST_SHARE
 
 
 def facet_warnings(part: Part, ball: float, reachable: float) -> list[str]:
@@ -36,7 +40,7 @@ def facet_warnings(part: Part, ball: float, reachable: float) -> list[str]:
         reachable: share of the target that the ball can touch between the facets.
     """
     facts = part.smoothing
-    if facts is None or facts.coarse_share < LEAST_SHARE:
+    if facts is None or not facets_are_left(part):
         return []
     noisy = facts.noisy_share >= max(facts.crossing_share, LEAST_SHARE)
     if noisy:
@@ -49,7 +53,7 @@ def facet_warnings(part: Part, ball: float, reachable: float) -> list[str]:
         why = "which were left as they are"
         remedy = "give a mesh with finer facets, or change part.smoothing"
     return [
-        f"{LEFT}they turn by {np.degrees(facts.coarse_turn):.2g} degrees on "
+        f"coverage is that of facets: they turn by {np.degrees(facts.coarse_turn):.2g} degrees on "
         f"{facts.coarse_share:.0%} of the target, {why}; in their hollows a ball lies across two "
         f"of them: by facets a ball of {1e3 * ball:g} mm touches {reachable:.1%} of the target, by "
         f"the curvature of its rounds up to {touched_by_curvature(part, ball):.1%}; {remedy}"

@@ -11,7 +11,7 @@ their candidates alone; the others have NONE in its place.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Annotated, Any
 
 import numpy as np
@@ -27,6 +27,7 @@ from chamberopt.design.table_base import FileTable
 from chamberopt.design.tolerances import tolerance_box
 from chamberopt.search.optimiser.domain import Axis, Domain
 
+ON_BOUND = 1e-3  # share of the bounds' distance
 NEAR = 1e-9  # of a step: how far a value may be from its place
 MAX_LEVELS = 1000
 NONE = "none"  # in the place of a value that a candidate's shape does not have
@@ -375,3 +376,11 @@ class ParameterSpace:
         low, high = self.bounds[k]
         decimals = 3 - math.floor(math.log10(high - low))
         return min(max(round(value, decimals), float(low)), float(high))
+
+
+def is_on_bound(value: float | str, ends: Sequence[float | str]) -> bool:
+    """True if a number lies on one of its two bounds, to a thousandth of their distance."""
+    if isinstance(value, str):
+        return False
+    low, high = (float(end) for end in ends)
+    return min(abs(value - low), abs(value - high)) < ON_BOUND * (high - low)
