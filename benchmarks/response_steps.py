@@ -34,7 +34,7 @@ def main() -> None:
     plate = plate.changed({"process.accuracy.replicas": given.replicas})
     rows, scale = [], scale_of(FIGURE)
     with local_executor() as executor:
-        runs = Variations(plate, build_chamber(plate), executor, RunsProgress(None, 0))
+        runs = Variations(plate, build_chamber(plate), executor, RunsProgress(None, 1))
         nominal = on_scale(runs.nominal.metrics[FIGURE], scale)
         for name in NUMBERS:
             for factor in FACTORS:

@@ -28,7 +28,7 @@ from chamberopt.design.calibration import Calibration, Parameter
 from chamberopt.design.design import Design
 from chamberopt.design.load import load_design
 from chamberopt.peening.calibrate import PRIORS, calibrate, prepare
-from chamberopt.peening.calibration_errors import evaluate_calibrated
+from chamberopt.peening.calibration_errors import SIMULATED, evaluate_calibrated
 from chamberopt.peening.measured import Measured, MeasuredDents, dent_errors, with_amplitude
 from chamberopt.peening.next_measurement import predict
 from chamberopt.peening.posterior import Model

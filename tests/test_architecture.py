@@ -35,7 +35,7 @@ ORDER = {
     "chamberopt/simulation": "resting_balls replicas evaluation estimates evaluate "
     "time_curve field_values variations effect_pilot error_law convergence recommendation",
     "chamberopt/peening": "strip+calibration_errors kirk_fit+strip_holder responses tolerances "
-    "virtual_strip measured probes posterior setups calibrate next_measurement",
+    "measured probes virtual_strip posterior setups calibrate next_measurement",
     "chamberopt/search": "study+optimiser trial_log study_folder "
     "sensitivity+evaluate_candidate candidates run_study pareto+run_sweep",
     "chamberopt/results": (

@@ -21,6 +21,7 @@ from chamberopt.chamber.build import build_chamber
 from chamberopt.common.files import make_folder
 from chamberopt.common.versions import package_versions
 from chamberopt.design.calibration import OF_STRIPS, PARAMETERS, WHOLE_STRIP, Calibration, Parameter
+from chamberopt.peening.calibration_errors import SIMULATED
 from chamberopt.peening.measured import (
     Measured,
     MeasuredCoupon,
@@ -39,14 +40,7 @@ from chamberopt.peening.posterior import (
     find_posterior,
 )
 from chamberopt.peening.probes import ArcProbe, Impacts, PartProbe, SaturationProbe, whole_target
-from chamberopt.peening.setups import (
-    SIMULATED,
-    DropModel,
-    Setup,
-    amplitude_model,
-    rows_of,
-    simulate_setup,
-)
+from chamberopt.peening.setups import DropModel, Setup, amplitude_model, rows_of, simulate_setup
 from chamberopt.peening.strip import strip_cells
 from chamberopt.peening.strip_holder import strip_design
 

@@ -2,7 +2,7 @@
 
 Notation
     p   logarithm of a calibrated parameter, see design/peening/calibration.py
-    h   how far p is moved in a run on the same replicas and seeds          (step_of)
+    h   how far p is moved in a run on the same replicas and seeds          (step)
     g   slope of a figure by p, (figure moved - figure) / h
 
 Amplitude, restitution, yield speed and friction take a run each. Hardness changes the dents of the
@@ -26,6 +26,7 @@ from chamberopt.common.estimate import FIRST_OF_CALIBRATION, Estimate
 from chamberopt.coverage.metrics import parse_objective
 from chamberopt.design.calibration import TIME_ERROR, Parameter
 from chamberopt.simulation.estimates import weighted_sum
+from chamberopt.simulation.replicas import ReplicaSet
 from chamberopt.simulation.variations import RunsProgress, Variations
 
 if TYPE_CHECKING:
@@ -34,9 +35,10 @@ if TYPE_CHECKING:
     from chamberopt.design.load import Design
     from chamberopt.simulation.evaluate import ReplicaPlan
     from chamberopt.simulation.evaluation import Evaluation
-    from chamberopt.simulation.replicas import Replica, ReplicaSet
+    from chamberopt.simulation.replicas import Replica
     from sim_core import AnalyticCavity
 
+SIMULATED: tuple[Parameter, ...] = ("amplitude", "C0", "v0", "mu")  # what takes a simulation
 # C0 goes down, because no restitution is above 1.
 MAX_STEP: dict[Parameter, float] = {
     "amplitude": 0.3, "C0": -0.08, "v0": 0.6, "mu": 0.6, "hardness": 0.4,
@@ -63,10 +65,10 @@ def evaluate_calibrated(
     known: ReplicaSet | None = None,
 ) -> Evaluation:
     """As `evaluate`, whose arguments and errors it has, with the errors of the calibration."""
-    of_all = RunsProgress(progress, len(simulated(moved_designs(design))))
-    return with_open_errors(
-        Variations(design, chamber, executor, of_all, plan, cavity is not None, known)
-    )
+    of_all = RunsProgress(progress, 1 + len(moved_designs(design)))
+    known, is_analytic = known or ReplicaSet(), cavity is not None
+    runs = Variations(design, chamber, executor, of_all, plan, is_analytic, known)
+    return with_open_errors(runs)
 
 
 def with_open_errors(runs: Variations) -> Evaluation:
@@ -75,10 +77,11 @@ def with_open_errors(runs: Variations) -> Evaluation:
     if calibration is None:
         return found
     figures, moves = _figures(found), moved_designs(runs.design)
+    harder = moved_designs(runs.design, ("hardness",))
     slopes = {name: _factors(name, one) for name, one in figures.items()}
-    for parameter, step, moved in moves:
+    for parameter, step, moved in (*moves, *harder):
         wider = math.exp(-0.25 * step)
-        dents = _with_other_dents(runs.replicas, wider) if parameter == "hardness" else []
+        dents = _with_other_dents(runs.known.replicas, wider) if parameter == "hardness" else []
         others = _figures(runs.run(moved, replicas=dents))
         for name, one in figures.items():
             slopes[name][parameter] = slope(one, others[name], step)
@@ -88,7 +91,7 @@ def with_open_errors(runs: Variations) -> Evaluation:
     metrics = {name: figures[name] for name in found.metrics}
     note = (
         "intervals hold the scatter of the replicas and what the calibration leaves open, by "
-        f"{len(simulated(moves))} more runs on the same seeds"
+        f"{len(moves)} more runs on the same seeds"
     )
     return replace(
         found,
@@ -99,35 +102,22 @@ def with_open_errors(runs: Variations) -> Evaluation:
     )
 
 
-def moved_designs(design: Design) -> list[Moved]:
-    """The design with each calibrated parameter moved that is not known exactly.
-
-    K and beta are left out, because they are factors on figures.
-    """
+def moved_designs(design: Design, names: Sequence[Parameter] = SIMULATED) -> list[Moved]:
+    """The design with each of some calibrated parameters moved that are not known exactly."""
     calibration = design.calibration
     if calibration is None:
         return []
     moves = []
-    for name in MAX_STEP:
-        sd = calibration.log_sd(name)
+    for name in names:
+        sd, most = calibration.log_sd(name), MAX_STEP[name]
         if sd > 0.0 and (name != "mu" or design.effects.friction is not None):
-            means, step = list(calibration.log_mean), step_of(name, sd)
+            step = math.copysign(min(max(STANDARD_DEVIATIONS * sd, MIN_STEP), abs(most)), most)
+            means = list(calibration.log_mean)
             means[calibration.parameters.index(name)] += step
             # Not checked again: a step may leave the limits of a design.
             moved = calibration.model_copy(update={"log_mean": tuple(means)})
             moves.append(Moved(name, step, design.model_copy(update={"calibration": moved})))
     return moves
-
-
-def simulated(moves: Sequence[Moved]) -> list[Moved]:
-    """The moves that take a run: hardness has the impacts that are known."""
-    return [one for one in moves if one.name != "hardness"]
-
-
-def step_of(name: Parameter, sd: float) -> float:
-    """How far the logarithm of a parameter of this standard deviation is moved."""
-    most = MAX_STEP[name]
-    return math.copysign(min(max(STANDARD_DEVIATIONS * sd, MIN_STEP), abs(most)), most)
 
 
 def slope(one: Estimate, two: Estimate, step: float) -> float:

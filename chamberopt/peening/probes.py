@@ -21,13 +21,15 @@ import numpy as np
 
 from chamberopt.common.errors import InputError
 from chamberopt.common.estimate import Estimate, jackknife
-from chamberopt.design.calibration import Parameter
+from chamberopt.design.calibration import Parameter, calibrated_strip
 from chamberopt.peening.kirk_fit import heights, strip_saturation
 from chamberopt.peening.strip import Cells, StripDents, count_dents, strip_curve
 
 if TYPE_CHECKING:
     from chamberopt.coverage.part_impacts import Hits
+    from chamberopt.design.load import Design
     from chamberopt.design.materials import PartMaterial
+    from chamberopt.simulation.replicas import Replica
 
 NOTHING = (
     "process.accuracy: hardly anything that was measured is dented in the simulation; raise "
@@ -53,6 +55,13 @@ class Impacts(NamedTuple):
     def strip_dents(self, cells: Cells) -> StripDents:
         """Dents in cells of a strip."""
         return count_dents(self.replicas, self.seconds, cells, self.density, self.strip)
+
+
+def impacts_of(design: Design, replicas: Sequence[Replica]) -> Impacts:
+    """The impacts of a design's replicas."""
+    strip = calibrated_strip(design.shot, design.calibration)
+    hits, seconds = [one.hits for one in replicas], design.process.recorded_time
+    return Impacts(hits, seconds, design.shot.density, strip)
 
 
 class Reading(NamedTuple):

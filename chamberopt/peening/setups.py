@@ -12,23 +12,15 @@ import numpy as np
 
 from chamberopt.chamber.scene import chamber_mesh
 from chamberopt.coverage.metrics import exposed_target, require_target
-from chamberopt.design.calibration import (
-    PARAMETERS,
-    Calibration,
-    Parameter,
-    calibrated_strip,
-    scaled_restitution,
-)
+from chamberopt.design.calibration import PARAMETERS, Calibration, Parameter, scaled_restitution
 from chamberopt.peening.posterior import Figures, Model, SimulatedModel
-from chamberopt.peening.probes import Impacts, Probe
+from chamberopt.peening.probes import Impacts, Probe, impacts_of
 from chamberopt.simulation.replicas import ReplicaSetting, simulate_replicas
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
     from chamberopt.design.load import Design
     from chamberopt.design.materials import RestitutionTable
-
-SIMULATED: tuple[Parameter, ...] = ("amplitude", "C0", "v0", "mu")  # what takes a simulation
 
 
 @dataclass
@@ -67,15 +59,11 @@ def simulate_setup(
         seed: of the run; runs of one seed start alike.
     """
     design = setup.design
-    calibration = exact_calibration(design, values)
-    tried = design.model_copy(update={"calibration": calibration})
+    process = design.process.model_copy(update={"seed": seed})
+    changed = {"calibration": exact_calibration(design, values), "process": process}
+    tried = design.model_copy(update=changed)
     setting = ReplicaSetting(tried, setup.chamber, setup.mesh)
-    return Impacts(
-        [one.hits for one in simulate_replicas(setting, executor, seed=seed)],
-        design.process.recorded_time,
-        design.shot.density,
-        calibrated_strip(design.shot, calibration),
-    )
+    return impacts_of(tried, simulate_replicas(setting, executor))
 
 
 def exact_calibration(design: Design, values: Mapping[Parameter, float]) -> Calibration:

@@ -37,7 +37,7 @@ from chamberopt.common.estimate import (
 )
 from chamberopt.coverage.metrics import find_metric
 from chamberopt.design.tolerances import require_tolerances, tolerance_box
-from chamberopt.peening.calibration_errors import moved_designs, simulated, with_open_errors
+from chamberopt.peening.calibration_errors import moved_designs, with_open_errors
 from chamberopt.peening.responses import (
     back_from_scale,
     combine,
@@ -226,15 +226,15 @@ def simulate_tolerances(
         with _run_named(one):
             build_chamber(one.changed, target)
     moved = [one for one in numbers if one.name != TREATMENT_TIME]
-    to_come = len(simulated(moved_designs(design))) + len(moved) + bool(moved)
-    of_all = RunsProgress(progress, to_come)
+    count = 1 + len(moved_designs(design)) + len(moved) + bool(moved)
+    of_all = RunsProgress(progress, count)
     runs = Variations(design, chamber, executor, of_all, analytic=analytic)
     nominal = with_open_errors(runs)
 
     def evaluate(changed: Design) -> Evaluation:
         same = {TREATMENT_TIME: design.value(TREATMENT_TIME), "tolerances": None}
         if changed.changed(same) == design.changed(same):  # another time of the same impacts
-            return runs.run(changed, replicas=runs.replicas)
+            return runs.run(changed, replicas=runs.known.replicas)
         return runs.run(changed, build_chamber(changed, target))
 
     return nominal, find_tolerances(design, numbers, nominal, evaluate)

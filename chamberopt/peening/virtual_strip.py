@@ -23,14 +23,14 @@ from chamberopt.common.estimate import FIRST_OF_CALIBRATION
 from chamberopt.common.number_text import plain
 from chamberopt.design.almen_strip import OVER_A, USED_FOR
 from chamberopt.design.calibration import TIME_ERROR, calibrated_strip, why_no_intensity
-from chamberopt.peening.calibration_errors import moved_designs, simulated, slope
+from chamberopt.peening.calibration_errors import moved_designs, slope
 from chamberopt.peening.kirk_fit import MULTIPLES, KirkFit, heights, kirk_fits, strip_saturation
+from chamberopt.peening.probes import impacts_of
 from chamberopt.peening.strip import (
     ENOUGH_DENTS,
     Cells,
     StripDents,
     StripSize,
-    count_dents,
     strip_cells,
     strip_curve,
     surface_cells,
@@ -161,10 +161,10 @@ def peen_strip(
     design = setting.design
     _require_bare(chamber)
     mesh = chamber_mesh(chamber)
-    moves = simulated(moved_designs(design))
-    of_all = RunsProgress(progress, len(moves))
+    moves = moved_designs(design)
+    of_all = RunsProgress(progress, 1 + len(moves))
     replicas = simulate_replicas(ReplicaSetting(design, chamber, mesh), executor, of_all)
-    dents = _dents(setting, design, replicas)
+    dents = impacts_of(design, replicas).strip_dents(setting.cells)
     first = strip_saturation(dents)
     if first.time.value <= 0.0:
         raise _without_dents(design, replicas)
@@ -172,9 +172,9 @@ def peen_strip(
     found = [*first, *heights(dents, [*at, *drawn_at])]
     slopes: list[dict[Parameter, float]] = [{} for _ in found]
     for name, step, moved in moves:
-        of_all.begin_next()
+        of_all.ended += 1
         again = simulate_replicas(ReplicaSetting(moved, chamber, mesh), executor, of_all)
-        other_dents = _dents(setting, moved, again)
+        other_dents = impacts_of(moved, again).strip_dents(setting.cells)
         others = [*strip_saturation(other_dents), *heights(other_dents, [*at, *drawn_at])]
         for of_one, one, other in zip(slopes, found, others, strict=True):
             of_one[name] = slope(one, other, step)
@@ -214,12 +214,6 @@ def _require_bare(chamber: Chamber) -> None:
             f"chamber: only {open_area:.0%} of the strip face the shot; move the deflectors away "
             "from the lid, or give --distance-mm"
         )
-
-
-def _dents(setting: StripSetting, design: Design, replicas: list[Replica]) -> StripDents:
-    shot = design.shot.density, calibrated_strip(design.shot, design.calibration)
-    hits = [one.hits for one in replicas]
-    return count_dents(hits, design.process.recorded_time, setting.cells, *shot)
 
 
 def _as_measured(

@@ -128,7 +128,7 @@ def advise(
     Raises:
         InputError, sim_core.SimulationError: as `evaluate` does.
     """
-    return _advise(_Pilot(design, chamber, executor, progress, prepare))
+    return _Pilot(design, chamber, executor, progress, prepare).advise()
 
 
 def with_effects_resolved(
@@ -153,7 +153,7 @@ def with_effects_resolved(
         return design, []
     complete = _switched(design, dict.fromkeys(_switchable(design, chamber), True))
     pilot = _Pilot(complete, chamber, executor, progress, prepare)
-    advice = _advise(pilot)
+    advice = pilot.advise()
     off = [one.effect for one in advice if one.verdict == "makes no difference"]
     while len(off) > 1:
         without = pilot.measure(dict.fromkeys(off, False))
@@ -177,43 +177,45 @@ class _Pilot:
         self.design, self.chamber, self._mesh = design, chamber, chamber_mesh(chamber)
         require_figures(design, chamber, self._mesh)
         self.effects = _switchable(design, chamber)
-        self._executor, self._prepare = executor, prepare
-        # After the short run for the time: one unchanged, one for each effect.
-        self._progress = RunsProgress(progress, 1 + len(self.effects))
+        self._executor, self._prepare, self._time = executor, prepare, FIRST_TIME
+        # One short run for the time, one unchanged, one for each effect.
+        self._progress = RunsProgress(progress, 2 + len(self.effects))
         target = exposed_target(chamber)
-        first = self._simulate(self._variant({}, FIRST_TIME))
-        hits = sum(int(target[one.triangle].sum()) for one in first)
+        hits = sum(int(target[one.triangle].sum()) for one in self._simulate({})[1])
         self._time = float(np.clip(FIRST_TIME * IMPACTS / max(hits, 1), FIRST_TIME, MAX_TIME))
         self.unchanged = self.measure({})
 
+    def advise(self) -> list[Advice]:
+        """Advice on each effect, the most important first."""
+        advice = []
+        for effect in self.effects:
+            is_on = _is_on(effect, self.design, self.chamber)
+            other = self.measure({effect: not is_on})
+            with_it, without = (self.unchanged, other) if is_on else (other, self.unchanged)
+            reason = _reason(effect, self.design, self.chamber)
+            advice.append(Advice(effect, is_on, reason, _changes(with_it, without), ACCURACY))
+        return sorted(advice, key=lambda one: -one.largest_change)
+
     def measure(self, effects: Mapping[str, bool]) -> dict[str, np.ndarray]:
         """Each of MEASURED in every replica, (REPLICAS,), with some effects switched on or off."""
-        self._progress.begin_next()
-        variant = self._variant(effects, self._time)
-        return _measure(variant, self.chamber, self._simulate(variant))
+        self._progress.ended += 1
+        variant, replicas = self._simulate(effects)
+        return _measure(variant, self.chamber, replicas)
 
-    def _variant(self, effects: Mapping[str, bool], time: float) -> Design:
-        accuracy = {"replicas": REPLICAS, "simulated_time_s": time, "objective_half_width": None}
+    def _simulate(self, effects: Mapping[str, bool]) -> tuple[Design, list[Hits]]:
+        """The design with some effects switched, and the impacts of its replicas."""
+        accuracy = {
+            "replicas": REPLICAS,
+            "simulated_time_s": self._time,
+            "objective_half_width": None,
+        }
         values = {f"process.accuracy.{name}": value for name, value in accuracy.items()}
-        return _switched(self.design, effects).changed(values)
-
-    def _simulate(self, variant: Design) -> list[Hits]:
+        variant = _switched(self.design, effects).changed(values)
         if self._prepare is not None:
             self._prepare(variant)
         setting = ReplicaSetting(variant, self.chamber, self._mesh)
         replicas = simulate_replicas(setting, self._executor, self._progress)
-        return [one.hits for one in replicas]
-
-
-def _advise(pilot: _Pilot) -> list[Advice]:
-    advice = []
-    for effect in pilot.effects:
-        is_on = _is_on(effect, pilot.design, pilot.chamber)
-        other = pilot.measure({effect: not is_on})
-        with_it, without = (pilot.unchanged, other) if is_on else (other, pilot.unchanged)
-        reason = _reason(effect, pilot.design, pilot.chamber)
-        advice.append(Advice(effect, is_on, reason, _changes(with_it, without), ACCURACY))
-    return sorted(advice, key=lambda one: -one.largest_change)
+        return variant, [one.hits for one in replicas]
 
 
 def _is_on(effect: str, design: Design, chamber: Chamber) -> bool:

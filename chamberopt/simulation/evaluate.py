@@ -43,6 +43,8 @@ from chamberopt.simulation.replicas import (
     ReplicaSet,
     ReplicaSetting,
     next_replica_count,
+    run_in_order,
+    simulate_replica,
 )
 from chamberopt.simulation.resting_balls import bouncing_notes, resting_notes
 
@@ -93,133 +95,122 @@ def evaluate(
         sim_core.SimulationError: a replica cannot be simulated.
     """
     plan = plan or ReplicaPlan()
-    run = _Run(design, chamber, executor, plan, cavity, known or ReplicaSet())
     accuracy = design.process.accuracy
     wanted = accuracy.objective_half_width if plan.count is None else None
     count = plan.count or accuracy.replicas
     if wanted is not None:
         count = min(max(count, MIN_REPLICAS_TO_STOP), accuracy.max_replicas)
+    run = _Run(design, chamber, executor, plan, cavity, known or ReplicaSet())
     while True:
-        run.simulate(count, progress)
-        if wanted is None:
-            return run.evaluation("replicas")
-        done, half_width = run.count, run.objective.half_width
-        count = next_replica_count(done, half_width, wanted, accuracy.max_replicas)
-        if count == done:
-            stopped_by = "accuracy" if half_width <= wanted else "max_replicas"
-            note = _accuracy_note(stopped_by, done, run.objective, wanted)
-            return run.evaluation(stopped_by, (note,))
+        found = run.add_up_to(count, progress, wanted)
+        if wanted is not None:
+            half_width = found.objective.half_width
+            count = next_replica_count(found.replicas, half_width, wanted, accuracy.max_replicas)
+        if count <= found.replicas:
+            return found
 
 
+@dataclass
 class _Run:
-    """The simulation of one candidate, with the estimates from its replicas so far."""
+    """The simulation of one candidate, to which replicas are added."""
 
-    objective: Estimate
+    design: Design
+    chamber: Chamber
+    executor: Executor
+    plan: ReplicaPlan
+    cavity: AnalyticCavity | None
+    known: ReplicaSet
 
-    def __init__(
-        self,
-        design: Design,
-        chamber: Chamber,
-        executor: Executor,
-        plan: ReplicaPlan,
-        cavity: AnalyticCavity | None,
-        known: ReplicaSet,
-    ) -> None:
-        require_metrics(design, plan.objective_name)
-        self._design, self._chamber, self._plan, self._cavity = design, chamber, plan, cavity
-        self._executor, self._known, mesh = executor, known, chamber_mesh(chamber)
-        self._setting = share(executor, ReplicaSetting(design, chamber, cavity or mesh))
-        self._timings = {"simulate": 0.0, "coverage": 0.0}
+    def __post_init__(self) -> None:
+        design, chamber, mesh = self.design, self.chamber, chamber_mesh(self.chamber)
+        require_metrics(design, self.plan.objective_name)
+        setting = ReplicaSetting(design, chamber, self.cavity or mesh)
+        self.setting = share(self.executor, setting)
+        self.timings = {"simulate": 0.0, "coverage": 0.0}
         window = require_figures(design, chamber, mesh)
 
         def see() -> tuple[SeenDents, dict[str, SeenDents]]:
-            field = known.target or find_target_field(chamber, mesh, window)
+            field = self.known.target or find_target_field(chamber, mesh, window)
             return SeenDents.none(field), see_zones(design, chamber, mesh)
 
         # The dents of a replica are looked at while others are simulated, so that no worker waits.
         beside = ThreadPoolExecutor(1)
-        self._seen = beside.submit(see)
+        self.seen = beside.submit(see)
         beside.shutdown(wait=False)
 
-    @property
-    def count(self) -> int:
-        """Number of replicas so far."""
-        return len(self._known.replicas)
-
-    def simulate(self, count: int, progress: Progress | None) -> None:
-        """Add replicas until there are so many, and estimate the objective from all."""
-        began, seed = time.perf_counter(), self._design.process.seed
-        how = self._setting, seed, self._executor, progress, self._plan.stream
-        for _ in self._known.add_up_to(count, *how):
-            self._look()
-        simulated = time.perf_counter()
-        hits, target, zones = self._look()
-        self._found = estimate_metrics(target, hits, self._chamber, self._design)
-        of_zones, self._zone_notes = estimate_zones(zones, hits, self._chamber, self._design)
-        self._metrics = self._found.metrics | of_zones
-        self.objective = weighted_sum(parse_objective(self._plan.objective_name), self._metrics)
-        self._timings["simulate"] += simulated - began
-        self._timings["coverage"] += time.perf_counter() - simulated
-
-    def _look(self) -> tuple[list[Hits], SeenDents, dict[str, SeenDents]]:
+    def look(self) -> tuple[list[Hits], SeenDents, dict[str, SeenDents]]:
         """The impacts of all replicas, and their dents on the target and on each zone."""
-        hits = [replica.hits for replica in self._known.replicas]
-        target, zones = self._seen.result()
+        hits = [replica.hits for replica in self.known.replicas]
+        target, zones = self.seen.result()
         for one in (target, *zones.values()):
             one.add(hits)
         return hits, target, zones
 
-    def evaluation(self, stopped_by: str, accuracy_note: tuple[str, ...] = ()) -> Evaluation:
-        """The evaluation from all replicas; `stopped_by` as Evaluation has it."""
-        hits, target, zones = self._look()
-        design, found, field = self._design, self._found, target.field
-        replicas, count = self._known.replicas, self.count
+    def add_up_to(self, count: int, progress: Progress | None, wanted: float | None) -> Evaluation:
+        """Add replicas until there are so many, and evaluate them all.
+
+        Args:
+            wanted: half-width of the objective to reach; None where the number was given.
+        """
+        design, plan, replicas = self.design, self.plan, self.known.replicas
+        how = design.process.seed, self.executor, plan.stream, range(len(replicas), count), count
+        began = time.perf_counter()
+        for replica in run_in_order(simulate_replica, self.setting, *how):
+            replicas.append(replica)
+            if progress:
+                progress(len(replicas), count, None)
+            self.look()
+        simulated = time.perf_counter()
+        hits, target, zones = self.look()
+        found = estimate_metrics(target, hits, self.chamber, design)
+        of_zones, zone_notes = estimate_zones(zones, hits, self.chamber, design)
+        metrics = found.metrics | of_zones
+        objective = weighted_sum(parse_objective(plan.objective_name), metrics)
+        self.timings["simulate"] += simulated - began
+        self.timings["coverage"] += time.perf_counter() - simulated
+        field, done = target.field, len(replicas)
+        stopped_by, accuracy_note = _end(done, objective, wanted)
         return Evaluation(
-            objective_name=self._plan.objective_name,
-            objective=self.objective,
-            metrics=self._metrics,
+            objective_name=plan.objective_name,
+            objective=objective,
+            metrics=metrics,
             metrics_of_wide=found.metrics_of_wide,
             gauge_mm2=design.process.accuracy.gauge_mm2,
             resolution=found.resolution,
             reachable=field.reachable,
             crease_share=target.crease_share,
             alike=field.alike,
-            replicas=count,
-            simulated_time=count * design.process.recorded_time,
+            replicas=done,
+            simulated_time=done * design.process.recorded_time,
             hits=tuple(hits),
-            timings=self._timings,
+            timings=self.timings,
             collisions={
                 kind: sum(replica.collisions[kind] for replica in replicas)
                 for kind in replicas[0].collisions
             },
             notes=(
-                *((cavity_note(self._cavity),) if self._cavity else ()),
+                *((cavity_note(self.cavity),) if self.cavity else ()),
                 *friction_notes(design),
                 *reach_notes(field.reach),
-                *facet_warnings(self._chamber.part, min(design.shot.diameters), field.reach.share),
+                *facet_warnings(self.chamber.part, min(design.shot.diameters), field.reach.share),
                 *_symmetry_note(field.alike),
                 *accuracy_note,
                 *resolution_notes(found.resolution),
                 *strength_notes(found.metrics, found.resolution),
-                *self._zone_notes,
+                *zone_notes,
                 *stress_notes(design.materials.part),
-                *resting_notes([one.resting for one in replicas if one.resting], count),
+                *resting_notes([one.resting for one in replicas if one.resting], done),
                 *bouncing_notes([one.bouncing_share for one in replicas]),
             ),
             zones={name: one.field.reachable for name, one in zones.items()},
-            stream=self._plan.stream,
+            stream=plan.stream,
             stopped_by=stopped_by,
-            analytic=self._cavity is not None,
+            analytic=self.cavity is not None,
         )
 
 
 def require_figures(design: Design, chamber: Chamber, mesh: TriangleMesh) -> WindowSetting:
-    """The windows for the target of a chamber.
-
-    Raises:
-        InputError: as `window_setting`, or the windows are too wide for the target, or no ball
-            touches a zone.
-    """
+    """As `window_setting`; InputError too if a window is too wide, or no ball touches a zone."""
     window = window_setting(design, chamber)
     require_narrow_gauge(chamber, window)
     require_touchable_zones(chamber, mesh, 0.5 * window.ball)
@@ -275,18 +266,22 @@ def _symmetry_note(alike: int) -> tuple[str, ...]:
     )
 
 
-def _accuracy_note(stopped_by: str, replicas: int, objective: Estimate, wanted: float) -> str:
-    """A note on whether the wanted accuracy was reached."""
-    if stopped_by == "accuracy":
-        return f"the wanted accuracy of ± {wanted:g} was reached after {replicas} replicas"
+def _end(replicas: int, objective: Estimate, wanted: float | None) -> tuple[str, tuple[str, ...]]:
+    """What ended a simulation, and a note on whether the wanted accuracy was reached."""
+    if wanted is None:
+        return "replicas", ()
+    if objective.half_width <= wanted:
+        note = f"the wanted accuracy of ± {wanted:g} was reached after {replicas} replicas"
+        return "accuracy", (note,)
     needed = (
         f"about {math.ceil(replicas * (objective.half_width / wanted) ** 2)}"
         if math.isfinite(objective.half_width)
         else "many more"
     )
-    return (
+    note = (
         f"the wanted accuracy of ± {wanted:g} was not reached: the simulation stopped at "
         f"process.accuracy.max_replicas = {replicas} with ± {objective.half_width:.2g}, and "
         f"{needed} replicas would be needed; raise process.accuracy.max_replicas or "
         "simulated_time_s"
     )
+    return "max_replicas", (note,)

@@ -58,53 +58,19 @@ class ReplicaSet:
     replicas: list[Replica] = field(default_factory=list)
     target: TargetField | None = None  # by `prepare_target`; None if it was not called
 
-    def add_up_to(
-        self,
-        count: int,
-        setting: Any,
-        seed: int,
-        executor: Executor,
-        progress: Progress | None = None,
-        stream: str = "search",
-    ) -> Iterator[Replica]:
-        """Simulate the replicas that are missing, and yield each after it has been added.
-
-        The results do not depend on the number of workers.
-
-        Args:
-            count: number of replicas to reach.
-            setting: a ReplicaSetting as executor.share returns it. Keep it until the last replica,
-                because it goes to each worker once.
-            seed: of the design's process.
-            stream: stream of seeds.
-        """
-        numbers = range(len(self.replicas), count)
-        ahead = len(numbers)
-        for replica in run_in_order(
-            simulate_replica, setting, seed, executor, stream, numbers, ahead
-        ):
-            self.replicas.append(replica)
-            if progress:
-                progress(len(self.replicas), count, None)
-            yield replica
-
 
 def simulate_replicas(
-    setting: ReplicaSetting,
-    executor: Executor,
-    progress: Progress | None = None,
-    seed: int | None = None,
+    setting: ReplicaSetting, executor: Executor, progress: Progress | None = None
 ) -> list[Replica]:
-    """Simulate as many replicas as the design asks for.
-
-    Args:
-        seed: in the place of the seed of the design's process.
-    """
-    process, found = setting.design.process, ReplicaSet()
-    seed, shared = process.seed if seed is None else seed, share(executor, setting)
-    for _ in found.add_up_to(process.accuracy.replicas, shared, seed, executor, progress):
-        pass
-    return found.replicas
+    """Simulate as many replicas as the design asks for."""
+    process, found = setting.design.process, list[Replica]()
+    count, shared = process.accuracy.replicas, share(executor, setting)
+    how = process.seed, executor, "search", range(count), count
+    for replica in run_in_order(simulate_replica, shared, *how):
+        found.append(replica)
+        if progress:
+            progress(len(found), count, None)
+    return found
 
 
 def run_in_order(
@@ -118,7 +84,12 @@ def run_in_order(
 ) -> Iterator[T]:
     """Yield task(setting, seed of the replica) for each number, in order, run on the workers.
 
+    The results do not depend on the number of workers.
+
     Args:
+        setting: as executor.share returns it, once for all numbers: it goes to each worker once.
+        seed: of the design's process.
+        stream: stream of seeds.
         ahead: tasks that are started before their results are wanted, which bounds the memory that
             waiting results take.
     """

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from concurrent.futures import Executor
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from chamberopt.chamber.analytic import analytic_cavity
@@ -22,56 +23,38 @@ if TYPE_CHECKING:
     from chamberopt.simulation.evaluation import Evaluation
 
 
+@dataclass
 class RunsProgress:
-    """One progress over several runs; each is expected to take as many replicas as the present."""
+    """One progress over several runs of as many replicas each."""
 
-    def __init__(self, progress: Progress | None, to_come: int) -> None:
-        """Begin the first of the runs, after which others are to come."""
-        self._progress, self._to_come, self._before, self._done = progress, to_come, 0, 0
-
-    def begin_next(self) -> None:
-        """Begin the next run."""
-        self._before, self._done = self._before + self._done, 0
-        self._to_come = max(0, self._to_come - 1)
+    progress: Progress | None
+    runs: int
+    ended: int = 0  # runs before the present one
 
     def __call__(self, done: int, total: int, best: float | None) -> None:
-        """Tell how many replicas of the present run are done."""
-        self._done = done
-        if self._progress:
-            self._progress(self._before + done, self._before + total * (1 + self._to_come), best)
+        """Tell how many of the replicas of the present run are done."""
+        if self.progress:
+            runs = max(self.runs, self.ended + 1)
+            self.progress(self.ended * total + done, runs * total, best)
 
 
+@dataclass
 class Variations:
     """The runs of a design, and of changed ones in the same replicas on the same seeds.
 
-    Attributes:
-        design, chamber: the nominal ones.
-        nominal: the evaluation of the nominal design.
-        replicas: of the nominal design.
+    The nominal design is evaluated at once, and is `nominal` then.
     """
 
-    def __init__(
-        self,
-        design: Design,
-        chamber: Chamber,
-        executor: Executor,
-        progress: RunsProgress,
-        plan: ReplicaPlan | None = None,
-        analytic: bool = False,
-        known: ReplicaSet | None = None,
-    ) -> None:
-        """Evaluate the nominal design.
+    design: Design
+    chamber: Chamber
+    executor: Executor
+    progress: RunsProgress
+    plan: ReplicaPlan | None = None
+    analytic: bool = False  # whether exact cavities take the place of meshes
+    known: ReplicaSet = field(default_factory=ReplicaSet)  # of the nominal design
 
-        Args:
-            progress: of all runs.
-            analytic: simulate in exact cavities instead of meshes.
-            known: as `evaluate` takes it, for the nominal design.
-        """
-        self.design, self.chamber = design, chamber
-        self._executor, self._progress, self._analytic = executor, progress, analytic
-        known = known or ReplicaSet()
-        self.nominal = self._evaluate(design, chamber, plan, known)
-        self.replicas = known.replicas
+    def __post_init__(self) -> None:
+        self.nominal = self._evaluate(self.design, self.chamber, self.plan, self.known)
 
     def run(
         self, design: Design, chamber: Chamber | None = None, replicas: Sequence[Replica] = ()
@@ -82,14 +65,13 @@ class Variations:
             chamber: of the changed design, if it is not the nominal one.
             replicas: of the changed design, if they follow from the nominal ones.
         """
+        self.progress.ended += not replicas
         nominal, known = self.nominal, ReplicaSet(list(replicas))
-        if not replicas:
-            self._progress.begin_next()
         plan = ReplicaPlan(nominal.replicas, nominal.stream, nominal.objective_name)
         return self._evaluate(design, chamber or self.chamber, plan, known)
 
     def _evaluate(
         self, design: Design, chamber: Chamber, plan: ReplicaPlan | None, known: ReplicaSet
     ) -> Evaluation:
-        cavity = analytic_cavity(design, chamber) if self._analytic else None
-        return evaluate(design, chamber, self._executor, self._progress, plan, cavity, known)
+        cavity = analytic_cavity(design, chamber) if self.analytic else None
+        return evaluate(design, chamber, self.executor, self.progress, plan, cavity, known)

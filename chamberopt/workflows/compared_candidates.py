@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -61,14 +61,8 @@ class Candidate:
     chamber: Chamber | None = None
 
 
-@dataclass(frozen=True)
-class SeedSettings:
-    """Random numbers and objective of a simulation.
-
-    Args:
-        seed: of the design's process.
-        plan: replicas, stream of random numbers and objective.
-    """
+class SeedSettings(NamedTuple):
+    """The random numbers, the number of replicas and the objective of a simulation."""
 
     seed: int
     plan: ReplicaPlan
@@ -128,16 +122,13 @@ def simulate_missing(
         if one.result is not None and not one.missing:
             results.append(one.result)
             continue
+        settings = SeedSettings(one.design.process.seed, ReplicaPlan())
         if one.result is not None:
             settings = _seed_settings(one.result)
             seconds = one.design.process.treatment_time_s
             remarks.append(f"{one.label}: simulated again for {seconds:g} s, on its own seeds")
-        else:
-            settings = (
-                _seed_settings(results[0])
-                if results
-                else SeedSettings(one.design.process.seed, ReplicaPlan())
-            )
+        elif results:
+            settings = _seed_settings(results[0])
             remarks += _overridden(one, settings)
         new, more = _simulate(one, settings, folder / name, executor, prepare)
         results.append(new)

@@ -235,9 +235,9 @@ def test_a_short_real_run() -> None:
     assert done[-1] == (9, 9, None)
     assert found.corner == {"sonotrode.amplitude_um": 23.0, "process.treatment_time_s": 4.8}
     low = found.figures["mean_coverage"].effects["process.treatment_time_s"][0]
-    runs = Variations(design, chamber, SerialExecutor(), RunsProgress(None, 0))
+    runs = Variations(design, chamber, SerialExecutor(), RunsProgress(None, 1))
     changed = design.changed({"process.treatment_time_s": 4.8})
-    at_low = runs.run(changed, replicas=runs.replicas)
+    at_low = runs.run(changed, replicas=runs.known.replicas)
     gap = at_low.metrics["mean_coverage"].value - nominal.metrics["mean_coverage"].value
     assert low.value == pytest.approx(gap, abs=1e-4)
     one = nominal.metrics["mean_coverage"]

@@ -171,7 +171,7 @@ def test_a_gauge_too_small_for_the_target_is_refused_before_anything_is_simulate
     def nothing(*_: object) -> Callable:
         raise AssertionError("a replica was simulated")
 
-    monkeypatch.setattr(ReplicaSet, "add_up_to", nothing)
+    monkeypatch.setattr("chamberopt.simulation.evaluate.run_in_order", nothing)
     design = plate_design(process__accuracy__gauge_mm2=1e-3)
     chamber = build_chamber(design)
     with pytest.raises(InputError, match=r"process\.accuracy\.gauge_mm2.*give at least 0\.0013"):
