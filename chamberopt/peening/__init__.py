@@ -1,1 +1,1 @@
-"""What a shop asks of a simulated design beyond its figures: strips, calibration, tolerances."""
+"""Strips, calibration and tolerances: a simulated design in the terms of a peening shop."""

@@ -1,9 +1,9 @@
-"""Calibrate a machine: simulate where it was measured, until the most probable values stay.
+"""Calibrate a machine: simulate its measurements until the most probable values stay.
 
-A round simulates every set-up at a centre and at one step to each side along each of the parameters
-that take a simulation. A quadratic surface through all runs so far stands in for the simulator, the
-most probable values by it are the centre of the next round, and the last surface gives their
-covariance. What measurements tell without a simulation (drops, amplitude) sets the first centre.
+A round simulates every set-up at a centre, and at one step to each side along each parameter that
+takes a simulation. A quadratic surface through all runs so far stands in for the simulator. The
+most probable values by this surface are the centre of the next round, and the last surface gives
+their covariance. Measurements that take no simulation (drops, amplitude) set the first centre.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ if TYPE_CHECKING:
     from chamberopt.common.progress import Progress
     from chamberopt.design.load import Design
 
-# Medians and standard deviations of logarithms before measuring: see docs/peening.md.
+# Medians, and standard deviations of logarithms, before measuring: see docs/peening.md.
 PRIORS: dict[Parameter, tuple[float, float]] = {
     "amplitude": (1.0, 0.10),
     "C0": (1.0, 0.04),
@@ -58,15 +58,15 @@ PRIORS: dict[Parameter, tuple[float, float]] = {
     "K": (13.5, 0.90),
     "beta": (1.0, 0.40),
 }
-# Least and largest step of a run from the centre, between which it is the standard deviation.
+# Least and largest step of a run from the centre; between these, a step is a standard deviation.
 STEPS: dict[Parameter, tuple[float, float]] = {
     "amplitude": (0.05, 0.10), "C0": (0.02, 0.04), "v0": (0.2, 0.7), "mu": (0.15, 0.3),
 }  # fmt: skip
-REACH = 2.0  # steps from the centre within which the next one may lie
+REACH = 2.0  # steps from the centre within which the next centre may lie
 MIN_ROUNDS, MAX_ROUNDS = 2, 5
-STAYS = 0.5  # standard deviations by which the centre of a last round may be off
-OF_DESIGN = 2  # probes for what is predicted of it
-DRAWN_TIMES = 12  # of a strip's curve
+STAYS = 0.5  # standard deviations by which the centre of the last round may be off
+OF_DESIGN = 2  # number of probes for predictions of the design
+DRAWN_TIMES = 12  # points of a strip's curve
 
 Simulator = Callable[[Setup, Mapping[Parameter, float], Executor, int], Impacts]
 
@@ -75,8 +75,8 @@ Simulator = Callable[[Setup, Mapping[Parameter, float], Executor, int], Impacts]
 class Calibrated:
     """A calibration and how it came about.
 
-    figures: of the design, by name.
-    moved: how far the last round's centre was from the result, in standard deviations.
+    figures: models of the design's figures, by name.
+    moved: distance of the last round's centre from the result, in standard deviations.
     """
 
     design: Design
@@ -90,12 +90,12 @@ class Calibrated:
 
 
 class Prepared(NamedTuple):
-    """What is simulated, and what for.
+    """The set-ups to simulate, and their purposes.
 
     Attributes:
-        setups: the first is the design itself.
+        setups: the design itself first.
         data: measurements with their models.
-        figures: of the design, by name.
+        figures: models of the design's figures, by name.
     """
 
     setups: list[Setup]
@@ -107,8 +107,8 @@ def prepare(measured: Measured, designs: Mapping[str, Design], folder: Path) -> 
     """The set-ups to simulate, the data with their models, and the figures of the design.
 
     Args:
-        designs: by path.
-        folder: for the meshes of strips in lids.
+        designs: designs by path.
+        folder: place for the meshes of strips in lids.
 
     Raises:
         InputError: a chamber cannot be built, or a strip does not fit.
@@ -167,7 +167,7 @@ def _single(kind: str, label: str, at: float, value: float, sd: float, model: Mo
 
 
 def _arcs(strip: MeasuredStrip, setup: Setup) -> Data:
-    """Arc heights with their model, whose further rows are for a picture."""
+    """Arc heights with their model, and a model of further times for a picture."""
     times = np.array(strip.time_s)
     drawn = np.geomspace(0.5 * times[0], 1.5 * times[-1], DRAWN_TIMES)
     model = setup.model(ArcProbe(strip_cells(strip.size), (*strip.time_s, *drawn.tolist())))
@@ -193,7 +193,7 @@ def _coupon_data(coupon: MeasuredCoupon, setup: Setup) -> list[Data]:
         times = np.array([one.time_s for one in coupon.coverage])
         left = 1.0 - np.array([one.percent for one in coupon.coverage]) / 100.0
         x = -np.log(left)
-        # By the slope of ln x over coverage.
+        # The standard deviation of ln x, by its slope over the coverage.
         sd = np.array([one.sd for one in coupon.coverage]) / 100.0 / (left * x)
         rows = rows_of(model, [0] * len(times))
         data.append(Data("coverage", label, times, np.log(x / times), np.diag(sd**2), rows))
@@ -208,7 +208,7 @@ def _coupon_data(coupon: MeasuredCoupon, setup: Setup) -> list[Data]:
 
 
 def prior_of(measured: Measured, simulated: tuple[Parameter, ...]) -> Prior:
-    """What is known before measuring, of the parameters that the measurements can concern."""
+    """The knowledge before measuring, of the parameters that the measurements can concern."""
     names = [
         name
         for name in PARAMETERS
@@ -235,9 +235,9 @@ def calibrate(
     """Find the parameters of a machine.
 
     Args:
-        designs: by path, as `load_measured` gives them.
-        prepared: by `prepare`.
-        progress: called as progress(simulations done, in all, None).
+        designs: designs by path, as `load_measured` gives them.
+        prepared: result of `prepare`.
+        progress: called as progress(simulations done, simulations in all, None).
         simulator: gives the impacts of a set-up at some logarithms of parameters.
 
     Raises:
@@ -294,14 +294,14 @@ def _centre_at(setups: list[Setup], middle: np.ndarray) -> None:
 def _bounds(
     known: Posterior, at: list[int], middle: np.ndarray, reach: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Ends between which theta may lie: as far as `reach` (k,) from the middle."""
+    """Ends between which theta may lie, at a distance `reach` (k,) from the middle."""
     low, high = np.full((2, len(known.mean)), np.inf) * [[-1.0], [1.0]]
     low[at], high[at] = middle - reach, middle + reach
     return low, high
 
 
 def _moved(known: Posterior, at: list[int], centre: np.ndarray) -> float:
-    """How far a round's centre (k,) was off, in standard deviations."""
+    """Distance of a round's centre (k,) from the result, in standard deviations."""
     sds = np.sqrt(np.diag(known.covariance))[at]
     return float((np.abs(known.mean[at] - centre) / sds).max())
 
@@ -309,7 +309,7 @@ def _moved(known: Posterior, at: list[int], centre: np.ndarray) -> float:
 def _table(
     found: Posterior, setups: list[Setup], design: Design, measured: Measured
 ) -> Calibration:
-    """The record for designs, with the ranges in which was measured."""
+    """The record for designs, with the ranges of the measurements."""
     tried = setups if len(setups[0].models) > OF_DESIGN else setups[1:] or setups
     amplitudes = [round(1e6 * one.design.sonotrode.amplitude, 6) for one in tried]
     balls = [1e3 * ball for one in tried for ball, _ in one.design.shot.sizes]

@@ -1,17 +1,18 @@
-"""Evaluate a design with intervals that hold what its calibration leaves open.
+"""Evaluate a design with intervals that hold the errors of its calibration.
 
 Notation
-    p   logarithm of a calibrated parameter, see design/peening/calibration.py
-    h   how far p is moved in a run on the same replicas and seeds          (step)
+    p   logarithm of a calibrated parameter, see design/calibration.py
+    h   step of p in a run on the same replicas and seeds          (Moved.step)
     g   slope of a figure by p, (figure moved - figure) / h
+    L   factor of the covariance of all p
 
 Amplitude, restitution, yield speed and friction take a run each. Hardness changes the dents of the
-impacts that are known, d ~ B^(-1/4), and K and beta are factors on figures. The standard errors L'g
-are the same causes in the same order for all designs with one calibration: what two designs have in
-common cancels in their difference.
+nominal impacts, d ~ B^(-1/4). K and beta are factors on figures. The standard errors L'g have the
+same causes in the same order for all designs with this calibration, so that errors that two designs
+have in common cancel in the difference of these designs.
 
-Chaos makes paired runs differ by noise that a long step drowns, at the price of curvature. A step
-is five standard deviations, but no more than MAX_STEP. What noise is left makes intervals wider.
+Chaos makes paired runs differ by noise. A long step drowns the noise, at the price of curvature. A
+step is five standard deviations, but at most MAX_STEP. The noise that is left widens intervals.
 """
 
 from __future__ import annotations
@@ -38,13 +39,13 @@ if TYPE_CHECKING:
     from chamberopt.simulation.replicas import Replica
     from sim_core import AnalyticCavity
 
-SIMULATED: tuple[Parameter, ...] = ("amplitude", "C0", "v0", "mu")  # what takes a simulation
-# C0 goes down, because no restitution is above 1.
+SIMULATED: tuple[Parameter, ...] = ("amplitude", "C0", "v0", "mu")  # parameters that take a run
+# The step of C0 is negative, because no restitution is above 1.
 MAX_STEP: dict[Parameter, float] = {
     "amplitude": 0.3, "C0": -0.08, "v0": 0.6, "mu": 0.6, "hardness": 0.4,
 }  # fmt: skip
 STANDARD_DEVIATIONS, MIN_STEP = 5.0, 0.02
-WIDE = ".wide."  # before the names of figures of wide windows: no zone is called so
+WIDE = ".wide."  # prefix of the figures of wide windows, which is the name of no zone
 
 
 class Moved(NamedTuple):
@@ -64,7 +65,7 @@ def evaluate_calibrated(
     cavity: AnalyticCavity | None = None,
     known: ReplicaSet | None = None,
 ) -> Evaluation:
-    """As `evaluate`, whose arguments and errors it has, with the errors of the calibration."""
+    """Evaluate as `evaluate`, with its arguments, and with the errors of the calibration."""
     of_all = RunsProgress(progress, 1 + len(moved_designs(design)))
     known, is_analytic = known or ReplicaSet(), cavity is not None
     runs = Variations(design, chamber, executor, of_all, plan, is_analytic, known)
@@ -72,7 +73,7 @@ def evaluate_calibrated(
 
 
 def with_open_errors(runs: Variations) -> Evaluation:
-    """The evaluation of the nominal design, with the errors that its calibration leaves."""
+    """The evaluation of the design itself, with the errors of its calibration."""
     found, calibration = runs.nominal, runs.design.calibration
     if calibration is None:
         return found
@@ -103,7 +104,7 @@ def with_open_errors(runs: Variations) -> Evaluation:
 
 
 def moved_designs(design: Design, names: Sequence[Parameter] = SIMULATED) -> list[Moved]:
-    """The design with each of some calibrated parameters moved that are not known exactly."""
+    """Designs with one calibrated parameter moved each; without parameters known exactly."""
     calibration = design.calibration
     if calibration is None:
         return []
@@ -114,30 +115,30 @@ def moved_designs(design: Design, names: Sequence[Parameter] = SIMULATED) -> lis
             step = math.copysign(min(max(STANDARD_DEVIATIONS * sd, MIN_STEP), abs(most)), most)
             means = list(calibration.log_mean)
             means[calibration.parameters.index(name)] += step
-            # Not checked again: a step may leave the limits of a design.
+            # The copies are not validated, because a step may leave the limits of a design.
             moved = calibration.model_copy(update={"log_mean": tuple(means)})
             moves.append(Moved(name, step, design.model_copy(update={"calibration": moved})))
     return moves
 
 
 def slope(one: Estimate, two: Estimate, step: float) -> float:
-    """Slope of a figure from one run to another; 0 where it has no number."""
+    """Slope of a figure from a run to a run with a step; 0 where a run gives no number."""
     known = all(math.isfinite(e.value) and e.has_number for e in (one, two))
     return (two.value - one.value) / step if known else 0.0
 
 
 def _figures(found: Evaluation) -> dict[str, Estimate]:
-    """The metrics of an evaluation, and those of wide windows after WIDE."""
+    """The metrics of an evaluation, and its metrics of wide windows with the prefix WIDE."""
     return found.metrics | {WIDE + name: one for name, one in found.metrics_of_wide.items()}
 
 
 def _with_other_dents(replicas: list[Replica], factor: float) -> list[Replica]:
-    """Replicas whose dents on the part are so many times as wide."""
+    """The replicas with dents on the part that are wider by a factor."""
     return [replace(one, hits=replace(one.hits, dent=one.hits.dent * factor)) for one in replicas]
 
 
 def _factors(name: str, one: Estimate) -> dict[Parameter, float]:
-    """Slopes of a figure by K and beta, which are factors."""
+    """Slopes of a figure by the logarithms of K and beta, which are factors on figures."""
     figure = name.rpartition(".")[2]
     if figure.startswith("almen_intensity"):
         return {"K": one.value}
@@ -145,5 +146,5 @@ def _factors(name: str, one: Estimate) -> dict[Parameter, float]:
 
 
 def _of_model(name: str, one: Estimate) -> float:
-    """Standard error of a figure by what the model leaves out."""
+    """Standard error of a figure by the simplifications of the model."""
     return TIME_ERROR * one.value if name.rpartition(".")[2] == "saturation_time_s" else 0.0

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class KirkFit:
-    """A fitted curve; c is 1 in that of two parameters."""
+    """A fitted curve; a curve of two parameters has c = 1."""
 
     a: float
     b: float  # [1/s^c]
@@ -43,7 +43,7 @@ class KirkFit:
         """T [s]."""
         from scipy.optimize import brentq
 
-        # x = b T^c is the only root above 0 of what twice the time gives beyond a tenth more.
+        # x = b T^c is the only root above 0 of h(2 T) - 1.1 h(T).
         power = 2.0**self.c
         x = brentq(lambda u: SATURATED * math.expm1(-u) - math.expm1(-power * u), 1e-9, 50.0)
         return float((x / self.b) ** (1.0 / self.c))
@@ -85,12 +85,12 @@ def kirk_fits(times: np.ndarray, heights: np.ndarray) -> tuple[KirkFit, KirkFit]
 
 # Figures of a virtual strip with their intervals.
 #
-# Each figure comes from all replicas, from all but each (jackknife), and from halves of them: h
-# of a cell with few dents is too small, the step from halves to all shows by how much, it is
-# made once more, and the interval includes it.
+# Each figure comes from all replicas, from all but each (jackknife), and from halves of them. h of
+# a cell with few dents is too small, and the step of a figure from halves to all replicas shows by
+# how much. So this step is added to the figure once more, and the interval includes the step.
 
-SPLITS = 3  # into halves
-MULTIPLES = 0.25, 0.5, 1.0, 2.0, 4.0  # of T: the times at which a shop measures
+SPLITS = 3  # splits of the replicas into halves
+MULTIPLES = 0.25, 0.5, 1.0, 2.0, 4.0  # times at which a shop measures, in units of T
 
 
 class StripSaturation(NamedTuple):
@@ -101,7 +101,7 @@ class StripSaturation(NamedTuple):
 
 
 def strip_saturation(dents: StripDents) -> StripSaturation:
-    """S and T of the curve, its largest root of h(2 T) = 1.1 h(T)."""
+    """S and T of the saturation curve; T is the largest root of h(2 T) = 1.1 h(T)."""
 
     def saturated(curve: StripCurve) -> np.ndarray:
         time = curve.saturation_time()
@@ -120,7 +120,7 @@ def corrected(dents: StripDents, figures: Callable[[StripCurve], np.ndarray]) ->
     """Estimates of some figures.
 
     Args:
-        figures: function of a curve that gives them, (n,).
+        figures: function that gives the figures of a curve, (n,).
     """
     count = len(dents.parts)
     whole = figures(strip_curve(dents))
@@ -134,7 +134,7 @@ def corrected(dents: StripDents, figures: Callable[[StripCurve], np.ndarray]) ->
         for order in (rng.permutation(count) for _ in range(SPLITS))
         for start in (0, size)
     ]
-    # What is left of a bias that falls as one over the number of replicas.
+    # The bias that is left, if it falls as one over the number of replicas.
     step = (whole - np.mean(of_halves, axis=0)) * size / (count - size)
     return [
         estimate(_moved(whole[k], without[:, k], step[k]), 0.0, bias=abs(float(step[k])))

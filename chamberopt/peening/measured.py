@@ -24,13 +24,13 @@ from chamberopt.peening.strip import StripSize
 if TYPE_CHECKING:
     from chamberopt.design.load import Design
 
-# Standard deviations of measurements that give none, of section and table in docs/peening.md.
+# Standard deviations of measurements that come without any, see docs/peening.md.
 ARC_PERCENT, COVERAGE_POINTS, DENT_PERCENT = 3.0, 3.0, 1.5
 DROP_PERCENT, IMPACTS_PERCENT = 1.5, 5.0
 MAX_ARC_MM = 3.0
-MAX_FALL = 3.0  # standard deviations by which an arc may be below an earlier one by chance
-# Diameters of single dents on the shipped plate differ by 30 % of their mean. Logarithms of mean
-# and 90th percentile of n of them have these covariances, times the square of that over n.
+MAX_FALL = 3.0  # standard deviations by which an arc may be below an earlier arc by chance
+# Diameters of single dents on the shipped plate scatter by SPREAD of their mean. The logarithms of
+# mean and 90th percentile of n dents have the covariance SAMPLED times SPREAD² / n.
 SPREAD = 0.3
 SAMPLED = np.array([[1.0, 0.3], [0.3, 0.33]])
 Surface = Literal["shot", "wall", "sonotrode", "part"]
@@ -49,12 +49,12 @@ class Peened(FileTable):
 
     @property
     def zero_to_peak_um(self) -> float | None:
-        """Amplitude as set [µm]; None for that of the design."""
+        """Amplitude as set [µm]; None for the amplitude of the design."""
         return 0.5 * self.amplitude_pv_um if self.amplitude_pv_um else self.amplitude_um
 
 
 class MeasuredStrip(Peened):
-    """Arc heights of Almen strips, one a time, in the lid of the chamber."""
+    """Arc heights of Almen strips in the lid of the chamber, a strip for each peening time."""
 
     type: StripType = Field(default="A", description="of the strip")
     time_s: Several[float] = list_field("a list of times in s", "at least two, each once")
@@ -96,7 +96,7 @@ class MeasuredStrip(Peened):
 
     @property
     def size(self) -> StripSize:
-        """Size of the strip."""
+        """The size of the strip, standard unless given."""
         if self.disc_mm is not None:
             return StripSize(1e-3 * self.disc_mm, 1e-3 * self.disc_mm, is_disc=True)
         if self.size_mm is None:
@@ -127,7 +127,7 @@ class MeasuredDents(FileTable):
 
 
 class CouponMaterial(FileTable):
-    """Metal of a coupon where it is not the part's."""
+    """The metal of a coupon that is of another metal than the part."""
 
     hardness_HB: float | None = quantity(5, 1000, "HB", "Brinell hardness", None)  # noqa: N815
     C0: float | None = quantity(0.05, 1, "", "restitution below v0", None)
@@ -135,7 +135,7 @@ class CouponMaterial(FileTable):
 
 
 class MeasuredCoupon(Peened):
-    """A coupon, which is the part of its design."""
+    """A coupon, which takes the place of the part of its design."""
 
     material: CouponMaterial | None = Field(default=None, description="if not that of the part")
     coverage: Several[MeasuredCoverage] = list_field(
@@ -176,7 +176,7 @@ class MeasuredAmplitude(FileTable):
 
 
 class PriorTable(FileTable):
-    """What is known of a parameter before measuring."""
+    """The knowledge of a parameter before measuring."""
 
     sd_log: float = quantity(1e-4, 5, "", "standard deviation of its natural logarithm")
     mean: float | None = quantity(1e-4, 1e4, "", "median, absent: the usual one", None)
@@ -223,7 +223,7 @@ Entry = MeasuredStrip | MeasuredCoupon | MeasuredDrop | MeasuredImpacts
 
 
 def load_measured(path: Path) -> tuple[Measured, dict[str, Design]]:
-    """The measurements in a file, and the designs they name by path.
+    """The measurements in a file, and the designs that it names, by path.
 
     InputError names every problem of the file, or of the first design that cannot be used.
     """
@@ -271,7 +271,7 @@ def _designs(found: Measured) -> Iterator[tuple[str, str]]:
 
 
 def _usable(design: Design) -> Design:
-    """The design without a calibration, which is to be found; InputError if it is not complete."""
+    """The design without its calibration; InputError if it cannot be used."""
     if design.effects.auto:
         text = 'effects: given "auto"; a calibration needs effects that stay: name them, as '
         raise InputError(f"{text}`chamberopt check --pilot` advises")
@@ -279,10 +279,10 @@ def _usable(design: Design) -> Design:
 
 
 def falls(arcs: np.ndarray, sd: float) -> list[tuple[int, float]]:
-    """Which arcs (n,) are below an earlier one, and by how many standard deviations of the two.
+    """Arcs (n,) that are below an earlier arc, and by how many standard deviations of the pair.
 
     Args:
-        sd: standard deviation of an arc over itself.
+        sd: standard deviation of each arc, as a share of it.
     """
     with np.errstate(divide="ignore", invalid="ignore"):  # arcs of 0 and less are refused
         fall = -np.log(arcs / np.maximum.accumulate(arcs)) / (math.sqrt(2.0) * sd)
@@ -299,7 +299,7 @@ def _time_problems(name: str, times: tuple[float, ...]) -> Iterator[Problem]:
 
 
 def with_amplitude(design: Design, amplitude_um: float | None) -> Design:
-    """The design at another zero-to-peak amplitude of its first sonotrode; None: its own."""
+    """The design at a zero-to-peak amplitude of its first sonotrode; None: its own amplitude."""
     if amplitude_um is None:
         return design
     face = design.sonotrode
@@ -313,7 +313,7 @@ def with_material(design: Design, material: CouponMaterial | None) -> Design:
 
 
 def dent_errors(dents: MeasuredDents) -> np.ndarray:
-    """Covariance of the logarithms of mean and 90th percentile; (1, 1) where the latter lacks."""
+    """Covariance of the logarithms of mean and 90th percentile; (1, 1) without a percentile."""
     reading = (1e-2 * dents.sd_percent) ** 2 * np.eye(2)
     size = 1 if dents.p90 is None else 2
     return np.asarray((SPREAD**2 / dents.count * SAMPLED + reading)[:size, :size])

@@ -1,4 +1,4 @@
-"""What is known of a calibrated design's figures, and which measurement would tell most more."""
+"""Predicted figures of a calibrated design, and the measurement that would tell most about them."""
 
 from __future__ import annotations
 
@@ -13,23 +13,25 @@ from chamberopt.peening.calibrate import Calibrated
 from chamberopt.peening.posterior import Model
 from chamberopt.peening.setups import DropModel, amplitude_model
 
-# Figure, its name in words, and the parameters without which it has no value.
+# Figures and their names in words.
 PREDICTED = (
     ("intensity", "Almen intensity"),
     ("saturation_time", "saturation time T"),
     ("coverage_rate", "coverage rate"),
 )
-FAST_DROP = 3.0  # m/s, at which e shows v0; half of v0 shows C0
-SET_SD = 0.015, 0.12  # of ln S and ln T from five arc heights, each read to 3 %
-COVERAGE_SD = 0.07  # of the rate, from coverages of 30 and 60 % read to 3 points
+FAST_DROP = 3.0  # m/s: a drop at this speed shows v0, and a drop at half of v0 shows C0
+# Standard deviations of logarithms: of S and T from five arc heights, each read to 3 %, of a rate
+# from coverages of 30 and 60 % read to 3 points, and of single figures.
+SET_SD = 0.015, 0.12
+COVERAGE_SD = 0.07
 DENTS_SD, DROP_SD, LASER_SD, IMPACTS_SD = 0.04, 0.015, 0.03, 0.05
-GAIN = 0.9  # of a standard deviation: what leaves more than that is not worth naming
+GAIN = 0.9  # share of a standard deviation that a measurement must get below to be named
 
 
 class Candidate(NamedTuple):
-    """A measurement that could be made next: its slopes J+ and errors R+.
+    """A measurement that could be made next, with its slopes J+ and errors R+.
 
-    Where the model does not explain those of its kind, errors are as much larger as theirs.
+    Errors are larger by the error scale of the measurements of its kind.
     """
 
     name: str
@@ -42,9 +44,10 @@ class Prediction:
     """A figure of the design.
 
     Attributes:
-        sd_before, sd: of its logarithm before measuring and now.
-        noise: of its logarithm, by the noise of simulations.
-        next_name, next_sd: the measurement that would leave least; "" where none helps.
+        sd_before, sd: standard deviations of its logarithm, before measuring and now.
+        noise: standard deviation of its logarithm by the noise of simulations.
+        next_name, next_sd: the measurement that would leave the least standard deviation, and this
+            deviation; the name is "" where no measurement helps.
     """
 
     name: str
@@ -105,7 +108,7 @@ def _candidates(found: Calibrated) -> list[Candidate]:
         Candidate(name, posterior.slopes(model), _diagonal([sd], scales.get(kind, 1.0)))
         for kind, name, model, sd in models
     ]
-    # K and beta are no parameters before the first strip.
+    # Without strips, K and beta are no parameters.
     if set(PARAMETERS[-2:]) <= set(posterior.prior.names):
         both = [posterior.slopes(figures[name]) for name in ("intensity", "saturation_time")]
         made.insert(

@@ -1,10 +1,10 @@
-"""What measurements tell of the parameters: the most probable values and their covariance.
+"""The parameters by the measurements: the most probable values and their covariance.
 
 Notation
     theta   natural logarithms of the parameters, (p,)
     m, P    mean and covariance of theta before measuring: independent, log-normal
     y, R    logarithms of measured figures and the covariance of their errors
-    f       what the model gives for y; N its error by the noise of simulations
+    f, N    the model's values for y, and their covariance by the noise of simulations
     J       df/dtheta at the most probable theta
     C       covariance of theta after measuring
 
@@ -13,12 +13,12 @@ C = (J' (R + N)^-1 J + P^-1)^-1, Laplace's approximation. A figure g of theta th
 deviation sqrt(g' C g), and a further measurement with J+ and R+ leaves
 C - C J+' (J+ C J+' + R+)^-1 J+ C, whatever it gives.
 
-Where the model does not explain the figures of one kind, neither they nor the model can be trusted
-to their errors: these are multiplied by sqrt(chi² / nu) (R. T. Birge, Phys. Rev. 40 (1932) 207)
-and all is fitted again, until chi² of every kind is one that chance allows. nu is the number of
-the kind's values less what the fit has taken of them, the trace of (R + N)^-1 J C J', and 1 at
-least. Parameters may explain all and be nothing that was expected: the least sum above has as many
-degrees of freedom as y has values, and where it is too large C is multiplied by their ratio.
+Where the model does not explain the figures of a kind, neither these figures nor the model can be
+trusted to their errors. The errors are then multiplied by sqrt(chi² / nu) (R. T. Birge, Phys. Rev.
+40 (1932) 207), and all is fitted again, until chance allows chi² of every kind. nu is the number of
+the kind's values less the trace of (R + N)^-1 J C J', which the fit has taken, and at least 1.
+Parameters that explain all may still be far from the priors. The least sum above has as many
+degrees of freedom as y has values. Where the sum is too large, C is multiplied by their ratio.
 """
 
 from __future__ import annotations
@@ -37,18 +37,18 @@ from chamberopt.peening.probes import Probe, Reading
 # Simulated figures as a smooth function of the parameters that a simulation takes.
 #
 # Notation
-#     x     logarithms of those parameters, less those of the centre, (k,)
-#     X     of all runs, (r, k)
-#     f     figures of a run, logarithms too, (n,); Y of all runs, (r, n)
+#     x     logarithms of these parameters, less the logarithms of the centre, (k,)
+#     X     x of all runs, (r, k)
+#     f, Y  logarithms of the figures of a run, (n,), and of all runs, (r, n)
 #     p(x)  1, x_i, x_i x_j: the terms of a quadratic polynomial, (q,)
 #     s     standard deviation of a figure by the noise of one run
-#     f(x) = p(x) M Y,  with error covariance c(x) times that of one run
+#     f(x) = p(x) M Y,  with an error covariance of c(x) times the covariance of one run
 #
-# Coefficients have priors, wide but for the curvatures, so that few runs do. A run far from the
-# centre counts less, by what cubic terms may be: every run that was made serves, near ones most.
+# Coefficients have priors, narrow for the curvatures alone, so that few runs suffice. A run far
+# from the centre counts less, because of cubic terms. So every run serves, and near runs most.
 
 CONSTANT, SLOPE, CURVATURE = 10.0, 3.0, 0.3  # prior standard deviations of coefficients
-CUBIC = 0.1  # of a cubic term
+CUBIC = 0.1  # standard deviation of the coefficient of a cubic term
 
 
 class Surface(NamedTuple):
@@ -57,7 +57,7 @@ class Surface(NamedTuple):
     Attributes:
         centre: logarithms of the parameters, (k,).
         matrix: M, (q, r).
-        spread: covariance of the coefficients over that of a run's figure, (q, q).
+        spread: covariance of the coefficients over the variance of a run's figure, (q, q).
     """
 
     centre: np.ndarray
@@ -65,7 +65,7 @@ class Surface(NamedTuple):
     spread: np.ndarray
 
     def weights(self, place: np.ndarray) -> np.ndarray:
-        """How much each run counts at a place (k,), (r,)."""
+        """The weight of each run at a place (k,), (r,)."""
         return np.asarray(_terms(place - self.centre)[0] @ self.matrix)
 
     def noise(self, place: np.ndarray) -> float:
@@ -75,7 +75,7 @@ class Surface(NamedTuple):
 
 
 def fit_surface(places: np.ndarray, centre: np.ndarray, noise: float) -> Surface:
-    """The surface of figures of runs.
+    """Fit the surface to some runs.
 
     Args:
         places: logarithms of the parameters of each run, (r, k).
@@ -92,30 +92,30 @@ def fit_surface(places: np.ndarray, centre: np.ndarray, noise: float) -> Surface
 
 
 def _terms(x: np.ndarray) -> np.ndarray:
-    """p of each row, (r, q)."""
+    """The terms p of each row, (r, q)."""
     x = np.atleast_2d(x)
     pairs = combinations_with_replacement(range(x.shape[1]), 2)
     return np.column_stack([np.ones(len(x)), x, *(x[:, i] * x[:, j] for i, j in pairs)])
 
 
-DIFFERENCE = 1e-4  # of theta, for slopes
-PASSES = 2  # with the noise of simulations at the place found before
-TOGETHER = "measurements and priors"  # the kind of a Misfit that is of all
-BY_CHANCE = 0.05  # of a true model's fits have a larger chi²: below, errors are multiplied
+DIFFERENCE = 1e-4  # difference in theta by which slopes are found
+PASSES = 2  # fits, each with the noise of simulations where the fit before it ended
+TOGETHER = "measurements and priors"  # the kind of the Misfit of all data
+BY_CHANCE = 0.05  # probability of a larger chi² below which errors are multiplied
 
 
 class Figures(NamedTuple):
-    """f and N."""
+    """The values f of a model, and their covariance N."""
 
     values: np.ndarray
     noise: np.ndarray
 
 
 class Prior(NamedTuple):
-    """What is known of the parameters before measuring.
+    """The knowledge of the parameters before measuring.
 
     Attributes:
-        names: of the parameters, (p,).
+        names: names of the parameters, (p,).
         mean: m, (p,).
         sd: square roots of P's diagonal, (p,).
     """
@@ -136,8 +136,8 @@ Model = Callable[[Mapping[Parameter, float]], Figures]
 class SimulatedModel:
     """The figures of a probe from all runs of one set-up.
 
-    `simulated` names the parameters that a simulation takes; `places` has their logarithms in each
-    run, (r, k), and `readings` what the probe read there.
+    `simulated` names the parameters that take a simulation. `add` takes their logarithms in a run,
+    (k,), and the reading of the probe there.
     """
 
     def __init__(self, probe: Probe, simulated: Sequence[Parameter]) -> None:
@@ -149,7 +149,7 @@ class SimulatedModel:
         self._noise = np.zeros((0, 0))
 
     def add(self, place: np.ndarray, reading: Reading) -> None:
-        """One more run."""
+        """Add the reading of a run."""
         self._places.append(place)
         self._readings.append(reading)
 
@@ -178,12 +178,12 @@ class Data:
 
     Args:
         kind: such as "arc heights", in words that a message can use.
-        label: which of several.
-        at: times [s], or other positions, that a picture shows them at, (n,).
-        y: logarithms of what was measured, (n,).
+        label: name among several data of this kind.
+        at: times [s] or other positions of the figures in a picture, (n,).
+        y: logarithms of the measured figures, (n,).
         covariance: R, (n, n).
-        model: f of them.
-        drawn: further times and their figures, for a picture.
+        model: gives f of the figures.
+        drawn: further times and a model of the figures then, for a picture.
     """
 
     kind: str
@@ -197,7 +197,7 @@ class Data:
 
 @dataclass(frozen=True)
 class Posterior:
-    """What is known of the parameters after measuring."""
+    """The knowledge of the parameters after measuring."""
 
     prior: Prior
     mean: np.ndarray  # most probable theta, (p,)
@@ -214,7 +214,7 @@ class Posterior:
         return slopes(model, self.prior, self.mean)
 
     def sd(self, model: Model, covariance: np.ndarray | None = None) -> np.ndarray:
-        """Standard deviations of figures, (n,), by C or another covariance, without noise."""
+        """Standard deviations of a model's figures, (n,), by C or another covariance of theta."""
         rows = self.slopes(model)
         spread = self.covariance if covariance is None else covariance
         return np.sqrt(np.einsum("ij,jk,ik->i", rows, spread, rows))
@@ -243,11 +243,11 @@ def find_posterior(
     bounds: tuple[np.ndarray, np.ndarray],
     scales: Mapping[str, float] | None = None,
 ) -> Posterior:
-    """The most probable theta within bounds, C there, and how well each kind of data is explained.
+    """The most probable theta within bounds, C there, and the misfit of each kind of data.
 
     Args:
-        start: theta from which to look, (p,).
-        scales: factors on the errors of each kind of data; absent: 1.
+        start: theta where the search begins, (p,).
+        scales: factor on the errors of each kind of data; None: 1 for all.
     """
     from scipy.linalg import block_diag, solve_triangular
     from scipy.optimize import least_squares
@@ -279,7 +279,7 @@ def find_posterior(
 def explaining_posterior(
     data: Sequence[Data], prior: Prior, start: np.ndarray, bounds: tuple[np.ndarray, np.ndarray]
 ) -> Posterior:
-    """As `find_posterior`, with errors so large that the model explains all that is known."""
+    """Find as `find_posterior`, with errors so large that the model explains data and priors."""
     from scipy.special import chdtrc
 
     found = find_posterior(data, prior, start, bounds)
@@ -300,7 +300,7 @@ def explaining_posterior(
 def _misfits(
     data: Sequence[Data], found: Posterior, scales: Mapping[str, float]
 ) -> tuple[Misfit, ...]:
-    """chi² of each kind of data by the errors given, and the factor on these that is wanted."""
+    """chi² of each kind of data, and the factor on its errors with which the model explains it."""
     from scipy.special import chdtrc
 
     misfits = []

@@ -1,14 +1,14 @@
-"""What is read off simulated impacts, as a measurement would: logarithms of figures.
+"""Readings of simulated impacts, as of a measurement: logarithms of figures.
 
 Notation
-    h     arc strength of a strip [m], see simulation/peening/strip.py
-    x     dented area of the part over its area, a second [1/s]; coverage is 1 - exp(-x t)
+    h     arc strength of a strip [m], see strip.py
+    x     dented area of the part over its area, per second [1/s]; coverage is 1 - exp(-x t)
     d     diameter of a dent on the part [m], as B^(-1/4) with its hardness
-    K, B, beta   as in design/peening/calibration.py: their slopes are exact, but that of arcs by
-                 beta, for which h is taken at other times
+    K, B, beta   as in design/calibration.py; slopes by these are exact, but for the slope of arcs
+                 by beta, for which h is taken at other times
 
-Figures and their slopes are those of logarithms: ln(K h(beta t)), ln x, ln d, ln T, and that of the
-rate of impacts.
+The figures are ln(K h(beta t)), ln x, ln d, ln T, and ln of the rate of impacts. Slopes are slopes
+of these logarithms.
 """
 
 from __future__ import annotations
@@ -41,10 +41,10 @@ class Impacts(NamedTuple):
     """Simulated impacts on the part.
 
     Attributes:
-        replicas: impacts of each, on the whole part.
-        seconds: simulated time of each.
-        density: of the balls [kg/m³].
-        strip: metal of a strip, with the restitution that was simulated.
+        replicas: impacts of each replica, on the whole part.
+        seconds: simulated time of each replica [s].
+        density: density of the balls [kg/m³].
+        strip: metal of a strip, with the restitution of the simulation.
     """
 
     replicas: Sequence[Hits]
@@ -68,8 +68,8 @@ class Reading(NamedTuple):
     """The figures of a probe in one run.
 
     Attributes:
-        at: function of ln beta that gives them, (n,).
-        noise: covariance of their error by the number of impacts, (n, n).
+        at: function of ln beta that gives the figures, (n,).
+        noise: covariance of their errors by the number of impacts, (n, n).
     """
 
     at: Callable[[float], np.ndarray]
@@ -93,7 +93,7 @@ class ArcProbe:
         times = np.array(self.times)
         dents = impacts.strip_dents(self.cells)
         curve, found = strip_curve(dents), heights(dents, times)
-        more = _logs(found) - np.log(curve.at(times))  # for what few dents lack
+        more = _logs(found) - np.log(curve.at(times))  # correction for few dents
 
         def at(log_beta: float) -> np.ndarray:
             return np.asarray(np.log(1e3 * curve.at(times * np.exp(log_beta))) + more)
@@ -122,9 +122,9 @@ class PartProbe:
     """Figures of dents and impacts on the part, in the order of `names`.
 
     Args:
-        names: of NAMES.
-        target: triangles of the part that are looked at, (m,) bool.
-        area: of these [m²].
+        names: names of figures, as in SLOPES.
+        target: whether dents on each triangle of the part count, (m,) bool.
+        area: area of the triangles that count [m²].
     """
 
     names: tuple[str, ...]
@@ -138,7 +138,7 @@ class PartProbe:
         return tuple({"hardness": self.SLOPES[name]} for name in self.names)
 
     def read(self, impacts: Impacts) -> Reading:
-        """ln of x [1/s], of mean and 90th percentile of d [mm], and of impacts on the part a s."""
+        """ln of x [1/s], mean d [mm], 90th percentile of d [mm] and impacts on the part [1/s]."""
         dents = [hits.on(self.target).dent.astype(float) for hits in impacts.replicas]
         dents = [one[one > 0.0] for one in dents]
         counts = np.array([len(hits) for hits in impacts.replicas])
@@ -187,5 +187,5 @@ def _noise(found: Sequence[Estimate]) -> np.ndarray:
     """Covariance (n, n) of the logarithms, from the pseudo-values of the replicas."""
     relative = np.array([np.array(one.pseudovalues) / one.value for one in found])
     scatter = np.atleast_2d(np.cov(relative)) / relative.shape[1]
-    # What the correction for few dents may be wrong by.
+    # The possible error of the correction for few dents is added.
     return np.asarray(scatter + np.diag([(one.bias / one.value) ** 2 for one in found]))

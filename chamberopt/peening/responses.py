@@ -52,12 +52,12 @@ def scale_of(name: str) -> FigureScale:
 
 
 def on_scale(figure: Estimate, scale: FigureScale) -> Estimate:
-    """The estimate of L from that of m; without an interval where there is none of m.
+    """The estimate of L from the estimate of m; without an interval where m has none.
 
-    The half-width is that whose wider side is the one of m, as `back_from_scale` gives it: near
-    full coverage the slope would make it far wider. Pseudo-values and shared errors are carried
-    over by the slope, as far as the half-width has room for them. A logarithm has no interval where
-    that of m reaches 0.
+    The half-width of L is so chosen that `back_from_scale` gives the half-width of m, because near
+    full coverage the slope would make it far wider. Pseudo-values and shared errors are multiplied
+    by the slope, as far as the half-width has room for them. A logarithm has no interval where the
+    interval of m reaches 0.
     """
     if not math.isfinite(figure.half_width):
         return figure.not_known(figure.in_words or NOT_RESOLVED)
@@ -66,7 +66,7 @@ def on_scale(figure: Estimate, scale: FigureScale) -> Estimate:
         half_width = value - scale.forward(figure.low)
     except (ValueError, ZeroDivisionError):
         return figure.not_known(figure.in_words or NOT_RESOLVED)
-    with contextlib.suppress(ValueError):  # a share has no value on its scale from 1 on
+    with contextlib.suppress(ValueError):  # a share of 1 or more has no value on its scale
         half_width = min(half_width, scale.forward(figure.high) - value)
     scatter = figure.half_width - figure.beyond_scatter
     if scatter > 0.0:
@@ -83,9 +83,9 @@ def on_scale(figure: Estimate, scale: FigureScale) -> Estimate:
 
 
 def with_errors_of(nominal: Estimate, changed: Estimate) -> Estimate:
-    """A changed design's L with the errors of the nominal one's calibration: they move together.
+    """A changed design's L with the errors of calibration of the nominal L: both move together.
 
-    A figure that the change leaves as it is has them already.
+    A figure that the change leaves as it is has these errors already.
     """
     errors = nominal.shared[FIRST_OF_CALIBRATION:]
     if not errors or changed.shared[FIRST_OF_CALIBRATION:]:
@@ -94,7 +94,7 @@ def with_errors_of(nominal: Estimate, changed: Estimate) -> Estimate:
 
 
 def back_from_scale(value: Estimate, scale: FigureScale) -> Estimate:
-    """The estimate of m from that of L; the wider side of its interval is the half-width."""
+    """The estimate of m from the estimate of L; the half-width is the interval's wider side."""
     middle = scale.inverse(value.value)
     if value.in_words or not math.isfinite(value.half_width):
         return Estimate(middle, math.inf, in_words=value.in_words or NOT_RESOLVED)
@@ -103,7 +103,7 @@ def back_from_scale(value: Estimate, scale: FigureScale) -> Estimate:
 
 
 def combine(figures: Mapping[str, Estimate], weights: Mapping[str, float]) -> Estimate:
-    """Weighted sum of paired estimates; what has no weight does not count."""
+    """Weighted sum of paired estimates; an estimate without a weight does not count."""
     used = {name: weight for name, weight in weights.items() if weight}
     if not used:
         return Estimate(0.0, 0.0)

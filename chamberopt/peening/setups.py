@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 @dataclass
 class Setup:
-    """A design as it was set, without a calibration, and what is read off its impacts."""
+    """A design as it was set, without a calibration, and the readings of its impacts."""
 
     design: Design
     chamber: Chamber
@@ -39,13 +39,13 @@ class Setup:
         self.mesh = chamber_mesh(self.chamber)
 
     def model(self, probe: Probe) -> SimulatedModel:
-        """The figures of one more probe, in all runs that follow."""
+        """The model of the figures of a further probe, in all runs that follow."""
         made = SimulatedModel(probe, self.simulated)
         self.models.append((probe, made))
         return made
 
     def add_run(self, place: np.ndarray, impacts: Impacts) -> None:
-        """Read all probes in one run at the logarithms `place` (k,)."""
+        """Read all probes in a run with the logarithms of parameters `place` (k,)."""
         for probe, model in self.models:
             model.add(place, probe.read(impacts))
 
@@ -53,10 +53,10 @@ class Setup:
 def simulate_setup(
     setup: Setup, values: Mapping[Parameter, float], executor: Executor, seed: int
 ) -> Impacts:
-    """Impacts at these logarithms of parameters, in the replicas of the design.
+    """Impacts at some logarithms of parameters, in as many replicas as the design asks for.
 
     Args:
-        seed: of the run; runs of one seed start alike.
+        seed: seed of the run; runs with the same seed start alike.
     """
     design = setup.design
     process = design.process.model_copy(update={"seed": seed})
@@ -67,7 +67,7 @@ def simulate_setup(
 
 
 def exact_calibration(design: Design, values: Mapping[Parameter, float]) -> Calibration:
-    """A calibration to these logarithms of parameters, known exactly."""
+    """A calibration to some logarithms of parameters that are known exactly."""
     names = tuple(name for name in PARAMETERS if name in values)
     count, balls = len(names), sorted(design.shot.diameters)
     return Calibration(
@@ -98,12 +98,12 @@ class DropModel:
 
 
 def amplitude_model(theta: Mapping[Parameter, float]) -> Figures:
-    """ln of the real amplitude over the one that is set."""
+    """ln of the real amplitude over the set amplitude."""
     return Figures(np.array([theta["amplitude"]]), np.zeros((1, 1)))
 
 
 def rows_of(model: Model, rows: Sequence[int]) -> Model:
-    """A model of some of another's figures, of which one may come twice."""
+    """A model of some rows of another model's figures; a row may come twice."""
     at = list(rows)
 
     def some(theta: Mapping[Parameter, float]) -> Figures:

@@ -1,21 +1,21 @@
 """Arc height of a virtual Almen strip against peening time, before a calibration's K and beta.
 
 Notation: as in coverage/strength.py, and
-    x, y      along the strip and across it, from its middle [m]
+    x, y      position along the strip and across it, from its middle [m]
     a, b      half distances of the gauge's balls along x and y [m]            (GAUGE)
     k_x, k_y  curvatures of the strip [1/m], in proportion to the local h
     w         share of a place in the arc height; its integral over the strip is 1
 
     arc height = 1/2 integral of (a - |x|) k_x dx + 1/2 integral of (b - |y|) k_y dy
 
-The gauge's four balls stand at (± a, ± b), and its tip measures the middle against them. A strip
-bends along x as a whole, so that k_x goes with the mean of h over its width, and k_y with that over
-the length between the balls: x counts for a² / (a² + b²) = 80 %. Discs, strips of other sizes
-and zones of a part count evenly: how their gauge weighs them is not known here.
+The gauge's four balls stand at (± a, ± b), and its tip measures the middle against the balls. A
+strip bends along x as a whole, so that k_x goes with the mean of h over its width. k_y goes with
+the mean of h over the length between the balls. So x counts for a² / (a² + b²) = 80 %. Discs,
+strips of other sizes and zones of a part count evenly, as the weights of their gauge are not known.
 
-h follows in cells of the strip from the dents in each, and is summed with their w. Few dents make
-h of a cell saturate too early, so neighbouring cells are put together until they have ENOUGH_DENTS;
-within them the dents count by their w.
+h of a cell of the strip follows from its dents, and is summed over cells with their w. Few dents
+make h of a cell saturate too early. So neighbouring cells are put together until they have
+ENOUGH_DENTS, and their dents count by the w of their cells.
 
 Source: the gauge of SAE J442: balls 31.75 mm and 15.87 mm apart.
 """
@@ -39,15 +39,15 @@ if TYPE_CHECKING:
 
 GAUGE = 15.875e-3, 7.94e-3  # a, b [m]
 LENGTH, WIDTH = STRIPS["A"].length, STRIPS["A"].width
-CELLS = 4, 4  # along and across, or rings times sectors / 4 of a disc
-ENOUGH_DENTS = 400  # in a cell on average
-LEVELS = 64  # of strength; twice as many change S by less than 0.1 %
-SCANNED = 200  # times among which the largest root is looked for
+CELLS = 4, 4  # cells along and across a strip; a disc has 4 rings of 4 sectors
+ENOUGH_DENTS = 400  # mean number of dents in a cell
+LEVELS = 64  # levels of strength; twice as many change S by less than 0.1 %
+SCANNED = 200  # number of times at which the largest root is looked for
 
 
 @dataclass(frozen=True)
 class StripSize:
-    """Length and width [m] of a strip, both the diameter of a disc."""
+    """Length and width [m] of a strip; of a disc both are its diameter."""
 
     length: float = LENGTH
     width: float = WIDTH
@@ -55,12 +55,12 @@ class StripSize:
 
     @property
     def is_whole(self) -> bool:
-        """Whether it is a standard strip, whose gauge is known."""
+        """Whether the strip is a standard strip, whose gauge is known."""
         return not self.is_disc and (self.length, self.width) == (LENGTH, WIDTH)
 
     @property
     def calibrated_as(self) -> str:
-        """What a calibration with such strips calls them."""
+        """The name of such strips in a calibration."""
         if self.is_whole:
             return WHOLE_STRIP
         return f"{self}" if self.is_disc else f"{self} strip"
@@ -75,9 +75,9 @@ class Cells(NamedTuple):
     """Pieces of a strip in which dents are counted.
 
     Attributes:
-        area: [m²], (c,).
-        weight: w of each, (c,); their sum is 1.
-        of: function of impacts that gives the cell of each, (k,); -1 outside.
+        area: area of each cell [m²], (c,).
+        weight: w of each cell, (c,); their sum is 1.
+        of: function of impacts that gives the cell of each impact, (k,); -1 outside.
     """
 
     area: np.ndarray
@@ -115,7 +115,7 @@ class StripCurve(NamedTuple):
     rate: np.ndarray
 
     def at(self, times: np.ndarray | float) -> np.ndarray:
-        """h [m] after these times [s], of the same shape."""
+        """h [m] after some times [s], of the same shape."""
         gone = -np.expm1(-np.multiply.outer(np.asarray(times, dtype=float), self.rate))
         return np.asarray(gone @ self.height)
 
@@ -132,7 +132,7 @@ class StripCurve(NamedTuple):
         if not len(rates):
             return 0.0
 
-        # Above the largest root twice the time gives less than a tenth more.
+        # After the largest root, twice the time gives less than a tenth more.
         times = np.geomspace(0.1 / rates.max(), 5.0 / rates.min(), SCANNED)
         last = int(np.flatnonzero(self._gain(times) > 0.0)[-1])
         return float(brentq(self._gain, times[last], times[last + 1], rtol=1e-10))
@@ -189,12 +189,12 @@ def _disc_cells(radius: float) -> Cells:
 
 
 def surface_cells(vertices: np.ndarray, triangles: np.ndarray, area: np.ndarray) -> Cells:
-    """Cells of a surface that counts evenly: neighbouring triangles of about a sixteenth of it.
+    """Cells of a surface that counts evenly: neighbouring triangles, about a sixteenth of it each.
 
     Args:
-        vertices: of the part [m], (n, 3).
-        triangles: of the part, (m, 3).
-        area: of the triangles of the surface [m²], (m,); 0 for others.
+        vertices: vertices of the part [m], (n, 3).
+        triangles: triangles of the part, (m, 3).
+        area: area of each triangle of the surface [m²], (m,); 0 for other triangles.
     """
     own = np.flatnonzero(area > 0.0)
     own = own[np.argsort(morton(vertices[triangles[own]].mean(axis=1)), kind="stable")]
@@ -212,9 +212,9 @@ def count_dents(
     """Dents of replicas in cells of a strip.
 
     Args:
-        replicas: impacts of each on the strip, or on more than it.
-        seconds: simulated time of each replica.
-        density: of the balls [kg/m³].
+        replicas: impacts of each replica, on the strip and perhaps beside it.
+        seconds: simulated time of each replica [s].
+        density: density of the balls [kg/m³].
         strip: the metal of a strip.
     """
     found = []
@@ -225,7 +225,7 @@ def count_dents(
         found.append((cell[rows], np.pi / 4.0 * dent[rows] ** 2, s[rows]))
     highest = max((float(s.max(initial=0.0)) for _, _, s in found), default=0.0)
     parts, count = np.zeros((len(found), len(cells.area), LEVELS)), np.zeros(len(cells.area))
-    sums = np.zeros((2, LEVELS))  # dented area, and that times s
+    sums = np.zeros((2, LEVELS))  # dented area, and dented area times s
     for part, (cell, dented, s) in zip(parts, found, strict=True):
         count += np.bincount(cell, minlength=len(count))
         level = np.minimum((LEVELS * s / max(highest, 1e-300)).astype(int), LEVELS - 1)
@@ -238,7 +238,7 @@ def count_dents(
 
 
 def _put_together(dents: StripDents) -> StripDents:
-    """Fewer cells, 4 or 1, where there are too few dents for all."""
+    """The dents in fewer cells, 4 or 1, where there are too few dents for all cells."""
     cells, total = len(dents.weight), dents.number.sum()
     groups = next((k for k in (cells, 4) if total >= ENOUGH_DENTS * k), 1)
     if groups >= cells:
@@ -253,7 +253,7 @@ def _put_together(dents: StripDents) -> StripDents:
 def strip_curve(dents: StripDents, some: np.ndarray | slice = slice(None)) -> StripCurve:
     """Arc strength against time from some replicas, all by default.
 
-    Almen's arc height is K times that at beta times the time.
+    Almen's arc height is K times the arc strength at beta times the time.
     """
     parts = dents.parts[some]
     density = parts.sum(axis=0) / (dents.seconds * len(parts))

@@ -7,7 +7,7 @@
     |_____________________________|
                sonotrode
 
-The strip is flush with its holder, which is of the strip's steel too.
+The strip is flush with its holder, and both are of the same steel.
 """
 
 from __future__ import annotations
@@ -32,8 +32,8 @@ if TYPE_CHECKING:
 
 HOLDER_FILE = "strip_holder.obj"
 STRIP_GROUP = "strip"
-SIDES = 64  # of a disc
-MARGIN_MM = 5.0  # of the holder beyond the walls
+SIDES = 64  # sides of the polygon for a disc
+MARGIN_MM = 5.0  # width by which the holder reaches beyond the walls
 FIT_MM = 1e-6
 
 
@@ -43,8 +43,8 @@ def strip_design(
     """The design with a strip in a flush lid in place of its part; the lid is written as a mesh.
 
     Args:
-        folder: of the mesh.
-        distance_mm: from the sonotrode to the strip; None for that of the part.
+        folder: folder for the mesh.
+        distance_mm: distance from the sonotrode to the strip; None for the distance of the part.
 
     Raises:
         InputError: the chamber is of another shape, or the strip does not fit into it.
@@ -90,13 +90,13 @@ def _outline_mm(chamber: ParametricChamber, height: float) -> np.ndarray:
 
 
 def _require_room(size: StripSize, outline: np.ndarray) -> None:
-    """Raise InputError, which says what fits, unless the strip is inside the outline [mm]."""
+    """Raise InputError, with the sizes that fit, unless the strip is inside the outline [mm]."""
     along = np.roll(outline, -1, axis=0) - outline
     normal = np.c_[along[:, 1], -along[:, 0]] / np.linalg.norm(along, axis=1)[:, None]
-    reach = (normal * outline).sum(axis=1)  # of each side from the middle
+    reach = (normal * outline).sum(axis=1)  # distance of each side from the middle
 
     def share(edge: np.ndarray) -> float:
-        """How many times as large the strip may be."""
+        """The factor by which the strip could be larger."""
         return float((reach / (edge @ normal.T).max(axis=0)).min())
 
     if share(_edge_mm(size)) >= 1.0 - FIT_MM:
@@ -129,16 +129,16 @@ def _holder_obj(edge: np.ndarray, half_sides: np.ndarray, thickness: float) -> s
     """A plate [mm] whose lower face, at z = 0, has the strip as a group of its own.
 
     Args:
-        edge: of the strip, (n, 2).
-        half_sides: of the plate along x and y, (2,).
+        edge: corners of the strip, (n, 2).
+        half_sides: half sides of the plate along x and y, (2,).
     """
     from scipy.spatial import Delaunay
 
     n = len(edge)
     corners = half_sides * np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]])
     points = np.r_[edge, corners]
-    # The corners of the strip are on a circle without others inside, so that Delaunay's triangles
-    # do not cross its edge.
+    # The corners of the strip are on a circle with no other point inside, so that Delaunay's
+    # triangles do not cross the edge of the strip.
     lower = Delaunay(points).simplices
     vertices = np.r_[np.c_[points, np.zeros(n + 4)], np.c_[corners, np.full(4, thickness)]]
     down = area_vectors(vertices, lower)[:, 2] < 0.0

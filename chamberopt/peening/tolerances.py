@@ -1,18 +1,18 @@
-"""What the tolerances of a design do to its figures: to first order, from 1 + k paired runs.
+"""The figures of a design over the box of its tolerances, to first order from 1 + k paired runs.
 
 Notation
-    x_i    a number with a tolerance, see tolerated_numbers.py
-    u_i    how far it is moved
+    x_i    a number with a tolerance; any value from low to high is as likely  (ToleratedNumber)
+    u_i    change of x_i: ln(x_i / nominal) where the number is positive, x_i - nominal otherwise
     L      a figure on its scale, see responses.py
-    g_i    dL/du_i, from one run in which x_i alone is changed
+    g_i    dL/du_i, from a run in which x_i alone is changed
     L(u) = L(0) + sum of g_i u_i
 
-The slope of a quantile of L over g_i is the mean of u_i where L has that quantile, because the
+The slope of a quantile of L over g_i is the mean of u_i where L has this quantile, because the
 share of the box below the quantile stays. So a quantile is a weighted sum of the runs, and has an
-interval like any other. An effect in the noise counts with its estimate, which makes the box look
-wider rather than narrower.
+interval like any other sum. An effect that drowns in noise counts with its estimate, which makes
+the box look wider rather than narrower.
 
-One more run in the worst corner, on the same seeds, tells whether first order is enough.
+A further run in the worst corner, on the same seeds, shows whether first order is enough.
 """
 
 from __future__ import annotations
@@ -53,12 +53,6 @@ if TYPE_CHECKING:
     from chamberopt.design.load import Design
     from chamberopt.simulation.evaluation import Evaluation
 
-# The numbers of a design that have tolerances: their ranges, and how far each is moved in its run.
-#
-# Notation
-#     x    a number with a tolerance; any value from low to high is as likely (ToleratedNumber)
-#     u    ln(x / nominal) where the number is positive, x - nominal otherwise         (moved)
-
 # A change of five times the tolerance has a fifth of the noise, at the price of curvature. Beyond
 # a third of the number, curvature would be the larger error (benchmarks/response_steps.py).
 STRETCH, MOST = 5.0, 0.3
@@ -68,14 +62,14 @@ SAMPLE_EXPONENT = 12  # the box has 2^12 points
 
 @dataclass(frozen=True)
 class ToleratedNumber:
-    """A number of a design with its range, in the unit of the file, and the run that moves it."""
+    """A number of a design with its range, in the unit of the file, and the design of its run."""
 
     name: str
     low: float
     nominal: float
     high: float
     changed: Design  # with this number alone changed
-    step: float  # u of that change, of what is really there
+    step: float  # u of this change; for the shot's mass, of its whole balls
 
     def moved(self, value: float) -> float:
         """u of a value."""
@@ -83,9 +77,9 @@ class ToleratedNumber:
 
 
 def plan_tolerances(design: Design) -> tuple[ToleratedNumber, ...]:
-    """The numbers of a design that have tolerances, each with the change that is simulated.
+    """The numbers of a design that have tolerances, each with the change to simulate.
 
-    InputError if there are none, or the design cannot have one end of a range.
+    InputError if no number has a tolerance, or the design cannot have an end of a range.
     """
     box = tolerance_box(design)
     if not box:
@@ -96,7 +90,7 @@ def plan_tolerances(design: Design) -> tuple[ToleratedNumber, ...]:
 
 
 def effective_move(design: Design, number: ToleratedNumber) -> float:
-    """u of a number in a design; of the shot's mass it is that of its whole balls."""
+    """u of a number in a design; for the shot's mass, u of the mass of its whole balls."""
     if number.name != MASS:
         return number.moved(design.value(number.name))
     return number.moved(1e3 * design.shot.count * design.shot.ball_mass)
@@ -116,7 +110,7 @@ def box_points(numbers: tuple[ToleratedNumber, ...]) -> np.ndarray:
 
 
 def ball_notes(design: Design, numbers: tuple[ToleratedNumber, ...]) -> list[str]:
-    """How many whole balls the range of the shot's mass is."""
+    """A note on the number of whole balls at both ends of the shot's mass."""
     for one in numbers:
         if one.name == MASS:
             ends = ({MASS: end, "tolerances": None} for end in (one.low, one.high))
@@ -129,7 +123,7 @@ def ball_notes(design: Design, numbers: tuple[ToleratedNumber, ...]) -> list[str
 
 
 def _planned(design: Design, name: str, low: float, high: float) -> ToleratedNumber:
-    """The change of one number: the widest allowed of those wanted, to the wider side if it can."""
+    """Plan the widest change of a number that the design allows, to the wider side if possible."""
     nominal = design.value(name)
     logarithmic = _is_logarithmic(nominal, low)
     sides = sorted((_moved(nominal, low, end) for end in (low, high)), key=abs)
@@ -158,27 +152,27 @@ def _moved(nominal: float, low: float, value: float) -> float:
 
 
 def _is_logarithmic(nominal: float, low: float) -> bool:
-    """Whether u is a logarithm, see above."""
+    """Whether u is a logarithm."""
     return nominal > 0.0 and low > 0.0
 
 
 NOMINAL = "nominal design"
 QUANTILES = (0.05, 0.95)
-BENT = 0.1  # of the change in the worst corner: as much curvature is no fault of first order
-NEAR = 0.02  # share of the points that are nearest to a quantile, for its slopes
-NAMED = 3  # more figures that are not resolved are counted
-# The corner is the worst for the first of these that is resolved.
+BENT = 0.1  # share of the change in the worst corner that curvature may have
+NEAR = 0.02  # share of the points that count as near to a quantile, for its slopes
+NAMED = 3  # largest number of unresolved figures that a note names, instead of their number
+# The worst corner is that of the first figure in this list that is resolved.
 DECIDING = ("p05_coverage", "mean_coverage", "impacts_per_mm2_s")
 
 
 @dataclass(frozen=True)
 class ToleratedFigure:
-    """One figure over the box.
+    """A figure over the box.
 
-    lowest and highest: in those corners of the box that are extreme to first order.
-    effects: change at the low and at the high end of each number alone.
-    predicted, simulated: in the worst corner; None where it could not be simulated.
-    agrees: whether these two differ by no more than noise, or than BENT of the change.
+    lowest and highest: values in the corners of the box that are extreme to first order.
+    effects: changes of the figure at the low and at the high end of each number alone.
+    predicted, simulated: values in the worst corner; None where it could not be simulated.
+    agrees: whether both values differ by no more than noise, or than BENT of the change.
     """
 
     nominal: Estimate
@@ -196,8 +190,8 @@ class ToleratedFigure:
 class ToleranceResult:
     """Figures over the box of tolerances.
 
-    worst_for: the figure that is lowest in `corner`; empty where none is resolved.
-    corner: value of each number there.
+    worst_for: the figure that is lowest in `corner`; empty where no such figure is resolved.
+    corner: value of each number in the worst corner.
     """
 
     numbers: tuple[ToleratedNumber, ...]
@@ -233,7 +227,7 @@ def simulate_tolerances(
 
     def evaluate(changed: Design) -> Evaluation:
         same = {TREATMENT_TIME: design.value(TREATMENT_TIME), "tolerances": None}
-        if changed.changed(same) == design.changed(same):  # another time of the same impacts
+        if changed.changed(same) == design.changed(same):  # the impacts are those of the design
             return runs.run(changed, replicas=runs.known.replicas)
         return runs.run(changed, build_chamber(changed, target))
 
@@ -242,7 +236,7 @@ def simulate_tolerances(
 
 @contextmanager
 def _run_named(number: ToleratedNumber) -> Iterator[None]:
-    """Add to an error in which run it is."""
+    """Add the run to the message of an error."""
     try:
         yield
     except Exception as error:
@@ -322,10 +316,10 @@ class _Figure:
     def __init__(
         self, name: str, numbers: tuple[ToleratedNumber, ...], runs: dict[str, Estimate]
     ) -> None:
-        """`runs` are of the nominal design and of each changed number."""
+        """`runs` has the figure of the nominal design, and of the run of each number."""
         metric, self._scale = find_metric(name), scale_of(name)
         if name.rpartition(".")[2] == "time_to_98_s" and TREATMENT_TIME in runs:
-            # Estimated after another part of the treatment, of which it does not know.
+            # It does not depend on the treatment time, but its estimate does, by chance.
             runs = runs | {TREATMENT_TIME: runs[NOMINAL]}
         self._range = (metric.lowest, metric.highest) if metric else (-math.inf, math.inf)
         self._numbers, self._nominal = numbers, runs[NOMINAL]
@@ -337,7 +331,7 @@ class _Figure:
         self._slopes = np.array([(self._on[x.name].value - at_nominal) / x.step for x in numbers])
 
     def signs(self) -> np.ndarray:
-        """Signs of the responses, (k,)."""
+        """Signs of the slopes g, (k,)."""
         return np.sign(self._slopes)
 
     def over_the_box(self) -> ToleratedFigure:
@@ -369,7 +363,7 @@ class _Figure:
     def with_corner(
         self, found: ToleratedFigure, u: np.ndarray, simulated: Estimate, confidence: float
     ) -> ToleratedFigure:
-        """The figure with what first order and a run say at u (k,)."""
+        """The figure with its values at u (k,) by first order and by a run."""
         predicted = self._at(u)
         there, shown = on_scale(simulated, self._scale), self._back(predicted)
         found = replace(found, predicted=shown, simulated=_without_replicas(simulated))
@@ -389,15 +383,16 @@ class _Figure:
         return combine(self._on, {NOMINAL: 1.0 - sum(shares), **weights})
 
     def _change(self, number: int, u: float) -> Estimate:
-        """Change of the figure when one number alone moves by u.
+        """Change of the figure when a number alone moves by u.
 
-        It is known as well as the change on the scale, and as the place on it where it starts.
+        Its error comes from the change on the scale, and from the place on the scale where the
+        change starts.
         """
         x, nominal = self._numbers[number], self._on[NOMINAL]
         share, changed = u / x.step, self._on[x.name]
         change = combine(self._on, {x.name: share, NOMINAL: -share})
         reach = change.half_width
-        if x.name == TREATMENT_TIME:  # the same impacts, whose biases go one way
+        if x.name == TREATMENT_TIME:  # both runs have the same impacts, and the same bias
             reach -= 2.0 * abs(share) * min(nominal.beyond_scatter, changed.beyond_scatter)
         there = self._back(Estimate(nominal.value + change.value, max(0.0, reach)))
 
@@ -416,7 +411,7 @@ class _Figure:
         )
 
     def _possible(self, value: Estimate) -> Estimate:
-        """The figure itself, within its range."""
+        """The figure from its value on the scale, within its range."""
         found = self._back(value)
         return replace(found, value=min(max(found.value, self._range[0]), self._range[1]))
 
@@ -427,7 +422,7 @@ class _Figure:
 def _resolved(
     name: str, nominal: Evaluation, changed: Mapping[str, Evaluation]
 ) -> dict[str, Estimate]:
-    """A figure of all runs; empty where one does not resolve it, or nothing in it is random."""
+    """A figure of all runs; empty where a run does not resolve it, or nothing in it is random."""
     runs = {NOMINAL: nominal, **changed}
     figures = {run: one.metrics[name] for run, one in runs.items() if name in one.metrics}
     known = all(_is_resolved(on_scale(one, scale_of(name))) for one in figures.values())

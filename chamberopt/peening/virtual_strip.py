@@ -1,12 +1,12 @@
-"""Peen a virtual strip, and give what a shop would read off it.
+"""Peen a virtual strip, and give the figures that a shop would read off it.
 
 Notation: as in strip.py, and
-    K, beta   arc height over h [mm/mm], dents on a real strip over those simulated; 1 where the
+    K, beta   arc height over h [mm/mm], dents on a real strip over simulated dents; 1 where the
               design is not calibrated
     H(t)      arc height of a real strip, K h(beta t); its saturation time is T / beta
 
 Slopes of a figure by the logarithms of amplitude, restitution, yield speed and friction come from
-runs on the same seeds (calibration_errors.py), those by K and beta from the formula.
+runs on the same seeds (calibration_errors.py). Slopes by K and beta come from the formula.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ if TYPE_CHECKING:
 
 DRAWN = np.linspace(0.0, 4.5, 46)[1:]  # times of the curve, in units of T
 MICROMETRES = 1e6
-MIN_OPEN = 0.999  # share of the strip
+MIN_OPEN = 0.999  # share of the strip that must face the shot
 ONLY_RATIOS = (
     "arc heights are strengths in micrometres before the machine's constant: only ratios between "
     "designs mean something"
@@ -75,11 +75,11 @@ class StripSetting(NamedTuple):
     """A strip in its place.
 
     Attributes:
-        design: in which it is peened.
-        type: of the strip.
-        place: where it is, in words.
-        cells: of the strip.
-        notes: on how it is looked at.
+        design: design in which the strip is peened.
+        type: type of the strip, as N, A or C.
+        place: place of the strip, in words.
+        cells: cells of the strip.
+        notes: sentences on how the gauge weighs places.
     """
 
     design: Design
@@ -111,7 +111,7 @@ class VirtualStrip:
 
     @property
     def of(self) -> str:
-        """The real strip that arc heights are those of; "" if the design is not calibrated."""
+        """The real strip whose arc heights these are; "" if the design is not calibrated."""
         calibration = self.setting.design.calibration
         return calibration.strips if calibration and calibration.has_strips else ""
 
@@ -123,7 +123,7 @@ def strip_in_lid(
     folder: Path,
     distance_mm: float | None = None,
 ) -> StripSetting:
-    """A strip in a flush lid; arguments and errors as strip_design has them."""
+    """A strip in a flush lid; arguments and errors as of `strip_design`."""
     changed = strip_design(design, size, folder, distance_mm)
     distance = changed.chamber.sonotrode_distance_mm
     place = f"{size}, flush in a lid {distance:g} mm over the sonotrode"
@@ -137,7 +137,7 @@ def strip_in_zone(
     """A strip in the place of a zone of the part, which stays as it is.
 
     Args:
-        chamber: of the design.
+        chamber: chamber of the design.
     """
     part = chamber.part
     cells = surface_cells(
@@ -152,7 +152,7 @@ def peen_strip(
     """Simulate the replicas of the design, and give arc heights with their intervals.
 
     Args:
-        chamber: of the setting's design.
+        chamber: chamber of the setting's design.
 
     Raises:
         InputError: no impact dents the strip, or something in the chamber covers a part of it.
@@ -223,12 +223,12 @@ def _as_measured(
     slopes: list[dict[Parameter, float]],
     times: list[float],
 ) -> list[Estimate]:
-    """Figures of a real strip from those simulated, with the errors of the calibration.
+    """Figures of a real strip from simulated figures, with the errors of the calibration.
 
     Args:
         found: S, T, and h after some times.
-        slopes: of each by what was moved in simulations.
-        times: [s].
+        slopes: slopes of each figure by the parameters that took a run.
+        times: times of h [s].
     """
     calibration = setting.design.calibration
     scale, slower = MICROMETRES, 1.0
@@ -254,7 +254,7 @@ def _as_measured(
 
 
 def _unit(setting: StripSetting) -> str:
-    """Of arc heights: mmA is that of whole strips alone."""
+    """The unit of arc heights; only whole strips have mmA."""
     calibration = setting.design.calibration
     if calibration is None or not calibration.has_strips:
         return "µm"
@@ -262,10 +262,10 @@ def _unit(setting: StripSetting) -> str:
 
 
 def _calibrated_notes(setting: StripSetting, height: float) -> tuple[str, ...]:
-    """What the arc heights belong to; and whether shops use another type at this intensity.
+    """Notes on the strip of the arc heights, and on the type that shops use at this intensity.
 
     Args:
-        height: [mm of the type].
+        height: the intensity [mm of the type].
     """
     calibration, strip_type = setting.design.calibration, setting.type
     assert calibration is not None

@@ -1,9 +1,9 @@
-"""Convergence study: each numerical parameter at several settings, compared with one reference.
+"""Convergence study: each numerical parameter at several settings, compared with a reference.
 
-The reference has every parameter at its finest setting; each other run has one parameter coarser.
-All take turns, a few replicas each, so that a machine that slows down slows them all. The error
-against the number of replicas comes from batches of the reference's replicas, and the bias of a
-setting is its difference from the reference.
+The reference has every parameter at its finest setting. Each other run has one parameter coarser,
+and the bias of this setting is its difference from the reference. All runs take turns, a few
+replicas each, so that a machine that slows down slows all of them. The error against the number of
+replicas comes from batches of the reference's replicas.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ REFERENCE, DESIGNED = "reference", "as designed"
 
 
 def numerical_parameters(design: Design) -> dict[str, tuple[Any, ...]]:
-    """Settings of every numerical parameter by dotted name; the last is the reference's."""
+    """Settings of each numerical parameter by dotted name; the last setting is the reference's."""
     accuracy = design.process.accuracy
     settings: dict[str, Iterable[Any]] = {}
     if design.chamber.is_round:
@@ -73,14 +73,14 @@ def numerical_parameters(design: Design) -> dict[str, tuple[Any, ...]]:
 
 
 def _falling(value: float, factor: float) -> list[float]:
-    """A value between a larger and a smaller one, all from 0.1 to 1000, as both fields allow."""
+    """A larger value, the value and a smaller value, within the range of its field, 0.1 to 1000."""
     return sorted({min(1e3, factor * value), value, max(0.1, value / factor)}, reverse=True)
 
 
 def study_designs(design: Design) -> tuple[dict[str, Any], dict[tuple[str, str], Design]]:
     """The reference's settings by parameter, and the designs by parameter and setting.
 
-    They are the reference, one for each other setting of each parameter, and the design as it is.
+    The designs are the reference, a design for each other setting, and the design as it is.
     """
     parameters = numerical_parameters(design)
     settings = {name: values[-1] for name, values in parameters.items()}
@@ -102,16 +102,16 @@ def short_name(parameter: str) -> str:
 
 
 MIN_ROUNDS = 3  # a run needs three replicas for an interval
-MIN_REPLICAS, MAX_REPLICAS = 32, 1024  # of the reference: two batch sizes
-LIKELY_REPLICAS = 256  # of all settings together, whose dents are kept
-MIN_BATCHES = 4  # of one size
-ZERO_ERROR = 1e-12  # of a share of area: rounding
+MIN_REPLICAS, MAX_REPLICAS = 32, 1024  # of the reference; 32 give two sizes of batches
+LIKELY_REPLICAS = 256  # number of replicas of all settings together, whose dents are kept
+MIN_BATCHES = 4  # of each size
+ZERO_ERROR = 1e-12  # share of an area below which an error is a rounding error
 ZERO = Estimate(0.0, 0.0)
 
 
 @dataclass(frozen=True)
 class Run:
-    """Result of one setting."""
+    """The result of one setting."""
 
     parameter: str  # dotted name of the numerical parameter that differs from the reference
     setting: str  # its value as text
@@ -119,8 +119,8 @@ class Run:
     cpu: Estimate  # CPU seconds of a replica
     objective: Estimate
     mean: Estimate  # mean coverage
-    bias: Estimate = ZERO  # of the objective: its difference from the reference
-    mean_bias: Estimate = ZERO  # of the mean coverage
+    bias: Estimate = ZERO  # objective less the reference's
+    mean_bias: Estimate = ZERO  # mean coverage less the reference's
 
     @property
     def is_biased(self) -> bool:
@@ -135,20 +135,20 @@ class Run:
 
 @dataclass(frozen=True)
 class ConvergenceStudy:
-    """Everything that was simulated."""
+    """The result of a convergence study."""
 
     design: Design
     settings: dict[str, Any]  # of the reference, by parameter
     reference: Run
-    runs: tuple[Run, ...]  # one parameter coarser each, and the design as it is
+    runs: tuple[Run, ...]  # each with a coarser parameter, and the run of the design as it is
     sizes: tuple[BatchSize, ...]  # error against CPU seconds of batches of the reference
-    law: ErrorLaw  # through the sizes
-    cpu_s: float  # of the simulations
-    wall_s: float  # that the study took
+    law: ErrorLaw  # fitted to the sizes
+    cpu_s: float  # CPU seconds of the simulations
+    wall_s: float  # duration of the study [s]
 
 
 class TimedReplica(NamedTuple):
-    """Dents of one replica, in windows, and CPU seconds."""
+    """The dents of one replica in windows, and its CPU seconds."""
 
     footprints: Prints
     cpu_s: float
@@ -160,7 +160,7 @@ class Replicas:
 
     setting: ReplicaSetting
     target: TargetField
-    skipped: int = 1  # first replicas whose time does not count, because they build a search tree
+    skipped: int = 1  # number of first replicas without a time, because they build a search tree
     started: int = 0  # number of replicas that are simulated or under way
     done: list[TimedReplica] = field(default_factory=list)
 
@@ -179,7 +179,7 @@ class Replicas:
         return objective, metrics["mean_coverage"], found.has_mean
 
     def run(self, parameter: str, setting: str, reference: Run | None = None) -> Run:
-        """The result of these replicas, compared with a reference unless they are its own."""
+        """The result of the replicas, compared with a reference; None: they are its own."""
         objective, mean, _ = self.estimates()
         run = Run(parameter, setting, len(self.done), self.cpu, objective, mean)
         if reference is None:
@@ -196,7 +196,7 @@ def require_budget(budget_s: float) -> None:
 
 
 def describe_cost(design: Design, budget_s: float) -> str:
-    """What a study will cost, for the user, before it begins."""
+    """A sentence on the cost of a study, for the user, before it begins."""
     settings = len(study_designs(design)[1])
     return (
         f"{settings} settings, each in {MIN_ROUNDS} replicas or more: about {budget_s:g} CPU s "
@@ -212,8 +212,8 @@ def run_convergence_study(
 ) -> ConvergenceStudy:
     """Simulate all runs for about the budgeted CPU seconds, at least three replicas of each.
 
-    Each round adds one replica to every run, and as many to the reference as there are runs.
-    `prepare` is called for each design before any is simulated, to compile. InputError if the
+    Each round adds a replica to every run, and as many replicas to the reference as there are runs.
+    `prepare` is called for each design before the first simulation, to compile. InputError if the
     budget is not positive, or evaluate() raises it.
     """
     from chamberopt.chamber.build import build_chamber
@@ -271,7 +271,7 @@ def require_memory(designs: Collection[Design], chamber: Chamber) -> None:
 
 
 def _add_replicas(designs: Sequence[Replicas], executor: Executor) -> float:
-    """Simulate one more replica of each design for each time that it is listed; CPU seconds."""
+    """Simulate another replica of each design as often as it is listed; their CPU seconds."""
     futures = []
     for one in designs:
         futures.append(executor.submit(simulate_timed, one.setting, one.target, one.started))
@@ -286,7 +286,7 @@ def _add_replicas(designs: Sequence[Replicas], executor: Executor) -> float:
 
 
 def simulate_timed(setting: ReplicaSetting, target: TargetField, number: int) -> TimedReplica:
-    """Simulate one replica; of its dents what coverage needs is kept, for hundreds of replicas."""
+    """Simulate one replica, and keep only its footprints, so that hundreds fit into memory."""
     begin = time.thread_time()
     replica = simulate_replica(setting, replica_seed(setting.design.process.seed, number))
     dents = locate_dents(target, target.in_sector(replica.hits))
@@ -295,7 +295,7 @@ def simulate_timed(setting: ReplicaSetting, target: TargetField, number: int) ->
 
 
 def _require_error(size: float) -> None:
-    """Raise InputError where coverage, or the error of a batch, is nothing."""
+    """Raise InputError where a coverage, or the error of a batch, is 0."""
     if size < ZERO_ERROR:
         why = "no dent on the target was simulated, so there is no error to measure"
         remedy = "raise it, or see chamberopt check"

@@ -1,9 +1,9 @@
-"""Which effects a design needs: dimensionless groups, and pilot runs with each effect switched.
+"""Advice on the effects of a design, from dimensionless groups and short pilot runs.
 
-The pilot simulates the design, and the design with one effect switched, from the same starts. It
-compares what a short run measures without bias: the mean normal speed of the impacts on the target,
-and the dented area per second on two halves of the target, the one nearer to the sonotrode and the
-farther one. Dented areas are shown as the coverage that they would give if they were spread evenly.
+The pilot simulates the design, and the design with each effect switched, from the same starts. It
+compares figures that a short run measures without bias: the mean normal speed of the impacts on the
+target, and the dented area per second on the nearer and on the farther half of the target, seen
+from the sonotrode. A dented area is shown as the coverage that it would give if spread evenly.
 
 The pilot advises and changes nothing. Only a design with effects = "auto" leaves the choice to it
 (with_effects_resolved).
@@ -42,13 +42,12 @@ MEASURED = SPEED, NEARER, FARTHER = (
     "coverage of its farther half",
 )
 REPLICAS = 8
-# Impacts on the target in all replicas together: speed and dents then have an error of about 0.5 %.
+# Impacts on the target in all replicas together, for an error of about 0.5 % of speed and dents.
 IMPACTS = 300_000
 FIRST_TIME = 0.05  # s of each replica, to find how often the target is hit
 MAX_TIME = 20.0  # s of each replica
-# Friction that is assumed when the pilot switches it on: mu of dry metal, and beta0 between none
-# and what S. Foerster, M. Louge, H. Chang and K. Allia, Phys. Fluids 6 (1994) 1108, measured (0.43,
-# 0.44).
+# Friction of a pilot run that switches it on: mu of dry metal, and beta0 between none and the 0.43
+# and 0.44 that S. Foerster, M. Louge, H. Chang and K. Allia, Phys. Fluids 6 (1994) 1108, measured.
 ASSUMED_FRICTION = {"mu": 0.3, "beta0": 0.2}
 ACCURACY = 0.01  # smaller changes do not matter
 
@@ -65,13 +64,13 @@ SWITCHED = {
 
 @dataclass(frozen=True)
 class Advice:
-    """What switching an effect on changes."""
+    """The changes by one effect, and the advice that follows from them."""
 
     effect: str
     on: bool  # whether the design has it on
-    reason: str  # what a dimensionless group says of its importance
-    # Change of each of MEASURED with its 95 % interval: of the mean normal speed as a share of it,
-    # of coverages as their difference.
+    reason: str  # its importance by a dimensionless group
+    # Change of each figure in MEASURED when the effect is switched on, with its 95 % interval. A
+    # speed changes by a share of itself, a coverage by a difference.
     changes: dict[str, Estimate]
     accuracy: float  # changes below do not matter
 
@@ -140,8 +139,8 @@ def with_effects_resolved(
 ) -> tuple[Design, list[Advice]]:
     """Choose the effects of a design that has effects = "auto"; other designs stay as they are.
 
-    All effects are on at first. Each is switched off alone, and then all together that make no
-    difference alone. While that does make a difference, the most important of them is kept.
+    All effects are on at first, and each is switched off alone. Effects that make no difference
+    alone are then switched off together. While that matters, the most important of them is kept.
 
     Args:
         prepare: called with each variant of the design before it runs.
@@ -178,7 +177,7 @@ class _Pilot:
         require_figures(design, chamber, self._mesh)
         self.effects = _switchable(design, chamber)
         self._executor, self._prepare, self._time = executor, prepare, FIRST_TIME
-        # One short run for the time, one unchanged, one for each effect.
+        # A short run for the time, a run without a change, and a run for each effect.
         self._progress = RunsProgress(progress, 2 + len(self.effects))
         target = exposed_target(chamber)
         hits = sum(int(target[one.triangle].sum()) for one in self._simulate({})[1])
@@ -197,7 +196,7 @@ class _Pilot:
         return sorted(advice, key=lambda one: -one.largest_change)
 
     def measure(self, effects: Mapping[str, bool]) -> dict[str, np.ndarray]:
-        """Each of MEASURED in every replica, (REPLICAS,), with some effects switched on or off."""
+        """The figures in MEASURED of every replica, (REPLICAS,), with some effects switched."""
         self._progress.ended += 1
         variant, replicas = self._simulate(effects)
         return _measure(variant, self.chamber, replicas)
@@ -225,10 +224,9 @@ def _is_on(effect: str, design: Design, chamber: Chamber) -> bool:
 
 
 def groups(design: Design, chamber: Chamber) -> list[dict[str, Any]]:
-    """What dimensionless groups say of each effect that can be switched, without a simulation.
+    """The name of each effect that can be switched, whether it is on, and a sentence on it.
 
-    Returns:
-        For each effect its name, whether it is on, and a sentence.
+    The sentences come from dimensionless groups, without a simulation.
     """
     found = []
     for effect in _switchable(design, chamber):
@@ -240,7 +238,7 @@ def groups(design: Design, chamber: Chamber) -> list[dict[str, Any]]:
 
 
 def _reason(effect: str, design: Design, chamber: Chamber) -> str:
-    """What a dimensionless group says of the importance of an effect."""
+    """The importance of an effect by a dimensionless group, in words."""
     return {
         "gravity": f"g H / V² = {dimensionless.gravity_speed_change(design, chamber):.2g}",
         "ball_collisions": (
@@ -283,7 +281,7 @@ def _switched(design: Design, effects: Mapping[str, bool]) -> Design:
 
 
 def _measure(design: Design, chamber: Chamber, replicas: Sequence[Hits]) -> dict[str, np.ndarray]:
-    """Each of MEASURED in every replica of a design."""
+    """The figures in MEASURED of every replica of a design."""
     target = exposed_target(chamber)
     centres = chamber.part.vertices[chamber.part.triangles].mean(axis=1)
     distance = np.linalg.norm(centres, axis=1)  # from the middle of the sonotrode
@@ -314,7 +312,7 @@ def _median(distances: np.ndarray, areas: np.ndarray) -> float:
 def _changes(
     with_it: Mapping[str, np.ndarray], without: Mapping[str, np.ndarray]
 ) -> dict[str, Estimate]:
-    """Mean changes, from replicas with the same seeds; infinitely uncertain if nothing was hit."""
+    """Mean changes from replicas on the same seeds; without an interval if nothing was hit."""
     changes = {}
     for name in MEASURED:
         scale = float(without[name].mean()) if name == SPEED else 1.0

@@ -1,4 +1,4 @@
-"""How the error falls with the number of replicas: errors of batches, and a power law through them.
+"""The error against the number of replicas: errors of batches, and a power law fitted to them.
 
 Notation
     R       number of replicas of the reference
@@ -24,9 +24,9 @@ NORMAL = 1.96  # half-width of a 95 % interval, in standard errors
 
 @dataclass(frozen=True)
 class BatchSize:
-    """Errors of batches of one size."""
+    """The errors of batches of one size."""
 
-    replicas: int  # of a batch
+    replicas: int  # number of replicas in a batch
     batches: int
     rms: float  # root mean square error of the objective
     half_width: float  # mean half-width of the intervals that the batches themselves estimate
@@ -35,7 +35,7 @@ class BatchSize:
 
     @property
     def error(self) -> float:
-        """Half-width of a 95 % interval that is as wide as the errors are."""
+        """Half-width of a 95 % interval of normal errors with this root mean square."""
         return NORMAL * self.rms
 
     @property
@@ -63,9 +63,13 @@ class ErrorLaw:
 def rms_error(values: np.ndarray, whole: float, share: float) -> float:
     """Root mean square error of batches against infinitely many replicas.
 
-    A batch is part of the pool that it is compared with. Independent replicas of variance s² have
-    the mean square difference s²/k - s²/R = s²/k (1 - k/R). The values (m,) are the estimates of
-    the batches, `whole` is that of all replicas, and `share` is k/R.
+    A batch is a part of the pool that it is compared with. Independent replicas of variance s² have
+    the mean square difference s²/k - s²/R = s²/k (1 - k/R).
+
+    Args:
+        values: estimates of the batches, (m,).
+        whole: estimate of all replicas.
+        share: k/R.
     """
     return math.sqrt(float(np.mean((np.asarray(values) - whole) ** 2)) / (1.0 - share))
 
@@ -80,7 +84,7 @@ def rms_interval(rms: float, batches: int) -> tuple[float, float]:
 
 
 def fit_error_law(sizes: Sequence[BatchSize]) -> ErrorLaw:
-    """Weighted least squares in logarithms, from the sizes that are resolved if there are two.
+    """Fit the law by weighted least squares in logarithms, to resolved sizes if there are two.
 
     The logarithm of an RMS error of m batches has the standard deviation 1 / sqrt(2 (m - 1)).
     """

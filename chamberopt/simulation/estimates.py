@@ -65,7 +65,10 @@ SHARES = frozenset({"mean_coverage", "std_coverage", "p05_coverage", "p95_covera
 
 @dataclass
 class SeenDents:
-    """The replicas so far: dents in windows of both sizes, and impacts in the windows' sector."""
+    """The dents of the replicas so far in windows of both sizes, and their impacts in the sector.
+
+    A symmetric target has its windows in one sector, into which all impacts are turned.
+    """
 
     field: TargetField
     gauge: list[Prints]
@@ -74,11 +77,11 @@ class SeenDents:
 
     @classmethod
     def none(cls, field: TargetField) -> SeenDents:
-        """Before the first replica."""
+        """A surface before the first replica."""
         return cls(field, [], [], [])
 
     def add(self, hits: Sequence[Hits]) -> None:
-        """Look at the replicas that are new."""
+        """Locate the dents of those replicas in `hits` that are new."""
         for one in hits[len(self.gauge) :]:
             in_sector = self.field.in_sector(one)
             dents = locate_dents(self.field, in_sector)
@@ -173,7 +176,7 @@ def _calibrated(
 def window_estimates(
     field: TargetField, gauge: Gauge, prints: Sequence[Prints], design: Design
 ) -> tuple[dict[str, Estimate], Resolution]:
-    """Metrics of coverage in windows of one size."""
+    """Metrics of coverage in the windows of a gauge, and how well they are resolved."""
     process = design.process
     time_ratio = process.treatment_time / process.recorded_time
     batches = batches_of(prints)
@@ -190,9 +193,10 @@ def window_estimates(
 
 
 def least_half_width(reach: Reach, prints: Sequence[Prints]) -> float:
-    """Half-width than which no share of the target is known better.
+    """The least half-width of any share of the target.
 
-    Points tell no better what is in reach, and dents, by the rule of three, what none of them hit.
+    It is the error of the share in reach, by the choice of points, or the share that no dent may
+    have hit by chance, by the rule of three, if that is larger.
     """
     area, squares = sum(one.area for one in prints), sum(one.squares for one in prints)
     dents = area**2 / squares if squares else 0.0  # as many, all alike, would scatter as these do
@@ -200,9 +204,10 @@ def least_half_width(reach: Reach, prints: Sequence[Prints]) -> float:
 
 
 def _all_resolved(found: Mapping[str, Estimate], resolution: Resolution) -> dict[str, Estimate]:
-    """All estimates as far as they are resolved; the mean at least by a bound, where there is one.
+    """All estimates as far as they are resolved.
 
-    The mean takes many dents where nearly all is covered, and then the 5th percentile is known.
+    A mean takes many dents where nearly all is covered. If it is not resolved, the 5th percentile
+    gives a bound below it.
     """
     shown = {name: as_resolved(name, one, resolution) for name, one in found.items()}
     for name in SHARES & shown.keys():
@@ -219,7 +224,7 @@ def as_resolved(name: str, value: Estimate, resolution: Resolution) -> Estimate:
     """The estimate of a metric, without an interval if there are too few dents for one."""
     metric = METRICS[name]
     enough = resolution.has_places if metric.of_places else resolution.has_mean
-    # 0 follows from places out of reach.
+    # A percentile of exactly 0 follows from places out of reach, not from dents.
     is_exact = metric.of_places and value.value == value.half_width == 0.0
     has_interval = math.isfinite(value.half_width) or value.in_words != ""
     if metric.of_impacts is not None or is_exact or value.in_words == "never":
@@ -255,7 +260,7 @@ def _ratios(
 
 
 def reach_notes(reach: Reach, surface: str = TARGET) -> tuple[str, ...]:
-    """How high coverage can go where some of a surface is out of reach, and so has coverage 0."""
+    """A note on the highest coverage of a surface of which some is out of reach."""
     reachable, beyond = reach.share, reach.beyond(1.0 - P05)
     if reachable > 1.0 - MIN_MISSED_SHARE:
         return ()
@@ -274,7 +279,7 @@ def reach_notes(reach: Reach, surface: str = TARGET) -> tuple[str, ...]:
 
 
 def resolution_notes(found: Resolution, surface: str = TARGET) -> tuple[str, ...]:
-    """What of a surface is not resolved, and the simulated time that would do."""
+    """A note on the figures of a surface that are not resolved, and on the time they take."""
     if found.has_mean and found.has_places:
         return ()
     if not found.dents:
@@ -300,7 +305,7 @@ def resolution_notes(found: Resolution, surface: str = TARGET) -> tuple[str, ...
 def strength_notes(
     metrics: Mapping[str, Estimate], resolution: Resolution, surface: str = TARGET
 ) -> tuple[str, ...]:
-    """Why strength and saturation are not resolved where other figures of places are."""
+    """A note where strength and saturation are not resolved, but other figures of places are."""
     saturation = metrics["saturation_time_s"]
     if saturation.in_words != NOT_RESOLVED or not resolution.has_places or not saturation.value:
         return ()
@@ -313,17 +318,17 @@ def strength_notes(
 
 
 def weighted_sum(objective: ObjectiveFunction, metrics: dict[str, Estimate]) -> Estimate:
-    """The objective from the metrics, with an interval that knows how they move together."""
+    """The objective from the metrics, with an interval from what they have in common."""
     terms = [(weight, metrics[name]) for name, weight in objective.terms.items()]
     value = sum(weight * metric.value for weight, metric in terms)
     columns = [weight * np.array(metric.pseudovalues) for weight, metric in terms]
     spread = estimate(np.sum(columns, axis=0), shared=sum_of_shared(terms))
-    # Words of a single metric are true of it alone.
+    # The words of a metric hold for an objective of this metric alone.
     words = next((metric.in_words for _, metric in terms if metric.in_words), "")
     if len(terms) > 1:
         words = "" if all(metric.has_number for _, metric in terms) else NOT_RESOLVED
     bias = sum(abs(weight) * metric.bias for weight, metric in terms)
-    # Biases, and by how much a steep interval is wider, may all go one way.
+    # Biases, and the extra width of steep intervals, may all go one way, so they are added.
     more = sum(abs(weight) * metric.beyond_scatter for weight, metric in terms)
     is_open = words == NOT_RESOLVED or any(math.isinf(metric.half_width) for _, metric in terms)
     half_width = math.inf if is_open else spread.half_width + more

@@ -54,15 +54,16 @@ if TYPE_CHECKING:
     from chamberopt.design.load import Design
     from sim_core import AnalyticCavity, TriangleMesh
 
-# Of the sonotrode's peak speed: faster impacts, which balls would have to drive one another to,
-# leave dents as wide as this one on creases.
+# The fastest impact for which windows are prepared, as a multiple of the sonotrode's peak speed.
+# Only balls that drive one another are faster, and on creases their dents count as wide as the
+# dent at this speed.
 MAX_SPEED = 4.0
-SPEEDS = 1001  # up to there, of which one leaves the widest dent
+SPEEDS = 1001  # impact speeds from 0 on that are tried for the widest dent
 
 
 @dataclass(frozen=True)
 class ReplicaPlan:
-    """Which replicas to simulate."""
+    """The replicas to simulate: their number, their seeds, and the objective they are for."""
 
     # Number of replicas; None for as many as the design's [process.accuracy] asks for.
     count: int | None = None
@@ -139,7 +140,7 @@ class _Run:
         beside.shutdown(wait=False)
 
     def look(self) -> tuple[list[Hits], SeenDents, dict[str, SeenDents]]:
-        """The impacts of all replicas, and their dents on the target and on each zone."""
+        """Locate new dents; all replicas' impacts, and their dents on the target and each zone."""
         hits = [replica.hits for replica in self.known.replicas]
         target, zones = self.seen.result()
         for one in (target, *zones.values()):
@@ -147,7 +148,7 @@ class _Run:
         return hits, target, zones
 
     def add_up_to(self, count: int, progress: Progress | None, wanted: float | None) -> Evaluation:
-        """Add replicas until there are so many, and evaluate them all.
+        """Add replicas until there are `count`, and evaluate all replicas.
 
         Args:
             wanted: half-width of the objective to reach; None where the number was given.
@@ -218,12 +219,12 @@ def require_figures(design: Design, chamber: Chamber, mesh: TriangleMesh) -> Win
 
 
 def prepare_target(design: Design, chamber: Chamber, mesh: TriangleMesh) -> TargetField:
-    """The target of a chamber, ready to be looked at through windows; InputError as below."""
+    """The target of a chamber with its windows; InputError as `window_setting`."""
     return find_target_field(chamber, mesh, window_setting(design, chamber))
 
 
 def see_zones(design: Design, chamber: Chamber, mesh: TriangleMesh) -> dict[str, SeenDents]:
-    """The zones of a chamber's part by their names, ready for dents; InputError as below."""
+    """The zones of a chamber's part by name, without dents; InputError as `window_setting`."""
     surfaces = {name: chamber.on_zone(name) for name in chamber.part.zones}
     return {
         name: SeenDents.none(prepare_target(design, one, mesh)) for name, one in surfaces.items()
@@ -231,7 +232,7 @@ def see_zones(design: Design, chamber: Chamber, mesh: TriangleMesh) -> dict[str,
 
 
 def window_setting(design: Design, chamber: Chamber) -> WindowSetting:
-    """The windows for the target of a chamber.
+    """The gauge, the ball and the largest dent by which the windows of a target are prepared.
 
     Raises:
         InputError: no triangle of the target bounds the cavity, or the gauge is too small for it.

@@ -1,7 +1,7 @@
 """The evaluation of a candidate, and its file.
 
-A study keeps its confirmed candidates in such files, exactly, so that it can be resumed without
-simulating them again.
+A study keeps its confirmed candidates in such files, bit for bit, so that it can be resumed without
+another simulation of these candidates.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ REMEDY = "restore the file or run the study in a new folder"
 
 @dataclass(frozen=True)
 class Evaluation:
-    """One candidate, simulated in independent replicas."""
+    """The figures of one candidate, from independent replicas."""
 
     objective_name: str
     objective: Estimate  # the weighted sum of metrics that a study maximises
     metrics: dict[str, Estimate]  # estimate of each metric at the gauge, by its name
-    metrics_of_wide: dict[str, Estimate]  # those of coverage in windows of twice the radius
+    metrics_of_wide: dict[str, Estimate]  # metrics of coverage in windows of twice the radius
     gauge_mm2: float  # area of the windows in which coverage is measured
     resolution: Resolution
     reachable: float  # share of the target that a ball can touch
@@ -38,11 +38,11 @@ class Evaluation:
     hits: tuple[Hits, ...]  # single impacts of each replica on the part
     timings: dict[str, float]  # wall-clock time of each step [s]
     collisions: dict[str, int]  # number of simulated collisions of each kind, warm-up included
-    notes: tuple[str, ...] = ()  # what to know before trusting the result
+    notes: tuple[str, ...] = ()  # sentences to read before trusting the result
     stream: str = "search"  # stream of seeds, "search" or "confirm"
-    # What ended it: "replicas" (their number was given), "accuracy" or "max_replicas".
+    # The reason to end: "replicas" (their number was given), "accuracy" or "max_replicas".
     stopped_by: str = "replicas"
-    # How many places of the target are alike by symmetry; figures are means over them.
+    # Number of places of the target that are alike by symmetry; figures are means over these.
     alike: int = 1
     # Share of each zone that a ball can touch, by its name.
     zones: dict[str, float] = field(default_factory=dict)
@@ -57,7 +57,7 @@ def save_evaluation(path: Path, evaluation: Evaluation) -> None:
 def load_evaluation(path: Path) -> Evaluation:
     """Read an evaluation, equal to the one that was saved.
 
-    InputError if the file is missing, damaged, or holds what no evaluation has.
+    InputError if the file is missing or damaged, or holds values that no evaluation has.
     """
     found = load_record(path, Evaluation, (Estimate, Hits, Resolution), REMEDY)
     try:
@@ -68,7 +68,7 @@ def load_evaluation(path: Path) -> Evaluation:
 
 
 def require_triangles(evaluation: Evaluation, triangles: int) -> None:
-    """Raise InputError unless all impacts are on a part of so many triangles."""
+    """Raise InputError unless all impacts are on triangles of a part with this number of them."""
     for hits in evaluation.hits:
         if len(hits) and not 0 <= hits.triangle.min() <= hits.triangle.max() < triangles:
             text = "confirm: an impact is on a triangle that the part does not have"

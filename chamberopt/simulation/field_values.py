@@ -1,4 +1,4 @@
-"""What is known at places of the part, in windows round them, and of each of its triangles.
+"""Figures at places of the part, in windows round these, and figures of each of its triangles.
 
 Notation
     x   dent density of a window at the treatment time: expected dents, by their share of it
@@ -45,15 +45,15 @@ if TYPE_CHECKING:
     from chamberopt.design.load import Design
     from chamberopt.simulation.evaluation import Evaluation
 
-POINTS_PER_WINDOW = 4  # by which a triangle's own values are measured, one at least
+POINTS_PER_WINDOW = 4  # points on an area of one window, for the values of a triangle
 MAX_POINTS = 300_000
-MAX_PAIRS = 50_000_000  # of a window and a dent, at 12 bytes, that are held at once
-WIDEST = 0.5  # interval of a coverage that is worth a colour: about ± 25 %
+MAX_PAIRS = 50_000_000  # pairs of a window and a dent, of 12 bytes each, in memory at once
+WIDEST = 0.5  # widest interval of a coverage that is drawn in a colour, about ± 25 %
 HIGH_SPEED = 0.9  # share of the impacts that are not faster than p90_normal_speed
 
 
 def _some_at_once(dents: int, windows: int) -> Iterator[slice]:
-    """Slices of so many dents whose pairs with windows fit into memory, however wide these are."""
+    """Slices of the dents, so short that the pairs of each with all windows fit into memory."""
     step = max(1, MAX_PAIRS // max(windows, 1))
     return (slice(first, first + step) for first in range(0, dents, step))
 
@@ -80,8 +80,8 @@ class PartField:
         )
 
     def coverage(self, places: Places) -> np.ndarray:
-        """Coverage at the treatment time in the window round each place, (p,), without the bands of
-        dents on creases; NaN out of reach.
+        """Coverage at the treatment time round each place, (p,), without the bands of dents on
+        creases; NaN out of reach.
         """
         gauge = self._gauge_off_creases(places)
         coverage = coverage_from_dent_density(self._dents(gauge)["dent_density"])
@@ -90,7 +90,7 @@ class PartField:
     def display(self) -> DisplayField:
         """The values at the vertices of a mesh to draw, without the bands of dents on creases.
 
-        These bands are as narrow as a dent, and a drawing would smear them over whole triangles.
+        These bands are as narrow as a dent. A drawing would smear them over whole triangles.
         """
         from chamberopt.coverage.field.display_mesh import DisplayField, display_mesh
 
@@ -105,7 +105,7 @@ class PartField:
         return replace(self.field.gauge_round(places, self.field.radius), band=None)
 
     def values(self, places: Places, gauge: Gauge | None = None) -> dict[str, np.ndarray]:
-        """Everything that is known in the windows round some places.
+        """All figures in the windows round some places.
 
         Returns:
             Arrays (p,) by name; NaN where nothing was hit, and but for the first two out of reach.
@@ -115,7 +115,7 @@ class PartField:
             dent_density: x.
             coverage_interval: width of the 95 % interval of the coverage.
             dents_in_window: simulated dents.
-            resolved: 1 where that interval is no wider than WIDEST, else 0.
+            resolved: 1 where the interval of the coverage is no wider than WIDEST, else 0.
             impacts_per_mm2, energy_per_mm2: impacts and energy [mJ] at the treatment time.
             mean_normal_speed, p90_normal_speed: mean and 90th percentile [m/s].
             mean_angle_deg: mean angle of the impacts [degrees]; 90 is head on.
@@ -140,7 +140,7 @@ class PartField:
         }
 
     def _moved(self, places: Places) -> dict[str, np.ndarray]:
-        """How far smoothing has moved the surface, see `values`."""
+        """The distance by which smoothing has moved the surface, see `values`."""
         part = self._chamber.part
         if part.smoothing is None or part.file is None or part.file.original is None:
             return {}
@@ -150,16 +150,16 @@ class PartField:
         return {"moved_um": 1e6 * closest_points(facets, places.place, size).distance}
 
     def element_values(self) -> dict[str, np.ndarray]:
-        """Means of the values over each triangle of the part, and what is its own.
+        """Means of the values over each triangle of the part, and figures of the triangle itself.
 
         Returns:
-            Arrays (m,) by name: those of `values`, NaN where the triangle is not exposed, and
+            Arrays (m,) by name: the names of `values`, NaN where the triangle is not exposed, and
 
             impacts, dents: simulated numbers on the triangle itself.
             exposed_area_mm2, reachable_area_mm2: its areas in the cavity, and where a ball fits.
             target, element: of the triangle; its number in the part's file.
-            zone: number of the last zone that has it, from 1, 0 for none; zone_NAME: whether that
-                zone has it. Both only where there are zones.
+            zone: number of the last zone with the triangle, from 1, or 0; zone_NAME: whether the
+                zone NAME has the triangle. Both only where there are zones.
         """
         from chamberopt.coverage.field.windows import Places
 
@@ -211,7 +211,7 @@ class PartField:
         return {"zone": last, **{f"zone_{k}": one.astype(np.uint8) for k, one in zones.items()}}
 
     def _dents(self, gauge: Gauge) -> dict[str, np.ndarray]:
-        """Coverage and its interval, by the footprints of the dents."""
+        """The dents in each window, and the width of the interval of its coverage."""
         from chamberopt.coverage.field.windows import add_powers
 
         sums, largest = np.zeros((len(gauge.area), 3)), 0.0
@@ -238,7 +238,7 @@ class PartField:
         points = len(gauge.area)
         shot, metal = self._design.shot, self._design.materials.part
         fastest = max(float(hits.speed.max(initial=0.0)) for hits in self._in_sector)
-        # Dents on a strip by their strength, and on the part by their size.
+        # Impacts are sorted by speed, dents on a strip by strength, dents on the part by size.
         strip = calibrated_strip(shot, self._design.calibration)
         on_strip = [strip_dents(hits, shot.density, strip) for hits in self._in_sector]
         strongest = max(float(one.max(initial=0.0)) for _, one in on_strip)
@@ -288,9 +288,9 @@ def density_bounds(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Ends of the 95 % interval of the dent density of each window.
 
-    y is a sum of dents that fall as a Poisson process, each with a weight of its own. The gamma
-    interval for such sums holds for few dents and for none. It does not know dents that come in
-    series from a ball that bounces on its spot.
+    The dents of a window fall as a Poisson process, each with a weight of its own. The gamma
+    interval for the sum of such weights holds for few dents and for none. It does not hold for the
+    series of dents that a ball leaves which bounces on its spot.
 
     Args:
         y: sum of the weights of the dents, (p,).
@@ -319,7 +319,7 @@ def _ratio(top: np.ndarray, bottom: np.ndarray) -> np.ndarray:
 
 
 def _quantile(counts: np.ndarray, share: float) -> np.ndarray:
-    """Quantile of each row of counts by level (p, LEVELS), as a share of the highest, (p,)."""
+    """Quantile of each row of counts (p, LEVELS), as a share of the highest level, (p,)."""
     upto = np.cumsum(counts, axis=1)
     wanted = share * upto[:, -1]
     level = np.minimum((upto < wanted[:, None]).sum(axis=1), LEVELS - 1)
@@ -329,12 +329,9 @@ def _quantile(counts: np.ndarray, share: float) -> np.ndarray:
     return np.asarray((level + inside) / LEVELS)
 
 
-# All that is computed of a candidate before its result is written, from its evaluation.
-
-
 @dataclass(frozen=True)
 class CandidateResult:
-    """A simulated candidate with the fields and curves of its result folder."""
+    """A simulated candidate with all that is computed before its result folder is written."""
 
     design: Design
     chamber: Chamber
@@ -345,13 +342,13 @@ class CandidateResult:
 
 
 def complete_result(design: Design, chamber: Chamber, evaluation: Evaluation) -> CandidateResult:
-    """Compute what only a final result needs; a search does without it.
+    """Compute the fields and curves of a final result, which a search does without.
 
-    InputError if the evaluation, which a resumed study has read from a file, is of another part.
+    InputError if the evaluation is of another part, as the file of a resumed study may be.
     """
     require_triangles(evaluation, len(chamber.part.triangles))
     seen = PartField(design, chamber, evaluation)
-    with ThreadPoolExecutor(2) as threads:  # compiled code, most of it, works beside other threads
+    with ThreadPoolExecutor(2) as threads:  # compiled code runs beside other threads
         element_values = threads.submit(seen.element_values)
         display = threads.submit(seen.display)
         time_curve = coverage_against_time(design, seen.target, evaluation)

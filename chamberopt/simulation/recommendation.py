@@ -1,4 +1,4 @@
-"""Which settings a convergence study recommends for an accuracy, and what they should cost."""
+"""The settings that a convergence study recommends for an accuracy, and their likely cost."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ from chamberopt.simulation.convergence import (
 )
 
 ACCURACIES = (0.05, 0.01, 0.001)  # half-width of the objective, absolute
-BIAS_SHARE = 1.0 / 3.0  # of the accuracy, that the bias of one parameter may be
-MAX_REPLICAS = 100_000  # that a design may have
+BIAS_SHARE = 1.0 / 3.0  # share of the accuracy that the bias of each parameter may take
+MAX_REPLICAS = 100_000  # largest number in a design
 TABLE = "process.accuracy."
 
 
 @dataclass(frozen=True)
 class Recommendation:
-    """Settings for one accuracy."""
+    """The settings for one accuracy."""
 
     accuracy: float
     settings: dict[str, Any]  # by numerical parameter
     replicas: int  # 0 if the accuracy is out of reach
-    cpu_s: float  # predicted
+    cpu_s: float  # predicted CPU seconds
     remarks: tuple[str, ...]  # sentences on what limits the recommendation
 
     @property
@@ -57,18 +57,19 @@ class Recommendation:
 
 
 def recommend(study: ConvergenceStudy, accuracy: float) -> Recommendation:
-    """For each parameter the cheapest setting whose bias is certainly within a third of `accuracy`.
+    """Choose for each parameter the cheapest setting that is accurate enough.
 
-    A coarser setting is taken only if its CPU time is significantly less. Savings of several
-    parameters multiply. The simulated time is the cheapest for this accuracy.
+    Its bias is certainly within a third of the accuracy. A coarser setting is chosen only if its
+    CPU time is significantly less. Savings of several parameters multiply. The simulated time is
+    the cheapest for this accuracy.
     """
     settings, remarks = dict(study.settings), []
     reference = study.reference.cpu.value
     factor, warm_up_saving = 1.0, 0.0
     for name in settings:
-        if name in (TIME, GAUGE):  # the gauge is what is measured, not how well
+        if name in (TIME, GAUGE):  # another gauge is another figure, not another accuracy
             continue
-        # Cheaper than the reference by more than the intervals.
+        # Settings that are cheaper than the reference by more than the intervals.
         tried = [run for run in study.runs if run.parameter == name]
         cheaper = [run for run in tried if run.cpu.high < study.reference.cpu.low]
         if good := [run for run in cheaper if run.max_bias <= BIAS_SHARE * accuracy]:
@@ -97,12 +98,12 @@ def recommend(study: ConvergenceStudy, accuracy: float) -> Recommendation:
 def replicas_for(study: ConvergenceStudy, accuracy: float, seconds: float) -> int:
     """Number of replicas of this simulated time whose interval is within the accuracy.
 
-    Their variance is proportional to 1/seconds. With few replicas the intervals are wider than
-    that; so the intervals of the batches count as well.
+    The variance of replicas is proportional to 1/seconds. Intervals from few replicas are wider
+    than this law says, so the intervals of the batches count as well.
     """
     time_ratio = float(study.settings[TIME]) / seconds
     reference = study.reference
-    pseudovalues = reference.objective.pseudovalues  # of batches, if there are many replicas
+    pseudovalues = reference.objective.pseudovalues  # a batch each, if there are many replicas
     variance = np.var(pseudovalues, ddof=1) * time_ratio * reference.replicas / len(pseudovalues)
     counts = range(3, MAX_REPLICAS + 1)
     needed = 3 + bisect_left(

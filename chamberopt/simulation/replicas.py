@@ -26,15 +26,15 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
-# An interval that is looked at until it is narrow enough tends to be too narrow by chance. From 10
-# replicas on, in steps of a quarter or more, a 95 % interval still holds the truth in 94 % (normal
-# replicas; 92 % from 5 on, 90 % from 3 on: docs/accuracy.md).
+# Replicas that are added until an interval is narrow enough leave it too narrow by chance. If that
+# begins with 10 replicas and adds a quarter or more each time, a 95 % interval still holds the
+# truth in 94 % of cases (normal replicas; 92 % from 5 on, 90 % from 3 on: docs/accuracy.md).
 MIN_REPLICAS_TO_STOP = 10
 MIN_GROWTH, MAX_GROWTH = 1.25, 2.0
 
 
 class ReplicaSetting(NamedTuple):
-    """What all replicas of a candidate have in common."""
+    """The design, the chamber and its surface, which all replicas of a candidate share."""
 
     design: Design
     chamber: Chamber
@@ -43,7 +43,7 @@ class ReplicaSetting(NamedTuple):
 
 @dataclass(frozen=True)
 class Replica:
-    """What is kept of one replica; its impact log is not."""
+    """The result of one replica, without its impact log, which would take too much memory."""
 
     collisions: dict[str, int]  # number of collisions of each kind
     resting: RestingBalls | None  # the balls at rest at its end; None if there are none
@@ -53,7 +53,7 @@ class Replica:
 
 @dataclass
 class ReplicaSet:
-    """The replicas of one candidate so far."""
+    """The replicas of one candidate so far, and its target where that was prepared before."""
 
     replicas: list[Replica] = field(default_factory=list)
     target: TargetField | None = None  # by `prepare_target`; None if it was not called
@@ -87,11 +87,11 @@ def run_in_order(
     The results do not depend on the number of workers.
 
     Args:
-        setting: as executor.share returns it, once for all numbers: it goes to each worker once.
-        seed: of the design's process.
-        stream: stream of seeds.
-        ahead: tasks that are started before their results are wanted, which bounds the memory that
-            waiting results take.
+        setting: the argument that all tasks share, as executor.share returns it.
+        seed: seed of the design's process.
+        stream: stream of seeds, "search" or "confirm".
+        ahead: number of tasks that are started before their results are wanted. It bounds the
+            memory that waiting results take.
     """
     waiting: deque[tuple[int, Future[T]]] = deque()
     try:
@@ -104,7 +104,7 @@ def run_in_order(
         while waiting:
             yield _result(*waiting.popleft())
     finally:
-        # If one replica fails or the user presses Ctrl-C, the rest need not be simulated.
+        # If a replica fails or the user presses Ctrl-C, the replicas that wait are not simulated.
         for _, future in waiting:
             future.cancel()
 
@@ -124,11 +124,11 @@ def most_replicas(design: Design) -> int:
 
 
 def next_replica_count(done: int, half_width: float, wanted: float, maximum: int) -> int:
-    """Number of replicas at which the interval is looked at again, predicted from its width.
+    """Number of replicas at which to look at the interval again, predicted from its width.
 
     Args:
         done: number of replicas so far.
-        half_width: half-width of the interval that they give.
+        half_width: half-width of the interval from these replicas.
         wanted: half-width to reach.
 
     Returns:
@@ -141,7 +141,7 @@ def next_replica_count(done: int, half_width: float, wanted: float, maximum: int
 
 
 def simulate_replica(setting: ReplicaSetting, seed: int) -> Replica:
-    """Simulate one replica; this runs on a worker."""
+    """Simulate one replica, on a worker."""
     design, chamber, mesh = setting
     result = simulate_seed(design, chamber, mesh, seed)
     impacts, part_turns = result.impacts, design.effects.part_turn is not None

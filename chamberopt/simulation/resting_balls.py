@@ -1,6 +1,6 @@
 """Notes on balls that no longer peen at the end of a replica: at rest, or bouncing on one spot.
 
-They name surfaces and places as the designer of a chamber would, so that room can be made there.
+The notes name surfaces and places as the designer of a chamber would, who can make room there.
 """
 
 from __future__ import annotations
@@ -20,13 +20,14 @@ if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
     from sim_core import Resting
 
-CONTACT_GAP = 2e-5  # m: a ball at rest is not farther than this from what holds it
+CONTACT_GAP = 2e-5  # m, at most between a ball at rest and the surface that holds it
 PLACE_DISTANCE = 3.0  # ball diameters: balls nearer to each other lie in one place
-MAX_PLACES = 3  # named in a note, the ones with most balls first
+MAX_PLACES = 3  # places named in a note, those places first that have most balls
 ON_BALLS = ""  # kind of a ball that only other balls carry
-# A ball with less of its speed sideways stays on its spot for thousands of impacts.
+# Share of its speed below which the sideways speed of a ball leaves it on its spot for thousands
+# of impacts.
 MAX_SIDEWAYS = 1e-6
-MIN_BOUNCING_SHARE = 0.1  # of the shot, to be worth a note
+MIN_BOUNCING_SHARE = 0.1  # share of the shot from which on there is a note
 
 
 @dataclass(frozen=True)
@@ -34,7 +35,7 @@ class RestingBalls:
     """The balls at rest at the end of a replica."""
 
     share: float  # their share of the shot
-    line: str  # how many there are, on what and where
+    line: str  # their number, what holds them and where, in words
 
 
 def find_resting_balls(
@@ -45,8 +46,8 @@ def find_resting_balls(
     Args:
         balls: number of all balls.
         diameter: of the balls [m].
-        part_turns: the part rotates. Its position at the end is then unknown, so no ball is said to
-            touch it.
+        part_turns: whether the part rotates. Its position at the end is then unknown, so that no
+            ball is said to touch it.
     """
     if len(resting) == 0:
         return None
@@ -65,7 +66,7 @@ def find_resting_balls(
 
 
 def bouncing_share(velocities: np.ndarray) -> float:
-    """Share of balls that move straight up and down, and will go on until they meet something.
+    """Share of the balls that move straight up and down, until they meet another ball.
 
     Args:
         velocities: of the balls [m/s], (n, 3).
@@ -76,7 +77,7 @@ def bouncing_share(velocities: np.ndarray) -> float:
 
 
 def bouncing_notes(shares: Sequence[float]) -> tuple[str, ...]:
-    """A note if much of the shot ends bouncing on the spot, which ideal faces can make it do.
+    """A note if much of the shot ends bouncing on the spot, as between ideal parallel faces.
 
     Args:
         shares: share of bouncing balls in each replica.
@@ -96,7 +97,7 @@ def resting_notes(resting: Sequence[RestingBalls], replicas: int) -> tuple[str, 
     """A note on all replicas in which balls came to rest.
 
     Args:
-        resting: of these replicas alone.
+        resting: the balls at rest in each replica that has some.
         replicas: number of all replicas.
     """
     if not resting:
@@ -117,7 +118,7 @@ def _percent(share: float) -> str:
 def _kind(
     resting: Resting, i: int, surfaces: np.ndarray, chamber: Chamber, reach: float, part_turns: bool
 ) -> str:
-    """What holds a ball, such as "on the part's upper side"; ON_BALLS if other balls alone do."""
+    """The place of a ball, as "on the part's upper side"; ON_BALLS if other balls alone hold it."""
     under = resting.triangles[i][resting.triangles[i] >= 0]
     if resting.jammed[i]:
         known = chamber.tags != TAG_PART if part_turns else np.ones(len(chamber.tags), dtype=bool)
@@ -144,7 +145,7 @@ def _join(preposition: str, names: list[str]) -> str:
 def _triangles_near(
     chamber: Chamber, triangles: np.ndarray, position: np.ndarray, reach: float
 ) -> np.ndarray:
-    """Which of these triangles are within `reach` [m] of a position (3,)."""
+    """The triangles among some that are within `reach` [m] of a position (3,)."""
     corners = chamber.vertices[chamber.triangles[triangles]]
     low, high = corners.min(axis=1), corners.max(axis=1)
     near = (np.abs(position - np.clip(position, low, high)) <= reach).all(axis=1)
@@ -153,10 +154,10 @@ def _triangles_near(
 
 
 def _with_carriers(resting: Resting, kinds: list[str]) -> list[str]:
-    """The kinds, with a ball on other balls counted to what the lowest of them lies on."""
+    """The kinds, where a ball on other balls has the kind of a ball that carries it."""
     row = {int(ball): i for i, ball in enumerate(resting.ball)}
     kinds = list(kinds)
-    # Upwards, because the balls that carry a ball are below it.
+    # From below upwards, because the balls that carry a ball are below it.
     for i in np.argsort(resting.position[:, 2], kind="stable"):
         carriers = [row[int(ball)] for ball in resting.balls[i] if int(ball) in row]
         if kinds[i] == ON_BALLS:
@@ -165,7 +166,7 @@ def _with_carriers(resting: Resting, kinds: list[str]) -> list[str]:
 
 
 def _places(resting: Resting, kinds: list[str], diameter: float) -> list[tuple[str, np.ndarray]]:
-    """Kind and balls of each place, the one with most balls first."""
+    """The kind and the balls of each place, in falling order of the number of balls."""
     from scipy.spatial import KDTree
 
     pairs = KDTree(resting.position).query_pairs(PLACE_DISTANCE * diameter, output_type="ndarray")

@@ -1,7 +1,7 @@
 """Coverage against peening time: mean and 5th percentile with intervals.
 
-What a calibration leaves open moves the dent density x of all times by one factor, and a coverage C
-by -(1 - C) ln(1 - C) times as much, as Avrami's C = 1 - exp(-x) does.
+The errors of a calibration move the dent density x of all times by the same factor. By Avrami's
+C = 1 - exp(-x) they move a coverage C by -(1 - C) ln(1 - C) times the logarithm of this factor.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 TIMES = 20
 POINTS = 4_000  # windows for the mean of each time
-MAX_TREATMENT_TIMES = 5.0  # a longer time would rather be another treatment
+MAX_TREATMENT_TIMES = 5.0  # end of the curve at most; a longer time is another treatment
 
 
 def coverage_against_time(
@@ -37,8 +37,8 @@ def coverage_against_time(
 ) -> list[dict[str, float]]:
     """Coverage of the target at rising peening times.
 
-    The curve goes on until the 5th percentile is 98 %, at least to the treatment time and at most
-    to MAX_TREATMENT_TIMES of it, as far as its mean is resolved.
+    The curve ends where the 5th percentile is 98 %, but not before the treatment time, nor after
+    MAX_TREATMENT_TIMES of it, nor where the mean coverage is not resolved.
 
     Returns:
         Rows with time_s, mean_coverage and half_width, and, where the 5th percentile is resolved,
@@ -47,7 +47,7 @@ def coverage_against_time(
     treatment, found = design.process.treatment_time, evaluation.resolution
     full = evaluation.metrics["time_to_98_s"]
     end = float(np.clip(1.1 * full.value, treatment, MAX_TREATMENT_TIMES * treatment))
-    # The longer the time is over the simulated one, the more dents the mean takes.
+    # A mean takes the more dents, the longer the time is over the simulated time.
     end = min(end, treatment * found.dents / found.needed_for_mean)
     times = sorted({*(end * np.arange(1, TIMES + 1) / TIMES).tolist(), min(treatment, end)})
     gauge = field.gauge_round(field.some_points(POINTS), field.radius)
@@ -76,7 +76,7 @@ def coverage_against_time(
 
 
 def _open_density(mean: Estimate) -> float:
-    """Half-width of the logarithm of the dent density by what a calibration leaves open.
+    """Half-width of the logarithm of the dent density by the errors of the calibration.
 
     Args:
         mean: coverage after the treatment time.
@@ -92,10 +92,10 @@ def _by_density(coverage: float) -> float:
 
 
 def _rates_of_p05(p05: Estimate, treatment: float, full: Estimate) -> list[float]:
-    """Dent density per second of where the 5th percentile of coverage is: low, middle, high.
+    """Dent density per second at the 5th percentile of coverage: low, middle and high estimate.
 
-    A coverage near 1 hardly tells a density from twice as large a one, but the time to full
-    coverage does.
+    A coverage near 1 hardly tells a density from twice this density, but the time to full coverage
+    does.
 
     Args:
         p05: the percentile after the treatment time [s].

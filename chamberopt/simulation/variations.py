@@ -1,4 +1,4 @@
-"""A design and changed ones, evaluated in the same replicas on the same seeds.
+"""A design and changed designs, evaluated in the same replicas on the same seeds.
 
 A chamber is chaotic, so that two runs on equal seeds correlate little. The noise of the slope
 between them falls as one over the step, and curvature makes the slope wrong by a share that grows
@@ -25,14 +25,14 @@ if TYPE_CHECKING:
 
 @dataclass
 class RunsProgress:
-    """One progress over several runs of as many replicas each."""
+    """One progress over several runs, each with the same number of replicas."""
 
     progress: Progress | None
     runs: int
-    ended: int = 0  # runs before the present one
+    ended: int = 0  # number of runs before the present run
 
     def __call__(self, done: int, total: int, best: float | None) -> None:
-        """Tell how many of the replicas of the present run are done."""
+        """Count the replicas of the present run that are done, and those of the runs before."""
         if self.progress:
             runs = max(self.runs, self.ended + 1)
             self.progress(self.ended * total + done, runs * total, best)
@@ -40,9 +40,9 @@ class RunsProgress:
 
 @dataclass
 class Variations:
-    """The runs of a design, and of changed ones in the same replicas on the same seeds.
+    """The runs of a design, and of changed designs in the same replicas on the same seeds.
 
-    The nominal design is evaluated at once, and is `nominal` then.
+    The design itself is evaluated at once; `nominal` is its evaluation.
     """
 
     design: Design
@@ -51,7 +51,7 @@ class Variations:
     progress: RunsProgress
     plan: ReplicaPlan | None = None
     analytic: bool = False  # whether exact cavities take the place of meshes
-    known: ReplicaSet = field(default_factory=ReplicaSet)  # of the nominal design
+    known: ReplicaSet = field(default_factory=ReplicaSet)  # replicas of the design itself
 
     def __post_init__(self) -> None:
         self.nominal = self._evaluate(self.design, self.chamber, self.plan, self.known)
@@ -62,8 +62,8 @@ class Variations:
         """Evaluate a changed design. InputError or an error of sim_core if it cannot be simulated.
 
         Args:
-            chamber: of the changed design, if it is not the nominal one.
-            replicas: of the changed design, if they follow from the nominal ones.
+            chamber: the chamber of the changed design; None where it is the same.
+            replicas: the replicas of the changed design, where nothing need be simulated.
         """
         self.progress.ended += not replicas
         nominal, known = self.nominal, ReplicaSet(list(replicas))
