@@ -217,7 +217,7 @@ class Posterior:
         """Standard deviations of a model's figures, (n,), by C or another covariance of theta."""
         rows = self.slopes(model)
         spread = self.covariance if covariance is None else covariance
-        return np.sqrt(np.einsum("ij,jk,ik->i", rows, spread, rows))
+        return np.asarray(np.sqrt(np.einsum("ij,jk,ik->i", rows, spread, rows)))
 
     def after(self, rows: np.ndarray, errors: np.ndarray) -> np.ndarray:
         """C after a further measurement with J+ (n, p) and R+ (n, n)."""

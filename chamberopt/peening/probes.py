@@ -180,7 +180,7 @@ def _logs(found: Sequence[Estimate]) -> np.ndarray:
     values = np.array([one.value for one in found])
     if not (values > 0.0).all():
         raise InputError(NOTHING)
-    return np.log(values)
+    return np.asarray(np.log(values))
 
 
 def _noise(found: Sequence[Estimate]) -> np.ndarray:

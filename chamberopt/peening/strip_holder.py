@@ -120,7 +120,7 @@ def _edge_mm(size: StripSize) -> np.ndarray:
     """Corners of the strip [mm], (n, 2), counter-clockwise."""
     if size.is_disc:
         angle = 2.0 * np.pi * (np.arange(SIDES) + 0.5) / SIDES
-        return 500.0 * size.length * np.c_[np.cos(angle), np.sin(angle)]
+        return np.asarray(500.0 * size.length * np.c_[np.cos(angle), np.sin(angle)])
     corners = np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]])
     return 500.0 * corners * [size.length, size.width]
 

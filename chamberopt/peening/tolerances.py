@@ -332,7 +332,7 @@ class _Figure:
 
     def signs(self) -> np.ndarray:
         """Signs of the slopes g, (k,)."""
-        return np.sign(self._slopes)
+        return np.asarray(np.sign(self._slopes))
 
     def over_the_box(self) -> ToleratedFigure:
         """The figure over the box, without its worst corner."""

@@ -315,7 +315,7 @@ def density_bounds(
 
 
 def _ratio(top: np.ndarray, bottom: np.ndarray) -> np.ndarray:
-    return np.divide(top, bottom, out=np.full(len(top), np.nan), where=bottom > 0.0)
+    return np.asarray(np.divide(top, bottom, out=np.full(len(top), np.nan), where=bottom > 0.0))
 
 
 def _quantile(counts: np.ndarray, share: float) -> np.ndarray:
