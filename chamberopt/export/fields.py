@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -21,7 +20,7 @@ from chamberopt.export.element_fields import (
 from chamberopt.geometry.meshes.part_mesh import PartMesh
 from chamberopt.results.chamber_file import CHAMBER_FILE, load_chamber
 from chamberopt.results.load import Result, load_part, load_result
-from chamberopt.results.vtp_files import PART, save_surface
+from chamberopt.results.vtp_files import PART, Surface, save_surface
 
 DECKS: dict[str, Callable[[list[str], PartMesh, ElementFields], dict[str, str]]] = {
     "abaqus": abaqus_deck,
@@ -59,7 +58,7 @@ def write_fields(folder: str | Path, path: str | Path, to: str) -> list[str]:
     return _write_deck(result, surface, to, path)
 
 
-def _write_deck(result: Result, surface: Any, to: str, path: Path) -> list[str]:
+def _write_deck(result: Result, surface: Surface, to: str, path: Path) -> list[str]:
     if path.resolve() == result.design.part.mesh_path:
         raise InputError(f"{path}: is the part's own file; choose another name")
     part = _part_of_file(result, surface)
@@ -106,7 +105,7 @@ def _elements_left_out(fields: ElementFields) -> list[str]:
     ]
 
 
-def _part_of_file(result: Result, surface: Any) -> PartOfFile:
+def _part_of_file(result: Result, surface: Surface) -> PartOfFile:
     """The part as simulated, and as its file has it. InputError if the part is another result's."""
     file = load_chamber(result).part.file
     if file is None or len(file.simulated.triangles) != surface.n_cells:

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor
 from contextlib import AbstractContextManager, ExitStack, contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple
 
 import numpy as np
 
@@ -219,7 +219,7 @@ def _pyarrow() -> Any:
 
 def _metadata(
     result: Result, rebuilt: RebuiltChamber, frame: Frame, columns: Sequence[Column], replicas: int
-) -> dict[str, Any]:
+) -> dict[str, object]:
     """Describe the rows: their origin, frame, unit and columns."""
     design = result.design
     return {
@@ -246,14 +246,14 @@ def _is_parquet(file: Path) -> bool:
 
 
 def _open_table(
-    file: Path, columns: Sequence[Column], metadata: dict[str, Any]
+    file: Path, columns: Sequence[Column], metadata: dict[str, object]
 ) -> AbstractContextManager[WriteRows]:
     return (_parquet if _is_parquet(file) else _csv)(file, columns, metadata)
 
 
 @contextmanager
 def _parquet(
-    file: Path, columns: Sequence[Column], metadata: dict[str, Any]
+    file: Path, columns: Sequence[Column], metadata: dict[str, object]
 ) -> Iterator[WriteRows]:
     pyarrow = _pyarrow()
     fields = [
@@ -284,12 +284,12 @@ def _parquet(
 
 
 @contextmanager
-def _csv(file: Path, columns: Sequence[Column], metadata: dict[str, Any]) -> Iterator[WriteRows]:
+def _csv(file: Path, columns: Sequence[Column], metadata: dict[str, object]) -> Iterator[WriteRows]:
     line = ",".join(column.text for column in columns) + "\n"
     try:
         with new_file(file) as plain:
             with ExitStack() as stack:
-                out: Any = plain
+                out: BinaryIO | gzip.GzipFile = plain
                 if file.suffix.lower() == ".gz":
                     # No name and time inside, so the same impacts give the same bytes.
                     out = stack.enter_context(gzip.GzipFile("", "wb", GZIP_LEVEL, plain, 0))

@@ -14,7 +14,7 @@ from chamberopt.pictures.charts.colours import DIFFERENCE_MAP
 from chamberopt.pictures.panels import near_panels
 from chamberopt.pictures.picture_page import ColourBar, Row, write_page
 from chamberopt.pictures.subprocess_drawing import draw_in_subprocess
-from chamberopt.results.vtp_files import read_surface, save_surface
+from chamberopt.results.vtp_files import Surface, read_surface, save_surface
 
 # Brown (less) over white to violet (more), readable for colour-blind readers, and not grey.
 PALE, NO_TARGET = "#e6e9ec", "#a9b0b7"
@@ -78,7 +78,7 @@ def render_difference(job: dict[str, Any]) -> None:
     write_page(job["picture"], rows, legend, bar)
 
 
-def _add_difference(plotter: Any, target: Any, rest: Any, k: int, limit: float) -> None:
+def _add_difference(plotter: Any, target: Surface, rest: Surface, k: int, limit: float) -> None:
     look: dict[str, Any] = {"ambient": 0.7, "diffuse": 0.3, **NO_RENDER}
     if rest.n_cells:
         plotter.add_mesh(rest, color=NO_TARGET, **look)
@@ -93,7 +93,7 @@ def _add_difference(plotter: Any, target: Any, rest: Any, k: int, limit: float) 
         )  # fmt: skip
 
 
-def _scale_limit(surface: Any, count: int) -> float:
+def _scale_limit(surface: Surface, count: int) -> float:
     """Return a round limit above nearly all real differences [percentage points]."""
     real = [
         np.abs(surface[f"difference_{k}"])[np.asarray(surface[f"real_{k}"]) > 0]

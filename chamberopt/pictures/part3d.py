@@ -123,7 +123,9 @@ def quantities_in_all(scenes: Sequence[dict[str, Any]]) -> list[dict[str, str]]:
     ]
 
 
-def _surfaces(part: DrawnPart, rest: Surface | None, chamber: Any, eye: np.ndarray) -> Any:
+def _surfaces(
+    part: DrawnPart, rest: Surface | None, chamber: Surface, eye: np.ndarray
+) -> dict[str, dict[str, Any]]:
     """The surfaces that view3d.js draws, by name: part, few, unreached, rest, sonotrode, glass."""
     tags = np.asarray(chamber["tag"])
     target, resolved = part.target, np.asarray(part.target["resolved"])
@@ -172,7 +174,7 @@ def _eye(normal: np.ndarray) -> np.ndarray:
     return np.asarray(np.r_[aside * np.hypot(*USUAL[:2]) / np.hypot(*aside), eye[2]])
 
 
-def _view(chamber: Any, eye: np.ndarray) -> dict[str, Any]:
+def _view(chamber: Surface, eye: np.ndarray) -> dict[str, object]:
     """Middle of the cavity, place of the eye, and size of the scene that fills the view [mm]."""
     around = np.asarray(chamber.points, dtype=float)
     size = float(np.linalg.norm(np.ptp(around, axis=0)))
@@ -184,7 +186,7 @@ def _view(chamber: Any, eye: np.ndarray) -> dict[str, Any]:
     }
 
 
-def _edges(chamber: Any, tags: np.ndarray) -> np.ndarray:
+def _edges(chamber: Surface, tags: np.ndarray) -> np.ndarray:
     """Ends of the sharp edges of the cavity, edge after edge, (2 n, 3)."""
     around = chamber.extract_cells(tags != TAG_PART).extract_surface(algorithm="dataset_surface")
     lines = around.extract_feature_edges(

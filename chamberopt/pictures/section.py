@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from chamberopt.geometry.triangles import border_edges
 
 if TYPE_CHECKING:
     from matplotlib.path import Path
+    from shapely import Point
 
     from chamberopt.chamber.build import Chamber
 
@@ -70,7 +71,7 @@ def inside(lines: np.ndarray) -> Path | None:
     return Path.make_compound_path(*(Path(one, closed=True) for one in rings)) if rings else None
 
 
-def _turns_around(lines: np.ndarray, point: Any) -> int:
+def _turns_around(lines: np.ndarray, point: Point) -> int:
     """Number of turns of the lines round a point: upward less downward lines to its right."""
     (x1, y1), (x2, y2) = lines[:, 0].T, lines[:, 1].T
     way = (y2 > point.y).astype(int) - (y1 > point.y)

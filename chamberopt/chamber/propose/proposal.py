@@ -183,6 +183,9 @@ AMPLITUDE_UM, FREQUENCY_KHZ = 40.0, 20.0
 USUAL_PART, WALL, SONOTRODE = "42CrMo4", "42CrMo4", "Ti-6Al-4V"  # of the catalogue
 TREATMENT_S, HALF_WIDTH = 300.0, 0.01
 
+Tables = dict[str, dict[str, Any]]
+"""Tables of a design file by dotted name, as TOML values."""
+
 
 @dataclass(frozen=True)
 class Wanted:
@@ -200,7 +203,7 @@ class Proposal:
     """A design with the reason for each value, and the warnings of its check."""
 
     design: Design
-    tables: dict[str, dict[str, Any]]  # the values of the design file
+    tables: Tables  # the values of the design file
     reasons: dict[str, str]  # of values, by dotted name
     bounds: dict[str, Range]  # of the study
     known: tuple[Surface, ...]  # surfaces to choose the target from
@@ -235,7 +238,7 @@ def propose(
     posed = mesh.vertices @ rotation_matrix(turns).T
     posed[:, 2] -= posed[:, 2].min()
     top = float(posed[mesh.triangles[target.triangles], 2].max())
-    tables: dict[str, dict[str, Any]] = {
+    tables: Tables = {
         "part": {"mesh": str(path.resolve()), "unit": mesh.unit, "rotate_deg": list(turns)},
         "part.target": target.keys,
         "chamber": {},
@@ -332,7 +335,7 @@ def _ball_diameter(mesh: PartMesh, target: Target, wanted: Wanted) -> tuple[floa
     return propose_ball(touched_shares(*surface), fit_fillets(*surface), sizes)
 
 
-def _chamber_table(sizes: Sizes) -> dict[str, Any]:
+def _chamber_table(sizes: Sizes) -> dict[str, float | str]:
     distance, height = round(1e3 * sizes.distance, 3), round(1e3 * sizes.height, 3)
     return {
         "shape": sizes.shape,
@@ -353,11 +356,7 @@ def _size_reasons(sizes: Sizes) -> dict[str, str]:
 
 
 def _checked(
-    tables: dict[str, dict[str, Any]],
-    reasons: dict[str, str],
-    sizes: Sizes,
-    known: Sequence[Surface],
-    mesh: PartMesh,
+    tables: Tables, reasons: dict[str, str], sizes: Sizes, known: Sequence[Surface], mesh: PartMesh
 ) -> Proposal:
     """The proposal of these values with its charge, built and checked."""
     largest = max(size for key, size in tables["chamber"].items() if key.endswith("_mm"))
@@ -379,7 +378,7 @@ def _checked(
     return Proposal(design, tables, reasons, bounds, tuple(known), mesh, chamber, reach, found)
 
 
-def _nested(tables: dict[str, dict[str, Any]]) -> dict[str, Any]:
+def _nested(tables: Tables) -> dict[str, Any]:
     """Nested tables from tables by dotted name."""
     nested: dict[str, Any] = {}
     for name, values in tables.items():

@@ -33,7 +33,7 @@ class Sizes:
     """Sizes of a chamber round a part."""
 
     shape: str
-    plan: dict[str, Any]  # keys of [chamber] for its form in plan, and their values
+    plan: dict[str, float | str]  # keys of [chamber] for its form in plan, and their values
     distance: float  # sonotrode to part [m]
     height: float  # [m]
     gap: float  # part to side wall [m]
@@ -73,7 +73,7 @@ def propose_sizes(
     gap = max(SIDE_GAP * ball, GAP_SHARE * 2.0 * float(half.max()), MIN_GAP) * wider
     radius = float(np.linalg.norm(inside[:, :2] - middle, axis=1).max())
     across = _up_mm(2.0 * (radius + gap))
-    plans: dict[str, dict[str, Any]] = {
+    plans: dict[str, dict[str, float | str]] = {
         "cylinder": {"diameter_mm": across},
         "box": dict(zip(("length_mm", "width_mm"), map(_up_mm, 2.0 * (half + gap)), strict=True)),
         "prism": {"sides": SIDES, "across_mm": across},
@@ -99,7 +99,10 @@ AS_LARGE = 0.9  # of the largest face's area: the target takes a face as large, 
 PATTERN = 6  # number of alike faces that make a repeated feature, such as teeth
 COLOUR, VIVID = re.compile(r"#([0-9a-f]{2})([0-9a-f]{2})([0-9a-f]{2})$", re.I), 100
 FACE = re.compile(r"face (\d+)", re.I)
-WHOLE: dict[str, Any] = {"surface": ["all"]}  # in [part.target]
+Keys = dict[str, list[Any]]
+"""Keys of [part.target], "surface" or "faces", and their values."""
+
+WHOLE: Keys = {"surface": ["all"]}
 
 
 @dataclass(frozen=True)
@@ -107,7 +110,7 @@ class Surface:
     """A surface that can be the target: a name of the file, or a face with all faces like it."""
 
     name: str  # value for --target
-    keys: dict[str, Any]  # of [part.target]
+    keys: Keys
     triangles: np.ndarray  # (m,) bool
     text: str  # description in a few words
     colour: str = ""  # colour of just these triangles in the file
@@ -117,7 +120,7 @@ class Surface:
 class Target:
     """The surface to peen."""
 
-    keys: dict[str, Any]  # of [part.target]
+    keys: Keys
     triangles: np.ndarray  # (m,) bool
     reason: str
 
@@ -196,7 +199,7 @@ def _faces(mesh: PartMesh) -> list[Surface]:
     free = (name for number in count(1) if (name := f"face {number}") not in taken)
     for (area, face, same), name in zip(found[:MAX_KINDS], free, strict=False):
         place = [_decimals(1e3 * x) for x in faces.place(face)]
-        key: dict[str, Any] = {"at_mm": place, "crease_deg": CREASE_DEG}
+        key: dict[str, object] = {"at_mm": place, "crease_deg": CREASE_DEG}
         several = int(same.sum())
         if several > 1:
             key["alike"] = True
@@ -246,7 +249,7 @@ def _find(mesh: PartMesh, known: Sequence[Surface], name: str) -> Surface:
 
 def _joined(chosen: Sequence[Surface], reason: str) -> Target:
     """One target of several surfaces. InputError if names are mixed with faces."""
-    keys: dict[str, Any] = {}
+    keys: Keys = {}
     for one in chosen:
         for key, values in one.keys.items():
             keys.setdefault(key, []).extend(values)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 import tomlkit
 
@@ -76,7 +75,7 @@ def study_lines(
     return "\n".join(lines) + "\n"
 
 
-def _values(values: Mapping[str, Any], table: str, reasons: Mapping[str, str]) -> list[str]:
+def _values(values: Mapping[str, object], table: str, reasons: Mapping[str, str]) -> list[str]:
     lines = [_line(key, value) for key, value in values.items()]
     noted = [reasons.get(f"{table}.{key}") for key in values]
     width = max((len(line) for line, reason in zip(lines, noted, strict=True) if reason), default=0)
@@ -86,7 +85,7 @@ def _values(values: Mapping[str, Any], table: str, reasons: Mapping[str, str]) -
     ]
 
 
-def _line(key: str, value: Any) -> str:
+def _line(key: str, value: object) -> str:
     """A key and its value on one line."""
     if isinstance(value, dict):
         return f"{key} = {{ {', '.join(_line(k, v) for k, v in value.items())} }}"

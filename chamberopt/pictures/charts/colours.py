@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from matplotlib.colors import Colormap
 
 # The palette of Okabe and Ito, which colour-blind readers can tell apart.
 BLUE, ORANGE, GREEN, GREY = "#0072B2", "#D55E00", "#009E73", "#9aa3ab"
@@ -33,7 +36,7 @@ def line_style(index: int) -> dict[str, Any]:
     return {"color": _COLOURS[index % len(_COLOURS)], "ls": _LINES[index % len(_LINES)]}
 
 
-def hex_colours(colour_map: Any, count: int = 10) -> list[str]:
+def hex_colours(colour_map: Colormap | str, count: int = 10) -> list[str]:
     """Evenly spaced colours of a matplotlib colour map, or of its name, as #rrggbb."""
     from matplotlib import colormaps
     from matplotlib.colors import to_hex

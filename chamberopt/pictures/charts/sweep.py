@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from itertools import combinations
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from matplotlib.axes import Axes
+    from matplotlib.collections import PathCollection, QuadMesh
     from matplotlib.figure import Figure
 
     from chamberopt.search.run_sweep import SweepResult
@@ -115,7 +116,7 @@ def _draw_maps(
     )
 
 
-def _draw_squares(axes: Axes, sweep: SweepResult, pair: tuple[str, str]) -> Any:
+def _draw_squares(axes: Axes, sweep: SweepResult, pair: tuple[str, str]) -> QuadMesh:
     """Draw a grid of two parameters. Candidates that could not be simulated stay white."""
     x, y = (np.unique(_places(sweep, sweep.trials, name)) for name in pair)
     objective = [trial.objective.value if trial.objective else np.nan for trial in sweep.trials]
@@ -123,7 +124,7 @@ def _draw_squares(axes: Axes, sweep: SweepResult, pair: tuple[str, str]) -> Any:
     return axes.pcolormesh(x, y, values.T, cmap=COVERAGE_MAP, shading="nearest")
 
 
-def _draw_points(axes: Axes, sweep: SweepResult, pair: tuple[str, str]) -> Any:
+def _draw_points(axes: Axes, sweep: SweepResult, pair: tuple[str, str]) -> PathCollection:
     # Good candidates are drawn last, so that the best candidate on a spot is visible.
     evaluated = sorted(
         ((trial.objective.value, trial) for trial in sweep.trials if trial.objective),
