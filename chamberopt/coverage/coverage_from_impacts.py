@@ -113,12 +113,20 @@ class Batch(NamedTuple):
 
 
 def coverage_from_dent_density(dent_density: np.ndarray) -> np.ndarray:
-    """Coverage 1 - exp(-x) of areas with dent density x, by Avrami's equation."""
+    """Coverage 1 - exp(-x) of areas with dent density x, by Avrami's equation.
+
+    >>> coverage_from_dent_density(np.array([np.log(50.0)]))
+    array([0.98])
+    """
     return np.asarray(-np.expm1(-dent_density))
 
 
 def in_batches(replicas: Sequence[T]) -> list[Sequence[T]]:
-    """Divide replicas into at most MAX_BATCHES batches whose sizes differ by at most 1."""
+    """Divide replicas into at most MAX_BATCHES batches whose sizes differ by at most 1.
+
+    >>> in_batches("abc")
+    ['a', 'b', 'c']
+    """
     count = len(replicas)
     ends = np.linspace(0, count, min(count, MAX_BATCHES) + 1).astype(int)
     return [replicas[a:b] for a, b in pairwise(ends)]

@@ -93,6 +93,9 @@ def dent_diameters(impacts: ImpactLog, design: Design) -> np.ndarray:
 def impact_angle_deg(velocity: np.ndarray, normal_speed: np.ndarray) -> np.ndarray:
     """Angle between the path of the incoming ball and the surface: 90 is head on, 0 grazing.
 
+    >>> impact_angle_deg(np.array([[1.0, 0.0, -1.0]]), np.array([1.0]))
+    array([45.])
+
     Args:
         velocity: velocity of the ball relative to the surface [m/s], (n, 3).
         normal_speed: its component along the normal [m/s], (n,).

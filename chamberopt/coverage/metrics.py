@@ -275,7 +275,10 @@ def renamed_objective(old: str) -> str:
 
 
 def parse_objective(name: str) -> ObjectiveFunction:
-    """The named objective, or a sum such as "1 uniform_coverage + -0.001 time_to_98_s".
+    """The named objective, or a sum of objectives and metrics.
+
+    >>> parse_objective("1 uniform_coverage + -0.001 time_to_98_s").terms
+    {'mean_coverage': 1.0, 'std_coverage': -1.0, 'time_to_98_s': -0.001}
 
     Raises:
         InputError: the text is neither a name nor a sum.

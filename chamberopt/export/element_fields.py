@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from chamberopt.geometry.triangles import areas
 
 if TYPE_CHECKING:
     from chamberopt.geometry.meshes.part_mesh import PartMesh
+    from chamberopt.results.vtp_files import Surface
 
 # Meaning of each column of part.vtp, and the combination of an element's triangles: their sum, or
 # a mean weighted with exposed area, impacts or dents. Values of the field, which are measured in
@@ -49,7 +50,7 @@ def combination_of(column: str) -> tuple[str, str]:
     return COLUMNS[column]
 
 
-def _columns(surface: Any) -> tuple[str, ...]:
+def _columns(surface: Surface) -> tuple[str, ...]:
     zones = (name for name in surface.cell_data if name.startswith(ZONE_COLUMN))
     return (*COLUMNS, *zones)
 
@@ -70,7 +71,7 @@ class ElementFields:
     columns: dict[str, np.ndarray]
 
 
-def fields_of_elements(surface: Any, number: np.ndarray) -> ElementFields:
+def fields_of_elements(surface: Surface, number: np.ndarray) -> ElementFields:
     """Combine the columns of part.vtp for each element.
 
     Args:
@@ -82,9 +83,14 @@ def fields_of_elements(surface: Any, number: np.ndarray) -> ElementFields:
 
 
 def fields_of_remeshed_elements(
-    surface: Any, number: np.ndarray, original: PartMesh, simulated: PartMesh
+    surface: Surface, number: np.ndarray, original: PartMesh, simulated: PartMesh
 ) -> ElementFields:
-    """Combine the columns of a part that was simulated in other triangles than its file has."""
+    """Combine the columns of a part that was simulated in other triangles than its file has.
+
+    A triangle counts for the element around its centre. An element without such a centre gets the
+    values of the triangles around the centres of its own triangles. Sums are left out, because
+    triangles reach across elements.
+    """
     cells = np.flatnonzero(number > 0)
     small = np.flatnonzero(~np.isin(original.elements, number[cells]) & (original.elements > 0))
     share = np.ones(len(cells))
@@ -104,7 +110,11 @@ def fields_of_remeshed_elements(
 
 
 def _combined(
-    surface: Any, cells: np.ndarray, number: np.ndarray, share: np.ndarray, names: tuple[str, ...]
+    surface: Surface,
+    cells: np.ndarray,
+    number: np.ndarray,
+    share: np.ndarray,
+    names: tuple[str, ...],
 ) -> ElementFields:
     """Combine triangles by element number.
 

@@ -19,7 +19,7 @@ Vector = tuple[float, float, float]
 PATCHES = 20  # along a target
 PIXELS = 240  # side of the small pictures
 AZIMUTHS = 12
-ELEVATIONS = (-60.0, -22.0, 15.0, 35.0, 60.0)  # degrees; the middle ones are preferred
+ELEVATIONS = (-60.0, -22.0, 15.0, 35.0, 60.0)  # degrees; middle elevations are preferred
 MIDDLE = (-25.0, 40.0)
 STEEP = 0.85  # weight of steep views against middle views
 FROM_BELOW = 0.6  # weight of views from below, in pictures with the chamber
@@ -40,7 +40,7 @@ def view_frame(eye: np.ndarray) -> np.ndarray:
 
 
 def directions(steep: bool = True) -> np.ndarray:
-    """Unit vectors to the eyes to try, (e, 3). Without steep ones they show chambers well."""
+    """Unit vectors to the eyes to try, (e, 3). With steep=False all of them show chambers well."""
     turn = 2.0 * np.pi * (np.arange(AZIMUTHS) + 0.5) / AZIMUTHS
     rows = [
         np.stack([np.cos(up) * np.cos(turn), np.cos(up) * np.sin(turn), np.sin(up) + 0 * turn], 1)
@@ -169,8 +169,8 @@ def _worth(eyes: np.ndarray) -> np.ndarray:
     return np.asarray(np.where(is_middle, 1.0, STEEP) * (1.0 + NEARNESS * nearness))
 
 
-def _is_middle(height: Any) -> Any:
-    return (MIDDLE[0] < height) & (height < MIDDLE[1])
+def _is_middle(height: float | np.ndarray) -> bool | np.ndarray:
+    return np.greater(height, MIDDLE[0]) & np.less(height, MIDDLE[1])
 
 
 class Room(NamedTuple):

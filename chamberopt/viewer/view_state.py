@@ -89,7 +89,11 @@ class ViewState:
 
 
 def parse_clip(text: str) -> Plane:
-    """Read --clip: X, Y or Z, and an optional place on the axis in mm, as in Z=12.5."""
+    """Read --clip: X, Y or Z, and an optional place on the axis in mm.
+
+    >>> parse_clip("Z=12.5")
+    ((0.0, 0.0, 1.0), (0.0, 0.0, 12.5))
+    """
     found = re.fullmatch(r"([xyzXYZ])(?:=([-+]?\d*\.?\d+))?", text.strip())
     if not found:
         raise InputError(

@@ -141,6 +141,9 @@ def inner_edges(
 def _turn_across(ends: np.ndarray, way: np.ndarray, turns: np.ndarray) -> np.ndarray:
     """Turn of the surface across each edge [m rad], summed over the edges at both its ends.
 
+    Each edge counts by its turn, its length and its squared cosine to the given edge. Sharp edges,
+    at which a fillet ends, do not count.
+
     Args:
         ends: vertices of each edge, shape (e, 2).
         way: vector from the first to the second vertex [m], shape (e, 3).

@@ -86,7 +86,11 @@ def _downs(normal: np.ndarray, weight: np.ndarray) -> Iterator[tuple[np.ndarray,
 
 
 def turns_down(down: np.ndarray) -> Turns:
-    """Turns about x, then y [degrees, to a tenth], that turn a direction down."""
+    """Turns about x, then y [degrees, to a tenth], that turn a direction down.
+
+    >>> turns_down(np.array([1.0, 0.0, 0.0]))
+    (0.0, 90.0, 0.0)
+    """
     x, y, z = down
     across = float(np.hypot(y, z))
     about_x = np.degrees(np.arctan2(-y, -z)) if across > 1e-9 else 0.0

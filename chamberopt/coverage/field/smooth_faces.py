@@ -131,7 +131,11 @@ def find_faces(
     for offset in OFFSETS:
         soft, sharp = near & (over <= offset), over[edge] > offset
         goes_on = sharp[links].all(axis=1) & (corner < STRAIGHT_ON + offset)
-        now = int(soft.sum()), int(sharp.sum()), int(goes_on.sum())  # each set holds the next
+        now = (
+            int(soft.sum()),
+            int(sharp.sum()),
+            int(goes_on.sum()),
+        )  # nested: equal sizes, equal sets
         if now != before:
             faces_by.append(_joined_faces(beside[soft], int(face.max(initial=-1)) + 1))
             line = connected_pieces(links[goes_on, 0], links[goes_on, 1], len(edge))[1] + len(

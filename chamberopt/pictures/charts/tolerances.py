@@ -47,7 +47,10 @@ def tornado_figure(panels: Sequence[TornadoPanel]) -> Figure:
 
 
 def draw_tornado(axes: Axes, bars: Sequence[TornadoBar], x_label: str) -> None:
-    """Draw a bar with its 95 % interval for each end of each number. Bars in the noise are grey."""
+    """Draw a bar with its 95 % interval for each end of each number, the first number on top.
+
+    Bars in the noise are grey.
+    """
     for row, bar in enumerate(bars):
         for end, colour in ((bar.low, ORANGE), (bar.high, BLUE)):
             resolved = abs(end.value) > end.half_width
