@@ -83,6 +83,12 @@ class Chamber:
         """The number of pieces of the part that reach no wall, and so have no holder."""
         return _pieces_in_air(self.vertices, self.triangles, self.tags)
 
+    @property
+    def on_target(self) -> np.ndarray:
+        """Marks of the cavity's triangles on the target, (k,) bool."""
+        # A source of -1, off the part, reads the appended False.
+        return np.asarray(np.append(self.part.target, False)[self.source])
+
     def on_zone(self, zone: str) -> Chamber:
         """The same chamber with a zone of the part as its target."""
         return replace(self, part=replace(self.part, target=self.part.zones[zone]))

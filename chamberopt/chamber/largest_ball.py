@@ -72,11 +72,19 @@ def spread_points(
     # One sequence runs over all triangles. If it began again on each triangle, the points of a row
     # of similar triangles would lie on a few lines.
     u, v = ((1.0 / 3.0 + np.arange(len(triangle))[:, None] * SEQUENCE_STEP) % 1.0).T
-    fold = u + v > 1.0  # the square's other half falls onto the triangle
-    u, v = np.where(fold, 1.0 - u, u), np.where(fold, 1.0 - v, v)
-    a, b, c = (vertices[triangles[triangle, k]] for k in range(3))
-    point = a + u[:, None] * (b - a) + v[:, None] * (c - a)
+    point = on_triangles(vertices[triangles[triangle]], u, v)
     return triangle, point, (size / np.maximum(count, 1))[triangle]
+
+
+def on_triangles(corners: np.ndarray, u: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """Points (..., n, c) on triangles (n, 3, c) from points u, v (..., n) of the unit square.
+
+    One half of the square is folded onto the other, so that an even spread stays even.
+    """
+    fold = u + v > 1.0
+    u, v = np.where(fold, 1.0 - u, u)[..., None], np.where(fold, 1.0 - v, v)[..., None]
+    a, b, c = corners.swapaxes(0, 1)
+    return np.asarray(a + u * (b - a) + v * (c - a))
 
 
 def largest_balls(

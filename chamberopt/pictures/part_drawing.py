@@ -17,6 +17,7 @@ from chamberopt.pictures.section import SAME, cut, face_size_mm, inside
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.patches import Rectangle
+    from numpy.typing import ArrayLike
 
     from chamberopt.chamber.build import Chamber
 
@@ -112,7 +113,7 @@ class View:
     high: np.ndarray
     outside: np.ndarray
 
-    def place(self, points: Any) -> np.ndarray:
+    def place(self, points: ArrayLike) -> np.ndarray:
         """Places on the page [mm] of points (..., 2) [mm] in the chamber."""
         return np.asarray(self.corner + self.scale * (np.asarray(points) - self.low))
 
@@ -127,7 +128,7 @@ class View:
         )
 
 
-def draw_chamber(axes: Axes, chamber: Chamber, left: float, top: float, size: Any) -> str:
+def draw_chamber(axes: Axes, chamber: Chamber, left: float, top: float, size: Point) -> str:
     """Draw both views at a place on the page, and return the scale, such as "1:2".
 
     Args:
@@ -190,7 +191,7 @@ def _draw_section(axes: Axes, chamber: Chamber, view: View, at: float) -> None:
     window = view.window(axes)
     _fill(axes, view, lines, window, facecolor=ROOM, lw=0.0)
     _fill(axes, view, own, window, facecolor=PART, edgecolor=DARK_GREY, hatch="////", lw=0.5)
-    tags, target = chamber.tags[row], _on_target(chamber)[row]
+    tags, target = chamber.tags[row], chamber.on_target[row]
     _lines(axes, view, lines[tags == TAG_WALL], BLACK, 1.1)
     _lines(axes, view, lines[tags > TAG_WALL], BLUE, 2.5)
     _lines(axes, view, lines[target], ORANGE, 2.0)
@@ -222,7 +223,7 @@ def _draw_section(axes: Axes, chamber: Chamber, view: View, at: float) -> None:
 def _draw_plan(axes: Axes, chamber: Chamber, view: View, across: int, at: float) -> None:
     from matplotlib.collections import PolyCollection
 
-    part, target = chamber.tags == TAG_PART, _on_target(chamber)
+    part, target = chamber.tags == TAG_PART, chamber.on_target
     for colour, rows in ((PART, part & ~target), (TARGET, target)):
         corners = view.place(1e3 * chamber.vertices[chamber.triangles[rows]][:, :, :2])
         seen = PolyCollection(list(corners), facecolors=colour, edgecolors=colour, lw=0.4)
@@ -250,12 +251,7 @@ def _draw_plan(axes: Axes, chamber: Chamber, view: View, across: int, at: float)
     _label(axes, left, top + (2.5 if across == 0 else 6.5), "plan: x to the right, y up")
 
 
-def _on_target(chamber: Chamber) -> np.ndarray:
-    """Mark the triangles of the cavity on the target."""
-    return np.asarray((chamber.source >= 0) & chamber.part.target[chamber.source])
-
-
-def _fill(axes: Axes, view: View, lines: np.ndarray, window: Any, **look: Any) -> None:
+def _fill(axes: Axes, view: View, lines: np.ndarray, window: Rectangle, **look: Any) -> None:
     from matplotlib.patches import PathPatch
 
     area = inside(1e3 * lines)

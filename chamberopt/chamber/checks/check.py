@@ -15,7 +15,7 @@ from chamberopt.chamber.checks.gaps import (
     pocket_warnings,
     surface_warnings,
 )
-from chamberopt.chamber.checks.place_names import CEILING, SIDE_WALL, on_target, surface_names
+from chamberopt.chamber.checks.place_names import CEILING, SIDE_WALL, surface_names
 from chamberopt.chamber.dimensionless import free_path
 from chamberopt.chamber.part import turning_axis
 from chamberopt.chamber.reach import Reach, find_reach, reached_part_share
@@ -43,6 +43,9 @@ MAX_PACKING_FRACTION = 0.2
 MIN_AMPLITUDES = 10.0  # between part and sonotrode, as for sonotrode_distance_mm of a design
 MAX_HIDDEN_SHARE = 0.05  # of the target's area; a larger share means a misplaced ceiling or wall
 MIN_FREE_PATH = 10.0  # chamber heights; on longer paths few balls meet another ball before a dent
+
+Facts = dict[str, object]
+"""JSON values by name, with the unit in the name."""
 
 
 def describe(design: Design, chamber: Chamber, reach: Reach | None = None) -> dict[str, Any]:
@@ -81,7 +84,7 @@ def describe(design: Design, chamber: Chamber, reach: Reach | None = None) -> di
     }
 
 
-def first_facts(design: Design, chamber: Chamber) -> dict[str, Any]:
+def first_facts(design: Design, chamber: Chamber) -> dict[str, Facts]:
     """The facts that are known as soon as the chamber is built."""
     part, shot = chamber.part, design.shot
     exposed = chamber.exposed_area > 0.0
@@ -129,7 +132,7 @@ def first_facts(design: Design, chamber: Chamber) -> dict[str, Any]:
     }
 
 
-def _smoothing_facts(part: Part, ball: float) -> dict[str, Any]:
+def _smoothing_facts(part: Part, ball: float) -> Facts:
     """Facts on the smoothing of the target's rounds, if the target has rounds."""
     facts = part.smoothing
     if facts is None or not facts.facet_turn:
@@ -146,7 +149,7 @@ def _smoothing_facts(part: Part, ball: float) -> dict[str, Any]:
     }
 
 
-def with_clearance(facts: dict[str, Any], mesh: TriangleMesh) -> dict[str, Any]:
+def with_clearance(facts: dict[str, Facts], mesh: TriangleMesh) -> dict[str, Facts]:
     """The first facts with the sonotrode's clearance, from the closed mesh of the chamber."""
     clearance = _rounded(sonotrode_clearance(mesh) * 1e3)
     more = {"closed": "yes", "sonotrode_clearance_mm": clearance}
@@ -179,7 +182,7 @@ def warnings(design: Design, chamber: Chamber, reach: Reach | None = None) -> li
     texts = first_warnings(design, chamber, reach.mesh)
     for name, surface in _to_be_peened(design, chamber).items():
         texts += surface_warnings(reach, surface, name, design.part.target.reachable)
-    texts += facet_warnings(chamber.part, reach.diameter, _reached_share(reach, on_target(chamber)))
+    texts += facet_warnings(chamber.part, reach.diameter, _reached_share(reach, chamber.on_target))
     texts += pocket_warnings(reach, chamber)
     turns = design.effects.part_turn is not None
     texts += gap_warnings(reach, chamber, design.shot.diameter, turns)
@@ -260,11 +263,11 @@ def friction_notes(design: Design) -> list[str]:
     ]
 
 
-def _reach_facts(reach: Reach, chamber: Chamber) -> dict[str, Any]:
+def _reach_facts(reach: Reach, chamber: Chamber) -> Facts:
     """Area of the target and of the part in the chamber that the smallest balls can touch."""
     size = areas(chamber.vertices, chamber.triangles)
-    facts: dict[str, Any] = {"ball_mm": _rounded(reach.diameter * 1e3)}
-    for name, rows in (("target", on_target(chamber)), ("part", chamber.tags == TAG_PART)):
+    facts: Facts = {"ball_mm": _rounded(reach.diameter * 1e3)}
+    for name, rows in (("target", chamber.on_target), ("part", chamber.tags == TAG_PART)):
         share = _reached_share(reach, rows)
         facts[f"{name}_reachable_mm2"] = _rounded(share * size[rows].sum() * 1e6)
         facts[f"{name}_reachable_share"] = _rounded(share)
@@ -277,11 +280,11 @@ def _reached_share(reach: Reach, rows: np.ndarray) -> float:
     return float(reach.share[rows] @ size / size.sum())
 
 
-def _zone_facts(reach: Reach, chamber: Chamber) -> dict[str, Any]:
+def _zone_facts(reach: Reach, chamber: Chamber) -> dict[str, Facts]:
     """Size of each zone, and the share of its exposed area that the smallest balls can touch."""
     part = chamber.part
     share = reached_part_share(reach, chamber.source, len(part.triangles))
-    facts = {}
+    facts: dict[str, Facts] = {}
     for name, zone in part.zones.items():
         exposed = chamber.exposed_area[zone]
         facts[f"zone {name}"] = {
@@ -293,7 +296,7 @@ def _zone_facts(reach: Reach, chamber: Chamber) -> dict[str, Any]:
     return facts
 
 
-def _turn_facts(design: Design, part: Part) -> dict[str, Any]:
+def _turn_facts(design: Design, part: Part) -> dict[str, Facts]:
     """The motion of a turning part, with its axis in the chamber's frame."""
     turn, line = design.effects.part_turn, turning_axis(design, part)
     if turn is None or line is None:
@@ -307,11 +310,13 @@ def _turn_facts(design: Design, part: Part) -> dict[str, Any]:
     return {"part_turn": {**(swing if turn.rpm is None else {"rpm": turn.rpm}), **pose}}
 
 
-def _tolerance_facts(design: Design) -> dict[str, Any]:
+def _tolerance_facts(design: Design) -> dict[str, Facts]:
     """The range of each number with a tolerance. InputError if a tolerance is out of bounds."""
     require_tolerances(design)
     box = tolerance_box(design)
-    ranges = {k: {"low": a, "start": design.value(k), "high": b} for k, (a, b) in box.items()}
+    ranges: Facts = {
+        k: {"low": a, "start": design.value(k), "high": b} for k, (a, b) in box.items()
+    }
     return {"tolerances": ranges} if box else {}
 
 

@@ -16,7 +16,6 @@ from chamberopt.chamber.checks.place_names import (
     SONOTRODE,
     around,
     mm2,
-    on_target,
     one_of,
     surface_names,
 )
@@ -67,7 +66,7 @@ def gap_warnings(reach: Reach, chamber: Chamber, largest: float, turns: bool = F
 def pocket_warnings(reach: Reach, chamber: Chamber) -> list[str]:
     """Warnings about pockets that could hold a ball but let no ball in, the largest areas first."""
     touches, closed = reach.touches, reach.fits & ~reach.reached
-    target = on_target(chamber)[touches.triangle]
+    target = chamber.on_target[touches.triangle]
     found: list[tuple[float, str]] = []
     for region in np.unique(reach.region[closed]):
         own = closed & (reach.region == region)
@@ -94,7 +93,7 @@ def surface_warnings(
         only_reachable: true if the design takes only the reachable surface for the target.
     """
     touches = reach.touches
-    own = on_target(chamber)[touches.triangle]
+    own = chamber.on_target[touches.triangle]
     whole, missed = float(touches.area[own].sum()), own & ~reach.reached
     left = float(touches.area[missed].sum())
     if not whole or left < MIN_MISSED_SHARE * whole:

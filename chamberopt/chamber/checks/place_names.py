@@ -45,9 +45,3 @@ def one_of(points: np.ndarray, weights: np.ndarray) -> str:
     """The point of (n, 3) [m] closest to their mean, as text. A ring's mean lies off the ring."""
     middle = np.average(points, axis=0, weights=weights)
     return around(points[[np.linalg.norm(points - middle, axis=1).argmin()]])
-
-
-def on_target(chamber: Chamber) -> np.ndarray:
-    """Mark the cavity's triangles on the target, (k,) bool."""
-    in_target = chamber.part.target[np.maximum(chamber.source, 0)]
-    return np.asarray((chamber.tags == TAG_PART) & in_target)

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from chamberopt.chamber.largest_ball import on_triangles
 from chamberopt.chamber.reach import TOLERATED_OVERLAP
 from chamberopt.common.estimate import CONFIDENCE, normal_quantile
 from chamberopt.geometry.triangles import count_up, unit_normals
@@ -77,8 +79,7 @@ def _within(
 ) -> SurfacePoints:
     """Points on triangles (p,), by their numbers (p,) in the sequence of the plastic number."""
     corners = vertices[triangles[triangle]]
-    u, v = _of_sequence(number)
-    place = _between(corners, u[:, None], v[:, None])
+    place = on_triangles(corners, *_in_square(number))
     return SurfacePoints(place, unit_normals(corners), triangle)
 
 
@@ -88,24 +89,15 @@ def within_each(corners: np.ndarray, count: int) -> np.ndarray:
     Each triangle takes the next numbers of the sequence. So a spot that the points miss on one of
     many alike triangles is not missed on all of them.
     """
-    u, v = _of_sequence(np.arange(count * len(corners)).reshape(-1, count).T)
-    return _between(corners, u[..., None], v[..., None])
+    return on_triangles(corners, *_in_square(np.arange(count * len(corners)).reshape(-1, count).T))
 
 
-def _of_sequence(number: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Coordinates in a triangle of points by their numbers in the sequence of the plastic number.
+def _in_square(number: np.ndarray) -> Iterator[np.ndarray]:
+    """Coordinates u and v of points by their numbers in the sequence of the plastic number.
 
-    The first point is the middle of the triangle.
+    The first point comes to the middle of a triangle.
     """
-    u, v = ((number / PLASTIC_NUMBER**power + 1.0 / 3.0) % 1.0 for power in (1, 2))
-    folded = u + v > 1.0
-    return np.where(folded, 1.0 - u, u), np.where(folded, 1.0 - v, v)
-
-
-def _between(corners: np.ndarray, u: np.ndarray, v: np.ndarray) -> np.ndarray:
-    """Points a + u (b - a) + v (c - a) on triangles (n, 3, c)."""
-    a, b, c = corners.swapaxes(0, 1)
-    return np.asarray(a + u * (b - a) + v * (c - a))
+    return ((number / PLASTIC_NUMBER**power + 1.0 / 3.0) % 1.0 for power in (1, 2))
 
 
 def morton(places: np.ndarray) -> np.ndarray:

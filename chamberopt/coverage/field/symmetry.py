@@ -114,8 +114,7 @@ def find_symmetry(chamber: Chamber, mesh: TriangleMesh) -> Symmetry | None:
 
     corners = chamber.vertices[chamber.triangles]
     inside = corners + INSIDE * (corners.mean(axis=1, keepdims=True) - corners)
-    on_target = np.append(chamber.part.target, False)[chamber.source]  # -1, a wall, reads the last
-    looks = chamber.tags + 256 * on_target.astype(int)
+    looks = chamber.tags + 256 * chamber.on_target.astype(int)
 
     def is_kept(angle: float, triangles: np.ndarray) -> bool:
         for places in (corners, inside):
