@@ -259,4 +259,6 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    from benchmarks import executors  # a worker can import its functions, but none of __main__
+
+    executors.main()

@@ -71,10 +71,8 @@ OPEN_METHODS = {
 }  # fmt: skip
 OPENED_ELSEWHERE = {
     "common/npz_files.py": {"np.savez", "np.savez_compressed"},  # into an open file, or memory
-    # a value for workers, in a file with a name that nobody can foresee
-    "common/processes.py": {"tempfile.mkstemp", "os.fdopen", "open", "os.unlink"},
-    # the process that ends with its parent leaves no private folder
-    "geometry/meshes/native_reader.py": {"shutil.rmtree"},
+    # pipes, and a private folder that a child removes if its parent has ended
+    "common/child.py": {"os.fdopen", "os.open", "shutil.rmtree"},
     # what the kernel tells of the machine, in files of its own
     "common/memory.py": {
         "Path('/proc/meminfo').read_text",

@@ -8,25 +8,22 @@ of its own, one task at a time.
 
 from __future__ import annotations
 
-import os
 import pickle
 import signal
-import tempfile
 import threading
 import weakref
 from collections.abc import Callable
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
-from contextlib import suppress
-from functools import lru_cache
-from multiprocessing import get_context
-from typing import TYPE_CHECKING, Any
+from contextlib import ExitStack, suppress
+from functools import cached_property, lru_cache
+from itertools import count
+from pathlib import Path
+from typing import Any
 
+from chamberopt.common.child import Child, ChildLostError
 from chamberopt.common.errors import WorkerLostError
-from chamberopt.common.lifetime import end_with_parent
+from chamberopt.common.files import private_folder, read_file, remove_file, write_bytes
 from chamberopt.common.memory import MEMORY
-
-if TYPE_CHECKING:
-    from multiprocessing.connection import Connection
 
 # A process may die by chance, for example when another program takes all memory. If two die of the
 # same task, the task is the cause.
@@ -37,25 +34,23 @@ MAX_SHARED = 4  # shared values that a worker keeps, of candidates that are eval
 class SharedFile:
     """A value that each worker reads once from a file; its pickle holds the file's name alone."""
 
-    def __init__(self, value: Any) -> None:
-        handle, self.path = tempfile.mkstemp(prefix="chamberopt-", suffix=".pickle")
-        weakref.finalize(self, _remove, self.path)
-        with os.fdopen(handle, "wb") as file:
-            pickle.dump(value, file, pickle.HIGHEST_PROTOCOL)
+    def __init__(self, value: Any, path: Path) -> None:
+        self.path = path
+        write_bytes(path, pickle.dumps(value, pickle.HIGHEST_PROTOCOL))
+        weakref.finalize(self, _remove, path)
 
-    def __reduce__(self) -> tuple[Callable[[str], Any], tuple[str]]:
+    def __reduce__(self) -> tuple[Callable[[Path], Any], tuple[Path]]:
         return _load, (self.path,)
 
 
 @lru_cache(maxsize=MAX_SHARED)
-def _load(path: str) -> Any:
-    with open(path, "rb") as file:
-        return pickle.load(file)
+def _load(path: Path) -> Any:
+    return pickle.loads(read_file(path))
 
 
-def _remove(path: str) -> None:
+def _remove(path: Path) -> None:
     with suppress(OSError):
-        os.unlink(path)
+        remove_file(path)
 
 
 class ProcessExecutor(Executor):
@@ -68,11 +63,17 @@ class ProcessExecutor(Executor):
     def __init__(self, workers: int) -> None:
         self._feeders = ThreadPoolExecutor(workers, thread_name_prefix="worker")
         self._of_thread = threading.local()
-        self._workers: list[_Worker] = []
+        self._workers: list[Child] = []
         self._ended, self._count = False, workers
+        self._resources, self._numbers = ExitStack(), count()
+
+    @cached_property
+    def _folder(self) -> str:
+        return self._resources.enter_context(private_folder())
 
     def share(self, value: Any) -> SharedFile:
-        return SharedFile(value)
+        """Keep a value in a file until nothing refers to the file or the executor has ended."""
+        return SharedFile(value, Path(self._folder, f"{next(self._numbers)}.pickle"))
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
         return self._feeders.submit(self._run, fn, args, kwargs)
@@ -92,93 +93,47 @@ class ProcessExecutor(Executor):
     @property
     def pids(self) -> list[int]:
         """Process ids of the living workers."""
-        processes = (worker.process for worker in self._workers)
-        return [process.pid for process in processes if process.pid and process.is_alive()]
+        return [pid for worker in self._workers if (pid := worker.pid) is not None]
 
     def _run(self, fn: Callable[..., Any], args: tuple[Any, ...], kwargs: dict[str, Any]) -> Any:
-        """Run a task in this thread's process, starting one if need be."""
-        task = pickle.dumps((fn, args, kwargs), pickle.HIGHEST_PROTOCOL)
+        """Run a task in this thread's process, starting the process if need be."""
         for _ in range(MAX_ATTEMPTS):
             if self._ended:
                 break
-            worker = getattr(self._of_thread, "worker", None)
-            if worker is None:
-                worker = self._of_thread.worker = _Worker(self._count)
-                self._workers.append(worker)
             try:
-                answer = worker.run(task)
-            except (EOFError, OSError):
-                self._of_thread.worker = None
-                code = worker.end()
-                continue
-            succeeded, value = pickle.loads(answer)
-            if succeeded:
-                return value
-            raise value
+                worker = self._worker()
+                worker.ask(_do, self._count, fn, args, kwargs)
+                return worker.answer()
+            except ChildLostError as lost:
+                self._of_thread.worker, status = None, lost.status
         if self._ended:
             raise WorkerLostError("the worker processes were ended")
-        text = f"its worker process died {MAX_ATTEMPTS} times ({_cause_of_death(code)})"
+        text = f"its worker process died {MAX_ATTEMPTS} times ({_cause_of_death(status)})"
         raise WorkerLostError(f"{text}; give fewer --workers, or look at the machine's log")
+
+    def _worker(self) -> Child:
+        """Return the process of this thread."""
+        worker: Child | None = getattr(self._of_thread, "worker", None)
+        if worker is None:
+            worker = self._of_thread.worker = Child(folder=self._folder)
+            self._workers.append(worker)
+        return worker
 
     def _end(self) -> None:
         self._ended = True
         for worker in self._workers:
             worker.end()
+        self._resources.close()
 
 
-class _Worker:
-    """A process and the pipe to it."""
-
-    def __init__(self, count: int) -> None:
-        context = get_context("spawn")
-        self._pipe, worker_end = context.Pipe()
-        # Daemon processes end with this program; `_serve` sees to it where it is killed.
-        self.process = context.Process(target=_serve, args=(worker_end, count), daemon=True)
-        self.process.start()
-        worker_end.close()
-
-    def run(self, task: bytes) -> bytes:
-        """Run a pickled task; see `_answer`. Raises EOFError or OSError if the process died."""
-        self._pipe.send_bytes(task)
-        return self._pipe.recv_bytes()
-
-    def end(self) -> int | None:
-        """End the process if it still runs, and return its exit code."""
-        self.process.terminate()
-        self.process.join()
-        return self.process.exitcode
-
-
-def _serve(pipe: Connection, count: int) -> None:
-    """Run tasks in one of so many worker processes until the other end of the pipe closes."""
-    # A terminal sends Ctrl-C to all of its processes. Only the main program reacts to it.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    end_with_parent()
+def _do(count: int, fn: Callable[..., Any], args: tuple[Any, ...], kwargs: dict[str, Any]) -> Any:
+    """Do a task in one of so many worker processes."""
     MEMORY.processes = count
-    with suppress(EOFError, OSError):
-        while True:
-            pipe.send_bytes(_answer(pipe.recv_bytes()))
+    return fn(*args, **kwargs)
 
 
-def _answer(task: bytes) -> bytes:
-    """Pickle of (True, the task's result) or (False, its exception)."""
-    try:
-        fn, args, kwargs = pickle.loads(task)
-        return pickle.dumps((True, fn(*args, **kwargs)), pickle.HIGHEST_PROTOCOL)
-    except Exception as error:
-        return pickle.dumps((False, _picklable(error)), pickle.HIGHEST_PROTOCOL)
-
-
-def _picklable(error: Exception) -> Exception:
-    """The error, or its text if its class takes other arguments than it stores."""
-    try:
-        return pickle.loads(pickle.dumps(error))
-    except Exception:
-        return RuntimeError(f"{type(error).__name__}: {error}")
-
-
-def _cause_of_death(code: int | None) -> str:
-    if code is None or code >= 0:
-        return f"exit status {code}"
-    killed = ", as when memory runs out" if -code == getattr(signal, "SIGKILL", None) else ""
-    return f"signal {-code}{killed}"
+def _cause_of_death(status: int) -> str:
+    if status >= 0:
+        return f"exit status {status}"
+    killed = ", as when memory runs out" if -status == getattr(signal, "SIGKILL", None) else ""
+    return f"signal {-status}{killed}"

@@ -1,19 +1,20 @@
-"""Check designs in a process of its own, so that the page answers meanwhile; the newest counts."""
+"""Check designs in child processes, so that the page answers meanwhile; the newest counts."""
 
 from __future__ import annotations
 
-import multiprocessing
 import os
+import tomllib
+from collections.abc import Iterator
 from contextlib import suppress
-from multiprocessing.connection import Connection
 from pathlib import Path
 from threading import Lock
-from typing import Any
 
+from chamberopt.common.child import Child, ChildLostError
 from chamberopt.common.errors import InputError
-from chamberopt.common.lifetime import end_with_parent
+from chamberopt.design.design import Design, validate
+from chamberopt.page.answers import check_answers, part_answer
+from sim_core import SceneError
 
-STEP = 0.05  # s between looks at whether an answer is still wanted
 ENDED = "the check's process ended (killed from outside, or out of memory)"
 
 
@@ -24,128 +25,86 @@ class SupersededError(Exception):
 class Checker:
     """Answers of `check_answers` for one file: the cavity, and then what is reached.
 
-    A question that comes while an older one is about what is reached ends that process; another
-    one, which has read the part already, takes its place.
+    A question that comes while a child works at what is reached ends that child. A spare child,
+    which has read the part already, takes its place.
     """
 
     def __init__(self, path: Path, text: str) -> None:
         self._path, self._text, self._newest = path, text, 0
         self._turn, self._reaching = Lock(), Lock()
-        self._now, self._spare = _Process(path, text), _Process(path, text)
+        self._now, self._spare = self._start(), self._start()
+        self._asked: dict[Child, int] = {}  # number of the question that a child works at
 
     def cavity(self, text: str) -> tuple[int, bytes]:
-        """Number of this question, and the cavity of the design with this text.
+        """Return the number of this question, and the cavity of the design with this text.
 
         Raises:
-            InputError: the design cannot be built.
+            InputError, SceneError: the design cannot be built.
             SupersededError: a newer question was asked meanwhile.
         """
         self._newest += 1
         mine = self._newest
         with self._turn:
-            self._require_newest(mine)
-            while self._now.is_busy or not self._now.is_alive:
-                self._now.stop()
-                self._now, self._spare = self._spare, _Process(self._path, self._text)
-            self._now.ask(mine, text)
+            if mine != self._newest:
+                raise SupersededError
+            while self._now in self._asked or self._now.pid is None:
+                self._replace()
+            self._asked[self._now] = mine
+            self._now.ask(_check, self._path, text)
             return mine, self._answer(self._now, mine)
 
     def reach(self, number: int) -> bytes:
-        """What is reached in the cavity of a question; raises as `cavity` does."""
+        """Return what is reached in the cavity of a question; raises as `cavity` does."""
         with self._reaching:
-            process = self._now
-            if process.number != number or not process.is_busy:
+            child = self._now
+            if self._asked.get(child) != number:
                 raise SupersededError
-            while not process.has_answer(STEP):
-                self._require_newest(number)
-            answer = self._answer(process, number)
-            process.is_busy = False
+            answer = self._answer(child, number)
+            self._asked.pop(child, None)
             return answer
 
     def stop(self) -> None:
-        """End the processes."""
-        for process in (self._now, self._spare):
-            process.stop()
+        """End the children."""
+        for child in (self._now, self._spare):
+            child.end()
 
-    def _answer(self, process: _Process, number: int) -> bytes:
+    def _start(self) -> Child:
+        child = Child()
+        child.ask(_read_ahead, self._path, self._text)
+        return child
+
+    def _replace(self) -> None:
+        self._now.end()
+        self._asked.pop(self._now, None)
+        self._now, self._spare = self._spare, self._start()
+
+    def _answer(self, child: Child, number: int) -> bytes:
         try:
-            answer = process.answer()
-        except (EOFError, OSError):
+            return bytes(child.answer())
+        except ChildLostError:
             if number != self._newest:
                 raise SupersededError from None
-            self._now, self._spare = self._spare, _Process(self._path, self._text)
+            self._replace()
             raise InputError(ENDED) from None
-        if isinstance(answer, str):
-            process.is_busy = False
-            raise InputError(answer)
-        return answer
-
-    def _require_newest(self, number: int) -> None:
-        if number != self._newest:
-            raise SupersededError
+        except Exception:
+            self._asked.pop(child, None)
+            raise
 
 
-class _Process:
-    """One process that answers questions."""
-
-    def __init__(self, path: Path, text: str) -> None:
-        context = multiprocessing.get_context("spawn")
-        self._pipe, theirs = context.Pipe()
-        self._process = context.Process(target=_serve, args=(path, text, theirs), daemon=True)
-        self._process.start()
-        theirs.close()
-        self.is_busy, self.number = False, 0
-
-    @property
-    def is_alive(self) -> bool:
-        return self._process.is_alive()
-
-    def ask(self, number: int, text: str) -> None:
-        self.is_busy, self.number = True, number
-        with suppress(OSError):  # it has ended, as `answer` tells
-            self._pipe.send(text)
-
-    def has_answer(self, seconds: float) -> bool:
-        try:
-            return self._pipe.poll(seconds)
-        except OSError:
-            return True  # it has ended, as `answer` tells
-
-    def answer(self) -> Any:
-        return self._pipe.recv()
-
-    def stop(self) -> None:
-        self._process.kill()
-
-
-def _serve(path: Path, text: str, pipe: Connection) -> None:
-    """Answer each design, as a text, with two packed answers, or with a message why not.
-
-    Before that, read the part of a first one ahead.
-    """
-    import tomllib
-    from signal import SIG_IGN, SIGINT, signal
-
-    from chamberopt.design.design import Design, validate
-    from chamberopt.page.answers import check_answers, part_answer
-    from sim_core import SceneError
-
-    signal(SIGINT, SIG_IGN)  # Ctrl-C ends the server, which ends this
-    end_with_parent()
+def _read_ahead(path: Path, text: str) -> Iterator[bytes]:
+    """Read the part of a design in this child, which then has it for the checks; no answer."""
     if hasattr(os, "nice"):
         os.nice(10)  # the page's own answers come first
-    with suppress(InputError, SceneError):
+    with suppress(Exception):  # the first check meets the same
         part_answer(validate(Design, tomllib.loads(text), path, text))
-    while True:
-        try:
-            text = pipe.recv()
-        except EOFError:
-            return
-        try:
-            design = validate(Design, tomllib.loads(text), path, text)
-            for answer in check_answers(design):
-                pipe.send(answer)
-        except (InputError, SceneError) as error:
-            pipe.send(str(error))
-        except Exception as error:  # a fault of ours, which must not be taken for another
-            pipe.send(f"the check failed: {error!r}")
+    yield from ()
+
+
+def _check(path: Path, text: str) -> Iterator[bytes]:
+    """Give the two answers on a design, as a text; InputError or SceneError if there are none."""
+    try:
+        yield from check_answers(validate(Design, tomllib.loads(text), path, text))
+    except (InputError, SceneError):
+        raise
+    except Exception as error:  # a fault of ours, which must not be taken for another
+        raise InputError(f"the check failed: {error!r}") from None

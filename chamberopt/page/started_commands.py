@@ -1,8 +1,4 @@
-"""Commands that the page starts: the same as those of the command line, in processes of theirs.
-
-Each has a pipe from the server as its standard input, and ends when that is closed: with the
-server, however the server ends.
-"""
+"""Commands that the page starts: each is a command of the command line, in a child process."""
 
 from __future__ import annotations
 
@@ -10,18 +6,17 @@ import json
 import os
 import signal
 import subprocess
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 from threading import Thread
 from typing import Any
 
-from chamberopt.common.lifetime import GRACE_S
+from chamberopt.common.child import GRACE_S, start_python
 
 MOST_LINES = 200  # of a command's remarks that the page shows
-BEGIN = (
-    "import sys; from chamberopt.common.lifetime import interrupt_with_stdin; "
-    "interrupt_with_stdin(); from chamberopt.cli import main; sys.exit(main())"
+COMMAND = (
+    "from chamberopt.common.child import interrupt_with_parent; interrupt_with_parent(); "
+    "from chamberopt.cli import main; sys.exit(main())"
 )
 
 
@@ -32,13 +27,13 @@ class StartedCommand:
         self.arguments = list(arguments)
         self._lines: list[str] = []
         self._steps: dict[str, dict[str, Any]] = {}
-        self._process = subprocess.Popen(
-            # -P: a file json.py in the folder of a design is no module of the command
-            [sys.executable, "-P", "-c", BEGIN, *arguments, "--progress", "jsonl"],
+        self._process = start_python(
+            COMMAND,
+            *arguments,
+            "--progress",
+            "jsonl",
             cwd=folder,
-            start_new_session=True,  # Ctrl-C is for the server, which tells it once
-            stdin=subprocess.PIPE,  # it is closed when this process ends, however it ends
-            stdout=subprocess.PIPE,
+            start_new_session=True,  # Ctrl-C is for the server, which tells the command once
             stderr=subprocess.STDOUT,
             text=True,
             encoding="utf-8",

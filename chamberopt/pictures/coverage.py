@@ -30,8 +30,8 @@ def draw_coverage(
     Returns:
         None, or one line that says why there is no picture.
     """
-    job = {"draw": "coverage", "folders": [str(one) for one in folders], "titles": list(titles)}
-    return draw_in_subprocess(job, picture)
+    job = {"folders": [str(one) for one in folders], "titles": list(titles)}
+    return draw_in_subprocess(render_coverage, job, picture)
 
 
 def render_coverage(job: dict[str, Any]) -> None:

@@ -14,8 +14,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from chamberopt.common.errors import InputError
-from chamberopt.common.files import private_folder
-from chamberopt.common.npz_files import save_arrays
 from chamberopt.pictures.actors import GREY, NO_RENDER, Discs, disc_actor, light
 from chamberopt.pictures.camera import Vector, near_directions, near_views, seen_area, view_frame
 from chamberopt.pictures.drawn_part import DrawnPart
@@ -62,12 +60,9 @@ def draw_dents(
     Raises:
         InputError: from `view` the target is seen edge on.
     """
-    with private_folder() as folder:
-        data = Path(folder) / "dents.npz"
-        save_arrays(data, place=dents.place, normal=dents.normal, radius=dents.radius)
-        job = {"draw": "dents", "folder": str(result), "dents": str(data), "title": title,
-               "view": view, "pixels": pixels}  # fmt: skip
-        return draw_in_subprocess(job, picture)
+    job = {"folder": str(result), "title": title, "view": view, "pixels": pixels,
+           "place": dents.place, "normal": dents.normal, "radius": dents.radius}  # fmt: skip
+    return draw_in_subprocess(render_dents, job, picture)
 
 
 def require_pixels(pixels: int) -> None:
@@ -78,13 +73,12 @@ def require_pixels(pixels: int) -> None:
 
 def render_dents(job: dict[str, Any]) -> None:
     """Draw the picture in the drawing process."""
-    with np.load(job["dents"]) as data:
-        diameter = 2e6 * data["radius"]  # µm
-        low, high = np.percentile(diameter, [1.0, 99.0]) if len(diameter) else (0.0, 1.0)
-        colours, limits = dent_colours(), (float(low), max(float(high), float(low) + 1.0))
-        shade = np.clip((diameter - limits[0]) / (limits[1] - limits[0]), 0.0, 1.0)
-        rgb = (255.0 * colours(shade)[:, :3]).astype(np.uint8)
-        discs = Discs(data["place"] * MM, -data["normal"], data["radius"] * MM, rgb)
+    diameter = 2e6 * job["radius"]  # µm
+    low, high = np.percentile(diameter, [1.0, 99.0]) if len(diameter) else (0.0, 1.0)
+    colours, limits = dent_colours(), (float(low), max(float(high), float(low) + 1.0))
+    shade = np.clip((diameter - limits[0]) / (limits[1] - limits[0]), 0.0, 1.0)
+    rgb = (255.0 * colours(shade)[:, :3]).astype(np.uint8)
+    discs = Discs(job["place"] * MM, -job["normal"], job["radius"] * MM, rgb)
     part = DrawnPart(read_surface(Path(job["folder"]) / COVERAGE))
     panels = [
         Panel(render_side(part, discs, view, job["pixels"]), caption, is_cut=part.rest.n_cells > 0)

@@ -54,8 +54,8 @@ def draw_difference(surface: str | Path, titles: Sequence[str], picture: str | P
     Returns:
         None, or one line that says why there is no picture.
     """
-    job = {"draw": "difference", "surface": str(surface), "titles": list(titles)}
-    return draw_in_subprocess(job, picture)
+    job = {"surface": str(surface), "titles": list(titles)}
+    return draw_in_subprocess(render_difference, job, picture)
 
 
 def render_difference(job: dict[str, Any]) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from chamberopt.common.errors import InputError
-from chamberopt.common.files import new_file, private_folder, write_bytes
-from chamberopt.common.npz_files import save_arrays
+from chamberopt.common.files import new_file, write_bytes
 from chamberopt.pictures.actors import DARK, Discs, add_chamber, disc_actor, escape_dollars, light
 from chamberopt.pictures.camera import Room, Vector, cells_of, fit_camera, target_in_chamber
 from chamberopt.pictures.overlay import LINE_HEIGHT, wrap
@@ -158,43 +157,39 @@ def draw_replay(
         "magenta: has just hit the part   pale: target"
     )
     point, axis = (np.zeros(3), np.zeros(3)) if flight.part_axis is None else flight.part_axis
-    with private_folder() as folder:
-        data = Path(folder) / "flight.npz"
-        poses = [rotation_about_line(point * MM, axis, float(angle)) for angle in flight.part_angle]
-        save_arrays(
-            data,
-            time=flight.time,
-            balls=flight.balls * MM,
-            trail=flight.trail * MM,
-            diameter=flight.diameter * MM,
-            pose=poses,
-            tags=np.array(list(flight.sonotrodes), dtype=int),
-            displacements=np.array(list(flight.sonotrodes.values())) * MM,
-            dent_place=flight.dents.place * MM,
-            dent_normal=-flight.dents.normal,
-            dent_radius=flight.dents.radius * MM,
-            dent_time=flight.dents.time,
-            hit_time=flight.impacts.time,
-            hit_ball=flight.impacts.ball,
-        )
-        job = {"draw": "replay", "folder": str(result), "flight": str(data), "title": title,
-               "fps": fps, "size": list(size), "view": view}  # fmt: skip
-        longest = 600.0 + MAX_FRAME_SECONDS * len(flight.time)
-        return draw_in_subprocess(job, film, longest, count)
+    poses = [rotation_about_line(point * MM, axis, float(angle)) for angle in flight.part_angle]
+    arrays = {
+        "time": flight.time,
+        "balls": flight.balls * MM,
+        "trail": flight.trail * MM,
+        "diameter": flight.diameter * MM,
+        "pose": np.array(poses),
+        "tags": np.array(list(flight.sonotrodes), dtype=int),
+        "displacements": np.array(list(flight.sonotrodes.values())) * MM,
+        "dent_place": flight.dents.place * MM,
+        "dent_normal": -flight.dents.normal,
+        "dent_radius": flight.dents.radius * MM,
+        "dent_time": flight.dents.time,
+        "hit_time": flight.impacts.time,
+        "hit_ball": flight.impacts.ball,
+    }
+    job = {"folder": str(result), "flight": arrays, "title": title, "fps": fps, "size": size,
+           "view": view}  # fmt: skip
+    longest = 600.0 + MAX_FRAME_SECONDS * len(flight.time)
+    return draw_in_subprocess(render_replay, job, film, longest, count)
 
 
-def render_replay(job: dict[str, Any]) -> None:
-    """Draw all frames in the drawing process, in one plotter."""
-    with np.load(job["flight"]) as data:
-        flight = dict(data)
-    plotter = pyvista().Plotter(off_screen=True, window_size=job["size"])
-    scene = _ReplayScene(plotter, Path(job["folder"]), flight, job)
+def render_replay(job: dict[str, Any]) -> Iterator[int | None]:
+    """Draw all frames in a child, in one plotter; yields as draw_in_subprocess wants it."""
+    plotter = pyvista().Plotter(off_screen=True, window_size=list(job["size"]))
+    scene = _ReplayScene(plotter, Path(job["folder"]), job["flight"], job)
     frames = []
-    for number in range(len(flight["time"])):
+    for number in range(len(job["flight"]["time"])):
         scene.show(number)
         frames.append(np.ascontiguousarray(plotter.screenshot(return_img=True)[..., :3]))
-        print(number + 1, flush=True)  # for `count` of draw_in_subprocess
+        yield number + 1
     write_film(Path(job["picture"]), frames, job["fps"])
+    yield None
 
 
 class _ReplayScene:

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from chamberopt.common.files import private_folder
-from chamberopt.common.npz_files import save_arrays
 from chamberopt.pictures.actors import FAULT, GREY, NO_RENDER, SONOTRODE, add_edges
 from chamberopt.pictures.camera import cells_of, near_directions, near_views, pushed_back, seen_area
 from chamberopt.pictures.charts.colours import BLUE, OUTSIDE
@@ -68,24 +67,20 @@ def draw_part(
     none = np.zeros(len(corners), dtype=bool)
     marked, missed = (none if chosen is None else chosen for chosen in (marked, missed))
     edges = np.zeros((0, 2, 3)) if edges is None else edges
+    job = {"title": title, "corners": corners * MM, "marked": marked & ~missed, "missed": missed,
+           "edges": edges * MM}  # fmt: skip
     with private_folder() as folder:
-        part = Path(folder) / "part.npz"
-        save_arrays(
-            part, corners=corners * MM, marked=marked & ~missed, missed=missed, edges=edges * MM
-        )
-        job = {"draw": "part", "part": str(part), "title": title}
         if chamber is not None:
             write_chamber(Path(folder), chamber)
             job["chamber"] = str(Path(folder) / CHAMBER)
-        return draw_in_subprocess(job, path)
+        return draw_in_subprocess(render_part, job, path, folder=folder)
 
 
 def render_part(job: dict[str, Any]) -> None:
-    """Draw the part in the drawing process: in its chamber, and its target or its faults."""
-    with np.load(job["part"]) as data:
-        corners, marked, missed, edges = (
-            data[name] for name in ("corners", "marked", "missed", "edges")
-        )
+    """Draw the part in a child: in its chamber, and its target or its faults."""
+    corners, marked, missed, edges = (
+        job[name] for name in ("corners", "marked", "missed", "edges")
+    )
     part = pyvista().PolyData.from_regular_faces(
         corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3)
     )

@@ -1,24 +1,22 @@
-"""Drawing in a process of its own.
+"""Drawing in a child process.
 
 Where OpenGL's library is installed but its driver is not, VTK does not raise an error: it ends the
-process. In a process of its own that costs the picture, never the result.
+process. In a child that costs the picture, never the result.
 """
 
 from __future__ import annotations
 
 import ctypes
 import io
-import json
 import os
 import subprocess
 import sys
-import tempfile
-import threading
-import time
+import traceback
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from chamberopt.common.child import Child, ChildLostError
 from chamberopt.common.errors import InputError
 from chamberopt.common.files import require_place, write_bytes
 
@@ -99,59 +97,46 @@ def write_screenshot(plotter: Any, picture: str) -> None:
 
 
 def draw_in_subprocess(
+    render: Callable[[dict[str, Any]], Any],
     job: dict[str, Any],
     picture: str | Path,
     max_seconds: float = MAX_SECONDS,
     count: Callable[[int], None] = lambda drawn: None,
+    folder: str = "",
 ) -> str | None:
-    """Do a drawing job in a process of its own.
+    """Draw a picture in a child.
 
     Args:
-        job: as JSON; "draw" names one of viewer.__main__.RENDERERS.
+        render: draws the picture. Of a film, it yields how many frames are drawn, and then None.
+        job: argument of `render`, with the path of the picture added as "picture".
         picture: file to write.
-        max_seconds: after which the process is stopped.
-        count: called with each number that the process prints on a line of its own.
+        max_seconds: after which the child is ended.
+        count: called with how many frames are drawn.
+        folder: removed by the child if this process ends first.
 
     Returns:
         None, or one line that says why there is no picture.
 
     Raises:
-        InputError: the job cannot be drawn as it was wanted.
+        InputError: the job cannot be drawn as the user wants it.
     """
     name, missing = Path(picture).name, missing_opengl()
     if missing:
         return f"{name} skipped: {missing}"
-    command = [sys.executable, "-P", "-m", "chamberopt.viewer"]
-    begun = time.monotonic()
-    with (
-        tempfile.TemporaryFile("w+") as errors,
-        subprocess.Popen(
-            [*command, json.dumps({**job, "picture": str(picture)})],
-            env=without_display(),
-            stdin=subprocess.PIPE,  # it is closed when this process ends, however it ends
-            stdout=subprocess.PIPE,
-            stderr=errors,
-            text=True,
-        ) as drawing,
-    ):
-        stop = threading.Timer(max_seconds, drawing.kill)
-        stop.start()
-        try:
-            for line in drawing.stdout or ():
-                if line.strip().isdigit():
-                    count(int(line))
-            status = drawing.wait()
-        finally:
-            stop.cancel()
-            drawing.kill()
-        errors.seek(0)
-        messages = errors.read().strip()
-    if status == 0 and Path(picture).is_file():
-        return None
-    if status == 2:
-        raise InputError(messages.splitlines()[-1])
-    if time.monotonic() - begun > max_seconds:
-        return f"{name} skipped: it could not be drawn within {max_seconds:g} s"
-    if "Traceback" in messages:
-        return f"{name} skipped: drawing failed ({messages.splitlines()[-1]})"
-    return f"{name} skipped: drawing failed (status {status}); {INSTALL}"
+    job = {**job, "picture": str(picture)}
+    try:
+        quiet = subprocess.DEVNULL
+        with Child(max_seconds, folder, env=without_display(), stderr=quiet) as child:
+            child.ask(render, job)
+            for drawn in iter(child.answer, None):
+                count(drawn)
+    except InputError:
+        raise
+    except ChildLostError as lost:
+        if lost.is_late:
+            return f"{name} skipped: it could not be drawn within {max_seconds:g} s"
+        return f"{name} skipped: drawing failed (status {lost.status}); {INSTALL}"
+    except Exception as error:
+        why = "".join(traceback.format_exception_only(error)).splitlines()[-1]
+        return f"{name} skipped: drawing failed ({why})"
+    return None

@@ -41,9 +41,9 @@ def inspect(
     """
     if screenshot is not None:
         results = [asdict(one) for one in infos]
-        job = {"draw": "inspect", "results": results, "state": asdict(state)}
+        job = {"results": results, "state": asdict(state)}
         with claim_file(picture_path(screenshot)) as path:
-            skipped = draw_in_subprocess(job, path)
+            skipped = draw_in_subprocess(render_inspect, job, path)
         if skipped:
             raise InputError(skipped)
         return

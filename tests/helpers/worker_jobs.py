@@ -3,11 +3,14 @@
 import os
 import signal
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 
 from chamberopt.common.errors import InputError
+from chamberopt.common.executor import local_executor, share
+from chamberopt.common.limits import limit_cpu_time
 from chamberopt.design.load import Design
 from chamberopt.simulation.evaluation import Evaluation
 from tests.helpers.synthetic import judged
@@ -28,6 +31,53 @@ def square(number: int, folder: Path | None = None, seconds: float = 0.0) -> int
         mark(folder, number)
     time.sleep(seconds)
     return number * number
+
+
+def count_to(number: int) -> Iterator[int]:
+    """Give the numbers from 1 on; below 0, raise InputError after 1."""
+    for one in range(1, abs(number) + 1):
+        yield one
+        if number < 0:
+            raise InputError("counts upwards only")
+
+
+def print_much() -> str:
+    print("printed", flush=True)
+    os.write(1, b"written")
+    return "answer"
+
+
+def signal_oneself(number: int) -> str:
+    os.kill(os.getpid(), number)
+    time.sleep(0.1)
+    return "alive"
+
+
+def keep_busy(cpu_s: float | None = None) -> None:
+    """Compute for ever, within a limit of computing time if one is given."""
+    if cpu_s is not None:
+        limit_cpu_time(cpu_s)
+    while True:
+        pass
+
+
+def wait_beside(file: Path) -> None:
+    """Make a file `waiting` beside another and wait for long."""
+    mark(file.parent, "waiting")
+    time.sleep(60.0)
+
+
+def be_parent() -> None:
+    """Start two workers, with a value that they share, print their numbers and wait for long."""
+    with local_executor(2, "processes") as executor:
+        shared = share(executor, np.zeros(1000))
+        print(*executor.map(pid_with, [shared] * 2), flush=True)
+        executor.submit(square, 3, None, 60.0).result()
+
+
+def pid_with(shared: np.ndarray) -> int:
+    time.sleep(0.5)
+    return os.getpid()
 
 
 def pid_of(_: object) -> int:

@@ -11,9 +11,9 @@ from typing import NamedTuple
 import numpy as np
 
 from chamberopt.common.errors import InputError
-from chamberopt.geometry.meshes.native_reader import NativeReader, converted
+from chamberopt.geometry.meshes.native_reader import NativeReader, read_in_child
 from chamberopt.geometry.meshes.raw_mesh import RawMesh
-from chamberopt.geometry.meshes.step_tessellation import REMEDY, Tessellation
+from chamberopt.geometry.meshes.step_tessellation import REMEDY, Tessellation, tessellate
 from chamberopt.geometry.meshes.units import METRES_PER
 
 # What a STEP file says in its text: the unit of its numbers, and the names of faces.
@@ -131,10 +131,7 @@ def _character(escape: re.Match[str]) -> str:
     return chr(ord(given) | 0x80) if kind == "upper" else given
 
 
-MESH = (
-    "from chamberopt.geometry.meshes.step_tessellation import tessellate; tessellate(*sys.argv[1:])"
-)
-READER = NativeReader("part.step", "part.npz", MESH, seconds_per_mb=60.0)
+READER = NativeReader(tessellate, "part.step", f"ended its reader; {REMEDY}", 60.0)
 NAMED_FACE = re.compile(r"(?:ADVANCED_FACE|FACE_SURFACE)\s*\(\s*'(?!'|NONE')")
 # Of a body's size: how far the middle of a face may be from that in the file's text.
 SAME_PLACE = 1e-4
@@ -149,13 +146,7 @@ def read_step(path: Path, content: bytes, how: Tessellation | None = None) -> Ra
         raise InputError(f"{path}: STEP needs the package gmsh: pip install 'chamberopt[cad]'")
     how = how or Tessellation()
     limits = 1e3 * how.chord, how.angle, 1e3 * how.side
-    with converted(READER, path, content, *limits) as file:
-        if file is None:
-            raise InputError(f"{path}: ended its reader; {REMEDY}")
-        with np.load(file) as loaded:
-            arrays: dict[str, np.ndarray] = dict(loaded)
-    if "fault" in arrays:
-        raise InputError(f"{path}: {arrays['fault']}")
+    arrays: dict[str, np.ndarray] = read_in_child(READER, path, content, *limits)
     if not len(arrays["corners"]):
         raise InputError(f"{path}: holds no faces; {REMEDY}")
     try:

@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from chamberopt.common.npz_files import save_arrays
+from chamberopt.common.errors import InputError
 from chamberopt.geometry.meshes.native_reader import allow_more
 
 # Lay grids on curved faces with four sides: fine across a fillet or a tooth, coarse along it.
@@ -132,27 +132,31 @@ class Tessellation(NamedTuple):
         return min(self.side, by_angle, math.sqrt(5.0 * self.chord * radius))
 
 
-def tessellate(source: str, target: str, chord: str, angle: str, side: str) -> None:
-    """Write the triangles of a STEP file as numpy arrays; lengths in mm, angle in rad.
+def tessellate(source: Path, chord: float, angle: float, side: float) -> dict[str, np.ndarray]:
+    """Mesh a STEP file; lengths in mm, angle in rad.
 
-    They are: corners (m, 3, 3), the normals of the faces there, up to their sign and 0 where a face
-    has none, and face_of (m,); how many faces of no solid are left out; of each
-    face its body (-1: none), its colour (r, g, b, and 0 if it has none) and the mean of its corners
-    (nan if it has none); of each body its name. Or only `fault`: what is wrong, as a sentence.
+    Returns:
+        `corners` of the triangles (m, 3, 3); `normals` of the faces at the corners (m, 3, 3), up to
+        their sign, and 0 where a face has none; `face_of` (m,), the face of each triangle;
+        `left_out`, how many faces of no solid are left out. Of each face: `body` (-1: none),
+        `colour` (r, g, b, and 0 if the face has none), and `middle`, the mean of its corners (nan
+        if the face has none). Of each body: `name`.
+
+    Raises:
+        InputError: Gmsh cannot be loaded, or does not mesh the file.
     """
     try:
         import gmsh
 
         gmsh.initialize(readConfigFiles=False, interruptible=False)
-        arrays = _mesh(gmsh, source, Tessellation(float(chord), float(angle), float(side)))
+        return _mesh(gmsh, str(source), Tessellation(chord, angle, side))
     except OSError as error:  # its library was not loaded
-        arrays = {"fault": np.array(f"Gmsh cannot be loaded ({error}); {LIBRARIES}")}
+        raise InputError(f"Gmsh cannot be loaded ({error}); {LIBRARIES}") from None
     except Exception as error:
         if type(error) is not Exception:  # as Gmsh's are
             raise
         why = str(error).replace(f" file '{source}'", " it")[:160]
-        arrays = {"fault": np.array(f"cannot be meshed ({why}); {REMEDY}")}
-    save_arrays(Path(target), **arrays)
+        raise InputError(f"cannot be meshed ({why}); {REMEDY}") from None
 
 
 def _mesh(gmsh: Any, source: str, how: Tessellation) -> dict[str, np.ndarray]:
@@ -178,7 +182,7 @@ def _mesh(gmsh: Any, source: str, how: Tessellation) -> dict[str, np.ndarray]:
     how = how._replace(side=how.side or LONGEST_IN_DIAGONALS * float(diagonal))
     triangles = _TriangleCount(model, faces)
     if not triangles(how) <= MOST_TRIANGLES:
-        return {"fault": np.array(triangles.advice(how))}
+        raise InputError(triangles.advice(how))
     allow_more(SECONDS_PER_TRIANGLE * triangles(how))
     lay_grids(model, faces, how.side_at)
 

@@ -13,9 +13,8 @@ import numpy as np
 
 from chamberopt.common.errors import InputError
 from chamberopt.common.limits import MAX_ELEMENTS
-from chamberopt.common.npz_files import save_arrays
 from chamberopt.geometry.meshes.elements import Block, ElementMesh, extract_surface
-from chamberopt.geometry.meshes.native_reader import NativeReader, converted
+from chamberopt.geometry.meshes.native_reader import NativeReader, read_in_child
 from chamberopt.geometry.meshes.raw_mesh import RawMesh
 
 # VTK's numbers of cell types, https://vtk.org/doc/nightly/html/vtkCellType_8h.html
@@ -31,10 +30,7 @@ WITHOUT_SURFACE = (0, 1, 2, 3, 4, 21, 35)  # points and lines
 MAX_GROUPS = 64
 MAX_COMPONENTS = 1000  # of an array
 FIELD = "field "  # before the names of cell fields among the arrays
-
-
-UNPACK = "from chamberopt.geometry.meshes.vtk import unpack; unpack(*sys.argv[1:])"
-READER = NativeReader("part.vtk", "part.npz", UNPACK, seconds_per_mb=10.0)
+FAULT = "cannot be read as VTK, it is damaged or truncated; export it again"
 
 
 def read_vtk(path: Path, content: bytes) -> RawMesh:
@@ -49,12 +45,7 @@ def read_vtk(path: Path, content: bytes) -> RawMesh:
         _require_counts(path, content)
     is_poly_data = holds == "POLYDATA"
     reader = ("vtkXML" if xml else "vtk") + ("PolyData" if is_poly_data else "UnstructuredGrid")
-    with converted(READER, path, content, f"{reader}Reader") as file:
-        if file is None:
-            why = "cannot be read as VTK, it is damaged or truncated"
-            raise InputError(f"{path}: {why}; export it again")
-        with np.load(file) as arrays:
-            data = dict(arrays)
+    data = read_in_child(READER, path, content, f"{reader}Reader")
     if data["strips"]:
         raise InputError(f"{path}: triangle strips are not supported; save plain triangles")
     before, offsets, nodes, types = (data[k] for k in ("before", "offsets", "nodes", "types"))
@@ -89,14 +80,14 @@ def _require_counts(path: Path, content: bytes) -> None:
             raise InputError(f"{path}: {found}, {expected}; it is damaged, export it again")
 
 
-def unpack(given: str, made: str, reader_name: str) -> None:
-    """Write the arrays of a VTK file as .npz; SystemExit for what VTK only reports."""
+def unpack(given: Path, reader_name: str) -> dict[str, Any]:
+    """Return the arrays of a VTK file; InputError for what VTK only reports."""
     from vtkmodules import vtkIOLegacy, vtkIOXML
     from vtkmodules.util.numpy_support import vtk_to_numpy
     from vtkmodules.vtkCommonCore import vtkLogger
 
     reader: Any = getattr(vtkIOXML if "XML" in reader_name else vtkIOLegacy, reader_name)()
-    reader.SetFileName(given)
+    reader.SetFileName(str(given))
     troubles: list[str] = []
     for source in (reader, getattr(reader, "GetXMLParser", lambda: None)()):
         if source is not None:
@@ -105,7 +96,7 @@ def unpack(given: str, made: str, reader_name: str) -> None:
     vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)  # VTK's messages do not help users
     reader.Update()
     if troubles or reader.GetErrorCode():
-        raise SystemExit(1)
+        raise InputError(FAULT)
     data = reader.GetOutputDataObject(0)
     is_poly_data = "PolyData" in reader_name
     before = data.GetNumberOfVerts() + data.GetNumberOfLines() if is_poly_data else 0
@@ -122,16 +113,18 @@ def unpack(given: str, made: str, reader_name: str) -> None:
         array = data.GetCellData().GetArray(k)
         if array is not None and array.GetNumberOfComponents() == 1:  # no texts and vectors
             fields[f"{FIELD}{array.GetName()}"] = vtk_to_numpy(array)
-    save_arrays(
-        Path(made),
-        points=points.astype(np.float64),
-        nodes=vtk_to_numpy(cells.GetConnectivityArray()),
-        offsets=offsets,
-        types=types,
-        before=before,
-        strips=data.GetNumberOfStrips() if is_poly_data else 0,
+    return {
+        "points": points.astype(np.float64),
+        "nodes": vtk_to_numpy(cells.GetConnectivityArray()),
+        "offsets": offsets,
+        "types": types,
+        "before": before,
+        "strips": data.GetNumberOfStrips() if is_poly_data else 0,
         **fields,
-    )
+    }
+
+
+READER = NativeReader(unpack, "part.vtk", FAULT, seconds_per_mb=10.0)
 
 
 def _groups_of_fields(fields: dict[str, np.ndarray], cells: np.ndarray) -> dict[str, np.ndarray]:

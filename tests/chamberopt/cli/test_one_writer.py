@@ -59,7 +59,7 @@ def test_the_second_is_told_at_once(
 
     monkeypatch.chdir(folder)
     monkeypatch.setattr("chamberopt.chamber.build.build_chamber", never)
-    monkeypatch.setattr("chamberopt.pictures.subprocess_drawing.subprocess.Popen", never)
+    monkeypatch.setattr("chamberopt.common.child.subprocess.Popen", never)
     before = sorted(folder.rglob("*"))
     with claimed(Path(output)):
         assert main(command.split()) == 2

@@ -39,7 +39,7 @@ def no_work(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("chamberopt.cli.teller.compile_with_message", work)
     monkeypatch.setattr("chamberopt.chamber.build.build_chamber", work)
     monkeypatch.setattr("chamberopt.peening.calibrate.prepare", work)
-    monkeypatch.setattr("chamberopt.pictures.subprocess_drawing.subprocess.Popen", work)
+    monkeypatch.setattr("chamberopt.common.child.subprocess.Popen", work)
     monkeypatch.setattr("chamberopt.printers.report_page.report", work)
 
 

@@ -5,7 +5,6 @@ import multiprocessing
 import os
 import subprocess
 import sys
-import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -15,7 +14,6 @@ import pytest
 from chamberopt.common.files import write_text
 from chamberopt.pictures.charts.figure_style import new_figure, save_picture
 from chamberopt.pictures.film import write_film
-from chamberopt.pictures.subprocess_drawing import missing_opengl, without_display
 from chamberopt.results.load import Result
 from chamberopt.results.vtp_files import pyvista, save_surface, write_stl
 from tests.helpers.results.short_plate import plate_result
@@ -118,23 +116,3 @@ def test_an_export_is_one_message(name: str, result: Result, tmp_path: Path) -> 
     assert "Traceback" not in ended.stderr
     assert "File too large" in ended.stderr.splitlines()[-1]
     assert not [one for one in tmp_path.rglob("*") if one.is_file()]
-
-
-@pytest.mark.skipif(missing_opengl() is not None, reason="needs OpenGL")
-def test_the_drawing_process_ends_with_the_command_that_opened_it() -> None:
-    """However that ends: here it is killed."""
-    reader, writer = os.pipe()
-    drawing = subprocess.Popen(
-        [sys.executable, "-c", "import time; import runpy, sys\n"
-         "from chamberopt.pictures import coverage\n"
-         "coverage.render_coverage = lambda job: time.sleep(60)\n"
-         "sys.argv[1:] = ['{\"draw\": \"coverage\"}']\n"
-         "runpy.run_module('chamberopt.viewer', run_name='__main__')"],
-        stdin=reader,
-        env={**without_display(), **NO_BYTECODE},
-    )  # fmt: skip
-    os.close(reader)
-    time.sleep(5.0)
-    assert drawing.poll() is None
-    os.close(writer)
-    assert drawing.wait(10) == 1

@@ -195,13 +195,13 @@ def test_the_mesher_ends_with_the_command(tmp_path: Path) -> None:
     """However that ends, and without its temporary folder."""
     read = (
         "import tempfile; from pathlib import Path\n"
-        "from chamberopt.geometry.meshes.native_reader import NativeReader, converted\n"
+        "from chamberopt.geometry.meshes.native_reader import NativeReader, read_in_child\n"
+        "from tests.helpers.worker_jobs import wait_beside\n"
         f"tempfile.tempdir = {str(tmp_path)!r}\n"
-        "wait = 'import time; open(sys.argv[2], \"w\"); time.sleep(60)'\n"
-        "with converted(NativeReader('a', 'b', wait, 1.0), Path('a'), b'x'): pass"
+        "read_in_child(NativeReader(wait_beside, 'a', '', 1.0), Path('a'), b'x')"
     )
-    with subprocess.Popen([sys.executable, "-c", read]) as command:
-        _wait_until(lambda: any(tmp_path.glob("*/b")))
+    with subprocess.Popen([sys.executable, "-c", read], cwd=Path(__file__).parents[4]) as command:
+        _wait_until(lambda: any(tmp_path.glob("*/waiting")))
         command.kill()
     _wait_until(lambda: not any(tmp_path.iterdir()))
 

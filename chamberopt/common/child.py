@@ -1,0 +1,204 @@
+"""Child processes of Python: they work for this process and end with it, however it ends.
+
+The standard input of a child is a pipe from its parent. The operating system closes the parent's
+end when the parent ends, also when the parent is killed. A thread of the child waits for that.
+"""
+
+from __future__ import annotations
+
+import _thread
+import json
+import math
+import os
+import pickle
+import shutil
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from inspect import isgenerator
+from queue import SimpleQueue
+from typing import Any, Self
+
+ENDED = 130  # exit status of a child whose parent has ended, as after Ctrl-C
+GRACE_S = 2.0  # in which an interrupted command removes what it has not finished
+TOO_MUCH_CPU = -getattr(signal, "SIGXCPU", math.inf)  # exit status, of limits.limit_cpu_time
+CLOSED = (EOFError, OSError, ValueError, pickle.UnpicklingError)  # errors of a pipe without an end
+BEGIN = "import json, signal, sys; sys.path[:] = json.loads(sys.argv.pop(1)); "
+# A terminal sends Ctrl-C to all of its processes, and only the parent reacts to it.
+SERVE = (
+    "signal.signal(signal.SIGINT, signal.SIG_IGN); "
+    "from chamberopt.common.child import serve; serve(*sys.argv[1:])"
+)
+
+
+def start_python(code: str, *arguments: str, **options: Any) -> subprocess.Popen[Any]:
+    """Start a process that runs Python code, with pipes at its standard input and output.
+
+    Args:
+        code: ends the process when its standard input is closed; `signal` and `sys` are imported.
+        arguments: sys.argv[1:] of the process.
+        options: of subprocess.Popen.
+    """
+    path = json.dumps([str(one) for one in sys.path if one])
+    # -P: a file json.py in the folder where the process runs is no module of the process
+    command = [sys.executable, "-P", "-c", BEGIN + code, path, *arguments]
+    return subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, **options)
+
+
+class ChildLostError(Exception):
+    """A child ended before it answered.
+
+    Attributes:
+        status: exit status of the child, negative for the signal that ended it.
+        is_late: whether the child was ended by a limit of time.
+    """
+
+    def __init__(self, status: int, is_late: bool) -> None:
+        super().__init__(status, is_late)
+        self.status, self.is_late = status, is_late
+
+
+class Child:
+    """A process that does one job after another; the end of a `with` block ends the process."""
+
+    def __init__(self, seconds: float = math.inf, folder: str = "", **options: Any) -> None:
+        """Start the process.
+
+        Args:
+            seconds: after which the process is killed.
+            folder: removed by the process if its parent ends first.
+            options: of subprocess.Popen.
+        """
+        self._process = start_python(SERVE, folder, **options)
+        self._timer, self._is_late = threading.Timer(seconds, self._end_late), False
+        self._timer.daemon = True
+        if seconds < math.inf:
+            self._timer.start()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.end()
+
+    @property
+    def pid(self) -> int | None:
+        """Number of the process; None if the process has ended."""
+        return self._process.pid if self._process.poll() is None else None
+
+    def ask(self, function: Callable[..., Any], *arguments: Any) -> None:
+        """Send a job: a function that can be imported, and its arguments.
+
+        A generator function gives an answer for each value that it yields.
+        """
+        job = pickle.dumps((function, arguments), pickle.HIGHEST_PROTOCOL)
+        with suppress(*CLOSED):  # the process has ended, as `answer` tells
+            _send(job, self._process.stdin)
+
+    def answer(self) -> Any:
+        """Wait for the next answer; an exception of the job is raised here.
+
+        Raises:
+            ChildLostError: the process has ended.
+        """
+        try:
+            answer = pickle.load(self._process.stdout)  # type: ignore[arg-type]
+        except CLOSED:
+            status = self.end()
+            is_late = self._is_late or status == TOO_MUCH_CPU
+            raise ChildLostError(status, is_late) from None
+        succeeded, value = pickle.loads(answer)
+        if not succeeded:
+            raise value
+        return value
+
+    def end(self) -> int:
+        """Kill the process if it still runs, and return its exit status."""
+        self._timer.cancel()
+        self._process.kill()
+        status = self._process.wait()
+        for pipe in (self._process.stdin, self._process.stdout):
+            with suppress(OSError):
+                pipe.close()  # type: ignore[union-attr]
+        return status
+
+    def _end_late(self) -> None:
+        self._is_late = True
+        self._process.kill()
+
+
+def serve(folder: str) -> None:
+    """Do the jobs of a Child, of which this is the process; `folder` as in Child."""
+    if hasattr(signal, "SIGHUP"):  # of a terminal that closes, which ends the parent
+        signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    questions, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
+    os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
+    os.dup2(2, 1)  # what a library prints is no answer
+    sys.stdout = sys.stderr
+    jobs: SimpleQueue[bytes] = SimpleQueue()
+
+    def receive() -> bool:
+        jobs.put(pickle.load(questions))
+        return True
+
+    _end_with_parent(receive, lambda: shutil.rmtree(folder, ignore_errors=True))
+    with suppress(OSError):
+        while True:
+            for answer in _answers(jobs.get()):
+                _send(answer, answers)
+    os._exit(ENDED)
+
+
+def interrupt_with_parent() -> None:
+    """Interrupt this process as Ctrl-C does when its parent has ended, and end it after GRACE_S."""
+
+    def interrupt() -> None:
+        if os.name == "posix":
+            os.kill(os.getpid(), signal.SIGINT)
+        else:
+            _thread.interrupt_main()
+        time.sleep(GRACE_S)
+
+    _end_with_parent(lambda: os.read(0, 1), interrupt)
+
+
+def _end_with_parent(receive: Callable[[], object], last_act: Callable[[], None]) -> None:
+    """Receive from the parent in a thread; when its pipe is closed, do a last act and end."""
+
+    def watch() -> None:
+        with suppress(*CLOSED):
+            while receive():
+                pass
+        last_act()
+        os._exit(ENDED)
+
+    threading.Thread(target=watch, daemon=True).start()
+
+
+def _answers(job: bytes) -> Iterator[bytes]:
+    """Pickles of (True, answer) for the answers of a pickled job, or of (False, exception)."""
+    try:
+        function, arguments = pickle.loads(job)
+        answer = function(*arguments)
+        for one in answer if isgenerator(answer) else (answer,):
+            yield pickle.dumps((True, one), pickle.HIGHEST_PROTOCOL)
+    except Exception as error:
+        yield pickle.dumps((False, _picklable(error)), pickle.HIGHEST_PROTOCOL)
+
+
+def _send(content: bytes, pipe: Any) -> None:
+    pickle.dump(content, pipe, pickle.HIGHEST_PROTOCOL)  # which tells where the bytes end
+    pipe.flush()
+
+
+def _picklable(error: Exception) -> Exception:
+    """Return the error, or its text if its class takes other arguments than it stores."""
+    try:
+        pickle.loads(pickle.dumps(error))
+    except Exception:
+        return RuntimeError(f"{type(error).__name__}: {error}")
+    return error
