@@ -35,7 +35,7 @@ def draw_coverage(
 
 
 def render_coverage(job: dict[str, Any]) -> None:
-    """Draw each result in its chamber and its target from near, in the drawing process."""
+    """Draw each result in its chamber and its target from near, in a child."""
     folders, titles = [Path(folder) for folder in job["folders"]], job["titles"]
     chambers = [read_surface(folder / CHAMBER) for folder in folders]
     parts = [

@@ -72,7 +72,7 @@ def require_pixels(pixels: int) -> None:
 
 
 def render_dents(job: dict[str, Any]) -> None:
-    """Draw the picture in the drawing process."""
+    """Draw the picture in a child."""
     diameter = 2e6 * job["radius"]  # µm
     low, high = np.percentile(diameter, [1.0, 99.0]) if len(diameter) else (0.0, 1.0)
     colours, limits = dent_colours(), (float(low), max(float(high), float(low) + 1.0))

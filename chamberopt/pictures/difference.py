@@ -59,7 +59,7 @@ def draw_difference(surface: str | Path, titles: Sequence[str], picture: str | P
 
 
 def render_difference(job: dict[str, Any]) -> None:
-    """Draw each candidate in the drawing process, from the direction with the largest area."""
+    """Draw each candidate in a child, from the direction with the largest area."""
     surface, titles = read_surface(Path(job["surface"])), job["titles"]
     limit = _scale_limit(surface, len(titles))
     on_target = np.asarray(surface["target"]) > 0

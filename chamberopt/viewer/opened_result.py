@@ -27,7 +27,7 @@ _REMEDIES = {  # for a quantity that a result lacks
 
 @dataclass(frozen=True)
 class ResultInfo:
-    """The data of a result.json for the viewer, plain enough for the drawing process.
+    """The data of a result.json for the viewer, plain enough to send to the child that draws.
 
     Attributes:
         treatment_s: peening time.

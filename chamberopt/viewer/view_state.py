@@ -6,8 +6,7 @@ import difflib
 import math
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
-from typing import Any
+from dataclasses import dataclass, replace
 
 from chamberopt.common.errors import InputError
 from chamberopt.pictures.camera import Vector
@@ -82,11 +81,6 @@ class ViewState:
         if self.cut_part and self.cut is None:
             raise InputError("--cut-part: add --clip X, Y or Z to say where")
 
-    @staticmethod
-    def from_json(values: dict[str, Any]) -> ViewState:
-        """Read the state from a drawing job, in which vectors are lists."""
-        return ViewState(**{one.name: _as_tuples(values[one.name]) for one in fields(ViewState)})
-
 
 def parse_clip(text: str) -> Plane:
     """Read --clip: X, Y or Z, and an optional place on the axis in mm.
@@ -151,7 +145,3 @@ def state_after_key(
     if key == "h":
         return replace(state, keys=not state.keys)
     return first if key == "r" else state
-
-
-def _as_tuples(value: Any) -> Any:
-    return tuple(_as_tuples(one) for one in value) if isinstance(value, list) else value

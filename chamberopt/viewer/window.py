@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Sequence
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -40,8 +40,7 @@ def inspect(
             quantity, or there is no display.
     """
     if screenshot is not None:
-        results = [asdict(one) for one in infos]
-        job = {"results": results, "state": asdict(state)}
+        job = {"results": infos, "state": state}
         with claim_file(picture_path(screenshot)) as path:
             skipped = draw_in_subprocess(render_inspect, job, path)
         if skipped:
@@ -57,10 +56,9 @@ def inspect(
 
 
 def render_inspect(job: dict[str, Any]) -> None:
-    """Draw the window's content in the drawing process."""
-    state = ViewState.from_json(job["state"])
-    results = open_results([ResultInfo(**one) for one in job["results"]], state)
-    view = ResultPlotter(results, off_screen=True)
+    """Draw the window's content in a child."""
+    state = job["state"]
+    view = ResultPlotter(open_results(job["results"], state), off_screen=True)
     view.draw(state)
     view.aim(state)
     write_screenshot(view.plotter, job["picture"])

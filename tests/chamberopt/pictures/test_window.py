@@ -3,7 +3,6 @@
 import json
 import subprocess
 import sys
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -108,13 +107,8 @@ def test_screenshot_without_a_display(
         ViewState("speed", below=90.0),
     )
     inspect([subject], look, tmp_path / "shot.png")
-    ((job, picture),) = drawn
-    assert (job["draw"], job["results"], picture) == (
-        "inspect",
-        [asdict(subject)],
-        tmp_path / "shot.png",
-    )
-    assert ViewState.from_json(json.loads(json.dumps(job["state"]))) == look
+    job = {"results": [subject], "state": look}
+    assert drawn == [(window.render_inspect, job, tmp_path / "shot.png")]
     if sys.platform.startswith("linux"):
         with pytest.raises(InputError, match=r"no display.*--screenshot"):
             inspect([subject], look)

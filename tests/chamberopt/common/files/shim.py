@@ -120,7 +120,7 @@ def run_traced(words: Sequence[str]) -> int:
 def run_drawing(words: Sequence[str]) -> int:
     """Run a command, or "save"; pictures of VTK are written, but have nothing on them."""
 
-    def drawn(job: dict[str, Any], picture: str | Path, *_: Any) -> None:
+    def drawn(render: Any, job: Any, picture: str | Path, *_: Any, **__: Any) -> None:
         written.write_bytes(Path(picture), b"a picture")
 
     subprocess_drawing.missing_opengl = lambda: None
