@@ -33,7 +33,7 @@ from chamberopt.peening.measured import Measured, MeasuredDents, dent_errors, wi
 from chamberopt.peening.next_measurement import predict
 from chamberopt.peening.posterior import Model
 from chamberopt.peening.probes import ArcProbe, PartProbe, SaturationProbe, whole_target
-from chamberopt.peening.setups import SIMULATED, DropModel, Setup, exact_calibration, simulate_setup
+from chamberopt.peening.setups import DropModel, Setup, exact_calibration, simulate_setup
 from chamberopt.peening.strip import StripSize, strip_cells
 from chamberopt.peening.strip_holder import strip_design
 from chamberopt.simulation.evaluate import evaluate

@@ -52,7 +52,8 @@ ROUNDING = 1e-9  # of a sum of costs
 
 Observe = Callable[[], Observations]
 """Returns what the model learns from the first points, those with scores."""
-Question, Answer = TypeVar("Question"), TypeVar("Answer")
+Question = TypeVar("Question")
+Answer = TypeVar("Answer", contravariant=True)
 Wait = Generator[np.ndarray | None, None, None]
 """Yields points to evaluate, and None where it needs one more score first."""
 
