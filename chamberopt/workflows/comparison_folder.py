@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
-from typing import Any
 
 from chamberopt.common.errors import InputError
 from chamberopt.common.files import make_folder, write_text
@@ -12,6 +10,7 @@ from chamberopt.documents.comparison import comparison_text
 from chamberopt.pictures.comparison import draw_distributions
 from chamberopt.pictures.coverage import draw_coverage
 from chamberopt.pictures.difference import draw_difference, write_differences
+from chamberopt.results.command_records import comparison_record, write_record
 from chamberopt.results.compare.comparison import Comparison, require_same_triangles
 from chamberopt.results.compare.distributions import distributions
 from chamberopt.results.compare.local_difference import (
@@ -51,9 +50,7 @@ def write_comparison(folder: str | Path, comparison: Comparison) -> list[str]:
     remarks = [comparison_picture(folder / "compare.png", comparison)]
     local = [local_difference(surfaces[0], other) for other in surfaces[1:]]
     remarks.append(_draw_differences(folder, comparison, local))
-    data: dict[str, Any] = comparison.as_json() | {"distributions": spread.as_json()}
-    data["local_differences_to_first"] = [one.as_json() for one in local]
-    write_text(folder / COMPARE, json.dumps(data, indent=2, allow_nan=False) + "\n")
+    write_record(folder / COMPARE, comparison_record(comparison, spread, local))
     return [text for text in remarks if text]
 
 

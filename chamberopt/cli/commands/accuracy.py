@@ -27,12 +27,13 @@ def accuracy(
     from chamberopt.common.executor import local_executor
     from chamberopt.common.progress import step
     from chamberopt.design.load import load_design
+    from chamberopt.documents.accuracy import accuracy_lines
     from chamberopt.simulation.convergence import (
         describe_cost,
         require_budget,
         run_convergence_study,
     )
-    from chamberopt.workflows.save_accuracy import accuracy_text, write_accuracy_results
+    from chamberopt.workflows.save_accuracy import save_accuracy
 
     require_budget(budget_s)
     one = load_design(design)
@@ -41,5 +42,5 @@ def accuracy(
         with local_executor() as executor:
             study = run_convergence_study(one, budget_s, executor, compile_with_message)
         with step("writing and drawing"):
-            write_accuracy_results(folder, study)
-    print_result(accuracy_text(study), folder, json, "accuracy.json")
+            save_accuracy(folder, study)
+    print_result(accuracy_lines(study), folder, json, "accuracy.json")

@@ -35,8 +35,7 @@ def calibrate(
     from chamberopt.peening.calibrate import calibrate as find
     from chamberopt.peening.calibrate import prepare
     from chamberopt.peening.measured import load_measured
-    from chamberopt.peening.next_measurement import predict
-    from chamberopt.workflows.save_calibration import calibration_text, write_calibration_results
+    from chamberopt.workflows.save_calibration import save_calibration
 
     loaded, designs = load_measured(measured)
     with (
@@ -50,5 +49,5 @@ def calibrate(
         with step("simulations") as progress:
             found = find(loaded, designs, prepared, executor, progress)
         with step("writing and drawing"):
-            write_calibration_results(folder, found)
-    console.print_result(calibration_text(found, predict(found)), folder, json, "calibration.json")
+            lines = save_calibration(folder, found)
+    console.print_result(lines, folder, json, "calibration.json")

@@ -64,8 +64,9 @@ def strip(
     from chamberopt.common.progress import step
     from chamberopt.design.load import load_design
     from chamberopt.design.zones import LID
+    from chamberopt.documents.strip import strip_lines
     from chamberopt.peening.virtual_strip import peen_strip, strip_in_lid, strip_in_zone
-    from chamberopt.workflows.save_strip import strip_text, write_strip_results
+    from chamberopt.workflows.save_strip import save_strip
     from chamberopt.workflows.simulate import resolve_effects
 
     size = _size(disc_mm, size_mm)
@@ -92,9 +93,9 @@ def strip(
         with step("replicas", resolved.process.accuracy.replicas) as progress:
             peened = peen_strip(setting, chamber, executor, progress)
         with step("writing and drawing"):
-            write_strip_results(folder, peened)
+            save_strip(folder, peened)
     notes = console.note_lines([*map(str, advice), *peened.notes])
-    console.print_result([*strip_text(peened), *notes], folder, json, "strip.json")
+    console.print_result([*strip_lines(peened), *notes], folder, json, "strip.json")
 
 
 def _size(disc_mm: float | None, size_mm: tuple[float, float] | None) -> StripSize:

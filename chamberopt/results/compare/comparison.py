@@ -148,26 +148,6 @@ class Comparison:
     differences: dict[str, tuple[Difference, ...]]
     confidence: float
 
-    def as_json(self) -> dict[str, Any]:
-        """Return the comparison as plain JSON values."""
-        return {
-            "results": [str(result.folder) for result in self.results],
-            "labels": list(self.labels),
-            "parameters": {name: list(values) for name, values in self.parameters.items()},
-            "metrics": {
-                name: [one.interval_json() for one in values]
-                for name, values in self.metrics.items()
-            },
-            "confidence_of_each_difference": self.confidence,
-            "differences_to_first": {
-                name: [gap.as_json() for gap in gaps] for name, gaps in self.differences.items()
-            },
-            "coverage_against_time": [
-                [row.as_json() for row in result.record.coverage_against_time]
-                for result in self.results
-            ],
-        }
-
 
 def compare(paths: Sequence[str | Path]) -> Comparison:
     """Compare results folders of the same part and target with the first of them.

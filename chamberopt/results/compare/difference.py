@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
 
 import numpy as np
 
@@ -52,15 +51,10 @@ class Difference:
         """Whether the difference is larger than its half-width."""
         return not self.in_words and abs(self.value) > self.half_width
 
-    def as_json(self) -> dict[str, Any]:
-        """Return plain JSON values."""
-        return {
-            **Estimate(self.value, self.half_width, in_words=self.in_words).interval_json(),
-            "paired": self.paired,
-            "real": self.real,
-            "times_as_long": self.time_ratio,
-            "replicas": self.replicas,
-        }
+    @property
+    def estimate(self) -> Estimate:
+        """The difference with its interval."""
+        return Estimate(self.value, self.half_width, in_words=self.in_words)
 
 
 def confidence_of_each(comparisons: int) -> float:

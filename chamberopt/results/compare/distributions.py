@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -27,11 +26,6 @@ class Histogram:
     edges: np.ndarray
     shares: tuple[np.ndarray, ...]
 
-    def as_json(self) -> dict[str, Any]:
-        """Return plain JSON values."""
-        shares = [one.tolist() for one in self.shares]
-        return {"unit": self.unit, "edges": self.edges.tolist(), "shares": shares}
-
 
 @dataclass(frozen=True)
 class Distributions:
@@ -52,17 +46,6 @@ class Distributions:
     impacts: tuple[int, ...]
     mean_speed: tuple[float | None, ...]
     mean_angle: tuple[float | None, ...]
-
-    def as_json(self) -> dict[str, Any]:
-        """Return plain JSON values."""
-        return {
-            "coverage": self.coverage.as_json(),
-            "normal_speed": self.speed.as_json(),
-            "angle": self.angle.as_json(),
-            "impacts": list(self.impacts),
-            "mean_normal_speed_m_s": list(self.mean_speed),
-            "mean_angle_deg": list(self.mean_angle),
-        }
 
 
 def distributions(candidates: Sequence[TargetSurface]) -> Distributions:

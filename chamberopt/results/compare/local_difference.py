@@ -133,10 +133,6 @@ class LocalDifference:
     more: float
     less: float
 
-    def as_json(self) -> dict[str, float]:
-        """Return the figures of the whole target as plain JSON values."""
-        return {"share_more": self.more, "share_less": self.less, "averaged_over_mm": self.radius}
-
 
 def local_difference(first: TargetSurface, other: TargetSurface) -> LocalDifference:
     """Compute other - first for two results of one part and target.

@@ -19,6 +19,7 @@ from chamberopt.coverage.part_impacts import Hits
 from chamberopt.design.calibration import Parameter, calibrated_strip
 from chamberopt.design.design import validate
 from chamberopt.design.load import load_design, save_design
+from chamberopt.documents.calibration import calibration_lines
 from chamberopt.peening.calibrate import Calibrated, calibrate, prepare
 from chamberopt.peening.measured import Measured, load_measured
 from chamberopt.peening.next_measurement import predict
@@ -26,7 +27,7 @@ from chamberopt.peening.posterior import TOGETHER, fit_surface
 from chamberopt.peening.probes import ArcProbe, Impacts, PartProbe
 from chamberopt.peening.setups import DropModel, Setup, exact_calibration
 from chamberopt.peening.strip import StripSize, strip_cells
-from chamberopt.workflows.save_calibration import calibration_text, write_calibration_results
+from chamberopt.workflows.save_calibration import save_calibration
 from tests.helpers.synthetic import plate_design
 
 TRUTH: dict[Parameter, float] = {
@@ -143,7 +144,7 @@ def test_figures_of_the_design_are_predicted(found: Calibrated) -> None:
 
 
 def test_the_result_is_a_machine_that_designs_can_name(found: Calibrated, tmp_path: Path) -> None:
-    write_calibration_results(tmp_path, found)
+    save_calibration(tmp_path, found)
     names = {one.name for one in tmp_path.iterdir()}
     assert names == {
         "calibration.json", "calibration.png", "calibration.txt", "design.toml", "machine.toml",
@@ -156,7 +157,7 @@ def test_the_result_is_a_machine_that_designs_can_name(found: Calibrated, tmp_pa
     assert design == load_design(tmp_path / "design.toml")
     data = json.loads((tmp_path / "calibration.json").read_text("utf-8"))
     assert data["parameters"]["K"]["log_sd"] < data["parameters"]["K"]["log_sd_before"]
-    text = "\n".join(calibration_text(found, predict(found)))
+    text = "\n".join(calibration_lines(found, predict(found)))
     assert "arc heights" in text
     assert "does not explain" not in text
 
@@ -171,7 +172,7 @@ def test_without_strips_there_is_no_intensity_and_it_is_said(tmp_path: Path) -> 
     found = calibrated(tmp_path, data)
     assert not found.table.has_strips
     assert {one.name for one in predict(found)} == {"coverage_rate"}
-    assert "no intensity in mmA" in "\n".join(calibration_text(found, predict(found)))
+    assert "no intensity in mmA" in "\n".join(calibration_lines(found, predict(found)))
 
 
 def test_what_the_model_cannot_explain_is_said_and_widens_intervals(
@@ -190,7 +191,7 @@ def test_what_the_model_cannot_explain_is_said_and_widens_intervals(
     assert flat["intensity"].sd > 2.5 * fit["intensity"].sd
     assert flat["intensity"].next_sd > 2.0 * fit["intensity"].sd  # more strips are no better
     assert flat["saturation_time"].sd > fit["saturation_time"].sd
-    text = "\n".join(calibration_text(worse, predict(worse)))
+    text = "\n".join(calibration_lines(worse, predict(worse)))
     assert "does not explain your arc heights: their errors are taken" in text
     assert "strip.1 (60 µm peak to valley): the arc after 160 s is below an earlier one" in text
 
@@ -204,7 +205,7 @@ def test_parameters_that_nobody_expects_widen_intervals_too(tmp_path: Path) -> N
     scales = {one.kind: one.error_scale for one in worse.table.misfits}
     assert scales["arc heights"] == 1.0
     assert scales[TOGETHER] > 1.2
-    text = "\n".join(calibration_text(worse, predict(worse)))
+    text = "\n".join(calibration_lines(worse, predict(worse)))
     assert "dents on strips is " in text
     assert "or give what you know as [prior] beta" in text
 

@@ -7,6 +7,7 @@ import pytest
 
 from chamberopt.common.estimate import Estimate, estimate, student_quantile
 from chamberopt.design.load import load_design
+from chamberopt.documents.accuracy import describe_error_law
 from chamberopt.simulation.convergence import (
     ELASTIC_SPEED,
     FACETS,
@@ -19,7 +20,6 @@ from chamberopt.simulation.convergence import (
 )
 from chamberopt.simulation.error_law import BatchSize, ErrorLaw
 from chamberopt.simulation.recommendation import recommend, replicas_for
-from chamberopt.workflows.save_accuracy import describe_error_law
 from tests.helpers.synthetic import DESIGNS
 
 

@@ -18,6 +18,7 @@ from chamberopt.coverage.compression import ERROR
 from chamberopt.coverage.metrics import NEVER, find_metric
 from chamberopt.design.load import load_design
 from chamberopt.documents.comparison import comparison_text
+from chamberopt.results.command_records import difference_record
 from chamberopt.results.compare.comparison import compare
 from chamberopt.results.compare.difference import MAX_TIME_RATIO, confidence_of_each, difference
 from chamberopt.results.vtp_files import read_surface
@@ -172,8 +173,8 @@ def test_a_figure_without_a_number_is_written_in_words_and_not_ranked(
     assert words in line
     assert line.split()[-3:] == ["not", "known", "no"]
     assert "1000000" not in line
-    assert both.as_json()["metrics"]["time_to_98_s"][1]["in_words"] == words
-    assert gap.as_json()["half_width"] is None
+    assert both.metrics["time_to_98_s"][1].in_words == words
+    assert difference_record(gap).half_width is None
 
 
 def test_three_results_and_what_is_written(tmp_path: Path) -> None:

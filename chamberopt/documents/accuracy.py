@@ -1,0 +1,91 @@
+"""What is said of a convergence study: its reference, the error law, biases, recommendations."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from chamberopt.simulation.convergence import FACETS, setting_text, short_name
+from chamberopt.simulation.recommendation import ACCURACIES, recommend
+
+if TYPE_CHECKING:
+    from chamberopt.common.estimate import Estimate
+    from chamberopt.simulation.convergence import ConvergenceStudy
+
+
+def accuracy_lines(study: ConvergenceStudy) -> list[str]:
+    """The lines that the command prints."""
+    lines = [
+        describe_reference(study),
+        "",
+        f"{'replicas':>10}{'CPU s':>9}{'RMS error':>12}{'95 % interval':>20}{'own interval':>15}",
+    ]
+    for size in study.sizes:
+        low, high = size.interval
+        lines.append(
+            f"{size.replicas:10}{size.cpu_s:9.2f}{size.rms:12.4f}{low:11.4f} .. {high:.4f}"
+            f"{f'± {size.half_width:.4f}':>15}"
+        )
+    lines += [
+        describe_error_law(study),
+        "",
+        f"{'parameter':24}{'setting':>24}{'CPU s a replica':>19}"
+        f"{'bias of objective':>21}{'of mean coverage':>21}",
+    ]
+    for run in study.runs:
+        cpu = f"{run.cpu.value:.3f} ± {run.cpu.half_width:.3f}"
+        biases = "".join(f"{_signed(bias):>21}" for bias in (run.bias, run.mean_bias))
+        lines.append(f"{short_name(run.parameter):24}{run.setting:>24}{cpu:>19}{biases}")
+    for accuracy in ACCURACIES:
+        lines += ["", *recommend(study, accuracy).lines]
+    total = f"{study.cpu_s:.0f} CPU s of simulation, {study.wall_s:.0f} s in all with compiling"
+    return [*lines, "", total]
+
+
+def _signed(bias: Estimate) -> str:
+    exact = bias.value == bias.half_width == 0.0
+    return "0" if exact else f"{bias.value:+.4f} ± {bias.half_width:.4f}"
+
+
+def describe_reference(study: ConvergenceStudy) -> str:
+    """Settings and estimates of the reference."""
+    run = study.reference
+    settings = ", ".join(
+        f"{short_name(name)} {setting_text(value)}" for name, value in study.settings.items()
+    )
+    walls = f"; no chamber here has a round wall, so {FACETS} can only be compared with the finest"
+    remark = walls if FACETS in study.settings else ""
+    return (
+        f"reference: {run.replicas} replicas with {settings}: objective {run.objective.value:.4f} "
+        f"± {run.objective.half_width:.2g}, mean coverage {run.mean.value:.4f} ± "
+        f"{run.mean.half_width:.2g}, in {run.replicas * run.cpu.value:.0f} CPU s{remark}"
+    )
+
+
+def describe_error_law(study: ConvergenceStudy) -> str:
+    """The cost of halving the error, and the reason if it is not 4."""
+    law, sizes = study.law, study.sizes
+    middle, low, high = law.halving
+    unresolved = [str(size.replicas) for size in sizes if not size.is_resolved]
+    left_out = len(unresolved) <= len(sizes) - 2
+    reason = "as independent replicas should: 4"
+    if high < 4.0:
+        reason = "less than the 4 of independent replicas"
+        if not left_out:
+            reason += ", because the windows have too few dents, and more replicas end it"
+    elif low > 4.0:
+        estimating = 1.0 - sizes[-1].replicas * study.reference.cpu.value / sizes[-1].cpu_s
+        reason = (
+            "more than the 4 of independent replicas: some replicas differ much from the others, "
+            f"or the estimate, {estimating:.0%} of the largest batch's time, takes too long"
+        )
+    text = (
+        f"more replicas alone: halving the error costs {middle:.2f} times as much "
+        f"({low:.2f} to {high:.2f}), {reason} "
+        f"(error ~ cost^-{law.power:.2f} ± {law.half_width:.2f})"
+    )
+    if unresolved and left_out:
+        text += (
+            f"; {', '.join(unresolved)} replicas are left out, because their windows have too few "
+            "dents"
+        )
+    return text
