@@ -41,7 +41,6 @@ class TouchPoints(NamedTuple):
         return np.asarray(self.point + self.radius[:, None] * self.normal)
 
     def select(self, rows: np.ndarray) -> TouchPoints:
-        """The touch points of the given rows."""
         return TouchPoints(*(column[rows] for column in self))
 
 

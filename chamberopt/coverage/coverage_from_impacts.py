@@ -133,7 +133,6 @@ def in_batches(replicas: Sequence[T]) -> list[Sequence[T]]:
 
 
 def joined(replicas: Sequence[Prints]) -> Prints:
-    """The footprints of several replicas together."""
     if len(replicas) == 1:
         return replicas[0]
     return JoinedFootprints(
@@ -145,7 +144,6 @@ def joined(replicas: Sequence[Prints]) -> Prints:
 
 
 def batches_of(replicas: Sequence[Prints]) -> list[Batch]:
-    """The footprints of replicas in batches."""
     return [Batch(len(part), joined(part)) for part in in_batches(replicas)]
 
 
@@ -176,7 +174,6 @@ class LocatedDents(NamedTuple):
     edge: np.ndarray
 
     def select(self, rows: slice) -> LocatedDents:
-        """The dents in the given rows."""
         columns = (self.triangle, self.radius, self.edge)
         return LocatedDents(self.contacts.select(rows), *(one[rows] for one in columns))
 

@@ -47,7 +47,6 @@ class Hits:
         return self.select(triangles[self.triangle])
 
     def select(self, rows: slice | np.ndarray) -> Hits:
-        """The impacts in the given rows."""
         return Hits(*(getattr(self, column.name)[rows] for column in fields(Hits)))
 
 

@@ -74,7 +74,6 @@ def write_stl_per_surface(folder: Path, out: Path) -> None:
 
 
 def write_3mf(folder: Path, file: Path) -> None:
-    """Write the cavity as 3MF."""
     cavity = read_cavity(folder)
     entries = {
         "[Content_Types].xml": '<Types xmlns="http://schemas.openxmlformats.org/package/2006/content-types">'

@@ -135,7 +135,6 @@ def _wrapped(text: str, pixels: float, font: int) -> str:
 
 
 def _draw_panel(axes: Axes, panel: Panel) -> None:
-    """Draw the view, and its axes and its scale below."""
     from matplotlib.patches import Rectangle
 
     rows, columns = panel.view.image.shape[:2]

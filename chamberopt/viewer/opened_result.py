@@ -73,7 +73,6 @@ class OpenedResult:
 
     @property
     def quantities(self) -> list[str]:
-        """Names of the quantities that the result has."""
         there = [*self.part.whole.point_data, *([ZONE] if self.part.zones else [])]
         return [name for name, one in QUANTITIES.items() if one.column in there]
 

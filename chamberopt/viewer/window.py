@@ -117,7 +117,6 @@ class Window:
         self.view.plotter.render()
 
     def press_key(self, key: str) -> None:
-        """React to a key."""
         if key == "r":
             self._remove_handles()
         self.change(state_after_key(self.state, key, self.first, self.view.quantities))

@@ -84,7 +84,6 @@ def surface_pieces(
 
 
 def joined_pieces(one: SurfacePieces, two: SurfacePieces) -> SurfacePieces:
-    """The pieces of two surfaces together."""
     return SurfacePieces(*(np.concatenate(both) for both in zip(one, two, strict=True)))
 
 

@@ -45,7 +45,6 @@ class Places(NamedTuple):
     face: np.ndarray
 
     def select(self, rows: np.ndarray | slice) -> Places:
-        """The places in the given rows."""
         return Places(*(column[rows] for column in self))
 
 
@@ -86,7 +85,6 @@ class Windows:
         return Windows(self.points, radius, self.faces, self.division)
 
     def select(self, rows: np.ndarray) -> Windows:
-        """The windows in the given rows."""
         return Windows(self.points.select(rows), self.radius, self.faces, self.division[rows])
 
     def pairs(self, contacts: Places) -> Iterator[tuple[np.ndarray, np.ndarray]]:
