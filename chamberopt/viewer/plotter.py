@@ -139,7 +139,7 @@ class ResultPlotter:
         return Room(left, right, BELOW, overlay.title_height(title, size))
 
     def _eye(self, results: Sequence[OpenedResult], state: ViewState) -> np.ndarray:
-        """Direction to the eye: the wanted direction, the triangle's, or where targets are seen."""
+        """Direction to the eye: as wanted, from the chosen triangle, or facing most targets."""
         if state.eye is not None:
             return np.array(state.eye)
         first = results[0]
@@ -252,7 +252,7 @@ def _menu(names: Sequence[str], state: ViewState) -> str:
 def _triangle_lines(
     result: OpenedResult, triangle: int, state: ViewState
 ) -> tuple[list[str], np.ndarray]:
-    """Return the lines on a triangle, and its impact speeds (k,) [m/s]."""
+    """Return lines of text on a triangle, and its impact speeds (k,) [m/s]."""
     return result.describe_triangle(triangle, state), result.hits.of(triangle).speed
 
 

@@ -178,8 +178,8 @@ class Reach(NamedTuple):
 def reach_from(fits: np.ndarray) -> Reach:
     """The reach, from marks (p,) of points where a ball fits.
 
-    A ball may fit at all points although a share of 3 / p is out of reach, with a probability of 5
-    %: the rule of three (J. A. Hanley and A. Lippman-Hand, J. Am. Med. Assoc. 249 (1983) 1743).
+    With a probability of 5 %, a ball fits at all points although a share of 3 / p is out of reach:
+    the rule of three (J. A. Hanley and A. Lippman-Hand, J. Am. Med. Assoc. 249 (1983) 1743).
     """
     scatter = sampling_errors(np.array([some.mean() for some in sparse_points(fits)]))
     least = RULE_OF_THREE / len(fits) / normal_quantile(CONFIDENCE)
