@@ -1,7 +1,7 @@
-"""Child processes of Python: they work for this process and end with it, however it ends.
+"""Child processes of Python: they work for this process, their parent, and end with it.
 
-The standard input of a child is a pipe from its parent. The operating system closes the parent's
-end when the parent ends, also when the parent is killed. A thread of the child waits for that.
+The standard input of a child is a pipe from its parent. The operating system closes the pipe when
+the parent ends, also when the parent is killed. A thread of the child waits for the pipe to close.
 """
 
 from __future__ import annotations
@@ -25,8 +25,9 @@ from typing import Any, Self
 
 ENDED = 130  # exit status of a child whose parent has ended, as after Ctrl-C
 GRACE_S = 2.0  # in which an interrupted command removes what it has not finished
-TOO_MUCH_CPU = -getattr(signal, "SIGXCPU", math.inf)  # exit status, of limits.limit_cpu_time
-CLOSED = (EOFError, OSError, ValueError, pickle.UnpicklingError)  # errors of a pipe without an end
+TOO_MUCH_CPU = -getattr(signal, "SIGXCPU", math.inf)  # exit status at limits.limit_cpu_time
+# Errors at a pipe whose other end has closed, perhaps in the midst of a pickle, or that was closed.
+CLOSED = (EOFError, OSError, ValueError, pickle.UnpicklingError)
 BEGIN = "import json, signal, sys; sys.path[:] = json.loads(sys.argv.pop(1)); "
 # A terminal sends Ctrl-C to all of its processes, and only the parent reacts to it.
 SERVE = (
@@ -36,15 +37,16 @@ SERVE = (
 
 
 def start_python(code: str, *arguments: str, **options: Any) -> subprocess.Popen[Any]:
-    """Start a process that runs Python code, with pipes at its standard input and output.
+    """Start a child with pipes at its standard input and output.
 
     Args:
-        code: ends the process when its standard input is closed; `signal` and `sys` are imported.
-        arguments: sys.argv[1:] of the process.
-        options: of subprocess.Popen.
+        code: Python code, which must end the child when the standard input closes; `signal` and
+            `sys` are imported before.
+        arguments: sys.argv[1:] of the child.
+        options: further arguments of subprocess.Popen.
     """
     path = json.dumps([str(one) for one in sys.path if one])
-    # -P: a file json.py in the folder where the process runs is no module of the process
+    # -P: the child imports no json.py that lies in its working folder
     command = [sys.executable, "-P", "-c", BEGIN + code, path, *arguments]
     return subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, **options)
 
@@ -63,15 +65,15 @@ class ChildLostError(Exception):
 
 
 class Child:
-    """A process that does one job after another; the end of a `with` block ends the process."""
+    """A child that does one job after another until the end of a `with` block, which kills it."""
 
     def __init__(self, seconds: float = math.inf, folder: str = "", **options: Any) -> None:
-        """Start the process.
+        """Start the child.
 
         Args:
-            seconds: after which the process is killed.
-            folder: removed by the process if its parent ends first.
-            options: of subprocess.Popen.
+            seconds: time after which the child is killed.
+            folder: path of a folder that the child removes if its parent ends first.
+            options: further arguments of subprocess.Popen.
         """
         self._process = start_python(SERVE, folder, **options)
         self._timer, self._is_late = threading.Timer(seconds, self._end_late), False
@@ -87,23 +89,25 @@ class Child:
 
     @property
     def pid(self) -> int | None:
-        """Number of the process; None if the process has ended."""
+        """Number of the process; None after its end."""
         return self._process.pid if self._process.poll() is None else None
 
     def ask(self, function: Callable[..., Any], *arguments: Any) -> None:
-        """Send a job: a function that can be imported, and its arguments.
+        """Send a job: a function that the child can import, and the function's arguments.
 
-        A generator function gives an answer for each value that it yields.
+        The job has one answer, the function's value. A generator has an answer for each value that
+        it yields.
         """
         job = pickle.dumps((function, arguments), pickle.HIGHEST_PROTOCOL)
-        with suppress(*CLOSED):  # the process has ended, as `answer` tells
+        with suppress(*CLOSED):  # the child has ended, as `answer` tells
             _send(job, self._process.stdin)
 
     def answer(self) -> Any:
-        """Wait for the next answer; an exception of the job is raised here.
+        """Wait for the next answer. An exception that the job raises is its last answer.
 
         Raises:
-            ChildLostError: the process has ended.
+            ChildLostError: the child has ended.
+            Exception: the job's exception.
         """
         try:
             answer = pickle.load(self._process.stdout)  # type: ignore[arg-type]
@@ -117,7 +121,7 @@ class Child:
         return value
 
     def end(self) -> int:
-        """Kill the process if it still runs, and return its exit status."""
+        """Kill the child if it still runs, and return its exit status."""
         self._timer.cancel()
         self._process.kill()
         status = self._process.wait()
@@ -132,8 +136,8 @@ class Child:
 
 
 def serve(folder: str) -> None:
-    """Do the jobs of a Child, of which this is the process; `folder` as in Child."""
-    if hasattr(signal, "SIGHUP"):  # of a terminal that closes, which ends the parent
+    """Do the jobs of a Child in the process that it started; `folder` as in Child."""
+    if hasattr(signal, "SIGHUP"):  # a terminal that closes ends the parent, which ends this
         signal.signal(signal.SIGHUP, signal.SIG_IGN)
     questions, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
     os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
@@ -167,7 +171,12 @@ def interrupt_with_parent() -> None:
 
 
 def _end_with_parent(receive: Callable[[], object], last_act: Callable[[], None]) -> None:
-    """Receive from the parent in a thread; when its pipe is closed, do a last act and end."""
+    """End this process after a last act when the parent has ended.
+
+    Args:
+        receive: reads from the pipe in a thread; false, or an error of CLOSED, at its end.
+        last_act: called before the end.
+    """
 
     def watch() -> None:
         with suppress(*CLOSED):
@@ -191,12 +200,12 @@ def _answers(job: bytes) -> Iterator[bytes]:
 
 
 def _send(content: bytes, pipe: Any) -> None:
-    pickle.dump(content, pipe, pickle.HIGHEST_PROTOCOL)  # which tells where the bytes end
+    pickle.dump(content, pipe, pickle.HIGHEST_PROTOCOL)  # a pickle tells where its bytes end
     pipe.flush()
 
 
 def _picklable(error: Exception) -> Exception:
-    """Return the error, or its text if its class takes other arguments than it stores."""
+    """Return the error, or a RuntimeError with its text if its pickle cannot be read."""
     try:
         pickle.loads(pickle.dumps(error))
     except Exception:

@@ -1,9 +1,8 @@
 """Worker processes on this machine.
 
-What the simulator leaves to Python runs in parallel too, and a task that crashes its process fails
-alone. The process pool of concurrent.futures cannot do that: it breaks as a whole when one of its
-processes dies, and does not tell which task caused it. Here each worker process is fed by a thread
-of its own, one task at a time.
+Python code runs in parallel in them, and a task that crashes its process fails alone. The process
+pool of concurrent.futures breaks as a whole when one process dies, and does not tell which task
+crashed. Here each worker process has a thread that hands it one task at a time.
 """
 
 from __future__ import annotations
@@ -25,14 +24,14 @@ from chamberopt.common.errors import WorkerLostError
 from chamberopt.common.files import private_folder, read_file, remove_file, write_bytes
 from chamberopt.common.memory import MEMORY
 
-# A process may die by chance, for example when another program takes all memory. If two die of the
-# same task, the task is the cause.
+# A process may die by chance, for example when another program takes all memory. If two processes
+# die of the same task, the task is the cause.
 MAX_ATTEMPTS = 2
-MAX_SHARED = 4  # shared values that a worker keeps, of candidates that are evaluated at a time
+MAX_SHARED = 4  # shared values that a worker keeps, one for each candidate in progress
 
 
 class SharedFile:
-    """A value that each worker reads once from a file; its pickle holds the file's name alone."""
+    """A value that each worker reads once from a file; the pickle of this holds the path alone."""
 
     def __init__(self, value: Any, path: Path) -> None:
         self.path = path
@@ -72,14 +71,14 @@ class ProcessExecutor(Executor):
         return self._resources.enter_context(private_folder())
 
     def share(self, value: Any) -> SharedFile:
-        """Keep a value in a file until nothing refers to the file or the executor has ended."""
+        """Write a value to a file, which lasts as long as the returned object and the executor."""
         return SharedFile(value, Path(self._folder, f"{next(self._numbers)}.pickle"))
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
         return self._feeders.submit(self._run, fn, args, kwargs)
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        """End the processes after their tasks, or, without waiting, together with this program."""
+        """End the processes after their tasks or, if `wait` is false, with this program."""
         self._feeders.shutdown(wait, cancel_futures=cancel_futures)
         if wait:
             self._end()
@@ -92,11 +91,11 @@ class ProcessExecutor(Executor):
 
     @property
     def pids(self) -> list[int]:
-        """Process ids of the living workers."""
+        """Numbers of the living worker processes."""
         return [pid for worker in self._workers if (pid := worker.pid) is not None]
 
     def _run(self, fn: Callable[..., Any], args: tuple[Any, ...], kwargs: dict[str, Any]) -> Any:
-        """Run a task in this thread's process, starting the process if need be."""
+        """Run a task in this thread's process; raises the task's exception, or WorkerLostError."""
         for _ in range(MAX_ATTEMPTS):
             if self._ended:
                 break
@@ -112,7 +111,7 @@ class ProcessExecutor(Executor):
         raise WorkerLostError(f"{text}; give fewer --workers, or look at the machine's log")
 
     def _worker(self) -> Child:
-        """Return the process of this thread."""
+        """Return the process of this thread, started if need be."""
         worker: Child | None = getattr(self._of_thread, "worker", None)
         if worker is None:
             worker = self._of_thread.worker = Child(folder=self._folder)
@@ -127,7 +126,7 @@ class ProcessExecutor(Executor):
 
 
 def _do(count: int, fn: Callable[..., Any], args: tuple[Any, ...], kwargs: dict[str, Any]) -> Any:
-    """Do a task in one of so many worker processes."""
+    """Do a task in this worker process, one of `count`."""
     MEMORY.processes = count
     return fn(*args, **kwargs)
 

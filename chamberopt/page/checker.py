@@ -1,4 +1,4 @@
-"""Check designs in child processes, so that the page answers meanwhile; the newest counts."""
+"""Check designs in children, so that the server answers meanwhile; a newer question goes first."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ class SupersededError(Exception):
 
 
 class Checker:
-    """Answers of `check_answers` for one file: the cavity, and then what is reached.
+    """The two answers of `check_answers` to questions on one file: the cavity, then the reach.
 
-    A question that comes while a child works at what is reached ends that child. A spare child,
-    which has read the part already, takes its place.
+    A question ends the child that still works at the reach of an older question. A spare child,
+    which has read the part already, takes the place of the ended child.
     """
 
     def __init__(self, path: Path, text: str) -> None:
@@ -36,7 +36,7 @@ class Checker:
         self._asked: dict[Child, int] = {}  # number of the question that a child works at
 
     def cavity(self, text: str) -> tuple[int, bytes]:
-        """Return the number of this question, and the cavity of the design with this text.
+        """Return the number of this question, and the cavity of the design in a text.
 
         Raises:
             InputError, SceneError: the design cannot be built.
@@ -54,7 +54,7 @@ class Checker:
             return mine, self._answer(self._now, mine)
 
     def reach(self, number: int) -> bytes:
-        """Return what is reached in the cavity of a question; raises as `cavity` does."""
+        """Return the reach in the cavity of a question; raises as `cavity` does."""
         with self._reaching:
             child = self._now
             if self._asked.get(child) != number:
@@ -92,19 +92,19 @@ class Checker:
 
 
 def _read_ahead(path: Path, text: str) -> Iterator[bytes]:
-    """Read the part of a design in this child, which then has it for the checks; no answer."""
+    """Read the part of a design, which this child keeps for later checks; give no answer."""
     if hasattr(os, "nice"):
         os.nice(10)  # the page's own answers come first
-    with suppress(Exception):  # the first check meets the same
+    with suppress(Exception):  # the first check meets the same fault, and tells it
         part_answer(validate(Design, tomllib.loads(text), path, text))
     yield from ()
 
 
 def _check(path: Path, text: str) -> Iterator[bytes]:
-    """Give the two answers on a design, as a text; InputError or SceneError if there are none."""
+    """Give the two answers on a design's text; InputError or SceneError if it cannot be built."""
     try:
         yield from check_answers(validate(Design, tomllib.loads(text), path, text))
     except (InputError, SceneError):
         raise
-    except Exception as error:  # a fault of ours, which must not be taken for another
+    except Exception as error:  # a fault of the program, whose message must not blame the design
         raise InputError(f"the check failed: {error!r}") from None

@@ -1,4 +1,4 @@
-"""Commands that the page starts: each is a command of the command line, in a child process."""
+"""Commands of the command line that the page starts, each in a child process."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from typing import Any
 
 from chamberopt.common.child import GRACE_S, start_python
 
-MOST_LINES = 200  # of a command's remarks that the page shows
+MOST_LINES = 200  # lines of a command's remarks that the page shows, the last ones
 COMMAND = (
     "from chamberopt.common.child import interrupt_with_parent; interrupt_with_parent(); "
     "from chamberopt.cli import main; sys.exit(main())"
@@ -21,7 +21,7 @@ COMMAND = (
 
 
 class StartedCommand:
-    """A command in a folder, with what it has printed."""
+    """A command that runs in a folder, with the lines that it has printed."""
 
     def __init__(self, arguments: Sequence[str], folder: Path) -> None:
         self.arguments = list(arguments)
@@ -43,7 +43,7 @@ class StartedCommand:
         self._reader.start()
 
     def status(self) -> dict[str, Any]:
-        """What the page shows; `exit` is None while the command runs."""
+        """Texts and steps of the command for the page; `exit` is None while the command runs."""
         code = self._process.poll()
         if code is not None:
             self._reader.join(5.0)
@@ -55,7 +55,7 @@ class StartedCommand:
         }
 
     def stop(self) -> None:
-        """As Ctrl-C: what was done is kept where the command keeps it."""
+        """Interrupt the command as Ctrl-C does."""
         if self._process.poll() is None:
             if os.name == "posix":
                 self._process.send_signal(signal.SIGINT)
@@ -63,7 +63,7 @@ class StartedCommand:
                 self._close_pipe()
 
     def end(self) -> None:
-        """End the command and all that it started, within seconds; what is on the disk stays."""
+        """End the command and its child processes within seconds; files on the disk stay."""
         self._close_pipe()
         try:
             self._process.wait(2.0 * GRACE_S)
@@ -88,7 +88,7 @@ class StartedCommand:
 
 
 def _step(line: str) -> dict[str, Any] | None:
-    """What a line says of a step (see common/progress.py); None for any other line."""
+    """Progress of a step that a line tells (see common/progress.py); None for other lines."""
     if not line.startswith('{"step"'):
         return None
     try:

@@ -1,7 +1,7 @@
-"""Drawing in a child process.
+"""Draw pictures with VTK in a child.
 
-Where OpenGL's library is installed but its driver is not, VTK does not raise an error: it ends the
-process. In a child that costs the picture, never the result.
+Where OpenGL's library is installed without a driver, VTK raises no error: it ends the process. In a
+child, the end costs the picture, never the result.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ OFFSCREEN_WINDOWS = (
 
 
 def missing_opengl() -> str | None:
-    """Return None if pictures can be tried on this machine, else one line on what is missing."""
+    """Return None if this machine may be able to draw, else one line that names what is missing."""
     if not sys.platform.startswith("linux") or offscreen_window():
         return None
     return f"no OpenGL library found: {INSTALL}"
@@ -59,18 +59,17 @@ def without_display() -> dict[str, str]:
 
 
 def picture_path(picture: str | Path, option: str = "--screenshot ") -> Path:
-    """Return where an option may write a .png; InputError as file_path."""
+    """Return the path of a .png that an option may write; raises as file_path."""
     return file_path(picture, (".png",), "pictures are written as .png", option)
 
 
 def file_path(file: str | Path, suffixes: tuple[str, ...], written: str, option: str = "") -> Path:
-    """Return where a file may be written.
+    """Return the path of a file that may be written.
 
     Args:
-        file: wanted.
-        suffixes: that are supported.
-        written: the sentence about them in the message.
-        option: begins the message.
+        suffixes: supported endings of its name, in lower case.
+        written: sentence on the endings in the message.
+        option: beginning of the message.
 
     Raises:
         InputError: another suffix, a missing folder, or a place that cannot be written.
@@ -90,7 +89,7 @@ def require_opengl(picture: Path) -> Path:
 
 
 def write_screenshot(plotter: Any, picture: str) -> None:
-    """Write what a plotter shows as .png, whole or not at all."""
+    """Write the picture of a plotter as .png, whole or not at all."""
     content = io.BytesIO()
     plotter.screenshot(content)
     write_bytes(Path(picture), content.getvalue())
@@ -107,18 +106,18 @@ def draw_in_subprocess(
     """Draw a picture in a child.
 
     Args:
-        render: draws the picture. Of a film, it yields how many frames are drawn, and then None.
-        job: argument of `render`, with the path of the picture added as "picture".
-        picture: file to write.
-        max_seconds: after which the child is ended.
-        count: called with how many frames are drawn.
-        folder: removed by the child if this process ends first.
+        render: function that draws the picture in the child. For a film it yields the number of
+            frames drawn so far, after each frame, and None at the end.
+        job: argument of `render`, to which "picture" is added, the file to write.
+        max_seconds: time after which the child is killed.
+        count: called with each number of frames.
+        folder: path of a folder that the child removes if this process ends first.
 
     Returns:
         None, or one line that says why there is no picture.
 
     Raises:
-        InputError: the job cannot be drawn as the user wants it.
+        InputError: raised by `render`.
     """
     name, missing = Path(picture).name, missing_opengl()
     if missing:

@@ -1,7 +1,7 @@
-"""Read files with libraries in C++ in a child process: a damaged file can end the process.
+"""Read files with libraries in C++, in a child: a damaged file can end the process that reads it.
 
-The child has limits on memory and on computing time, which do not count what other programs take
-of the processor. A damaged file can keep such a library busy for ever.
+A damaged file can also keep a library busy for ever, so the child's memory and computing time are
+limited. Computing time does not count how long other programs use the processor.
 """
 
 from __future__ import annotations
@@ -18,22 +18,22 @@ from chamberopt.common.errors import InputError
 from chamberopt.common.files import private_folder, write_bytes
 from chamberopt.common.limits import limit_cpu_time, limit_memory, raise_cpu_time
 
-# Of computing time. The shipped and other STEP files took 0.5 to 1 s up to 0.5 MB, and 1.4 to 4.5 s
-# for each MB of large ones (docs/trust.md); a slow machine may take thrice that, and this is ten
-# times as much again.
+# Seconds of computing time. STEP files took 0.5 to 1 s up to 0.5 MB, and large files took 1.4 to
+# 4.5 s for each MB (docs/trust.md). A slow machine may take thrice as long, and the limits are ten
+# times as long again.
 LEAST_SECONDS = 30.0
 VARIABLE = "CHAMBEROPT_READER_S"
-WALL_CLOCK_S = 1800.0  # for a child that waits, and where computing time cannot be limited
+WALL_CLOCK_S = 1800.0  # limit for a child that waits, and where computing time has no limit
 
 
 class NativeReader(NamedTuple):
     """How a format is read in a child.
 
     Attributes:
-        read: function of the path of a file and of further arguments; the child calls it.
-        name: of the file that the child reads.
-        fault: what is said of a file that ends its reader.
-        seconds_per_mb: of computing time, beside LEAST_SECONDS.
+        read: function of the path of a file and further arguments, called in the child.
+        name: name of the file that the child reads.
+        fault: message, without the path, on a file that ends its reader.
+        seconds_per_mb: computing time allowed beside LEAST_SECONDS [s/MB].
     """
 
     read: Callable[..., Any]
@@ -43,7 +43,11 @@ class NativeReader(NamedTuple):
 
 
 def read_in_child(reader: NativeReader, path: Path, content: bytes, *arguments: object) -> Any:
-    """Return what a reader makes of the content of a path.
+    """Read a file's content in a child, and return the value of `reader.read`.
+
+    Args:
+        path: file of the content, for messages.
+        arguments: further arguments of `reader.read`.
 
     Raises:
         InputError: the reader refused the file, failed, or took too long.
@@ -75,14 +79,14 @@ def _too_long(seconds: float, content: bytes) -> str:
 
 
 def _read_limited(seconds: float, read: Callable[..., Any], given: Path, *arguments: Any) -> Any:
-    """Read a file in this child, within limits of memory and computing time."""
+    """Limit the memory and computing time of this child, and read a file."""
     limit_memory()
     limit_cpu_time(seconds)
     return read(given, *arguments)
 
 
 def given_seconds() -> float:
-    """Seconds of computing time that the user allows a reader; 0 if none are given."""
+    """Computing time [s] that the user allows a reader by VARIABLE; 0 if it is not set."""
     text = os.environ.get(VARIABLE, "")
     try:
         seconds = float(text or "0")
@@ -94,6 +98,6 @@ def given_seconds() -> float:
 
 
 def allow_more(seconds: float) -> None:
-    """Allow this process more computing time, for work that was asked for, unless one is given."""
+    """Allow this child more computing time [s], unless the user has set the time by VARIABLE."""
     if not given_seconds():
         raise_cpu_time(seconds)
