@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 from chamberopt.simulation.convergence import FACETS, setting_text, short_name
@@ -78,9 +79,11 @@ def describe_error_law(study: ConvergenceStudy) -> str:
             "more than the 4 of independent replicas: some replicas differ much from the others, "
             f"or the estimate, {estimating:.0%} of the largest batch's time, takes too long"
         )
+    cost = f"costs {middle:.2f} times as much ({low:.2f} to {high:.2f}), {reason}"
+    if math.isinf(middle):
+        cost = "is out of reach of the numbers of replicas that were tried"
     text = (
-        f"more replicas alone: halving the error costs {middle:.2f} times as much "
-        f"({low:.2f} to {high:.2f}), {reason} "
+        f"more replicas alone: halving the error {cost} "
         f"(error ~ cost^-{law.power:.2f} ± {law.half_width:.2f})"
     )
     if unresolved and left_out:

@@ -242,11 +242,11 @@ class ReferenceRecord(Table):
 
 
 class ErrorLawRecord(Table):
-    """error = scale cost^-power."""
+    """error = scale cost^-power; the half-width is null if it is infinite."""
 
     scale: float
     power: float
-    power_half_width: float
+    power_half_width: float | None
 
 
 class HalvingRecord(Table):

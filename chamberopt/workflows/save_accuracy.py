@@ -37,12 +37,14 @@ def save_accuracy(folder: Path, study: ConvergenceStudy) -> None:
 def convergence_record(study: ConvergenceStudy) -> ConvergenceRecord:
     """The record of a convergence study."""
     law = study.law
-    times, low, high = (one if math.isfinite(one) else None for one in law.halving)
+    times, low, high = map(_finite, law.halving)
     return ConvergenceRecord(
         format=3,
         reference=ReferenceRecord(text=describe_reference(study), settings=study.settings),
         rows=rows(study),
-        law=ErrorLawRecord(scale=law.scale, power=law.power, power_half_width=law.half_width),
+        law=ErrorLawRecord(
+            scale=law.scale, power=law.power, power_half_width=_finite(law.half_width)
+        ),
         halving=HalvingRecord(times=times, low=low, high=high, text=describe_error_law(study)),
         recommendations=[_recommendation(recommend(study, one)) for one in ACCURACIES],
         cpu_s=study.cpu_s,
@@ -50,6 +52,11 @@ def convergence_record(study: ConvergenceStudy) -> ConvergenceRecord:
         design=study.design.model_dump(mode="json", exclude_none=True, exclude={"part": {"mesh"}}),
         versions=versions(),
     )
+
+
+def _finite(value: float) -> float | None:
+    """The value; None if it is infinite, which JSON does not have."""
+    return value if math.isfinite(value) else None
 
 
 def _recommendation(advice: Recommendation) -> RecommendationRecord:

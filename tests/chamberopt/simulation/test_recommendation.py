@@ -1,5 +1,7 @@
 """Recommendations from a convergence study whose runs are made up."""
 
+import json
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -20,6 +22,7 @@ from chamberopt.simulation.convergence import (
 )
 from chamberopt.simulation.error_law import BatchSize, ErrorLaw
 from chamberopt.simulation.recommendation import recommend, replicas_for
+from chamberopt.workflows.save_accuracy import convergence_record
 from tests.helpers.synthetic import DESIGNS
 
 
@@ -117,6 +120,14 @@ def test_the_gauge_is_what_is_measured_and_not_how_well() -> None:
         assert found.settings[GAUGE] == 1.0
         assert "gauge_mm2 = 1" in found.lines
         assert not any(GAUGE in text for text in found.remarks)
+
+
+def test_a_law_without_a_cost_of_halving_is_told_and_written() -> None:
+    study = replace(study_of(), law=ErrorLaw(0.1, -0.2))
+    assert "halving the error is out of reach" in describe_error_law(study)
+    record = convergence_record(study)
+    assert record.halving.times is record.law.power_half_width is None
+    assert json.loads(json.dumps(record.as_json(), allow_nan=False))["halving"]["times"] is None
 
 
 def test_the_cost_of_halving_the_error_is_compared_with_independent_replicas() -> None:
