@@ -1,1 +1,1 @@
-"""Triangles, solids and mesh files; nothing in this package knows about shot or designs."""
+"""Triangles, solids and mesh files. This package knows nothing about shot or designs."""

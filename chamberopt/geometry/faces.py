@@ -1,4 +1,4 @@
-"""Faces of a surface: pieces within which neighbouring triangles turn by less than an angle."""
+"""Faces of a surface: connected triangles whose neighbours turn by less than a given angle."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ class Faces:
     """The faces of a closed surface.
 
     Args:
-        vertices: [m], shape (n, 3).
-        triangles: shape (m, 3).
-        crease_deg: neighbours whose normals differ by less are of one face.
+        vertices: vertex positions [m], shape (n, 3).
+        triangles: vertex indices, shape (m, 3).
+        crease_deg: largest angle between the normals of neighbours in one face [degrees].
     """
 
     def __init__(self, vertices: np.ndarray, triangles: np.ndarray, crease_deg: float) -> None:
         normal = unit_vectors(area_vectors(vertices, triangles))
         one, two = (side_pairs(triangles) // 3).T
         smooth = np.einsum("ij,ij->i", normal[one], normal[two]) > np.cos(np.radians(crease_deg))
-        # A triangle without area has no normal: it goes with its neighbours.
+        # A triangle without area has no normal. It belongs to the faces of its neighbours.
         smooth |= ~normal[one].any(axis=1) | ~normal[two].any(axis=1)
         self.of_triangle = connected_pieces(one[smooth], two[smooth], len(triangles))[1]  # (m,)
         self.count = int(self.of_triangle.max()) + 1
@@ -46,7 +46,7 @@ class Faces:
         return int(self.of_triangle[away.argmin()]), float(away.min())
 
     def normal(self, face: int) -> np.ndarray:
-        """Mean normal (3,) of a face, of length 1; 0 for one that bends all round."""
+        """Mean unit normal (3,) of a face; 0 for a face that bends all round."""
         own = self.of_triangle == face
         mean = self._weight[own] @ self._normal[own] / max(float(self._weight[own].sum()), 1e-30)
         length = float(np.linalg.norm(mean))
@@ -60,7 +60,7 @@ class Faces:
         return np.asarray(middles[np.linalg.norm(middles - middle, axis=1).argmin()])
 
     def alike(self, face: int) -> np.ndarray:
-        """Marks (count,) the faces that are congruent with one, or its mirror image."""
+        """Mark the faces (count,) that are congruent with the given face or its mirror image."""
         figures = self._figures
         scale = np.maximum(np.abs(figures[face]), 1e-12 * np.abs(figures).max())
         return np.asarray((np.abs(figures - figures[face]) <= SAME * scale).all(axis=1))
@@ -79,12 +79,12 @@ class Faces:
 
         middle = per_face(weight[:, None] * corners.mean(axis=1))
         offset = corners - middle[face][:, None]
-        # The second moment of a triangle's area is that of its corners and of its middle.
+        # The second moment of a triangle's area is the sum over its corners and its middle.
         total = np.concatenate([offset, offset.mean(axis=1, keepdims=True) * 3.0], axis=1)
         moments = per_face(weight[:, None, None] * np.einsum("tki,tkj->tij", total, total) / 12.0)
         extent = np.sqrt(np.maximum(np.linalg.eigvalsh(moments), 0.0))
         size = np.sqrt(self.area)
-        # The thinnest extent of a flat face is rounding: differences count against its size.
+        # The thinnest extent of a flat face is rounding. Differences count against the face's size.
         extent[extent < SAME * size[:, None]] = 0.0
         bend = np.linalg.norm(per_face(weight[:, None] * self._normal), axis=1)
         return np.column_stack([size, extent, size * bend])

@@ -1,12 +1,12 @@
-"""Remesh the target with triangles of a given size, without changing its surface.
+"""Remeshing of the target with triangles of a given size, without changing its surface.
 
-Sides longer than 4/3 of the size are halved, sides shorter than 0.6 of it are collapsed, edges are
-turned until they are Delaunay, and points move towards the mean of their neighbours. Each is done
-only where the surface stays the same: within a flat face, or along a straight edge between two. A
-surface that curves in steps finer than the size keeps those steps.
+Sides longer than 4/3 of the size are halved, and sides shorter than 0.6 of it are collapsed. Edges
+are turned until they are Delaunay. Points move towards the mean of their neighbours. Each change is
+made only where the surface stays the same: within a flat face, or along a straight edge between two
+flat faces. A surface that curves in steps finer than the size keeps these steps.
 
-Notation: a triangle's side k runs from its corner k to the next; side 3 t + k is side k of
-triangle t. A crease is an edge between two flat faces.
+Notation: a triangle's side k runs from its corner k to the next. Side 3 t + k is side k of triangle
+t. A crease is an edge between two flat faces.
 
 Source: M. Botsch and L. Kobbelt, Symposium on Geometry Processing 2004, 185.
 """
@@ -26,12 +26,12 @@ from chamberopt.geometry.triangles import (
     unit_vectors,
 )
 
-# Of the size. A halved side is 2/3 of it, so that nothing is split and collapsed in turn.
+# Shares of the size. A halved side is 2/3 of it, so that no side is split and collapsed in turn.
 LONG, SHORT = 4.0 / 3.0, 0.6
-FLAT = 1e-6  # of the bounding box's diagonal: what a text format with 6 digits rounds away
-STRAIGHT = 1e-3  # rad; turns a ball's path by less than roughness does
+FLAT = 1e-6  # share of the bounding box's diagonal: rounding of a text format with 6 digits
+STRAIGHT = 1e-3  # rad: turns a ball's path by less than roughness does
 ROUNDS = 5
-MAX_PASSES = 50  # of turning edges; of collapsing and of smoothing MAX_CHANGES
+MAX_PASSES = 50  # passes of turning edges; MAX_CHANGES counts passes of collapsing and of smoothing
 MAX_CHANGES = 20
 
 
@@ -41,10 +41,10 @@ def remesh(
     """Remesh the target of a closed surface with triangles whose sides are about `size` [m] long.
 
     Args:
-        target: (m,) bool.
-        kinds: (m,); triangles of different kinds are never mixed.
+        target: marks the target's triangles, (m,) bool.
+        kinds: kind of each triangle, (m,). Triangles of different kinds are never mixed.
     Returns:
-        Vertices, triangles (k, 3), and for each of these one given triangle of the same flat face
+        Vertices, triangles (k, 3), and for each new triangle a given triangle of the same flat face
         and kind, (k,).
     """
     mesh = _TargetMesh(vertices, triangles, target, _flat_faces(vertices, triangles, kinds), size)
@@ -62,7 +62,7 @@ def triangle_quality(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     corners = vertices[triangles]
     squares = ((corners - np.roll(corners, 1, axis=1)) ** 2).sum(axis=(1, 2))
     top = 4.0 * np.sqrt(3.0) * areas(vertices, triangles)
-    return np.divide(top, squares, out=np.zeros_like(top), where=squares > 0.0)
+    return np.asarray(np.divide(top, squares, out=np.zeros_like(top), where=squares > 0.0))
 
 
 def _flat_faces(vertices: np.ndarray, triangles: np.ndarray, kinds: np.ndarray) -> np.ndarray:
@@ -88,14 +88,15 @@ def _flat_faces(vertices: np.ndarray, triangles: np.ndarray, kinds: np.ndarray) 
 class _TargetMesh:
     """A closed surface while its target is remeshed.
 
-    Each change is made at many places at once, chosen so that no two of them touch.
+    Each change is made at many places at once, chosen so that no two places touch.
 
     Attributes:
-        target, face, source: (m,), whether each triangle is of the target, its flat face, and the
-            given triangle that it stems from.
-        touched: (m,), triangles that may change: the target's, and others that the target's edges
-            had to split.
-        edge_order: keys of all edges in order, as `_edges` found them last.
+        target: marks the target's triangles, (m,).
+        face: flat face of each triangle, (m,).
+        source: given triangle from which each triangle stems, (m,).
+        touched: marks the triangles that may change, (m,): the target's triangles, and others that
+            the target's edges had to split.
+        edge_order: keys of all edges in order, from the last call of `_edges`.
     """
 
     def __init__(
@@ -113,20 +114,22 @@ class _TargetMesh:
         self.rng = np.random.default_rng(0)
 
     def split(self) -> bool:
-        """Halve sides of the target until none is too long; return whether any was."""
+        """Halve sides of the target until none is too long; True if any was halved."""
         any_long = False
         while self._split_once():
-            self.turn()  # now, or the halves of a thin triangle would be halved as they are
+            # turned now, because the halves of a thin triangle would otherwise be halved as they
+            # are
+            self.turn()
             any_long = True
         return any_long
 
     def _split_once(self) -> bool:
-        """Halve one side that is too long in each triangle that has one."""
+        """Halve one side that is too long in each triangle; False if there is no such side."""
         edges, sides, _ = self._edges()
         length = self._lengths(edges)
         beside = self.target[sides // 3].any(axis=1)
-        # Random order within a class of lengths: ranked by length, a row of equal strips would be
-        # split one by one.
+        # Random order within a class of lengths. Ranked by length, a row of equal strips would be
+        # split strip by strip.
         rank = self.rng.random(len(length)) - np.floor(4.0 * np.log2(length))
         edge, wanted = np.repeat(np.arange(len(sides)), 2), (length > LONG * self.size) & beside
         chosen = self._independent(sides.ravel() // 3, edge, rank, wanted)
@@ -160,11 +163,11 @@ class _TargetMesh:
             one, two = np.stack([c, a, d], axis=1), np.stack([d, b, c], axis=1)
             normal = self._area_vectors(self.triangles[t]) + self._area_vectors(self.triangles[u])
             wanted = (c != d) & ~self._are_linked(c, d)
-            for new in (one, two):  # else the two are no convex quadrilateral
+            for new in (one, two):  # otherwise the two are not a convex quadrilateral
                 wanted &= np.einsum("ij,ij->i", self._area_vectors(new), normal) > 0.0
             edge = np.tile(np.arange(len(t)), 2)
             chosen = self._independent(np.r_[t, u], edge, -excess, wanted)
-            # Two edges turned at once could become the same edge. Only the first one is turned.
+            # Two edges turned at once could become the same edge. Only the first edge is turned.
             new_edges = np.sort(np.stack([c, d], axis=1)[chosen], axis=1)
             chosen = chosen[np.unique(new_edges, axis=0, return_index=True)[1]]
             if not len(chosen):
@@ -172,7 +175,7 @@ class _TargetMesh:
             self.triangles[t[chosen]], self.triangles[u[chosen]] = one[chosen], two[chosen]
 
     def collapse(self) -> bool:
-        """Move points that shape nothing along short sides onto neighbours; return if any was."""
+        """Merge points that do not shape the surface into near neighbours; True if any was."""
         changed = False
         for _ in range(MAX_CHANGES):
             edges, sides, crease = self._edges()
@@ -232,7 +235,7 @@ class _TargetMesh:
         self.turn()
 
     def _edges(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Edges (e, 2), the two sides (e, 2) at each, and which edges are creases (e,)."""
+        """Edges (e, 2), the two sides (e, 2) at each edge, and marks (e,) of the creases."""
         keys = edge_keys(self.triangles)
         sides = np.argsort(keys, kind="stable").reshape(-1, 2)
         self.edge_order = keys[sides[:, 0]]
@@ -240,14 +243,14 @@ class _TargetMesh:
         return sides_of(self.triangles)[sides[:, 0]], sides, face[:, 0] != face[:, 1]
 
     def _are_linked(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
-        """Whether points a and b (e,) are the ends of an edge, as `_edges` found them last."""
+        """True where points a and b (e,) are the ends of an edge, by the last call of `_edges`."""
         keys = np.minimum(a, b) * (int(self.triangles.max()) + 1) + np.maximum(a, b)
         at = np.minimum(np.searchsorted(self.edge_order, keys), len(self.edge_order) - 1)
-        return self.edge_order[at] == keys
+        return np.asarray(self.edge_order[at] == keys)
 
     def _lengths(self, edges: np.ndarray) -> np.ndarray:
         a, b = self.vertices[edges].transpose(1, 0, 2)
-        return np.linalg.norm(b - a, axis=1)
+        return np.asarray(np.linalg.norm(b - a, axis=1))
 
     def _area_vectors(self, triangles: np.ndarray) -> np.ndarray:
         return area_vectors(self.vertices, triangles)
@@ -257,7 +260,7 @@ class _TargetMesh:
         a, b, apex = (self.vertices[self.triangles[t, (k + j) % 3]] for j in range(3))
         to_a, to_b = a - apex, b - apex
         sine = np.linalg.norm(np.cross(to_a, to_b), axis=1)
-        return np.arctan2(sine, np.einsum("ij,ij->i", to_a, to_b))
+        return np.asarray(np.arctan2(sine, np.einsum("ij,ij->i", to_a, to_b)))
 
     def _independent(
         self, triangle: np.ndarray, change: np.ndarray, rank: np.ndarray, wanted: np.ndarray
@@ -272,7 +275,7 @@ class _TargetMesh:
         return at[~np.isin(at, change[beaten])]
 
     def _movable(self, edges: np.ndarray, crease: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Points (n,) inside a flat face, and points on a straight crease, all around touched."""
+        """Marks of points (n,) inside flat faces, and on straight creases, in touched triangles."""
         n = len(self.vertices)
         inside = np.ones(n, dtype=bool)
         inside[self.triangles[~self.touched]] = False
@@ -286,7 +289,7 @@ class _TargetMesh:
         return inside & (count == 0), inside & (count == 2) & straight
 
     def _rings(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Triangles around each of some points (p,): indices, and the point that each is at."""
+        """Triangles around each of some points (p,): their indices, and the index of the point."""
         corner = np.argsort(self.triangles.ravel(), kind="stable")
         start = np.searchsorted(self.triangles.ravel()[corner], np.arange(len(self.vertices) + 1))
         count = start[points + 1] - start[points]
@@ -295,7 +298,7 @@ class _TargetMesh:
         return corner[start[points][point] + inside] // 3, point
 
     def _collapses_well(self, moved: np.ndarray, kept: np.ndarray) -> np.ndarray:
-        """Whether points `moved` can be merged into points `kept`, all (p,).
+        """True where points `moved` can be merged into points `kept`, all (p,).
 
         The surface must stay the same closed surface, without long sides or thinner triangles.
         """
@@ -310,9 +313,9 @@ class _TargetMesh:
         thinner = triangle_quality(self.vertices, new) < least
         wrong = stays & ((facing <= 0.0) | (longest > LONG * self.size) | thinner)
         bad = np.bincount(point[wrong], minlength=len(moved)) > 0
-        # Both ends may share only the two neighbours across the edge, or the surface would touch
-        # itself.
+        # The two ends may share only the two neighbours across the edge. Otherwise the surface
+        # would touch itself.
         n = len(self.vertices)
         who, other = np.divmod(np.unique(np.repeat(point, 3) * n + old.ravel()), n)
         shared = (other != moved[who]) & (other != kept[who]) & self._are_linked(other, kept[who])
-        return ~bad & (np.bincount(who[shared], minlength=len(moved)) == 2)
+        return np.asarray(~bad & (np.bincount(who[shared], minlength=len(moved)) == 2))

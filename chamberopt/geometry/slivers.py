@@ -1,8 +1,9 @@
-"""Remove slivers: triangles too thin to have a direction.
+"""Removal of slivers: triangles too thin to have a direction.
 
-Where two faces nearly coincide, a boolean operation leaves triangles 1e-12 m high. The rounding of
-their corners is as large as they are, so their normals point anywhere, and a ball could be thrown
-back into the wall. The surface stays closed and moves by less than the height of a sliver.
+A boolean operation leaves triangles 1e-12 m high where two faces nearly coincide. The rounding of
+their corners is as large as their height. Their normals are therefore arbitrary, and a ball could
+be thrown back into the wall. The surface stays closed and moves by less than the height of a
+sliver.
 """
 
 from __future__ import annotations
@@ -14,18 +15,18 @@ from chamberopt.geometry.triangles import area_vectors, heights
 
 # m: a thousand times the rounding of a boolean at 100 mm, a millionth of the smallest ball.
 MIN_HEIGHT = 1e-9
-MAX_PASSES = 20  # a change can make the next one possible; two or three passes are usual
+MAX_PASSES = 20  # a change can make another change possible; two or three passes are usual
 
 Triangle = tuple[int, int, int]
 
 
 def remove_slivers(surface: SolidSurface) -> SolidSurface:
-    """The surface without triangles lower than MIN_HEIGHT, where they need not stay.
+    """The surface without triangles lower than MIN_HEIGHT, where these can be removed.
 
     A needle (one edge shorter than MIN_HEIGHT) is removed by merging that edge's ends. Any other
-    sliver gets one edge turned. Within one source triangle this is done if the thinner of the two
-    triangles becomes thicker. Across two source triangles it is done only where the sliver's apex
-    lies on the edge, and then both halves belong to the neighbour.
+    sliver gets an edge turned. Within one source triangle, the edge is turned if the thinner of the
+    two triangles becomes thicker. Across two source triangles, the edge is turned only if the
+    sliver's apex lies on it, and then both halves belong to the neighbour.
     """
     found = np.flatnonzero(heights(surface.vertices, surface.triangles) < MIN_HEIGHT)
     if not len(found):
@@ -47,7 +48,8 @@ class _EditableMesh:
         self.triangles: dict[int, Triangle] = {}
         self.of_edge: dict[tuple[int, int], int] = {}
         self.of_vertex: dict[int, set[int]] = {}
-        self.candidates = slivers  # and the triangles that are made while these are removed
+        # the slivers, and the triangles that are made while slivers are removed
+        self.candidates = slivers
         for index, (a, b, c) in enumerate(surface.triangles.tolist()):
             self._add(index, (a, b, c))
 
@@ -82,7 +84,7 @@ class _EditableMesh:
         return True
 
     def turn(self, index: int) -> bool:
-        """Turn the edge that leaves the highest pair of triangles, if higher than the pair now."""
+        """Turn the edge that leaves the highest pair of triangles, if it is higher than before."""
         options = []
         for a, b in _edges(self.triangles[index]):
             beyond = self.of_edge[b, a]
@@ -110,12 +112,12 @@ class _EditableMesh:
         return True
 
     def _faces_alike(self, new: tuple[Triangle, Triangle], old: tuple[Triangle, Triangle]) -> bool:
-        """Whether two new triangles face as the old pair does: it is a convex quadrilateral."""
+        """True if two new triangles face as the old pair does: a convex quadrilateral."""
         facing = area_vectors(self.vertices, np.array(old)).sum(axis=0)
         return all(float(v @ facing) > 0.0 for v in area_vectors(self.vertices, np.array(new)))
 
     def _apex_on(self, a: int, b: int, c: int) -> bool:
-        """Whether c is within MIN_HEIGHT of the edge a-b, between its ends."""
+        """True if c is within MIN_HEIGHT of the edge a-b, between its ends."""
         along, to_apex = self.vertices[b] - self.vertices[a], self.vertices[c] - self.vertices[a]
         length = float(np.linalg.norm(along))
         if length == 0.0 or not 0.0 < float(to_apex @ along) < length * length:

@@ -1,11 +1,11 @@
 """Solids and the operations on them: unite, subtract, sweep, project.
 
-This is the only file that imports manifold3d. Each triangle of a result remembers which solid it
-comes from and on which triangle of that solid it lies. manifold3d keeps this only for meshes with
-reserved ids; an unlabelled Mesh64 would lose it (its original_id() is -1).
+This is the only file that imports manifold3d. Each triangle of a result remembers its solid and the
+triangle of that solid on which it lies. manifold3d keeps this only for meshes with reserved ids. An
+unlabelled Mesh64 would lose it (its original_id() is -1).
 
-Inside, lengths are millimetres on a grid of 2^-20 mm (1 nm). Faces that coincide in the design then
-coincide exactly, instead of leaving needles 1e-10 mm high between them.
+Internal lengths are millimetres on a grid of 2^-20 mm (1 nm). Faces that coincide in the design
+then coincide exactly, and leave no needles 1e-10 mm high between them.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ if TYPE_CHECKING:
 
 # 1 nm: a thousandth of the finest surface roughness, yet 1e7 steps of a double at 100 mm.
 GRID_MM = 2.0**-20
-# What a vertex may be off its plane: the rounding of a file's numbers of 32 bits.
+# Largest distance of a vertex from its plane: the rounding of a file's 32-bit numbers.
 PLANE_MM, PLANE_OF_SIZE = 1e-5, 3e-7
-# Relative. A boolean that went wrong is off by whole triangles, rounding by 1e-13.
+# Relative. A failed boolean is off by whole triangles, and rounding by 1e-13.
 SAME_VOLUME = 1e-9
 
 
@@ -36,7 +36,7 @@ class SolidSurface:
     vertices: np.ndarray  # (n, 3) float64 [m]
     triangles: np.ndarray  # (k, 3) int32, rows of the vertices; normals point outward
     solid: np.ndarray  # (k,) int64, label of the solid that each triangle comes from
-    source: np.ndarray  # (k,) int32, index there of the triangle on which it lies
+    source: np.ndarray  # (k,) int32, index in that solid of the triangle on which it lies
 
     def select(self, keep: np.ndarray) -> SolidSurface:
         """The triangles marked by `keep` (k,), with only the vertices that they use."""
@@ -50,7 +50,7 @@ class Solid:
     """A closed body."""
 
     body: Manifold
-    label: int  # that its own triangles carry; -1 for the result of an operation
+    label: int  # label of its own triangles; -1 for the result of an operation
     name: str  # for messages
 
     @property
@@ -84,7 +84,7 @@ def make_solid(
             solid's triangles still count in the whole list.
 
     Raises:
-        InputError: the surface does not enclose a body.
+        InputError: if the surface does not enclose a body.
     """
     from manifold3d import Manifold, Mesh64
 
@@ -99,7 +99,7 @@ def make_solid(
         face_id=chosen.astype(np.uint64),
     )
     solid = Solid(_checked(Manifold(mesh), f"{name}: cannot be made a solid"), label, name)
-    if solid.volume <= 0.0:  # subtracting it would ADD material, without an error
+    if solid.volume <= 0.0:  # subtracting such a solid would ADD material, without an error
         why = "the surface is inside out or encloses nothing"
         raise InputError(f"{name}: {why}; make its normals point outward")
     return solid
@@ -111,12 +111,12 @@ def simplify_planes(
     """A closed surface without the vertices inside its planes and on their straight borders.
 
     Args:
-        vertices: [m], shape (n, 3).
-        triangles: shape (m, 3).
-        label: of each triangle, from 0 on, shape (m,); borders between labels stay.
+        vertices: vertex positions [m], shape (n, 3).
+        triangles: vertex indices, shape (m, 3).
+        label: label of each triangle, from 0 on, shape (m,). Borders between labels stay.
 
     Returns:
-        Vertices [m], triangles (k, 3) and the label of each, shape (k,).
+        Vertices [m], triangles (k, 3) and the label of each triangle, shape (k,).
     """
     from manifold3d import Manifold, Mesh64
 
@@ -136,10 +136,10 @@ def simplify_planes(
 
 
 def split_bodies(vertices: np.ndarray, triangles: np.ndarray, name: str) -> tuple[list[Solid], int]:
-    """Solids of a surface of one or several bodies, and the number of voids that were filled.
+    """Solids of a surface of one or several bodies, and the number of filled voids.
 
-    Unite them before use: a mesh of bodies that overlap would be subtracted wrongly, without an
-    error. Sources count in the whole list of triangles.
+    The solids must be united before use: a mesh of bodies that overlap would be subtracted wrongly,
+    without an error. Sources count in the whole list of triangles.
     """
     shells, volumes = find_shells(vertices, triangles)
     if len(volumes) == 1:
@@ -152,7 +152,7 @@ def split_bodies(vertices: np.ndarray, triangles: np.ndarray, name: str) -> tupl
 
 
 def sweep_face(face: SolidSurface, way: np.ndarray, name: str) -> Solid:
-    """The prism over a flat face, its normals pointing away, up to the face moved by a way [m]."""
+    """The prism over a flat face, its normals outward, up to the face moved by ``way`` [m]."""
     count, (a, b) = len(face.vertices), border_edges(face.triangles).T
     walls = np.concatenate([np.c_[b, a, a + count], np.c_[b, a + count, b + count]])
     triangles = np.concatenate([face.triangles, face.triangles[:, ::-1] + count, walls])
@@ -173,7 +173,7 @@ def subtract(whole: Solid, taken: Solid) -> Solid:
     """Cut `taken` out of `whole`.
 
     Raises:
-        InputError: the volumes do not add up, because a surface crosses itself.
+        InputError: if the volumes do not add up, because a surface crosses itself.
     """
     rest = _checked(whole.body - taken.body, f"{taken.name}: cannot be cut out of {whole.name}")
     common = _checked(
@@ -196,32 +196,33 @@ class Outline:
     section: CrossSection
 
     def offset(self, by: float, facets: int) -> Outline:
-        """The area within a distance `by` [m] of this one; smaller than it if `by` is negative.
+        """The area within a distance `by` [m] of this area; a negative distance shrinks the area.
 
-        Its round corners are parts of circles with that many facets.
+        The round corners of the result are parts of circles with ``facets`` sides.
         """
         from manifold3d import JoinType
 
         return Outline(self.section.offset(1e3 * by, JoinType.Round, circular_segments=facets))
 
     def hull(self, tolerance: float) -> np.ndarray:
-        """Corners (n, 2) [m] of the convex hull, counter-clockwise, but for a tolerance [m]."""
+        """Corners (n, 2) [m] of the convex hull, counter-clockwise, up to a tolerance [m]."""
         return _corners(self.section.hull().simplify(1e3 * tolerance))[0]
 
     def without_holes(self, tolerance: float) -> list[np.ndarray]:
-        """Corners of each piece, as those of the hull; holes are left out."""
+        """Corners of each piece, in the form of `hull`, without holes."""
         from manifold3d import CrossSection
 
         outer = []
         for piece in self.section.to_polygons():
             (x, y), (xn, yn) = piece.T, np.roll(piece, -1, axis=0).T
-            if (x * yn - y * xn).sum() > 0.0:  # counter-clockwise; holes run the other way
+            # the corner order is counter-clockwise; holes run in the other direction
+            if (x * yn - y * xn).sum() > 0.0:
                 outer.append(piece)
         return _corners(CrossSection(outer).simplify(1e3 * tolerance))
 
 
 def plan_outline(vertices: np.ndarray, triangles: np.ndarray, below: float) -> Outline:
-    """The area in plan of what a closed surface, its normals outward, has below a height [m]."""
+    """The area in plan of the part of a closed surface, normals outward, below a height [m]."""
     from manifold3d import CrossSection, OpType
 
     sections = [
@@ -241,7 +242,7 @@ def extrude(outline: np.ndarray, height: float) -> tuple[np.ndarray, np.ndarray]
 
 
 def overlap_volume(one: Solid, two: Solid) -> float:
-    """Volume [m³] that two solids have in common."""
+    """Common volume [m³] of two solids."""
     common = one.body ^ two.body
     text = f"{one.name} and {two.name} cannot be intersected"
     return float(_checked(common, text).volume()) * 1e-9
@@ -269,7 +270,7 @@ def _grid_mm(vertices: np.ndarray) -> np.ndarray:
 
 
 def _checked(body: Manifold, what: str) -> Manifold:
-    """The body, if manifold3d reports no error: all later results would silently be empty."""
+    """The body, unless manifold3d reports an error, with which all results would be empty."""
     from manifold3d import Error
 
     if body.status() != Error.NoError:

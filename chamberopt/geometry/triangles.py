@@ -1,13 +1,13 @@
 """Geometry of triangle meshes: edges, connected pieces, areas, normals, inside or outside.
 
 A surface is given by vertices (n, 3) [m] and triangles (m, 3), rows of the vertices. Side k of
-triangle t runs from its corner k to the next; the sides of all triangles count as 3 t + k.
+triangle t runs from its corner k to the next corner. The sides of all triangles count as 3 t + k.
 """
 
 import numpy as np
 
-LEVEL = 1e-3  # rad: a surface that rises by less is level but for rounding
-MAX_SAMPLES = 8  # points of a shell that are tested for lying in another
+LEVEL = 1e-3  # rad: a surface that rises by less is level up to rounding
+MAX_SAMPLES = 8  # points of a shell that are tested for lying in another shell
 
 
 def unique_rows(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -27,7 +27,7 @@ def count_up(times: np.ndarray) -> np.ndarray:
 
 
 def connected_pieces(a: np.ndarray, b: np.ndarray, count: int) -> tuple[int, np.ndarray]:
-    """Connected pieces of a graph with links a (k,) to b (k,): number, and piece of each node."""
+    """Number of connected pieces of a graph with links a (k,) to b (k,); piece of each node."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
@@ -45,7 +45,7 @@ def edge_keys(triangles: np.ndarray) -> np.ndarray:
     """A number for each side, shape (3 m,), the same for both directions of an edge."""
     count = int(triangles.max()) + 1
     a, b = sides_of(triangles).T.astype(np.int64)
-    return np.minimum(a, b) * count + np.maximum(a, b)
+    return np.asarray(np.minimum(a, b) * count + np.maximum(a, b))
 
 
 def side_pairs(triangles: np.ndarray) -> np.ndarray:
@@ -77,13 +77,13 @@ def find_shells(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray
 
 
 def tetrahedron_volumes(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Signed volumes (m,) [m³] over the mean of all vertices; their sum is the enclosed volume."""
+    """Signed volumes (m,) [m³] over the mean of all vertices. Their sum is the enclosed volume."""
     a, b, c = (vertices[triangles[:, k]] - vertices.mean(axis=0) for k in range(3))
-    return np.einsum("ij,ij->i", a, np.cross(b, c)) / 6.0
+    return np.asarray(np.einsum("ij,ij->i", a, np.cross(b, c)) / 6.0)
 
 
 def winding_number(points: np.ndarray, corners: np.ndarray) -> np.ndarray:
-    """How often a closed surface with corners (m, 3, 3) winds around each point (p, 3), shape (p,).
+    """Winding number (p,) of a closed surface (m, 3, 3) around each point (p, 3).
 
     It is 1 inside and 0 outside: the sum of the triangles' solid angles over 4 pi.
 
@@ -94,13 +94,13 @@ def winding_number(points: np.ndarray, corners: np.ndarray) -> np.ndarray:
     triple = np.einsum("pij,pij->pi", a, np.cross(b, c))
     ab, bc, ca = (np.einsum("pij,pij->pi", u, v) for u, v in ((a, b), (b, c), (c, a)))
     bottom = length_a * length_b * length_c + ab * length_c + bc * length_a + ca * length_b
-    return np.arctan2(triple, bottom).sum(axis=1) / (2.0 * np.pi)
+    return np.asarray(np.arctan2(triple, bottom).sum(axis=1) / (2.0 * np.pi))
 
 
 def shell_winding(
     vertices: np.ndarray, triangles: np.ndarray, shells: np.ndarray, outer: int, inner: int
 ) -> float:
-    """How often one of the shells (m,) winds around another: 1 if that is in it, 0 if beside it."""
+    """Winding number of a shell around another shell: 1 if that is inside, 0 if beside."""
     points = vertices[triangles[shells == inner]].mean(axis=1)
     points = points[:: max(1, len(points) // MAX_SAMPLES)]
     return float(np.median(winding_number(points, vertices[triangles[shells == outer]])))
@@ -111,8 +111,8 @@ def find_unwalled_border(
 ) -> np.ndarray | None:
     """A point (3,) at the border of flat triangles beside which the surface does not rise.
 
-    Normals point out of the room: a floor's neighbours should rise into the room as walls. None if
-    they do all round the flat triangles, which `face` (m,) marks.
+    Normals point out of the room: a floor's neighbours should rise into the room as walls. The
+    result is None if they rise all round the flat triangles, which `face` (m,) marks.
     """
     sides, pairs = sides_of(triangles), side_pairs(triangles)
     one, two = pairs[face[pairs[:, 0] // 3] != face[pairs[:, 1] // 3]].T
@@ -128,16 +128,16 @@ def find_unwalled_border(
 
 
 def heights(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Smallest height of each triangle, shape (m,) [m]; 0 if it has no area."""
+    """Smallest height of each triangle, shape (m,) [m]; 0 for a triangle without area."""
     corners = vertices[triangles]
     longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
     twice = 2.0 * areas(vertices, triangles)
-    return np.divide(twice, longest, out=np.zeros_like(twice), where=longest > 0.0)
+    return np.asarray(np.divide(twice, longest, out=np.zeros_like(twice), where=longest > 0.0))
 
 
 def areas(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """Area of each triangle, shape (m,) [m²]."""
-    return np.linalg.norm(area_vectors(vertices, triangles), axis=1)
+    return np.asarray(np.linalg.norm(area_vectors(vertices, triangles), axis=1))
 
 
 def area_vectors(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
@@ -147,10 +147,10 @@ def area_vectors(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 
 
 def interpolate(values: np.ndarray, corners: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """Values (p, 3, c) at the corners (p, 3, 3) of triangles, linear in between, at places (p, 3).
+    """Interpolate values (p, 3, c) linearly from corners (p, 3, 3) of triangles to places (p, 3).
 
-    Places beside the plane of their triangle count as the nearest in it. A triangle without area
-    has the mean of its values.
+    A place beside the plane of its triangle counts as the nearest place in the plane. A triangle
+    without area has the mean of its values.
     """
     a, b, c = corners.swapaxes(0, 1)
     normal = np.cross(b - a, c - a)
@@ -160,11 +160,11 @@ def interpolate(values: np.ndarray, corners: np.ndarray, places: np.ndarray) -> 
     for k, (one, two) in enumerate(((b, c), (c, a), (a, b))):
         piece = np.einsum("ij,ij->i", np.cross(two - one, places - one), normal)
         weights[some, k] = piece[some] / square[some]
-    return np.einsum("pk,pkc->pc", weights, values)
+    return np.asarray(np.einsum("pk,pkc->pc", weights, values))
 
 
 def unit_normals(corners: np.ndarray) -> np.ndarray:
-    """Unit normals of triangles with corners (..., 3, 3), shape (..., 3); zero if without area."""
+    """Unit normals of triangles with corners (..., 3, 3), shape (..., 3); zero without area."""
     first = corners[..., 0, :]
     return unit_vectors(np.cross(corners[..., 1, :] - first, corners[..., 2, :] - first))
 
@@ -172,7 +172,7 @@ def unit_normals(corners: np.ndarray) -> np.ndarray:
 def unit_vectors(vectors: np.ndarray) -> np.ndarray:
     """Vectors (..., 3) scaled to length 1; a zero vector stays zero."""
     length = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    return np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0.0)
+    return np.asarray(np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0.0))
 
 
 def angles_between(one: np.ndarray, two: np.ndarray) -> np.ndarray:
@@ -182,11 +182,11 @@ def angles_between(one: np.ndarray, two: np.ndarray) -> np.ndarray:
 
 
 def closest_on_each(corners: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """The point of each triangle (n, 3, 3) that is closest to the matching point (n, 3), (n, 3)."""
+    """The point of each triangle (n, 3, 3) closest to the matching point (n, 3), shape (n, 3)."""
     from trimesh.triangles import closest_point
 
-    # In mm: trimesh takes fourth powers of lengths below 1e-13 for zero. In metres that would
-    # already be a triangle of half a millimetre.
+    # In mm, because trimesh takes fourth powers of lengths below 1e-13 for zero. In metres this
+    # would already hold for a triangle of half a millimetre.
     return np.asarray(closest_point(corners * 1e3, points * 1e3)) * 1e-3 if len(points) else points
 
 

@@ -1,7 +1,7 @@
-"""Read Abaqus input files: shells and solids of parts and instances; sets and surfaces as groups.
+"""Reader of Abaqus input files: shells, solids, parts and instances; sets and surfaces as groups.
 
-A keyword that makes or moves nodes or elements in a way that is not supported is refused by name,
-never ignored.
+The reader never ignores an unsupported keyword that makes or moves nodes or elements. It refuses
+the file and names the keyword.
 
 Source: Abaqus Keywords Reference Guide.
 """
@@ -27,7 +27,7 @@ UNSUPPORTED = (
     "INCLUDE", "SYSTEM", "NGEN", "NFILL", "NCOPY", "NMAP", "ELGEN", "ELCOPY",
     "SUBSTRUCTURE GENERATE",
 )  # fmt: skip
-# STRI65 has six nodes: the last 5 of a name are its degrees of freedom.
+# STRI65 has six nodes. The last 5 of its name counts its degrees of freedom.
 SHELL = re.compile(r"(?:STRI|SFM3D|M3D|R3D|CPS|CPE|DS|S)(3|4|6|8|9)\D*5?$")
 SOLID = re.compile(r"(?:AC3D|DC3D|C3D)(4|5|6|8|10|13|15|20)\D*$")
 WITHOUT_SURFACE = re.compile(
@@ -39,8 +39,10 @@ SOLID_KIND = {
     8: "hexahedron", 20: "hexahedron",
 }  # fmt: skip
 Options = dict[str, str]
-Member = tuple[str, range]  # instance that a set names ("" for any), and numbers in it
-Members = dict[Member, None]  # in their order, each once: sets may name one another many times
+# instance that a set names ("" for any), and element or node numbers in it
+Member = tuple[str, range]
+# members in their order, each once, because sets may name one another many times
+Members = dict[Member, None]
 Place = tuple[int, int]  # position of a placed scope, and the file's number in it
 NO_ROWS = np.zeros(0, dtype=np.int64)
 _FindRows = Callable[[Iterable[Member]], np.ndarray]
@@ -48,7 +50,7 @@ _FindRows = Callable[[Iterable[Member]], np.ndarray]
 
 @dataclass
 class _Scope:
-    """What stands between *PART and *END PART, or outside of all parts, by the file's numbers."""
+    """The content between *PART and *END PART, or outside of all parts, by the file's numbers."""
 
     nodes: dict[int, list[float]] = field(default_factory=dict)
     elements: dict[int, tuple[str, list[int]]] = field(default_factory=dict)
@@ -76,7 +78,7 @@ class _Instance(NamedTuple):
 
 
 def read_abaqus(path: Path, content: bytes) -> RawMesh:
-    """Read the surface in an input file; InputError names keyword and line that are refused."""
+    """Read the surface of an input file; InputError names the refused keyword and its line."""
     scopes, instances, notes = _read_scopes(path, content.decode("utf-8", errors="replace"))
     try:
         placed = [scopes[instance.part] for instance in instances.values()]
@@ -216,9 +218,10 @@ def _members(options: Options, data: list[str], sets: dict[str, Members]) -> Mem
 def _assemble(
     scopes: dict[str, _Scope], instances: dict[str, _Instance], notes: list[str]
 ) -> ElementMesh:
-    """All instances in one mesh; if there are none, everything in the file.
+    """Join all instances into one mesh; without instances, join everything in the file.
 
-    Elements have the file's numbers, or positions if several instances number their own.
+    Elements keep the file's numbers. If several instances number their own elements, the numbers
+    are positions.
     """
     placed = [(scopes[instance.part], instance) for instance in instances.values()]
     placed += [
@@ -250,7 +253,7 @@ def _assemble(
         notes=notes,
     )
     for at, (scope, _) in enumerate(placed):
-        # Sets outside of parts mean the instance that they name, or every instance.
+        # A set outside of parts means the instance that it names, or every instance.
         anywhere = [at] if scope.elements or scope.nodes else list(range(len(names) + 1))
 
         def find(
@@ -272,7 +275,7 @@ def _assemble(
 
 
 def _add_groups(mesh: ElementMesh, scope: _Scope, elements: _FindRows, nodes: _FindRows) -> None:
-    """Add the sets and surfaces of a scope, with the rows of elements and nodes that it lists."""
+    """Add the sets and surfaces of a scope, with the listed rows of elements and nodes."""
     for name, members in scope.element_sets.items():
         mesh.element_sets[name] = np.r_[mesh.element_sets.get(name, NO_ROWS), elements(members)]
     for name, members in scope.node_sets.items():

@@ -21,7 +21,7 @@ from chamberopt.geometry.meshes.raw_mesh import ElementNumbers, RawMesh
 Face = tuple[int, ...]
 RING: tuple[Face, ...] = ((0, 1), (1, 2), (2, 3), (3, 0))
 
-# Corner numbers of each face; solids in the order in which Abaqus counts their faces S1, S2 ...
+# Corner numbers of each face. Solids list their faces in the order of Abaqus, S1, S2 ...
 FACES: dict[str, tuple[Face, ...]] = {
     "triangle": ((0, 1, 2),),
     "quad": ((0, 1, 2, 3),),
@@ -32,7 +32,7 @@ FACES: dict[str, tuple[Face, ...]] = {
         (0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0),
     ),
 }  # fmt: skip
-# Edges in the order of their mid-edge nodes, which follow the corners (VTK's and Abaqus's order).
+# Edges in the order of their mid-edge nodes, which follow the corners (in VTK and Abaqus).
 EDGES: dict[str, tuple[Face, ...]] = {
     "triangle": ((0, 1), (1, 2), (2, 0)),
     "quad": RING,
@@ -59,17 +59,17 @@ class Block(NamedTuple):
 
 @dataclass
 class ElementMesh:
-    """A finite element mesh; elements count through all blocks.
+    """A finite element mesh. Element numbers count through all blocks.
 
-    Sets are by name: elements (e,), elements and the face of each, and points. A triangle is in the
-    group of a node set if all of its corners are.
+    Sets have a name each: sets of elements (e,), sets of elements with a face of each, and sets of
+    points. A triangle is in the group of a node set if all its corners are in the set.
     """
 
     points: np.ndarray  # (n, 3) in the file's numbers
     blocks: list[Block]
     numbers: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
-    own: bool = True  # numbers (e,) are the file's own; else positions
-    instance: str = ""  # the Abaqus instance in which the numbers count
+    own: bool = True  # True if the numbers (e,) are the file's own, False if they are positions
+    instance: str = ""  # Abaqus instance in which the numbers count
     element_sets: dict[str, np.ndarray] = field(default_factory=dict)
     face_sets: dict[str, tuple[np.ndarray, np.ndarray]] = field(default_factory=dict)
     node_sets: dict[str, np.ndarray] = field(default_factory=dict)
@@ -81,16 +81,16 @@ class _Polygons(NamedTuple):
 
     corners: np.ndarray  # (k, n) points
     mids: np.ndarray  # (k, n) points in the middle of edges, or NONE
-    owner: np.ndarray  # (k,), the element
-    side: np.ndarray  # (k,), which of the element's faces it is
-    shell: np.ndarray  # (k,), the shell element that lies on the face, or NONE
+    owner: np.ndarray  # (k,) element of each face
+    side: np.ndarray  # (k,) number of the face in its element
+    shell: np.ndarray  # (k,) shell element that lies on the face, or NONE
 
     def select(self, keep: np.ndarray) -> _Polygons:
         return _Polygons(*(column[keep] for column in self))
 
 
 def extract_surface(mesh: ElementMesh) -> RawMesh:
-    """The triangles that bound the elements, in the order of these, with the sets as groups."""
+    """The triangles that bound the elements, in the elements' order, with the sets as groups."""
     corners, owners, origins, groups, notes = [], [], [], [], list(mesh.notes)
     has_solids = any(block.kind in SOLIDS for block in mesh.blocks)
     for n in (3, 4):
@@ -118,9 +118,10 @@ def extract_surface(mesh: ElementMesh) -> RawMesh:
 
 
 def _origin(mesh: ElementMesh, faces: _Polygons) -> tuple[np.ndarray, np.ndarray]:
-    """Number (k,) of the element of each face, and which face of a solid it is, from 1; 0: shell.
+    """Element number (k,) of each face, and number of the face of a solid from 1, or 0 for a shell.
 
-    Where a shell lies on a solid, the shell counts: the file's author put it there to show results.
+    If a shell lies on a solid, the shell counts, because the file's author put it there to show
+    results.
     """
     has_shell = faces.shell != NONE
     is_solid = [np.full(len(block.nodes), block.kind in SOLIDS) for block in mesh.blocks]
@@ -145,7 +146,7 @@ def _polygons(mesh: ElementMesh, n: int, kinds: tuple[str, ...]) -> _Polygons:
 
 
 def _mids(block: Block, face: Face) -> np.ndarray:
-    """Points (k, n) in the middle of a face's edges; NONE where an element has none."""
+    """Points (k, n) in the middle of a face's edges; NONE if an element has no mid-edge node."""
     edges = {frozenset(edge): CORNERS[block.kind] + k for k, edge in enumerate(EDGES[block.kind])}
     columns = [edges[frozenset((face[k], face[(k + 1) % len(face)]))] for k in range(len(face))]
     if block.nodes.shape[1] <= max(edges.values()):
@@ -154,7 +155,7 @@ def _mids(block: Block, face: Face) -> np.ndarray:
 
 
 def _skin(faces: _Polygons, points: np.ndarray, blocks: list[Block]) -> _Polygons:
-    """The faces that belong to one solid only, turned to face away from it."""
+    """The faces that belong to only one solid, turned to face away from it."""
     keys = np.sort(faces.corners, axis=1)
     _, same, times = np.unique(keys, axis=0, return_inverse=True, return_counts=True)
     faces = faces.select(times[same.reshape(-1)] == 1)
@@ -171,7 +172,7 @@ def _skin(faces: _Polygons, points: np.ndarray, blocks: list[Block]) -> _Polygon
 
 
 def _with_shells(skin: _Polygons, shells: _Polygons) -> tuple[_Polygons, int]:
-    """The skin with the shell elements that lie on it, and the number of shells that do not."""
+    """The skin with the shell elements on it, and the number of shells that are not on the skin."""
     if not len(shells.corners):
         return skin, 0
     keys = np.sort(np.concatenate([skin.corners, shells.corners]), axis=1)
@@ -184,7 +185,7 @@ def _with_shells(skin: _Polygons, shells: _Polygons) -> tuple[_Polygons, int]:
 
 
 def _groups(mesh: ElementMesh, faces: _Polygons) -> dict[str, np.ndarray]:
-    """Name -> its faces, (k,) bool. A node set and an element set may share a name."""
+    """The faces of each group, (k,) bool, by name. Node and element sets may share a name."""
     groups: dict[str, np.ndarray] = {
         name: np.isin(faces.owner, elements) | np.isin(faces.shell, elements)
         for name, elements in mesh.element_sets.items()
@@ -199,13 +200,13 @@ def _groups(mesh: ElementMesh, faces: _Polygons) -> dict[str, np.ndarray]:
 
 
 def _triangulate(faces: _Polygons, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Triangles (t, 3) of points, and the face (t,) of each; collapsed ones are left out."""
+    """Triangles (t, 3) of points, and the face (t,) of each. Collapsed triangles are left out."""
     curved = (faces.mids != NONE).any(axis=1)
     plain, bent = np.flatnonzero(~curved), np.flatnonzero(curved)
     pieces = [_split(faces.corners[plain], plain, points)]
     if len(bent):
         corners = faces.corners[bent]
-        # A missing node is replaced by the corner: the edge is straight, one triangle collapses.
+        # The corner replaces a missing node: the edge is straight, and one triangle collapses.
         mids = np.where(faces.mids[bent] == NONE, corners, faces.mids[bent])
         pieces += [
             (np.stack([corners[:, k], mids[:, k], mids[:, k - 1]], axis=1), bent)
@@ -221,7 +222,7 @@ def _triangulate(faces: _Polygons, points: np.ndarray) -> tuple[np.ndarray, np.n
 def _split(
     polygons: np.ndarray, of_face: np.ndarray, points: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Triangles as they are, quadrilaterals cut along the shorter diagonal."""
+    """Keep triangles, and cut quadrilaterals along the shorter diagonal."""
     if polygons.shape[1] == 3:
         return polygons, of_face
     a, b, c, d = (points[polygons[:, k]] for k in range(4))

@@ -1,4 +1,4 @@
-"""The mesh formats that are read; a file is recognised by its content, then by its name."""
+"""The supported mesh formats. A file is recognised by its content, then by its name."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class MeshFormat(NamedTuple):
 
     name: str
     suffixes: tuple[str, ...]  # usual endings of file names
-    content: re.Pattern[bytes]  # what the file begins with, or a line that it holds
+    content: re.Pattern[bytes]  # start of the file, or a line in it
     read: Callable[[Path, bytes], RawMesh]
 
 
@@ -38,7 +38,7 @@ def _begins_with(pattern: str) -> re.Pattern[bytes]:
 
 
 def _has_line(pattern: str) -> re.Pattern[bytes]:
-    """Matches a line anywhere in the file that begins with the pattern."""
+    """A pattern that matches a line anywhere in the file that begins with ``pattern``."""
     return re.compile(rb"^[ \t]*(?:" + pattern.encode() + rb")", re.M | re.I)
 
 
@@ -60,10 +60,11 @@ BINARY_HEAD = 1 << 10
 
 
 def read_raw_mesh(path: Path, content: bytes, how: Tessellation | None = None) -> RawMesh:
-    """Read a file; `how` is for faces of CAD.
+    """Read a mesh file. `how` applies to CAD faces.
 
     Raises:
-        InputError: the format is not known, has no faces of CAD, or is damaged or truncated.
+        InputError: for an unknown format, a format without CAD faces if `how` is given, or a
+            damaged or truncated file.
     """
     found = _find_format(path, content)
     if how is not None and found.name != "STEP":
@@ -86,7 +87,7 @@ def read_raw_mesh(path: Path, content: bytes, how: Tessellation | None = None) -
 
 @contextmanager
 def _libraries_quiet() -> Iterator[None]:
-    """Suppress what libraries say of a damaged file, since the mesh is checked as a whole."""
+    """Suppress messages of libraries on a damaged file, because the mesh is checked as a whole."""
     before = logging.root.manager.disable
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")

@@ -1,6 +1,6 @@
-"""Read Gmsh's .msh, versions 2.2 and 4.1, text and binary; physical groups as groups.
+"""Reader of Gmsh's .msh, versions 2.2 and 4.1, text and binary; physical groups as groups.
 
-Both encodings hold the same numbers in the same order, so that one reader serves both: it asks a
+Both encodings hold the same numbers in the same order, so that one reader serves both. It asks a
 stream for "two int, three double".
 
 Source: Gmsh reference manual, sections "MSH file format" and "Node ordering".
@@ -25,15 +25,15 @@ from chamberopt.geometry.meshes.elements import (
 )
 from chamberopt.geometry.meshes.raw_mesh import RawMesh
 
-# Gmsh's number of an element type: kind, nodes.
+# Kind and number of nodes by Gmsh's number of an element type.
 TYPES = {
     2: ("triangle", 3), 9: ("triangle", 6), 3: ("quad", 4), 16: ("quad", 8), 10: ("quad", 9),
     4: ("tetra", 4), 11: ("tetra", 10), 7: ("pyramid", 5), 19: ("pyramid", 13),
     14: ("pyramid", 14), 6: ("wedge", 6), 18: ("wedge", 15), 13: ("wedge", 18),
     5: ("hexahedron", 8), 17: ("hexahedron", 20), 12: ("hexahedron", 27),
 }  # fmt: skip
-WITHOUT_SURFACE = {15: 1, 1: 2, 8: 3, 26: 4, 27: 5}  # points and lines: nodes
-# Where Gmsh's order of mid-edge nodes is not that of `elements.EDGES`.
+WITHOUT_SURFACE = {15: 1, 1: 2, 8: 3, 26: 4, 27: 5}  # number of nodes of points and lines
+# Order of mid-edge nodes of the kinds for which Gmsh's order differs from `elements.EDGES`.
 MIDS = {
     "tetra": ((0, 1), (1, 2), (0, 2), (0, 3), (2, 3), (1, 3)),
     "pyramid": ((0, 1), (0, 3), (0, 4), (1, 2), (1, 4), (2, 3), (2, 4), (3, 4)),
@@ -67,14 +67,14 @@ class _Stream:
         return int(self.sizes(1)[0])
 
     def text_size(self) -> int:
-        """A count that is text even in binary files."""
+        """Read a count that is text even in binary files."""
         if self.text:
             return self.one_size()
         line, _, self.bytes = self.bytes.partition(b"\n")
         return int(line)
 
     def numbered_points(self, count: int) -> tuple[np.ndarray, np.ndarray]:
-        """An int and three doubles, `count` times: numbers (count,) and points (count, 3)."""
+        """Read an int and three doubles `count` times: numbers (count,) and points (count, 3)."""
         if self.text:
             rows = self.reals(4 * count).reshape(count, 4)
             return rows[:, 0].astype(np.int64), rows[:, 1:]
@@ -101,12 +101,12 @@ class _GmshMesh(NamedTuple):
 
     numbers: list[np.ndarray]
     points: list[np.ndarray]
-    # Gmsh's type of elements, rows (k, 1 + p) of their numbers and nodes, and physical groups
+    # Gmsh's element type, rows (k, 1 + p) of element numbers and nodes, and physical groups
     batches: list[tuple[int, np.ndarray, tuple[int, ...]]]
 
 
 def read_gmsh(path: Path, content: bytes) -> RawMesh:
-    """Read the surface in a .msh; InputError for other versions and unsupported elements."""
+    """Read the surface of a .msh; InputError for other versions and unsupported elements."""
     found = re.match(
         rb"\s*\$MeshFormat\s+([\d.]+)\s+([01])\s+(\d+)[ \t]*\r?\n?(.{0,4})", content, re.S
     )
@@ -200,7 +200,7 @@ def _node_count(path: Path, kind: int) -> int:
 
 
 def _element_mesh(path: Path, mesh: _GmshMesh, name_of: dict[tuple[int, int], str]) -> ElementMesh:
-    """The elements that have a surface, and those of each physical group; group 0 means none."""
+    """The elements with a surface, and the elements of each physical group. Group 0 means none."""
     numbers = np.concatenate([np.zeros(0, dtype=np.int64), *mesh.numbers])
     points = np.concatenate([np.zeros((0, 3)), *(point.reshape(-1, 3) for point in mesh.points)])
     by_number = np.argsort(numbers, kind="stable")
@@ -227,7 +227,7 @@ def _element_mesh(path: Path, mesh: _GmshMesh, name_of: dict[tuple[int, int], st
 
 
 def _reorder(kind: str, nodes: np.ndarray) -> np.ndarray:
-    """Nodes with the mid-edge nodes in the order of `elements.EDGES`."""
+    """Order the mid-edge nodes as in `elements.EDGES`."""
     corners = CORNERS[kind]
     if kind not in MIDS or nodes.shape[1] == corners:
         return nodes

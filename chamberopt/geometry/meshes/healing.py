@@ -1,6 +1,6 @@
-"""Make one closed surface that faces outward of loose triangles.
+"""Repair of loose triangles to one closed surface that faces outward.
 
-Every change is noted for the user; what cannot be put right without guessing is refused.
+Each change gives a note for the user. Faults that need a guess are refused.
 """
 
 from __future__ import annotations
@@ -24,25 +24,26 @@ from chamberopt.geometry.triangles import (
     unique_rows,
 )
 
-# Close small holes and cracks of a surface; large openings are left for the user to close.
+# Small holes and cracks of a surface are closed. Large openings are left for the user to close.
 #
-# The rim of a hole with n edges gets the n - 2 triangles that have the least area together,
-# found by dynamic programming.
+# The rim of a hole with n edges gets the n - 2 triangles with the least total area, found by
+# dynamic programming.
 #
 # Source: G. Barequet and M. Sharir, Computer Aided Geometric Design 12 (1995) 207.
 
-MAX_WIDTH = 0.03  # of the part's diagonal: the widest hole that is closed automatically
+# share of the part's diagonal: width of the widest hole that is closed automatically
+MAX_WIDTH = 0.03
 MAX_RIM_EDGES = 64  # the time for a rim grows with the cube of its edges
 
 
 def close_holes(
     points: np.ndarray, triangles: np.ndarray, open_edges: np.ndarray, tolerance: float
 ) -> tuple[np.ndarray, list[str]]:
-    """Triangles (k, 3) that close the small holes, facing as their neighbours do, and notes.
+    """Triangles (k, 3) that close the small holes and face as their neighbours do; and notes.
 
     Args:
-        open_edges: edges (j, 2) that belong to one triangle only.
-        tolerance: a crack no wider than this [m] is closed however long it is.
+        open_edges: edges (j, 2) that belong to only one triangle.
+        tolerance: width [m] up to which a crack of any length is closed.
     """
     diagonal = float(np.linalg.norm(np.ptp(points, axis=0)))
     more: list[tuple[int, int, int]] = []
@@ -70,7 +71,7 @@ def close_holes(
 
 
 def count_holes(edges: np.ndarray) -> int:
-    """Number of connected pieces that open edges (k, 2) form."""
+    """Number of connected pieces of open edges (k, 2)."""
     ends, numbers = np.unique(edges, return_inverse=True)
     a, b = numbers.reshape(-1, 2).T
     return connected_pieces(a, b, len(ends))[0]
@@ -79,8 +80,8 @@ def count_holes(edges: np.ndarray) -> int:
 def _simple_rims(triangles: np.ndarray, edges: np.ndarray) -> list[list[int]]:
     """Closed loops of open edges, each in the direction that new triangles need.
 
-    That is against the side of the triangle beside its first edge. Holes that touch in a corner
-    are left out.
+    This direction is opposite to the side of the triangle beside the first edge. Holes that touch
+    in a corner are left out.
     """
     neighbours: dict[int, list[int]] = defaultdict(list)
     for a, b in edges.tolist():
@@ -95,7 +96,8 @@ def _simple_rims(triangles: np.ndarray, edges: np.ndarray) -> list[list[int]]:
             rim.append(here)
             one, other = neighbours[here]
             here = other if len(rim) > 1 and one == rim[-2] else one
-        # A walk that stops elsewhere met a corner where holes touch, or an earlier walk to one.
+        # A walk that ends elsewhere met a corner where holes touch, or an earlier walk to such a
+        # corner.
         if here == start and 3 <= len(rim) <= MAX_RIM_EDGES:
             against = (sides == (rim[1], rim[0])).all(axis=1).any()
             rims.append(rim if against else rim[::-1])
@@ -105,8 +107,8 @@ def _simple_rims(triangles: np.ndarray, edges: np.ndarray) -> list[list[int]]:
 def _least_area_patch(corners: np.ndarray) -> tuple[float, list[tuple[int, int, int]]]:
     """Least area [m²] that closes a rim with corners (n, 3) [m], and its triangles."""
     n = len(corners)
-    # least[i, j]: least area over the part of the rim from i to j; apex[i, j]: the third corner of
-    # the triangle at the side from i to j.
+    # least[i, j]: least area over the part of the rim from i to j. apex[i, j]: third corner of the
+    # triangle at the side from i to j.
     least, apex = np.zeros((n, n)), np.zeros((n, n), dtype=int)
     for span in range(2, n):
         for i in range(n - span):
@@ -127,8 +129,8 @@ def _least_area_patch(corners: np.ndarray) -> tuple[float, list[tuple[int, int, 
     return float(least[0, n - 1]), patch
 
 
-STRAY_SHARE = 0.01  # of the area: more than that is not there by mistake
-WELD = 1e-6  # of the bounding box's diagonal: what a text format with 6 digits rounds away
+STRAY_SHARE = 0.01  # share of the area: a larger share of loose facets is not there by mistake
+WELD = 1e-6  # share of the bounding box's diagonal: rounding of a text format with 6 digits
 
 
 class SewnSurface(NamedTuple):
@@ -136,12 +138,12 @@ class SewnSurface(NamedTuple):
 
     points: np.ndarray  # (n, 3) [m]
     triangles: np.ndarray  # (k, 3), rows of the points
-    source: np.ndarray  # (k,), the given triangle that each one is; -1 if it closes a hole
-    notes: list[str]  # what was changed
+    source: np.ndarray  # (k,), the given triangle of each; -1 if the triangle closes a hole
+    notes: list[str]  # one sentence for each change
 
 
 def sew_bodies(path: Path, corners: np.ndarray, bodies: np.ndarray) -> SewnSurface:
-    """Sew triangles (m, 3, 3) [m] body by body (m,): bodies that touch keep their own vertices."""
+    """Sew triangles (m, 3, 3) [m] body by body (m,). Bodies that touch keep their own vertices."""
     rows = [np.flatnonzero(bodies == body) for body in np.unique(bodies)]
     sewn = [sew(path, corners[own]) for own in rows]
     first = np.cumsum([0, *(len(one.points) for one in sewn)])
@@ -210,7 +212,7 @@ def _require_closed(path: Path, points: np.ndarray, triangles: np.ndarray) -> No
 
 
 def _drop_useless(points: np.ndarray, triangles: np.ndarray, source: np.ndarray) -> SewnSurface:
-    """Drop triangles with two corners in one place, and second copies; the order stays."""
+    """Drop triangles with two corners in one place, and second copies. The order stays."""
     notes = []
     flat = (triangles == np.roll(triangles, 1, axis=1)).any(axis=1)
     if flat.any():
@@ -228,10 +230,10 @@ def _drop_useless(points: np.ndarray, triangles: np.ndarray, source: np.ndarray)
 
 
 def _drop_strays(surface: SewnSurface) -> SewnSurface:
-    """Drop facets that hang on nothing, or by an edge that is closed without them.
+    """Drop stray facets: loose facets, and facets that hang by an edge that is closed without them.
 
-    They are pieces, joined where exactly two triangles meet, with at least as many open edges as
-    triangles: a body with a hole in it has few.
+    Stray facets form pieces, joined where exactly two triangles meet, that have at least as many
+    open edges as triangles. A body with a hole has few open edges.
     """
     points, triangles = surface.points, surface.triangles
     _, edge, times = np.unique(edge_keys(triangles), return_inverse=True, return_counts=True)
@@ -255,7 +257,10 @@ def _drop_strays(surface: SewnSurface) -> SewnSurface:
 
 
 def _weld(points: np.ndarray, tolerance: float) -> tuple[np.ndarray, np.ndarray]:
-    """The points that remain if those within a tolerance [m] are merged, and each one's number."""
+    """Merge points within a tolerance [m].
+
+    Returns: the remaining points, and the number of each given point among them.
+    """
     from scipy.spatial import cKDTree
 
     a, b = cKDTree(points).query_pairs(tolerance, output_type="ndarray").T
@@ -274,7 +279,7 @@ def _edges(triangles: np.ndarray, count: int) -> np.ndarray:
 def turn_outward(
     path: Path, vertices: np.ndarray, triangles: np.ndarray
 ) -> tuple[np.ndarray, list[str]]:
-    """Turn triangles (m, 3) so that neighbours agree and bodies have positive volumes; notes."""
+    """Turn triangles (m, 3) so that neighbours agree and volumes are positive; and notes."""
     notes = []
     wrong = _against_neighbours(path, triangles)
     if wrong.any():
@@ -284,7 +289,7 @@ def turn_outward(
     for k in np.flatnonzero(volumes < 0.0).tolist():
         others = (other for other in range(len(volumes)) if other != k)
         if any(abs(shell_winding(vertices, triangles, shells, one, k)) > 0.5 for one in others):
-            continue  # the wall of a void in another piece, whichever way that one faces
+            continue  # the wall of a void in another piece, which may face either way
         triangles = np.where((shells == k)[:, None], triangles[:, ::-1], triangles)
         which = "it was" if len(volumes) == 1 else f"body {k + 1} of {len(volumes)} was"
         notes.append(f"{which} inside out: turned its normals outward")
@@ -296,9 +301,9 @@ def turn_outward(
 def _against_neighbours(path: Path, triangles: np.ndarray) -> np.ndarray:
     """Triangles (m,) to turn so that neighbours agree, the fewest of each piece of the surface.
 
-    In a graph each triangle has two nodes, as it is and turned. Nodes that agree across an edge are
-    linked. A piece of the surface then falls into two halves, each the other's mirror image; only a
-    one-sided surface does not.
+    In a graph each triangle has two nodes, one as it is and one turned. Nodes that agree across an
+    edge are linked. A piece of the surface then falls into two halves, each the other's mirror
+    image. Only a one-sided surface does not fall apart.
     """
     m, pairs, sides = len(triangles), side_pairs(triangles), sides_of(triangles)
     agree = sides[pairs[:, 0], 0] != sides[pairs[:, 1], 0]
@@ -314,4 +319,4 @@ def _against_neighbours(path: Path, triangles: np.ndarray) -> np.ndarray:
         )
     size = np.bincount(as_is, minlength=count)
     fewer = size[as_is] < size[turned]
-    return fewer | ((size[as_is] == size[turned]) & (as_is > turned))
+    return np.asarray(fewer | ((size[as_is] == size[turned]) & (as_is > turned)))

@@ -1,7 +1,8 @@
-"""Read Nastran bulk data (CATIA V5, Patran, HyperMesh ...); properties and sets as groups.
+"""Reader of Nastran bulk data (CATIA V5, Patran, HyperMesh ...); properties and sets as groups.
 
-A card of geometry that is not supported is refused by name, never ignored. Fields come in the small
-format (8 columns), the large format (16 columns, name with *) and the free format (commas).
+The reader never ignores an unsupported geometry card. It refuses the file and names the card.
+Fields come in the small format (8 columns), the large format (16 columns, name with *) and the free
+format (commas).
 
 Source: MSC Nastran Quick Reference Guide.
 """
@@ -30,7 +31,8 @@ KINDS = {
     "CQUAD4": "quad", "CQUADR": "quad", "CQUAD8": "quad",
     "CTETRA": "tetra", "CPYRAM": "pyramid", "CPENTA": "wedge", "CHEXA": "hexahedron",
 }  # fmt: skip
-# Nastran counts the mid-edge nodes of these bottom, upright, top; `elements` bottom, top, upright.
+# Nastran counts the mid-edge nodes of these kinds bottom, upright, top. `elements` counts bottom,
+# top, upright.
 REORDERED = {
     "wedge": [0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 13, 14, 9, 10, 11],
     "hexahedron": [*range(12), 16, 17, 18, 19, 12, 13, 14, 15],
@@ -52,7 +54,7 @@ Card = tuple[str, list[str], int]
 
 
 def read_nastran(path: Path, content: bytes) -> RawMesh:
-    """Read the surface in bulk data; InputError names card and line of what is refused."""
+    """Read the surface of bulk data; InputError names the refused card and its line."""
     text = content.decode("latin-1")
     cards: dict[str, list[Card]] = defaultdict(list)
     left_out: Counter[str] = Counter()
@@ -77,7 +79,7 @@ def read_nastran(path: Path, content: bytes) -> RawMesh:
 
 
 def _cards(text: str) -> list[Card]:
-    """Name, further fields and line number of each card; continuation lines are joined."""
+    """Name, further fields and line number of each card. Continuation lines are joined."""
     lines = text.splitlines()
     starts = (k + 1 for k, line in enumerate(lines) if re.match(r"\s*BEGIN\s+BULK", line, re.I))
     start = next(starts, 0)
@@ -152,10 +154,10 @@ def _points(cards: dict[str, list[Card]]) -> tuple[np.ndarray, dict[int, int]]:
 def _to_basic(
     systems: dict[int, Card], number: int, points: np.ndarray, above: tuple[int, ...] = ()
 ) -> np.ndarray:
-    """Points (n, 3) given in a coordinate system CORD2R, CORD2C or CORD2S, in the basic one.
+    """Transform points (n, 3) from a system CORD2R, CORD2C or CORD2S to the basic system.
 
-    A card has the origin A, a point B on the z axis and a point C in the xz plane, perhaps given in
-    another system; `above` are those that refer to this one.
+    A card gives the origin A, a point B on the z axis and a point C in the xz plane, perhaps in
+    another system. ``above``: numbers of the systems that refer to this system.
     """
     if number == 0:
         return points
@@ -171,11 +173,11 @@ def _to_basic(
     y /= np.linalg.norm(y)
     if name != "CORD2R":
         radius, theta, height = points[:, 0], np.radians(points[:, 1]), points[:, 2]
-        if name == "CORD2S":  # r, theta from z, phi
+        if name == "CORD2S":  # spherical coordinates: r, theta from z, phi
             radius, height = radius * np.sin(theta), radius * np.cos(theta)
             theta = np.radians(points[:, 2])
         points = np.stack([radius * np.cos(theta), radius * np.sin(theta), height], axis=1)
-    return a + points @ np.array([np.cross(y, z), y, z])
+    return np.asarray(a + points @ np.array([np.cross(y, z), y, z]))
 
 
 def _add_blocks(

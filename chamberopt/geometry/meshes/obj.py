@@ -1,4 +1,4 @@
-"""Read Wavefront OBJ files."""
+"""Reader of Wavefront OBJ files."""
 
 from __future__ import annotations
 
@@ -11,14 +11,16 @@ from chamberopt.geometry.meshes.raw_mesh import ElementNumbers, RawMesh
 
 
 def read_obj(path: Path, content: bytes) -> RawMesh:
-    """Read an OBJ; o, g and usemtl give names. Faces with more corners become fans."""
+    """Read an OBJ file; o, g and usemtl give names. Faces with more corners become fans."""
     points: list[list[float]] = []
-    directions: list[list[float]] = [[0.0, 0.0, 0.0]]  # the first stands for none
-    of_corners: list[tuple[int, int, int]] = []  # directions at the corners of the triangles
+    directions: list[list[float]] = [[0.0, 0.0, 0.0]]  # the first row stands for no direction
+    # rows of directions at the corners of the triangles
+    of_corners: list[tuple[int, int, int]] = []
     triangles: list[tuple[int, int, int]] = []
     fan_sizes: list[int] = []  # triangles of each face
-    current: dict[str, tuple[str, ...]] = {}  # names in force, by keyword
-    runs: list[tuple[int, tuple[str, ...]]] = []  # first triangle, and the names from there on
+    current: dict[str, tuple[str, ...]] = {}  # present names, by keyword
+    # first triangle of each run, and the names of its triangles
+    runs: list[tuple[int, tuple[str, ...]]] = []
     for number, line in enumerate(content.decode("utf-8", errors="replace").splitlines(), start=1):
         keyword, *words = line.split("#")[0].split() or [""]
         try:
@@ -62,7 +64,7 @@ def read_obj(path: Path, content: bytes) -> RawMesh:
 
 
 def _direction(word: str, count: int) -> int:
-    """Row of the normal that a corner such as 3/1/2 names, of so many so far; 0 if it has none."""
+    """Row of the normal that a corner such as 3/1/2 names, of ``count`` rows; 0 for none."""
     parts = word.split("/")
     number = int(parts[2]) if len(parts) > 2 and parts[2] else 0
     return number if number >= 0 else max(count + number, 0)

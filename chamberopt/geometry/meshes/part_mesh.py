@@ -1,4 +1,4 @@
-"""Read the mesh of a part: one closed surface in metres, its normals outward.
+"""Reader of part meshes: one closed surface in metres with outward normals.
 
 A file passes through these steps:
     formats: recognise the format and read its triangles;
@@ -6,9 +6,9 @@ A file passes through these steps:
     healing, holes: make one closed surface of the triangles;
     self_intersection: refuse a surface that crosses itself.
 
-What needs no guessing is put right, with a note for the user. Everything else is refused, with the
+Faults that need no guess are repaired, with a note for the user. Other faults are refused, with the
 reason and the place. The triangles keep their order and their corners, so that coverage can be
-given on the mesh of the user.
+given on the user's mesh.
 """
 
 from __future__ import annotations
@@ -33,37 +33,39 @@ from chamberopt.geometry.meshes.surface_error import SurfaceError
 from chamberopt.geometry.meshes.units import METRES_PER, find_unit
 from chamberopt.geometry.triangles import unit_normals
 
-MEANT = 0.5  # cosine between a facet and the normal of its surface, below which one is wrong
+MEANT = 0.5  # cosine between a facet and a stated normal, below which the normal is wrong
 
 
-@dataclass(frozen=True, eq=False)  # one that was read once is known again by its identity
+@dataclass(frozen=True, eq=False)  # a mesh that was read once is recognised by its identity
 class PartMesh:
     """A closed part in the coordinates of its file."""
 
     vertices: np.ndarray  # (n, 3) float64 [m]
     triangles: np.ndarray  # (m, 3) int32, in the file's order; normals point outward
-    numbering: ElementNumbers  # the file's element to which each triangle belongs
-    notes: tuple[str, ...]  # what was changed
-    sha256: str  # of the file as read
-    groups: dict[str, np.ndarray] = field(default_factory=dict)  # name -> triangles, (m,) bool
-    unit: str = "m"  # of the file's numbers
-    normals: np.ndarray | None = None  # of the surface at the corners, (m, 3, 3), if the file tells
-    is_exact: bool = False  # whether the triangles were made of the surface itself, as of STEP
+    numbering: ElementNumbers  # the file's element of each triangle
+    notes: tuple[str, ...]  # one sentence for each change
+    sha256: str  # digest of the file as read
+    # triangles of each group by name, (m,) bool
+    groups: dict[str, np.ndarray] = field(default_factory=dict)
+    unit: str = "m"  # unit of the file's numbers
+    # surface normals at the corners, (m, 3, 3), if the file states them
+    normals: np.ndarray | None = None
+    is_exact: bool = False  # True if the triangles were made from the exact surface, as for STEP
 
     @property
     def elements(self) -> np.ndarray:
-        """Number of each triangle's element in the file, (m,) int64; 0 if it has none there."""
+        """Number of each triangle's element in the file, (m,) int64; 0 for an added triangle."""
         return self.numbering.elements
 
     @property
     def size(self) -> np.ndarray:
         """Sides (3,) of the bounding box [m]."""
-        return np.ptp(self.vertices, axis=0)
+        return np.asarray(np.ptp(self.vertices, axis=0))
 
 
 @dataclass(frozen=True)
 class TriangleSoup:
-    """The triangles of a file in metres, before a closed surface is made of them."""
+    """The triangles of a file in metres, before they become a closed surface."""
 
     path: Path
     corners: np.ndarray  # (m, 3, 3) [m], in the coordinates of the file
@@ -72,20 +74,20 @@ class TriangleSoup:
     notes: tuple[str, ...]
     sha256: str
     unit: str
-    bodies: np.ndarray  # (m,), the body of each; 0 where the file does not tell bodies apart
+    bodies: np.ndarray  # (m,), body of each triangle; 0 if the file does not tell bodies apart
     normals: np.ndarray | None = None  # as in PartMesh
     is_exact: bool = False
 
 
 def read_part(path: Path, unit: str = "guess", how: Tessellation | None = None) -> PartMesh:
-    """Read a part whose numbers are in um, mm, cm, m or in; or guess the unit.
+    """Read a part whose numbers are in um, mm, cm, m or in, or guess the unit.
 
     Args:
-        how: how fine the triangles of a STEP file are.
+        how: fineness of the triangles of a STEP file.
 
     Raises:
-        InputError: the file is missing, empty, truncated or not finite; its surface is open, not
-            manifold or crosses itself; or it has a size that no part has.
+        InputError: for a file that is missing, empty, truncated or not finite, for a surface that
+            is open, not manifold or crosses itself, and for a size that no part has.
     """
     soup = read_triangles(path, unit, how)
     try:
@@ -97,11 +99,11 @@ def read_part(path: Path, unit: str = "guess", how: Tessellation | None = None) 
 
 
 def read_part_cached(path: Path, unit: str = "guess", how: Tessellation | None = None) -> PartMesh:
-    """As read_part, but reads a file again only if it has changed: a study builds many chambers."""
+    """Read a part only if its file has changed, because a study builds many chambers."""
     try:
         stamp = path.stat()
     except OSError:
-        return read_part(path, unit, how)  # raises an error that explains why
+        return read_part(path, unit, how)  # this raises an error that explains the reason
     return _read_part_cached(path, unit, how, stamp.st_mtime_ns, stamp.st_size)
 
 
@@ -115,7 +117,7 @@ def _read_part_cached(
 def read_triangles(
     path: Path, unit: str = "guess", how: Tessellation | None = None
 ) -> TriangleSoup:
-    """Read a mesh file without making a surface of it; raises InputError as read_part."""
+    """Read a mesh file without making a closed surface; raises InputError as read_part does."""
     content = _read_content(path)
     raw = read_raw_mesh(path, content, how)
     corners = raw.corners
@@ -129,7 +131,7 @@ def read_triangles(
             f"the first is triangle {bad[0] + 1} of {len(corners)}; export the mesh again"
         )
     unit, unit_notes = find_unit(path, content, corners, unit, raw.unit)
-    corners = corners * METRES_PER[unit] + 0.0  # + 0.0 turns -0 into 0, to be one place
+    corners = corners * METRES_PER[unit] + 0.0  # + 0.0 turns -0 into 0, so that both are one place
     numbering, notes = raw.numbering or number_by_position(len(corners)), (*raw.notes, *unit_notes)
     sha256 = hashlib.sha256(content).hexdigest()
     bodies = np.zeros(len(corners), dtype=np.int64) if raw.bodies is None else raw.bodies
@@ -139,7 +141,7 @@ def read_triangles(
 
 
 def close_surface(soup: TriangleSoup, only: np.ndarray | None = None) -> PartMesh:
-    """Make one closed surface of all triangles, or of those marked by `only` (m,).
+    """Make one closed surface of all triangles, or of the triangles marked by `only` (m,).
 
     Raises:
         SurfaceError: with the place where the surface is open, not manifold or crosses itself.
@@ -151,7 +153,7 @@ def close_surface(soup: TriangleSoup, only: np.ndarray | None = None) -> PartMes
     )
     triangles, turned = turn_outward(path, vertices, triangles)
     refuse_self_intersection(path, vertices, triangles)
-    given = np.where(source >= 0, chosen[source], -1)  # -1: closes a hole
+    given = np.where(source >= 0, chosen[source], -1)  # -1: the triangle closes a hole
     return PartMesh(
         vertices,
         triangles.astype(np.int32),
@@ -166,9 +168,9 @@ def close_surface(soup: TriangleSoup, only: np.ndarray | None = None) -> PartMes
 
 
 def _normals_at(soup: TriangleSoup, corners: np.ndarray, given: np.ndarray) -> np.ndarray | None:
-    """Normals at the corners (k, 3, 3) of triangles, of which `given` (k,) are those of the file.
+    """Normals at the corners (k, 3, 3) of triangles, from the file's triangles `given` (k,).
 
-    The facet's own where the file has none, or one that cannot be meant.
+    A corner without a plausible normal in the file has the normal of its facet.
     """
     if soup.normals is None:
         return None
@@ -186,12 +188,13 @@ def _normals_at(soup: TriangleSoup, corners: np.ndarray, given: np.ndarray) -> n
 def select_triangles(
     groups: Mapping[str, np.ndarray], names: Iterable[str], count: int, field: str
 ) -> np.ndarray:
-    """Mark (count,) the triangles of the named groups; "all" means every triangle.
+    """Mark the triangles (count,) of the named groups; "all" means every triangle.
 
-    Case matters only if the file has names that differ in nothing else.
+    Case matters only between names of the file that differ in nothing else.
 
     Raises:
-        InputError: the file has no group of that name; names the design's field that holds it.
+        InputError: for a name without a group in the file; the message names the design's
+            ``field``.
     """
     by_lower = {name.lower(): name for name in groups}
     chosen = np.zeros(count, dtype=bool)

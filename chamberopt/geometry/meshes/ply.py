@@ -1,4 +1,4 @@
-"""Read PLY files, text and binary, with trimesh; colours give names."""
+"""Reader of PLY files, text and binary, with trimesh; colours give names."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ import numpy as np
 from chamberopt.common.errors import InputError
 from chamberopt.geometry.meshes.raw_mesh import RawMesh
 
-MAX_COLOURS = 64  # more are a photograph on the part, not names of groups
+MAX_COLOURS = 64  # more colours are a photograph on the part, not names of groups
 
 
 def read_ply(path: Path, content: bytes) -> RawMesh:
-    """Read a PLY; triangles of one colour, by face or by all three corners, are named "#rrggbb"."""
+    """Read a PLY file. Triangles of one colour, by face or corners, are named "#rrggbb"."""
     import trimesh
 
     _require_all_lines(path, content)
@@ -37,9 +37,9 @@ def read_ply(path: Path, content: bytes) -> RawMesh:
 
 
 def _require_all_lines(path: Path, content: bytes) -> None:
-    """Raise InputError for a truncated text file, of which trimesh would read what is left.
+    """Raise InputError for a truncated text file, because trimesh would read the remaining part.
 
-    A text file has a line for each element that its header counts, a binary one some bytes.
+    A text file has a line for each element that its header counts.
     """
     header, end, body = content.partition(b"end_header")
     if not end:

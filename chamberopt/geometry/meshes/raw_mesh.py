@@ -1,4 +1,4 @@
-"""What a reader returns: triangles as the file gives them, with element numbers and group names."""
+"""Result of each reader: triangles as in the file, with element numbers and group names."""
 
 from __future__ import annotations
 
@@ -11,19 +11,20 @@ import numpy as np
 
 @dataclass(frozen=True)
 class ElementNumbers:
-    """The element of the file to which each of m triangles belongs; results can be exported by it.
+    """The file's element of each of m triangles. Results can be exported by element.
 
     The triangles of a quadrilateral share a number. If the file does not number its elements (`own`
     is false), the number is the position from 1 of the triangle, polygon (OBJ) or cell (VTK).
     """
 
-    elements: np.ndarray  # (m,) int64, the element's number; 0: not in the file
-    faces: np.ndarray  # (m,) int8, face of a solid element, from 1 as Abaqus's S1, S2 ...; 0: shell
-    own: bool = False  # whether the numbers are the file's own
-    instance: str = ""  # the Abaqus instance in which the numbers count, if any
+    elements: np.ndarray  # (m,) int64, number of the element; 0: not in the file
+    # (m,) int8, face of a solid element, from 1 as in Abaqus's S1, S2 ...; 0: shell
+    faces: np.ndarray
+    own: bool = False  # True if the numbers are the file's own
+    instance: str = ""  # Abaqus instance in which the numbers count, if any
 
     def select(self, rows: np.ndarray) -> ElementNumbers:
-        """Numbers of some triangles, by a mask (m,) or by indices; index -1: not in the file."""
+        """Numbers of triangles, by a mask (m,) or by indices. Index -1: not in the file."""
         if rows.dtype == bool:
             rows = np.flatnonzero(rows)
         elements, faces = (
@@ -41,21 +42,22 @@ def number_by_position(count: int) -> ElementNumbers:
 class RawMesh:
     """The triangles of a file, before they are checked.
 
-    Groups are the file's sets, groups, properties or colours: name -> triangles, (m,) bool.
+    Groups are the file's sets, groups, properties or colours: triangles (m,) bool by name.
     """
 
-    corners: np.ndarray  # (m, 3, 3), in the file's numbers and order
+    corners: np.ndarray  # (m, 3, 3), in the file's unit and order
     groups: dict[str, np.ndarray] = field(default_factory=dict)
-    unit: str | None = None  # of the file's numbers, if the file states one
-    notes: tuple[str, ...] = ()  # what was left out or turned into triangles
+    unit: str | None = None  # unit of the file's numbers, if the file states a unit
+    notes: tuple[str, ...] = ()  # one sentence for each omission or conversion
     numbering: ElementNumbers | None = None  # None if the file has only triangles
-    bodies: np.ndarray | None = None  # (m,), the body of each, if each is closed by itself
-    normals: np.ndarray | None = None  # of the surface at the corners, (m, 3, 3); 0: not known
-    is_exact: bool = False  # whether the triangles were made of the surface itself
+    # (m,), body of each triangle, if each body is closed by itself
+    bodies: np.ndarray | None = None
+    normals: np.ndarray | None = None  # surface normals at the corners, (m, 3, 3); 0: not known
+    is_exact: bool = False  # True if the triangles were made from the exact surface
 
 
 def read_scene(file: BinaryIO | Path, kind: str) -> RawMesh:
-    """Read a file of a kind ("stl", "3mf", "glb") with trimesh; meshes of one name are a group."""
+    """Read a file of a kind ("stl", "3mf", "glb") with trimesh. Meshes of one name are a group."""
     import trimesh
 
     scene = trimesh.load_scene(file, file_type=kind, process=False)
@@ -63,7 +65,7 @@ def read_scene(file: BinaryIO | Path, kind: str) -> RawMesh:
     for node in scene.graph.nodes_geometry:
         transform, key = scene.graph[node]
         mesh: Any = scene.geometry[key]
-        if hasattr(mesh, "faces") and len(mesh.faces):  # no lines and points
+        if hasattr(mesh, "faces") and len(mesh.faces):  # lines and points have no faces
             points = np.asarray(mesh.vertices, dtype=np.float64)
             points = points @ transform[:3, :3].T + transform[:3, 3]
             names.append(str(mesh.metadata.get("name") or node))

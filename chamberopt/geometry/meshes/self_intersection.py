@@ -1,7 +1,7 @@
-"""Refuse surfaces that cross themselves: cutting such a part out of a chamber fails silently.
+"""Check for surfaces that cross themselves: cutting such a part out of a chamber fails silently.
 
-Candidate pairs come from a tree of boxes over the triangles, in the order of a k-d tree, which is
-compared with itself level by level. Each pair is then tested exactly.
+Candidate pairs come from a tree of boxes over the triangles, in the order of a k-d tree. The tree
+is compared with itself level by level. Each pair is then tested exactly.
 
 Source: T. Möller, "A fast triangle-triangle intersection test", J. Graphics Tools 2 (1997) 25.
 """
@@ -16,8 +16,8 @@ import numpy as np
 from chamberopt.geometry.meshes.surface_error import SurfaceError, format_point
 from chamberopt.geometry.triangles import find_shells, heights, unit_normals
 
-CHUNK = 1 << 18  # pairs tested at once: bounds memory at some 100 MB
-# Of the bounding box's diagonal. Surfaces that pass through each other by less only touch.
+CHUNK = 1 << 18  # pairs tested at once, which bounds memory at some 100 MB
+# Share of the bounding box's diagonal. Surfaces that pass through each other by less only touch.
 TOUCH = 1e-6
 
 
@@ -43,11 +43,12 @@ def refuse_self_intersection(path: Path, vertices: np.ndarray, triangles: np.nda
 
 
 def crossing_pairs(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Pairs (2, k) of triangles (m, 3) that cross each other and are of one closed body."""
+    """Pairs (2, k) of triangles (m, 3) that cross each other and belong to one closed body."""
     corners = vertices[triangles]
     touch = TOUCH * float(np.linalg.norm(np.ptp(vertices, axis=0)))
     shells, _ = find_shells(vertices, triangles)
-    usable = np.flatnonzero(heights(vertices, triangles) > touch)  # thinner ones have no direction
+    # thinner triangles have no direction
+    usable = np.flatnonzero(heights(vertices, triangles) > touch)
     found = []
     for a, b in _close_pairs(corners[usable]):
         a, b = usable[a], usable[b]
@@ -60,9 +61,10 @@ def _close_pairs(corners: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]
     """Pairs of triangles (m, 3, 3) whose boxes overlap, each pair once, in chunks."""
     from scipy.spatial import cKDTree
 
-    order = cKDTree(corners.mean(axis=1), leafsize=1).indices  # keeps neighbours together
+    # this order keeps neighbours together
+    order = cKDTree(corners.mean(axis=1), leafsize=1).indices
     low, high = corners.min(axis=1)[order].T.copy(), corners.max(axis=1)[order].T.copy()
-    levels = [(low, high)]  # of boxes, each (3, count); the next level joins boxes in pairs
+    levels = [(low, high)]  # levels of boxes, each (3, count); the next level joins boxes in pairs
     while levels[-1][0].shape[1] > 1:
         low, high = levels[-1]
         if low.shape[1] % 2:
@@ -80,7 +82,7 @@ def _close_pairs(corners: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]
             different = i != j
             yield order[i[different]], order[j[different]]
             continue
-        # The four pairs of halves; of a box with itself, the two halves only once.
+        # The four pairs of halves. A box paired with itself has its two halves only once.
         two = i != j
         i, j = (
             np.r_[2 * i, 2 * i + 1, 2 * i, 2 * i[two] + 1],
@@ -98,7 +100,7 @@ def _crossing(
     corners: np.ndarray, a: np.ndarray, b: np.ndarray, touch: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """The pairs of triangles a, b (k,) that pass through each other by more than `touch` [m]."""
-    for _ in range(2):  # each must have corners on both sides of the other's plane
+    for _ in range(2):  # each triangle must have corners on both sides of the other's plane
         distance = _distances(corners[a], corners[b])
         through = (distance.min(axis=1) < -touch) & (distance.max(axis=1) > touch)
         a, b = b[through], a[through]
@@ -114,14 +116,14 @@ def _crossing(
 
 
 def _distances(corners: np.ndarray, planes: np.ndarray) -> np.ndarray:
-    """Distances (k, 3) of triangles' corners from the planes of others, both (k, 3, 3)."""
-    return np.einsum("kij,kj->ki", corners - planes[:, :1], unit_normals(planes))
+    """Distances (k, 3) of triangles' corners from the planes of other triangles, both (k, 3, 3)."""
+    return np.asarray(np.einsum("kij,kj->ki", corners - planes[:, :1], unit_normals(planes)))
 
 
 def _interval(
     corners: np.ndarray, distance: np.ndarray, along: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Where triangles cross the plane of the others: first and last position (k,) on the line."""
+    """First and last position (k,) of triangles on the line where they cross the other planes."""
     positions = []
     for i, j in ((0, 1), (1, 2), (2, 0)):
         through = distance[:, i] * distance[:, j] < 0.0

@@ -1,4 +1,4 @@
-"""Read STEP files, parts and assemblies, in the file's unit; names and colours are groups."""
+"""Reader of STEP parts and assemblies, in the file's unit; names and colours are groups."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from chamberopt.geometry.meshes.raw_mesh import RawMesh
 from chamberopt.geometry.meshes.step_tessellation import REMEDY, Tessellation, tessellate
 from chamberopt.geometry.meshes.units import METRES_PER
 
-# What a STEP file says in its text: the unit of its numbers, and the names of faces.
+# The text of a STEP file states the unit of its numbers and the names of its faces.
 #
-# An entity is `#12 = TYPE('name', #7, ...);`; a complex one has several types: `#12 = (A()
+# An entity is `#12 = TYPE('name', #7, ...);`. A complex entity has several types: `#12 = (A()
 # B(#7));`.
 #
 # Source: ISO 10303-21 (exchange structure), ISO 10303-42 (geometry and topology).
@@ -42,7 +42,8 @@ FACES = ("ADVANCED_FACE", "FACE_SURFACE")
 SHELLS, TURNED_SHELL = ("CLOSED_SHELL", "OPEN_SHELL"), "ORIENTED_CLOSED_SHELL"
 SOLIDS = ("MANIFOLD_SOLID_BREP", "BREP_WITH_VOIDS", "FACETED_BREP")
 BOUNDS, LOOPS = ("FACE_OUTER_BOUND", "FACE_BOUND"), ("EDGE_LOOP", "POLY_LOOP")
-# The way from a face to its corners. A curve, on which points lie too, is not on it.
+# The entities on the way from a face to its corners. Curves are left out, although points lie on
+# them too.
 LEADS_TO = {
     **dict.fromkeys(FACES, BOUNDS),
     **dict.fromkeys(BOUNDS, LOOPS),
@@ -52,19 +53,20 @@ LEADS_TO = {
     "VERTEX_POINT": ("CARTESIAN_POINT",),
     "POLY_LOOP": ("CARTESIAN_POINT",),
 }
-# Names that CAD programs give to faces that have none.
+# Names that CAD programs give to faces without a name.
 NO_NAMES = ("", "NONE")
 
 
 class StepFace(NamedTuple):
     """A face of a solid."""
 
-    name: str  # "" if it has none
-    middle: np.ndarray  # mean of its corners, (3,), in the file's numbers; nan if it has none
+    name: str  # "" if the face has no name
+    # mean of its corners, (3,), in the file's numbers; nan for a face without corners
+    middle: np.ndarray
 
 
 def stated_unit(text: str) -> str | None:
-    """Unit of the lengths of a STEP file, as in part.unit; None if it is none of these."""
+    """Unit of the lengths of a STEP file, as in part.unit; None if it is another unit."""
     assigned = UNIT_ASSIGNED.search(text)
     for number in REFERENCE.findall(assigned[1]) if assigned else ():
         entity = re.search(rf"#{number}\s*=([^;]*);", text)
@@ -81,7 +83,7 @@ def read_solids(text: str) -> list[list[StepFace]]:
     entities = {number: (kind, value) for number, kind, value in ENTITY.findall(text)}
 
     def linked(number: str, kinds: tuple[str, ...]) -> list[str]:
-        """Entities of these kinds to which one refers."""
+        """Entities of these kinds to which an entity refers."""
         found = REFERENCE.findall(STRING.sub("", entities[number][1]))
         return [one for one in found if one in entities and entities[one][0] in kinds]
 
@@ -115,13 +117,13 @@ def read_solids(text: str) -> list[list[StepFace]]:
 
 
 def _decoded(text: str) -> str:
-    """A string of ISO 10303-21 as text; "" for a name that stands for none."""
+    """A string of ISO 10303-21 as text; "" for a placeholder of a missing name."""
     text = ESCAPE.sub(_character, text.translate(IGNORED)).strip()
     return "" if text.upper() in NO_NAMES else text
 
 
 def _character(escape: re.Match[str]) -> str:
-    """What an escape stands for; half a character becomes U+FFFD."""
+    """The character of an escape sequence. Half a character becomes U+FFFD."""
     kind = str(escape.lastgroup)
     given = escape[kind]
     if kind in ("utf16", "utf32"):
@@ -133,12 +135,13 @@ def _character(escape: re.Match[str]) -> str:
 
 READER = NativeReader(tessellate, "part.step", f"ended its reader; {REMEDY}", 60.0)
 NAMED_FACE = re.compile(r"(?:ADVANCED_FACE|FACE_SURFACE)\s*\(\s*'(?!'|NONE')")
-# Of a body's size: how far the middle of a face may be from that in the file's text.
+# Share of a body's size: largest distance between the middle of a face and its middle in the file's
+# text.
 SAME_PLACE = 1e-4
 
 
 def read_step(path: Path, content: bytes, how: Tessellation | None = None) -> RawMesh:
-    """Mesh the bodies of a STEP file, in its own unit; an assembly's parts are placed as in it.
+    """Mesh the bodies of a STEP file, in its own unit, with an assembly's parts in their places.
 
     Groups are the names of bodies and of faces, and the colours of faces, as "#ff0000".
     """
@@ -200,13 +203,13 @@ def read_step(path: Path, content: bytes, how: Tessellation | None = None) -> Ra
 def _face_names(solids: list[list[StepFace]], middles: np.ndarray) -> tuple[str, ...] | None:
     """Names of the faces of a body, in order.
 
-    Faces are in the order of the solid in the file. That it is this solid is seen from the middles
-    of its faces: moved and turned as one, they are those of the body.
+    Faces have the order of the solid in the file. The solid is recognised by the middles of its
+    faces, which coincide with the body's after a motion.
 
     Args:
         middles: mean of each face's corners, (k, 3), in the file's numbers.
     Returns:
-        None if no solid is the body, or several that differ in their names could be.
+        The names. None if no solid is the body, or if several solids with different names could be.
     """
     if not any(face.name for faces in solids for face in faces):
         return ()
@@ -220,7 +223,7 @@ def _face_names(solids: list[list[StepFace]], middles: np.ndarray) -> tuple[str,
 
 
 def _is_moved(one: np.ndarray, other: np.ndarray) -> bool:
-    """Whether places (k, 3) are the others, moved and turned as one; nan is left out."""
+    """True if places (k, 3) are the other places, moved and turned; nan is left out."""
     kept = np.isfinite(one).all(axis=1) & np.isfinite(other).all(axis=1)
     if not kept.any():
         return False

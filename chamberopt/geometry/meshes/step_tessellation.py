@@ -1,13 +1,13 @@
-"""Mesh the faces of a STEP file with Gmsh; runs in a process of its own.
+"""Meshing of STEP faces with Gmsh, in a separate process.
 
 The side h of the triangles follows the radius of curvature r of surfaces and edges, so that fillets
 are fine and planes coarse:
 
     h = min(side, sqrt(5 chord r), max(angle r, 4 chord)), where r is 3 chord at least
 
-Neighbours then turn by about the angle, but for radii too small for a ball. The middle of an
-equilateral triangle is h² / 6 r below a sphere; 5 instead of 6 leaves room for longer sides than
-wanted. Faces with four sides get grids, with cells longer where the face is straight.
+Neighbours then turn by about the angle, except at radii too small for a ball. The middle of an
+equilateral triangle is h² / 6 r below a sphere. The factor 5 instead of 6 leaves room for sides
+longer than wanted. Faces with four sides get grids, with longer cells where the face is straight.
 """
 
 from __future__ import annotations
@@ -22,21 +22,25 @@ import numpy as np
 from chamberopt.common.errors import InputError
 from chamberopt.geometry.meshes.native_reader import allow_more
 
-# Lay grids on curved faces with four sides: fine across a fillet or a tooth, coarse along it.
+# Grids lie on curved faces with four sides. They are fine across a fillet or a tooth and coarse
+# along it.
 #
-# A grid has as many rows in each of its two directions as the curvature of its lines there asks
-# for. Opposite edges have the same number; faces that share an edge pass it on to each other.
+# A grid has as many rows in each of its two directions as the curvature of its lines asks for.
+# Opposite edges have the same number of rows. Faces that share an edge pass the number on to each
+# other.
 
-GRID_SAMPLES = 13  # in each direction: enough for the curvature of a fillet or an aerofoil
-ON_EDGE = 0.01  # of a face's parameters
-MOST_TIMES_LONGER = 6.0  # one side of a grid's cell than the other
-# A line whose curvature varies so much that even rows would be this many times more is no grid's.
+GRID_SAMPLES = 13  # samples in each direction: enough for the curvature of a fillet or an aerofoil
+ON_EDGE = 0.01  # share of a face's parameter range
+MOST_TIMES_LONGER = 6.0  # largest ratio of the two sides of a grid's cell
+# Largest number of even rows over rows that follow the curvature. Lines with a larger ratio get no
+# grid.
 MOST_TIMES_MORE = 3.0
-Grid = tuple[tuple[int, int, int], tuple[int, int, int]]  # in each direction: two edges, rows
+# two edges and the number of rows, in each direction
+Grid = tuple[tuple[int, int, int], tuple[int, int, int]]
 
 
 def lay_grids(model: Any, faces: list[int], side_at: Callable[[float], float]) -> None:
-    """Lay grids where faces have four sides, and leave all others to the mesher.
+    """Lay grids on faces with four sides, and leave all other faces to the mesher.
 
     Args:
         model: gmsh.model.
@@ -59,7 +63,7 @@ def lay_grids(model: Any, faces: list[int], side_at: Callable[[float], float]) -
 
 
 def _find_grid(model: Any, face: int, side_at: Callable[[float], float]) -> Grid | None:
-    """The edges at the four ends of a face's parameters and the rows between, if it has such."""
+    """The edges at the four ends of a face's parameters, and the rows between; None if absent."""
     edges = [tag for _, tag in model.getBoundary([(2, face)], oriented=False)]
     low, high = map(np.array, model.getParametrizationBounds(2, face))
     at_end: dict[tuple[int, int], int] = {}
@@ -89,9 +93,9 @@ def _find_grid(model: Any, face: int, side_at: Callable[[float], float]) -> Grid
 
 
 def _line(points: np.ndarray, side_at: Callable[[float], float]) -> tuple[float, float, float]:
-    """The longest of lines (points of each, lines, 3), their shortest wanted side, and waste.
+    """Length of the longest line, shortest wanted side, and waste of lines (points, lines, 3).
 
-    Waste is how many times more rows of that side are than rows of the side wanted in each place.
+    The waste is the number of even rows over the number of rows with the side wanted in each place.
     """
     steps = np.diff(points, axis=0)
     length = np.maximum(np.linalg.norm(steps, axis=2), 1e-12)
@@ -105,28 +109,29 @@ def _line(points: np.ndarray, side_at: Callable[[float], float]) -> tuple[float,
 
 
 SHORTEST_IN_CHORDS, SMALLEST_RADIUS_IN_CHORDS = 4.0, 3.0
-LONGEST_IN_DIAGONALS = 1.0 / 40.0  # of the part's box, where no longest side is given
-PRECISION = 1e-4  # of the number of sides along an edge
-MOST_TRIANGLES = 2e6  # which take minutes
-SECONDS_PER_TRIANGLE = 3e-4  # of computing time, at most: ten times what was measured
-SAMPLES = 9  # of a face's curvature, in each direction
+# share of the diagonal of the part's box, if no longest side is given
+LONGEST_IN_DIAGONALS = 1.0 / 40.0
+PRECISION = 1e-4  # share of the number of sides along an edge
+MOST_TRIANGLES = 2e6  # more triangles take minutes
+SECONDS_PER_TRIANGLE = 3e-4  # most computing time: ten times the measured time
+SAMPLES = 9  # samples of a face's curvature, in each direction
 LIBRARIES = "on Debian: apt-get install libglu1-mesa libxcursor1 libxft2 libxinerama1"
 REMEDY = "the file is damaged, or holds no solid; export it again as AP214 or AP242"
 
 
 class Tessellation(NamedTuple):
-    """How fine the triangles of a CAD file are.
+    """Fineness of the triangles of a CAD file.
 
     The corner between two facets of a hollow keeps a ball away by 1 / cos(angle / 2) - 1 of its
-    radius, 0.25 % by default. The check of what a ball can reach allows for 1 %.
+    radius, 0.25 % by default. The check of the faces that a ball can reach allows 1 %.
     """
 
-    chord: float = 2e-5  # distance that triangles keep from the surface [m]
-    angle: float = math.radians(6.0)  # between neighbours [rad]
+    chord: float = 2e-5  # largest distance of triangles from the surface [m]
+    angle: float = math.radians(6.0)  # largest angle between neighbours [rad]
     side: float = 0.0  # longest side [m]; 0: a fortieth of the part's diagonal
 
     def side_at(self, radius: float) -> float:
-        """Wanted side of triangles where the radius of curvature is `radius`."""
+        """Wanted side of triangles at a radius of curvature [m]."""
         radius = max(radius, SMALLEST_RADIUS_IN_CHORDS * self.chord)
         by_angle = max(self.angle * radius, SHORTEST_IN_CHORDS * self.chord)
         return min(self.side, by_angle, math.sqrt(5.0 * self.chord * radius))
@@ -153,7 +158,7 @@ def tessellate(source: Path, chord: float, angle: float, side: float) -> dict[st
     except OSError as error:  # its library was not loaded
         raise InputError(f"Gmsh cannot be loaded ({error}); {LIBRARIES}") from None
     except Exception as error:
-        if type(error) is not Exception:  # as Gmsh's are
+        if type(error) is not Exception:  # errors of Gmsh have the type Exception
             raise
         why = str(error).replace(f" file '{source}'", " it")[:160]
         raise InputError(f"cannot be meshed ({why}); {REMEDY}") from None
@@ -168,7 +173,7 @@ def _mesh(gmsh: Any, source: str, how: Tessellation) -> dict[str, np.ndarray]:
         "Mesh.MeshSizeFromPoints": 0,
         "Mesh.MeshSizeExtendFromBoundary": 0,
         "Mesh.LcIntegrationPrecision": PRECISION,
-        "Mesh.Algorithm": 5,  # Delaunay; the frontal one leaves thinner triangles
+        "Mesh.Algorithm": 5,  # Delaunay, because the frontal algorithm leaves thinner triangles
     }.items():
         gmsh.option.setNumber(option, value)
     gmsh.open(source)
@@ -176,7 +181,8 @@ def _mesh(gmsh: Any, source: str, how: Tessellation) -> dict[str, np.ndarray]:
     bodies = [tag for _, tag in model.getEntities(3)]
     body_of = {face: k for k, tag in enumerate(bodies) for face in model.getAdjacencies(3, tag)[1]}
     drawn = [tag for _, tag in model.getEntities(2)]
-    faces = [tag for tag in drawn if tag in body_of] or drawn  # sketches beside solids are no part
+    # sketches beside solids are not part of it
+    faces = [tag for tag in drawn if tag in body_of] or drawn
     box = np.array([model.getBoundingBox(2, tag) for tag in faces]).reshape(-1, 2, 3)
     diagonal = np.linalg.norm(box[:, 1].max(axis=0) - box[:, 0].min(axis=0)) if faces else 0.0
     how = how._replace(side=how.side or LONGEST_IN_DIAGONALS * float(diagonal))
@@ -221,19 +227,19 @@ def _normals(model: Any, face: int, nodes: np.ndarray) -> np.ndarray:
 
 
 class _TriangleCount:
-    """About how many triangles the faces of a model take, by how fine they are."""
+    """Approximate number of triangles of a model's faces, by their fineness."""
 
     def __init__(self, model: Any, faces: list[int]) -> None:
         self._areas = np.array([model.occ.getMass(2, face) for face in faces])
         self._radii = [_radii(model, face) for face in faces]
 
     def __call__(self, how: Tessellation) -> float:
-        """Number of equilateral triangles of the wanted sides, about."""
+        """Approximate number of equilateral triangles with the wanted sides."""
         each = [np.mean([how.side_at(one) ** -2.0 for one in own]) for own in self._radii]
         return float(self._areas @ np.array(each)) * 4.0 / math.sqrt(3.0)
 
     def advice(self, how: Tessellation) -> str:
-        """Why there would be too many triangles, with the smallest value that gives fewer."""
+        """Sentence on too many triangles, with the smallest value that gives fewer."""
         if not math.isfinite(self(how)):
             return f"has a face of no finite area; {REMEDY}"
         is_side = self(how._replace(side=math.inf)) <= MOST_TRIANGLES
@@ -255,7 +261,7 @@ def _radii(model: Any, face: int) -> list[float]:
 
 
 def _middle(model: Any, face: int) -> np.ndarray:
-    """Mean of a face's corners, (3,); nan if it has none."""
+    """Mean of a face's corners, (3,); nan if the face has none."""
     corners = [tag for dim, tag in model.getBoundary([(2, face)], recursive=True) if dim == 0]
     places = [model.getValue(0, tag, []) for tag in corners]
     return np.mean(places, axis=0) if places else np.full(3, np.nan)

@@ -1,6 +1,6 @@
-"""Read STL files: binary ones as an array of records, text with trimesh.
+"""Reader of STL files: binary files as an array of records, text with trimesh.
 
-A record is read faster than trimesh is imported, and most parts are binary STL files.
+Reading the records is faster than importing trimesh, and most parts are binary STL files.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ RECORD = TRIANGLE.itemsize
 
 
 def read_stl(path: Path, content: bytes) -> RawMesh:
-    """Read an STL; the solids of a text file give names."""
+    """Read an STL file. The solids of a text file give names."""
     content = _complete_stl(path, content)
     if _is_text_stl(content):
         return read_scene(io.BytesIO(content), "stl")
@@ -27,13 +27,13 @@ def read_stl(path: Path, content: bytes) -> RawMesh:
 
 
 def is_binary_stl(content: bytes) -> bool:
-    """Whether the length fits the number of triangles: a binary STL has no other mark."""
+    """True if the length fits the number of triangles, the only mark of a binary STL file."""
     length = HEADER + RECORD * _declared_triangles(content)
     return len(content) >= HEADER and len(content) == length and not _is_text_stl(content)
 
 
 def _complete_stl(path: Path, content: bytes) -> bytes:
-    """The STL without what some exporters append to it; InputError if it is truncated.
+    """The STL content without data that some exporters append; InputError if it is truncated.
 
     A binary STL states its number of triangles, a text STL ends with "endsolid".
     """
@@ -58,5 +58,5 @@ def _declared_triangles(content: bytes) -> int:
 
 
 def _is_text_stl(content: bytes) -> bool:
-    """Whether it is a text STL; binary ones may begin with "solid" too."""
+    """True for text STL. Binary files may begin with "solid" too."""
     return content.lstrip()[:5].lower() == b"solid" and b"facet" in content[:2000].lower()

@@ -1,4 +1,4 @@
-"""Errors that show what is wrong with a surface, and where; lengths as text for messages."""
+"""Errors that show the fault of a surface and its place; lengths as text for messages."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from chamberopt.common.errors import InputError
 
 
 class SurfaceError(InputError):
-    """A surface cannot be used, as it is or where it is.
+    """Error for a surface that cannot be used, as it is or at its place.
 
     Args:
-        corners: of the surface's triangles as read, (m, 3, 3) [m].
-        edges: lines that show what is wrong in a picture, (k, 2, 3) [m].
+        corners: corners of the surface's triangles as read, (m, 3, 3) [m].
+        edges: lines that show the fault in a picture, (k, 2, 3) [m].
     """
 
     def __init__(self, message: str, corners: np.ndarray, edges: np.ndarray) -> None:
@@ -22,7 +22,7 @@ class SurfaceError(InputError):
 
 
 class OpenSurfaceError(SurfaceError):
-    """A surface has open edges that are not closed automatically."""
+    """Error for a surface with open edges that are not closed automatically."""
 
 
 def format_box(sides: np.ndarray) -> str:

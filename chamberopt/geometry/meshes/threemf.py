@@ -1,4 +1,4 @@
-"""Read 3MF files with trimesh."""
+"""Reader of 3MF files with trimesh."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ OBJECT = re.compile(rb'<(?:\w+:)?(object|component)\s[^>]*?\b(?:object)?id\s*=\s
 
 
 def read_3mf(path: Path, content: bytes) -> RawMesh:
-    """Read the objects that a 3MF builds, by name; the file states its unit."""
+    """Read the objects that a 3MF file builds, by name. The file states its unit."""
     with zipfile.ZipFile(io.BytesIO(content)) as archive:
         unpacked = sum(entry.file_size for entry in archive.infolist())
         require_size(path, unpacked, MAX_UNPACKED_BYTES, "file that unpacks to data")
@@ -35,7 +35,7 @@ def read_3mf(path: Path, content: bytes) -> RawMesh:
 
 
 def _copies(model: bytes) -> int:
-    """Most bodies that one object stands for: components of components can be very many."""
+    """Largest number of bodies of one object, because components of components can be very many."""
     bodies: dict[bytes, int] = {}
     current = b""
     for kind, number in OBJECT.findall(model):

@@ -22,11 +22,11 @@ UNIT_NAMES = {
 }  # fmt: skip
 UNIT_COMMENT = re.compile(rb"\bunits?\b[\"' ]*[=:][\"' ]*(\w+)", re.I)
 
-# m, longest side of the bounding box of a part that can be peened in a chamber.
+# m: longest side of the bounding box of a part that can be peened in a chamber.
 MIN_SIZE, MAX_SIZE = 5e-4, 3.0
-GUESSED = "unit guessed as"  # in the note of a unit that is not certain
+GUESSED = "unit guessed as"  # start of the note on a unit that is not certain
 # Units that exporters write, the most likely first, and the sizes [m] for which they are guessed.
-# Inches and centimetres cannot be told from millimetres by size, so they are never guessed.
+# Inches and centimetres are never guessed, because their sizes overlap with millimetres.
 GUESSED_UNITS = ("mm", "m", "um")
 MIN_GUESSED_SIZE, MAX_GUESSED_SIZE = 3e-3, 1.5
 
@@ -40,8 +40,8 @@ def find_unit(
         given: the design's part.unit, or "guess".
         stated: the unit that the file's format states, if any.
     Raises:
-        InputError: the two contradict each other, the unit cannot be guessed, or no part can be
-            so large or so small.
+        InputError: if the two units contradict each other, the unit cannot be guessed, or no part
+            can be so large or so small.
     """
     sides = np.ptp(corners.reshape(-1, 3), axis=0)
     if stated is not None and given not in ("guess", stated):
@@ -65,7 +65,7 @@ def find_unit(
 
 
 def _guess(path: Path, content: bytes, sides: np.ndarray) -> tuple[str, str]:
-    """Unit, and the reason for it: a comment in the file, or the size."""
+    """The guessed unit, and the reason for it: a comment in the file, or the size."""
     comment = UNIT_COMMENT.search(content[:4096])
     name = comment[1].decode().lower() if comment else ""
     if comment and name in UNIT_NAMES:

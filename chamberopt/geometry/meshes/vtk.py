@@ -1,6 +1,6 @@
-"""Read VTK files with VTK's own readers: legacy .vtk, XML .vtp and .vtu.
+"""Reader of VTK files with VTK's own readers: legacy .vtk, XML .vtp and .vtu.
 
-VTK believes the counts in a file. Where they are wrong, it may end the process, or fill the memory.
+VTK trusts the counts in a file. With wrong counts it may end the process, or fill the memory.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ KINDS = {
 }  # fmt: skip
 TRIANGLE, POLYGON, QUAD = 5, 7, 9
 WITHOUT_SURFACE = (0, 1, 2, 3, 4, 21, 35)  # points and lines
-# An integer cell field with more values than this numbers the cells rather than naming groups.
+# An integer cell field with more values numbers the cells and does not name groups.
 MAX_GROUPS = 64
 MAX_COMPONENTS = 1000  # of an array
 FIELD = "field "  # before the names of cell fields among the arrays
@@ -34,7 +34,7 @@ FAULT = "cannot be read as VTK, it is damaged or truncated; export it again"
 
 
 def read_vtk(path: Path, content: bytes) -> RawMesh:
-    """Read the surface in a VTK file; integer cell data give groups: "FIELD 3" where FIELD is 3."""
+    """Read the surface of a VTK file. Integer cell data give groups: "FIELD 3" where FIELD is 3."""
     legacy = re.search(rb"^DATASET\s+(\w+)", content[:4096], re.M | re.I)
     xml = re.search(rb'<VTKFile[^>]*\btype\s*=\s*"(\w+)"', content[:4096])
     found = legacy or xml
@@ -71,7 +71,7 @@ def read_vtk(path: Path, content: bytes) -> RawMesh:
 
 
 def _require_counts(path: Path, content: bytes) -> None:
-    """Raise InputError for a count in XML that is no number, or so large that VTK would hang."""
+    """Raise InputError for an XML count that is no number, or so large that VTK would hang."""
     for name, text in re.findall(rb"""\b(NumberOf\w+)\s*=\s*["']([^"']*)""", content):
         most = MAX_COMPONENTS if name == b"NumberOfComponents" else MAX_ELEMENTS
         if not text.strip().isdigit() or int(text) > most:
@@ -111,7 +111,8 @@ def unpack(given: Path, reader_name: str) -> dict[str, Any]:
     fields = {}
     for k in range(data.GetCellData().GetNumberOfArrays()):
         array = data.GetCellData().GetArray(k)
-        if array is not None and array.GetNumberOfComponents() == 1:  # no texts and vectors
+        # text and vector fields give no groups
+        if array is not None and array.GetNumberOfComponents() == 1:
             fields[f"{FIELD}{array.GetName()}"] = vtk_to_numpy(array)
     return {
         "points": points.astype(np.float64),

@@ -1,25 +1,25 @@
-"""Finer triangles on the smooth surface: edges along which it bends are split, their middles moved.
+"""Division of triangles: edges along which the smooth surface bends are split at moved middles.
 
-Each edge decides alone whether it is split, so triangles on both sides always meet at whole edges
-and a closed surface stays closed. The middle of an edge lies on the arc through its ends that has
-their normals. The tangents of a crease are the cross products of the normals of both sides, and its
-normals are across them, in the plane in which it bends. A piece of a plane therefore stays in its
-plane, its border included.
+Each edge decides alone about its split. The triangles on both sides therefore always meet at whole
+edges, and a closed surface stays closed. The middle of an edge lies on the arc through its ends
+that has their normals. The tangents of a crease are the cross products of the normals of both
+sides. The normals of a crease are perpendicular to its tangents, in the plane in which it bends. A
+piece of a plane stays in its plane, its border included.
 
 Notation
-    p, n   ends of an edge [m] and the surface's unit normals there
-    t      unit tangents of a crease at its ends
-    e      unit vector from end to end
-    s      rise of the middle over the chord [m]
+p, n   ends of an edge [m] and the surface's unit normals there
+t      unit tangents of a crease at its ends
+e      unit vector from end to end
+s      rise of the middle over the chord [m]
 
-    s = dp.dn / (4 + 2 |n0 + n1|)        along n0 + n1: exact on a circle
-    n = n0 + n1 - 1.5 f (e . (n0 + n1))  in the middle, before it is made a unit vector: that of a
-                                         cubic with these ends and normals
-    f ~ (W² + |det W|) e, with f . e = 1
+s = dp.dn / (4 + 2 |n0 + n1|)        along n0 + n1: exact on a circle
+n = n0 + n1 - 1.5 f (e . (n0 + n1))  normal in the middle, before it is made a unit vector: the
+                                     normal of a cubic with these ends and normals
+f ~ (W² + |det W|) e, with f . e = 1
 
-W is the shape operator of the triangle, which its three normals tell. Among all f with f . e = 1
-this one turns the normal where the surface bends: across the lines of a cylinder, along e on a
-sphere and in the straight directions of a saddle.
+W is the shape operator of the triangle, given by its three normals. Many vectors f have f . e = 1.
+This f turns the normal where the surface bends: across the lines of a cylinder, along e on a sphere
+and in the straight directions of a saddle.
 """
 
 from __future__ import annotations
@@ -37,17 +37,19 @@ from chamberopt.geometry.triangles import (
 )
 
 LEVELS = 6  # rounds of splitting; 90 degrees an edge at 6 degrees take four
-TURNED = 0.6  # cosine between a triangle and the normals at its corners: below, it is not made
-STRAIGHT = 6.0  # a side that bends by so many times less than the limit makes no triangle lean
-SLACK = 1.02  # what bends by the limit is not split, whichever way it is rounded
-WEAK = 0.1  # sine between the sides of a crease below which it has no tangent of its own
-FARTHER = 3.0  # a surface so many times farther than a side may move is not approached
-LEVEL = 1e-3  # rise over length of what is as good as straight
-LESS = 1.0 / 3.0  # rise of the middle of half an edge over that of the edge, with a margin over 1/4
+# cosine between a triangle and the normals at its corners: a triangle below is not made
+TURNED = 0.6
+STRAIGHT = 6.0  # factor below the limit: a side that bends by less makes no triangle lean
+SLACK = 1.02  # an edge that bends by the limit is not split, in either direction of rounding
+WEAK = 0.1  # sine between the sides of a crease below which the crease has no tangent
+FARTHER = 3.0  # a surface farther than this many times the allowed move is not approached
+LEVEL = 1e-3  # rise over length of an edge that is as good as straight
+# rise of the middle of half an edge over the rise of the edge, with a margin over 1/4
+LESS = 1.0 / 3.0
 TIE = 1e-6  # relative difference of diagonals that counts as none
 
-# The triangles that become of one, by which of its sides are split: corners 0 to 2, middles of
-# sides 3 to 5. The first side that is split comes first; of two split sides the last is whole.
+# The triangles that one triangle becomes, by its split sides: corners 0 to 2, middles of sides 3 to
+# 5. The first split side comes first. Of two split sides the last side is whole.
 _ONE = ((0, 3, 2), (3, 1, 2))
 _TWO = ((3, 1, 4), (0, 3, 4), (0, 4, 2))
 _TWO_OTHER = ((3, 1, 4), (0, 3, 2), (3, 4, 2))
@@ -56,15 +58,15 @@ _THREE = ((0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5))
 
 @dataclass(frozen=True)
 class Surface:
-    """A mesh with what is known of the smooth surface behind it.
+    """A mesh with its normals, creases and limits of the smooth surface behind it.
 
     Attributes:
-        vertices: [m], shape (n, 3).
-        triangles: shape (k, 3).
-        parent: triangle of the file from which each comes, shape (k,).
-        normals: of the smooth surface at the corners, unit vectors, shape (k, 3, 3).
+        vertices: vertex positions [m], shape (n, 3).
+        triangles: vertex indices, shape (k, 3).
+        parent: triangle of the file from which each triangle comes, shape (k,).
+        normals: unit normals of the smooth surface at the corners, shape (k, 3, 3).
         crease: marks the sides at creases, shape (k, 3).
-        rise: the farthest that the middle of a side may move [m], shape (k,).
+        rise: largest move of the middle of a side [m], shape (k,).
     """
 
     vertices: np.ndarray
@@ -79,7 +81,8 @@ def divide(surface: Surface, limit: np.ndarray, narrow: np.ndarray) -> Surface:
     """Split edges until none bends by more than the lower limit of the parents at both sides.
 
     Args:
-        limit: of each triangle of the file [rad], shape (m,); infinite where none is divided.
+        limit: largest bend of each triangle of the file [rad], shape (m,); infinite where no edge
+            is divided.
         narrow: distance across the bend [m] below which an edge of such a triangle is not split,
             shape (m,).
     """
@@ -95,7 +98,7 @@ def divide(surface: Surface, limit: np.ndarray, narrow: np.ndarray) -> Surface:
 def _split_once(
     surface: Surface, limit: np.ndarray, narrow: np.ndarray, whole: np.ndarray
 ) -> tuple[Surface, np.ndarray]:
-    """One round of splitting; edges stay whole where a new triangle would be turned over."""
+    """Split once all edges that bend too much, except where a new triangle would turn over."""
     sides = np.argsort(edge_keys(surface.triangles), kind="stable").reshape(-1, 2)
     place, normal, bend, width, is_near = _middles(surface, sides)
     most, least = (
@@ -125,10 +128,10 @@ def _split_once(
 
 
 def _folds(surface: Surface, limit: np.ndarray) -> np.ndarray:
-    """Marks (k, 3) the longest side of each triangle that leans by more than the limit.
+    """Mark (k, 3) the longest side of each triangle that leans by more than the limit.
 
     A long and narrow triangle leans away from the surface's normals by the rise along its longest
-    side over its height, though no side bends by much; two of them make a fold.
+    side over its height, although no side bends by much. Two such triangles make a fold.
     """
     corners = surface.vertices[surface.triangles]
     cosine = np.einsum("ki,ki->k", unit_normals(corners), unit_vectors(surface.normals.sum(axis=1)))
@@ -142,13 +145,13 @@ def _middles(surface: Surface, sides: np.ndarray) -> tuple[np.ndarray, ...]:
 
     Returns:
         Places [m], shape (e, 3); normals on both sides, shape (2, e, 3); the bend along each edge
-        [rad], shape (e,), and its width across the bend [m], shape (e,); marks edges whose middle
-        may move as far as their surface is away, or nearly, shape (e,).
+        [rad], shape (e,), and its width across the bend [m], shape (e,); marks of the edges whose
+        middle may move to its surface, or nearly so, shape (e,).
     """
     triangle, k = np.divmod(sides.T, 3)
     own, following = (
         surface.normals[triangle, at] for at in (k, (k + 1) % 3)
-    )  # (2, e, 3), at the sides' starts and ends; the second side runs the other way
+    )  # (2, e, 3), at the sides' starts and ends; the second side runs in the other direction
     n0, n1 = np.stack([own[0], following[1]]), np.stack([following[0], own[1]])
     is_crease = surface.crease[triangle[0], k[0]]
     start, end = (
@@ -182,10 +185,10 @@ def _middles(surface: Surface, sides: np.ndarray) -> tuple[np.ndarray, ...]:
 def _tilts(
     surface: Surface, sides: np.ndarray, normal: np.ndarray, e: np.ndarray, is_crease: np.ndarray
 ) -> np.ndarray:
-    """The vectors f of edges on both sides, (2, e, 3); of creases each side has its own W.
+    """The vectors f of edges on both sides, (2, e, 3). At creases each side has its own W.
 
     Args:
-        normal: in the middle of the edges, of any length, shape (2, e, 3).
+        normal: vector of any length along the normal in the middle of the edges, shape (2, e, 3).
         e: unit vectors along the edges, shape (e, 3).
     """
     triangle, k = np.divmod(sides.T, 3)
@@ -200,7 +203,7 @@ def _tilts(
     m = unit_vectors(np.cross(unit_vectors(normal), e))
 
     def components(vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Along e and along m, (2, e) each."""
+        """Components along e and along m, (2, e) each."""
         return np.einsum("sei,ei->se", vectors, e), np.einsum("sei,sei->se", vectors, m)
 
     along, height = components(away)
@@ -213,7 +216,7 @@ def _tilts(
     turned = em * (ee + mm)
     size, turned = (np.where(is_crease, one, one.sum(axis=0)) for one in (size, turned))
     share = np.divide(turned, size, out=np.zeros_like(size), where=size > 0.0)
-    return e + share[..., None] * m
+    return np.asarray(e + share[..., None] * m)
 
 
 def _lean(normal: np.ndarray, e: np.ndarray) -> np.ndarray:
@@ -229,7 +232,8 @@ def _curve_normals(n0: np.ndarray, n1: np.ndarray, e: np.ndarray) -> tuple[np.nd
         e: unit vectors from start to end, shape (e, 3).
     """
     t0, t1 = (_tangent(of_end[0], of_end[1], e) for of_end in (n0, n1))
-    first, last = np.cross(t0, e), np.cross(e, t1)  # of one direction where the curve is an arc
+    # both have one direction where the curve is an arc
+    first, last = np.cross(t0, e), np.cross(e, t1)
     more = np.linalg.norm(first, axis=1) > np.linalg.norm(last, axis=1)
     axis = unit_vectors(np.where(more[:, None], first, last))
     return np.cross(t0, axis), np.cross(t1, axis)
@@ -249,17 +253,18 @@ def _divided(
     """Divide triangles at the middles of their sides.
 
     Args:
-        vertices: those of the surface and the new ones [m].
-        new: vertex in the middle of each side, -1 where it is not split, shape (k, 3).
-        normal: in the middle of each side, shape (k, 3, 3).
+        vertices: vertices of the surface and new vertices [m].
+        new: vertex in the middle of each side, -1 for a whole side, shape (k, 3).
+        normal: normal in the middle of each side, shape (k, 3, 3).
 
     Returns:
-        The finer surface; the triangle (c,) of the surface from which each comes; and the side of
-        that triangle on which each new side lies, -1 inside it, shape (c, 3).
+        The finer surface; the triangle of the surface from which each new triangle comes, shape
+        (c,); and the side of that triangle on which each new side lies, -1 inside it, shape (c, 3).
     """
     split = new >= 0
     count = split.sum(axis=1)
-    # Turned so that of one split side it is the first, and of two the first two.
+    # The triangle is turned so that its only split side is the first, or its two split sides are
+    # the first two.
     first = np.where(count == 2, ((~split).argmax(axis=1) + 1) % 3, split.argmax(axis=1))
     first[count % 3 == 0] = 0
     turned = (first[:, None] + np.arange(3)) % 3
@@ -268,8 +273,8 @@ def _divided(
     )
     a, c, ab, bc = (vertices[corner[:, k]] for k in (0, 2, 3, 4))
     one, other = (np.linalg.norm(d, axis=1) for d in (a - bc, ab - c))
-    # Diagonals of one length are told apart by the order of the corners in the file, which is the
-    # same in copies of one figure: the mesh keeps the symmetry of the part.
+    # The order of the corners in the file decides between diagonals of one length. Copies of one
+    # figure have the same order, so that the mesh keeps the symmetry of the part.
     shorter = one < other * (1.0 - TIE)
     rows, codes = [np.flatnonzero(count == 0)], [np.tile([[0, 1, 2]], ((count == 0).sum(), 1))]
     for chosen, pieces in (
@@ -282,7 +287,7 @@ def _divided(
             rows.append(np.flatnonzero(chosen))
             codes.append(np.tile([piece], (int(chosen.sum()), 1)))
     row, code = np.concatenate(rows), np.concatenate(codes)
-    order = np.argsort(row, kind="stable")  # children lie where their parents did
+    order = np.argsort(row, kind="stable")  # children take the place of their parents
     row, code = row[order], code[order]
 
     normals = np.concatenate(
@@ -305,7 +310,7 @@ def _divided(
 
 
 def _sides_of_codes() -> np.ndarray:
-    """The side (6, 6) of a triangle on which two of its corners and middles lie; else -1."""
+    """The side (6, 6) of a triangle on which two of its corners and middles lie; otherwise -1."""
     table = np.full((6, 6), -1)
     for k in range(3):
         on_side = [k, 3 + k, (k + 1) % 3]

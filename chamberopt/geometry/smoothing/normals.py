@@ -1,22 +1,23 @@
-r"""Normals of the smooth surface of which a mesh has the facets.
+r"""Normals of the smooth surface behind the facets of a mesh.
 
 Notation
-    t      turn of an edge [rad], convex positive                            Edges.turn, (e,)
-    l, h   length of an edge, and the lower height of its triangles [m]
-    phi    angle from a facet's normal to the surface's, in the middle of each side of the facet
-           [rad], positive where the surface falls away from it              phi, (m, 3)
-    A      area of a facet [m²]
-    m      unit vector in a facet's plane, out of it across a side           across, (m, 3, 3)
-    S      shape operator of a facet: sum over its sides of l phi / A m mᵀ   [1/m]
+t      turn of an edge [rad], convex positive                            Edges.turn, (e,)
+l, h   length of an edge, and the lower height of its triangles [m]
+phi    angle from a facet's normal to the surface's, in the middle of each side of the facet
+       [rad], positive where the surface falls away from it              phi, (m, 3)
+A      area of a facet [m²]
+m      unit vector in a facet's plane, out of it across a side           across, (m, 3, 3)
+S      shape operator of a facet: sum over its sides of l phi / A m mᵀ   [1/m]
 
-The surface is the one of piecewise constant curvature that turns at edges as the facets do: phi
-minimises the sum over the smooth edges of
+The surface has piecewise constant curvature and turns at edges as the facets do. phi minimises the
+sum over the smooth edges of
 
     l (FIT |t - phi_1 - phi_2| + ‖(l dS_ee, sqrt(l² + h²) dS_em, h dS_mm)‖) + l CREASE |phi|,
 
-dS the difference of the shape operators in the frame of the edge and the direction across it; the
-last term stands for sides at creases. Sums of absolute values let curvature jump at few edges, so
-planes, cylinders and spheres come out exactly, with the plane's own normal where one ends.
+where dS is the difference of the shape operators in the frame of the edge and the direction across
+it. The last term holds for sides at creases. Sums of absolute values let curvature jump at few
+edges. Planes, cylinders and spheres therefore come out exactly, and a round has the plane's own
+normal where it meets a plane.
 
 Source: E. Grinspun, Y. Gingold, J. Reisman, D. Zorin, "Computing discrete shape operators on
 general meshes", Computer Graphics Forum 25 (2006) 547.
@@ -42,16 +43,16 @@ if TYPE_CHECKING:
     from chamberopt.geometry.smoothing.rounds import Edges
 
 FIT, CREASE, DOUBTED = 2.5, 0.5, 0.005
-# Of the reweighted least squares: the most steps, [rad] below which a residual counts by its
+# Reweighted least squares: largest number of steps, [rad] below which a residual counts by its
 # square, and [rad] of the last step.
 STEPS, FEW_STEPS, FLOOR, LAST = 25, 10, 0.01, 1e-3
 FLAT = np.radians(0.5)  # phi below which a facet is a piece of a plane
-PLANE = 1e-4  # rad: facets that turn by less are in one plane, but for the rounding of a file
-MANY_SIDES = 64  # of a plane that is one facet
+PLANE = 1e-4  # rad: facets that turn by less are in one plane, up to the rounding of a file
+MANY_SIDES = 64  # sides of a plane that is one facet
 OPPOSITE = 0.45  # cosine between sides across which a facet bends about one axis
-ONE_LINE = 0.02  # of squares: sides that bend by less at a corner are one line, 16 degrees
-# Angle defects by which a vertex is the apex of a cone: at once, or if it is so many times larger
-# than those around it.
+ONE_LINE = 0.02  # share of squares: sides that bend by less at a corner are one line, 16 degrees
+# Angle defects by which a vertex is the apex of a cone: at once, or if the defect is OF_AROUND
+# times larger than the defects around it.
 APEX, SMALL_APEX, OF_AROUND = 0.5, np.radians(3.0), 4.0
 
 
@@ -59,10 +60,10 @@ class Facets(NamedTuple):
     """Measures of the triangles of a surface.
 
     Attributes:
-        normal: unit vectors outward, shape (m, 3).
-        area: [m²], shape (m,).
+        normal: outward unit normals, shape (m, 3).
+        area: areas [m²], shape (m,).
         across: unit vectors in the plane, out of the triangle across each side, shape (m, 3, 3).
-        length: of each side [m], shape (m, 3).
+        length: length of each side [m], shape (m, 3).
     """
 
     normal: np.ndarray
@@ -92,7 +93,7 @@ class Pieces(NamedTuple):
     """The facets of a surface: quadrangles of strips and other small planes, or single triangles.
 
     Attributes:
-        number: of the piece of each triangle, shape (m,).
+        number: number of the piece of each triangle, shape (m,).
         inner: marks the sides between triangles of one piece, shape (3 m,).
     """
 
@@ -101,11 +102,11 @@ class Pieces(NamedTuple):
 
     @property
     def has_several(self) -> np.ndarray:
-        """Marks the triangles of pieces of several, shape (m,)."""
+        """Mark the triangles of pieces with several triangles, shape (m,)."""
         return np.asarray(np.bincount(self.number)[self.number] > 1)
 
     def around(self, triangle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The outer sides of the pieces of triangles (r,): rows of these, and sides, (k,) each."""
+        """The outer sides (k,) of the pieces of triangles (r,), and the row (k,) of each side."""
         outer = np.flatnonzero(~self.inner)
         outer = outer[np.argsort(self.number[outer // 3], kind="stable")]
         ends = np.searchsorted(self.number[outer // 3], np.arange(int(self.number.max()) + 2))
@@ -116,7 +117,7 @@ class Pieces(NamedTuple):
 
 
 def find_pieces(edges: Edges, count: int) -> Pieces:
-    """The facets of so many triangles: planes of no more than MANY_SIDES, and other triangles."""
+    """The facets of ``count`` triangles: planes of no more than MANY_SIDES, and other triangles."""
     number = plane_facets(edges, count)
     one, two = number[edges.triangles].T
     inner = np.zeros(3 * count, dtype=bool)
@@ -139,12 +140,12 @@ def fit_phi(
     """The angles phi (m, 3) [rad]; 0 off the fitted triangles.
 
     Args:
-        is_crease: marks edges, shape (e,).
+        is_crease: marks the creases, shape (e,).
         fitted: marks the triangles that have unknown phi, shape (m,).
         apexes: marks edges that end at the apex of a cone, shape (e,).
-        doubted: marks the creases that may be none, shape (e,): they hold phi by very little. Then
-            the phi is for looking further, and a few steps are enough.
-        told: marks the creases whose turn counts all the same, shape (e,).
+        doubted: marks the creases that may be no creases, shape (e,). They hold phi by very little.
+            The phi then serves for a further search, and a few steps are enough.
+        told: marks the creases whose turn counts although they are creases, shape (e,).
     """
     phi = np.zeros(3 * len(fitted))
     if not fitted.any():
@@ -176,9 +177,9 @@ def fit_phi(
 def _straight_to_creases(
     facets: Facets, pieces: Pieces, edges: Edges, is_crease: np.ndarray
 ) -> np.ndarray:
-    """Marks the sides (3 m,) of pieces at creases, towards which no other side tells of a bend.
+    """Mark the sides (3 m,) of pieces at creases, towards which no other side shows a bend.
 
-    Those of a cylinder or cone at its ends: the facets turn along them alone.
+    Such sides are at the ends of a cylinder or cone, whose facets turn only along them.
     """
     turns = np.zeros(3 * len(facets.area), dtype=bool)
     turns[edges.sides[~is_crease & (np.abs(edges.turn) > PLANE)]] = True
@@ -210,8 +211,8 @@ def _bend_differences(
 ) -> list[csr_array]:
     """Matrices of l dS_ee, sqrt(l² + h²) dS_em, h dS_mm at the smooth edges.
 
-    At the apex of a cone the sum of both S_ee stands for the difference, since a cone is straight
-    along its edges, and nothing for dS_em.
+    At the apex of a cone the sum of both S_ee replaces the difference, because a cone is straight
+    along its edges, and dS_em is zero.
     """
     sides, length = edges.sides[smooth], edges.length[smooth]
     height = facets.height.ravel()[sides].min(axis=1)
@@ -220,7 +221,7 @@ def _bend_differences(
     parts: list[list[np.ndarray]] = [[], [], []]
     for which, sign in ((0, 1.0), (1, -1.0)):
         triangle, k = np.divmod(sides[:, which], 3)
-        m = facets.across[triangle]  # of the three sides, (s, 3, 3)
+        m = facets.across[triangle]  # vectors of the three sides, (s, 3, 3)
         own = m[np.arange(len(k)), k]
         along = np.cross(facets.normal[triangle], own)  # the side's own direction
         of_m = np.einsum("sij,sj->si", m, own)
@@ -228,7 +229,7 @@ def _bend_differences(
         weight = sign * facets.length[triangle] / facets.area[triangle][:, None]
         of_sum = np.abs(weight)
         weights = (np.where(keeps[:, None], weight, of_sum), weight, weight)
-        # Both along and across are reversed on the second side, so products keep their sign.
+        # Both along and across are reversed on the second side, so that products keep their sign.
         products = (of_e * of_e, of_e * of_m, of_m * of_m)
         for part, factor, product in zip(parts, weights, products, strict=True):
             part.append(factor * product)
@@ -244,7 +245,7 @@ def _solve(
 ) -> np.ndarray:
     """Minimise sums of weighted absolute values: of turns, of bends (three rows each), of creases.
 
-    By least squares whose weights are divided by the residuals of the step before.
+    The method is least squares whose weights are divided by the residuals of the previous step.
     """
     from scipy.sparse import csc_array, diags_array, vstack
     from scipy.sparse.linalg import splu
@@ -275,7 +276,7 @@ def _solve(
 
 
 def phi_of_normals(facets: Facets, normals: np.ndarray) -> np.ndarray:
-    """The angles phi (m, 3) [rad] of normals (m, 3, 3) that are known at the corners."""
+    """The angles phi (m, 3) [rad] of known normals (m, 3, 3) at the corners."""
     middle = normals + np.roll(normals, -1, axis=1)
     sine = np.einsum("mki,mki->mk", middle, facets.across)
     return np.asarray(np.arctan2(sine, np.einsum("mki,mi->mk", middle, facets.normal)))
@@ -288,7 +289,7 @@ def shape_operators(facets: Facets, phi: np.ndarray) -> np.ndarray:
 
 
 def hollow_curvature(facets: Facets, phi: np.ndarray) -> np.ndarray:
-    """Largest hollow curvature of each facet [1/m], 0 where none is hollow, shape (m,)."""
+    """Largest hollow curvature of each facet [1/m], 0 for a facet without it, shape (m,)."""
     return np.asarray(np.maximum(-np.linalg.eigvalsh(shape_operators(facets, phi))[:, 0], 0.0))
 
 
@@ -305,11 +306,12 @@ def corner_normals(
     """Unit normals of the surface at the corners of the triangles, shape (m, 3, 3).
 
     Args:
-        phi: see above, shape (m, 3).
-        apex: marks vertices, shape (n,): there each facet keeps a normal of its own.
+        phi: angles of the module docstring, shape (m, 3).
+        apex: marks vertices, shape (n,), at which each facet keeps its own normal.
     """
     lean = np.tan(phi)[..., None] * facets.across  # at the middles of the sides
-    # Linear over the facet: at a corner the sum of its two sides less the side opposite.
+    # Linear over the facet: the value at a corner is the sum of its two sides less the opposite
+    # side.
     own = facets.normal[:, None] + lean + np.roll(lean, 1, axis=1) - np.roll(lean, 2, axis=1)
     own = unit_vectors(own.reshape(-1, 3))
     own = _at_corners_of_pieces(own, facets, pieces, triangles, edges, is_crease, phi)
@@ -324,7 +326,7 @@ def corner_normals(
     mean = unit_vectors(sums_of(opening, own))
     of_planes = np.where(np.repeat((np.abs(phi) < FLAT).all(axis=1), 3), opening, 0.0)
     planes = sums_of(of_planes, np.repeat(facets.normal, 3, axis=0))
-    # Planes of one normal are as long as their weights together.
+    # Planes with one normal have a total length equal to the sum of their weights.
     total = np.bincount(fan, of_planes, count)
     is_one = (total > 0.0) & (np.linalg.norm(planes, axis=1) > np.cos(FLAT) * total)
     mean[is_one] = unit_vectors(planes)[is_one]
@@ -332,7 +334,7 @@ def corner_normals(
     result = mean[fan]
     at_apex = apex[triangles].ravel()
     result[at_apex] = own[at_apex]
-    return result.reshape(-1, 3, 3)
+    return np.asarray(result.reshape(-1, 3, 3))
 
 
 def _at_corners_of_pieces(
@@ -344,10 +346,10 @@ def _at_corners_of_pieces(
     is_crease: np.ndarray,
     phi: np.ndarray,
 ) -> np.ndarray:
-    """Unit normals (3 m, 3) at corners, of pieces of several triangles by the sides beside them.
+    """Unit normals (3 m, 3) at corners of pieces with several triangles, by the sides beside them.
 
     The normal leans by phi across each side of the piece that ends at the corner. A side at a
-    crease with a phi of 0 tells nothing: a cone leans across its straight lines alone.
+    crease with a phi of 0 shows nothing, because a cone leans only across its straight lines.
     """
     corners = np.flatnonzero(np.repeat(pieces.has_several, 3))
     told = ~pieces.inner & np.repeat(pieces.has_several, 3)
@@ -383,8 +385,9 @@ def _even_along_lines(
 ) -> np.ndarray:
     """Normals (f, 3) of fans, the same along each line in which two plane facets meet.
 
-    Two plane facets of several triangles each are of a developable surface, whose normal does not
-    change along such a line. New vertices then lie in planes too, which are few faces for a ball.
+    Two plane facets of several triangles each belong to a developable surface, whose normal does
+    not change along such a line. New vertices then lie in planes too, which are few faces for a
+    ball.
     """
     one, two = edges.triangles.T
     facet = plane_facets(edges, len(triangles))
@@ -413,7 +416,7 @@ def _even_along_lines(
 
 
 def plane_facets(edges: Edges, count: int) -> np.ndarray:
-    """The plane facet of each of so many triangles, shape (m,)."""
+    """The plane facet of each of ``count`` triangles, shape (m,)."""
     one, two = edges.triangles[np.abs(edges.turn) < PLANE].T
     return connected_pieces(one, two, count)[1]
 
@@ -421,7 +424,7 @@ def plane_facets(edges: Edges, count: int) -> np.ndarray:
 def fans(triangles: np.ndarray, edges: Edges, joins: np.ndarray) -> np.ndarray:
     """The fan of each corner, shape (3 m,): corners of a vertex joined by edges (e,)."""
     one, two = edges.sides[joins].T
-    # Side k begins at corner k; the side across the edge runs the other way.
+    # Side k begins at corner k. The side across the edge runs in the other direction.
     next_of_one, next_of_two = (3 * (s // 3) + (s % 3 + 1) % 3 for s in (one, two))
     return connected_pieces(np.r_[one, next_of_one], np.r_[next_of_two, two], 3 * len(triangles))[1]
 
@@ -429,7 +432,7 @@ def fans(triangles: np.ndarray, edges: Edges, joins: np.ndarray) -> np.ndarray:
 def find_apexes(
     facets: Facets, triangles: np.ndarray, edges: Edges, is_crease: np.ndarray
 ) -> np.ndarray:
-    """Marks (n,) the vertices without creases at which the surface comes to a point."""
+    """Mark (n,) the vertices without creases at which the surface comes to a point."""
     count = int(triangles.max()) + 1
     defect = 2.0 * np.pi - np.bincount(triangles.ravel(), _opening(facets).ravel(), count)
     start, end = sides_of(triangles)[edges.sides[:, 0]].T
@@ -442,6 +445,6 @@ def find_apexes(
 
 def _opening(facets: Facets) -> np.ndarray:
     """Angle [rad] at each corner, shape (m, 3)."""
-    into = -facets.across  # of the sides k and k - 1, which meet at corner k
+    into = -facets.across  # vectors of the sides k and k - 1, which meet at corner k
     cosine = -np.einsum("mki,mki->mk", into, np.roll(into, 1, axis=1))
-    return np.arccos(np.clip(cosine, -1.0, 1.0))
+    return np.asarray(np.arccos(np.clip(cosine, -1.0, 1.0)))

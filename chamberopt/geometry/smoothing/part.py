@@ -1,7 +1,7 @@
-"""The part's mesh with the rounds of its target divided, and what is known of its facets.
+"""The part's mesh with divided rounds on its target, and facts about its facets.
 
-A ball meets the surface that was drawn, of which the file has facets. What is divided are the
-rounds of target and zones, and what is near enough for a ball that touches them to touch it too.
+A ball meets the drawn surface, while the file has facets. The rounds of target and zones are
+divided, and rounds so near that a ball can touch them at the same time.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 # Records that take seconds to make, kept in the user's cache folder for the next command.
 
 Record = TypeVar("Record")
-MOST_KEPT = 40  # records that are kept: each holds a few MB
+MOST_KEPT = 40  # number of records that are kept: each holds a few MB
 
 
 def key_of(values: Iterable[object]) -> str:
@@ -57,17 +57,17 @@ def kept(
     """The record of a key, made only if it is not kept yet.
 
     Args:
-        kind: its class.
-        others: classes of what it holds.
+        kind: class of the record.
+        others: classes of the objects in the record.
     """
     cache = user_cache()
     if cache is None:
         return make()
     folder = cache / "kept"
-    with suppress(InputError):  # not there, or damaged: it is made again
+    with suppress(InputError):  # a missing or damaged record is made again
         return load_record(folder / f"{key}.npz", kind, others, "")
     record = make()
-    with suppress(InputError, OSError):  # such as a full disk: every command makes its own
+    with suppress(InputError, OSError):  # such as a full disk: every command makes its own record
         make_folder(folder)
         save_record(folder / f"{key}.npz", record)
         found = sorted(folder.glob("*.npz"), key=lambda path: path.stat().st_mtime)
@@ -77,29 +77,29 @@ def kept(
 
 
 NEAR = 2e-3  # m from the target: as far as usual balls reach
-DIVIDED = 1e-9  # m: what has moved by less has not moved
-MOST = 0.9  # of the area
-ALONG = np.radians(1.0)  # planes of a facet differ by less
-MOST_TRIANGLES = 1.5e6  # of a part: more take too long to fly among
+DIVIDED = 1e-9  # m: a smaller move is no move
+MOST = 0.9  # share of the area
+ALONG = np.radians(1.0)  # largest angle between planes of a facet
+MOST_TRIANGLES = 1.5e6  # triangles of a part: more take too long to fly among
 
 
 @dataclass(frozen=True)
 class SmoothingFacts:
-    """What smoothing has done to a part, and which facets are left.
+    """Results of the smoothing of a part, and the remaining facets.
 
     Attributes:
-        largest_move: of the surface [m].
-        moved_share: of the target's area, where the surface was moved.
-        volume_change: of the part, relative.
+        largest_move: largest move of the surface [m].
+        moved_share: share of the target's area where the surface was moved.
+        volume_change: relative change of the part's volume.
         given_triangles: number of the file's triangles.
-        blunt_creases: number of edges that turn by no more than facets of rounds may, and are
-            creases all the same.
-        facet_turn: largest turn between the file's facets on rounds of the target, but for a tenth
-            of the area [rad].
-        coarse_turn: the same of the facets that are left coarser than was asked for; 0: of none.
+        blunt_creases: number of creases that turn by no more than facets of rounds may.
+        facet_turn: largest turn between the file's facets on rounds of the target [rad], without
+            the tenth of the area with the largest turns.
+        coarse_turn: largest turn in this sense of facets left coarser than requested; 0 without
+            such facets.
         coarse_share: share of the target's area on facets that are left coarser.
-        noisy_share: the part of it on rounds left because they are noise.
-        crossing_share: the part of it on rounds left because they would cross others.
+        noisy_share: part of coarse_share on rounds left because they are noise.
+        crossing_share: part of coarse_share on rounds left because they would cross others.
     """
 
     largest_move: float
@@ -119,12 +119,12 @@ class SmoothPart:
     """A part with divided rounds.
 
     Attributes:
-        vertices: [m], shape (n, 3).
-        triangles: shape (k, 3).
-        origin: the file's triangle from which each comes, shape (k,).
-        normals: of the surface at the corners, unit vectors, shape (k, 3, 3).
+        vertices: vertex positions [m], shape (n, 3).
+        triangles: vertex indices, shape (k, 3).
+        origin: the file's triangle from which each triangle comes, shape (k,).
+        normals: unit normals of the surface at the corners, shape (k, 3, 3).
         hollow: largest hollow curvature [1/m], shape (k,).
-        facts: what was done.
+        facts: results of the smoothing.
     """
 
     vertices: np.ndarray
@@ -135,8 +135,8 @@ class SmoothPart:
     facts: SmoothingFacts
 
     def of_part(self, mesh: PartMesh) -> PartMesh:
-        """The divided mesh of a part; triangles keep the numbers and groups of the file's."""
-        # Numbers of triangles tell nothing: a simplified mesh may have as many when it is divided.
+        """The divided mesh of a part, with the numbers and groups of the file's triangles."""
+        # The number of triangles is no test: a simplified mesh may have as many after its division.
         if np.array_equal(self.triangles, mesh.triangles):
             return mesh
         return replace(
@@ -150,14 +150,14 @@ class SmoothPart:
 
 
 class Rule(NamedTuple):
-    """How some triangles of the file are smoothed.
+    """Rule for the smoothing of some triangles of the file.
 
     Attributes:
-        triangles: marks them, shape (m,).
-        is_off: whether they stay as they are.
+        triangles: marks the triangles, shape (m,).
+        is_off: True if the triangles stay as they are.
         turn: largest angle between facets [rad].
         narrow: width [m] below which facets are not divided.
-        tolerance: the farthest that the surface may move [m].
+        tolerance: largest move of the surface [m].
     """
 
     triangles: np.ndarray
@@ -168,11 +168,11 @@ class Rule(NamedTuple):
 
 
 def smooth(mesh: PartMesh, target: Rule, zones: list[Rule]) -> SmoothPart:
-    """Divide the rounds of a part, or take what an earlier command has made of it.
+    """Divide the rounds of a part, or load the result of an earlier command.
 
     Args:
-        target: for the triangles to cover, and for what is near them and the zones.
-        zones: for surfaces that may lie on the target.
+        target: rule for the triangles to cover, and for triangles near them and near the zones.
+        zones: rules for surfaces that may lie on the target.
     """
     values = [one for rule in (target, *zones) for one in rule]
     key = key_of([mesh.vertices, mesh.triangles, mesh.normals, mesh.is_exact, *values])
@@ -180,7 +180,7 @@ def smooth(mesh: PartMesh, target: Rule, zones: list[Rule]) -> SmoothPart:
 
 
 def _smooth(mesh: PartMesh, target: Rule, zones: list[Rule]) -> SmoothPart:
-    """Divide the rounds of a part; arguments as for `smooth`."""
+    """Divide the rounds of a part, with the arguments of `smooth`."""
     rules = [target, *zones]
     if mesh.normals is None and _has_points_in_facets(mesh, rules):
         plain, plain_rules = _without_points_in_planes(mesh, rules)
@@ -191,9 +191,9 @@ def _smooth(mesh: PartMesh, target: Rule, zones: list[Rule]) -> SmoothPart:
 
 
 def _has_points_in_facets(mesh: PartMesh, rules: list[Rule]) -> bool:
-    """Whether a facet of a round to be divided has vertices of the file inside.
+    """True if a facet of a round to be divided has vertices of the file inside.
 
-    They are on the facet, and not on the surface behind it.
+    Such vertices are on the facet, and not on the surface behind it.
     """
     edges = find_edges(mesh.vertices, mesh.triangles)
     facet, size = plane_facets(edges, len(mesh.triangles)), np.abs(edges.turn)
@@ -202,7 +202,7 @@ def _has_points_in_facets(mesh: PartMesh, rules: list[Rule]) -> bool:
         limit[rule.triangles] = math.inf if rule.is_off else rule.turn
     bends = ~is_hard(edges) & (size > limit[edges.triangles].min(axis=1))
     of_round = np.isin(facet, facet[edges.triangles[bends]])
-    # A vertex inside a facet has triangles of that facet alone around it.
+    # A vertex inside a facet has only triangles of that facet around it.
     low = np.full(len(mesh.vertices), len(mesh.triangles))
     high = np.full(len(mesh.vertices), -1)
     for corner in mesh.triangles.T:
@@ -215,7 +215,7 @@ def _has_points_in_facets(mesh: PartMesh, rules: list[Rule]) -> bool:
 def _without_points_in_planes(mesh: PartMesh, rules: list[Rule]) -> tuple[PartMesh, list[Rule]]:
     """The part with as few triangles as its planes need, and its rules.
 
-    Borders of the rules' triangles stay where they are.
+    Borders of the rules' triangles stay in place.
     """
     marks = np.stack([rule.triangles for rule in rules], axis=1)
     kinds, label = np.unique(marks, axis=0, return_inverse=True)
@@ -233,8 +233,9 @@ def _without_points_in_planes(mesh: PartMesh, rules: list[Rule]) -> tuple[PartMe
 def _on_file(found: SmoothPart, plain: PartMesh, mesh: PartMesh) -> SmoothPart:
     """A divided part whose origins are triangles of the file, not of its simplified mesh.
 
-    Each is the triangle that is closest to the middle of the new one, moved into its plane; or
-    closest to the middle of the simplified one where that is beyond the plane's border.
+    The origin of a new triangle is the file's triangle closest to its middle, moved into the
+    origin's plane. If this middle is beyond the plane's border, the middle of the simplified
+    triangle counts.
     """
     from sim_core import TriangleMesh, closest_points
 
@@ -262,8 +263,8 @@ def _divided(mesh: PartMesh, target: Rule, zones: list[Rule]) -> SmoothPart:
         asked[own] = math.inf if rule.is_off else rule.turn
         turn[own], narrow[own], tolerance[own] = rule.turn, rule.narrow, rule.tolerance
     if mesh.is_exact:
-        asked[:] = np.inf  # the triangles are of the surface itself, as fine as was asked for
-    # Sides of halves move again, all together by 1 / (1 - LESS) times what the first does.
+        asked[:] = np.inf  # the triangles were made from the exact surface, as fine as requested
+    # The sides of halves move again. All moves together are 1 / (1 - LESS) times the first move.
     surfaces = surfaces._replace(rise=np.minimum(surfaces.rise, (1.0 - LESS) * tolerance))
     finer, crossing = _divide_apart(mesh, surfaces, asked, narrow)
     moved = moves(vertices, triangles, finer)
@@ -304,7 +305,7 @@ def _divided(mesh: PartMesh, target: Rule, zones: list[Rule]) -> SmoothPart:
 def _divide_apart(
     mesh: PartMesh, surfaces: Surfaces, limit: np.ndarray, narrow: np.ndarray
 ) -> tuple[Surface, np.ndarray]:
-    """Divide the rounds, but not those that would cross others; and mark these (m,)."""
+    """Divide the rounds, except rounds that would cross others, which are marked (m,)."""
     crossing = np.zeros(len(mesh.triangles), dtype=bool)
     while True:
         stays = surfaces.noisy | crossing
@@ -327,7 +328,7 @@ def _divide_apart(
 
 
 def _near(vertices: np.ndarray, triangles: np.ndarray, chosen: np.ndarray) -> np.ndarray:
-    """Marks (m,) the chosen triangles, and those with a corner near one of theirs."""
+    """Mark (m,) the chosen triangles, and the triangles with a corner near a chosen corner."""
     from scipy.spatial import cKDTree
 
     corners = np.unique(triangles[chosen])
@@ -336,7 +337,7 @@ def _near(vertices: np.ndarray, triangles: np.ndarray, chosen: np.ndarray) -> np
 
 
 def _usual_turn(turn: np.ndarray, area: np.ndarray, chosen: np.ndarray) -> float:
-    """The turn (m,) [rad] that is not exceeded on most of the chosen facets of rounds; or 0."""
+    """The turn (m,) [rad] that most of the chosen facets of rounds do not exceed; or 0."""
     rows = np.flatnonzero(chosen & (turn > 0.0))
     if not len(rows):
         return 0.0

@@ -1,8 +1,8 @@
-"""Edges of a part's surface: which of them divide a round into facets, and which are creases.
+"""Edges of a part's surface, told apart: edges that divide a round into facets, and creases.
 
-An angle alone cannot tell: the facets of a coarse fillet turn by as much as the faces of a chamfer.
-A round shows by its neighbours: several facets beside each other turn the same way, with nearly the
-same curvature. An edge without such evidence is a crease.
+An angle alone cannot tell them apart: the facets of a coarse fillet turn by as much as the faces of
+a chamfer. A round shows by its neighbours: several facets beside each other turn in the same
+direction, with nearly the same curvature. An edge without such evidence is a crease.
 
 Facets are triangles that lie in one plane, such as the two halves of a quadrangle.
 """
@@ -22,24 +22,27 @@ from chamberopt.geometry.triangles import (
     unit_vectors,
 )
 
-# Edges that turn by more are no evidence of a round. No regular prism turns by as much: rounding
-# would decide.
+# Edges that turn by more are no evidence of a round. The turn of no regular prism is near these
+# values, so that rounding does not decide.
 CONVEX_SURE, HOLLOW_SURE = np.radians(38.0), np.radians(55.0)
-# Edges that turn by more are creases, whatever is beside them. Between the two an edge belongs to a
-# round if others show that there is one: the facets of a round turn by nearly the same angle, which
-# may lie on the limit.
+# Edges that turn by more are always creases. Edges between these limits and the sure limits belong
+# to a round if other edges are evidence of it: the facets of a round turn by nearly the same angle,
+# which may lie on the limit.
 CONVEX_CREASE, HOLLOW_CREASE = np.radians(48.0), np.radians(66.0)
 LEVEL = np.radians(0.3)  # triangles that turn by less are one facet
-# Also those that turn by less than this share of the largest turn of either, and least of all sides
-# of one: halves of a quadrangle that is not quite flat.
+# Triangles are also one facet if they turn by less than this share of the largest turn of either,
+# and by the least of all sides of a triangle: halves of a quadrangle that is not quite flat.
 OF_LARGEST = 0.3
 SMOOTH = np.radians(1.0)  # edges that turn by less need no evidence
-# Factor of curvatures: beside a plane the first facet of a round has 3/4 of that of the others.
+# Factor of curvatures. Beside a plane the first facet of a round has 3/4 of the curvature of the
+# other facets.
 ALIKE = 1.6
-# The same of the curvatures about an edge: those of a cone and of its flat end are alike in sum.
+# Factor of the curvatures about an edge, because a cone and its flat end are alike in the sum of
+# curvatures.
 ALIKE_ABOUT_AXIS = 4.0
-# A round goes on beyond a facet: its other edges bend about an edge too, by this share of that
-# edge's own bend if it turns by CONVEX_SURE, and by less, with the square, if it turns by less.
+# A round goes on beyond a facet if the facet's other edges bend about an edge by this share of that
+# edge's own bend. The share holds for an edge that turns by CONVEX_SURE, and falls with the square
+# of a smaller turn.
 GOES_ON = 0.5
 ACROSS = 0.4  # cosine between edges of a facet below which they bend about different axes
 FEW_EDGES = 64
@@ -51,8 +54,8 @@ class Edges(NamedTuple):
     Attributes:
         sides: the two sides at each edge, 3 t + k for side k of triangle t, shape (e, 2).
         turn: angle between the normals of both sides [rad], negative in a hollow, shape (e,).
-        length: [m], shape (e,).
-        along: unit vector, shape (e, 3).
+        length: length of each edge [m], shape (e,).
+        along: unit vector along each edge, shape (e, 3).
     """
 
     sides: np.ndarray
@@ -80,15 +83,15 @@ def find_edges(vertices: np.ndarray, triangles: np.ndarray) -> Edges:
 
 
 def is_hard(edges: Edges) -> np.ndarray:
-    """Marks (e,) the edges that are creases whatever is beside them."""
-    return (edges.turn > CONVEX_CREASE) | (edges.turn < -HOLLOW_CREASE)
+    """Mark (e,) the edges that are creases in any neighbourhood."""
+    return np.asarray((edges.turn > CONVEX_CREASE) | (edges.turn < -HOLLOW_CREASE))
 
 
 def find_creases(edges: Edges, area: np.ndarray) -> np.ndarray:
-    """Marks (e,) the edges without evidence of a round.
+    """Mark (e,) the edges without evidence of a round.
 
     Args:
-        area: of the triangles [m²], shape (m,).
+        area: areas of the triangles [m²], shape (m,).
     """
     size, hard, count = np.abs(edges.turn), is_hard(edges), len(area)
     one, two = edges.triangles.T
@@ -104,18 +107,18 @@ def find_creases(edges: Edges, area: np.ndarray) -> np.ndarray:
     smooth = size <= SMOOTH
     for level in (flat, flat | nearly):
         smooth |= level | _has_evidence(edges, level, hard, area)
-    return hard | ~smooth
+    return np.asarray(hard | ~smooth)
 
 
 def _has_evidence(
     edges: Edges, level: np.ndarray, hard: np.ndarray, area: np.ndarray
 ) -> np.ndarray:
-    """Marks (e,) the edges that belong to a round.
+    """Mark (e,) the edges that belong to a round.
 
     Args:
         level: marks the edges within facets, shape (e,).
-        hard: marks the edges that belong to none, shape (e,).
-        area: of the triangles [m²], shape (m,).
+        hard: marks the edges that belong to no round, shape (e,).
+        area: areas of the triangles [m²], shape (m,).
     """
     size = np.abs(edges.turn)
     sure = (edges.turn < CONVEX_SURE) & (edges.turn > -HOLLOW_SURE)
@@ -135,13 +138,13 @@ def _has_evidence(
 
 
 def _is_in_round(facet: np.ndarray, edges: Edges, sure: np.ndarray, area: np.ndarray) -> np.ndarray:
-    """Whether edges that all turn the same way belong to a round, shape (k,).
+    """True for edges that belong to a round, shape (k,), among edges that turn in one direction.
 
     Args:
-        facet: on both sides of each, shape (k, 2).
-        edges: the same with turns made positive.
+        facet: facets on both sides of each edge, shape (k, 2).
+        edges: the edges with turns made positive.
         sure: marks the edges that are evidence, shape (k,).
-        area: of the facets, shape (f,).
+        area: areas of the facets, shape (f,).
     """
     bend = edges.length * edges.turn
     curvature = np.bincount(facet.T.ravel(), np.tile(bend, 2), len(area)) / np.maximum(area, 1e-30)
@@ -157,22 +160,23 @@ def _is_in_round(facet: np.ndarray, edges: Edges, sure: np.ndarray, area: np.nda
     needed = GOES_ON * (edges.turn / CONVEX_SURE) ** 2 * bend
     goes_on = bends_beside >= needed[:, None]
     alike = beside.all(axis=1) & _are_alike(curvature[facet], ALIKE)
-    return (goes_on & beside).any(axis=1) & (sure | alike)
+    return np.asarray((goes_on & beside).any(axis=1) & (sure | alike))
 
 
 def _bends_beside(facet: np.ndarray, bend: np.ndarray, along: np.ndarray, count: int) -> np.ndarray:
     """Bends about each edge of the other edges of the facets on both sides, (k, 2).
 
-    What bends about an axis across the edge does not count: the round of a shaft tells nothing of
-    the edge at its end. Nor does the round of a cone, whose lines are not quite across its end.
+    A bend about an axis across the edge does not count: the round of a shaft shows nothing about
+    the edge at its end. The round of a cone does not count either, although its lines are not quite
+    across its end.
     """
     tensor = np.einsum("k,ki,kj->kij", bend, along, along).reshape(-1, 9)
     sums = np.stack(
         [np.bincount(facet.T.ravel(), np.tile(one, 2), count) for one in tensor.T], axis=1
     ).reshape(-1, 3, 3)
     bends = np.einsum("kfij,ki,kj->kf", sums[facet], along, along) - bend[:, None]
-    # Of facets with few edges those nearly across are taken out, pair by pair.
-    side = facet.ravel()  # two of each edge
+    # Edges that are nearly across are taken out pair by pair, in facets with few edges.
+    side = facet.ravel()  # two facets of each edge
     number, order = np.bincount(side, minlength=count), np.argsort(side, kind="stable")
     few = np.flatnonzero(number[side] <= FEW_EDGES)
     times, first = number[side[few]], (np.cumsum(number) - number)[side[few]]
@@ -180,10 +184,10 @@ def _bends_beside(facet: np.ndarray, bend: np.ndarray, along: np.ndarray, count:
     other = order[np.repeat(first, times) + count_up(times)] // 2
     cosine = np.einsum("ri,ri->r", along[pair // 2], along[other])
     across = np.where(np.abs(cosine) < ACROSS, bend[other] * cosine**2, 0.0)
-    return bends - np.bincount(pair, across, 2 * len(bend)).reshape(-1, 2)
+    return np.asarray(bends - np.bincount(pair, across, 2 * len(bend)).reshape(-1, 2))
 
 
 def _are_alike(curvature: np.ndarray, factor: float) -> np.ndarray:
-    """Whether the curvatures of pairs (k, 2) of facets differ by no more, shape (k,)."""
+    """True where the curvatures of facet pairs (k, 2) differ by at most ``factor``, shape (k,)."""
     low, high = np.sort(curvature, axis=1).T
     return np.asarray(high <= factor * low)

@@ -1,14 +1,14 @@
-"""The smooth surface of a part, of which its file has facets.
+"""The smooth surface of a part whose file has facets.
 
-The facets of a round touch a ball elsewhere than the round does: in a hollow a ball lies across two
-of them and leaves a bare strip between. So rounds are found and their triangles divided, with new
-vertices on the surface on which the file's vertices lie. Planes, sharp edges and noise stay as they
-are. No vertex of the file moves.
+The facets of a round touch a ball elsewhere than the round does. In a hollow a ball lies across two
+facets and leaves a bare strip between them. Rounds are therefore found and their triangles divided,
+with new vertices on the surface through the file's vertices. Planes, sharp edges and noise stay as
+they are. No vertex of the file moves.
 
-    rounds    which edges divide a round into facets
-    irregular which others do, if the facets are irregular triangles
-    normals   of the smooth surface at the corners of the facets
-    divide    finer triangles
+rounds    edges that divide a round into facets
+irregular further such edges between irregular triangles
+normals   normals of the smooth surface at the corners of the facets
+divide    finer triangles
 """
 
 from __future__ import annotations
@@ -36,9 +36,9 @@ from chamberopt.geometry.triangles import connected_pieces, sides_of, unit_norma
 
 # Edges of irregular triangles, across which a round goes on without evidence of its own.
 #
-# Facets that are nearly alike are evidence of a round. The edges of irregular triangles turn by
-# anything, also the other way round. A fit to the edges with evidence tells the curvature beside
-# the others. A round goes on across an edge that turns as this curvature lets expect.
+# Facets that are nearly alike are evidence of a round. The edges of irregular triangles turn by any
+# angle, also in the other direction. A fit to the edges with evidence gives the curvature beside
+# the other edges. A round goes on across an edge that turns as this curvature suggests.
 #
 # Notation
 #     S, A, l, phi   as in `normals`
@@ -46,18 +46,19 @@ from chamberopt.geometry.triangles import connected_pieces, sides_of, unit_norma
 #
 #     phi = -l (e_1ᵀ S e_2) / (4 A)    the only phi of which S is the shape operator
 
-WRONG = 0.5  # share of an edge's turn by which the turn may differ from what is expected
-LITTLE = np.radians(3.0)  # turn by which it always may
-SWEEPS = 20  # triangles in a row, each of which takes the curvature of the one before
+WRONG = 0.5  # share of an edge's turn by which the turn may differ from the expected turn
+LITTLE = np.radians(3.0)  # difference of the turn that is always allowed
+SWEEPS = 20  # triangles in a row, each of which takes the curvature of the previous triangle
 
 
 def valleys(edges: Edges, pieces: Pieces, is_crease: np.ndarray) -> np.ndarray:
-    """Marks (e,) the creases that irregular triangles of one round may have between them.
+    """Mark (e,) the creases that irregular triangles of one round may have between them.
 
-    Both are single triangles with other edges that turn the other way, and by more. Two rows of
-    triangles, each half a triangle ahead of the other, have such an edge along each row.
+    Both triangles are single triangles with other edges that turn in the other direction, and by
+    more. Two rows of triangles, each half a triangle ahead of the other, have such an edge along
+    each row.
     """
-    largest = np.zeros((2, len(pieces.number)))  # turns the one way and the other
+    largest = np.zeros((2, len(pieces.number)))  # largest turns in each of the two directions
     for way, sign in enumerate((1.0, -1.0)):
         turns = ~is_crease & (sign * edges.turn > SMOOTH)
         for triangle in edges.triangles[turns].T:
@@ -71,12 +72,12 @@ def valleys(edges: Edges, pieces: Pieces, is_crease: np.ndarray) -> np.ndarray:
 def find_continued(
     sides: np.ndarray, edges: Edges, facets: Facets, is_crease: np.ndarray, phi: np.ndarray
 ) -> np.ndarray:
-    """Marks (e,) the creases across which a round goes on.
+    """Mark (e,) the creases across which a round goes on.
 
     Args:
-        sides: of the triangles, as vectors [m], shape (m, 3, 3).
+        sides: sides of the triangles, as vectors [m], shape (m, 3, 3).
         is_crease: marks the edges without evidence, shape (e,).
-        phi: of a fit to the other edges [rad], shape (m, 3).
+        phi: angles from a fit to the other edges [rad], shape (m, 3).
     """
     shape = shape_operators(facets, phi)
     turns = ~is_crease & (np.abs(edges.turn) > SMOOTH)
@@ -105,30 +106,32 @@ def find_continued(
     return continued
 
 
-# Times the rise of the circle that an edge's larger turn and facet are of: of two facets of unequal
-# width the wide one turns by up to twice as much as the edge between them.
+# Factor on the rise of the circle given by an edge's larger turn and its facet. Of two facets of
+# unequal width, the wide facet turns by up to twice as much as the edge between them.
 RISE = 2.0
-FAR_LARGER = 3.0  # times the area of the facets beside it: a plane facet is no part of a round
-BY_CHANCE = 8  # the most triangles of a round that lie in one plane by chance
-LOOKS = 2  # for edges across which a round goes on, each a fit to what was found before
-LEFT_OVER = 0.5  # share of an edge's turn that no round explains, above which it is a crease
+# times the area of the facets beside it: such a plane facet is not part of a round
+FAR_LARGER = 3.0
+BY_CHANCE = 8  # largest number of triangles of a round that lie in one plane by chance
+LOOKS = 2  # searches for edges across which a round goes on, each with a new fit
+LEFT_OVER = 0.5  # share of an edge's turn that no round explains, above which the edge is a crease
 CREASE = np.radians(8.0)  # the least turn of such a crease
-EXPLAINED = 0.25  # share below which an edge without evidence is of the rounds beside it
-# Share of a round's turns that nothing explains, above which it is noise; the same of all turns.
+EXPLAINED = 0.25  # share below which an edge without evidence belongs to the rounds beside it
+# Share of a round's turns without explanation, above which the round is noise; and this share of
+# all turns.
 NOISE, NOISE_IN_ALL = 0.3, 0.2
 LINE = 12.0  # degrees: creases that turn by less and end freely are no line
-TOLD = 3.0  # degrees: smaller turns tell nothing of noise
+TOLD = 3.0  # degrees: smaller turns say nothing about noise
 
 
 class Surfaces(NamedTuple):
-    """What is known of a part's surface before it is divided.
+    """Normals, curvatures and creases of a part's surface before it is divided.
 
     Attributes:
-        normals: of the smooth surface at the corners, unit vectors, shape (m, 3, 3).
-        hollow: largest hollow curvature on each triangle [1/m], 0 where there is none, shape (m,).
+        normals: unit normals of the smooth surface at the corners, shape (m, 3, 3).
+        hollow: largest hollow curvature on each triangle [1/m], 0 without it, shape (m,).
         turn: largest turn at the smooth edges of each triangle [rad], shape (m,).
         crease: marks the sides at creases, shape (m, 3).
-        rise: the farthest that the surface may move from each triangle [m], shape (m,).
+        rise: largest move of the surface from each triangle [m], shape (m,).
         face: number of the round of each triangle, shape (m,).
         noisy: marks the triangles of rounds that are noise, shape (m,).
         blunt: number of the creases that turn by less than the facets of a round may.
@@ -150,10 +153,11 @@ def find_surfaces(
     """Find rounds and creases of a part, and the normals of the surface behind its facets.
 
     Args:
-        vertices: [m], shape (n, 3).
-        triangles: closed, normals outward, shape (m, 3).
-        wanted: marks the triangles that matter, shape (m,). Rounds without one are left flat.
-        given: normals at the corners that the file states, unit vectors, shape (m, 3, 3).
+        vertices: vertex positions [m], shape (n, 3).
+        triangles: vertex indices of a closed surface, normals outward, shape (m, 3).
+        wanted: marks the triangles that matter, shape (m,). Rounds without a wanted triangle are
+            left flat.
+        given: unit normals at the corners that the file states, shape (m, 3, 3).
     """
     edges, facets = find_edges(vertices, triangles), measure_facets(vertices, triangles)
     size = np.abs(edges.turn)
@@ -204,7 +208,7 @@ def divide_rounds(
     limit: np.ndarray,
     narrow: np.ndarray,
 ) -> Surface:
-    """Divide the triangles of rounds; the new vertices lie on the smooth surface.
+    """Divide the triangles of rounds. The new vertices lie on the smooth surface.
 
     Args:
         limit: turn [rad] above which each triangle's edges are split, shape (m,); infinite where
@@ -223,7 +227,7 @@ def divide_rounds(
 
 
 def moves(vertices: np.ndarray, triangles: np.ndarray, finer: Surface) -> np.ndarray:
-    """How far the divided surface is from each triangle that was divided [m], shape (m,)."""
+    """Distance of the divided surface from each triangle that was divided [m], shape (m,)."""
     normal = unit_normals(vertices[triangles])[finer.parent]
     start = vertices[triangles[finer.parent, 0]][:, None]
     height = np.abs(np.einsum("kci,ki->kc", finer.vertices[finer.triangles] - start, normal))
@@ -233,7 +237,7 @@ def moves(vertices: np.ndarray, triangles: np.ndarray, finer: Surface) -> np.nda
 
 
 def _stated_creases(edges: Edges, normals: np.ndarray) -> np.ndarray:
-    """Marks (e,) the edges at which normals that a file states differ on both sides."""
+    """Mark (e,) the edges at which the file's normals on both sides differ."""
     triangle, k = np.divmod(edges.sides.T, 3)
     start, end = normals[triangle, k], normals[triangle, (k + 1) % 3]
     cosine = [np.einsum("ei,ei->e", start[0], end[1]), np.einsum("ei,ei->e", end[0], start[1])]
@@ -249,7 +253,7 @@ def _continued(
     lone: np.ndarray,
     wanted: np.ndarray,
 ) -> np.ndarray:
-    """Marks (e,) the edges without evidence across which a round goes on.
+    """Mark (e,) the edges without evidence across which a round goes on.
 
     Args:
         lone: marks the edges without evidence, shape (e,).
@@ -258,7 +262,7 @@ def _continued(
     _, fitted = _faces_to_fit(edges, facets, lone, wanted)
     doubted = lone & ~is_hard(edges) & fitted[edges.triangles].any(axis=1)
     if not doubted.any():
-        return doubted
+        return np.asarray(doubted)
     apexes = find_apexes(facets, triangles, edges, lone)[sides_of(triangles)[edges.sides[:, 0]]]
     told = doubted & valleys(edges, pieces, lone)
     phi = fit_phi(facets, pieces, edges, lone, fitted, apexes.any(axis=1), doubted, told)
@@ -269,15 +273,16 @@ def _continued(
 def _faces_to_fit(
     edges: Edges, facets: Facets, is_crease: np.ndarray, wanted: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Rounds, and which of them have normals to be found.
+    """Number of each triangle's round, and marks of the triangles whose normals are to be found.
 
     Args:
         wanted: marks the triangles that are to be divided, shape (m,).
 
     Returns:
-        The number of the round to which each triangle belongs, shape (m,), one of its own for one
-        that belongs to none; marks the triangles of rounds with or beside a wanted one, and those
-        beside them across smooth edges, shape (m,). Plane faces beside rounds are left out.
+        The number of the round to which each triangle belongs, shape (m,), and a separate number
+        for a triangle without a round; marks of the triangles in or beside a round with a wanted
+        triangle, and of their neighbours across smooth edges, shape (m,). Plane faces beside rounds
+        are left out.
     """
     joins = ~is_crease & (np.abs(edges.turn) > SMOOTH)
     one, two = edges.triangles[joins].T
@@ -290,10 +295,11 @@ def _faces_to_fit(
 
 
 def _planes(edges: Edges, facets: Facets, is_crease: np.ndarray) -> np.ndarray:
-    """Marks (m,) the triangles of plane facets that are far larger than all facets beside them.
+    """Mark (m,) the triangles of plane facets that are far larger than all facets beside them.
 
-    The facets of a round are nearly alike, so these are no part of it. A few irregular triangles of
-    a round may lie in one plane by chance, so beside single triangles each of them counts.
+    The facets of a round are nearly alike, so that these planes are not part of it. A few irregular
+    triangles of a round may lie in one plane by chance. Beside single triangles, each triangle of
+    the plane therefore counts separately.
     """
     facet = plane_facets(edges, len(facets.area))
     count, area = np.bincount(facet), np.bincount(facet, facets.area)
@@ -306,7 +312,7 @@ def _planes(edges: Edges, facets: Facets, is_crease: np.ndarray) -> np.ndarray:
 
 
 def _with_neighbours(marked: np.ndarray, pairs: np.ndarray) -> np.ndarray:
-    """Marked triangles (m,) and those beside them, by pairs of neighbours (e, 2)."""
+    """The marked triangles (m,) and their neighbours, by pairs of neighbours (e, 2)."""
     both = pairs[marked[pairs].any(axis=1)]
     result = marked.copy()
     result[both] = True
@@ -326,7 +332,7 @@ def _noise(
     Args:
         lone: marks the edges without evidence of a round, shape (e,).
         left: turn of each edge that the fit does not explain [rad], shape (e,).
-        face: of each triangle, shape (m,).
+        face: face of each triangle, shape (m,).
         fitted: marks the triangles for which there is a fit, shape (m,).
         ends: vertices of each edge, shape (e, 2).
     """
@@ -346,15 +352,15 @@ def _noise(
     )
     if some.sum() > NOISE_IN_ALL * every.sum():
         return np.ones(count)  # smooth pieces among noise are no rounds either
-    return np.divide(some, every, out=np.zeros(count), where=every > 0.0)
+    return np.asarray(np.divide(some, every, out=np.zeros(count), where=every > 0.0))
 
 
 def _turns_and_rises(
     edges: Edges, facets: Facets, is_crease: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The largest turn [rad] at the smooth sides of each triangle, shape (m,), and the rise [m].
+    """Largest turn [rad] at the smooth sides of each triangle, and its rise [m], shape (m,) each.
 
-    The rise is that of the circle of which the triangle is a facet, over its chord.
+    The rise belongs to the circle of which the triangle is a facet, over its chord.
     """
     turn = np.zeros(3 * len(facets.area))
     turn[edges.sides[~is_crease]] = np.abs(edges.turn[~is_crease])[:, None]
