@@ -1,1 +1,1 @@
-"""What every package uses: errors, TOML fields and messages, file writing, progress, workers."""
+"""Tools of every package: errors, TOML fields and messages, file writing, progress, workers."""

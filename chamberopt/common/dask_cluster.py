@@ -20,16 +20,16 @@ from chamberopt.common.errors import ClusterLostError, InputError, WorkerLostErr
 from chamberopt.common.limits import MAX_TEXT_BYTES, read_limited
 from chamberopt.common.versions import simulation_versions
 
-TIMEOUT_S = 4.0  # for the scheduler to answer, and again to accept a client
-WORKER_TIMEOUT_S = 20.0  # for its first worker
-MAX_GREETING = 100_000  # bytes; what Dask sends first has some hundred
+TIMEOUT_S = 4.0  # wait for the scheduler to answer, and again for it to accept a client
+WORKER_TIMEOUT_S = 20.0  # wait for its first worker
+MAX_GREETING = 100_000  # bytes; the first message of Dask has some hundred
 SCHEDULER_FILE = "what `dask scheduler --scheduler-file FILE` wrote"
 
 
 class DaskExecutor(Executor):
-    """Runs tasks on the workers of a Dask scheduler.
+    """Executor that runs tasks on the workers of a Dask scheduler.
 
-    If a worker dies, the scheduler runs its task again on another. A task that takes several
+    If a worker dies, the scheduler runs its task again on another worker. A task that takes several
     workers down (distributed.scheduler.allowed-failures) raises WorkerLostError. An exception that
     leaves the `with` block cancels the tasks.
     """
@@ -42,8 +42,8 @@ class DaskExecutor(Executor):
             timeout: seconds to wait for a worker.
 
         Raises:
-            InputError: Dask is not installed, no scheduler answers, it has no workers, or these
-                run another program.
+            InputError: if Dask is not installed, no scheduler answers, it has no workers, or its
+                workers run another program.
         """
         try:
             from distributed import Client
@@ -70,13 +70,13 @@ class DaskExecutor(Executor):
         self._executor = self._client.get_executor(pure=False)
 
     def share(self, value: Any) -> Any:
-        # As a task's result rather than as scattered data: the scheduler can compute a result
-        # again if the workers that hold it die.
+        # The value is sent as a task's result and not as scattered data, because the scheduler can
+        # compute a result again if the workers that hold it die.
         pickled = pickle.dumps(value, pickle.HIGHEST_PROTOCOL)
         return self._client.submit(pickle.loads, pickled, pure=False)
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
-        """Queue a task; its future raises this package's errors instead of Dask's."""
+        """Queue a task. Its future raises this package's errors instead of Dask's."""
         dask_future = self._executor.submit(fn, *args, **kwargs)
         future: Future[Any] = Future()
 
@@ -89,7 +89,7 @@ class DaskExecutor(Executor):
         return future
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        """Disconnect; the cluster keeps running."""
+        """Disconnect. The cluster keeps running."""
         self._executor.shutdown(wait and not cancel_futures)
         self._client.close()
 
@@ -136,8 +136,8 @@ def _scheduler_address(cluster: str) -> str:
 def _require_scheduler(address: str) -> None:
     """Raise OSError or ValueError unless a Dask scheduler answers at the address.
 
-    A Dask client that meets another program waits for minutes, or takes its first bytes for a
-    length and that much memory.
+    A Dask client that meets another program waits for minutes, or takes the program's first bytes
+    for a length and allocates that much memory.
     """
     place = urlsplit(address)
     if place.scheme not in ("tcp", "tls") or not place.hostname or not place.port:

@@ -1,4 +1,4 @@
-"""Errors that a user can put right, errors of lost workers, and text that is safe to show."""
+"""Errors that a user can correct, errors of lost workers, and text that is safe to show."""
 
 from __future__ import annotations
 
@@ -9,47 +9,47 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from pydantic import ValidationError
 
-FORMULA = ("=", "+", "-", "@", "\t", "\n")  # the beginnings of one in spreadsheet programs
+FORMULA = ("=", "+", "-", "@", "\t", "\n")  # beginnings of a formula in spreadsheet programs
 # Characters that a terminal obeys instead of showing them, or that reverse the text.
 CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]")
 
 
 class InputError(Exception):
-    """A design, study, mesh or result folder cannot be used as it is.
+    """Error for a design, study, mesh or result folder that cannot be used as it is.
 
     The message is one sentence with the field, file or triangle and the remedy. The command line
-    prints the message alone and exits with status 2.
+    prints only the message and exits with status 2.
     """
 
 
 class UnreadableError(InputError):
-    """A file cannot be read now, by no fault of the design or candidate that names it."""
+    """Error for a file that cannot be read now, although the design that names it is right."""
 
 
 class OutputTakenError(InputError):
-    """The place for a result holds something, or another process writes to it."""
+    """Error for the place of a result that holds something, or that another process writes to."""
 
 
 class WorkerLostError(BrokenExecutor):
-    """A worker died while it ran a task, and so did the worker that tried again."""
+    """Error for a task whose worker died, and whose second worker died too."""
 
 
 class ClusterLostError(BrokenExecutor):
-    """The cluster ended with tasks unfinished; the command line exits with status 1."""
+    """Error for a cluster that ended too early. The command line exits with status 1."""
 
 
 def visible(text: str) -> str:
-    """The text with control characters as escapes; it keeps its tabs and line breaks."""
+    """The text with control characters as escapes. Tabs and line breaks stay."""
     return CONTROL.sub(lambda one: one[0].encode("unicode_escape").decode(), text)
 
 
 def one_line(text: str) -> str:
-    """The text as `visible` gives it, with line breaks as escapes too."""
+    """The text with control characters and line breaks as escapes."""
     return visible(text).replace("\n", "\\n")
 
 
 def spreadsheet_cell(value: Any) -> Any:
-    """A value of a .csv file; a text that a spreadsheet would take for a formula is quoted.
+    """A value of a .csv file. A text that a spreadsheet would take for a formula is quoted.
 
     A carriage return becomes a line feed: the csv module leaves it without quotes, and a
     spreadsheet begins a row after it.
@@ -69,7 +69,7 @@ def spreadsheet_cell(value: Any) -> Any:
 
 
 def first_wrong_value(error: ValidationError) -> str:
-    """Where the first wrong value of a program's own file lies, and what is wrong with it."""
+    """Place of the first wrong value in a file of the program, and its fault."""
     first = error.errors(include_url=False, include_input=False)[0]
     where, why = ".".join(map(str, first["loc"])), first["msg"].removeprefix("Value error, ")
     return f"{where}: {why}" if where else why

@@ -1,14 +1,14 @@
 """Estimates of any quantity with 95 % confidence intervals from independent replicas.
 
 Notation
-    n       number of replicas
-    y_j     pseudo-value of replica j; their mean is the estimate     (pseudovalues, (n,))
-    s       standard deviation of the pseudo-values
-    t       quantile of Student's distribution                        (student_quantile)
-    u_k     signed standard errors by causes that replicas do not show, and that estimates of one
-            part have in common, such as the choice of points               (shared)
-    z       quantile of the normal distribution                      (normal_quantile)
-    half-width = sqrt((t s)² / n + z² sum of u_k²) + bias
+n       number of replicas
+y_j     pseudo-value of replica j; their mean is the estimate     (pseudovalues, (n,))
+s       standard deviation of the pseudo-values
+t       quantile of Student's distribution                        (student_quantile)
+u_k     signed standard error by a cause that replicas do not show and that is common to the
+        estimates of one part, such as the choice of points       (shared)
+z       quantile of the normal distribution                      (normal_quantile)
+half-width = sqrt((t s)² / n + z² sum of u_k²) + bias
 
 The difference of two estimates of one part has the differences of their u_k.
 """
@@ -24,27 +24,33 @@ from typing import Any
 import numpy as np
 
 CONFIDENCE = 0.95
-# Position in Estimate.shared of the errors that a calibration leaves: those by the choice of points
-# come before.
+# Position in Estimate.shared of the first error of a calibration. The errors by the choice of
+# points come before.
 FIRST_OF_CALIBRATION = 16
-# And that of what an estimate of the part's metal under this shot leaves out, such as its depth.
+# Position of the error of effects left out for the part's metal under this shot, such as its depth.
 OF_METAL = FIRST_OF_CALIBRATION - 1
-ZERO_TOLERANCE = 1e-12  # a value below is a rounding error of zero
+ZERO_TOLERANCE = 1e-12  # a smaller value is a rounding error of zero
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """A value with its 95 % interval."""
+    """A value with its 95 % interval.
+
+    Example:
+        >>> coverage = estimate([0.90, 0.92, 0.91], lowest=0.0, highest=1.0)
+        >>> round(coverage.value, 3), round(coverage.half_width, 3)
+        (0.91, 0.025)
+    """
 
     value: float
     half_width: float  # half of the interval's width; infinite if there is only one replica
     # One value a replica, from which value and interval come, (n,).
     pseudovalues: tuple[float, ...] = field(default=(), repr=False)
-    # Bound on the error that more replicas would not remove; included in half_width.
+    # Bound on the error that more replicas would not remove. It is included in half_width.
     bias: float = 0.0
-    shared: tuple[float, ...] = field(default=(), repr=False)  # u_k; none left out are 0
-    # What stands in the place of the number: where there is none, such as never, and where its
-    # digits would say more than is known, such as more than 99.9 %.
+    shared: tuple[float, ...] = field(default=(), repr=False)  # u_k; omitted errors are 0
+    # Words in place of the number, if there is no number, such as never, or if its digits would say
+    # more than is known, such as more than 99.9 %.
     in_words: str = ""
 
     @property
@@ -57,14 +63,14 @@ class Estimate:
 
     @property
     def has_number(self) -> bool:
-        """Whether the value is a number that can be compared, whatever words stand for it."""
+        """True if the value is a number that can be compared, also if words replace it in texts."""
         return not self.in_words or 0.0 < self.half_width < math.inf
 
     @property
     def beyond_scatter(self) -> float:
-        """By how much the interval is wider than what replicas and shared errors tell.
+        """Width of the interval beyond the scatter of replicas and the shared errors.
 
-        That is the bias, and what a steep interval has more.
+        It is the bias, and the extra width of a steep interval.
         """
         if not self.pseudovalues or not math.isfinite(self.half_width):
             return self.bias
@@ -72,18 +78,18 @@ class Estimate:
         return max(self.bias, self.half_width - scatter) if math.isfinite(scatter) else self.bias
 
     def interval_json(self) -> dict[str, Any]:
-        """Value and half-width as JSON values, null where they are not finite, and the words."""
+        """Value and half-width as JSON values, null if they are not finite, and the words."""
         interval = {"value": _finite(self.value), "half_width": _finite(self.half_width)}
         return interval | ({"in_words": self.in_words} if self.in_words else {})
 
     def to_json(self) -> dict[str, Any]:
-        """As JSON values, with the pseudo-values by which results can be compared later."""
+        """The estimate as JSON values, with its pseudo-values for later comparisons."""
         return {**self.interval_json(), "pseudovalues": list(self.pseudovalues),
                 "bias": _finite(self.bias), "shared": list(self.shared)}  # fmt: skip
 
     @classmethod
     def from_json(cls, data: Mapping[str, Any]) -> Estimate:
-        """The estimate that `to_json` wrote. Raises KeyError, TypeError or ValueError otherwise."""
+        """The estimate that `to_json` wrote; KeyError, TypeError or ValueError for other data."""
         pseudovalues = tuple(float(x) for x in data["pseudovalues"])
         bias = math.inf if data["bias"] is None else float(data["bias"])
         shared = tuple(float(x) for x in data["shared"])
@@ -91,17 +97,17 @@ class Estimate:
         return replace(found, pseudovalues=pseudovalues, bias=bias, shared=shared)
 
     def not_known(self, in_words: str) -> Estimate:
-        """The same value without an interval, and the words that stand in its place."""
+        """The same value without an interval, and the words in its place."""
         return replace(self, half_width=math.inf, in_words=in_words)
 
     def at_least_as_wide(self, half_width: float) -> Estimate:
-        """The estimate with an interval of at least that; an exact 0 stays exact."""
+        """The estimate with at least this half-width of its interval. An exact 0 stays exact."""
         if self.value == self.half_width == 0.0:
             return self
         return replace(self, half_width=max(self.half_width, half_width))
 
     def times(self, factor: float) -> Estimate:
-        """The estimate of so many times this figure; the factor is exact and above 0."""
+        """The estimate multiplied by an exact factor above 0."""
         return replace(
             self,
             value=factor * self.value,
@@ -123,7 +129,7 @@ class Estimate:
         return replace(self, shared=shared, half_width=self.half_width - scatter + wider)
 
     def of_another_metal(self) -> Estimate:
-        """The estimate with an error of its own in the place of that of the metal."""
+        """The estimate with an independent error in place of its metal's error."""
         if len(self.shared) <= OF_METAL:
             return self
         before, own = self.shared[: OF_METAL - 1], self.shared[OF_METAL]
@@ -139,8 +145,9 @@ class Estimate:
 
 
 def _finite(number: float) -> float | None:
-    """None for NaN and for what is infinite, such as the half-width of a single replica or the
-    bias where there is no dent at all: JSON has neither.
+    """The number, or None for NaN and infinity, because JSON has neither.
+
+    The half-width of a single replica is infinite, for example, and so is the bias without a dent.
     """
     return number if math.isfinite(number) else None
 
@@ -156,7 +163,7 @@ def estimate(
     """Mean of the pseudo-values with its Student-t interval.
 
     Args:
-        lowest, highest: range of the quantity; the mean is clipped to it.
+        lowest, highest: range of the quantity, to which the mean is clipped.
         bias: bound on the error that more replicas would not remove.
         shared: signed standard errors by causes that replicas do not show.
     """
@@ -175,10 +182,10 @@ def estimate(
 
 
 def jackknife(values: np.ndarray) -> np.ndarray:
-    """Pseudo-values about a value that needs no correction of its bias.
+    """Pseudo-values about a value whose bias needs no correction.
 
     Args:
-        values: of all batches, and of all but each, (g + 1,).
+        values: the value of all batches, and the values without each batch, (g + 1,).
     """
     batches = len(values) - 1
     if batches == 1:
@@ -188,7 +195,7 @@ def jackknife(values: np.ndarray) -> np.ndarray:
 
 
 def shared_half_width(shared: Sequence[float], confidence: float = CONFIDENCE) -> float:
-    """Half-width of the interval by what replicas do not show."""
+    """Half-width of the interval by causes that replicas do not show."""
     return normal_quantile(confidence) * math.hypot(*shared)
 
 
@@ -217,8 +224,8 @@ def paired_difference(
 ) -> Estimate:
     """Difference after - before of replicas that ran on the same seeds, pair by pair.
 
-    A peening chamber is chaotic, so equal seeds hardly correlate. Where they do, the interval is
-    right too. With different numbers of replicas the two are taken as independent.
+    A peening chamber is chaotic, so that equal seeds hardly correlate. If they do, the interval is
+    still right. Estimates with different numbers of replicas are taken as independent.
     """
     if not after.pseudovalues or len(after.pseudovalues) != len(before.pseudovalues):
         return independent_difference(after, before, confidence)
@@ -232,10 +239,10 @@ def paired_difference(
 def independent_difference(
     after: Estimate, before: Estimate, confidence: float = CONFIDENCE
 ) -> Estimate:
-    """Difference after - before of two that were simulated independently (Welch's t)."""
+    """Difference after - before of two independently simulated estimates (Welch's t)."""
     value, bias = after.value - before.value, after.beyond_scatter + before.beyond_scatter
     if min(len(after.pseudovalues), len(before.pseudovalues)) < 2:
-        # Without replicas to count, the intervals are added in quadrature.
+        # Without numbers of replicas, the intervals are added in quadrature.
         return Estimate(value, math.hypot(after.half_width, before.half_width), (), bias)
     scatter = welch_half_width(after.pseudovalues, before.pseudovalues, confidence)
     shared = sum_of_shared(((1.0, after), (-1.0, before)))
@@ -251,7 +258,7 @@ def welch_half_width(
 ) -> float:
     """Half-width of the interval of a difference of two means.
 
-    It is for samples as if each had `times` as many values of the same scatter.
+    The samples count as if each had `times` as many values of the same scatter.
 
     Source: B. L. Welch, "The generalization of 'Student's' problem when several different
     population variances are involved", Biometrika 34 (1947) 28.

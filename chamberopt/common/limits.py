@@ -1,4 +1,4 @@
-"""Limits on what is read from files, checked before memory is taken; a message names its limit."""
+"""Limits on data from files, checked before memory is taken. A message names its limit."""
 
 from __future__ import annotations
 
@@ -13,35 +13,37 @@ from chamberopt.common.files import open_plain
 from chamberopt.common.number_text import plain
 
 MEBIBYTE = 1 << 20
-MAX_TEXT_BYTES = MEBIBYTE  # a design, a study, or a shape of one's own
+MAX_TEXT_BYTES = MEBIBYTE  # a design, a study, or a user's own shape
 MAX_RESULT_BYTES = 256 * MEBIBYTE  # a result.json
 MAX_MESH_BYTES = 2048 * MEBIBYTE
-MAX_UNPACKED_BYTES = 1024 * MEBIBYTE  # of a compressed mesh
-MAX_READER_BYTES = 16384 * MEBIBYTE  # of memory, for a library that reads STEP or VTK
-# A result's compressed arrays unpack to some three times their size; more fills memory on purpose.
+MAX_UNPACKED_BYTES = 1024 * MEBIBYTE  # size of an unpacked compressed mesh
+MAX_READER_BYTES = 16384 * MEBIBYTE  # memory of a library that reads STEP or VTK
+# A result's compressed arrays unpack to some three times their size. A larger factor fills memory
+# on purpose.
 MAX_SHRINKAGE, ANY_SHRINKAGE_BYTES = 100, 64 * MEBIBYTE
 MAX_CPU_S = 1e7  # four months, for a library that reads STEP or VTK
-MAX_NUMBER = 1e30  # either way, of any number in a result: squares and cubes of it are finite
+MAX_NUMBER = 1e30  # largest size of any number in a result: its squares and cubes are finite
 MAX_ELEMENTS = 20_000_000  # points, elements or triangles of a mesh
-MAX_COPIES = 10_000  # of bodies, where a file puts one in several places
+MAX_COPIES = 10_000  # copies of bodies that a file puts in several places
 
 
 def read_limited(path: Path, most: int, what: str, follow: bool = False) -> bytes:
     """The bytes of a file.
 
     Args:
-        most: bytes that it may have.
-        what: it is, such as "mesh file".
-        follow: links, which users may have among their own files.
+        most: largest number of bytes.
+        what: kind of the file in messages, such as "mesh file".
+        follow: True to follow links, which users may have among their own files.
     Raises:
         FileNotFoundError: for the caller to explain.
-        InputError: it is no plain file, such as a link or a pipe; or too large.
-        UnreadableError: the system does not read it.
+        InputError: if it is no plain file, such as a link or a pipe, or is too large.
+        UnreadableError: if the system does not read it.
     """
     try:
         with open_plain(path, follow) as file:
             require_size(path, os.fstat(file.fileno()).st_size, most, what)
-            # A file of /proc states no size, and may wait for more for ever: it is not waited for.
+            # A file of /proc states no size, and its end may never come. The read does not wait for
+            # it.
             content = file.read(most + 1)
         if content is None:
             raise InputError(f"{path}: is not a plain file; give a {what}")
@@ -57,7 +59,7 @@ def read_limited(path: Path, most: int, what: str, follow: bool = False) -> byte
 
 
 def limit_memory() -> None:
-    """Refuse this process more memory than MAX_READER_BYTES, where the system can do that."""
+    """Refuse this process more memory than MAX_READER_BYTES, if the system can do that."""
     try:
         import resource
     except ImportError:  # Windows
@@ -68,7 +70,7 @@ def limit_memory() -> None:
 
 
 def limit_cpu_time(seconds: float) -> None:
-    """End this process after so much computing time, where the system can do that, with no dump."""
+    """End this process after so much computing time, without a dump, if the system can do that."""
     try:
         import resource
     except ImportError:  # Windows
@@ -80,7 +82,7 @@ def limit_cpu_time(seconds: float) -> None:
 
 
 def raise_cpu_time(seconds: float) -> None:
-    """Allow this process so much more computing time than `limit_cpu_time` did, if it did."""
+    """Allow this process so much computing time beyond `limit_cpu_time`, if it was limited."""
     try:
         import resource
     except ImportError:
@@ -91,23 +93,23 @@ def raise_cpu_time(seconds: float) -> None:
 
 
 def require_size(path: Path, size: int, most: int, what: str) -> None:
-    """Raise InputError if `what`, of `size` bytes, has more than are read."""
+    """Raise InputError if `what`, of `size` bytes, exceeds `most` bytes."""
     if size > most:
         given = f"a {what} of {size / MEBIBYTE:,.1f} MiB"
         raise InputError(f"{path}: {given}, at most {most / MEBIBYTE:,g} MiB are read; reduce it")
 
 
 def require_few(path: Path, count: int, what: str, most: int = MAX_ELEMENTS) -> None:
-    """Raise InputError if a file has more of something than are read."""
+    """Raise InputError if a file has more than `most` of something."""
     if count > most:
         text = f"{plain(count)} {what}, at most {most:,} are read; export a coarser mesh"
         raise InputError(f"{path}: {text}")
 
 
 def parse_json(content: bytes | str) -> Any:
-    """The value of a JSON text of a result; ValueError for any but plain numbers up to MAX_NUMBER.
+    """The value of a JSON text of a result; ValueError except for plain numbers up to MAX_NUMBER.
 
-    Python reads NaN, and numbers too large for arithmetic, such as 1e999 or 400 digits.
+    Python would read NaN, and numbers too large for arithmetic, such as 1e999 or 400 digits.
     """
     value = json.loads(
         content, parse_constant=_plain_number, parse_float=_plain_number, parse_int=_whole_number

@@ -1,4 +1,4 @@
-"""Memory that this process may take, and what is left of it for what can be computed again."""
+"""Memory that this process may take, and a budget for arrays that can be computed again."""
 
 from __future__ import annotations
 
@@ -12,8 +12,9 @@ from pathlib import Path
 
 import numpy as np
 
-OF_FREE = 0.5  # share of the free memory that is taken; other programs and surprises have the rest
-# Files of a container or a batch job, by the version of the kernel's groups: limit and use.
+# share of the free memory that is taken; the rest is for other programs and surprises
+OF_FREE = 0.5
+# Files with limit and use of a container or a batch job, by the version of the kernel's groups.
 GROUPS = Path("/sys/fs/cgroup")
 FILES = {
     "": ("memory.max", "memory.current"),
@@ -22,7 +23,7 @@ FILES = {
 
 
 def free_memory() -> float:
-    """Bytes that programs can still take on this machine; infinite where it does not tell."""
+    """Bytes that programs can still take on this machine; infinite if the machine does not tell."""
     return min(_free_of_machine(), *_free_of_groups(), math.inf)
 
 
@@ -31,7 +32,7 @@ def _free_of_machine() -> float:
         for line in Path("/proc/meminfo").read_text().splitlines():
             if line.startswith("MemAvailable:"):
                 return 1024.0 * int(line.split()[1])
-    # macOS has no such file, and tells its memory alone; Windows tells neither.
+    # macOS has no such file and tells only its total memory. Windows tells neither.
     with suppress(AttributeError, OSError, ValueError):
         pages = os.sysconf("SC_PHYS_PAGES")
         return float(pages * os.sysconf("SC_PAGE_SIZE"))
@@ -39,7 +40,7 @@ def _free_of_machine() -> float:
 
 
 def _free_of_groups() -> Iterator[float]:
-    """Bytes that are left of the limits of the groups that this process is in, and those above."""
+    """Bytes left of the limits of this process's groups and of the groups above them."""
     with suppress(OSError, ValueError):
         for line in Path("/proc/self/cgroup").read_text().splitlines():
             _, kinds, name = line.split(":", 2)
@@ -51,7 +52,7 @@ def _free_of_groups() -> Iterator[float]:
 
 
 def _free_of_group(group: Path, limit: str, used: str) -> float:
-    """What is left of one limit; files that the kernel can drop count as free."""
+    """Bytes left of one limit. Files that the kernel can drop count as free."""
     with suppress(OSError, ValueError):
         most, taken = int((group / limit).read_text()), int((group / used).read_text())
         rows = (group / "memory.stat").read_text().splitlines()
@@ -63,17 +64,17 @@ def _free_of_group(group: Path, limit: str, used: str) -> float:
 class MemoryBudget:
     """Bytes of arrays that are kept although they could be computed again.
 
-    The budget is a share of what is free when the first array is kept. What is kept by worker
-    processes of one command is divided among them.
+    The budget is a share of the free memory when the first array is kept. The worker processes of
+    one command divide it among them.
     """
 
     def __init__(self) -> None:
-        self._lock = threading.RLock()  # arrays may be freed in the midst of this
+        self._lock = threading.RLock()  # arrays may be freed while the lock is held
         self._left: float | None = None
         self.processes = 1
 
     def keeps(self, *arrays: np.ndarray) -> bool:
-        """Whether there is room for arrays; they count until the first of them is freed."""
+        """True if there is room for the arrays. They count until the first of them is freed."""
         size = float(sum(one.nbytes for one in arrays))
         with self._lock:
             if self._left is None:

@@ -1,8 +1,8 @@
 """Arrays, and records that hold arrays, in .npz files: plain data, never pickles.
 
-A record's file has one more entry, `tree`: JSON of everything that is no array. In it {"array":
-name} stands for an array and {"is": class, "of": fields} for a dataclass. Sequences come back as
-tuples. Everything else comes back exactly.
+A record's file has one more entry, `tree`: JSON of all content except arrays. In it {"array": name}
+stands for an array and {"is": class, "of": fields} for a dataclass. Sequences come back as tuples.
+Everything else comes back exactly.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from chamberopt.common.errors import InputError
 from chamberopt.common.files import new_file, open_plain, write_bytes
 from chamberopt.common.limits import ANY_SHRINKAGE_BYTES, MAX_SHRINKAGE, require_text
 
-# What reading a damaged file can raise.
+# Errors that reading a damaged file can raise.
 UNREADABLE = (
     OSError, ValueError, KeyError, TypeError, AttributeError, EOFError, MemoryError,
     RecursionError, NotImplementedError, zipfile.BadZipFile, zlib.error,
@@ -31,7 +31,7 @@ Record = TypeVar("Record")
 
 
 def read_arrays(path: Path, remedy: str) -> dict[str, np.ndarray]:
-    """The arrays of an .npz file by their names; InputError if it is missing or damaged."""
+    """The arrays of an .npz file by their names; InputError if the file is missing or damaged."""
     try:
         with open_plain(path) as file:
             with zipfile.ZipFile(file) as packed:
@@ -54,7 +54,7 @@ def save_arrays(path: Path, **arrays: Any) -> None:
 
 
 def save_record(path: Path, record: object) -> None:
-    """Write a dataclass with all that it holds. Raises OSError if it cannot be written."""
+    """Write a dataclass with all its content; raises OSError if the file cannot be written."""
     arrays: dict[str, np.ndarray] = {}
     tree = json.dumps(_to_tree(record, arrays)).encode()
     packed = io.BytesIO()  # in memory first, so that a full disk is one plain OSError
@@ -63,15 +63,15 @@ def save_record(path: Path, record: object) -> None:
 
 
 def load_record(path: Path, kind: type[Record], others: Sequence[type], remedy: str) -> Record:
-    """Read a record, equal to the one that was saved.
+    """Read a record, equal to the saved record.
 
     Args:
-        kind: its class.
-        others: classes of what it holds; nothing else is made.
-        remedy: ends the message on a file that cannot be used.
+        kind: class of the record.
+        others: classes of the objects in the record. No other class is made.
+        remedy: end of the message on a file that cannot be used.
 
     Raises:
-        InputError: the file is missing or damaged, or another version of the program wrote it.
+        InputError: if the file is missing or damaged, or written by another version of the program.
     """
     arrays = read_arrays(path, remedy)
     classes = {one.__name__: one for one in (kind, *others)}
@@ -88,9 +88,9 @@ def load_record(path: Path, kind: type[Record], others: Sequence[type], remedy: 
 
 
 def is_of_type(value: Any, hint: Any) -> bool:
-    """Whether a value read from a file, and all that it holds, has the types of its class.
+    """True if a value from a file, with all its content, has the types of its class.
 
-    A whole number may stand for a float; true and false are no numbers.
+    A whole number may stand for a float. True and false are no numbers.
 
     Args:
         hint: a plain class, a dataclass, tuple[T, ...] or dict[str, T].
@@ -112,7 +112,7 @@ def _unreadable(path: Path, error: BaseException, remedy: str) -> InputError:
 
 
 def _to_tree(value: Any, arrays: dict[str, np.ndarray]) -> Any:
-    """Plain JSON values; arrays go into `arrays` under new names."""
+    """The value as plain JSON values. Arrays go into `arrays` under new names."""
     if isinstance(value, np.ndarray):
         name = f"a{len(arrays)}"
         arrays[name] = value

@@ -1,6 +1,6 @@
 """Numbers and estimates as text: the same digits in console, pictures, tables and reports.
 
-An interval is given to one or two digits, and its value to the same decimals.
+An interval has one or two digits, and its value has the same decimals.
 """
 
 from __future__ import annotations
@@ -10,20 +10,20 @@ import re
 
 from chamberopt.common.estimate import ZERO_TOLERANCE, Estimate
 
-NEARLY_ALL = 1e-3  # shares that leave less are said in words
+NEARLY_ALL = 1e-3  # words replace shares that are closer to 1
 MOST_NINES = 6
-THIN_SPACE = "\u202f"  # between thousands; no line breaks there
+THIN_SPACE = "\u202f"  # gap between thousands, at which no line breaks
 
 
 def estimate_text(
     estimate: Estimate, factor: float = 1.0, unit: str = "", sign: bool = False
 ) -> str:
-    """The estimate with its interval, or the words that stand in its place.
+    """The estimate with its interval, or the words that replace its number.
 
     Args:
         factor: number shown over number stored.
-        unit: of the number shown.
-        sign: put a plus before positive values.
+        unit: unit of the number shown.
+        sign: True to put a plus before positive values.
     """
     if estimate.in_words:
         return estimate.in_words
@@ -31,9 +31,9 @@ def estimate_text(
 
 
 def share_in_words(share: Estimate) -> str:
-    """Such as "more than 99.9 %" for a share that is so near 1; "" for others.
+    """Words such as "more than 99.9 %" for a share that is so near 1; "" for other shares.
 
-    As many nines as its interval leaves.
+    The words have as many nines as the interval of the share allows.
     """
     least = 1.0 - share.low
     if not least < NEARLY_ALL:
@@ -43,9 +43,9 @@ def share_in_words(share: Estimate) -> str:
 
 
 def plain(value: float | str, digits: int = 4) -> str:
-    """The number to a number of significant digits, without an exponent if it is of usual size.
+    """The number with ``digits`` significant digits, without an exponent if it is of usual size.
 
-    A text is as it is.
+    A text stays as it is.
     """
     if isinstance(value, str):
         return value
@@ -60,10 +60,12 @@ def plain(value: float | str, digits: int = 4) -> str:
 
 
 def with_interval(value: float, half_width: float, unit: str = "", sign: bool = False) -> str:
-    """Such as "0.809 ± 0.004 mm": both to the decimals of the half-width; exact values stand alone.
+    """Value and interval such as "0.809 ± 0.004 mm", both to the decimals of the half-width.
+
+    Exact values stand alone.
 
     Args:
-        sign: put a plus before positive values.
+        sign: True to put a plus before positive values.
     """
     unit = f" {unit}" if unit else ""
     if not math.isfinite(value):
@@ -73,7 +75,8 @@ def with_interval(value: float, half_width: float, unit: str = "", sign: bool = 
         return f"{plus}{plain(value)}{unit}"
     if not math.isfinite(half_width):
         return f"{plus}{plain(value)} ± not known{unit}"
-    # Two digits for half-widths from 1.0 to 2.9, one from 3 to 9; negative: tens, hundreds.
+    # Two digits for half-widths from 1.0 to 2.9, one digit from 3 to 9. A negative number means
+    # tens, hundreds.
     magnitude = math.floor(math.log10(half_width))
     decimals = value_decimals = (1 if half_width / 10.0**magnitude < 2.95 else 0) - magnitude
     shown = 0.0 if abs(value) < ZERO_TOLERANCE else value

@@ -1,4 +1,4 @@
-"""Progress on stderr: the named steps of a command, with counts, the best value and time left.
+"""Progress on stderr: the named steps of a command, with counts, the best value and the time left.
 
 After `write_json_lines` each step is lines of JSON, for a program that reads them: {"step": name,
 "done": 3, "total": 20, "best": 0.81}, and at its end {"step": name, "ended": true}.
@@ -20,14 +20,16 @@ if TYPE_CHECKING:
 # Called as progress(done, total, best value so far or None).
 Progress = Callable[[int, int, "float | None"], None]
 
-FIRST_LINE = 30.0  # s from which a step is worth a line in a log; the next come after twice as long
+# s until a step gets a line in a log; each further line comes after twice the time
+FIRST_LINE = 30.0
 LEAST_PAUSE = 0.2  # s between JSON lines of a step
 _json_lines = False
-_displays: list[Display] = []  # on the terminal now, at most one: steps within steps share it
+# display on the terminal now, at most one: steps within steps share it
+_displays: list[Display] = []
 
 
 def write_json_lines() -> None:
-    """Tell of steps in lines of JSON from now on."""
+    """Write steps as lines of JSON from now on."""
     global _json_lines
     _json_lines = True
 
@@ -36,13 +38,13 @@ def write_json_lines() -> None:
 def step(
     what: str, total: int | None = None, *, stream: TextIO | None = None
 ) -> Iterator[Progress]:
-    """Show a named step during a `with` block, and give the function that counts in it.
+    """Show a named step during a `with` block, and yield the function that counts in it.
 
-    The total is what is known of it at the beginning.
+    The total is the number known at the beginning.
 
     On a terminal the step has a line on stderr (or `stream`) from its beginning to its end, below
-    that of the step around it. Logs and pipes stay clean: they get a plain line about a long step
-    now and then.
+    the line of the step around it. Logs and pipes stay clean: a long step writes a plain line to
+    them now and then.
     """
     stream = stream or sys.stderr
     if _json_lines:
@@ -91,7 +93,8 @@ def _display(stream: TextIO) -> Iterator[Display]:
         "[dim]{task.fields[left]}",
         rich.TimeRemainingColumn(),
     )
-    # An evaluation can take seconds. The time left is estimated from all of the last hour's.
+    # An evaluation can take seconds. The time left is estimated from all evaluations of the last
+    # hour.
     console = Console(file=stream)
     with rich.Progress(
         *columns, console=console, speed_estimate_period=3600, transient=True, redirect_stdout=False
@@ -123,7 +126,7 @@ def _log_lines(what: str, stream: TextIO) -> Progress:
     def write(done: int, total: int, best: float | None) -> None:
         nonlocal due, first
         now = time.monotonic()
-        first = first or (now, done)  # what came before, such as compiling, is not counted
+        first = first or (now, done)  # earlier work, such as compiling, is not counted
         if now < due or not first[1] < done < total:
             return
         due = now + (now - begun)

@@ -1,8 +1,8 @@
-"""Error messages for TOML files: file, line, field, the value given, what is allowed, a remedy.
+"""Error messages for TOML files: file, line, field, given value, allowed values and a remedy.
 
-All problems of a file are reported at once, the first MOST_PROBLEMS of them in words. Messages
-are made from the pydantic models of the files: a field's bounds, unit and description are stated
-once, in its model.
+All problems of a file are reported at once, the first MOST_PROBLEMS problems in words. Messages are
+made from the pydantic models of the files. A field's bounds, unit and description are stated once,
+in its model.
 """
 
 import difflib
@@ -26,23 +26,24 @@ TYPE_NAMES = {
     str: "a text in quotes",
     bool: "true or false",
 }
-SIMILARITY = 0.6  # of two spellings, from 0 to 1 (difflib's ratio): below it a hint would mislead
-MOST_PROBLEMS = 10  # listed in a message
+# similarity of two spellings, from 0 to 1 (difflib's ratio): below it a hint would mislead
+SIMILARITY = 0.6
+MOST_PROBLEMS = 10  # problems listed in a message
 MAX_NAME_TEXT = 200  # characters of a field's name that a message repeats
-MAX_CHOICES = 8  # listed in a message
+MAX_CHOICES = 8  # choices listed in a message
 MAX_VALUE_TEXT = 60  # characters of a given value that a message repeats
 
 
 @dataclass(frozen=True)
 class Problem:
-    """One thing to put right."""
+    """A problem of a field that the user must correct."""
 
     field: str  # dotted name; "" for the whole file
     text: str  # sentence with the value given and the remedy
 
 
 class CrossCheckError(ValueError):
-    """Fields that are each in range but contradict each other; raised by pydantic validators."""
+    """Error of pydantic validators for fields in range that contradict each other."""
 
     def __init__(self, problems: Iterable[Problem]) -> None:
         self.problems = tuple(problems)
@@ -50,7 +51,7 @@ class CrossCheckError(ValueError):
 
 
 def closest_name(name: str, known: Iterable[str]) -> str | None:
-    """The known name most similar to `name`, if one is; case is ignored."""
+    """The known name most similar to `name`, if any is similar; case is ignored."""
     by_lower = {word.lower(): word for word in known}
     close = difflib.get_close_matches(name.lower(), by_lower, n=1, cutoff=SIMILARITY)
     return by_lower[close[0]] if close else None
@@ -59,7 +60,8 @@ def closest_name(name: str, known: Iterable[str]) -> str | None:
 def did_you_mean(name: str, known: Iterable[str]) -> str:
     """A hint: "did you mean 'x'?", the allowed names, or both if there are few.
 
-    Of a dotted name the table counts, if it is known: no other has the same keys.
+    A dotted name with a known table is compared only within this table, because no other table has
+    the same keys.
     """
     words, table = list(known), name.rpartition(".")[0]
     words = [one for one in words if table and one.rpartition(".")[0] == table] or words
@@ -71,7 +73,7 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
 
 
 def format_problems(problems: Iterable[Problem], path: Path | None = None, source: str = "") -> str:
-    """One line for each of the first problems, `file:line: field: text`, and how many follow.
+    """Lines `file:line: field: text` for the first problems, and the number of further problems.
 
     Args:
         source: the file's text.
@@ -79,7 +81,7 @@ def format_problems(problems: Iterable[Problem], path: Path | None = None, sourc
     line_of = key_lines(source)
     texts, problems = [], list(problems)
     for problem in problems[:MOST_PROBLEMS]:
-        # The line of the field, or of the innermost table around it that the file has.
+        # Line of the field, or of the innermost table around the field that the file has.
         steps = problem.field.split(".")
         names = (".".join(steps[:n]) for n in range(len(steps), 0, -1))
         line = next((line_of[name] for name in names if name in line_of), None)
@@ -94,7 +96,7 @@ def format_problems(problems: Iterable[Problem], path: Path | None = None, sourc
 def explain_validation_error(error: ValidationError, model: type[BaseModel]) -> list[Problem]:
     """Pydantic's errors as problems in the words of the file.
 
-    Words take time, so that those beyond MOST_PROBLEMS have none: they are counted only.
+    Words take time. Problems beyond MOST_PROBLEMS are counted and have no words.
     """
     problems: dict[Problem, None] = {}  # a union reports the same error for each alternative
     details = error.errors(include_url=False)
@@ -123,7 +125,7 @@ def explain_missing_file(path: Path, what: str, pattern: str) -> str:
     if not folder.is_dir():
         return f"{path}: no such {what}; the folder {folder} does not exist"
     names = sorted(p.name for p in folder.glob(pattern) if p.is_file())
-    # Without the suffixes, which are alike and would make every name similar.
+    # The suffixes are left out, because they are alike and would make every name similar.
     close = closest_name(path.stem, (Path(name).stem for name in names))
     likely = [str(folder / name) for name in names if Path(name).stem == close]
     if likely:
@@ -136,10 +138,10 @@ def explain_missing_file(path: Path, what: str, pattern: str) -> str:
 def numeric_fields(
     table: BaseModel | type[BaseModel], prefix: str = ""
 ) -> Iterator[tuple[str, FieldInfo]]:
-    """Dotted name and field of every number in a table; numbers in lists as part.offset_mm.0.
+    """Dotted name and field of every number in a table; in lists such as part.offset_mm.0.
 
-    For a model class these are the numbers that its tables can hold. For an instance they include
-    the tables of its lists.
+    For a model class the result has the numbers that its tables can hold. For an instance it
+    includes the tables of its lists.
     """
     is_class = isinstance(table, type)
     for name, field in (table if isinstance(table, type) else type(table)).model_fields.items():
@@ -165,7 +167,7 @@ def numeric_fields(
 
 
 def text_choices(table: BaseModel, prefix: str) -> Iterator[tuple[str, tuple[str, ...]]]:
-    """Dotted name and allowed texts of every text of a table that is set and has a few to be."""
+    """Dotted name and allowed texts of every set text of a table that has few allowed texts."""
     for name, field in type(table).model_fields.items():
         allowed = get_args(_alternatives(field.annotation)[0])
         if isinstance(getattr(table, name), str) and len(allowed) > 1:
@@ -175,7 +177,8 @@ def text_choices(table: BaseModel, prefix: str) -> Iterator[tuple[str, tuple[str
 def key_lines(source: str) -> dict[str, int]:
     """Line number of every table header and key in a TOML text, by dotted name.
 
-    A simple scan is enough to point a person at the place: the keys of inline tables are not found.
+    A simple scan is enough to point a person at the place. It does not find the keys of inline
+    tables.
     """
     lines: dict[str, int] = {}
     rows: Counter[str] = Counter()
@@ -190,7 +193,7 @@ def key_lines(source: str) -> dict[str, int]:
         if header:
             table = _without_quotes(header[2])
             lines.setdefault(table, number)
-            if header[1] == "[[":  # one of a list of tables
+            if header[1] == "[[":  # a table in a list of tables
                 rows[table] += 1
                 table = f"{table}.{rows[table] - 1}"
                 lines[table] = number
@@ -204,7 +207,7 @@ def key_lines(source: str) -> dict[str, int]:
 
 
 def describe_allowed(field: FieldInfo) -> str:
-    """What a field accepts: 'a number from 2 to 2000 mm (inner height of the chamber)'."""
+    """Values that a field accepts: 'a number from 2 to 2000 mm (inner height of the chamber)'."""
     bounds: dict[str, str] = {}
     for constraint in field.metadata:
         found = ((k, getattr(constraint, k, None)) for k in ("ge", "le"))
@@ -241,7 +244,7 @@ def _alternatives(annotation: Any) -> tuple[Any, ...]:
 
 
 def _bare(annotation: Any) -> Any:
-    """A type without what annotates it."""
+    """A type without its annotations."""
     return get_args(annotation)[0] if get_origin(annotation) is Annotated else annotation
 
 
@@ -320,7 +323,7 @@ def _explain(detail: ErrorDetails, model: type[BaseModel]) -> Problem:
 def _explain_unknown_key(key: str, table: type[BaseModel], model: type[BaseModel]) -> str:
     """Hint for an unknown key: its new name, a similar key, its place, or the allowed keys.
 
-    A model lists former names of its keys in RENAMED, and in REMOVED what became of others.
+    A model lists former names of its keys in RENAMED, and the fate of removed keys in REMOVED.
     """
     renamed, removed = getattr(table, "RENAMED", {}), getattr(table, "REMOVED", {})
     if key in renamed:

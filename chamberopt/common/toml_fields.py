@@ -1,4 +1,4 @@
-"""TOML files: reading one, and types of fields: numbers with a unit, lists, positions, files."""
+"""Reading of TOML files, and their field types: numbers with a unit, lists, positions, files."""
 
 import math
 import os
@@ -17,11 +17,11 @@ from chamberopt.common.files import is_of_the_program
 from chamberopt.common.limits import MAX_TEXT_BYTES, read_limited
 from chamberopt.common.toml_errors import CrossCheckError, Problem
 
-MAX_COORDINATE_MM = 10000  # from the middle of the sonotrode: no chamber is larger
+MAX_COORDINATE_MM = 10000  # distance from the middle of the sonotrode: no chamber is larger
 
 Vector = tuple[float, float, float]
 T = TypeVar("T")
-# TOML has lists only. These become tuples when they are read; what is in them stays strict.
+# TOML has only lists. They become tuples when they are read. Their items stay strict.
 Several = Annotated[tuple[T, ...], Field(strict=False)]
 Pair = Annotated[tuple[float, float], Field(strict=False)]
 Triple = Annotated[Vector, Field(strict=False)]
@@ -57,13 +57,14 @@ def _form(form: str) -> Any:
     return Field(json_schema_extra={"form": form})
 
 
-# The form is what error messages show.
+# Error messages show the form.
 Direction = Annotated[Triple, AfterValidator(_nonzero), _form("three numbers [x, y, z], not all 0")]
 Position = Annotated[Triple, AfterValidator(_within_limits), _form("three numbers [x, y, z] in mm")]
 Shift = Annotated[Pair, AfterValidator(_within_limits), _form("two numbers [x, y] in mm")]
-Turns = Annotated[Triple, _form("three numbers [x, y, z] in degrees")]  # about x, then y, then z
-# Paths are relative to the file that names them, and absolute once read: the design stays valid
-# wherever it is saved.
+# rotations about x, then y, then z
+Turns = Annotated[Triple, _form("three numbers [x, y, z] in degrees")]
+# Paths are relative to the file that names them, and absolute once read. The design therefore stays
+# valid at any place of its file.
 File = Annotated[
     str, Field(min_length=1), AfterValidator(lambda path, info: str(from_file(path, info.context)))
 ]
@@ -77,7 +78,7 @@ Names = Annotated[
 
 
 def quantity(low: float, high: float, unit: str, what: str, default: Any = ...) -> Any:
-    """Field of a bounded number; error messages show its unit and meaning."""
+    """Field of a bounded number. Error messages show its unit and meaning."""
     return Field(default, ge=low, le=high, description=what, json_schema_extra={"unit": unit})
 
 
@@ -89,18 +90,18 @@ def allowed_range(field: FieldInfo) -> tuple[float, float]:
 
 
 def list_field(form: str, what: str, default: Any = ...) -> Any:
-    """Field of a list; error messages show its form and meaning."""
+    """Field of a list. Error messages show its form and meaning."""
     return Field(default, description=what, json_schema_extra={"form": form})
 
 
 def from_file(path: str, context: Mapping[str, Any] | None) -> Path:
     """Absolute path of a file that a design file names relative to its own folder.
 
-    `context` is that of the pydantic validation, as `validate` in design/design.py makes it.
+    `context`: context of the pydantic validation, from `validate` in design/design.py.
     """
     context = context or {}
     named = context.get("folder", Path()) / path
-    # What a result names is recorded, and nothing is looked for on this machine.
+    # Files that a result names are recorded and not looked for on this machine.
     return Path(os.path.abspath(named)) if context.get("recorded") else named.resolve()
 
 

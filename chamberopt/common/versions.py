@@ -1,4 +1,4 @@
-"""Versions of Python, packages and this program's own sources: what figures were made with."""
+"""Versions of Python, packages and this program's own sources, on which figures depend."""
 
 from __future__ import annotations
 
@@ -15,31 +15,31 @@ from chamberopt.common.executor import core_count
 from chamberopt.common.files import read_file
 
 SIMULATION_PACKAGES = ("chamberopt", "numpy", "scipy", "numba", "manifold3d")
-# The search depends on two more. Packages that only draw or print are left out.
+# The search depends on two more packages. Packages that only draw or print are left out.
 PACKAGES = (*SIMULATION_PACKAGES, "nlopt", "scikit-learn")
-# What else than the sources decides on what compiled code computes.
+# Settings that, besides the sources, decide the results of compiled code.
 COMPILER_SETTINGS = (
     "NUMBA_OPT", "NUMBA_ENABLE_AVX", "NUMBA_LOOP_VECTORIZE", "NUMBA_SLP_VECTORIZE",
 )  # fmt: skip
 
 
 def versions() -> dict[str, str]:
-    """Python, system, number of cores and packages: what a result states it was made with."""
+    """Versions of Python, system and packages, and number of cores, for the record of a result."""
     machine = {"system": platform.platform(), "cores": str(core_count())}
     return {"python": platform.python_version(), **machine, **package_versions()}
 
 
 def program_versions() -> dict[str, str]:
-    """Everything but the machine that a candidate's figures depend on.
+    """Versions of all that a candidate's figures depend on, except the machine.
 
-    A study can only be resumed where all of this is the same.
+    A study can only be resumed where all these versions are the same.
     """
     python = ".".join(platform.python_version_tuple()[:2])
     return {"python": python, **package_versions(), "sources": sources_digest()}
 
 
 def simulation_versions() -> dict[str, str]:
-    """What a replica's figures depend on, on whichever machine it is simulated."""
+    """Versions of all that a replica's figures depend on, on any machine."""
     settings = {name: os.environ.get(name, "not set") for name in COMPILER_SETTINGS}
     python = ".".join(platform.python_version_tuple()[:2])
     packages = package_versions((*SIMULATION_PACKAGES, "llvmlite"))
@@ -59,10 +59,10 @@ def package_versions(packages: Iterable[str] = PACKAGES) -> dict[str, str]:
 
 @cache
 def sources_digest() -> str:
-    """Digest of all source files: tells programs apart whose sources were edited in place."""
+    """Digest of all source files, which tells programs with edited sources apart."""
     digest = hashlib.sha256()
     for package in ("chamberopt", "sim_core"):
-        spec = find_spec(package)  # finds the package without importing it
+        spec = find_spec(package)  # find_spec finds the package without importing it
         folder = Path(spec.origin).parent if spec and spec.origin else Path()
         for source in sorted(folder.rglob("*.py")):
             digest.update(f"{package}/{source.relative_to(folder).as_posix()}\0".encode())

@@ -1,8 +1,7 @@
-"""The file layer: everything that is opened, written, claimed or removed in a user's folders.
+"""The file layer: all opening, writing, claiming and removing of files in a user's folders.
 
-Outputs have one writer each, overwrite nothing, and are written whole or not at all. No link is
-followed in a folder that the program writes to, or in one of its results and studies. See
-docs/trust.md.
+Each output has one writer, overwrites nothing, and is written whole or not at all. No link is
+followed in a folder that the program writes to, or in its results and studies. See docs/trust.md.
 """
 
 from chamberopt.common.files.claimed import (

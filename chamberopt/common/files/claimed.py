@@ -1,4 +1,4 @@
-"""Outputs have one writer each, and overwrite nothing."""
+"""Claims on outputs: each output has one writer and overwrites nothing."""
 
 from __future__ import annotations
 
@@ -21,21 +21,21 @@ from chamberopt.common.files.written import LOCK, is_leftover, remove_leftovers
 if sys.platform == "win32":
     import msvcrt
 
-    HELD = (errno.EACCES, errno.EDEADLK)  # how a lock tells that another process has it
+    HELD = (errno.EACCES, errno.EDEADLK)  # error numbers of a lock that another process holds
 else:
     import fcntl
 
     HELD = (errno.EWOULDBLOCK,)
 
 ANOTHER_FOLDER = "choose another folder (out, or --out)"
-# Bytes that must be free where a command begins to write: a result of a usual part takes a few MB,
+# Bytes that must be free when a command begins to write. A result of a usual part takes a few MB,
 # and on a disk that is nearly full other programs fail too.
 LEAST_FREE = 20_000_000
-LOCKED_BYTE = 1 << 30  # after the holder's name: Windows lets nobody read what is locked
+LOCKED_BYTE = 1 << 30  # after the holder's name, because Windows lets nobody read a locked byte
 
 
 def is_new_or_empty(folder: Path) -> bool:
-    """Whether results can be written to a folder: it does not exist, or holds nothing."""
+    """True if results can be written to a folder: it does not exist, or holds nothing."""
     if not os.path.lexists(folder):
         return True
     return not folder.is_symlink() and folder.is_dir() and all(map(is_leftover, folder.iterdir()))
@@ -67,11 +67,11 @@ def claim_folder(
     Folders that are made here and are empty at the end are removed.
 
     Args:
-        is_own: whether a folder that holds files may be used all the same.
+        is_own: tells if a folder that holds files may be used all the same.
 
     Raises:
-        OutputTakenError: the folder is a file, holds other files, or another process has it.
-        InputError: it cannot be written; or it is a link, or holds one.
+        OutputTakenError: if the folder is a file, holds other files, or is held by another process.
+        InputError: if the folder cannot be written, is a link, or holds a link.
     """
     folder = Path(path)
     made = [one for one in (folder, *folder.parents) if not os.path.lexists(one)]
@@ -94,10 +94,10 @@ def claim_folder(
 
 @contextmanager
 def claim_file(path: Path, wait: float = 0.0) -> Iterator[Path]:
-    """Hold a file that is to be written against other processes; errors as claim_folder.
+    """Hold a new output file against other processes; raises errors as claim_folder does.
 
     Args:
-        wait: for another writer, at most so long [s].
+        wait: longest time to wait for another writer [s].
     """
     with _only_writer(path.with_name(f"{LOCK}-{path.name}"), path, "choose another name", wait):
         yield path
@@ -105,11 +105,11 @@ def claim_file(path: Path, wait: float = 0.0) -> Iterator[Path]:
 
 @contextmanager
 def _only_writer(lock_file: Path, output: Path, remedy: str, wait: float = 0.0) -> Iterator[None]:
-    """Hold the lock of an output for which there is room.
+    """Hold the lock of an output, after a check of the free space.
 
-    The lock belongs to the operating system and ends with its process, however that ends. A forked
-    child would share it until both have ended; workers are spawned. The file holds the name of its
-    process.
+    The lock belongs to the operating system and ends with its process, however the process ends. A
+    forked child would share the lock until both have ended, so that workers are spawned. The lock
+    file holds the name of its process.
     """
     name, until = lock_file.name, time.monotonic() + wait
     with _writing_in(output, remedy):
@@ -124,24 +124,25 @@ def _only_writer(lock_file: Path, output: Path, remedy: str, wait: float = 0.0) 
                 time.sleep(0.01)
         try:
             since = datetime.now().astimezone().isoformat(sep=" ", timespec="seconds")
-            with suppress(OSError):  # a full disk is reported by the files that matter
+            with suppress(OSError):  # the important files report a full disk
                 os.ftruncate(lock, 0)
                 os.write(lock, f"process {os.getpid()} on {platform.node()} since {since}".encode())
             yield
         finally:
-            # Before the release: who opened the file that is removed here does not get its lock.
+            # Removed before the release: a process that opened this file does not get its lock.
             with suppress(OSError):
                 folder.remove(name)
             os.close(lock)
-            if os.name == "nt":  # which removes no open file
+            if os.name == "nt":  # Windows removes no open file
                 with suppress(OSError):
                     folder.remove(name)
 
 
 def _locked(folder: OpenFolder, name: str) -> int | None:
-    """The descriptor of a file that is locked now; None if another process has it.
+    """Lock a file and return its descriptor; None if another process holds the lock.
 
-    InputError for a file with a second name, which may lie anywhere: its content would be lost.
+    Raises InputError for a file with a second name, which may lie anywhere: its content would be
+    lost.
     """
     while True:
         file = folder.open(name, os.O_RDWR | os.O_CREAT)
@@ -151,14 +152,16 @@ def _locked(folder: OpenFolder, name: str) -> int | None:
                 where = folder.path / name
                 raise InputError(f"{where}: has a second name elsewhere; remove this one")
             _lock(file)
-            there = folder.status(name)  # who had it may have removed it since it was opened here
+            # the previous holder may have removed the file since it was opened here
+            there = folder.status(name)
             keep = there is not None and os.path.samestat(there, os.fstat(file))
             if keep:
                 return file
         except OSError as error:
             if error.errno in HELD:
                 return None
-            if os.fstat(file).st_size == 0:  # made here: a holder writes its name
+            # the file was made here, because a holder writes its name
+            if os.fstat(file).st_size == 0:
                 folder.remove(name)
             raise
         finally:
@@ -167,7 +170,7 @@ def _locked(folder: OpenFolder, name: str) -> int | None:
 
 
 def _lock(file: int) -> None:
-    """Lock a file for this process alone; an OSError of HELD if another has it."""
+    """Lock a file for this process alone; raises an OSError of HELD if another process has it."""
     if sys.platform == "win32":
         os.lseek(file, LOCKED_BYTE, os.SEEK_SET)
         try:
@@ -179,7 +182,7 @@ def _lock(file: int) -> None:
 
 
 def _holder(folder: OpenFolder, name: str) -> str:
-    """Who writes, by its own words."""
+    """Name of the writer, as it stated it itself."""
     with suppress(OSError, InputError):
         file = folder.open(name, os.O_RDONLY)
         try:
@@ -209,7 +212,7 @@ def check_new_file(path: Path) -> Path:
 
 
 def require_place(path: Path, option: str = "") -> None:
-    """Raise InputError, which begins with the option, unless a file can be written there."""
+    """Raise InputError, beginning with the option, unless a file can be written at the path."""
     folder = path.parent
     if not folder.is_dir():
         text = f"the folder {path.parent} does not exist; make it first"
@@ -230,8 +233,9 @@ def _require_writable(folder: Path) -> None:
 
 
 def _require_space(folder: Path) -> None:
-    """Raise OSError where results will hardly find room."""
+    """Raise OSError if the disk hardly has room for results."""
     disk = shutil.disk_usage(folder)
-    if disk.free < LEAST_FREE and disk.total:  # some file systems do not tell: all is 0
+    # some file systems do not tell: all their sizes are 0
+    if disk.free < LEAST_FREE and disk.total:
         text = f"only {1e-6 * disk.free:.1f} MB of this disk are free"
         raise OSError(errno.ENOSPC, f"{text}, at least {1e-6 * LEAST_FREE:g} are needed")

@@ -1,7 +1,7 @@
-"""Open plain files and folders.
+"""Opening of plain files and folders.
 
-A link in a folder that came from elsewhere leads where its author wanted, so none is followed
-there. Links on the way to a folder, and links to files that a design names, are the user's own.
+A link in a folder that came from elsewhere leads to a place that its author chose. No such link is
+followed. Links on the way to a folder, and links to files that a design names, are the user's own.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from typing import Self
 
 from chamberopt.common.errors import InputError
 
-# A pipe would block its reader, and a link may lead anywhere; Windows has neither flag.
+# A pipe would block its reader, and a link may lead anywhere. Windows has neither flag.
 PLAIN = sum(
     getattr(os, name, 0)
     for name in ("O_NONBLOCK", "O_NOFOLLOW", "O_CLOEXEC", "O_BINARY", "O_NOINHERIT")
@@ -26,18 +26,19 @@ NO_FOLLOW = getattr(os, "O_NOFOLLOW", 0)
 FOLDER = os.O_RDONLY | getattr(os, "O_DIRECTORY", 0)
 BY_DESCRIPTOR = os.open in os.supports_dir_fd and bool(NO_FOLLOW)
 SWAPS, SWAP = ("renameat2", "renameatx_np"), 2  # of Linux and macOS, which Python lacks
-JUNCTION = 0xA0000003  # tag of a folder of Windows that is a link to another
-RESULT, INPUTS = "result.json", "inputs.json"  # by which the program's own folders are known
+JUNCTION = 0xA0000003  # tag of a Windows folder that is a link to another folder
+# files by which the program recognises its own folders
+RESULT, INPUTS = "result.json", "inputs.json"
 
 
 def open_plain(path: Path, follow: bool = False) -> BufferedReader:
     """Open a plain file for reading.
 
     Args:
-        follow: links, which users may have among their own files.
+        follow: True to follow links, which users may have among their own files.
     Raises:
-        OSError: it is not there, or cannot be read.
-        InputError: it is a link, a folder, a pipe or a device.
+        OSError: if the file does not exist or cannot be read.
+        InputError: if the path is a link, a folder, a pipe or a device.
     """
     status = path.stat() if follow else path.lstat()
     require_plain(path, status)
@@ -54,7 +55,7 @@ def open_plain(path: Path, follow: bool = False) -> BufferedReader:
 
 
 def read_file(path: Path, follow: bool = False) -> bytes:
-    """The bytes of a plain file; raises as open_plain."""
+    """The bytes of a plain file; raises errors as open_plain does."""
     with open_plain(path, follow) as file:
         return file.read()
 
@@ -66,7 +67,7 @@ def require_plain(path: Path, status: os.stat_result) -> None:
 
 
 def require_plain_folder(path: Path, remedy: str = "put a plain folder in its place") -> Path:
-    """Return the path of a folder; InputError for a link, OSError if there is none."""
+    """Return the path of a folder; InputError for a link, OSError if there is no folder."""
     status = path.lstat()
     if is_link(status):
         where = os.path.realpath(path)
@@ -77,7 +78,7 @@ def require_plain_folder(path: Path, remedy: str = "put a plain folder in its pl
 
 
 def require_plain_content(folder: Path) -> None:
-    """Raise InputError for anything in a folder of the program but plain files and folders."""
+    """Raise InputError for any content of a program's folder except plain files and folders."""
     for one in sorted(folder.iterdir()):
         status = one.lstat()
         if stat.S_ISDIR(status.st_mode) and not is_link(status):
@@ -92,7 +93,7 @@ def is_link(status: os.stat_result) -> bool:
 
 
 def is_of_the_program(folder: Path) -> bool:
-    """Whether a folder is one of a result or a study, where no link is followed."""
+    """True for the folder of a result or a study, in which no link is followed."""
     return any(os.path.lexists(folder / name) for name in (RESULT, INPUTS))
 
 
@@ -103,10 +104,10 @@ def _kind(status: os.stat_result) -> str:
 
 
 class OpenFolder:
-    """An open folder; no name in it is looked up through a link.
+    """An open folder. No name in it is looked up through a link.
 
-    Where the system has descriptors of folders, this stays the same folder, whatever is put in its
-    place meanwhile.
+    On systems with descriptors of folders, the object stays the same folder, even if another one
+    takes its place meanwhile.
     """
 
     def __init__(self, path: Path) -> None:
@@ -121,7 +122,7 @@ class OpenFolder:
             os.close(self._file)
 
     def status(self, name: str) -> os.stat_result | None:
-        """What a name stands for, a link for itself; None if it is free."""
+        """Status of a name, of a link itself and not of its target; None if the name is free."""
         try:
             return os.stat(self._at(name), dir_fd=self._file, follow_symlinks=False)
         except FileNotFoundError:
@@ -140,12 +141,12 @@ class OpenFolder:
         return file
 
     def rename(self, name: str, new: str) -> None:
-        """Give a file a new name, whose file it replaces."""
+        """Give a file a new name and replace the file with that name."""
         at = {"src_dir_fd": self._file, "dst_dir_fd": self._file}
         os.replace(self._at(name), self._at(new), **at)
 
     def swap(self, name: str, other: str) -> bool:
-        """Let two files have each other's name at once; False where the system cannot do that."""
+        """Exchange the names of two files at once; False if the system cannot do that."""
         if self._file is None:
             return False
         library = ctypes.CDLL(None, use_errno=True)
@@ -160,7 +161,7 @@ class OpenFolder:
         raise OSError(error, os.strerror(error))
 
     def remove(self, name: str) -> None:
-        """Remove a name, if it is there; of a link not what it leads to."""
+        """Remove a name, if it exists. The target of a link stays."""
         with suppress(FileNotFoundError):
             os.unlink(self._at(name), dir_fd=self._file)
 

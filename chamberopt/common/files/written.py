@@ -1,4 +1,4 @@
-"""Write files whole or not at all, and make and remove files and folders."""
+"""Writing of files, whole or not at all, and making and removing of files and folders."""
 
 from __future__ import annotations
 
@@ -18,22 +18,23 @@ from chamberopt.common.errors import InputError, spreadsheet_cell
 from chamberopt.common.files.opened import OpenFolder, require_plain, require_plain_folder
 
 LOCK, WRITING = ".lock", ".writing-"
-LEFTOVER_PREFIXES = (LOCK, WRITING)  # of files that a command that was killed may leave
+LEFTOVER_PREFIXES = (LOCK, WRITING)  # prefixes of files that a killed command may leave
 
 
 @contextmanager
 def new_file(path: Path, look: Callable[[Path], None] | None = None) -> Iterator[BinaryIO]:
-    """Open a temporary file beside `path`, which replaces it when the block ends without an error.
+    """Open a temporary file, which replaces `path` when the block ends without an error.
 
     The file is on the disk before it gets its name, so that neither a crash nor a power cut leaves
-    half a file, and has the permissions of the one that it replaces. Its own name, for libraries
-    that need one, is in `name`: nobody can foresee it, and it has the suffix of `path`.
+    half a file. It has the permissions of the replaced file. Libraries that need a file name find
+    it in `name`. This name cannot be foreseen, and it has the suffix of `path`.
 
     Args:
-        look: called with a file that holds what is replaced; with an error, that stays in place.
+        look: called with a file that holds the replaced content. If it raises an error, that
+            content stays in place.
     Raises:
-        OSError: it cannot be written.
-        InputError: at `path` is a link, a folder or another thing that is no plain file.
+        OSError: if the file cannot be written.
+        InputError: if a link, a folder or another thing that is no plain file is at `path`.
     """
     temporary = f"{WRITING}{secrets.token_hex(8)}{path.suffix}"
     try:
@@ -65,7 +66,7 @@ def new_file(path: Path, look: Callable[[Path], None] | None = None) -> Iterator
 def _put_in_place(
     folder: OpenFolder, temporary: str, path: Path, look: Callable[[Path], None] | None
 ) -> None:
-    """Give a file its name, with a look at what it replaces."""
+    """Give a file its name, after a look at the file that it replaces."""
     if look is None or not folder.swap(temporary, path.name):
         if look is not None:
             look(path)
@@ -82,7 +83,7 @@ def _put_in_place(
 def write_bytes(
     path: Path, content: bytes | memoryview, look: Callable[[Path], None] | None = None
 ) -> None:
-    """Write a file, whole or not at all; `look` as in new_file."""
+    """Write a file, whole or not at all. `look`: as in new_file."""
     with new_file(path, look) as file:
         file.write(content)
 
@@ -93,7 +94,7 @@ def write_text(path: Path, text: str) -> None:
 
 
 def write_new_texts(texts: Mapping[Path, str]) -> None:
-    """Write text files that belong together and are not there yet, all or none."""
+    """Write text files that belong together and do not exist yet, all or none."""
     written = []
     try:
         for path, text in texts.items():
@@ -107,11 +108,12 @@ def write_new_texts(texts: Mapping[Path, str]) -> None:
 
 
 def append_bytes(path: Path, content: bytes, survives_power_cut: bool = True) -> None:
-    """Add to the end of a file, all or nothing, and make it if it is not there.
+    """Add to the end of a file, all or nothing, and make the file if it does not exist.
 
     Raises:
-        OSError: it cannot be written.
-        InputError: it is no plain file, or has a second name (a hard link), which may lie anywhere.
+        OSError: if the file cannot be written.
+        InputError: if it is no plain file, or has a second name (a hard link), which may lie
+            anywhere.
     """
     with OpenFolder(path.parent) as folder:
         is_new = folder.status(path.name) is None
@@ -143,13 +145,13 @@ def append_bytes(path: Path, content: bytes, survives_power_cut: bool = True) ->
 
 
 def remove_file(path: Path) -> None:
-    """Remove a file, if it is there; of a link not what it leads to."""
+    """Remove a file, if it exists. The target of a link stays."""
     with OpenFolder(path.parent) as folder:
         folder.remove(path.name)
 
 
 def make_folder(path: Path) -> Path:
-    """Make a folder inside one of the program, if it is not there; InputError for a link."""
+    """Make a folder inside a folder of the program, if it does not exist; InputError for a link."""
     with OpenFolder(path.parent) as parent, suppress(FileExistsError):
         parent.make(path.name)
     return require_plain_folder(path)
@@ -157,7 +159,7 @@ def make_folder(path: Path) -> Path:
 
 @contextmanager
 def whole_or_nothing(folder: Path) -> Iterator[None]:
-    """Empty a folder, which was new or empty before, where the `with` block fails."""
+    """Empty a folder, which was new or empty before, if the `with` block fails."""
     try:
         yield
     except BaseException:
@@ -166,12 +168,12 @@ def whole_or_nothing(folder: Path) -> Iterator[None]:
 
 
 def remove_leftovers(folder: Path) -> None:
-    """Remove the temporary files of commands that were killed, from a folder that is held."""
+    """Remove the temporary files of killed commands from a folder that is held."""
     _empty(folder, lambda name: name.startswith(WRITING))
 
 
 def _empty(folder: Path, which: Callable[[str], bool]) -> None:
-    """Remove what is in a folder, as far as that can be removed."""
+    """Remove the content of a folder, as far as it can be removed."""
     with suppress(OSError), os.scandir(folder) as there:
         for one in [one for one in there if which(one.name)]:
             with suppress(OSError):
@@ -182,7 +184,7 @@ def _empty(folder: Path, which: Callable[[str], bool]) -> None:
 
 
 def is_leftover(path: Path) -> bool:
-    """Whether a command that was killed may have left this; it leaves only plain files."""
+    """True if a killed command may have left this path. Commands leave only plain files."""
     return path.name.startswith(LEFTOVER_PREFIXES) and stat.S_ISREG(path.lstat().st_mode)
 
 
@@ -192,7 +194,7 @@ def private_folder() -> AbstractContextManager[str]:
 
 
 def csv_text(rows: Sequence[Mapping[str, Any]]) -> str:
-    """A table with a header and the columns of all rows together; what a row lacks stays empty."""
+    """A table with a header and the columns of all rows together. Missing values stay empty."""
     text = io.StringIO()
     columns = dict.fromkeys(name for row in rows for name in row)
     table = csv.DictWriter(text, list(columns), lineterminator="\n")
