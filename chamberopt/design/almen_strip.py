@@ -1,4 +1,4 @@
-"""Almen strips: sizes, material, and the speed at which a ball starts to dent one."""
+"""Almen strips: sizes, material, and the speed at which a ball starts to dent a strip."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ STRIP_HB = 450.0  # SAE 1070 spring steel of 44 to 50 HRC (SAE J442)
 
 @dataclass(frozen=True)
 class AlmenStrip:
-    """Dimensions [m] of a strip; the type tells the thickness (SAE J442)."""
+    """Dimensions [m] of a strip. Its type tells the thickness (SAE J442)."""
 
     type: StripType
     thickness: float
@@ -31,8 +31,8 @@ STRIPS = {
     one.type: one
     for one in (AlmenStrip("N", 0.79e-3), AlmenStrip("A", 1.29e-3), AlmenStrip("C", 2.39e-3))
 }
-# Arc height over that on an A strip, and the range [mm on an A strip] in which a type is used:
-# "approximate", AMS-S-13165 6.10; bending by the same layer goes with 1 / thickness².
+# Arc height over the arc height of an A strip, and the range [mm on an A strip] of each type:
+# "approximate", AMS-S-13165 6.10. The bending by the same layer goes with 1 / thickness².
 OVER_A: dict[StripType, float] = {"N": 3.0, "A": 1.0, "C": 1.0 / 3.5}
 USED_FOR: dict[StripType, tuple[float, float]] = {
     "N": (0.0, 0.1016), "A": (0.1016, 0.6096), "C": (0.6096, math.inf),
@@ -43,7 +43,7 @@ STRIP_STEEL = Elastic(205e9, 0.29)
 def strip_material(shot: ShotTable) -> PartMaterial:
     """Hardness and restitution of a strip under this shot.
 
-    A charge that is given by its density alone counts as steel in its elasticity.
+    A charge that is given only by its density has the elasticity of steel.
     """
     elastic = ball(shot.material or "steel").elastic
     hardness = STRIP_HB * BRINELL_TO_PASCAL

@@ -1,7 +1,7 @@
-"""What measurements tell of one machine: factors on numbers of its designs, and Almen constants.
+"""Calibration of one machine by measurements: factors on design numbers, and Almen constants.
 
-`chamberopt calibrate` finds them. A design that names the file is simulated with these values in
-the place of its own, and its figures have intervals that include what is not known of them.
+`chamberopt calibrate` finds them. A design that names the calibration file is simulated with these
+values in place of its own. The intervals of its figures include the uncertainty of the calibration.
 
 Notation, with the names of PARAMETERS
     amplitude   factor on the amplitude of the sonotrode
@@ -9,7 +9,7 @@ Notation, with the names of PARAMETERS
     mu          factor on the coefficients of friction, where a design has friction
     hardness    factor on the hardness of the part, B of Kirk's law of dents
     K           arc height over peening strength [mmA/mm]
-    beta        dents on a real strip over those that are simulated
+    beta        number of dents on a real strip over the simulated number
     m, C        mean and covariance of their natural logarithms     (log_mean, log_covariance)
     L           lower triangle with L L' = C
     g           slopes of a figure by the logarithms
@@ -40,8 +40,8 @@ Parameter = Literal["amplitude", "C0", "v0", "mu", "hardness", "K", "beta"]
 PARAMETERS: tuple[Parameter, ...] = get_args(Parameter)
 OF_STRIPS: tuple[Parameter, ...] = ("K", "beta")
 MAX_LOG = 10.0
-# Standard error of ln T by what the model leaves out, such as dents after the strongest of a spot:
-# no saturation time is better known than to ± 15 %.
+# Standard error of ln T by effects that the model leaves out, such as dents after the strongest
+# dent of a spot. No saturation time is better known than to ± 15 %.
 TIME_ERROR = 0.075
 ROUNDING = 1e-9
 WHOLE_STRIP = "whole strip"
@@ -58,7 +58,7 @@ Law = TypeVar("Law", bound=RestitutionTable)
 
 
 class Misfit(FileTable):
-    """How well the model explains the measurements of one kind."""
+    """Agreement of the model with the measurements of one kind."""
 
     kind: str = Field(description="of measurement")
     chi2: float = quantity(0, 1e12, "", "sum of squared residuals over their variances")
@@ -69,7 +69,7 @@ class Misfit(FileTable):
 
 
 class Calibration(FileTable):
-    """What is known of one machine."""
+    """Calibrated values of one machine, with their uncertainty."""
 
     program: str = Field(description="version of chamberopt that made it")
     parameters: Annotated[Several[Parameter], Field(min_length=1)] = list_field(
@@ -144,7 +144,7 @@ class Calibration(FileTable):
 
     @property
     def not_mmA(self) -> str:  # noqa: N802
-        """What its intensities are where they are not those of whole strips; else ""."""
+        """Meaning of the intensities if they are not of whole strips; otherwise ""."""
         if not self.has_strips or self.strips == WHOLE_STRIP:
             return ""
         return (
@@ -154,12 +154,12 @@ class Calibration(FileTable):
 
     @property
     def has_strips(self) -> bool:
-        """Whether arc heights were measured, without which there is no Almen intensity."""
+        """True if arc heights were measured. Without them there is no Almen intensity."""
         return "K" in self.parameters
 
     @cached_property
     def _triangle(self) -> np.ndarray:
-        """L, in the order of PARAMETERS; rows and columns of those not calibrated are 0."""
+        """L, in the order of PARAMETERS. Rows and columns of uncalibrated parameters are 0."""
         rows = [PARAMETERS.index(name) for name in self.parameters]
         matrix = np.array(self.log_covariance)
         # A parameter that is known exactly has a row of zeros, for which there is no L.
@@ -172,20 +172,20 @@ class Calibration(FileTable):
         return found
 
     def errors(self, slopes: Mapping[Parameter, float], of_model: float = 0.0) -> tuple[float, ...]:
-        """L' g, one standard error for each of PARAMETERS, and last that of the model itself.
+        """Standard errors L' g, one for each of PARAMETERS, and last the model's own error.
 
-        Those of two figures subtract.
+        The errors of two figures subtract.
 
         Args:
-            slopes: g by name of the parameter; others are 0.
-            of_model: standard error by what the model leaves out.
+            slopes: g by name of the parameter; missing parameters have slope 0.
+            of_model: standard error by effects that the model leaves out.
         """
         slope = np.array([slopes.get(name, 0.0) for name in PARAMETERS])
         return *(self._triangle.T @ slope).tolist(), of_model
 
 
 def why_no_intensity(calibration: Calibration | None) -> str:
-    """Why a design with this calibration has no Almen intensity; "" if it has one."""
+    """Reason why a design with this calibration has no Almen intensity; "" if it has."""
     if calibration is None:
         return NO_CALIBRATION
     return "" if calibration.has_strips else NO_STRIPS
@@ -224,9 +224,9 @@ CalibrationField = Annotated[
 
 
 def with_measured_values(design: Any) -> Any:
-    """A Design with the values of its calibration in the place of its own.
+    """A Design with the values of its calibration in place of its own.
 
-    It is for a simulation alone: it has no calibration, and its values are not checked.
+    It serves only for a simulation: it has no calibration, and its values are not checked.
     """
     one: Calibration | None = design.calibration
     if one is None:
@@ -256,7 +256,7 @@ def with_measured_values(design: Any) -> Any:
 
 
 def calibration_problems(design: Any) -> Iterator[Problem]:
-    """Values beyond those of a Design that its calibration gives it, as one edited by hand may."""
+    """Problems of values beyond a Design's range, given by its calibration."""
     one: Calibration | None = design.calibration
     if one is None:
         return
@@ -271,7 +271,7 @@ def calibration_problems(design: Any) -> Iterator[Problem]:
             for problem in explain_validation_error(error, type(table)):
                 text = f"{name}.{problem.field} would be out of range: {problem.text}"
                 yield Problem("calibration", f"{text}; {remedy}")
-    # C0 may come out above 1 by its own error, and is 1 then.
+    # C0 may come out above 1 by its own error. It is then 1.
     least = one.factor("C0") * math.exp(-NOT_BY_CHANCE * one.log_sd("C0"))
     for name in ("shot", "wall", "sonotrode", "part"):
         law = getattr(design.materials, name)
@@ -283,13 +283,13 @@ def calibration_problems(design: Any) -> Iterator[Problem]:
 
 
 def calibrated_strip(shot: ShotTable, calibration: Calibration | None) -> PartMaterial:
-    """The metal of an Almen strip under this shot; its hardness is known."""
+    """The metal of an Almen strip under this shot, with known hardness."""
     strip = strip_material(shot)
     return strip if calibration is None else _with_measured_restitution(strip, calibration)
 
 
 def _times(table: Any, factors: Mapping[str, float]) -> Any:
-    """A table with some of its numbers multiplied; those that are not set stay so."""
+    """A table with some of its numbers multiplied. Unset numbers stay unset."""
     values = {name: getattr(table, name) for name in factors}
     changed = {name: one * factors[name] for name, one in values.items() if one is not None}
     return table.model_copy(update=changed)
@@ -300,9 +300,9 @@ def _with_measured_restitution(law: Law, one: Calibration) -> Law:
 
 
 def scaled_restitution(law: Law, c0: float, v0: float) -> Law:
-    """A restitution law with factors on C0 and v0; no restitution is above 1.
+    """A restitution law with factors on C0 and v0. No restitution is above 1.
 
-    Its v0 is no longer that of the catalogue.
+    Its v0 then differs from the catalogue's.
     """
     law = law.model_copy(update={"v0_for": None})
     if law.e_at_m_s is not None:

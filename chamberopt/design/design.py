@@ -1,6 +1,6 @@
 """One complete candidate chamber, with the values of its design file.
 
-Fields have the names and units of the file (`height_mm`); properties without a suffix are SI
+Fields have the names and units of the file (`height_mm`). Properties without a suffix are SI
 (`height`, in metres). This package is the only place where units are converted. Every table is
 frozen, refuses unknown keys, and has bounds wide enough for any real peening set-up.
 """
@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from functools import cache, partial
 from numbers import Integral, Real
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeVar
+from typing import Annotated, Any, Literal, TypeVar, cast
 
 import pydantic
 from pydantic import BaseModel, Field, ValidationError, ValidationInfo
@@ -39,7 +39,7 @@ from chamberopt.design.tolerances import FORM as TOLERANCE_FORM
 from chamberopt.design.tolerances import Tolerance, tolerance_problems
 from chamberopt.design.zones import MAX_ZONES, Zone, zone_problems
 
-# Each further sonotrode has a tag below 255 and needs a cut through all walls that come before it.
+# Each further sonotrode has a tag below 255 and needs a cut through all walls before it.
 MAX_SONOTRODES = 50
 SHAPE = "chamber.shape"
 NOT_VARIED = ("calibration.", "zones.", "part.tessellation.")
@@ -84,18 +84,18 @@ class Design(FileTable):
         return design_class(data, info.context).model_validate(data, context=info.context)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Pickle the values: a worker process creates the class of a shape's designs itself."""
+        """Pickle the values. A worker process creates the class of a shape's designs itself."""
         return _unpickled, (self.model_dump(), self.is_recorded, self.chamber.sha256)
 
     @property
     def simulated(self) -> "Design":
-        """The design that is simulated: with its calibration's values in the place of its own."""
+        """The design that is simulated: with its calibration's values in place of its own."""
         found: Design = with_measured_values(self)
         return found
 
     @property
     def is_recorded(self) -> bool:
-        """Whether it was read from a result and has a shape of the user's, which is not run."""
+        """True if the design comes from a result and has a user's own shape, which is not run."""
         return isinstance(self.chamber, RecordedShape)
 
     @pydantic.model_validator(mode="before")
@@ -111,7 +111,7 @@ class Design(FileTable):
     @pydantic.model_validator(mode="before")
     @classmethod
     def _look_up_metals(cls, data: Any) -> Any:
-        """Put the catalogue's numbers in the place of its names, so that results hold them."""
+        """Replace the catalogue's names by numbers, so that results hold the numbers."""
         if (materials := _table(data, "materials")) is None:
             return data
         shot = data.get("shot")
@@ -149,7 +149,7 @@ class Design(FileTable):
         """Problems of part, balls and sonotrode that do not fit into the chamber."""
         chamber, amplitude_um = self.chamber, self.sonotrode.zero_to_peak_um
         distance, widths = chamber.sonotrode_distance_mm, chamber.widths_mm()
-        if distance is None:  # as drawn: known only once the set-up's file is read
+        if distance is None:  # the drawn distance is known only once the set-up's file is read
             distance = math.inf
         distance_field = "chamber.sonotrode_distance_mm"
         height = widths.get("height_mm", math.inf)
@@ -209,7 +209,7 @@ class Design(FileTable):
         return tuple(name for name in whole if not name.startswith(others))
 
     def choices(self) -> dict[str, tuple[str, ...]]:
-        """Dotted names of the texts of which a study may choose, and what each may be."""
+        """Dotted names of the texts that a study may choose, and the allowed texts of each."""
         tables = {"chamber": self.chamber, "sonotrode": self.sonotrode, "shot": self.shot}
         found = (one for name, table in tables.items() for one in text_choices(table, name))
         choices = {name: texts for name, texts in found if name != "chamber.unit"}
@@ -217,12 +217,12 @@ class Design(FileTable):
         return choices | ({SHAPE: generated} if self.chamber.shape in generated else {})
 
     def chamber_keys(self, shape: str) -> dict[str, bool]:
-        """Dotted names of the keys of a shape's chamber; whether each is a whole number."""
+        """Dotted names of the keys of a shape's chamber; True for a whole number."""
         fields = SHAPES[shape].model_fields.items()
         return {f"chamber.{key}": field.annotation is int for key, field in fields}
 
     def why_fixed(self, name: str) -> str:
-        """Why a number cannot be changed by degrees; an empty text if it can."""
+        """Reason why a number cannot be changed by degrees; an empty text if it can."""
         if name == SHAPE:
             return "a shape of your own, or one that is drawn; it cannot vary"
         if name.startswith("calibration."):
@@ -244,7 +244,7 @@ class Design(FileTable):
         return "" if name in numbers else "a whole number cannot vary; leave it out"
 
     def value(self, name: str) -> float:
-        """The number at a dotted name, in the file's unit; InputError if none is set there."""
+        """The number at a dotted name, in the file's unit; InputError if no number is set there."""
         known = [known for known, _ in toml_errors.numeric_fields(self)]
         if name not in known:
             hint = toml_errors.did_you_mean(name, known)
@@ -254,7 +254,7 @@ class Design(FileTable):
             value = value[int(step)] if isinstance(value, tuple) else getattr(value, step)
             if value is None:
                 raise InputError(f"{name}: not set in this design; give it a value there first")
-        return value
+        return cast(float, value)
 
     def setting(self, name: str) -> float | str:
         """The number, or the text of `choices`, at a dotted name; InputError as `value`."""
@@ -266,10 +266,10 @@ class Design(FileTable):
     def changed(self, values: Mapping[str, Any]) -> "Design":
         """A copy with other values, checked again as a whole.
 
-        They are in the file's units by dotted name, e.g. {"chamber.height_mm": 45}; an entry of a
-        list goes by its position: part.offset_mm.0. With another chamber.shape the chamber keeps
-        what both shapes have. InputError if a name is not a key of a design, or the new values are
-        out of range or contradict each other.
+        The values are in the file's units, by dotted name, e.g. {"chamber.height_mm": 45}. An entry
+        of a list is named by its position: part.offset_mm.0. With another chamber.shape the chamber
+        keeps the keys that both shapes have. Raises InputError if a name is not a key of a design,
+        or the new values are out of range or contradict each other.
         """
         data = self.model_dump()
         if (shape := values.get(SHAPE, self.chamber.shape)) != self.chamber.shape:
@@ -281,7 +281,7 @@ class Design(FileTable):
 
 
 def _unpickled(data: dict[str, Any], recorded: bool, sha256: str) -> Design:
-    """The design on a worker; InputError if the file of its shape is another one there."""
+    """The design on a worker; InputError if the file of its shape differs there."""
     design = validate(Design, data, recorded=recorded)
     if design.chamber.sha256 != sha256:
         raise InputError(
@@ -306,7 +306,7 @@ def _replaced(old: Any, name: str, steps: Sequence[str], value: Any) -> Any:
 
 
 def _of_the_same_kind(old: Any, value: Any) -> Any:
-    """The value, as a whole number or not like the old one: numpy's numbers are accepted too."""
+    """The value as a whole number if the old value is one. Numpy's numbers are accepted too."""
     is_number = isinstance(value, Real) and not isinstance(value, bool)
     if not is_number:
         return value
@@ -374,9 +374,9 @@ def validate(
     """The data as a frozen model.
 
     Args:
-        path: of the file that holds the data; paths of meshes and shapes are relative to it.
+        path: path of the file that holds the data. Paths of meshes and shapes are relative to it.
         source: text of that file, for line numbers in messages.
-        recorded: True for the design of a result: no file that it names is looked for or run.
+        recorded: True for the design of a result. No file that it names is looked for or run.
     Raises:
         InputError: names every problem.
     """

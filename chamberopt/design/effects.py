@@ -11,7 +11,7 @@ from chamberopt.design.table_base import FileTable, Metres
 
 
 class PartTurn(FileTable):
-    """The part turns about an axis: steadily (rpm), or to and fro (angle_deg and frequency_hz)."""
+    """Rotation of the part about an axis: steady (rpm) or to and fro (angle_deg, frequency_hz)."""
 
     rpm: float | None = quantity(
         -10000, 10000, "1/min", "right-handed about the axis; real set-ups: 1 to 100", None
@@ -51,7 +51,7 @@ class PartTurn(FileTable):
 
     @property
     def period(self) -> float:
-        """Time [s] after which the part is where it was; infinite for 0 rpm."""
+        """Time [s] after which the part is at its starting angle again; infinite for 0 rpm."""
         if self.frequency_hz is not None:
             return 1.0 / self.frequency_hz
         return 60.0 / abs(self.rpm) if self.rpm else math.inf
@@ -83,7 +83,7 @@ class FrictionTable(FileTable):
 
 
 class SurfaceEffectTable(FileTable):
-    """A table of [effects] for one of the simulator's further effects of hits on surfaces."""
+    """A table of [effects] for a further effect of hits on surfaces in the simulator."""
 
     @property
     def parameters(self) -> dict[str, float]:
@@ -92,7 +92,7 @@ class SurfaceEffectTable(FileTable):
 
 
 class Effects(FileTable):
-    """Which effects act on the shot. An effect that is not listed here is not simulated."""
+    """The effects that act on the shot. An effect that is not listed here is not simulated."""
 
     auto: bool = Field(
         default=False,

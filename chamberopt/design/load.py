@@ -1,4 +1,4 @@
-"""Load and save design files; every problem of a file is reported in one error."""
+"""Loading and saving of design files. All problems of a file are reported in one error."""
 
 import os
 from collections.abc import Mapping
@@ -15,7 +15,7 @@ __all__ = ["Design", "load_design", "read_toml", "save_design"]
 
 
 def load_design(path: str | Path) -> Design:
-    """The design in a file; InputError names every problem, with file and line."""
+    """Load the design in a file; InputError names every problem, with file and line."""
     path = Path(path)
     source, data = read_toml(path, "design")
     if is_study(data):
@@ -56,7 +56,7 @@ def _relative(path: str, folder: Path) -> str:
 
 
 def is_study(data: Mapping[str, Any]) -> bool:
-    """Whether these are the values of a study file."""
+    """True if these are the values of a study file."""
     return isinstance(data.get("design"), str) or not {"vary", "optimizer"}.isdisjoint(data)
 
 

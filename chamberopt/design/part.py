@@ -30,7 +30,7 @@ MAX_FACES = 500
 
 
 class FaceAt(FileTable):
-    """A face of the part, by a place on it."""
+    """A face of the part, selected by a place on it."""
 
     at_mm: Position = Field(description="a place on the face, in the part file's frame")
     crease_deg: float = quantity(
@@ -40,7 +40,7 @@ class FaceAt(FileTable):
 
 
 class Selection(FileTable):
-    """Triangles of the part, which meet all given conditions."""
+    """Triangles of the part that meet all given conditions."""
 
     surface: Names = list_field(
         'a name in quotes, or a list of names, e.g. ["flank", "root"]',
@@ -92,7 +92,7 @@ class Selection(FileTable):
 
 
 class Target(Selection):
-    """Which triangles of the part must be covered."""
+    """The triangles of the part that must be covered."""
 
     element_mm: float | None = quantity(
         0.01, 1000, "mm", "wanted side of the target's triangles; absent: the file's", None
@@ -108,7 +108,7 @@ class Target(Selection):
 
 
 class TessellationTable(FileTable):
-    """How fine the triangles of a STEP file are."""
+    """Fineness of the triangles of a STEP file."""
 
     chord_mm: float = quantity(
         1e-4, 10, "mm", "distance that triangles keep from the surface", 0.02
@@ -120,17 +120,17 @@ class TessellationTable(FileTable):
 
     @property
     def limits(self) -> Tessellation:
-        """The same in m and rad."""
+        """The fineness in m and rad."""
         side = 0.0 if self.side_mm is None else 1e-3 * self.side_mm
         return Tessellation(1e-3 * self.chord_mm, math.radians(self.angle_deg), side)
 
 
 class SmoothingTable(FileTable):
-    """How fine the facets of rounds become, and how far the surface may move.
+    """Fineness of the facets of rounds, and limit of the surface's move.
 
     A ball of radius r in a hollow touches facets that turn by an angle a at r tan(a / 2) from their
-    edge, on both sides. Dents of a diameter d cover the strip between if a < d / 2 r. Dents are
-    0.15 to 0.25 r wide, which asks for 4 to 7 degrees.
+    edge, on both sides. Dents of a diameter d cover the strip between them if a < d / 2 r. Dents
+    are 0.15 to 0.25 r wide, which asks for 4 to 7 degrees.
     """
 
     off: bool = Field(
@@ -147,7 +147,7 @@ class SmoothingTable(FileTable):
     )  # fmt: skip
 
     def rule(self, triangles: np.ndarray) -> Rule:
-        """The same for some triangles (m,) bool, in SI units."""
+        """The smoothing rule for some triangles (m,) bool, in SI units."""
         tolerance = math.inf if self.tolerance_mm is None else 1e-3 * self.tolerance_mm
         turn = math.radians(self.limit_deg)
         return Rule(triangles, self.off, turn, 1e-3 * self.narrow_mm, tolerance)
@@ -186,7 +186,7 @@ class PartTable(FileTable):
 
     @property
     def limits(self) -> Tessellation | None:
-        """How fine the triangles of a STEP file are; None: the usual limits."""
+        """Fineness of the triangles of a STEP file; None for the usual limits."""
         return None if self.tessellation is None else self.tessellation.limits
 
     @property

@@ -9,11 +9,11 @@ from chamberopt.common.toml_errors import Problem
 from chamberopt.common.toml_fields import quantity
 from chamberopt.design.table_base import SI, FileTable
 
-MIN_POINTS, MAX_POINTS = 1_000, 1_000_000  # of coverage windows
+MIN_POINTS, MAX_POINTS = 1_000, 1_000_000  # limits on the number of coverage windows
 
 
 class Accuracy(FileTable):
-    """Number and length of the independent replicas; each has its own start and warm-up."""
+    """Number and length of the independent replicas. Each replica has its own start and warm-up."""
 
     RENAMED: ClassVar[dict[str, str]] = {
         "coverage": "objective_half_width",
@@ -58,7 +58,7 @@ class Accuracy(FileTable):
 
 
 class Process(FileTable):
-    """How long the part is peened, and how accurately that is simulated."""
+    """Duration of the peening, and accuracy of its simulation."""
 
     treatment_time_s: float = quantity(0.01, 1e6, "s", "peening time the coverage is predicted for")
     seed: int = quantity(0, 2**63 - 1, "", "same seed, same result", 1)

@@ -81,7 +81,7 @@ class ShotTable(FileTable):
 
     @property
     def diameter(self) -> float:
-        """Ball diameter [m]; of the largest ball if there are several sizes."""
+        """Ball diameter [m]; diameter of the largest ball if there are several sizes."""
         return max(diameter for diameter, _ in self.sizes)
 
     @property

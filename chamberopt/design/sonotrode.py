@@ -1,4 +1,4 @@
-"""Sonotrodes of a design: the one that is the chamber's floor, and further ones in its walls."""
+"""Sonotrodes of a design: the chamber's floor, and further sonotrodes in its walls."""
 
 import math
 from collections.abc import Iterator
@@ -13,7 +13,7 @@ from chamberopt.design.table_base import SI, FileTable
 
 
 class VibratingFace(FileTable):
-    """A face that vibrates, by its zero-to-peak amplitude or by twice that, peak to valley."""
+    """A vibrating face, by its zero-to-peak or peak-to-valley amplitude."""
 
     frequency_khz: float = quantity(0.01, 200, "kHz", "usually 20")
     amplitude_um: float | None = quantity(
@@ -40,12 +40,12 @@ class VibratingFace(FileTable):
 
     @property
     def per_amplitude(self) -> float:
-        """What the given key has over the zero-to-peak amplitude: 1 or 2."""
+        """Given amplitude over the zero-to-peak amplitude: 1 or 2."""
         return 2.0 if self.amplitude_um is None else 1.0
 
     @property
     def zero_to_peak_um(self) -> float:
-        """Zero-to-peak amplitude [µm], whichever key gives it."""
+        """Zero-to-peak amplitude [µm], from either key."""
         return float(getattr(self, self.amplitude_key)) / self.per_amplitude
 
     @property

@@ -1,4 +1,4 @@
-"""What every table of a design or study file has in common, and values in SI units."""
+"""Base class of every table of a design or study file, and descriptors of values in SI units."""
 
 from collections.abc import Iterable
 from typing import Any, ClassVar, Self
@@ -10,7 +10,7 @@ from chamberopt.common.toml_fields import metres
 
 
 class SI:
-    """A value in SI units: that of a key, times a factor."""
+    """A key's value in SI units: the value in the file times a factor."""
 
     def __init__(self, key: str, factor: float, meaning: str) -> None:
         self._key, self._factor, self.__doc__ = key, factor, meaning
@@ -20,7 +20,7 @@ class SI:
 
 
 class Metres:
-    """A position or three sides in metres: those of a key in mm."""
+    """A position or three sides in metres, from a key in mm."""
 
     def __init__(self, key: str, meaning: str) -> None:
         self._key, self.__doc__ = key, meaning
@@ -33,15 +33,15 @@ STRICT = ConfigDict(
     frozen=True, extra="forbid", strict=True, allow_inf_nan=False, ignored_types=(SI, Metres)
 )
 
-MAX_NAMES = 500  # of numbers or metrics in one table: no design has as many
+MAX_NAMES = 500  # numbers or metrics in one table: no design has as many
 
 
 class FileTable(BaseModel):
     """A frozen table without unknown keys, whose values are also checked against each other."""
 
     model_config = STRICT
-    RENAMED: ClassVar[dict[str, str]] = {}  # former names of keys: an error names the new one
-    REMOVED: ClassVar[dict[str, str]] = {}  # former keys, and why they are no longer there
+    RENAMED: ClassVar[dict[str, str]] = {}  # new name of each renamed key, for errors
+    REMOVED: ClassVar[dict[str, str]] = {}  # removed keys, and the reason for each removal
 
     def _problems(self) -> Iterable[Problem]:
         """Problems of values that are each in range but contradict each other."""

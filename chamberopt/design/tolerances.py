@@ -22,13 +22,13 @@ from chamberopt.common.toml_errors import CrossCheckError, Problem
 from chamberopt.common.toml_fields import allowed_range
 
 SHORT_NAMES = {key: f"sonotrode.{key}" for key in ("amplitude_um", "amplitude_pv_um")}
-# A design gives one of the two; peak to valley is twice zero-to-peak.
+# A design gives one of the two. Peak to valley is twice zero-to-peak.
 TWINS = {"amplitude_um": ("amplitude_pv_um", 2.0), "amplitude_pv_um": ("amplitude_um", 0.5)}
 FORM = 'a number, a share such as "2 %", or [low, high] of these, such as ["-10 %", "0 %"]'
 
 
 def _deviation(side: Any) -> tuple[float, bool]:
-    """A deviation, and whether it is in per cent. ValueError if it is neither."""
+    """A deviation, and True if it is in per cent; raises ValueError if it is neither."""
     if isinstance(side, str) and (found := re.fullmatch(r"\s*([-+]?[\d.]+)\s*%\s*", side)):
         return float(found[1]), True
     if isinstance(side, bool) or not isinstance(side, (int, float)) or not math.isfinite(side):
@@ -37,7 +37,7 @@ def _deviation(side: Any) -> tuple[float, bool]:
 
 
 def _checked(given: Any) -> Any:
-    """A tolerance as its file has it, once it is found to be one."""
+    """A tolerance in the form of its file, after a check that it is a tolerance."""
     several = isinstance(given, (list, tuple))
     shown = list(given) if several else given
     try:
@@ -62,7 +62,7 @@ Tolerance = Annotated[Any, PlainValidator(_checked)]  # a side, or a tuple of tw
 
 
 class ToleratedDesign(Protocol):
-    """What is asked of a design here."""
+    """The part of a design that this module uses."""
 
     @property
     def tolerances(self) -> dict[str, Tolerance] | None: ...
@@ -74,7 +74,7 @@ class ToleratedDesign(Protocol):
 def tolerance_box(design: ToleratedDesign) -> dict[str, tuple[float, float]]:
     """Lowest and highest value of each number that has a tolerance, by its whole dotted name.
 
-    They are in the units of the file, those of the key that the design gives.
+    The values are in the units of the file, for the key that the design gives.
     """
     box = {}
     for key, tolerance in (design.tolerances or {}).items():
@@ -84,7 +84,7 @@ def tolerance_box(design: ToleratedDesign) -> dict[str, tuple[float, float]]:
 
 
 def require_tolerances(design: ToleratedDesign) -> None:
-    """Raise InputError unless the design can have both ends of the range of each number."""
+    """Raise InputError unless the design is valid at both ends of the range of each number."""
     for name, ends in tolerance_box(design).items():
         for end in ends:
             try:
@@ -97,10 +97,10 @@ def require_tolerances(design: ToleratedDesign) -> None:
 def tolerance_problems(
     design: ToleratedDesign, fields: Mapping[str, FieldInfo]
 ) -> Iterator[Problem]:
-    """Tolerances of what is no number of the design, and ranges beyond what a number may be.
+    """Problems of tolerances: keys that are no numbers of the design, ranges beyond bounds.
 
     Args:
-        fields: of every number of the design, by dotted name.
+        fields: fields of every number of the design, by dotted name.
     """
     seen: set[str] = set()
     for key, tolerance in (design.tolerances or {}).items():
@@ -124,7 +124,7 @@ def tolerance_problems(
 
 
 def _number_of(design: ToleratedDesign, key: str) -> tuple[str, float]:
-    """The number of the design that a key means, and its size over that of the key's number."""
+    """The number of the design that a key means, and its size over the key's number."""
     name = SHORT_NAMES.get(key, key)
     table, _, last = name.rpartition(".")
     if last in TWINS and design.why_fixed(name):

@@ -1,8 +1,8 @@
-"""Zones of the part, as a drawing gives them: each with figures and limits of its own.
+"""Zones of the part, as a drawing gives them, each with its own figures and limits.
 
 Limits are on figures that hold for nearly all of the zone's area, because a drawing's limit holds
-for every place of it: the least coverage on the 5th percentile, the largest coverage and the
-largest exposure on the 95th, the band of the intensity on both.
+for every place of the zone. The least coverage is taken on the 5th percentile, the largest coverage
+and the largest exposure on the 95th, and the band of the intensity on both.
 """
 
 from __future__ import annotations
@@ -18,13 +18,13 @@ from chamberopt.design.calibration import Calibration, why_no_intensity
 from chamberopt.design.part import Selection, Smoothing
 from chamberopt.design.table_base import FileTable
 
-MAX_ZONES = 20  # each is looked at through as many windows as the target
+MAX_ZONES = 20  # each zone is looked at through as many windows as the target
 LID = "lid"
 NAMES = (
     "a name in quotes of at most 40 letters, digits and _, no digit first, other than lid, which "
     "is the chamber's for chamberopt strip"
 )
-# The metric of a zone that each number of a key limits, and which of its ends.
+# The metric of a zone that each number of a key limits, and the limited end.
 LIMITED = {
     "coverage_min": (("p05_coverage", "min"),),
     "coverage_max": (("p95_coverage", "max"),),
@@ -34,7 +34,7 @@ LIMITED = {
 
 
 class Zone(FileTable):
-    """A surface of the part with figures and limits of its own; it may lie beside the target."""
+    """A surface of the part with its own figures and limits. It may lie beside the target."""
 
     name: Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$", max_length=40)] = Field(
         description="e.g. root: its figures are root.mean_coverage ...",
@@ -61,7 +61,7 @@ class Zone(FileTable):
 
     @property
     def is_spared(self) -> bool:
-        """Whether it is to have little coverage, and none is wanted."""
+        """True if the zone is to have little coverage, with none wanted."""
         return self.coverage_max is not None and self.coverage_min is None
 
     def _problems(self) -> Iterator[Problem]:
@@ -79,7 +79,7 @@ class Zone(FileTable):
 
 
 def zone_problems(zones: Sequence[Zone], calibration: Calibration | None) -> Iterator[Problem]:
-    """Problems of a design's zones beside each other, and beside its calibration."""
+    """Problems between a design's zones, and between its zones and its calibration."""
     names = [zone.name for zone in zones]
     for k, zone in enumerate(zones):
         if zone.name in names[:k]:

@@ -1,4 +1,4 @@
-"""Materials of balls and surfaces: tables of a design, and a catalogue of what they may name."""
+"""Materials of balls and surfaces: tables of a design, and the catalogue of names in them."""
 
 from chamberopt.design.materials.catalogue import (
     BRINELL_TO_PASCAL,

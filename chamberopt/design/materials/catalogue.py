@@ -1,4 +1,4 @@
-"""The catalogue: alloys, and balls as they are sold, from alloys.toml and balls.toml beside it."""
+"""The catalogue: alloys and commercial balls, from alloys.toml and balls.toml beside it."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ from chamberopt.common.toml_errors import did_you_mean
 from chamberopt.common.toml_fields import Several, quantity
 from chamberopt.design.table_base import FileTable
 
-# The speed from which a ball dents what it hits, by Johnson's formula.
+# The speed from which a ball dents a surface or another ball, by Johnson's formula.
 #
 # Notation
-#     E*   1 / ((1 - nu1²) / E1 + (1 - nu2²) / E2) [Pa], of ball and surface
+#     E*   1 / ((1 - nu1²) / E1 + (1 - nu2²) / E2) [Pa], for ball and surface
 #     Y    yield stress of the softer of the two, 9.81e6 HB / 2.8 [Pa]
 #     rho  density of the ball [kg/m³]
 #     v_Y  speed at which yielding starts; v_Y² = 26 (Y / E*)^4 Y / rho
 #     v0   speed from which e = C0 (v / v0)^(-1/4) holds, v_Y (1.18 / C0)^4
 #
-# Two equal balls have half the radius and half the mass of one on a surface: half its v_Y.
+# Two equal balls have half the radius and half the mass of a ball on a surface: half its v_Y.
 #
 # Source: K. L. Johnson, "Contact Mechanics", Cambridge 1985, section 11.5.
 
@@ -51,11 +51,11 @@ class Elastic:
 def yield_speed(
     ball: Elastic, surface: Elastic, density: float, hardness: float, c0: float
 ) -> float:
-    """v0 [m/s] of a ball on a surface, see above.
+    """Yield speed v0 [m/s] of a ball on a surface, see above.
 
     Args:
-        density: of the ball [kg/m³].
-        hardness: of the softer of the two [Pa].
+        density: density of the ball [kg/m³].
+        hardness: hardness of the softer of the two [Pa].
         c0: restitution below v0.
     """
     stress = hardness / 2.8
@@ -64,7 +64,7 @@ def yield_speed(
 
 
 class Named(FileTable):
-    """What every solid of the catalogue has."""
+    """Common properties of every solid of the catalogue."""
 
     name: str
     also: Several[str] = Field(description="other names under which it is found")
@@ -96,7 +96,7 @@ class Ball(Named):
 
 
 class Grade(FileTable):
-    """What a grade of ISO 3290-1 allows."""
+    """Tolerances of a grade of ISO 3290-1."""
 
     name: str
     ball_um: float = quantity(0.01, 1000, "µm", "differences of the diameters of one ball")
@@ -117,23 +117,26 @@ File = TypeVar("File", bound=FileTable)
 Solid = TypeVar("Solid", bound=Named)
 
 
+@cache
 def alloys() -> tuple[Alloy, ...]:
-    """All alloys, those of one base metal together."""
+    """All alloys. The alloys of one base metal are together."""
     return _read("alloys.toml", _Alloys).alloy
 
 
+@cache
 def balls() -> tuple[Ball, ...]:
     """All materials of balls."""
     return _read("balls.toml", _Balls).ball
 
 
+@cache
 def grades() -> tuple[Grade, ...]:
     """All grades, the finest first."""
     return _read("balls.toml", _Balls).grade
 
 
 def find(name: object, among: Iterable[Solid]) -> Solid | None:
-    """The one of this name, of whose case, spaces and hyphens nothing depends; None if unknown."""
+    """The solid of this name; None if unknown. Case, spaces and hyphens do not matter."""
     if not isinstance(name, str):
         return None
     plain = _plain(name)
@@ -156,7 +159,7 @@ def ball_sizes(material: str) -> tuple[float, ...]:
 
 
 def unknown(name: object, among: Iterable[Named]) -> str:
-    """Why a name was not found: the most similar one, or all."""
+    """Message on a name that was not found, with the most similar name or all names."""
     known = [word for one in among for word in (one.name, *one.also)]
     close = did_you_mean(str(name), known)
     if close.startswith("did"):
@@ -175,7 +178,6 @@ def _plain(name: str) -> str:
     return re.sub(r"[\W_]", "", name).casefold()
 
 
-@cache
 def _read(file: str, kind: type[File]) -> File:
     path = Path(__file__).with_name(file)
     return kind.model_validate(tomllib.loads(read_file(path, follow=True).decode()))

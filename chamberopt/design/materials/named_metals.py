@@ -1,4 +1,4 @@
-"""Names of metals in [materials]: the numbers of the catalogue, and v0 by Johnson's formula."""
+"""Names of metals in [materials]: numbers of the catalogue, and v0 by Johnson's formula."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from chamberopt.design.materials.catalogue import (
 )
 
 SURFACES = ("wall", "sonotrode", "part")
-OTHER_LAW = {"exponent", "e_at_m_s"}  # with one of these a table has all of its law
+OTHER_LAW = {"exponent", "e_at_m_s"}  # a table with one of these keys has all of its law
 DEFAULT_C0 = 0.91
 NOT_NAMED = (
     "the catalogue gives both only for a shot.material with a known hardness, see chamberopt shot"
@@ -26,13 +26,13 @@ NOT_NAMED = (
 
 
 def with_numbers(materials: Mapping[str, Any], material: object) -> dict[str, Any]:
-    """The tables of [materials] with numbers in the place of names.
+    """The tables of [materials] with numbers in place of names.
 
-    Numbers that are given stay. A v0 that was computed for another ball, hardness or C0 is
-    computed anew. What is not in the catalogue stays as it is, and is reported by the tables.
+    Given numbers stay. A v0 that was computed for another ball, hardness or C0 is computed again. A
+    name that is not in the catalogue stays, and the tables report it.
 
     Args:
-        material: shot.material as given; one that is unknown is reported at its own place.
+        material: shot.material as given. An unknown material is reported at its own place.
     """
     ball = find(material, balls()) or (None if material is None else balls()[0])
     tables = {name: _surface(name, given, ball) for name, given in materials.items()}
@@ -42,7 +42,7 @@ def with_numbers(materials: Mapping[str, Any], material: object) -> dict[str, An
 
 
 def name_problems(materials: object) -> Iterator[Problem]:
-    """Names in [materials] that with_numbers did not find."""
+    """Problems of names in [materials] that with_numbers did not find."""
     for name, given in materials.items() if isinstance(materials, Mapping) else ():
         if isinstance(given, str) and name == "shot":
             known = find(given, balls()) is not None
@@ -57,7 +57,7 @@ def name_problems(materials: object) -> Iterator[Problem]:
 
 
 def _surface(name: str, given: Any, ball: Ball | None) -> Any:
-    """The table of a surface; what was given if it names no known alloy."""
+    """The table of a surface; the given value if it names no known alloy."""
     table = {"alloy": given} if isinstance(given, str) else given
     if name not in SURFACES or not isinstance(table, Mapping) or not table.get("alloy"):
         return given
@@ -72,7 +72,7 @@ def _surface(name: str, given: Any, ball: Ball | None) -> Any:
 
 
 def _pair(given: Any, ball: Ball | None) -> Any:
-    """The table of two balls; what was given if it is a law of its own."""
+    """The table of two balls; the given value if it is a law of its own."""
     if given is None or (isinstance(given, str) and ball and find(given, balls()) is ball):
         given = {}
     if not isinstance(given, Mapping) or (given and not given.get("v0_for")):
@@ -84,11 +84,13 @@ def _pair(given: Any, ball: Ball | None) -> Any:
 def _with_v0(
     table: dict[str, Any], ball: Ball | None, other: Alloy | Ball | None, hardness: Any
 ) -> dict[str, Any]:
-    """A table with C0 and v0, and for what v0 holds; as it is if it has a law of its own.
+    """A table with C0 and v0, and the solids and numbers for which v0 holds.
+
+    A table with a law of its own stays as it is.
 
     Args:
-        other: what the ball hits; None if it is not in the catalogue.
-        hardness: of the surface as given [HB]; None for two balls.
+        other: solid that the ball hits; None if it is not in the catalogue.
+        hardness: given hardness of the surface [HB]; None for two balls.
     """
     c0 = table.get("C0", DEFAULT_C0)
     if not (_is_number(c0) and (hardness is None or _is_number(hardness))):
@@ -110,12 +112,12 @@ def _with_v0(
 def computed_v0(
     ball: Ball, other: Alloy | Ball, c0: float = DEFAULT_C0, hardness: float | None = None
 ) -> float:
-    """v0 [m/s] of a ball, of known hardness, on a surface or on an equal ball.
+    """Yield speed v0 [m/s] of a ball, of known hardness, on a surface or on an equal ball.
 
-    Two digits, which is more than the formula is good for.
+    It has two digits, which is more than the accuracy of the formula.
 
     Args:
-        hardness: of the surface [HB], if not that of the catalogue.
+        hardness: hardness of the surface [HB]; None means the catalogue's hardness.
     """
     harder, given = ball.hardness_HB, hardness or other.hardness_HB
     assert harder is not None

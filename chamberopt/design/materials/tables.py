@@ -28,9 +28,9 @@ from chamberopt.design.table_base import SI, FileTable
 if TYPE_CHECKING:
     from sim_core import RestitutionLaw
 
-MAX_POINTS = 200  # of a table
+MAX_POINTS = 200  # points of a table
 # Tensile over yield strength. It is 2 for 316L, whose layer is 1.6 times as deep as the estimate of
-# coverage/compression.py, and 1.1 to 1.4 for the steels and alloys that agree with it.
+# coverage/compression.py. It is 1.1 to 1.4 for the steels and alloys that agree with the estimate.
 STRONG_HARDENING = 1.6
 ALLOY = "name in the catalogue (chamberopt materials), whose numbers hold where none are given"
 POINTS = "pairs [v in m/s, e] with ascending v, e.g. [[0.1, 0.97], [1, 0.9], [5, 0.6]]"
@@ -39,7 +39,7 @@ POINTS = "pairs [v in m/s, e] with ascending v, e.g. [[0.1, 0.97], [1, 0.9], [5,
 class RestitutionTable(FileTable):
     """The restitution law of one surface, or of two balls."""
 
-    WITHOUT_EFFECT: ClassVar[tuple[str, ...]] = ("C0", "v0_m_s", "exponent")  # beside a table
+    WITHOUT_EFFECT: ClassVar[tuple[str, ...]] = ("C0", "v0_m_s", "exponent")  # keys beside a table
 
     C0: float | None = quantity(0.05, 1, "", "restitution below v0", None)
     v0_m_s: float | None = quantity(1e-4, 100, "m/s", "normal speed where yielding starts", None)
@@ -73,7 +73,7 @@ class RestitutionTable(FileTable):
 
     @property
     def _why_not_named(self) -> str:
-        """Why the catalogue did not give what is missing."""
+        """Reason why the catalogue did not give the missing numbers."""
         return f" ({NOT_NAMED})" if getattr(self, "alloy", None) and self.exponent is None else ""
 
     @property
@@ -88,13 +88,14 @@ class RestitutionTable(FileTable):
 
     @property
     def restitution(self) -> RestitutionLaw:
-        """The law as the simulator takes it."""
+        """The law in the form that the simulator takes."""
         from sim_core import TabulatedRestitution
 
         if self.e_at_m_s is not None:
             return TabulatedRestitution(*zip(*self.e_at_m_s, strict=True))
         assert self.C0 is not None
-        v0 = 1.0 if self.v0_m_s is None else self.v0_m_s  # any does where e is the same at all
+        # any speed does if e is the same at all speeds
+        v0 = 1.0 if self.v0_m_s is None else self.v0_m_s
         return (self.C0, v0) if self.exponent is None else (self.C0, v0, self.exponent)
 
 
@@ -127,14 +128,14 @@ class SurfaceMaterial(RestitutionTable):
 
 
 class PartMaterial(RestitutionTable):
-    """The part's restitution law, and what sets the size of a dent: hardness and yield speed.
+    """The part's restitution law, and the size of its dents: hardness and yield speed.
 
     With every law v0_m_s is the speed below which the contact is elastic and no dent is left.
     """
 
     alloy: str | None = Field(default=None, description=ALLOY)
     WITHOUT_EFFECT: ClassVar[tuple[str, ...]] = ("C0", "exponent")
-    # HB is how hardness is written.
+    # HB is the usual symbol of hardness.
     hardness_HB: float = quantity(5, 1000, "HB", "Brinell hardness of the part")  # noqa: N815
 
     yield_MPa: float | None = quantity(  # noqa: N815
@@ -164,7 +165,7 @@ class PartMaterial(RestitutionTable):
 
     @property
     def hardens_strongly(self) -> bool:
-        """Whether tensile and yield strength show that its depth of compression is not known."""
+        """True if tensile and yield strength show that the depth of compression is not known."""
         if self.yield_MPa is None or self.tensile_MPa is None:
             return False
         return self.tensile_MPa > STRONG_HARDENING * self.yield_MPa
@@ -180,7 +181,7 @@ def _law(what: str, else_: str = 'the name of an alloy, e.g. "Ti-6Al-4V"') -> An
 
 
 class Materials(FileTable):
-    """One restitution law for each thing that a ball can hit."""
+    """One restitution law for each object that a ball can hit."""
 
     shot: RestitutionTable = _law("ball against ball", "a shot.material of known hardness")
     wall: SurfaceMaterial = _law("ball against chamber wall and lid")

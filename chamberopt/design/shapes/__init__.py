@@ -1,6 +1,6 @@
-"""Shapes of chambers: one file each, and the name by which a design chooses it.
+"""Shapes of chambers: a file each, and the name by which a design chooses it.
 
-The names a shape of one's own may import from here are below; registry.py lists the shapes.
+A user's own shape may import the names below. registry.py lists the shapes.
 """
 
 from chamberopt.common.errors import InputError

@@ -33,13 +33,13 @@ from chamberopt.design.table_base import SI, FileTable
 
 
 class ChamberTable(FileTable):
-    """A cavity before the part is taken out of it; its floor is the sonotrode, at z = 0.
+    """A cavity before the part is taken out of it. Its floor is the sonotrode, at z = 0.
 
-    A shape is a subclass with keys of its own, in the file's units, and ``surface``.
+    A shape is a subclass with its own keys, in the file's units, and ``surface``.
     """
 
-    sha256: ClassVar[str] = ""  # of the file of a user's own shape
-    ceiling_key: ClassVar[str] = "shape"  # what to change when the ceiling is too low
+    sha256: ClassVar[str] = ""  # digest of the file of a user's own shape
+    ceiling_key: ClassVar[str] = "shape"  # key to change when the ceiling is too low
 
     shape: str = Field(description="form of the cavity")
     sonotrode_distance_mm: float = quantity(
@@ -55,24 +55,24 @@ class ChamberTable(FileTable):
     @field_validator("shape")
     @classmethod
     def _absolute(cls, shape: str, info: ValidationInfo) -> str:
-        """Make the path of a user's own shape absolute, like that of the part's mesh."""
+        """Make the path of a user's own shape absolute, like the path of the part's mesh."""
         return str(from_file(shape, info.context)) if is_custom(shape) else shape
 
     sonotrode_distance = SI("sonotrode_distance_mm", 1e-3, "Sonotrode to lowest point of part [m]")
 
     @abstractmethod
     def surface(self, vertices: np.ndarray, triangles: np.ndarray) -> ShapeSurface:
-        """The closed surface of the cavity, without the part; InputError if the values make none.
+        """The closed surface of the cavity, without the part; InputError if there is none.
 
         Shapes that follow the part get its vertices (n, 3) [m] and triangles (m, 3) in the chamber.
         """
 
     def setup(self) -> Setup | None:
-        """The set-up as drawn, where chamber and part come from one file; otherwise None."""
+        """The set-up as drawn, if chamber and part come from one file; otherwise None."""
         return None
 
     def widths_mm(self) -> dict[str, float]:
-        """Inner widths [mm] by the key that sets them: every ball must be narrower than all."""
+        """Inner widths [mm] by the key that sets them. Every ball must be narrower than each."""
         return {}
 
     def room(self) -> float:
@@ -81,7 +81,7 @@ class ChamberTable(FileTable):
 
     @property
     def is_round(self) -> bool:
-        """Whether `facets` makes a difference."""
+        """True if `facets` makes a difference."""
         return False
 
     def notes(self, ball: float) -> list[str]:
@@ -151,7 +151,7 @@ class PolygonChamber(ParametricChamber):
 
     @property
     def is_round(self) -> bool:
-        """Whether `facets` makes a difference."""
+        """True if `facets` makes a difference."""
         return self.radius > 0.0
 
     @model_validator(mode="after")
@@ -184,8 +184,8 @@ class PolygonChamber(ParametricChamber):
 class RoundChamber(WalledChamber):
     """A profile that may lean, its corners rounded, turned about the axis.
 
-    Corners of the wall's flat sides lie on the round wall, so the sides lie inside, by at most
-    radius * (1 - cos(pi/facets)): 0.04 mm for 70 mm across and 64 facets.
+    Corners of the wall's flat sides lie on the round wall. The sides therefore lie inside it, by at
+    most radius * (1 - cos(pi/facets)): 0.04 mm for 70 mm across and 64 facets.
     """
 
     corner_radius_mm: float = quantity(
@@ -198,14 +198,16 @@ class RoundChamber(WalledChamber):
 
     @property
     def is_round(self) -> bool:
-        """Whether `facets` makes a difference."""
+        """True if `facets` makes a difference."""
         return True
 
     def profile(self) -> np.ndarray:
-        """The profile (n, 2) [m] as it leans, with sharp corners."""
+        """The leaning profile (n, 2) [m] with sharp corners."""
         line = self.upright()
         off_axis = line[:, 0] > 0.0
-        return np.c_[line[:, 0] + np.where(off_axis, self.slope * line[:, 1], 0.0), line[:, 1]]
+        return np.asarray(
+            np.c_[line[:, 0] + np.where(off_axis, self.slope * line[:, 1], 0.0), line[:, 1]]
+        )
 
     @model_validator(mode="after")
     def _makes_a_cavity(self) -> Self:
@@ -234,5 +236,5 @@ class RoundChamber(WalledChamber):
 
 
 def is_custom(shape: object) -> bool:
-    """Whether a design's shape names a Python file of the user's."""
+    """True if a design's shape names a Python file of the user's."""
     return isinstance(shape, str) and shape.endswith(".py")

@@ -1,8 +1,8 @@
-"""Read a set-up from CAD: the room over its sonotrode, with the sonotrode's face at z = 0.
+"""Reader of a CAD set-up: the room over its sonotrode, with the sonotrode's face at z = 0.
 
 The part is either a separate closed body, which is cut out of the room later, or the piece of the
-room's surface that it bounds. The room is the closed surface that the sonotrode's face belongs to,
-whichever way its triangles face.
+room's surface that it bounds. The room is the closed surface that the sonotrode's face belongs to.
+Its triangles may face either way.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from chamberopt.geometry.solids import Solid, make_solid, overlap_volume, snap_t
 from chamberopt.geometry.triangles import area_vectors, find_shells, find_unwalled_border
 
 FLATNESS = 2e-6  # m: rounding in a text file may lift a sonotrode's corners by this much
-AXIS_TOLERANCE = 1e-6  # rad: a direction this close to an axis of the file is taken as that axis
+AXIS_TOLERANCE = 1e-6  # rad: a direction this close to an axis of the file is taken as the axis
 VOLUME_TOLERANCE = 1e-6  # relative
 FACING_TOLERANCE = 1e-3  # share of the area that triangles facing another way may take away
 
@@ -36,25 +36,25 @@ FACING_TOLERANCE = 1e-3  # share of the area that triangles facing another way m
 class Setup:
     """The set-up as drawn, with the face of its sonotrode at z = 0 and facing up."""
 
-    room: ShapeSurface  # without the part if that is a separate body
-    # In the file's frame, normals out of the part, with the notes on the whole set-up. It is a
-    # piece of the room's surface unless it is a separate body.
+    room: ShapeSurface  # without the part if the part is a separate body
+    # The part in the file's frame, normals out of the part, with the notes on the whole set-up. It
+    # is a piece of the room's surface unless it is a separate body.
     part: PartMesh
-    turn: np.ndarray  # rotation from the file's frame, shape (3, 3), before the shift
+    turn: np.ndarray  # rotation from the file's frame, shape (3, 3), applied before the shift
     shift: np.ndarray  # [m], shape (3,)
-    distance: float  # from the sonotrode to the lowest point of the part [m]
+    distance: float  # distance from the sonotrode to the lowest point of the part [m]
 
 
 def read_setup(path: Path, unit: str, part: tuple[str, ...], sonotrode: tuple[str, ...]) -> Setup:
-    """The set-up in a file, which is read again only after it has changed.
+    """Read the set-up in a file, again only if the file has changed.
 
-    `part` and `sonotrode` (its face) are names of the file's groups. InputError if a name is not in
-    the file, the room is not closed, or the face is not flat.
+    `part` and `sonotrode` (its face) are names of the file's groups. Raises InputError if a name is
+    not in the file, the room is not closed, or the face is not flat.
     """
     try:
         stamp = path.stat()
     except OSError:
-        read_triangles(path, unit)  # its error names what is wrong
+        read_triangles(path, unit)  # the error of this call names the fault
         raise
     return _read_once(path, unit, part, sonotrode, stamp.st_mtime_ns, stamp.st_size)
 
@@ -108,7 +108,7 @@ def _select_some(read: TriangleSoup, names: tuple[str, ...], field: str) -> np.n
 def _separate_part(read: TriangleSoup, in_part: np.ndarray) -> tuple[PartMesh | None, PartMesh]:
     """The part as a closed body, and the closed surface of the rest.
 
-    None and the whole surface where only a piece of the part's surface is drawn.
+    The result is None and the whole surface if only a piece of the part's surface is drawn.
     """
     try:
         body = close_surface(read, in_part)
@@ -148,9 +148,9 @@ def _piece_of_part(mesh: PartMesh, in_part: np.ndarray) -> PartMesh:
 
 
 def _room_over_sonotrode(mesh: PartMesh, sonotrode: tuple[str, ...]) -> tuple[PartMesh, list[str]]:
-    """The closed surface with the sonotrode and the bodies in it, facing out of the room; notes.
+    """The closed surface of sonotrode and bodies in it, facing out of the room; and notes.
 
-    What lies around it, such as the outside of a chamber with thick walls, is left out.
+    Surfaces around it, such as the outside of a chamber with thick walls, are left out.
     """
     face = select_triangles(mesh.groups, sonotrode, len(mesh.triangles), "chamber.sonotrode")
     facing = area_vectors(mesh.vertices, mesh.triangles[face])
@@ -183,7 +183,7 @@ def _room_over_sonotrode(mesh: PartMesh, sonotrode: tuple[str, ...]) -> tuple[Pa
 
 
 def _is_inside(body: Solid, room: Solid) -> bool:
-    """Whether a body stands in the room, not beside or around it; InputError if it crosses it."""
+    """True if a body stands in the room; InputError if it crosses the room."""
     common = overlap_volume(body, room)
     smaller = min(body.volume, room.volume)
     if VOLUME_TOLERANCE * body.volume < common < (1.0 - VOLUME_TOLERANCE) * smaller:
@@ -195,7 +195,7 @@ def _is_inside(body: Solid, room: Solid) -> bool:
 
 
 def _pose(mesh: PartMesh, face: np.ndarray) -> tuple[np.ndarray, np.ndarray, list[str]]:
-    """Rotation (3, 3) and shift (3,) [m] that put the face at z = 0, facing up; and a note."""
+    """Rotation (3, 3) and shift (3,) [m] that put the face at z = 0, facing up; and notes."""
     up = -area_vectors(mesh.vertices, mesh.triangles[face]).sum(axis=0)
     up /= np.linalg.norm(up)
     axis = np.round(up)

@@ -34,7 +34,7 @@ SIMPLIFIED = 5e-6
 
 
 class Conformal(ParametricChamber):
-    """A wall round the shadow of what is below the ceiling; holes in the shadow are filled."""
+    """A wall round the shadow of the part below the ceiling. Holes in the shadow are filled."""
 
     shape: Literal["conformal"]
     outline: Literal["hull", "silhouette"] = Field(
@@ -56,7 +56,7 @@ class Conformal(ParametricChamber):
 
     @property
     def is_round(self) -> bool:
-        """Whether `facets` makes a difference: outward corners are arcs about the part's."""
+        """True, because outward corners are arcs about the part's corners."""
         return True
 
     def _problems(self) -> Iterator[Problem]:
@@ -74,7 +74,7 @@ class Conformal(ParametricChamber):
         return self
 
     def surface(self, vertices: np.ndarray, triangles: np.ndarray) -> ShapeSurface:
-        """The wall round the part; InputError if it is above the ceiling or in several pieces."""
+        """The wall round the part; InputError if it is above the ceiling or in pieces."""
         if not len(vertices) or vertices[:, 2].min() >= self.height:
             raise InputError(
                 f"chamber.height_mm: given {self.height_mm:g}: no part below that ceiling, whose "
@@ -105,11 +105,11 @@ class Conformal(ParametricChamber):
         return ShapeSurface(vertices, triangles, tags)
 
     def widths_mm(self) -> dict[str, float]:
-        """The height; in plan the chamber is wider than the part."""
+        """Height of the chamber, which is wider than the part in plan."""
         return {"height_mm": self.height_mm}
 
     def notes(self, ball: float) -> list[str]:
-        """A remark where balls do not fit beside the part."""
+        """A remark if balls do not fit beside the part."""
         if self.gap >= ball:
             return []
         return [

@@ -30,7 +30,7 @@ MAX_WIDTH = 10.0  # m: shipped shapes are smaller; a chamber with mm taken for m
 
 
 def find_fault(cavity: object) -> str | None:
-    """What is wrong with a surface, to follow the words "the surface"; None if it can be used."""
+    """Fault of a surface, to follow the words "the surface"; None if it can be used."""
     if not isinstance(cavity, ShapeSurface):
         given = type(cavity).__name__
         return f"gives {given}; it must give a chamberopt.design.shapes.ShapeSurface"
@@ -57,7 +57,7 @@ def find_fault(cavity: object) -> str | None:
 
 
 def with_array_types(cavity: ShapeSurface) -> ShapeSurface:
-    """A surface without a fault, with the array types that a ShapeSurface promises and no part."""
+    """The surface with the array types of a ShapeSurface and no part, if it has no fault."""
     arrays = (cavity.vertices, np.float64), (cavity.triangles, np.int32), (cavity.tags, np.uint8)
     return ShapeSurface(*(np.asarray(array, dtype=kind) for array, kind in arrays))
 
@@ -97,12 +97,12 @@ def _crossing_fault(vertices: np.ndarray, triangles: np.ndarray) -> str | None:
 
 
 class RecordedShape(ChamberTable):
-    """Replaces a user's own shape in the design of a result: values that were recorded, no code."""
+    """Replaces a user's own shape in the design of a result: recorded values, no code."""
 
     model_config = ConfigDict(**{**STRICT, "extra": "allow"})
 
     def surface(self, vertices: np.ndarray, triangles: np.ndarray) -> ShapeSurface:
-        """InputError: a result holds its chamber, and never runs the file that made it."""
+        """Raise InputError: a result holds its chamber, and never runs the file that made it."""
         raise InputError(
             f"chamber.shape: {self.shape}: named by a result, whose code is never run; load the "
             "design file to build its chamber again"
@@ -110,10 +110,11 @@ class RecordedShape(ChamberTable):
 
 
 def _is_positive(number: object) -> bool:
-    return isinstance(number, int | float | np.number) and bool(number > 0.0)  # False for NaN
+    # bool(...) is False for NaN
+    return isinstance(number, int | float | np.number) and bool(number > 0.0)
 
 
-# The optional methods of a shape: what each must give, and a check of that.
+# The optional methods of a shape: a description of each result, and a check of it.
 OPTIONAL_METHODS: dict[str, tuple[str, Callable[[Any], bool]]] = {
     "widths_mm": (
         "widths [mm] by key",
@@ -128,9 +129,9 @@ OPTIONAL_METHODS: dict[str, tuple[str, Callable[[Any], bool]]] = {
 
 
 def load_custom_shape(path: Path) -> type[ChamberTable]:
-    """The shape in a file; the same class as long as the file's content is the same.
+    """Load the shape in a file, as the same class while the file's content is the same.
 
-    InputError if the file cannot be read or run, or does not hold exactly one shape.
+    Raises InputError if the file cannot be read or run, or does not hold exactly one shape.
     """
     try:
         source = read_limited(path, MAX_TEXT_BYTES, "shape file (.py)", follow=True)
@@ -145,7 +146,7 @@ def _run(path: Path, source: bytes) -> type[ChamberTable]:
     digest = sha256(source).hexdigest()
     module = ModuleType(f"chamberopt_own_shape_{digest[:16]}")
     module.__file__ = str(path)
-    sys.modules[module.__name__] = module  # where pydantic looks up the names in annotations
+    sys.modules[module.__name__] = module  # pydantic looks up the names in annotations here
     with _errors_of_the_file(path, "cannot be run"):
         exec(compile(source, str(path), "exec"), vars(module))
     classes = [value for value in vars(module).values() if isinstance(value, type)]
@@ -182,7 +183,8 @@ def _with_checks(path: Path, shape: type[ChamberTable], digest: str) -> type[Cha
 
     def surface(self: ChamberTable, vertices: np.ndarray, triangles: np.ndarray) -> ShapeSurface:
         """The surface that the file makes, if it is closed and has a sonotrode."""
-        views = vertices.view(), triangles.view()  # of the part, not to be changed by the shape
+        # views of the part, which the shape cannot change
+        views = vertices.view(), triangles.view()
         for view in views:
             view.flags.writeable = False
         cavity = unchecked_surface(self, *views)
@@ -201,12 +203,13 @@ def _with_checks(path: Path, shape: type[ChamberTable], digest: str) -> type[Cha
     methods["_run_validators"] = model_validator(mode="wrap")(classmethod(run_validators))  # type: ignore[arg-type]
     about = {"__module__": shape.__module__, "__doc__": shape.__doc__, "sha256": digest}
     metaclass: Any = type(shape)
-    return metaclass(shape.__name__, (shape,), {**methods, **about})
+    checked: type[ChamberTable] = metaclass(shape.__name__, (shape,), {**methods, **about})
+    return checked
 
 
 @contextmanager
 def _errors_of_the_file(path: Path, what: str) -> Iterator[None]:
-    """Report an error in the user's code as InputError with the line it comes from."""
+    """Report an error in the user's code as InputError with the line of its origin."""
     try:
         yield
     except (InputError, ValidationError):

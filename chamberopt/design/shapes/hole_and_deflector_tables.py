@@ -1,4 +1,4 @@
-"""Fixture holes and deflectors of a chamber, whatever its shape."""
+"""Fixture holes and deflectors of a chamber of any shape."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -29,7 +29,7 @@ SIZE_KEYS = {
 
 
 class Deflector(FileTable):
-    """A body that stands still in the chamber and is wall to the shot.
+    """A body that stands still in the chamber and acts on the shot as a wall.
 
     It is a plate (a box), a rod along its z, a ball, or any closed mesh.
     """
@@ -80,7 +80,7 @@ class PlacedBore(FileTable):
 
     @property
     def direction(self) -> tuple[float, float, float]:
-        """Its axis, a unit vector."""
+        """Axis of the bore, a unit vector."""
         return toml_fields.unit_vector(self.axis)
 
     diameter = SI("diameter_mm", 1e-3, "Its diameter [m]")

@@ -33,7 +33,7 @@ from chamberopt.geometry.solids import (
 )
 from chamberopt.geometry.triangles import border_edges
 
-# Move the sonotrode of a set-up from CAD nearer to the part, or farther from it.
+# The sonotrode of a CAD set-up can be moved nearer to the part, or farther from it.
 
 VOLUME_TOLERANCE = 1e-6  # relative
 SAME_DISTANCE = 1e-9  # m
@@ -42,8 +42,8 @@ SAME_DISTANCE = 1e-9  # m
 def move_sonotrode(setup: Setup, distance: float) -> ShapeSurface:
     """The room with its sonotrode at another distance [m] from the lowest point of the part.
 
-    InputError if the sonotrode is to come nearer than the walls rise straight from it, or farther
-    where another part of the room is in the way.
+    Raises InputError if the sonotrode is to come nearer than the walls rise straight from it, or
+    farther where another part of the room is in the way.
     """
     room, farther = setup.room, distance - setup.distance
     if abs(farther) < SAME_DISTANCE:
@@ -53,7 +53,7 @@ def move_sonotrode(setup: Setup, distance: float) -> ShapeSurface:
 
 
 def _extend_down(room: ShapeSurface, setup: Setup) -> ShapeSurface:
-    """The room whose walls continue straight down from the sonotrode's outline to z = 0."""
+    """The room with walls continued straight down from the sonotrode's outline to z = 0."""
     on_face = room.tags == TAG_SONOTRODE
     face, count = room.triangles[on_face], len(room.vertices)
     used, numbers = np.unique(face, return_inverse=True)
@@ -117,7 +117,7 @@ IMPORTED = "imported"
 
 
 class Imported(ChamberTable):
-    """A chamber drawn with its part in one file; what is neither part nor sonotrode is wall."""
+    """A chamber drawn with its part in one file. All but part and sonotrode is wall."""
 
     shape: Literal["imported"]
     sonotrode_distance_mm: float | None = quantity(  # type: ignore[assignment]
@@ -132,7 +132,7 @@ class Imported(ChamberTable):
 
     @property
     def sonotrode_distance(self) -> float:  # type: ignore[override]
-        """Mean sonotrode face to lowest point of the part [m]."""
+        """Distance from the mean sonotrode face to the lowest point of the part [m]."""
         given = self.sonotrode_distance_mm
         return self.setup().distance if given is None else given * 1e-3
 

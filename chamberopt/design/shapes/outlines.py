@@ -13,7 +13,7 @@ import numpy as np
 
 from chamberopt.design.shapes.surface import MIN_LENGTH, ShapeSurface, lofted
 
-# Convex outlines in plan: their sides moved, their corners rounded.
+# Convex outlines in plan: move their sides, round their corners.
 #
 # An outline is an array of corners (n, 2) [m], counter-clockwise.
 
@@ -22,18 +22,20 @@ def corner_angles(outline: np.ndarray) -> np.ndarray:
     """Angle [rad] by which the outline turns left at each corner, (n,)."""
     before, after = _directions(outline)
     cross = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
-    return np.arctan2(cross, np.einsum("ij,ij->i", before, after))
+    return np.asarray(np.arctan2(cross, np.einsum("ij,ij->i", before, after)))
 
 
 def move_sides(outline: np.ndarray, distance: float) -> np.ndarray:
     """Corners of the outline whose sides are moved outward by a distance [m]."""
     before, after = _directions(outline)
     outward = np.c_[before[:, 1] + after[:, 1], -before[:, 0] - after[:, 0]]
-    return outline + distance * outward / (1.0 + np.einsum("ij,ij->i", before, after))[:, None]
+    return np.asarray(
+        outline + distance * outward / (1.0 + np.einsum("ij,ij->i", before, after))[:, None]
+    )
 
 
 def largest_inward_move(outline: np.ndarray) -> float:
-    """How far [m] all sides can be moved inward until one of them is only MIN_LENGTH long."""
+    """Largest distance [m] by which all sides can be moved inward, until a side has MIN_LENGTH."""
     tangent = np.tan(corner_angles(outline) / 2.0)
     length = np.hypot(*(np.roll(outline, -1, axis=0) - outline).T)
     return max(0.0, float(((length - MIN_LENGTH) / (tangent + np.roll(tangent, -1))).min()))
@@ -49,12 +51,12 @@ def area_inside(outline: np.ndarray, distance: float = 0.0) -> float:
 
 
 def corner_arcs(outline: np.ndarray, facets: int) -> tuple[np.ndarray, np.ndarray]:
-    """Points of a rounded outline: the corner of each, (k,), and its direction from there, (k, 2).
+    """Points of a rounded outline: corner of each, (k,), and direction from the corner, (k, 2).
 
     Corners plus radius times directions are the outline grown by the radius. Each corner has a fan
-    from the normal of one side to that of the next, in steps of at most a full turn / facets. A
-    corner of less than half a step gets one direction, longer than 1, that moves both sides by the
-    radius.
+    from the normal of one side to the normal of the next, in steps of at most a full turn / facets.
+    A corner of less than half a step gets one direction, longer than 1, that moves both sides by
+    the radius.
     """
     before, _ = _directions(outline)
     turn = corner_angles(outline)
@@ -80,13 +82,13 @@ def turn_angles(line: np.ndarray) -> np.ndarray:
     along = np.diff(line, axis=0)
     before, after = along[:-1], along[1:]
     cross = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
-    return np.r_[0.0, np.arctan2(cross, np.einsum("ij,ij->i", before, after)), 0.0]
+    return np.asarray(np.r_[0.0, np.arctan2(cross, np.einsum("ij,ij->i", before, after)), 0.0])
 
 
 def largest_corner_radius(line: np.ndarray) -> float:
     """Largest radius [m] to which all corners can be rounded.
 
-    The arc of radius r begins r tan(angle / 2) from its corner; two arcs must not meet.
+    The arc of radius r begins r tan(angle / 2) from its corner. Two arcs must not meet.
     """
     tangent = np.tan(np.abs(turn_angles(line)) / 2.0)
     length = np.hypot(*np.diff(line, axis=0).T)
@@ -122,7 +124,7 @@ def find_contact(line: np.ndarray) -> np.ndarray | None:
     """A point (2,) [m] where the line folds back or comes nearer to itself than MIN_LENGTH."""
     sharp = np.abs(turn_angles(line)) > np.pi - 1e-3
     if sharp.any():
-        return line[np.argmax(sharp)]
+        return np.asarray(line[np.argmax(sharp)])
     start, end = line[:-1], line[1:]
     i, j = np.triu_indices(len(start), 2)
     ends = ((i, j), (i + 1, j), (j, i), (j + 1, i))
@@ -132,7 +134,7 @@ def find_contact(line: np.ndarray) -> np.ndarray | None:
 
 
 def crosses_itself(line: np.ndarray) -> bool:
-    """Whether two sides of the line that are not neighbours cross."""
+    """True if two sides of the line that are not neighbours cross."""
     start, end = line[:-1], line[1:]
     i, j = np.triu_indices(len(start), 2)
     return bool(_cross(start[i], end[i], start[j], end[j]).any())
@@ -154,20 +156,20 @@ def revolve(line: np.ndarray, facets: int) -> ShapeSurface:
 
 
 def _unit(vector: np.ndarray) -> np.ndarray:
-    return vector / np.hypot(*vector)
+    return np.asarray(vector / np.hypot(*vector))
 
 
 def _distance(point: np.ndarray, start: np.ndarray, end: np.ndarray) -> np.ndarray:
-    """Distance [m] of points (k, 2) from straight pieces, one each."""
+    """Distance [m] of points (k, 2) from one straight piece each."""
     along = end - start
     share = np.einsum("ij,ij->i", point - start, along) / np.einsum("ij,ij->i", along, along)
-    return np.hypot(*(point - start - np.clip(share, 0.0, 1.0)[:, None] * along).T)
+    return np.asarray(np.hypot(*(point - start - np.clip(share, 0.0, 1.0)[:, None] * along).T))
 
 
 def _cross(a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray) -> np.ndarray:
-    """Whether pieces ab and cd cross, (k,) bool."""
+    """True where pieces ab and cd cross, (k,) bool."""
 
     def side(p: np.ndarray, q: np.ndarray, x: np.ndarray) -> np.ndarray:
-        return np.sign((q - p)[:, 0] * (x - p)[:, 1] - (q - p)[:, 1] * (x - p)[:, 0])
+        return np.asarray(np.sign((q - p)[:, 0] * (x - p)[:, 1] - (q - p)[:, 1] * (x - p)[:, 0]))
 
-    return (side(a, b, c) * side(a, b, d) < 0.0) & (side(c, d, a) * side(c, d, b) < 0.0)
+    return np.asarray((side(a, b, c) * side(a, b, d) < 0.0) & (side(c, d, a) * side(c, d, b) < 0.0))

@@ -1,4 +1,4 @@
-"""The shapes of chambers by the name with which a design chooses one.
+"""The shapes of chambers by the name with which a design chooses a shape.
 
 To add a shape, write a file with a subclass of ChamberTable and enter it here.
 """

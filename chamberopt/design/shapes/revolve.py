@@ -43,19 +43,19 @@ class Revolve(RoundChamber):
         return _to_the_axis(self.profile_mm)
 
     def widths_mm(self) -> dict[str, float]:
-        """The largest diameter or the height, whichever is less."""
+        """The largest diameter or the height, the smaller of the two."""
         r, z = np.array(self.profile_mm).T
         return {"profile_mm": float(min(2.0 * r.max(), z.max()))}
 
 
 def _to_the_axis(points: tuple[Pair, ...]) -> np.ndarray:
-    """Points (r, z) [m], with the middle of the ceiling if it is flat."""
+    """Points (r, z) [m], with the middle of the ceiling if the ceiling is flat."""
     line = 1e-3 * np.array(points)
     return line if line[-1, 0] == 0.0 else np.r_[line, [[0.0, line[-1, 1]]]]
 
 
 def _find_fault(points: tuple[Pair, ...]) -> str | None:
-    """Why the points cannot be a profile; None if they can."""
+    """Reason why the points cannot be a profile; None if they can."""
     if points[0][1] != 0.0:
         return f"begins at z = {points[0][1]:g}; the rim is on the sonotrode, at z = 0"
     for number, (r, z) in enumerate(points):

@@ -1,4 +1,4 @@
-"""A chamber with n equal flat walls: a regular polygon, extruded."""
+"""Chambers with straight walls: box, cylinder or cone, and regular prism."""
 
 from typing import Literal
 
@@ -12,7 +12,7 @@ from chamberopt.design.table_base import SI
 
 
 class Box(PolygonChamber):
-    """Four sides."""
+    """A chamber with four flat sides."""
 
     shape: Literal["box"]
     length_mm: float = quantity(2, 2000, "mm", "inner size along x, at the sonotrode")
@@ -21,7 +21,7 @@ class Box(PolygonChamber):
     def floor(self) -> np.ndarray:
         """The corners, beginning at +x, -y."""
         half_sides = 0.5e-3 * np.array([self.length_mm, self.width_mm])
-        return half_sides * np.array([[1, -1], [1, 1], [-1, 1], [-1, -1]])
+        return np.asarray(half_sides * np.array([[1, -1], [1, 1], [-1, 1], [-1, -1]]))
 
     def widths_mm(self) -> dict[str, float]:
         """Length, width and height."""
@@ -47,7 +47,7 @@ class Cylinder(RoundChamber, ParametricChamber):
     diameter = SI("diameter_mm", 1e-3, "Inner diameter at the sonotrode [m]")
 
     def upright(self) -> np.ndarray:
-        """Up the side, then in along the ceiling."""
+        """The profile: up the side, then in along the ceiling."""
         radius = self.diameter / 2.0
         return np.array([[radius, 0.0], [radius, self.height], [0.0, self.height]])
 
@@ -57,7 +57,7 @@ class Cylinder(RoundChamber, ParametricChamber):
 
 
 class Prism(PolygonChamber):
-    """A prism measured across flats: by the widest round bar that fits in."""
+    """A regular prism measured across flats, by the widest round bar that fits in."""
 
     shape: Literal["prism"]
     sides: int = quantity(3, 64, "", "flat walls")
@@ -67,10 +67,12 @@ class Prism(PolygonChamber):
     turn_deg: float = quantity(-360, 360, "degrees", "about z; at 0 the first side faces +x", 0.0)
 
     def floor(self) -> np.ndarray:
-        """The corners, beginning at the one after the first side."""
+        """The corners, beginning at the corner after the first side."""
         half_angle = np.pi / self.sides
         angle = np.radians(self.turn_deg) + half_angle * (2.0 * np.arange(self.sides) + 1.0)
-        return 0.5e-3 * self.across_mm / np.cos(half_angle) * np.c_[np.cos(angle), np.sin(angle)]
+        return np.asarray(
+            0.5e-3 * self.across_mm / np.cos(half_angle) * np.c_[np.cos(angle), np.sin(angle)]
+        )
 
     def widths_mm(self) -> dict[str, float]:
         """Width across flats, and height."""

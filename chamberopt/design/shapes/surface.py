@@ -8,7 +8,7 @@ import numpy as np
 
 from chamberopt.common.toml_errors import CrossCheckError, Problem
 
-# Smallest lengths of a cavity, and errors that name the largest value that still makes one.
+# Smallest lengths of a cavity, and errors that name the largest value that still makes a cavity.
 
 # Shorter sides and smaller radii count as 0 [m]: a fiftieth of usual shot, far above the grid that
 # solids are rounded to.
@@ -27,7 +27,7 @@ def refuse_above(key: str, given: float, limit: float, why: str) -> None:
 def refuse_meeting_walls(slope: float, limits: Iterable[float], inclination_deg: float) -> None:
     """Raise CrossCheckError if walls lean in so far that they meet below the ceiling.
 
-    Slope is the tangent of the inclination, outward; `limits` has the least that each wall allows.
+    ``slope``: tangent of the outward inclination. ``limits``: least slope that each wall allows.
     """
     least = max(limits, default=-math.inf)
     if slope < least:
@@ -45,8 +45,8 @@ def further_sonotrode_tag(k: int) -> int:
 
 
 def is_sonotrode(tags: np.ndarray) -> np.ndarray:
-    """Which tags (k,) belong to a sonotrode, the first or a further one."""
-    return (tags == TAG_SONOTRODE) | (tags > TAG_WALL)
+    """True for tags (k,) of a sonotrode, the first or a further sonotrode."""
+    return np.asarray((tags == TAG_SONOTRODE) | (tags > TAG_WALL))
 
 
 @dataclass(frozen=True)
@@ -54,10 +54,10 @@ class ShapeSurface:
     """The cavity before the part is taken out of it."""
 
     vertices: np.ndarray  # [m], shape (n, 3), float64
-    triangles: np.ndarray  # shape (k, 3), int32; closed, normals pointing out of the cavity
+    triangles: np.ndarray  # shape (k, 3), int32; closed, with normals out of the cavity
     tags: np.ndarray  # shape (k,), uint8
-    # Shape (k,), int32: the part triangle that each TAG_PART triangle lies on, else -1. None where
-    # the part is a separate body that still has to be cut out.
+    # Shape (k,), int32: the part triangle that each TAG_PART triangle lies on, else -1. None if the
+    # part is a separate body that still has to be cut out.
     source: np.ndarray | None = None
 
 
