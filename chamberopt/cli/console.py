@@ -16,10 +16,7 @@ from chamberopt.common.errors import visible
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
-    from chamberopt.common.estimate import Estimate
     from chamberopt.design.load import Design
-    from chamberopt.peening.tolerances import ToleranceResult
-    from chamberopt.simulation.evaluation import Evaluation
 
 T = TypeVar("T")
 RESULTS = Path("results")  # where results go without --out
@@ -119,82 +116,6 @@ def print_finished(folder: Path, what: str, lines: Sequence[str], as_json: bool)
     again = "to run it again, give another folder (--out)"
     print_remarks([f"{folder}: this {what} is finished, nothing was run; {again}"])
     print_result(lines, folder, as_json)
-
-
-def estimate_line(name: str, estimate: Estimate) -> str:
-    from chamberopt.common.number_text import estimate_text
-
-    return f"{name:34}{estimate_text(estimate)}"
-
-
-def evaluation_lines(evaluation: Evaluation) -> list[str]:
-    """Objective and metrics, one line each, with their 95 % intervals; last the gauge."""
-    from chamberopt.common.number_text import plain
-
-    rows = {evaluation.objective_name: evaluation.objective, **evaluation.metrics}
-    lines = [estimate_line(name, estimate) for name, estimate in rows.items()]
-    found = evaluation.resolution
-    return [
-        *lines,
-        f"{'gauge_mm2':34}{plain(evaluation.gauge_mm2)}: area of the windows; the median window "
-        f"has {plain(found.dents, 2)} dents",
-    ]
-
-
-def tolerance_lines(found: ToleranceResult) -> list[str]:
-    """Figures over the box of tolerances, the worst corner, and what each tolerance does."""
-    from chamberopt.common.number_text import estimate_text, plain
-
-    rows = [["over the tolerances", "as designed", "q05", "q95", "in the worst corner"]]
-    for name, figure in found.figures.items():
-        known = (figure.nominal, figure.q05, figure.q95, figure.simulated)
-        rows.append([name, *(estimate_text(one) if one else "" for one in known)])
-    lines = [f"{name:34}{''.join(f'{one:19} ' for one in ends)}".rstrip() for name, *ends in rows]
-    if found.corner:
-        place = ", ".join(f"{name} = {plain(value)}" for name, value in found.corner.items())
-        lines.append(f"worst corner, for {found.worst_for}: {place}")
-    lines.append("")
-    for name, figure in found.figures.items():
-        lines.append(f"{name}: change at the low and at the high end of")
-        small, none = [], []
-        for number in found.numbers:
-            effects = figure.effects[number.name]
-            if any(abs(end.value) > end.half_width for end in effects):
-                low, high = (estimate_text(end, sign=True) for end in effects)
-                span = f"{number.name} {plain(number.low)} .. {plain(number.high)}"
-                lines.append(f"    {span:50}{low:21} {high}")
-            elif all(end.half_width == 0.0 for end in effects):
-                none.append(number.name)
-            else:
-                small.append(number.name)
-        lines += [f"    not resolved: {', '.join(small)}"] if small else []
-        lines += [f"    does not depend on: {', '.join(none)}"] if none else []
-    return [*lines, *note_lines(found.notes)]
-
-
-def zone_lines(design: Design, evaluation: Evaluation) -> list[str]:
-    """Whether the limits of each zone are met, a line each."""
-    from chamberopt.common.number_text import estimate_text
-    from chamberopt.search.study.constraints import judge_zones
-
-    return [
-        f"zone {zone}: {row['key']} {row['limit']:g}: {row['standing']} "
-        f"({row['metric']} {estimate_text(evaluation.metrics[row['metric']])})"
-        for zone, rows in judge_zones(design, evaluation.metrics).items()
-        for row in rows
-    ]
-
-
-def note_lines(notes: Iterable[str]) -> list[str]:
-    return [f"note: {note}" for note in notes]
-
-
-def replicas_text(design: Design) -> str:
-    """How many replicas a design asks for, in words."""
-    accuracy = design.process.accuracy
-    if accuracy.objective_half_width is not None:
-        return f"as many replicas as give ± {accuracy.objective_half_width:g}"
-    return f"{accuracy.replicas} replicas of {design.process.recorded_time:g} s"
 
 
 def table_lines(table: Mapping[str, Any], prefix: str = "") -> list[str]:

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from chamberopt.common.number_text import estimate_text
+from chamberopt.common.number_text import plain as ascii_number
 from chamberopt.documents.document import Block, Chart, Items, Section, Sentence, Table
+from chamberopt.documents.terminal_lines import note_lines
 from chamberopt.documents.wording import Label, metric_label, plain
 from chamberopt.pictures.charts.tolerances import TornadoBar, TornadoPanel, tornado_figure
 
 if TYPE_CHECKING:
+    from chamberopt.peening.tolerances import ToleranceResult
     from chamberopt.results.records import EffectEnds, TolerancesRecord, ToleratedFigureRecord
 
 MAX_CHARTS = 3
@@ -73,3 +77,32 @@ def _panel(label: Label, figure: ToleratedFigureRecord) -> TornadoPanel:
 
 def _is_resolved(ends: EffectEnds) -> bool:
     return any(abs(one.value) > one.half_width for one in (ends.low, ends.high))
+
+
+def tolerance_lines(found: ToleranceResult) -> list[str]:
+    """Lines for a terminal: figures over the box, the worst corner, each tolerance's effect."""
+    rows = [["over the tolerances", "as designed", "q05", "q95", "in the worst corner"]]
+    for name, figure in found.figures.items():
+        known = (figure.nominal, figure.q05, figure.q95, figure.simulated)
+        rows.append([name, *(estimate_text(one) if one else "" for one in known)])
+    lines = [f"{name:34}{''.join(f'{one:19} ' for one in ends)}".rstrip() for name, *ends in rows]
+    if found.corner:
+        place = ", ".join(f"{name} = {ascii_number(value)}" for name, value in found.corner.items())
+        lines.append(f"worst corner, for {found.worst_for}: {place}")
+    lines.append("")
+    for name, figure in found.figures.items():
+        lines.append(f"{name}: change at the low and at the high end of")
+        small, none = [], []
+        for number in found.numbers:
+            effects = figure.effects[number.name]
+            if any(abs(end.value) > end.half_width for end in effects):
+                low, high = (estimate_text(end, sign=True) for end in effects)
+                span = f"{number.name} {ascii_number(number.low)} .. {ascii_number(number.high)}"
+                lines.append(f"    {span:50}{low:21} {high}")
+            elif all(end.half_width == 0.0 for end in effects):
+                none.append(number.name)
+            else:
+                small.append(number.name)
+        lines += [f"    not resolved: {', '.join(small)}"] if small else []
+        lines += [f"    does not depend on: {', '.join(none)}"] if none else []
+    return [*lines, *note_lines(found.notes)]

@@ -45,6 +45,7 @@ def run(
         from chamberopt.chamber.build import build_chamber
         from chamberopt.common.executor import open_executor
         from chamberopt.common.progress import step
+        from chamberopt.documents.terminal_lines import note_lines, study_lines
         from chamberopt.results.load import load_result, summary
         from chamberopt.search.study import load_study
         from chamberopt.search.study_folder import open_study_folder
@@ -64,7 +65,7 @@ def run(
             with resume_note(folder, command), open_executor(workers, cluster) as executor:
                 how_to_resume = f"to resume: {command}"
                 result, notes = _search(folder, chamber, executor, interrupt, how_to_resume)
-            lines = [*_result_lines(result), *console.note_lines(notes)]
+            lines = [*study_lines(result), *note_lines(notes)]
             console.print_result(lines, folder.path, json)
             if not json:
                 show, best = quoted("report", folder.path), folder.path / "best.toml"
@@ -125,34 +126,3 @@ def _candidates_at_once(study: Study, chamber: Chamber) -> int:
         text = f"there is memory for {count} of the {settings.batch} candidates of optimizer.batch"
         console.print_remarks([f"{text} at a time; the others wait, and figures stay the same"])
     return count
-
-
-def _result_lines(result: StudyResult) -> list[str]:
-    from chamberopt.common.number_text import plain
-
-    study, start, best = result.study, result.start, result.best
-    lines = [f"{'parameter':34}{'start':>12}{'best':>12}"]
-    for name in study.vary:
-        values = (f"{plain(one.parameters[name], 6):>12}" for one in (start, best))
-        lines.append(f"{name:34}{''.join(values)}")
-    for title, one in (("start", start), ("best", best)):
-        limits = console.zone_lines(one.design, one.evaluation)
-        lines += ["", title, *console.evaluation_lines(one.evaluation), *limits]
-    verdict = "better than the start" if result.improved else "within the noise of the start"
-    if result.gain.in_words:
-        verdict = "the objective of the start or of the best design is not known"
-    lines += ["", f"{console.estimate_line('gain', result.gain)}: {verdict}"]
-    if result.sensitivity:
-        lines += ["", *result.sensitivity.sentences(), ""]
-    if study.objective.pareto:
-        names = " and ".join(study.objective.pareto)
-        lines += [f"the Pareto front of {names}: pareto.csv, pareto.png", ""]
-    replicas, seconds = best.evaluation.replicas, study.design.process.recorded_time
-    effort = console.replicas_text(study.at_search_accuracy(study.design))
-    if result.given_up:
-        effort += f"; {study.first_look} where they showed that a candidate is worse"
-    return [
-        *lines,
-        f"± 95 % intervals; start and best: {replicas} replicas of {seconds:g} s with seeds of "
-        f"their own; candidates of the search in history.csv: {effort}",
-    ]

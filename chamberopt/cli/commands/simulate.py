@@ -35,6 +35,8 @@ def simulate(
     from chamberopt.cli.teller import TerminalTeller
     from chamberopt.common.executor import open_executor
     from chamberopt.design.load import load_design
+    from chamberopt.documents.terminal_lines import evaluation_lines, note_lines, zone_limit_lines
+    from chamberopt.documents.tolerances import tolerance_lines
     from chamberopt.peening.tolerances import plan_tolerances
     from chamberopt.workflows.simulate import simulate_design
 
@@ -51,11 +53,9 @@ def simulate(
             candidate, folder, executor, TerminalTeller(), analytic=analytic, tolerances=tolerances
         )
     console.print_remarks(done.remarks)
-    notes = console.note_lines(
-        [*map(str, done.advice), *done.chamber.notes, *done.evaluation.notes]
-    )
-    limits = console.zone_lines(done.design, done.evaluation)
-    lines = [*console.evaluation_lines(done.evaluation), *limits, *notes]
+    notes = note_lines([*map(str, done.advice), *done.chamber.notes, *done.evaluation.notes])
+    limits = zone_limit_lines(done.design, done.evaluation)
+    lines = [*evaluation_lines(done.evaluation), *limits, *notes]
     if done.tolerances:
-        lines += ["", *console.tolerance_lines(done.tolerances)]
+        lines += ["", *tolerance_lines(done.tolerances)]
     console.print_result(lines, folder, json)

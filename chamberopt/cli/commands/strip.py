@@ -65,6 +65,7 @@ def strip(
     from chamberopt.design.load import load_design
     from chamberopt.design.zones import LID
     from chamberopt.documents.strip import strip_lines
+    from chamberopt.documents.terminal_lines import note_lines
     from chamberopt.peening.virtual_strip import peen_strip, strip_in_lid, strip_in_zone
     from chamberopt.workflows.save_strip import save_strip
     from chamberopt.workflows.simulate import resolve_effects
@@ -94,7 +95,7 @@ def strip(
             peened = peen_strip(setting, chamber, executor, progress)
         with step("writing and drawing"):
             save_strip(folder, peened)
-    notes = console.note_lines([*map(str, advice), *peened.notes])
+    notes = note_lines([*map(str, advice), *peened.notes])
     console.print_result([*strip_lines(peened), *notes], folder, json, "strip.json")
 
 

@@ -50,8 +50,8 @@ def sweep(
     from chamberopt.chamber.build import build_chamber
     from chamberopt.cli.teller import TerminalTeller
     from chamberopt.common.executor import open_executor
-    from chamberopt.common.number_text import plain
     from chamberopt.common.progress import step
+    from chamberopt.documents.terminal_lines import note_lines, sweep_lines
     from chamberopt.results.write import best_row_note
     from chamberopt.search.run_sweep import plan_sweep, run_sweep
     from chamberopt.search.study import load_study
@@ -84,20 +84,12 @@ def sweep(
             result = run_sweep(loaded, plan, folder, executor, progress)
         with step("writing and drawing"):
             console.print_remarks(save_sweep(folder.path, result))
-    effort = console.replicas_text(loaded.at_search_accuracy(loaded.design))
-    lines = [f"{len(result.trials)} candidates in {result.seconds:.0f} s, {effort} each"]
-    best = result.best
-    if best is not None and best.objective is not None:
-        lines += ["", f"best, number {best.number + 1}"]
-        lines += [f"{name:34}{plain(value, 5):>12}" for name, value in best.parameters.items()]
-        estimates = {loaded.objective.goals[0]: best.objective, **best.metrics}
-        lines += [console.estimate_line(name, estimate) for name, estimate in estimates.items()]
     notes = [*map(str, advice)]
     failed = [trial for trial in result.trials if trial.objective is None]
     if failed:
         notes.append(f"{len(failed)} candidates failed, the first because: {failed[0].reason}")
     notes.append(best_row_note(result))
-    console.print_result([*lines, *console.note_lines(notes)], folder.path, json)
+    console.print_result([*sweep_lines(result), *note_lines(notes)], folder.path, json)
 
 
 def _workers_that_fit(study: Study, chamber: Chamber, wanted: int | None) -> int | None:

@@ -1,0 +1,99 @@
+"""What is said of an evaluation, of a study and of a sweep on a terminal: a figure a line."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+from chamberopt.common.number_text import estimate_text, plain
+from chamberopt.search.study.constraints import judge_zones
+
+if TYPE_CHECKING:
+    from chamberopt.common.estimate import Estimate
+    from chamberopt.design.load import Design
+    from chamberopt.search.run_study import StudyResult
+    from chamberopt.search.run_sweep import SweepResult
+    from chamberopt.simulation.evaluation import Evaluation
+
+
+def estimate_line(name: str, estimate: Estimate) -> str:
+    """The estimate with its interval behind its name."""
+    return f"{name:34}{estimate_text(estimate)}"
+
+
+def evaluation_lines(evaluation: Evaluation) -> list[str]:
+    """Objective and metrics, one line each, with their 95 % intervals; last the gauge."""
+    rows = {evaluation.objective_name: evaluation.objective, **evaluation.metrics}
+    lines = [estimate_line(name, estimate) for name, estimate in rows.items()]
+    found = evaluation.resolution
+    return [
+        *lines,
+        f"{'gauge_mm2':34}{plain(evaluation.gauge_mm2)}: area of the windows; the median window "
+        f"has {plain(found.dents, 2)} dents",
+    ]
+
+
+def zone_limit_lines(design: Design, evaluation: Evaluation) -> list[str]:
+    """Whether the limits of each zone are met, a line each."""
+    return [
+        f"zone {zone}: {row['key']} {row['limit']:g}: {row['standing']} "
+        f"({row['metric']} {estimate_text(evaluation.metrics[row['metric']])})"
+        for zone, rows in judge_zones(design, evaluation.metrics).items()
+        for row in rows
+    ]
+
+
+def note_lines(notes: Iterable[str]) -> list[str]:
+    """A line for each note."""
+    return [f"note: {note}" for note in notes]
+
+
+def replicas_text(design: Design) -> str:
+    """How many replicas a design asks for, in words."""
+    accuracy = design.process.accuracy
+    if accuracy.objective_half_width is not None:
+        return f"as many replicas as give ± {accuracy.objective_half_width:g}"
+    return f"{accuracy.replicas} replicas of {design.process.recorded_time:g} s"
+
+
+def study_lines(result: StudyResult) -> list[str]:
+    """Parameters and figures of start and best, the gain, and the effort."""
+    study, start, best = result.study, result.start, result.best
+    lines = [f"{'parameter':34}{'start':>12}{'best':>12}"]
+    for name in study.vary:
+        values = (f"{plain(one.parameters[name], 6):>12}" for one in (start, best))
+        lines.append(f"{name:34}{''.join(values)}")
+    for title, one in (("start", start), ("best", best)):
+        limits = zone_limit_lines(one.design, one.evaluation)
+        lines += ["", title, *evaluation_lines(one.evaluation), *limits]
+    verdict = "better than the start" if result.improved else "within the noise of the start"
+    if result.gain.in_words:
+        verdict = "the objective of the start or of the best design is not known"
+    lines += ["", f"{estimate_line('gain', result.gain)}: {verdict}"]
+    if result.sensitivity:
+        lines += ["", *result.sensitivity.sentences(), ""]
+    if study.objective.pareto:
+        names = " and ".join(study.objective.pareto)
+        lines += [f"the Pareto front of {names}: pareto.csv, pareto.png", ""]
+    replicas, seconds = best.evaluation.replicas, study.design.process.recorded_time
+    effort = replicas_text(study.at_search_accuracy(study.design))
+    if result.given_up:
+        effort += f"; {study.first_look} where they showed that a candidate is worse"
+    return [
+        *lines,
+        f"± 95 % intervals; start and best: {replicas} replicas of {seconds:g} s with seeds of "
+        f"their own; candidates of the search in history.csv: {effort}",
+    ]
+
+
+def sweep_lines(result: SweepResult) -> list[str]:
+    """The effort, and the best candidate with its figures."""
+    study, best = result.study, result.best
+    effort = replicas_text(study.at_search_accuracy(study.design))
+    lines = [f"{len(result.trials)} candidates in {result.seconds:.0f} s, {effort} each"]
+    if best is not None and best.objective is not None:
+        lines += ["", f"best, number {best.number + 1}"]
+        lines += [f"{name:34}{plain(value, 5):>12}" for name, value in best.parameters.items()]
+        estimates = {study.objective.goals[0]: best.objective, **best.metrics}
+        lines += [estimate_line(name, estimate) for name, estimate in estimates.items()]
+    return lines
