@@ -67,9 +67,8 @@ def evaluate_calibrated(
 ) -> Evaluation:
     """Evaluate as `evaluate`, with its arguments, and with the errors of the calibration."""
     of_all = RunsProgress(progress, 1 + len(moved_designs(design)))
-    known, is_analytic = known or ReplicaSet(), cavity is not None
-    runs = Variations(design, chamber, executor, of_all, plan, is_analytic, known)
-    return with_open_errors(runs)
+    known = known or ReplicaSet()
+    return with_open_errors(Variations(design, chamber, executor, of_all, plan, cavity, known))
 
 
 def with_open_errors(runs: Variations) -> Evaluation:

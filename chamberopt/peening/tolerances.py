@@ -26,6 +26,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from chamberopt.chamber.analytic import analytic_cavity
 from chamberopt.chamber.build import build_chamber
 from chamberopt.common.errors import InputError, UnreadableError
 from chamberopt.common.estimate import (
@@ -222,7 +223,8 @@ def simulate_tolerances(
     moved = [one for one in numbers if one.name != TREATMENT_TIME]
     count = 1 + len(moved_designs(design)) + len(moved) + bool(moved)
     of_all = RunsProgress(progress, count)
-    runs = Variations(design, chamber, executor, of_all, analytic=analytic)
+    cavity = analytic_cavity(design, chamber) if analytic else None
+    runs = Variations(design, chamber, executor, of_all, cavity=cavity)
     nominal = with_open_errors(runs)
 
     def evaluate(changed: Design) -> Evaluation:
@@ -281,10 +283,10 @@ def find_tolerances(
     found = {name: one.over_the_box() for name, one in figures.items()}
     if not worst_for:
         return ToleranceResult(numbers, found, "", {}, tuple(notes))
-    signs = figures[worst_for].signs()
+    slopes = figures[worst_for].slopes
     corner = {
-        one.name: one.low if sign > 0.0 else one.high
-        for one, sign in zip(numbers, signs, strict=True)
+        one.name: one.low if slope > 0.0 else one.high
+        for one, slope in zip(numbers, slopes, strict=True)
     }
     try:
         there = design.changed({**corner, "tolerances": None})  # which would lie about the corner
@@ -328,24 +330,20 @@ class _Figure:
         for x in numbers:
             self._on[x.name] = with_errors_of(nominal, on_scale(runs[x.name], self._scale))
         at_nominal = nominal.value
-        self._slopes = np.array([(self._on[x.name].value - at_nominal) / x.step for x in numbers])
-
-    def signs(self) -> np.ndarray:
-        """Signs of the slopes g, (k,)."""
-        return np.asarray(np.sign(self._slopes))
+        self.slopes = np.array([(self._on[x.name].value - at_nominal) / x.step for x in numbers])
 
     def over_the_box(self) -> ToleratedFigure:
         """The figure over the box, without its worst corner."""
         ends = np.array([[x.moved(x.low), x.moved(x.high)] for x in self._numbers])
         points = box_points(self._numbers)
-        order = np.argsort(points @ self._slopes, kind="stable")
+        order = np.argsort(points @ self.slopes, kind="stable")
         quantiles = []
         for share in QUANTILES:
             first = round(len(points) * (share - 0.5 * NEAR))
             near = order[first : first + round(len(points) * NEAR)]
             quantiles.append(self._possible(self._at(points[near].mean(axis=0))))
-        lowest = np.where(self._slopes > 0.0, *ends.T)
-        highest = np.where(self._slopes > 0.0, *ends.T[::-1])
+        lowest = np.where(self.slopes > 0.0, *ends.T)
+        highest = np.where(self.slopes > 0.0, *ends.T[::-1])
         extremes = [self._possible(self._at(corner)) for corner in (lowest, highest)]
         effects = {
             x.name: (self._change(k, ends[k, 0]), self._change(k, ends[k, 1]))

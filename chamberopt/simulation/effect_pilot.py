@@ -162,26 +162,26 @@ def with_effects_resolved(
     return _switched(complete, dict.fromkeys(off, False)), advice
 
 
+@dataclass
 class _Pilot:
     """Short runs of a design with some of its effects switched."""
 
-    def __init__(
-        self,
-        design: Design,
-        chamber: Chamber,
-        executor: Executor,
-        progress: Progress | None,
-        prepare: Prepare | None,
-    ) -> None:
-        self.design, self.chamber, self._mesh = design, chamber, chamber_mesh(chamber)
-        require_figures(design, chamber, self._mesh)
+    design: Design
+    chamber: Chamber
+    executor: Executor
+    progress: Progress | None
+    prepare: Prepare | None
+
+    def __post_init__(self) -> None:
+        design, chamber, self.mesh = self.design, self.chamber, chamber_mesh(self.chamber)
+        require_figures(design, chamber, self.mesh)
         self.effects = _switchable(design, chamber)
-        self._executor, self._prepare, self._time = executor, prepare, FIRST_TIME
+        self.time = FIRST_TIME
         # A short run for the time, a run without a change, and a run for each effect.
-        self._progress = RunsProgress(progress, 2 + len(self.effects))
+        self.runs = RunsProgress(self.progress, 2 + len(self.effects))
         target = exposed_target(chamber)
         hits = sum(int(target[one.triangle].sum()) for one in self._simulate({})[1])
-        self._time = float(np.clip(FIRST_TIME * IMPACTS / max(hits, 1), FIRST_TIME, MAX_TIME))
+        self.time = float(np.clip(FIRST_TIME * IMPACTS / max(hits, 1), FIRST_TIME, MAX_TIME))
         self.unchanged = self.measure({})
 
     def advise(self) -> list[Advice]:
@@ -197,7 +197,7 @@ class _Pilot:
 
     def measure(self, effects: Mapping[str, bool]) -> dict[str, np.ndarray]:
         """The figures in MEASURED of every replica, (REPLICAS,), with some effects switched."""
-        self._progress.ended += 1
+        self.runs.ended += 1
         variant, replicas = self._simulate(effects)
         return _measure(variant, self.chamber, replicas)
 
@@ -205,15 +205,15 @@ class _Pilot:
         """The design with some effects switched, and the impacts of its replicas."""
         accuracy = {
             "replicas": REPLICAS,
-            "simulated_time_s": self._time,
+            "simulated_time_s": self.time,
             "objective_half_width": None,
         }
         values = {f"process.accuracy.{name}": value for name, value in accuracy.items()}
         variant = _switched(self.design, effects).changed(values)
-        if self._prepare is not None:
-            self._prepare(variant)
-        setting = ReplicaSetting(variant, self.chamber, self._mesh)
-        replicas = simulate_replicas(setting, self._executor, self._progress)
+        if self.prepare is not None:
+            self.prepare(variant)
+        setting = ReplicaSetting(variant, self.chamber, self.mesh)
+        replicas = simulate_replicas(setting, self.executor, self.runs)
         return variant, [one.hits for one in replicas]
 
 

@@ -128,10 +128,10 @@ class _Run:
         setting = ReplicaSetting(design, chamber, self.cavity or mesh)
         self.setting = share(self.executor, setting)
         self.timings = {"simulate": 0.0, "coverage": 0.0}
-        window = require_figures(design, chamber, mesh)
+        require_figures(design, chamber, mesh)
 
         def see() -> tuple[SeenDents, dict[str, SeenDents]]:
-            field = self.known.target or find_target_field(chamber, mesh, window)
+            field = self.known.target or prepare_target(design, chamber, mesh)
             return SeenDents.none(field), see_zones(design, chamber, mesh)
 
         # The dents of a replica are looked at while others are simulated, so that no worker waits.
@@ -210,12 +210,11 @@ class _Run:
         )
 
 
-def require_figures(design: Design, chamber: Chamber, mesh: TriangleMesh) -> WindowSetting:
-    """As `window_setting`; InputError too if a window is too wide, or no ball touches a zone."""
+def require_figures(design: Design, chamber: Chamber, mesh: TriangleMesh) -> None:
+    """Raise InputError as `window_setting`, if windows are too wide, or no ball touches a zone."""
     window = window_setting(design, chamber)
     require_narrow_gauge(chamber, window)
     require_touchable_zones(chamber, mesh, 0.5 * window.ball)
-    return window
 
 
 def prepare_target(design: Design, chamber: Chamber, mesh: TriangleMesh) -> TargetField:

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from chamberopt.common.progress import Progress
     from chamberopt.design.load import Design
     from chamberopt.simulation.evaluation import Evaluation
+    from sim_core import AnalyticCavity
 
 
 @dataclass
@@ -50,11 +51,12 @@ class Variations:
     executor: Executor
     progress: RunsProgress
     plan: ReplicaPlan | None = None
-    analytic: bool = False  # whether exact cavities take the place of meshes
+    cavity: AnalyticCavity | None = None  # exact cavity in the place of the chamber's mesh
     known: ReplicaSet = field(default_factory=ReplicaSet)  # replicas of the design itself
 
     def __post_init__(self) -> None:
-        self.nominal = self._evaluate(self.design, self.chamber, self.plan, self.known)
+        how = self.executor, self.progress, self.plan, self.cavity, self.known
+        self.nominal = evaluate(self.design, self.chamber, *how)
 
     def run(
         self, design: Design, chamber: Chamber | None = None, replicas: Sequence[Replica] = ()
@@ -68,10 +70,6 @@ class Variations:
         self.progress.ended += not replicas
         nominal, known = self.nominal, ReplicaSet(list(replicas))
         plan = ReplicaPlan(nominal.replicas, nominal.stream, nominal.objective_name)
-        return self._evaluate(design, chamber or self.chamber, plan, known)
-
-    def _evaluate(
-        self, design: Design, chamber: Chamber, plan: ReplicaPlan | None, known: ReplicaSet
-    ) -> Evaluation:
-        cavity = analytic_cavity(design, chamber) if self.analytic else None
-        return evaluate(design, chamber, self.executor, self.progress, plan, cavity, known)
+        cavity = analytic_cavity(design, chamber) if self.cavity and chamber else self.cavity
+        how = self.executor, self.progress, plan, cavity, known
+        return evaluate(design, chamber or self.chamber, *how)
