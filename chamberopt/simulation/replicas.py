@@ -63,8 +63,9 @@ def simulate_replicas(
     setting: ReplicaSetting, executor: Executor, progress: Progress | None = None
 ) -> list[Replica]:
     """Simulate as many replicas as the design asks for."""
-    process, found = setting.design.process, list[Replica]()
-    count, shared = process.accuracy.replicas, share(executor, setting)
+    found: list[Replica] = []
+    process, shared = setting.design.process, share(executor, setting)
+    count = process.accuracy.replicas
     how = process.seed, executor, "search", range(count), count
     for replica in run_in_order(simulate_replica, shared, *how):
         found.append(replica)

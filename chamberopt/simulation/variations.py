@@ -33,7 +33,7 @@ class RunsProgress:
     ended: int = 0  # number of runs before the present run
 
     def __call__(self, done: int, total: int, best: float | None) -> None:
-        """Count the replicas of the present run that are done, and those of the runs before."""
+        """Count the replicas that are done, of the present run and of the runs before it."""
         if self.progress:
             runs = max(self.runs, self.ended + 1)
             self.progress(self.ended * total + done, runs * total, best)

@@ -42,15 +42,15 @@ Prepare = Callable[[Design, "Chamber", "AnalyticCavity | None"], "tuple[Design, 
 
 @dataclass(frozen=True)
 class Candidate:
-    """One argument of `compare`.
+    """An argument of `compare`.
 
     Args:
         label: short name, unique among the candidates.
-        path: as given.
+        path: path as given.
         design: the design to compare.
-        result: as read from the folder; None for a design.
-        missing: whether it has to be simulated.
-        chamber: built where it has to be simulated.
+        result: the result in the folder; None for a design.
+        missing: whether the design has to be simulated.
+        chamber: the chamber of a design that has to be simulated.
     """
 
     label: str
@@ -110,10 +110,11 @@ def read_candidates(
 def simulate_missing(
     candidates: Sequence[Candidate], folder: Path, executor: Executor, prepare: Prepare
 ) -> tuple[list[Result], list[str]]:
-    """Return the result of each candidate, and remarks for the user.
+    """Simulate where needed; the result of each candidate, and remarks for the user.
 
     Designs are simulated with seed, stream and number of replicas of the first candidate. Results
-    of another treatment time keep their own. New results are written to folders inside `folder`.
+    of another treatment time keep their own settings. New results are written to folders inside
+    `folder`.
     """
     results: list[Result] = []
     remarks: list[str] = []
@@ -153,7 +154,7 @@ def _simulate(
 
 
 def _with_seeds(design: Design, settings: SeedSettings) -> Design:
-    """Return the design with these settings, so that its file tells what was simulated."""
+    """The design with the settings, so that its file tells how it was simulated."""
     values: dict[str, Any] = {"process.seed": settings.seed}
     if settings.plan.count is not None:
         values["process.accuracy.replicas"] = settings.plan.count
@@ -193,7 +194,7 @@ def _with_treatment_time(one: Candidate, seconds: float) -> Candidate:
 
 
 def _named(path: Path) -> Path:
-    """Return the path that names a candidate: a design without .toml, the folder of a result."""
+    """The path that names a candidate: a design without .toml, or the folder of a result."""
     if path.suffix == ".toml":
         return path.with_suffix("")
     return path.parent if path.name == "result.json" else path
@@ -217,7 +218,7 @@ def _seed_settings(result: Result) -> SeedSettings:
 
 
 def _folder_names(candidates: Sequence[Candidate]) -> list[str]:
-    """Return the last name of each path, with a number where two are the same."""
+    """The last name of each path, with a number where two names are the same."""
     names: list[str] = []
     for one in candidates:
         name, number = _named(one.path).resolve().name, 1
