@@ -97,7 +97,7 @@ class Estimate:
         return replace(found, pseudovalues=pseudovalues, bias=bias, shared=shared)
 
     def not_known(self, in_words: str) -> Estimate:
-        """The same value without an interval, and the words in its place."""
+        """The value without an interval, with words in the interval's place."""
         return replace(self, half_width=math.inf, in_words=in_words)
 
     def at_least_as_wide(self, half_width: float) -> Estimate:

@@ -1,8 +1,8 @@
-"""[tolerances] of a design: how far its numbers may lie from what the file says, in production.
+"""Tolerances of a design: largest deviations of its numbers in production.
 
 [tolerances]
-amplitude_pv_um = 4                      # the number given, 4 µm more or less
-"shot.mass_g" = ["-10 %", "0 %"]         # what it loses until shot is added
+amplitude_pv_um = 4                      # 4 µm more or less than given
+"shot.mass_g" = ["-10 %", "0 %"]         # the loss until shot is added
 "process.treatment_time_s" = "2 %"
 """
 

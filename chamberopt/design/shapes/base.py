@@ -1,6 +1,6 @@
-"""What chambers of several shapes have in common.
+"""Base classes of chambers of several shapes.
 
-Each shape is a file of its own beside this one, entered in registry.py.
+Each shape is a file beside this file, entered in registry.py.
 
 ChamberTable          keys of every chamber: shape, sonotrode distance, holes, deflectors
   WalledChamber       + side walls all round, which may lean

@@ -212,7 +212,7 @@ def _bend_differences(
     """Matrices of l dS_ee, sqrt(l² + h²) dS_em, h dS_mm at the smooth edges.
 
     At the apex of a cone the sum of both S_ee replaces the difference, because a cone is straight
-    along its edges, and dS_em is zero.
+    along its edges, and dS_em counts as zero.
     """
     sides, length = edges.sides[smooth], edges.length[smooth]
     height = facets.height.ravel()[sides].min(axis=1)
