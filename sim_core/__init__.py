@@ -2,6 +2,26 @@
 
 Build a Scene from a TriangleMesh (or a cylinder_cavity, prism_cavity or periodic_box), Balls and
 Physics, then simulate it. All quantities are in SI units.
+
+Example: steel balls in a box whose floor vibrates, with the impacts on the ceiling recorded.
+
+    >>> import numpy as np
+    >>> FLOOR, CEILING, WALLS = 0, 1, 2
+    >>> square = np.array([[0.0, 0.0], [0.03, 0.0], [0.03, 0.03], [0.0, 0.03]])
+    >>> box = prism_cavity(square, bottom=0.0, top=0.05, tags=[FLOOR, CEILING, WALLS])
+    >>> rng = np.random.default_rng(seed=1)
+    >>> positions = pack_balls(box, 20, diameter=0.003, rng=rng, clear=1e-4)
+    >>> balls = Balls(positions, np.zeros((20, 3)), diameter=0.003, density=7800.0)
+    >>> steel = (0.9, 1.0)
+    >>> physics = Physics(
+    ...     gravity=Gravity(),
+    ...     restitution=Restitution(surfaces=[steel] * 3, balls=steel),
+    ...     vibration=Vibration(tag=FLOOR, amplitude=50e-6, frequency=20e3),
+    ... )
+    >>> scene = Scene(box, balls, physics, duration=0.5, warmup=0.5, record=[CEILING])
+    >>> impacts = simulate(scene).impacts
+    >>> len(impacts.normal_speed) > 100, impacts.position.shape[1]
+    (True, 3)
 """
 
 from sim_core.balls import Balls

@@ -1,4 +1,4 @@
-"""The shot: spheres of one size or a few, with positions, velocities and, with friction, spins."""
+"""The shot: spheres of one or a few sizes, with positions, velocities and, with friction, spins."""
 
 from dataclasses import dataclass
 
@@ -6,20 +6,22 @@ import numpy as np
 
 from sim_core.errors import SceneError, number
 
-MAX_SIZES = 8  # each has obstacles of its own; a few sizes stand for a distribution well
-MAX_SPEED = 1e6  # m/s: shot has 20; the filters' float32 squares of much more overflow
+MAX_SIZES = 8  # each size has its own obstacles; a few sizes stand for a distribution well
+# m/s: shot flies at 20; the float32 filters overflow on squares of much faster speeds
+MAX_SPEED = 1e6
 
 
 @dataclass(frozen=True)
 class Balls:
-    """n balls, all alike or of a few sizes.
+    """The n balls of a scene.
 
     Args:
-        positions: of the centres [m], shape (n, 3).
-        velocities: in m/s, shape (n, 3).
-        diameter: one number [m], or one for each ball, shape (n,).
-        density: one number [kg/m³], or one for each ball, shape (n,).
-        spins: in rad/s, shape (n, 3), only with Physics.friction, where None is no spin.
+        positions: positions of the ball centres [m], shape (n, 3).
+        velocities: velocities of the balls [m/s], shape (n, 3).
+        diameter: one diameter [m] for all balls, or an array of shape (n,).
+        density: one density [kg/m³] for all balls, or an array of shape (n,).
+        spins: angular velocities [rad/s], shape (n, 3). They need Physics.friction. None means no
+            spin.
 
     Raises:
         SceneError: for wrong shapes, numbers that are not finite, speeds beyond MAX_SPEED, or more
@@ -79,7 +81,7 @@ class Balls:
 
     @property
     def alike(self) -> bool:
-        """True when all balls have the same diameter and density."""
+        """True if all balls have the same diameter and density."""
         return np.ndim(self.diameter) == 0 and np.ndim(self.density) == 0
 
     @property
@@ -104,7 +106,7 @@ class Balls:
 
     @property
     def ball_mass(self) -> float:
-        """Mean mass of a ball [kg]."""
+        """Mean mass of the balls [kg]."""
         return float(self.masses.mean())
 
     @property
@@ -114,7 +116,7 @@ class Balls:
 
 
 def _one_or_each(name: str, given: object, count: tuple[int, ...]) -> float | np.ndarray:
-    """One positive number, also if all balls have the same, or one for each ball, shape (n,)."""
+    """One positive number if all balls share it, otherwise an array of shape (n,)."""
     if np.ndim(given) == 0:  # type: ignore[arg-type]
         values = np.array([number(f"balls.{name}", given)])
     else:

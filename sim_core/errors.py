@@ -9,11 +9,11 @@ NOT_NUMBERS = (bool, np.bool_, str, bytes)
 
 
 class SceneError(ValueError):
-    """The scene cannot be simulated; the message names ball, triangle or field, and remedy."""
+    """Error for an impossible scene. It names the ball, triangle or field, and the remedy."""
 
 
 class SimulationError(RuntimeError):
-    """An invariant is broken or a ball cannot be followed; the message says what to try."""
+    """Error for a broken invariant or a lost ball. The message says what to try."""
 
 
 def number(name: str, value: object) -> float:
@@ -32,17 +32,17 @@ def surface_table(
     """Two coefficients of an effect for each surface tag, and for ball on ball.
 
     Args:
-        effect: name of the effect, for messages.
-        form: what the two numbers are, e.g. "(C0, v0)".
-        surfaces: as given, one pair for each tag.
-        balls: as given, one pair.
+        effect: name of the effect in messages.
+        form: names of the two numbers, e.g. "(C0, v0)".
+        surfaces: user input with one pair for each tag.
+        balls: user input with one pair.
         tags: number of tags that need a pair.
 
     Returns:
         ``surfaces`` as an array of shape (tags or more, 2), and ``balls`` as two floats.
 
     Raises:
-        SceneError: for a missing tag, or anything that is not a number.
+        SceneError: for a missing tag, or input that is not a number.
     """
     try:
         given = (*np.array(surfaces, dtype=object).ravel(), *balls)

@@ -4,11 +4,11 @@ Notation:
     x(t) = base + velocity t + ½ a t²: position of a ball [m]; ``motion`` holds base (0:3) [m] and
         velocity (3:6) [m/s] of each ball, shape (n, 6)
     t: time on the window's clock [s], one clock for all balls
-    a: acceleration [m/s²], that of gravity unless the ball is in contact mode
+    a: acceleration [m/s²], equal to gravity unless the ball is in contact mode
 
-The difference between two balls is then a straight line, pairs need no clock of their own, and the
-numbers of a ball change only at its events. The clock's zero moves on every window, so that t stays
-small and its rounding with it.
+The difference between two balls is a straight line in this frame. Pairs need no clock of their own,
+and the numbers of a ball change only at its events. The clock's zero moves on every window, so that
+t and its rounding stay small.
 """
 
 from typing import NamedTuple
@@ -20,17 +20,17 @@ from sim_core.effects.gravity import Gravity
 from sim_core.numerics.jit import inlined, jit
 from sim_core.numerics.vec3 import Vec3, add_scaled
 
-# s: rounding of t is 3e-18 s, and a ball at 20 m/s moves 0.4 m. A longer window loses digits, a
-# shorter one costs more changes of the clock.
+# s: rounding of t is 3e-18 s, and a ball at 20 m/s moves 0.4 m. A longer window loses digits, and a
+# shorter window costs more changes of the clock.
 WINDOW = 0.02
 
 
 class BallEvent(NamedTuple):
-    """A ball, and the time at which something happens to it.
+    """A ball, and the time of its event.
 
     Args:
-        time: on the window's clock [s].
-        time_since_start: the same since the start of the scene [s].
+        time: time on the window's clock [s].
+        time_since_start: time since the start of the scene [s].
     """
 
     ball: int
@@ -67,7 +67,7 @@ def state_under(motion: np.ndarray, ball: int, time: float, acceleration: Vec3) 
 
 @inlined
 def change_velocity(motion: np.ndarray, ball: int, time: float, change: Vec3) -> None:
-    """Change a ball's velocity by ``change`` [m/s] at ``time``; its position then stays."""
+    """Change a ball's velocity by ``change`` [m/s] at ``time``, with its position kept."""
     here = free_fall_position(motion, ball, time)
     for axis, (now, add) in enumerate(((here.x, change.x), (here.y, change.y), (here.z, change.z))):
         velocity = motion[ball, 3 + axis] + add
@@ -92,7 +92,7 @@ def set_path(
 def shift_motion(
     motion: np.ndarray, window: float, gravity: Gravity | None, contact: ContactState | None = None
 ) -> None:
-    """Move the clock's zero forward by ``window`` [s]."""
+    """Move the clock's zero of the motion forward by ``window`` [s]."""
     for ball in range(len(motion)):
         acceleration = ball_acceleration(contact, ball, gravity)
         for axis, a in enumerate((acceleration.x, acceleration.y, acceleration.z)):

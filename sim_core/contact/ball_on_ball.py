@@ -1,11 +1,14 @@
-"""Two balls meet, and at least one of them is not in free flight.
+"""Collision of two balls of which at least one is in contact mode.
 
-A fast hit is the ordinary one: what a surface behind the ball does to it is the next event. For a
-slow one (below Restitution.elastic_below) a ball that lies still is a still surface: friction holds
-it, and what would be handed on is below elastic_below²/2 of energy per mass. Between balls on the
-move a slow hit is a single constrained impact. A ball on supports takes of an impulse along d only
-what they leave of it, P(d), so its share of the inverse mass is |P(d)|² in place of 1, and elastic
-means elastic for the two together. Slow hits between moving balls do not rub.
+A fast hit is an ordinary collision. The reaction of a surface behind a ball is the next event.
+
+A slow hit is slower than Restitution.elastic_below. A ball that lies still acts as a still surface
+for slow hits: friction holds it, and the momentum that is not handed on is below elastic_below²/2
+of energy per mass. A slow hit between two moving balls is a single constrained impact: a ball on
+supports changes its velocity only by the projection P(d) of an impulse along d onto the directions
+that its supports leave free. Its share of the inverse mass is therefore |P(d)|² in place of 1, and
+an elastic hit keeps the energy of the two balls together. Slow hits between moving balls have no
+friction.
 
 Source: B. Brogliato, Nonsmooth Mechanics (2016), section 5.2.
 """
@@ -27,14 +30,14 @@ from sim_core.motion import BallEvent, BallState, state_under
 from sim_core.numerics.jit import jit
 from sim_core.numerics.vec3 import Vec3, dot, scaled, sub, vec3_at
 
-# m/s. Balls in touch that part more slowly are in touch for good. Slow hits part them twice as
-# fast: two that went on as one (e = 0) would meet for ever by rounding.
+# m/s. Balls in touch that part more slowly stay in touch. Slow hits part two balls twice as fast,
+# because rounding would make two balls with e = 0 meet again for ever.
 PARTING = 1e-9
 
 
 @jit
 def place(contact: ContactState, motion: np.ndarray, ball: int, time: float) -> BallState:
-    """Where a ball is [m], and its velocity [m/s], at a time of the window's clock."""
+    """Position [m] and velocity [m/s] of a ball at a time of the window's clock."""
     return state_under(motion, ball, time, vec3_at(contact.acceleration, ball))
 
 
@@ -46,7 +49,10 @@ def meet(
     two: BallEvent,
     restitution: RestitutionState | None,
 ) -> bool:
-    """Two balls meet now; True when one that lay still is moved, so that others must be woken."""
+    """Resolve the collision of two balls.
+
+    Returns: True if a ball that lay still has been moved, so that its neighbours must be woken.
+    """
     first = place(contact, motion, one.ball, one.time)
     second = place(contact, motion, two.ball, two.time)
     apart, closing = sub(second.position, first.position), sub(second.velocity, first.velocity)
@@ -54,7 +60,7 @@ def meet(
     approach = -dot(apart, closing) / distance
     if approach < -PARTING:
         return False
-    approach = max(approach, 0.0)  # pressed together without any speed
+    approach = max(approach, 0.0)  # balls that are pressed together have no approach speed
     still_one = contact.mode[one.ball] >= ASLEEP
     still_two = contact.mode[two.ball] >= ASLEEP
     slow = approach < contact.elastic_below
@@ -104,7 +110,10 @@ def _land_on_ball(
     normal: Vec3,
     rebound: float,
 ) -> None:
-    """A ball meets one that lies still, which is a surface; ``rebound`` [m/s]: its speed change."""
+    """Let a ball hit another ball that lies still and acts as a surface.
+
+    ``rebound``: change of the normal speed [m/s].
+    """
     ball = event.ball
     if contact.mode[ball] >= ASLEEP:
         return
@@ -124,7 +133,10 @@ def _land_on_ball(
 
 @jit
 def _of_balls(restitution: RestitutionState | None, speed: float) -> float:
-    """e of ball on ball at any speed [m/s], also below elastic_below; 1 without the effect."""
+    """Coefficient of restitution of ball on ball at a speed [m/s]; 1 without the effect.
+
+    The law also holds below elastic_below.
+    """
     if restitution is None:
         return 1.0
     return restitution_law(restitution.points, BALLS, speed)

@@ -1,4 +1,4 @@
-"""Freeze a ball that keeps bouncing in place; the time doubles each time at the same place."""
+"""Holding of balls that keep bouncing in place, twice as long for each further jam at a place."""
 
 import numpy as np
 
@@ -18,21 +18,22 @@ from sim_core.motion import BallEvent, BallState, state_under
 from sim_core.numerics.jit import jit
 from sim_core.numerics.vec3 import Vec3, dot, set_vec3, sub, vec3_at
 
-# Slow hits in a row at one place that are a jam. A ball that slides off another is further along
-# after a few.
+# Number of successive slow hits at one place that count as a jam. A ball that slides off another
+# ball has moved on after a few hits.
 JAM_HITS = 64
-SAME_PLACE = 0.01  # of a radius
-# s. So many hits in a shorter time are no hops under weight (see SHORTEST_HOP): a turning part
-# closes the gap.
+SAME_PLACE = 0.01  # distance within which a ball counts as in place, as a share of its radius
+# s. JAM_HITS hits in a shorter time are not hops under weight (see SHORTEST_HOP). They mean that a
+# turning part closes the gap.
 PRESS_TIME = 1e-4
-# s. What is held a second time at one place is not woken for this time, then for twice as long, ...
+# s. A ball that is held a second time at one place is not woken for this time. The time doubles
+# with each further jam.
 HOLD_TIME = 1e-3
-MAX_REPEATS = 40  # after which a ball is held for ever
+MAX_REPEATS = 40  # a ball with more jams at one place is held for ever
 
 
 @jit
 def hold_still(contact: ContactState, motion: np.ndarray, event: BallEvent, position: Vec3) -> None:
-    """Hold a ball still where it is; one that was held there before is left alone for longer."""
+    """Hold a ball still where it is, for longer if it was held there before."""
     ball, jams = event.ball, contact.jams
     if _is_elsewhere(contact, jams.position, ball, position):
         set_vec3(jams.position, ball, position)
@@ -49,9 +50,9 @@ def hold_still(contact: ContactState, motion: np.ndarray, event: BallEvent, posi
 def count_slow_hit(
     contact: ContactState, motion: np.ndarray, event: BallEvent, position: Vec3, slow: bool
 ) -> None:
-    """Count a ball's hits at one place, and hold it still when they lead nowhere.
+    """Count a ball's slow hits at one place, and hold the ball still when the hits lead nowhere.
 
-    ``slow``: whether this hit is slower than ContactState.elastic_below.
+    ``slow``: True if this hit is slower than ContactState.elastic_below.
     """
     ball, now, hits = event.ball, event.time_since_start, contact.slow_hits
     forget_left_support(contact, ball)
@@ -85,6 +86,6 @@ def count_slow_hit(
 
 @jit
 def _is_elsewhere(contact: ContactState, places: np.ndarray, ball: int, position: Vec3) -> bool:
-    """True when a position is further than SAME_PLACE from the ball's row of ``places``."""
+    """True if a position is further than SAME_PLACE from the ball's row of ``places``."""
     gone = sub(position, vec3_at(places, ball))
     return dot(gone, gone) > (SAME_PLACE * contact.radius) ** 2

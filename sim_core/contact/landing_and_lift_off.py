@@ -1,10 +1,10 @@
-"""Capture by a surface, and which supports a ball keeps as it moves on.
+"""Capture of balls by surfaces, and choice of the supports that a ball keeps as it moves on.
 
-When a rolling ball leaves its support is computed in path_end.py.
+The time at which a rolling ball leaves its support is computed in path_end.py.
 
 Notation: b: ball. n: unit normal of a surface, towards the ball. v: velocity of the ball [m/s].
-The approach speed is -n v. A ball is captured by a still surface when this is below
-ContactState.capture and gravity or its own acceleration presses it on.
+The approach speed is -n v. A still surface captures a ball if the approach speed is below
+ContactState.capture and gravity or the ball's own acceleration presses the ball on the surface.
 """
 
 import math
@@ -40,25 +40,27 @@ from sim_core.motion import BallEvent, BallState, change_velocity, set_path
 from sim_core.numerics.jit import inlined, jit
 from sim_core.numerics.vec3 import Vec3, add_scaled, cross, dot, set_vec3, vec3_at
 
-# what ends a path in contact, in place of an obstacle's number (event_queue.py has -1 and -2)
+# reasons for the end of a path in contact, used in place of an obstacle's number (event_queue.py
+# uses -1 and -2)
 PATH_GOES_ON = -1
-BRAKE_ENDS = -3  # the ball stops, or the direction of its brake is set again
+BRAKE_ENDS = -3  # the ball stops, or its resistance gets a new direction
 WAKES = -4
 LIES_STILL = -5
-RECHECK = -6  # a jammed ball looks whether the balls around it are still there
-RIDE_ENDS = -7  # the parabola of a ball that moves with a vibrating face
-LEAVES_SUPPORT = -10  # minus the number of the support
+RECHECK = -6  # a jammed ball checks the balls around it
+RIDE_ENDS = -7  # the parabola of a ball that moves with a vibrating face ends
+LEAVES_SUPPORT = -10  # LEAVES_SUPPORT minus k: the ball leaves support number k
 
-# Faces that meet at less than this angle stand for a smooth surface (cosine).
+# Cosine. Faces that meet at a smaller angle approximate a smooth surface.
 ONE_SURFACE = math.cos(math.radians(25.0))
-# A hit up to this multiple of the speed that a facet's turn gives is a landing on the next facet.
+# A hit that is at most this multiple of the speed given by a facet's turn is a landing on the next
+# facet.
 FACET_HOP = 1.05
-# of capture: how fast a ball may come down again when its plane has left what is round under it
+# Share of capture: largest speed at which a ball falls back from its plane onto a round support.
 COMES_DOWN = 0.5
-# A ball wedged between its supports and an edge, which would have to move more than ten times as
-# far as it is deep, has no way out.
+# A ball wedged between its supports and an edge has no way out if it would have to move more than
+# 1/sqrt(NO_WAY_OUT) = ten times its depth.
 NO_WAY_OUT = 0.01
-# of capture: a support from which the ball moves as slowly as this, against gravity, is kept
+# Share of capture: a ball keeps a support from which it moves more slowly against gravity.
 DETACH_TOLERANCE = 0.01
 NO_SUPPORT = -1
 LAST_LEFT = -2
@@ -66,11 +68,11 @@ LAST_LEFT = -2
 
 @jit
 def settle(contact: ContactState, motion: np.ndarray, event: BallEvent, at: BallState) -> None:
-    """Let a ball go on from ``at`` on those of its supports that hold it.
+    """Let a ball go on from the state ``at`` on those supports that hold it.
 
-    A support that is hit faster than capture is dropped, and the search finds it again at once as
-    the wall that it then is. So is a support on a ball that has begun to move: the two are an
-    ordinary pair again.
+    A support that the ball hits faster than capture is dropped. The search for contacts then finds
+    it at once as a wall. A support on a ball that has begun to move is dropped too, because the two
+    balls are an ordinary pair again.
     """
     ball, supports = event.ball, contact.supports
     contact.wake_pending[ball] = 0
@@ -131,7 +133,7 @@ def move_on(
 def impart(
     contact: ContactState, motion: np.ndarray, event: BallEvent, at: BallState, change: Vec3
 ) -> None:
-    """Change a ball's velocity by ``change`` [m/s]; on supports it keeps what they leave of it."""
+    """Change a ball's velocity by ``change`` [m/s], projected onto the cone of its supports."""
     if contact.mode[event.ball] == FLYING:
         change_velocity(motion, event.ball, event.time, change)
     else:
@@ -142,7 +144,7 @@ def impart(
 def deflect(
     contact: ContactState | None, motion: np.ndarray, event: BallEvent, at: BallState, change: Vec3
 ) -> None:
-    """The same after a hit on a surface, with contact mode or without."""
+    """Change a ball's velocity after a hit on a surface, with contact mode or without it."""
     if contact is None:
         change_velocity(motion, event.ball, event.time, change)
         return
@@ -154,10 +156,10 @@ def deflect(
 def moved_off_edge(
     contact: ContactState | None, motion: np.ndarray, event: BallEvent, at: BallState, away: Vec3
 ) -> BallState:
-    """The ball, put back to one radius from an edge that it meets.
+    """State of a ball after it is put back to one radius from an edge.
 
-    Contact is up to 1e-13 m deep there, and thousands of small hops on one edge would add up. The
-    ball goes out along the planes of its supports, not into them. ``away``: from the edge to it.
+    Rounding makes contact up to 1e-13 m deep, and thousands of small hops on one edge would add up.
+    The ball is moved along the planes of its supports. ``away``: vector from the edge to the ball.
     """
     if contact is None:
         return at
@@ -166,7 +168,7 @@ def moved_off_edge(
     if distance >= contact.radius:
         return at
     free = onto_cone(contact.supports, ball, away)
-    share = dot(free, free) / (distance * distance)  # of a step along ``free`` that leads out
+    share = dot(free, free) / (distance * distance)  # share of a step along ``free`` that leads out
     if share < NO_WAY_OUT:
         return at
     step = (contact.radius - distance) / (distance * share)
@@ -185,7 +187,10 @@ def land(
     at: BallState,
     away: Vec3,
 ) -> int:
-    """Result of a hit on a still surface: BOUNCES, ROLLS (as if both were one), or CAUGHT."""
+    """Result of a hit on a still surface: BOUNCES, ROLLS or CAUGHT.
+
+    ROLLS means that the ball goes on as if this surface and its support were the same surface.
+    """
     if contact is None:
         return BOUNCES
     scale = 1.0 / math.sqrt(dot(away, away))
@@ -204,13 +209,16 @@ def touch_down(
     at: BallState,
     normal: Vec3,
 ) -> int:
-    """Result of a hit on anything still; ``bend``: radius [m] on which the centre goes round it."""
+    """Result of a hit on any still object: BOUNCES, ROLLS or CAUGHT.
+
+    ``bend``: radius [m] of the centre's path round the object.
+    """
     ball, supports, velocity = event.ball, contact.supports, at.velocity
     speed = math.sqrt(dot(velocity, velocity))
     approach = max(0.0, -dot(normal, velocity))
     presses = dot(normal, contact.gravity) < 0.0
     reach = math.inf
-    if bend < math.inf:  # so far that the ball comes down again more slowly than capture
+    if bend < math.inf:  # a ball on a round object comes down again more slowly than capture
         weight = math.sqrt(dot(contact.gravity, contact.gravity))
         reach = (
             COMES_DOWN
@@ -231,13 +239,14 @@ def touch_down(
                 drop_support(supports, ball, neighbour)
             flat = add_scaled(velocity, approach, normal)
             size = math.sqrt(dot(flat, flat))
-            if not stays and size > 0.5 * speed:  # turned into the new face's plane, not slowed
+            # the velocity is turned into the new face's plane, not slowed
+            if not stays and size > 0.5 * speed:
                 velocity = Vec3(flat.x * speed / size, flat.y * speed / size, flat.z * speed / size)
             add_support(supports, ball, obstacle, normal, at.position, reach)
             settle(contact, motion, event, BallState(at.position, velocity))
             return ROLLS
     acceleration = vec3_at(contact.acceleration, ball)
-    supported = supports.number[ball] > 0  # between two surfaces it would bounce without end
+    supported = supports.number[ball] > 0  # a ball between two surfaces would bounce without end
     if approach < contact.capture and (presses or supported or dot(normal, acceleration) < 0.0):
         add_support(supports, ball, obstacle, normal, at.position, reach)
         settle(contact, motion, event, at)
@@ -247,16 +256,18 @@ def touch_down(
 
 @jit
 def _smooth_neighbour(contact: ContactState, ball: int, normal: Vec3) -> tuple[int, Vec3]:
-    """The support, or the one just left, that is most nearly in the plane with this normal.
+    """The support, or the support that the ball has just left, that is most nearly in a plane.
 
-    Returns: its number, LAST_LEFT, or NO_SUPPORT if none is nearly in the plane; its normal.
+    Returns: the support's number and its normal. The number is LAST_LEFT for the support just left,
+    and NO_SUPPORT if no support is nearly in the plane with this normal.
     """
     found, best, last = NO_SUPPORT, ONE_SURFACE, normal
     for support in range(contact.supports.number[ball]):
         other = support_normal(contact.supports, ball, support)
         if dot(normal, other) > best:
             found, best, last = support, dot(normal, other), other
-    left = vec3_at(contact.left_normal, ball)  # zero, and so never better, if none was just left
+    # zero, and so never the best, if no support was just left
+    left = vec3_at(contact.left_normal, ball)
     if dot(normal, left) > best:
         found, last = LAST_LEFT, left
     return found, last
@@ -264,9 +275,9 @@ def _smooth_neighbour(contact: ContactState, ball: int, normal: Vec3) -> tuple[i
 
 @jit
 def _lies_in_valley(contact: ContactState, one: Vec3, two: Vec3, velocity: Vec3) -> bool:
-    """True when both faces run down to their crease and the ball hardly moves across it.
+    """True if both faces run down to their crease and the ball hardly moves across it.
 
-    Such a ball stays on both faces. ``one``, ``two``: their unit normals.
+    Such a ball stays on both faces. ``one``, ``two``: unit normals of the faces.
     """
     gravity = contact.gravity
     down_one = add_scaled(gravity, -dot(gravity, one), one)
@@ -283,7 +294,7 @@ def _lies_in_valley(contact: ContactState, one: Vec3, two: Vec3, velocity: Vec3)
 def end_path(
     contact: ContactState, motion: np.ndarray, event: BallEvent, reason: int, at: BallState
 ) -> bool:
-    """Let a ball go on at the end of its path in contact; False if ``reason`` is no such end."""
+    """Let a ball go on at the end of its path in contact; False if the path does not end."""
     ball = event.ball
     if reason <= LEAVES_SUPPORT:
         support = LEAVES_SUPPORT - reason
@@ -293,7 +304,8 @@ def end_path(
         return True
     if reason == BRAKE_ENDS:
         velocity, acceleration = at.velocity, vec3_at(contact.acceleration, ball)
-        # The brake has used up what was left of the speed, and was not merely set again.
+        # The resistance has used up the remaining speed: the ball did not merely get a new
+        # direction.
         if dot(velocity, velocity) <= 1e-18 * max(1.0, dot(acceleration, acceleration)):
             velocity = Vec3(0.0, 0.0, 0.0)
         settle(contact, motion, event, BallState(at.position, velocity))

@@ -1,4 +1,4 @@
-"""When the path of a ball in contact ends: over a face's border, off an edge, or at a stop."""
+"""End of a ball's path in contact: at the border of a face, off an edge, or at a stop."""
 
 import math
 
@@ -24,17 +24,18 @@ from sim_core.numerics.jit import inlined, jit
 from sim_core.numerics.roots import NEVER, first_approach
 from sim_core.numerics.vec3 import Flight, Vec3, add_scaled, cross, dot, sub, vec3_at
 
-# seams. A support reaches further over its border than the face does, so that a ball that has left
-# it is past the face.
+# Multiple of the face overlap. A support reaches further over its border than the face does, so
+# that a ball that has left the support is past the face.
 OVER = 1.5
-# rad. Faces that meet at less than this angle are told apart at their border only; over a seam the
-# angle makes 1e-13 m.
+# rad. Faces that meet at a smaller angle are told apart at their border only. Such an angle moves a
+# ball over a seam by 1e-13 m.
 ONE_PLANE = 1e-5
-BEHIND = 2e-13  # m: an edge this little in front of a support's plane is behind it but for rounding
-# rad. What resistance or friction slows while it curves has its direction read again after this,
+# m: an edge this little in front of a support's plane counts as behind it, because of rounding
+BEHIND = 2e-13
+# rad. On a curved path the direction of resistance or friction is read again after this turn,
 MAX_TURN = 0.1
-MIN_TIME = 1e-3  # s: but not more often than this.
-# s. In this time a ball that nothing holds any more would fall 20 um, see MAX_JAM_GAP.
+MIN_TIME = 1e-3  # s: but not more often than this
+# s. A ball without support would fall 20 um in this time, see MAX_JAM_GAP.
 RECHECK_TIME = 2e-3
 
 
@@ -42,14 +43,14 @@ RECHECK_TIME = 2e-3
 def out_of_reach(
     contact: ContactState | None, tree: Tree, ball: int, position: Vec3, obstacle: int
 ) -> bool:
-    """True for an obstacle that a ball moving along its supports' planes cannot meet.
+    """True for an obstacle that a ball on supports cannot meet as it moves along their planes.
 
-    This is what it stands on itself, and an edge behind a plane.
+    Such an obstacle is a support itself, or an edge behind the plane of a support.
     """
     if contact is None:
         return False
     if rides(contact.ride, ball):
-        return False  # it does not move along a plane that stands still
+        return False  # the ball does not move along a still plane
     supports = contact.supports
     for support in range(supports.number[ball]):
         normal = support_normal(supports, ball, support)
@@ -83,9 +84,9 @@ def end_of_path(
     flight: Flight,
     length: float,
 ) -> tuple[float, int]:
-    """How long [s], at most ``length``, the ball's path is good, and what ends it.
+    """Time [s], at most ``length``, for which the ball's path holds, and the reason for its end.
 
-    ``event``: the ball, now. Of a ball that LIES_STILL only the reason is meant, not the time.
+    ``event``: the ball and the present time. For the reason LIES_STILL the time has no meaning.
     """
     if contact is None:
         return length, PATH_GOES_ON
@@ -118,7 +119,8 @@ def end_of_path(
     if delay < best:
         best, end = delay, BRAKE_ENDS
     elif turns and end == PATH_GOES_ON:
-        # Otherwise the direction would turn in every piece by less than MAX_TURN, unnoticed.
+        # Without this limit the direction would turn in every piece by less than MAX_TURN,
+        # unnoticed.
         end = BRAKE_ENDS
     return best, end
 
@@ -132,7 +134,7 @@ def _end_of_ride(
     flight: Flight,
     length: float,
 ) -> tuple[float, int]:
-    """The same of a ball that moves with a vibrating face: where that ends, or its parabola."""
+    """Time [s] and reason of the end of the path of a ball that moves with a vibrating face."""
     if ride is None:
         return length, PATH_GOES_ON
     face = int(np.int64(ride.face[event.ball]))
@@ -157,10 +159,10 @@ def _leaves_face(numbers: np.ndarray, row: int, flight: Flight, over: float) -> 
 def _leaves_edge(
     supports: Supports, numbers: np.ndarray, ball: int, support: int, flight: Flight, over: float
 ) -> float:
-    """When a ball leaves an edge.
+    """Time [s] at which a ball leaves an edge.
 
-    The support is a plane that touches the edge's capsule: good for a short way across the edge,
-    and along it to its ends.
+    The support is a plane that touches the edge's capsule. It holds for a short way across the
+    edge, and along the edge up to its ends.
     """
     row = supports.obstacles[ball, support]
     start = vec3_at(numbers, row)
@@ -180,7 +182,7 @@ def _leaves_edge(
 
 @jit
 def _leaves_round(supports: Supports, ball: int, support: int, flight: Flight, line: Vec3) -> float:
-    """How long a plane stands for something round under it.
+    """Time [s] for which a plane can stand for a round object under a ball.
 
     Motion along ``line`` (a unit vector, or zero) does not count.
     """
@@ -205,7 +207,10 @@ def _leaves_round(supports: Supports, ball: int, support: int, flight: Flight, l
 def _brake_ends(
     friction_state: FrictionState | None, contact: ContactState, event: BallEvent, flight: Flight
 ) -> tuple[float, bool]:
-    """How long the force against a ball's slip or motion keeps its direction, and if that turns."""
+    """Time [s] for which the force against a ball's slip or motion keeps its direction.
+
+    The second value is True if the force then turns, and False if it ends.
+    """
     if friction_state is not None:
         slips, ball = friction_state.slips, event.ball
         change = Vec3(slips[ball, 3], slips[ball, 4], slips[ball, 5])

@@ -1,6 +1,6 @@
-"""The turning part moves what it touches, slow or not, and that moves what lies still in its way.
+"""Pushes by the turning part: on the balls that it touches, and on still balls in their way.
 
-A slow hit is a single constrained impact, as that of two balls in ball_on_ball.py.
+A slow hit is a single constrained impact, as between two balls in ball_on_ball.py.
 """
 
 import math
@@ -15,7 +15,7 @@ from sim_core.motion import BallEvent, BallState
 from sim_core.numerics.jit import inlined, jit
 from sim_core.numerics.vec3 import Vec3, dot, scaled
 
-# s. What lies on a turning part is touched more often: its hops at 10 mm/s last 2 ms.
+# s. A ball that lies on a turning part is touched more often: its hops at 10 mm/s last 2 ms.
 TOUCHING = 1e-2
 
 
@@ -30,8 +30,9 @@ def constrained_change(
 ) -> Vec3:
     """Velocity change [m/s] of a ball that the turning part hits, without friction.
 
-    ``change`` [m/s]: that of a free ball. ``away``: to the ball from where it is touched, in the
-    part's frame. ``approach`` [m/s]: speed along the normal.
+    ``change``: velocity change [m/s] of a free ball.
+    ``away``: vector from the touched point to the ball, in the part's frame.
+    ``approach``: speed [m/s] along the normal.
     """
     if contact is None:
         return change
@@ -45,7 +46,7 @@ def constrained_change(
 def _constrained(contact: ContactState, ball: int, normal: Vec3, approach: float) -> Vec3:
     drop_pressed_balls(contact, ball, normal)
     give = response(contact, ball, normal)
-    # What lies on the part hops, but not too often.
+    # A ball that lies on the part hops, but not too often.
     lift = SHORTEST_HOP * math.sqrt(dot(contact.gravity, contact.gravity))
     return scaled((approach + max(approach, lift)) / max(dot(give, normal), BLOCKED), give)
 
@@ -54,14 +55,14 @@ def _constrained(contact: ContactState, ball: int, normal: Vec3, approach: float
 def push_ball(
     contact: ContactState | None, motion: np.ndarray, event: BallEvent, at: BallState, change: Vec3
 ) -> None:
-    """The turning part changes a ball's velocity by ``change`` [m/s]."""
+    """Change the velocity of a ball that the turning part hits by ``change`` [m/s]."""
     deflect(contact, motion, event, at, change)
     note_touch(contact, event)
 
 
 @jit
 def note_touch(contact: ContactState | None, event: BallEvent) -> None:
-    """Note that the turning part, or a ball that it presses, has touched a ball."""
+    """Note that the turning part, or a ball that the part presses, has touched a ball."""
     if contact is None:
         return
     hits, ball = contact.slow_hits, event.ball
@@ -71,15 +72,15 @@ def note_touch(contact: ContactState | None, event: BallEvent) -> None:
 
 @jit
 def is_pressed(contact: ContactState, event: BallEvent) -> bool:
-    """True when the turning part pushes a ball that gets nowhere: what is in its way must move."""
+    """True if the turning part pushes a blocked ball, so that the ball's neighbours must move."""
     hits, ball = contact.slow_hits, event.ball
     recent = event.time_since_start - hits.touched_at[ball] < TOUCHING
-    return hits.part_contact[ball] == PRESSED and recent
+    return bool(hits.part_contact[ball] == PRESSED and recent)
 
 
 @jit
 def drop_pressed_balls(contact: ContactState, ball: int, push: Vec3) -> None:
-    """Drop the supports on balls that a push presses: those balls must give way or press back."""
+    """Drop the supports on balls that a push presses. Those balls must give way or press back."""
     supports = contact.supports
     for support in range(supports.number[ball] - 1, -1, -1):
         on_ball = supports.obstacles[ball, support] <= ON_BALL

@@ -1,4 +1,4 @@
-"""Where balls can lie still, and which ones do: in pockets, slots and dead corners."""
+"""Balls that lie still at the end of a simulation, and a test for chambers that let balls rest."""
 
 from dataclasses import dataclass
 
@@ -13,7 +13,7 @@ from sim_core.geometry.obstacles import CAPSULE
 from sim_core.geometry.triangle_lookup import find_triangle
 from sim_core.numerics.vec3 import Vec3
 
-UPWARD = 1e-6  # of the weight: a wall that bears less is upright but for rounding
+UPWARD = 1e-6  # share of the weight: a wall that bears less is upright up to rounding
 NONE = -1
 
 
@@ -21,12 +21,14 @@ NONE = -1
 class Resting:
     """The k balls that lie still at the end.
 
-    ball: their numbers, (k,).
-    position: centres [m], (k, 3).
-    since: when each came to lie still [s], (k,), on the clock of the impacts, so negative when it
-        was during the warm-up.
-    triangles, balls: what each stands on, (k, 4), -1 where there is no more.
-    jammed: held by the balls around it, not only by what it stands on, (k,) bool.
+    ball: numbers of the balls, (k,).
+    position: positions of the ball centres [m], (k, 3).
+    since: times at which the balls came to lie still [s], (k,), on the clock of the impacts. A time
+        during the warm-up is negative.
+    triangles: triangles under each ball, (k, 4), -1 for unused entries.
+    balls: balls under each ball, (k, 4), -1 for unused entries.
+    jammed: True for a ball that is held by the balls around it and not only by its supports, (k,)
+        bool.
     """
 
     ball: np.ndarray
@@ -47,11 +49,11 @@ def resting(
     middle: np.ndarray,
     origin: float,
 ) -> Resting:
-    """The balls that lie still now.
+    """Find the balls that lie still now.
 
     Args:
-        positions: centres of all balls [m], (n, 3).
-        middle: of the mesh [m], (3,).
+        positions: positions of all ball centres [m], (n, 3).
+        middle: middle of the mesh [m], (3,).
         origin: end of the warm-up [s since the start].
     """
     still = np.zeros(0, np.int64)
@@ -78,7 +80,7 @@ def resting(
 
 
 def can_rest(mesh: TriangleMesh | AnalyticCavity, gravity: Gravity | None, *moving: int) -> bool:
-    """True when gravity can press a ball onto some triangle of the chamber that keeps still.
+    """True if gravity can press a ball onto a still triangle of the chamber.
 
     ``moving``: tags of the surfaces that vibrate or turn.
     """

@@ -1,25 +1,24 @@
-"""A ball that moves with a vibrating face: it sticks while the face presses it, and lets go.
+"""Balls that move with a vibrating face: a ball sticks while the face presses it, and then lets go.
 
 A ball that bounces ever lower on a face that presses it bounces infinitely often in finite time. A
-hit slower than capture therefore ends the bouncing: from then on the ball's velocity along the
-normal is that of the face, until the face's acceleration away from the ball is more than its
-weight.
+hit slower than capture therefore ends the bouncing. From then on the ball's normal velocity is the
+face's velocity, until the face accelerates away from the ball by more than the ball's weight.
 
 Notation:
     n: unit normal of the face, towards the ball
-    A, omega, angle: amplitude along n [m], angular frequency [rad/s] and phase now [rad], so that
-        the face is displaced by A sin(angle) and accelerated by -A omega² sin(angle)
+    A, omega, angle: amplitude along n [m], angular frequency [rad/s] and present phase [rad]. The
+        displacement of the face is A sin(angle), its acceleration -A omega² sin(angle)
     w = -n g: weight per mass along the normal [m/s²], negative where gravity pulls the ball off
 
 The face presses while sin(angle) < w / (A omega²). It lets go at angle = asin(w / (A omega²)).
 
-Between these events the ball's path is a chain of parabolas, as the rest of the simulator takes
-them. Each begins on the face with its velocity, ends on it, and is off by at most OFF between.
-Along the face the ball slides freely.
+Between these events the ball's path is a chain of parabolas, because the rest of the simulator
+takes only parabolas. Each parabola begins on the face with the face's velocity, ends on the face,
+and deviates from it by at most OFF. The ball slides freely along the face.
 
-Source: A. Mehta & J. M. Luck, Phys. Rev. Lett. 65 (1990) 393, for the ball that is locked to the
-plate and let go; the bouncing ball as a map is in J. M. Luck & A. Mehta, Phys. Rev. E 48 (1993)
-3988.
+Sources: A. Mehta & J. M. Luck, Phys. Rev. Lett. 65 (1990) 393, for a ball that is locked to the
+plate and let go. J. M. Luck & A. Mehta, Phys. Rev. E 48 (1993) 3988, for the bouncing ball as a
+map.
 """
 
 import math
@@ -44,22 +43,24 @@ from sim_core.numerics.jit import inlined, jit
 from sim_core.numerics.roots import NEVER
 from sim_core.numerics.vec3 import Flight, Vec3, add_scaled, dot, set_vec3, vec3_at
 
-OFF = 1e-11  # m: how far a parabola may be from the face; the velocity is off by some 1e-6 m/s
-# rad: a ball that would be let go so soon is let go now
+# m: largest distance of a parabola from the face; the velocity is off by about 1e-6 m/s
+OFF = 1e-11
+# rad: a ball that would be let go within this angle is let go at once
 AT_ONCE = 1e-9
-# m/s. What has no speed relative to the face leaves it as fast as this, so that rounding cannot
+# m/s. A ball without speed relative to the face leaves it at this speed, so that rounding cannot
 # make the two meet again for ever.
 PARTING = 1e-12
 
 
 @jit
 def time_to_let_go(weight: float, strength: float, omega: float, angle: float) -> float:
-    """How long [s] the face will press the ball; 0 if it does not, NEVER if it always does.
+    """Time [s] for which the face will press the ball; 0 if it does not, NEVER if it always does.
 
     Args:
         weight: w [m/s²].
         strength: A omega² [m/s²].
-        omega, angle: of the face.
+        omega: angular frequency of the face [rad/s].
+        angle: present phase of the face [rad].
     """
     if strength <= weight:
         return NEVER
@@ -72,7 +73,7 @@ def time_to_let_go(weight: float, strength: float, omega: float, angle: float) -
 
 @jit
 def _swing(ride: Ride, face: int, normal: Vec3, time: float) -> tuple[float, float, float]:
-    """A, omega and the angle of a face; A is positive."""
+    """Positive amplitude A [m], omega [rad/s] and present angle [rad] of a face."""
     wave = wave_of_face(ride.waves, ride.wave, face)
     lift = dot(normal, wave.axis)
     angle = wave.omega * time + wave.phase
@@ -88,9 +89,10 @@ def stick(
     face: int,
     at: BallState,
 ) -> int:
-    """Result of a hit on a vibrating face: BOUNCES, or CAUGHT where the ball goes on with it.
+    """Result of a hit on a vibrating face: BOUNCES, ROLLS or CAUGHT.
 
-    ROLLS where the face leaves a ball behind that has no speed relative to it: that is no impact.
+    CAUGHT means that the ball moves on with the face. ROLLS means that the face leaves a ball
+    behind that has no speed relative to it, which is not an impact.
     """
     if contact is None:
         return BOUNCES
@@ -135,7 +137,7 @@ def _go_on(
     at: BallState,
     speed: float,
 ) -> None:
-    """Let a ball go on from ``at``: with its face, or in flight with ``speed`` [m/s] from it."""
+    """Let a ball go on from ``at``: with its face, or in flight off the face at ``speed`` [m/s]."""
     ball, time = event.ball, event.time
     normal = support_normal(contact.supports, ball, 0)
     amplitude, omega, angle = _swing(ride, ride.face[ball], normal, time)
@@ -153,7 +155,7 @@ def _go_on(
     velocity = add_scaled(at.velocity, wanted - dot(normal, at.velocity), normal)
     acceleration, mode = contact.gravity, FLYING
     if stays:
-        # the error of a parabola through both ends is at most A omega³ t³ 4 / (6 27)
+        # a parabola through both ends is off by at most A omega³ t³ 4 / (6 27)
         piece = min(held, (40.5 * OFF / (strength * omega)) ** (1.0 / 3.0)) if strength else held
         mean = -strength * math.sin(angle + omega * min(piece, math.pi / omega) / 3.0)
         acceleration = add_scaled(acceleration, weight + mean, normal)
@@ -171,7 +173,7 @@ def _go_on(
 def settle_on_face(
     ride: Ride | None, contact: ContactState, motion: np.ndarray, event: BallEvent, at: BallState
 ) -> bool:
-    """Let a ball that rides go on after a hit, from ``at``; False for a ball that does not ride."""
+    """Let a ball that rides go on from ``at`` after a hit; False if it does not ride."""
     if ride is None:
         return False
     if ride.face[event.ball] < 0:
@@ -193,7 +195,7 @@ def go_on_riding(
     at: BallState,
     face: int,
 ) -> None:
-    """Let a ball go on where its parabola ends: with ``face``, or in flight where that is -1."""
+    """Let a ball go on at its parabola's end: with ``face``, or in flight if ``face`` is -1."""
     if ride is None:
         return
     if face >= 0:
@@ -203,7 +205,7 @@ def go_on_riding(
 
 @jit
 def is_of_plane(ride: Ride, tree: Tree, face: int, row: int) -> bool:
-    """True when an obstacle is in the plane of a face and moves with it."""
+    """True if an obstacle lies in the plane of a face and moves with the face."""
     return (
         tree.kinds[row] == VIBRATING_FACE
         and same_plane(tree.numbers, face, row)
@@ -213,7 +215,7 @@ def is_of_plane(ride: Ride, tree: Tree, face: int, row: int) -> bool:
 
 @inlined
 def moves_with_face(contact: ContactState | None, tree: Tree, ball: int, row: int) -> bool:
-    """True for a ball that rides on the plane that this vibrating face is in."""
+    """True if the ball rides on the plane of this vibrating face."""
     if contact is None:
         return False
     return _is_ridden(contact.ride, tree, ball, row)
@@ -229,7 +231,7 @@ def _is_ridden(ride: Ride | None, tree: Tree, ball: int, row: int) -> bool:
 
 @inlined
 def seen_from_face(ride: Ride | None, ball: int, time: float, flight: Flight) -> Flight:
-    """The ball's flight relative to the face that it rides on, which moves as it does now."""
+    """The ball's flight relative to the face that it rides on, at the face's present velocity."""
     if ride is None:
         return flight
     wave = wave_of_face(ride.waves, ride.wave, int(np.int64(ride.face[ball])))
@@ -251,7 +253,7 @@ def _shift_rides(ride: Ride | None, window: float) -> None:
 
 @inlined
 def shift_contact(contact: ContactState | None, window: float) -> None:
-    """Move the clock's zero forward by ``window`` [s]."""
+    """Move the clock's zero of contact mode forward by ``window`` [s]."""
     if contact is None:
         return
     _shift_rides(contact.ride, window)

@@ -1,30 +1,37 @@
-"""How resistance and friction move a ball on its supports: it rolls, slips, or lies still.
+"""Resistance and friction of a ball on its supports: the ball rolls, slips, or lies still.
 
 Notation, all per unit mass of the ball:
 
-    R      radius of the ball [m]                                       friction_state.radius
-    b      unit normal of what bears the load                           Stand.normal
-    h      distance of the centre from the points or line it touches    Stand.arm
-    v, w   velocity [m/s] and spin [rad/s]                              velocity, spin
-    u      slip of the touching points, v - h w x b [m/s]               slip
-    g      what the supports leave of gravity [m/s²]                    acceleration
-    k      5 h²/(2 R²), the share of inertia that spins                 inertia
-    mu     coefficient of friction                                      friction_state.mu
-    f      friction force; at most mu times the load [m/s²]             rub; Stand.max_friction
+R      radius of the ball [m]                                       friction_state.radius
+b      unit normal of the plane or groove that bears the load       Stand.normal
+h      distance of the centre from the points or line it touches    Stand.arm
+v, w   velocity [m/s] and spin [rad/s]                              velocity, spin
+u      slip of the touching points, v - h w x b [m/s]               slip
+g      gravity projected onto the cone of the supports [m/s²]       acceleration
+k      5 h²/(2 R²), the share of inertia that spins                 inertia
+mu     coefficient of friction                                      friction_state.mu
+f      friction force; at most mu times the load [m/s²]             rub; Stand.max_friction
 
-One support that bears the load is a plane at h = R. Two are a groove: b lies between their
-normals, h is the distance of the centre from the line through the two touching points, about which
-the ball rolls, and the load of each counts. Either way f changes u at the rate g + (1 + k) f, and u
-stays zero for f = -g/(1 + k): the ball rolls with k/(1 + k) of g, which is 5/7 of it on a plane,
-as long as f is less than mu times the load (Coulomb's law). While it slips, f is mu times the load
-against u, whose direction is read again as path_end.py says.
+If one support bears the load, it is a plane at h = R. If two supports bear it, they are a groove: b
+lies between their normals, and h is the distance of the centre from the line through the two
+touching points, about which the ball rolls. Friction then depends on the load of each support.
 
-Simplifications. The load is that of gravity: neither a curved path nor friction on another support
-adds to it. A support that bears no load does not rub. Friction that would lift the ball off its
-supports does not act. Spin about b lasts on a plane; on two supports all spin goes that is not
-about the line through them. A slip slower than Rest.capture that friction can stop is stopped at
-once, which takes less than capture²/7 of energy per mass. A ball that creeps at less than a
-hundredth of capture is stopped where an event finds it.
+In both cases f changes u at the rate g + (1 + k) f. For f = -g/(1 + k) u stays zero: the ball rolls
+with k/(1 + k) of g, which is 5/7 of g on a plane. It rolls as long as f is less than mu times the
+load (Coulomb's law). While the ball slips, f is mu times the load and opposes u. The direction of u
+is read again as path_end.py says.
+
+Simplifications:
+
+- The load is due to gravity alone. Neither a curved path nor friction on another support adds to
+  it.
+- A support that bears no load has no friction.
+- Friction that would lift the ball off its supports does not act.
+- Spin about b lasts on a plane. On two supports only the spin about the line through the touching
+  points lasts.
+- A slip that is slower than Rest.capture and that friction can stop is stopped at once. This takes
+  less than capture²/7 of energy per mass.
+- A ball that creeps at less than a hundredth of capture is stopped at its next event.
 
 Source: the energy of a rolling ball is in Goldstein, Poole & Safko, Classical Mechanics, 3rd ed.,
 section 5.7.
@@ -40,16 +47,18 @@ from sim_core.motion import BallEvent
 from sim_core.numerics.jit import jit
 from sim_core.numerics.vec3 import Vec3, add_scaled, cross, dot, scaled, sub
 
-LOAD_ROUNDING = 1e-9  # of the load: what one support or two leave of it is rounding
+LOAD_ROUNDING = 1e-9  # share of the load: one support or two bear the load up to this rounding
 NO_SLIP = 1e-9  # m/s: rounding of a slip
-STILL_BELOW = 1e-9  # of gravity: an acceleration this small is rounding
+STILL_BELOW = 1e-9  # share of gravity: an acceleration this small is rounding
 ZERO = Vec3(0.0, 0.0, 0.0)
 
 
 class Stand(NamedTuple):
-    """What bears the load of a ball.
+    """The plane or groove that bears the load of a ball.
 
-    normal: b. arm: h [m]. max_friction: largest friction force per mass [m/s²].
+    normal: b.
+    arm: h [m].
+    max_friction: largest friction force per mass [m/s²].
     axis: direction of the line through the two touching points of a groove, zero on a plane.
     """
 
@@ -69,7 +78,8 @@ def braked(
 ) -> tuple[Vec3, Vec3, int]:
     """Velocity [m/s], acceleration [m/s²] and mode of a ball under resistance and friction.
 
-    ``velocity`` and ``acceleration``: what its supports leave of those it had.
+    ``velocity`` and ``acceleration``: vectors that are already projected onto the cone of the
+    supports.
     """
     if friction_state is None:
         return _resisted(contact, event.ball, velocity, acceleration)
@@ -103,7 +113,7 @@ def _rubbed(
 ) -> tuple[Vec3, Vec3, int]:
     ball, time = event.ball, event.time
     weight, size = _size(contact.gravity), _size(acceleration)
-    push = sub(acceleration, contact.gravity)  # the force of all supports together
+    push = sub(acceleration, contact.gravity)  # force of all supports together
     stand = _find_stand(friction_state, contact, ball, push)
     b, h = stand.normal, stand.arm
     spin = spin_at(friction_state, ball, time)
@@ -113,9 +123,9 @@ def _rubbed(
     slip = add_scaled(slip, -dot(slip, b), b)
     slip_speed = _size(slip)
     inertia = 2.5 * (h / friction_state.radius) ** 2
-    needed = size / (1.0 + inertia)  # friction force that keeps it rolling
+    needed = size / (1.0 + inertia)  # friction force that keeps the ball rolling
     if slip_speed < contact.capture and needed < stand.max_friction:
-        # It rolls, or friction holds it.
+        # The ball rolls, or friction holds it.
         velocity = onto_cone(
             contact.supports, ball, add_scaled(velocity, -1.0 / (1.0 + inertia), slip)
         )
@@ -154,9 +164,9 @@ def _rubbed(
 def _find_stand(
     friction_state: FrictionState, contact: ContactState, ball: int, push: Vec3
 ) -> Stand:
-    """What bears the load ``push`` [m/s²].
+    """Find the plane or groove that bears the load ``push`` [m/s²].
 
-    Three supports leave nothing to move: then there is no friction.
+    A ball on three supports cannot move, so that there is no friction.
     """
     supports, radius = contact.supports, friction_state.radius
     count = supports.number[ball]
@@ -207,10 +217,10 @@ def stopped_if_creeping(
     velocity: Vec3,
     creeping: float,
 ) -> Vec3:
-    """The velocity [m/s] of a ball on its supports, zero if it is below ``creeping``.
+    """The velocity [m/s] of a ball on its supports; zero if it is slower than ``creeping``.
 
-    Friction holds such a ball. Between two surfaces it would otherwise go on in ever smaller hops,
-    which its slip keeps up.
+    Friction holds such a ball. Without this stop a ball between two surfaces would go on in ever
+    smaller hops, kept up by its slip.
     """
     if friction_state is None:
         return velocity
@@ -222,7 +232,7 @@ def stopped_if_creeping(
 
 @jit
 def reset_spin(friction_state: FrictionState | None, ball: int, time: float, mode: int) -> None:
-    """A ball that comes into flight keeps its spin; one that comes to lie still loses it."""
+    """Keep the spin of a ball that begins to fly; stop the spin of a ball that lies still."""
     if friction_state is None:
         return
     if mode != SLIDING:
@@ -234,9 +244,9 @@ def reset_spin(friction_state: FrictionState | None, ball: int, time: float, mod
 def _with_supports_left(
     contact: ContactState, ball: int, velocity: Vec3, acceleration: Vec3
 ) -> tuple[Vec3, Vec3, int]:
-    """The same without the supports that friction leads the ball away from.
+    """Velocity, acceleration and mode without the supports that friction leads the ball away from.
 
-    It may come back to them as to walls.
+    The ball may meet these supports again as walls.
     """
     weight, supports = _size(contact.gravity), contact.supports
     drop_supports_along(supports, ball, velocity, ROUNDING * (1.0 + _size(velocity)))
@@ -248,7 +258,10 @@ def _with_supports_left(
 
 @jit
 def _load(weight: float, size: float) -> float:
-    """Load on the supports [m/s²] where they leave ``size`` of the ``weight`` (Moreau's cones)."""
+    """Load on the supports [m/s²], where the supports leave ``size`` of the ``weight``.
+
+    The load and the remaining part of the weight are perpendicular (Moreau's polar cones).
+    """
     return math.sqrt(max(0.0, weight * weight - size * size))
 
 

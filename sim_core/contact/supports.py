@@ -1,9 +1,9 @@
-"""The supports of a ball, and what they leave of a vector: the projection on their cone.
+"""The supports of a ball, and the projection of vectors onto the cone that the supports leave free.
 
-Notation: n_k: unit normal of support k, towards the ball. The supports leave the cone
-{x: n_k x >= 0 for all k}. The vector of the cone that is nearest to x is x itself, or it lies on
-the plane of one support, or on the planes of two; it is unique, and it is the one whose
-multipliers all push (conditions of Kuhn and Tucker).
+Notation: n_k: unit normal of support k, towards the ball. The supports leave the cone {x: n_k x >=
+0 for all k}. The vector of the cone that is nearest to x is x itself, or lies on the plane of one
+support, or on the planes of two supports. It is unique: it is the projection whose multipliers all
+push (conditions of Kuhn and Tucker).
 """
 
 import numpy as np
@@ -12,11 +12,12 @@ from sim_core.effects.contact_mode import FLYING, MAX_SUPPORTS, ON_BALL, Contact
 from sim_core.numerics.jit import jit
 from sim_core.numerics.vec3 import Vec3, add_scaled, cross, dot, set_vec3
 
-ROUNDING = 1e-12  # [-], of a projection
-# of an inverse mass: an impulse on balls that give way by less than this does not grow any more
+ROUNDING = 1e-12  # rounding of a projection, without unit
+# Share of an inverse mass: an impulse on balls that give way by less than this does not grow any
+# more.
 BLOCKED = 0.01
 # s. Balls that are pressed together without any speed would meet again at once. They part for this
-# time, which lifts them by 50 nm.
+# time, in which they rise by 50 nm.
 SHORTEST_HOP = 1e-4
 
 
@@ -29,7 +30,7 @@ def support_normal(supports: Supports, ball: int, support: int) -> Vec3:
 
 @jit
 def stands_on_ball(supports: Supports, ball: int, other: int) -> bool:
-    """True when a ball has a support on another ball."""
+    """True if a ball has a support on another ball."""
     stands = False
     for support in range(supports.number[ball]):
         stands |= supports.obstacles[ball, support] == ON_BALL - other
@@ -88,7 +89,7 @@ def response(contact: ContactState, ball: int, push: Vec3) -> Vec3:
 
 @jit
 def drop_support(supports: Supports, ball: int, support: int) -> None:
-    """Remove a support; those after it move up."""
+    """Remove a support and move the later supports up."""
     last = supports.number[ball] - 1
     for k in range(support, last):
         supports.obstacles[ball, k] = supports.obstacles[ball, k + 1]
@@ -112,7 +113,7 @@ def drop_supports_along(supports: Supports, ball: int, direction: Vec3, least: f
 def add_support(
     supports: Supports, ball: int, obstacle: int, normal: Vec3, position: Vec3, reach: float
 ) -> None:
-    """Add a support that is good up to ``reach`` [m] from here; the oldest gives way to a fifth."""
+    """Add a support that holds up to ``reach`` [m] from here. A fifth replaces the oldest."""
     if supports.number[ball] == MAX_SUPPORTS:
         drop_support(supports, ball, 0)
     support = supports.number[ball]
@@ -126,7 +127,7 @@ def add_support(
 
 @jit
 def set_mode(contact: ContactState, ball: int, mode: int) -> None:
-    """Set how a ball moves, and keep the list of the balls that are not in flight."""
+    """Set how a ball moves, and update the list of the balls that are not in flight."""
     contact.mode[ball] = mode
     balls, places, length = contact.contact_list
     place = places[ball]
@@ -144,5 +145,5 @@ def set_mode(contact: ContactState, ball: int, mode: int) -> None:
 
 @jit
 def forget_left_support(contact: ContactState, ball: int) -> None:
-    """From now on the support that the ball left last does not count any more."""
+    """Forget the support that the ball left last."""
     set_vec3(contact.left_normal, ball, Vec3(0.0, 0.0, 0.0))

@@ -1,1 +1,1 @@
-"""When a ball meets something."""
+"""Search for the time at which a ball meets an obstacle or another ball."""

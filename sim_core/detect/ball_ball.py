@@ -1,6 +1,7 @@
-"""When two balls meet.
+"""Time at which two balls meet.
 
-In the free-fall frame both fly straight, with gravity or without, unless one is in contact mode.
+In the free-fall frame both balls fly straight, with gravity or without it, unless a ball is in
+contact mode.
 """
 
 import numpy as np
@@ -10,7 +11,7 @@ from sim_core.numerics.jit import jit
 from sim_core.numerics.roots import NEVER, first_approach
 from sim_core.numerics.vec3 import Flight, Vec3, dot, position_after, velocity_after
 
-STANDING = 1e-12  # m/s: what rounding leaves of a normal velocity that was removed
+STANDING = 1e-12  # m/s: rounding of a normal velocity that was removed
 
 
 @jit
@@ -23,8 +24,8 @@ def pair_delay(apart: Vec3, closing: Vec3, reach: float) -> float:
         reach: sum of the radii [m].
 
     Returns:
-        Time [s] until |apart + closing s| = reach, approaching; 0 when they overlap and approach;
-        NEVER otherwise.
+        Time [s] until |apart + closing s| = reach, approaching. The time is 0 for balls that
+        overlap and approach, and NEVER for balls that do not meet.
     """
     rate = dot(apart, closing)
     if rate >= 0.0:
@@ -35,15 +36,15 @@ def pair_delay(apart: Vec3, closing: Vec3, reach: float) -> float:
     disc = rate * rate - dot(closing, closing) * excess
     if disc <= 0.0:
         return NEVER
-    return excess / (np.sqrt(disc) - rate)
+    return float(excess / (np.sqrt(disc) - rate))
 
 
 @jit
 def accelerated_pair_delay(relative: Flight, reach: float, limit: float) -> float:
     """Time [s] until |relative position| = reach [m], within ``limit`` [s], or NEVER.
 
-    The steps are those of capsule_delay, for the ``relative`` flight of two balls of which one at
-    least is in contact mode.
+    The steps are as in capsule_delay. ``relative``: relative flight of two balls of which at least
+    one is in contact mode.
     """
     delay = 0.0
     for _ in range(MAX_STEPS):
@@ -55,7 +56,8 @@ def accelerated_pair_delay(relative: Flight, reach: float, limit: float) -> floa
         if gap <= CONTACT and rate < -STANDING:
             return delay
         if gap <= CONTACT:
-            # not approaching: on until it could be as near as now, at once if pressed together
+            # The balls do not approach: go on until they could be as near as now, or meet at once
+            # if pressed together.
             gap, rate = 0.0, max(rate, 0.0)
         bend = 0.5 * dot(at, relative.acceleration) / distance
         step = first_approach(gap, rate, bend, HALF * reach)

@@ -1,8 +1,8 @@
-"""When a ball in an upright cylinder touches its wall: seen from above it flies straight.
+"""Time at which a ball in an upright cylinder touches the wall. From above it flies straight.
 
-The ball is its centre p, which stays within R - r of the axis. (R - r)² - |p + v s|² is a quadratic
-in s and never rises again once it falls, so that a ball outside that moves further out is in
-contact now, however far out it is.
+The centre p of a ball of radius r stays within R - r of the axis. The gap (R - r)² - |p + v s|² is
+a quadratic in s and never rises again once it falls. A ball outside that moves further out is
+therefore in contact now, however far out it is.
 """
 
 import math
@@ -19,7 +19,7 @@ from sim_core.numerics.vec3 import Flight, Vec3
 
 @jit
 def is_cylinder_wall(cylinder: CylinderAxis | None, kind: int) -> bool:
-    """True for an obstacle that is the cylinder wall; a mesh has none."""
+    """True if the obstacle is a cylinder wall. A mesh has none."""
     if cylinder is None:
         return False
     return kind == CYLINDER_WALL
@@ -43,7 +43,7 @@ def cylinder_delay(
 def normal_at(
     cylinder: CylinderAxis | None, numbers: np.ndarray, row: int, kind: int, at: Vec3
 ) -> Vec3:
-    """Unit normal towards the shot of a face, or of the wall where the centre is ``at``."""
+    """Unit normal towards the shot of a face, or of the cylinder wall at the ball centre ``at``."""
     if cylinder is None:
         return face_normal(numbers, row)
     if kind != CYLINDER_WALL:

@@ -1,4 +1,4 @@
-"""Which obstacle a ball meets first: a walk down the tree along its parabola."""
+"""Search for the first obstacle that a ball meets, down the tree along the ball's parabola."""
 
 from typing import NamedTuple
 
@@ -25,22 +25,22 @@ from sim_core.numerics.roots import NEVER
 from sim_core.numerics.simd import BOXES, boxes_hit, lowest_bit
 from sim_core.numerics.vec3 import Flight
 
-# On float32 times: ten times their rounding, so that an equal time is never left out.
+# Factor on float32 times: ten times their rounding, so that an equal time is never left out.
 SLACK = np.float32(1.000001)
-TINY = 1e-30  # stands for a chord component of zero, whose inverse would be infinite
+TINY = 1e-30  # replaces a chord component of zero, whose inverse would be infinite
 
 
 class Scratch(NamedTuple):
-    """Working space of one simulation, made once."""
+    """Working arrays of one simulation, allocated once."""
 
     ray: np.ndarray  # chord of a flight, see aim_ray, shape (9,) float32
-    enter: np.ndarray  # entry times of a node's boxes [s], shape (8,) float32
+    enter: np.ndarray  # entry times into the boxes of a node's children [s], shape (8,) float32
     nodes: np.ndarray  # stack of nodes still to visit, int64
-    times: np.ndarray  # their entry times [s], float32
+    times: np.ndarray  # entry times of the stacked nodes [s], float32
 
 
 def new_scratch() -> Scratch:
-    """Fresh working space."""
+    """Allocate the working arrays."""
     return Scratch(
         np.zeros(9, dtype=np.float32),
         np.zeros(BOXES, dtype=np.float32),
@@ -51,16 +51,16 @@ def new_scratch() -> Scratch:
 
 @jit
 def aim_ray(ray: np.ndarray, ball: Flight, length: float, error: float) -> None:
-    """Set the chord of a flight: upper and lower origins (0:3, 3:6) and inverse velocity (6:9).
+    """Write the chord of a flight: upper and lower origins (0:3, 3:6) and inverse velocity (6:9).
 
-    The arc lies between its chord and the chord shifted by -a T²/8. The two origins are those of
-    both, moved apart by ``error``.
+    The arc lies between its chord and the chord shifted by -a T²/8. The two origins belong to these
+    two lines, moved apart by ``error``.
 
     Args:
-        ray: written, shape (9,) float32.
+        ray: output array, shape (9,) float32.
         ball: the flight from now on.
-        length: T [s].
-        error: how far the path may be from the parabola [m].
+        length: duration T of the flight [s].
+        error: largest distance of the path from the parabola [m].
     """
     bulge = -0.125 * length * length
     for axis in range(3):
@@ -78,7 +78,7 @@ def aim_ray(ray: np.ndarray, ball: Flight, length: float, error: float) -> None:
 def stack_children(tree: Tree, scratch: Scratch, node: int, depth: int, longest: np.float32) -> int:
     """Stack the children that the flight enters within ``longest`` [s], nearest on top.
 
-    Returns the new depth of the stack.
+    Returns: the new depth of the stack.
     """
     hits = boxes_hit(tree.bounds, node, scratch.ray, longest, scratch.enter)
     floor = depth
@@ -112,33 +112,34 @@ def first_contact(
     time: float,
     length: float,
 ) -> tuple[float, int]:
-    """The first contact of a ball with an obstacle that does not turn.
+    """Find the first contact of a ball with an obstacle that does not turn.
 
-    Ties go to the obstacle stored first.
+    The obstacle stored first wins a tie.
 
     Args:
-        contact: of contact mode; what the ball is in contact with is left out.
-        sizes: of balls of several sizes, which have obstacles of their own.
+        contact: state of contact mode. Obstacles in contact with the ball are left out.
+        sizes: sizes of balls that are not all alike. Each size has its own obstacles.
         cylinder: axis of an analytical cylinder.
-        number: of the ball; any where ``contact`` and ``sizes`` are None.
-        tree: of obstacles.
-        scratch: working space.
-        ball: its flight from now on, with its own acceleration.
-        wave: of the only sonotrode, or the slowest of several.
-        waves: of several sonotrodes.
-        face_overlap: how far faces overlap [m].
-        time: now, on the window's clock [s]; the phase of a sonotrode depends on it.
-        length: of the search [s].
+        number: number of the ball. It is unused if ``contact`` and ``sizes`` are None.
+        tree: tree of the obstacles.
+        scratch: working arrays.
+        ball: the ball's flight from now on, with its own acceleration.
+        wave: wave of the only sonotrode, or of the slowest one.
+        waves: waves of several sonotrodes.
+        face_overlap: overlap of neighbouring faces [m].
+        time: present time on the window's clock [s]. The phase of a sonotrode depends on it.
+        length: duration of the search [s].
 
     Returns:
-        Delay [s] and obstacle; (NEVER, -1) if there is none within ``length``.
+        Delay [s] and obstacle number of the contact, or (NEVER, -1) if there is none within
+        ``length``.
     """
     radius = radius_of_ball(sizes, tree.radius, number)
     aim_ray(scratch.ray, ball, length, 0.0)
     best = length
     found = -1
-    # The faces of a sonotrode share a plane, whose equation is solved once a query: plane_row is
-    # the last face solved for.
+    # The faces of a sonotrode share a plane, whose equation is solved once a query. plane_row is
+    # the last face whose equation was solved.
     plane_row = -1
     plane_delay = NEVER
     scratch.nodes[0] = root_of_ball(sizes, number)
@@ -168,7 +169,8 @@ def first_contact(
             if plane_row < 0 or not (
                 same_plane(tree.numbers, row, plane_row) and same_sonotrode(waves, row, plane_row)
             ):
-                if plane_row >= 0 and plane_delay < best:  # the last plane was met beside its faces
+                # the ball met the last plane beside its faces
+                if plane_row >= 0 and plane_delay < best:
                     last = wave_of_face(waves, wave, plane_row)
                     later, face = find_later_contact(
                         tree,
@@ -198,7 +200,7 @@ def first_contact(
         if delay < best or (delay == best and (found < 0 or row < found)):
             best = delay
             found = row
-    if plane_row >= 0 and plane_delay < best:  # the last plane was met beside its faces
+    if plane_row >= 0 and plane_delay < best:  # the ball met the last plane beside its faces
         last = wave_of_face(waves, wave, plane_row)
         later, face = find_later_contact(
             tree, waves, last, plane_row, ball, radius, face_overlap, time, plane_delay, best

@@ -1,4 +1,4 @@
-"""When a ball on a parabola touches a face of a vibrating sonotrode, exactly."""
+"""Exact time at which a ball on a parabola touches a face of a vibrating sonotrode."""
 
 import math
 
@@ -32,7 +32,7 @@ def vibrating_plane_delay(
 
 @jit
 def _plane_gap(numbers: np.ndarray, row: int, ball: Flight, wave: Wave, time: float) -> WaveGap:
-    """The gap between the centre and the face's moving plane."""
+    """The gap between the ball's centre and the face's moving plane."""
     normal = face_normal(numbers, row)
     lift = dot(normal, wave.axis)
     theta = wave.omega * time + wave.phase
@@ -58,7 +58,7 @@ def within_moved_borders(
     time: float,
     delay: float,
 ) -> bool:
-    """True when the centre is inside the moved face's borders ``delay`` [s] after ``time`` [s]."""
+    """True if the centre is inside the moved face's borders ``delay`` [s] after ``time`` [s]."""
     if wave is None:
         return False
     shift = wave.amplitude * math.sin(wave.omega * (time + delay) + wave.phase)
@@ -79,25 +79,25 @@ def find_later_contact(
     delay: float,
     limit: float,
 ) -> tuple[float, int]:
-    """Contact after the plane of a face was met where there is no face.
+    """Find a contact after the ball has met the plane of a face beside the face.
 
-    Beside the sonotrode, over a pit, a ball is free to be below its plane, and may come down on it
-    afterwards.
+    Beside the sonotrode, over a pit, a ball can be below the plane. It may then come down on the
+    plane later.
 
     Args:
-        tree: of obstacles.
-        waves: of several sonotrodes.
-        wave: of the face.
-        row: a face in the plane.
-        ball: its flight from ``time`` on.
-        radius: of the ball [m].
-        face_overlap: how far faces overlap [m].
-        time: now, on the window's clock [s].
-        delay: when the plane was met [s].
+        tree: tree of the obstacles.
+        waves: waves of several sonotrodes.
+        wave: wave of the face.
+        row: number of a face in the plane.
+        ball: the ball's flight from ``time`` on.
+        radius: radius of the ball [m].
+        face_overlap: overlap of neighbouring faces [m].
+        time: present time on the window's clock [s].
+        delay: delay of the meeting with the plane [s].
         limit: end of the search [s].
 
     Returns:
-        Delay [s] and face of the contact; (NEVER, -1) if there is none.
+        Delay [s] and face of the contact, or (NEVER, -1) if there is none.
     """
     if wave is None:
         return NEVER, -1

@@ -1,7 +1,7 @@
-"""When a ball on a parabola touches a still triangle: its moved face, or the capsule about an edge.
+"""Time at which a ball on a parabola touches a still triangle: its face, or an edge's capsule.
 
-The ball is its centre; geometry/obstacles.py has the obstacles that the centre meets. ``numbers``
-and ``row`` stand for one of them: ``numbers[row]`` of ObstacleTable.
+The ball is represented by its centre. geometry/obstacles.py describes the obstacles that the centre
+meets. ``numbers`` and ``row`` select an obstacle: ``numbers[row]`` of ObstacleTable.
 """
 
 import numpy as np
@@ -20,19 +20,19 @@ from sim_core.numerics.vec3 import (
     velocity_after,
 )
 
-# A gap this small [m] is contact with a capsule: a thousandth of what would count as early, and a
-# hundred times rounding.
+# A gap this small [m] to a capsule is contact. It is a thousandth of the smallest error that would
+# count as an early contact, and a hundred times rounding.
 CONTACT = 1e-13
-# 3 to 6 steps are used; a grazing touch converges by a factor of four a step, and a ball that
-# slides over an edge needs 300.
+# Most contacts take 3 to 6 steps. A grazing touch converges by a factor of four a step, and a ball
+# that slides over an edge needs 300.
 MAX_STEPS = 1000
-ROUNDING = 1e-15  # m: of a point in a face's plane
-HALF = 0.5  # of a radius: an overlap deeper than this is the far side of a one-sided face
+ROUNDING = 1e-15  # m: rounding of a point in a face's plane
+HALF = 0.5  # share of the radius: a deeper overlap means the far side of a one-sided face
 
 
 @jit
 def within_borders(numbers: np.ndarray, row: int, at: Vec3, face_overlap: float) -> bool:
-    """True when a point in the face's plane is inside its borders or at most an overlap outside."""
+    """True if a point in the face's plane is at most ``face_overlap`` outside the borders."""
     over = False
     for k in range(4, 20, 4):
         inside = _inside_border(numbers, row, k, at)
@@ -50,14 +50,14 @@ def _inward(numbers: np.ndarray, row: int, border: int) -> Vec3:
 @jit
 def _inside_border(numbers: np.ndarray, row: int, border: int, at: Vec3) -> float:
     """Distance of a point from a border [m], negative outside."""
-    return dot(_inward(numbers, row, border), at) - numbers[row, border + 3]
+    return float(dot(_inward(numbers, row, border), at) - numbers[row, border + 3])
 
 
 @jit
 def _near_corners(numbers: np.ndarray, row: int, at: Vec3, reach: float) -> bool:
     """False for a point more than ``reach`` [m] past a corner, beyond the ends of both its borders.
 
-    The overlaps of two borders cross far beyond a corner as sharp as a needle's tip.
+    The overlaps of two borders cross far beyond a corner that is as sharp as a needle's tip.
     """
     for border in range(4, 20, 4):
         over = _inside_border(numbers, row, border, at)
@@ -97,7 +97,7 @@ def face_delay(
 
 @jit
 def away_from_capsule(numbers: np.ndarray, row: int, at: Vec3) -> Vec3:
-    """Vector [m] to a point from the nearest point of the capsule's segment."""
+    """Vector [m] from the nearest point of the capsule's segment to a point."""
     start = Vec3(numbers[row, 0], numbers[row, 1], numbers[row, 2])
     direction = Vec3(numbers[row, 3], numbers[row, 4], numbers[row, 5])
     offset = sub(at, start)
@@ -107,9 +107,9 @@ def away_from_capsule(numbers: np.ndarray, row: int, at: Vec3) -> Vec3:
 
 @jit
 def nearer_neighbour(numbers: np.ndarray, row: int, away: Vec3) -> int:
-    """Which of a capsule's two triangles, 0 or 1, faces the ball more.
+    """Index, 0 or 1, of the capsule's neighbour triangle that faces the ball more.
 
-    Impacts on an edge are so shared fairly between its two triangles.
+    This choice shares the impacts on an edge fairly between its two triangles.
     """
     lean = Vec3(numbers[row, 7], numbers[row, 8], numbers[row, 9])
     return 0 if dot(lean, away) >= 0.0 else 1
@@ -121,10 +121,10 @@ def capsule_delay(
 ) -> float:
     """Time [s] until the centre meets the capsule; NEVER if it does not within ``limit`` [s].
 
-    The distance to a convex body is never below the distance to the plane that touches it at the
-    nearest point. Along the flight that plane distance is a quadratic in time: go to where it
-    closes, take the plane there, and repeat. Each stop lies before the contact, so that none is
-    missed.
+    The distance to a convex body is never below the distance to the plane that touches the body at
+    the nearest point. Along the flight the plane distance is a quadratic in time. Each step goes to
+    the time at which this quadratic closes and takes the plane there. Each stop lies before the
+    contact, so that no contact is missed.
     """
     delay = 0.0
     for _ in range(MAX_STEPS):
@@ -140,7 +140,8 @@ def capsule_delay(
             return delay
         bend = 0.5 * dot(away, ball.acceleration) / distance
         if -HALF * radius < gap <= CONTACT and rate * rate <= 4.0 * bend * min(gap, -CONTACT):
-            gap = CONTACT  # it touches and does not come free: on until it could be deeper than now
+            # The ball touches and does not come free: go on until it could be deeper than now.
+            gap = CONTACT
         step = first_approach(gap, rate, bend, HALF * radius)
         if delay + step > limit:
             return NEVER

@@ -1,12 +1,14 @@
-"""When a ball first touches a turning part, searched for in the part's frame.
+"""Time at which a ball first touches a turning part, searched in the part's frame.
 
-There the part's tree stands still. The flight is cut into pieces so short that in the part's frame
-each is a parabola up to a small share of a radius; the tree is searched along that parabola,
-widened by its error. At an obstacle the true path is followed by conservative advancement (Mirtich,
-PhD thesis, Berkeley 1996): within a piece the gap is never below a quadratic made of its value,
-rate and curvature now and of the bound J on its third derivative. Go to where that closes, and
-repeat. Each stop lies before the contact, so that none is missed, and near it the steps are
-Newton's.
+The part's tree stands still in this frame. The flight is cut into short pieces, each a parabola in
+the part's frame up to a small share of a radius. The tree is searched along this parabola, widened
+by its error.
+
+At each obstacle found, the true path is followed by conservative advancement (Mirtich, PhD thesis,
+Berkeley 1996). Within a piece the gap is never below a quadratic made of its present value, rate
+and curvature and of the bound J on its third derivative. Each step goes to the time at which the
+quadratic closes. Each stop lies before the contact, so that no contact is missed, and near the
+contact the steps are Newton's.
 """
 
 import numpy as np
@@ -27,14 +29,15 @@ from sim_core.numerics.jit import inlined, jit
 from sim_core.numerics.roots import NEVER, first_approach
 from sim_core.numerics.vec3 import Flight, Vec3, add_scaled, dot, flight_after, position_after, sub
 
-# Of a radius: how far a piece of the path may be from its parabola, and the parabola from its
-# chord. Boxes are widened by that; a fifth and four times of both measured within 4 %.
+# Share of a radius: largest distance of a piece of the path from its parabola, and of the parabola
+# from its chord. Boxes are widened by it. A fifth and four times of both measured within 4 %.
 OFF_PARABOLA = 0.1
 BULGE = 0.25
-# A few are used; a path along a surface at a distance of CONTACT needs one every 1e-7 s or so.
+# Most contacts take a few steps. A path along a surface at a distance of CONTACT needs one step
+# every 1e-7 s or so.
 MAX_STEPS = 1000
-# A centre this far [m] behind a face and coming out was left there by rounding; ten times
-# scene.TOUCH.
+# A centre this far [m] behind a face that moves outwards was left there by rounding. The value is
+# ten times scene.TOUCH.
 OVERLAP = 1e-8
 
 
@@ -50,22 +53,22 @@ def first_part_contact(
     known: int,
     first: int,
 ) -> tuple[float, int]:
-    """The first contact with the part, if it is before a known one.
+    """Find the first contact with the part before a known contact.
 
     Args:
         part: obstacles of the part.
-        rotation: of the part.
-        scratch: working space.
-        ball: its flight in the room from now on.
-        face_overlap: how far faces overlap [m].
-        time: now, on the window's clock [s].
-        limit: when the known contact is, or end of the search [s].
+        rotation: rotation of the part.
+        scratch: working arrays.
+        ball: the ball's flight in the room from now on.
+        face_overlap: overlap of neighbouring faces [m].
+        time: present time on the window's clock [s].
+        limit: delay of the known contact, or end of the search [s].
         known: obstacle of the known contact, negative for none.
         first: number of the part's first obstacle.
 
     Returns:
-        Delay [s] and obstacle; (limit, known) if the part is not met before, and (how far it got,
-        -1) if the search ran out of steps.
+        Delay [s] and obstacle of the contact. The result is (limit, known) if the ball does not
+        meet the part before. It is (searched time, -1) if the search ran out of steps.
     """
     if part is None or rotation is None:
         return limit, known
@@ -109,19 +112,19 @@ def first_part_contact(
 
 @jit
 def _jerk(part: PartTree, rotation: RotationState, ball: Flight, limit: float) -> float:
-    """Bound J of the path in the part's frame; -1 if it stays clear of all that the part sweeps."""
+    """Bound J of the path in the part's frame; -1 if the path stays clear of the part."""
     bulge = 0.125 * limit * limit
     start = sub(ball.position, rotation.point)
     halfway = add_scaled(ball.velocity, 0.5 * limit, ball.acceleration)
     way = add_scaled(Vec3(0.0, 0.0, 0.0), limit, halfway)
-    # along the axis
+    # component along the axis
     low = dot(rotation.axis, start)
     rise = dot(rotation.axis, way)
     drop = dot(rotation.axis, ball.acceleration)
     sag = bulge * abs(drop)
     if min(low, low + rise) - sag > part.high or max(low, low + rise) + sag < part.low:
         return -1.0
-    # across the axis
+    # component across the axis
     start = add_scaled(start, -low, rotation.axis)
     way = add_scaled(way, -rise, rotation.axis)
     pull = add_scaled(ball.acceleration, -drop, rotation.axis)
@@ -160,20 +163,20 @@ def _obstacle_delay(
     end: float,
     jerk: float,
 ) -> tuple[float, bool]:
-    """Delay [s] of the contact with one obstacle in a piece, and whether the search is complete.
+    """Delay [s] of the contact with one obstacle in a piece; True if the search is complete.
 
-    NEVER if there is none. Contact is a gap of at most CONTACT.
+    The delay is NEVER if there is no contact. Contact is a gap of at most CONTACT.
 
     Args:
-        tree: of the part.
-        row: the obstacle.
-        rotation: of the part.
-        ball: its flight in the room from now on.
-        relative: its flight in the part's frame at ``begin``.
-        face_overlap: how far faces overlap [m].
-        time: now, on the window's clock [s].
-        begin: of the piece [s].
-        end: of the piece [s].
+        tree: tree of the part.
+        row: number of the obstacle.
+        rotation: rotation of the part.
+        ball: the ball's flight in the room from now on.
+        relative: the ball's flight in the part's frame at ``begin``.
+        face_overlap: overlap of neighbouring faces [m].
+        time: present time on the window's clock [s].
+        begin: start of the piece [s].
+        end: end of the piece [s].
         jerk: J [m/s³].
     """
     radius = tree.radius
@@ -201,7 +204,7 @@ def _obstacle_delay(
         ):
             return delay, True
         if gap > CONTACT or (gap > -OVERLAP and rate >= 0.0) or round_edge:
-            # in front of it: on until it could be touched
+            # The ball is in front of the obstacle: go on until it could touch.
             height = max(gap, CONTACT)
             near = min(left, -2.0 * height / rate) if rate < 0.0 else left
             step = first_approach(height, rate, bend - jerk * near / 6.0, 0.0)
@@ -217,7 +220,7 @@ def _obstacle_delay(
                     tree.numbers, row, at, face_overlap
                 ):
                     return delay + step, True
-        else:  # behind a plane beside its face: on until it could come out in front
+        else:  # the ball is behind a plane beside its face: go on until it could come out in front
             step = first_approach(max(-gap, 0.0), -rate, -(bend + jerk * left / 6.0), 0.0)
             if delay + step > end:
                 return NEVER, True

@@ -1,5 +1,5 @@
-"""Effects of a scene, one a file: source, formula, and the neutral result when absent.
+"""Effects of a scene, each in its own file with source, formula and the result without the effect.
 
-Absent means None: numba removes the branch by its type, so that an absent effect is in neither
+An effect that is None is absent: numba removes its branches by type, so that it takes neither
 memory nor machine code.
 """

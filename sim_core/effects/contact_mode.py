@@ -1,6 +1,6 @@
-"""Contact mode: what a user chooses (Rest), and what the simulator stores of it (ContactState).
+"""Options (Rest) and state (ContactState) of contact mode.
 
-The package sim_core.contact explains contact mode and holds everything that acts on this state.
+The package sim_core.contact explains contact mode and holds all code that acts on this state.
 """
 
 import math
@@ -17,19 +17,21 @@ from sim_core.errors import SceneError, number
 from sim_core.numerics.jit import inlined
 from sim_core.numerics.vec3 import Vec3, vec3_at
 
-# m/s. A drop from 50 nm is as fast, and the shot is ten thousand times faster. A lower value costs
-# bounces: 22 for each decade at a restitution of 0.9.
+# m/s. A ball that drops from 50 nm is as fast, and the shot is ten thousand times faster. A lower
+# value costs bounces: 22 for each decade at a restitution of 0.9.
 CAPTURE = 1e-3
-# Steel balls on steel have about this rolling resistance (assumed). Slower ones lie still.
+# Approximate rolling resistance of steel balls on steel (assumed). A ball whose drive is less lies
+# still.
 RESISTANCE = 0.005
 
-MAX_SUPPORTS = 4  # three hold a ball; a fourth is needed until it is decided which three
+MAX_SUPPORTS = 4  # three supports hold a ball; a fourth is needed until three of them are chosen
 
-# values of ContactState.mode: how a ball moves
+# values of ContactState.mode, the way a ball moves
 FLYING, SLIDING, ASLEEP, JAMMED = 0, 1, 2, 3
-# results of a hit on a surface; a ball that rolls goes on as if it and the last were one
+# Results of a hit on a surface. A ball that rolls goes on as if this surface and the last one were
+# one surface.
 BOUNCES, ROLLS, CAUGHT = 0, 1, 2
-# values of SlowHits.part_contact: what the turning part does to a ball
+# values of SlowHits.part_contact, the action of the turning part on a ball
 UNTOUCHED, TOUCHED, PRESSED = 0, 1, 2
 
 # A support on a ball that lies still has the obstacle number ON_BALL minus the number of that ball.
@@ -41,7 +43,7 @@ class Rest(NamedTuple):
 
     capture: normal speed [m/s] below which a hit on a still surface ends in contact.
     resistance: deceleration of a ball in contact, as a share of the load on its supports.
-    on_vibrating: whether balls also stick to vibrating faces while these press them.
+    on_vibrating: True if balls also stick to vibrating faces while these faces press them.
     """
 
     capture: float = CAPTURE
@@ -50,13 +52,13 @@ class Rest(NamedTuple):
 
 
 class Supports(NamedTuple):
-    """The planes on which each of n balls stands, at most MAX_SUPPORTS of them.
+    """The planes on which each of n balls stands, at most MAX_SUPPORTS planes a ball.
 
-    number: how many a ball has, (n,) int32.
-    obstacles: number of the obstacle under each, or see ON_BALL, (n, 4) int32.
+    number: number of supports of each ball, (n,) int32.
+    obstacles: obstacle number of each support, or see ON_BALL, (n, 4) int32.
     normals: unit normals towards the ball, (n, 4, 3).
-    origins: where the ball was when it came onto the support [m], (n, 4, 3).
-    ranges: how far from there a plane stands for something round [m], (n, 4).
+    origins: ball positions at which the supports were added [m], (n, 4, 3).
+    ranges: distance from the origin up to which a plane stands for a round object [m], (n, 4).
     """
 
     number: np.ndarray
@@ -67,13 +69,13 @@ class Supports(NamedTuple):
 
 
 class SlowHits(NamedTuple):
-    """Slow hits in a row of each of n balls, from which a jam is recognised.
+    """Successive slow hits of each of n balls, from which a jam is recognised.
 
-    number: hits in the row, (n,) int32.
-    position: where the row began [m], (n, 3).
-    began: when it began [s since the start], (n,).
+    number: number of hits in the row, (n,) int32.
+    position: ball position at the first hit of the row [m], (n, 3).
+    began: time of the first hit of the row [s since the start], (n,).
     part_contact: UNTOUCHED, TOUCHED or PRESSED by the turning part, (n,) int32.
-    touched_at: when the part, or a ball that it presses, touched the ball last [s], (n,).
+    touched_at: last time at which the part, or a ball pressed by it, touched the ball [s], (n,).
     """
 
     number: np.ndarray
@@ -86,10 +88,10 @@ class SlowHits(NamedTuple):
 class Jams(NamedTuple):
     """Jams of each of n balls.
 
-    position: where the ball was held last [m], (n, 3).
-    repeats: how often it was held there again, (n,) int32.
-    neighbour_count: balls around it while some of them move, else 0, (n,) int32.
-    neighbour_sum: sum of the numbers of these balls, which tells whether they are the same, (n,).
+    position: position at which the ball was last held [m], (n, 3).
+    repeats: number of further jams at that position, (n,) int32.
+    neighbour_count: number of balls around the ball while some of these move, else 0, (n,) int32.
+    neighbour_sum: sum of the numbers of these balls, which shows if the neighbours change, (n,).
     """
 
     position: np.ndarray
@@ -101,9 +103,9 @@ class Jams(NamedTuple):
 class ContactList(NamedTuple):
     """The balls that are not in flight.
 
-    balls: their numbers, (n,) int32, of which the first length[0] are in use.
+    balls: ball numbers, (n,) int32. The first length[0] entries are in use.
     places: place of each ball in the list, -1 for a ball in flight, (n,) int32.
-    length: (1,) int64.
+    length: number of balls in the list, (1,) int64.
     """
 
     balls: np.ndarray
@@ -112,12 +114,13 @@ class ContactList(NamedTuple):
 
 
 class Ride(NamedTuple):
-    """Balls that move with a vibrating face, for n balls.
+    """State of n balls that may move with a vibrating face.
 
     face: number of the obstacle that a ball rides on, -1 for none, (n,) int32.
-    height: of the face's plane at rest, moved by a radius [m], (n,).
-    until: when the ball's present parabola along the face ends [s on the window's clock], (n,).
-    wave, waves: of the only sonotrode, or of all.
+    height: offset of the face's plane at rest, moved by a ball radius [m], (n,).
+    until: end of the ball's present parabola along the face [s on the window's clock], (n,).
+    wave: wave of the only sonotrode.
+    waves: waves of several sonotrodes.
     """
 
     face: np.ndarray
@@ -131,15 +134,16 @@ class ContactState(NamedTuple):
     """State of contact mode for n balls.
 
     mode: FLYING, SLIDING, ASLEEP or JAMMED, (n,) int32.
-    acceleration: each ball's own [m/s²], (n, 3).
-    left_normal: normal of the support left last, 0 unless the ball has just left it, (n, 3).
-    still_since: when the ball came to lie still [s since the start], (n,).
-    wake_pending: 1 where something under the ball has begun to move and the ball has not yet
-        reacted, (n,) int32.
-    stays_until: the ball is not woken before this time [s since the start], (n,).
+    acceleration: acceleration of each ball [m/s²], (n, 3).
+    left_normal: normal of the support that the ball has just left, otherwise 0, (n, 3).
+    still_since: time at which the ball came to lie still [s since the start], (n,).
+    wake_pending: 1 if an object under the ball has begun to move and the ball has not yet reacted,
+        (n,) int32.
+    stays_until: time before which the ball is not woken [s since the start], (n,).
     capture, resistance: as in Rest.
-    elastic_below: balls that hit each other more slowly lose no speed [m/s].
-    radius: of every ball [m]. reach: distance at which two balls touch [m], 0 where they never do.
+    elastic_below: speed [m/s] below which collisions of balls lose no speed.
+    radius: radius of every ball [m].
+    reach: distance at which two balls touch [m], 0 if balls never touch.
     ride: None unless balls stick to vibrating faces.
     """
 
@@ -164,7 +168,7 @@ class ContactState(NamedTuple):
 
 
 def checked_rest(rest: Rest | None) -> Rest | None:
-    """The same with plain floats; raises SceneError for numbers out of range."""
+    """The options as plain floats; raises SceneError for numbers out of range."""
     if rest is None:
         return None
     plain = Rest(
@@ -226,7 +230,7 @@ def new_contact_state(
 def new_ride(
     rest: Rest | None, balls: int, wave: Wave | None, waves: SonotrodeWaves | None
 ) -> Ride | None:
-    """The state of n balls of which none rides; None where none ever does."""
+    """The state of n balls of which none rides; None if balls never ride."""
     if rest is None or not rest.on_vibrating or wave is None:
         return None
     face = np.full(balls, -1, dtype=np.int32)
@@ -235,15 +239,15 @@ def new_ride(
 
 @inlined
 def rides(ride: Ride | None, ball: int) -> bool:
-    """True for a ball that moves with a vibrating face."""
+    """True if the ball moves with a vibrating face."""
     if ride is None:
         return False
-    return ride.face[ball] >= 0
+    return bool(ride.face[ball] >= 0)
 
 
 @inlined
 def ball_acceleration(contact: ContactState | None, ball: int, gravity: Gravity | None) -> Vec3:
-    """A ball's acceleration [m/s²]: gravity, or what its supports leave of it."""
+    """Acceleration of a ball [m/s²]: gravity in flight, or gravity limited by its supports."""
     if contact is None:
         return gravity_acceleration(gravity)
     return vec3_at(contact.acceleration, ball)
@@ -251,25 +255,25 @@ def ball_acceleration(contact: ContactState | None, ball: int, gravity: Gravity 
 
 @inlined
 def is_flying(contact: ContactState | None, ball: int) -> bool:
-    """True for a ball that is not in contact."""
+    """True if the ball is not in contact."""
     if contact is None:
         return True
-    return contact.mode[ball] == FLYING
+    return bool(contact.mode[ball] == FLYING)
 
 
 @inlined
 def is_still(contact: ContactState | None, ball: int) -> bool:
-    """True for a ball that sleeps or is jammed."""
+    """True if the ball sleeps or is jammed."""
     if contact is None:
         return False
-    return contact.mode[ball] >= ASLEEP
+    return bool(contact.mode[ball] >= ASLEEP)
 
 
 @inlined
 def still_surface_restitution(
     contact: ContactState | None, restitution: RestitutionState | None
 ) -> RestitutionState | None:
-    """The law for hits on still surfaces: with contact mode they lose energy at all speeds."""
+    """Restitution law for hits on still surfaces. In contact mode it has no elastic speeds."""
     if contact is None:
         return restitution
     if restitution is None:
@@ -281,7 +285,7 @@ def still_surface_restitution(
 def vibrating_restitution(
     contact: ContactState | None, restitution: RestitutionState | None
 ) -> RestitutionState | None:
-    """The law for hits on vibrating faces: the same where balls stick to them."""
+    """Restitution law for hits on vibrating faces. If balls stick, it has no elastic speeds."""
     if contact is None:
         return restitution
     return _where_balls_stick(contact.ride, restitution)

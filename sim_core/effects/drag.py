@@ -9,14 +9,14 @@ Notation:
     k: 3/4 C_d rho_air / (rho D) [1/m], ``quadratic``: the deceleration is k v² beyond
     h: ``piece`` of a flight [s]
 
-Both decelerations have closed solutions, which are used. Buoyancy and added mass, 1.5e-4 of steel's
+The closed solutions of both decelerations are used. Buoyancy and added mass, 1.5e-4 of steel's
 weight and inertia, are left out. 3 mm steel at 5 m/s decelerates by 0.4 m/s².
 
 Flights stay parabolas: the air acts by impulses along the velocity, one in the middle of each piece
-of a flight (half a flight, impulse, half a flight). If an event comes before, the ball is given the
-rest of the impulse, or what was too much is taken back, so that velocities at events hold to second
-order in h. Within a piece the path is off the true one by at most a h²/8, with a the ball's
-deceleration: 5 µm for 0.4 m/s² and 10 ms.
+of a flight (half a flight, impulse, half a flight). If an event comes before the end of a piece,
+the ball gets the rest of the impulse, or the excess is taken back. Velocities at events therefore
+hold to second order in h. Within a piece the path deviates from the true path by at most a h²/8,
+with a the ball's deceleration: 5 µm for 0.4 m/s² and 10 ms.
 
 Sources: Schiller & Naumann, Z. Ver. Dtsch. Ing. 77 (1935) 318; Clift, Grace & Weber, Bubbles, Drops
 and Particles (1978), chapter 5; Strang, SIAM J. Numer. Anal. 5 (1968) 506.
@@ -33,9 +33,10 @@ from sim_core.numerics.jit import jit
 TURBULENT = 1000.0  # Re from which C_d is NEWTON; the two laws differ by 0.3 % there
 NEWTON = 0.44
 INERTIA, POWER = 0.15, 0.687
-MIN_PIECE = 1e-5  # s: shorter ones gain nothing, cost more events, and in the end look like a jam
-# The smallest divisor of an impulse back in time; with pieces shorter than the time in which a ball
-# slows down nothing comes near it.
+# s: shorter pieces gain nothing and cost more events, and in the end look like a jam
+MIN_PIECE = 1e-5
+# Smallest divisor of an impulse back in time. Pieces shorter than the time in which a ball slows
+# down never come near it.
 MIN_DIVISOR = 0.5
 
 
@@ -43,8 +44,8 @@ class Drag(NamedTuple):
     """Still air, by default dry air at 20 °C and 1013 hPa.
 
     Args:
-        density: of the air [kg/m³].
-        viscosity: of the air [Pa s].
+        density: density of the air [kg/m³].
+        viscosity: viscosity of the air [Pa s].
         piece: longest time between two impulses [s].
     """
 
@@ -65,7 +66,7 @@ class DragState(NamedTuple):
 
 
 def checked_drag(drag: Drag | None) -> Drag | None:
-    """The same as plain floats; raises SceneError for numbers out of range."""
+    """The drag as plain floats; raises SceneError for numbers out of range."""
     if drag is None:
         return None
     given = drag._asdict().items()
@@ -84,7 +85,7 @@ def checked_drag(drag: Drag | None) -> Drag | None:
 def new_drag_state(
     drag: Drag | None, diameters: np.ndarray, densities: np.ndarray
 ) -> DragState | None:
-    """The state at time 0 of balls of these diameters [m] and densities [kg/m³], (n,) each."""
+    """The drag state at time 0 for diameters [m] and densities [kg/m³] of shape (n,) each."""
     if drag is None:
         return None
     return DragState(
@@ -97,26 +98,26 @@ def new_drag_state(
 
 
 def drag_coefficient(reynolds: float) -> float:
-    """C_d of a sphere at a Reynolds number."""
+    """Drag coefficient C_d of a sphere at a Reynolds number."""
     if reynolds >= TURBULENT:
         return NEWTON
-    return 24.0 / reynolds * (1.0 + INERTIA * reynolds**POWER)
+    return float(24.0 / reynolds * (1.0 + INERTIA * reynolds**POWER))
 
 
 @jit
 def remaining_speed(drag: DragState, ball: int, speed: float, span: float) -> float:
-    """Share of a speed [m/s] that ``span`` [s] of air leave; more than 1 for a negative span."""
+    """Share of a speed [m/s] that remains after ``span`` [s] in air; above 1 if it is negative."""
     reynolds = drag.reynolds[ball] * speed
     if reynolds >= TURBULENT:
-        return 1.0 / max(1.0 + drag.quadratic[ball] * speed * span, MIN_DIVISOR)
+        return float(1.0 / max(1.0 + drag.quadratic[ball] * speed * span, MIN_DIVISOR))
     inertial = INERTIA * reynolds**POWER
     left = (1.0 + inertial) * math.exp(POWER * drag.stokes[ball] * span) - inertial
-    return max(left, MIN_DIVISOR) ** (-1.0 / POWER)
+    return float(max(left, MIN_DIVISOR) ** (-1.0 / POWER))
 
 
 @jit
 def shift_drag(drag: DragState | None, window: float) -> None:
-    """Move the clock's zero forward by ``window`` [s]."""
+    """Move the clock's zero of the drag state forward by ``window`` [s]."""
     if drag is None:
         return
     for ball in range(len(drag.acted_until)):

@@ -2,16 +2,16 @@
 
 Notation:
     J_n: normal impulse [kg m/s]
-    v_t: velocity at which the touching points pass each other, with spin [m/s], ``slip``
+    v_t: relative velocity of the touching points along the surface, with spin [m/s], ``slip``
     mu: coefficient of friction [-]
     beta0: coefficient of tangential restitution [-]; -1 is smooth, 1 perfectly rough, and both keep
         the energy
     m_eff: mass m at a surface, m/2 for a pair of equal balls [kg]
 
-The tangential impulse opposes v_t and is the smaller of mu J_n, when the points slip throughout,
-and 2/7 (1 + beta0) m_eff |v_t|, when they stick and v_t turns into -beta0 v_t; 2/7 is that of solid
-spheres. In contact mode mu is also Coulomb's coefficient of a ball that slips, rolls or lies on a
-surface; see contact/rolling_friction.py.
+The tangential impulse opposes v_t and is the smaller of two impulses. One is mu J_n, if the points
+slip throughout. The other is 2/7 (1 + beta0) m_eff |v_t|, if they stick and v_t turns into
+-beta0 v_t; solid spheres have the factor 2/7. In contact mode mu is also Coulomb's coefficient of a
+ball that slips, rolls or lies on a surface (contact/rolling_friction.py).
 
 Sources: O. R. Walton, in Particulate Two-Phase Flow (ed. Roco, 1993) ch. 25; Foerster, Louge, Chang
 & Allia, Phys. Fluids 6 (1994) 1108.
@@ -26,7 +26,7 @@ from sim_core.errors import SceneError, surface_table
 from sim_core.numerics.jit import inlined, jit
 from sim_core.numerics.vec3 import Vec3
 
-OF_BALLS = -1  # in place of a surface's tag
+OF_BALLS = -1  # stands for ball on ball in place of a surface's tag
 
 
 class Friction(NamedTuple):
@@ -42,22 +42,22 @@ class Friction(NamedTuple):
 
 
 class FrictionState(NamedTuple):
-    """Friction as compiled code needs it, for n balls; times are on the window's clock."""
+    """Friction as compiled code needs it, for n balls. Times are on the window's clock."""
 
     surfaces: np.ndarray  # (mu, beta0) of each surface, shape (tags, 2)
-    mu: float  # of ball on ball
-    beta0: float  # of ball on ball
-    radius: float  # of the balls [m]
+    mu: float  # coefficient of friction of ball on ball
+    beta0: float  # coefficient of tangential restitution of ball on ball
+    radius: float  # radius of the balls [m]
     mu_of_rows: np.ndarray  # mu of each obstacle that a ball can stand on, shape (obstacles,)
-    spins: np.ndarray  # at time 0 [rad/s], shape (n, 3)
+    spins: np.ndarray  # spins at time 0 [rad/s], shape (n, 3)
     twists: np.ndarray  # constant change of the spin while in contact [rad/s²], shape (n, 3)
-    # velocity [m/s] at time 0 and acceleration [m/s²] of the touching points of a ball that slips
-    # in contact, zero for one that rolls, lies or flies, shape (n, 6)
+    # Velocity [m/s] at time 0 and acceleration [m/s²] of the touching points of a ball that slips
+    # in contact. Both are zero for a ball that rolls, lies or flies. Shape (n, 6).
     slips: np.ndarray
 
 
 def checked_friction(friction: Friction, tags: int) -> Friction:
-    """The coefficients as an array (tags, 2) and floats; raises SceneError if one is bad."""
+    """The coefficients as an array (tags, 2) and floats; raises SceneError for bad coefficients."""
     surfaces, of_balls = surface_table("friction", "(mu, beta0)", *friction, tags)
     pairs = [(f"surfaces[{i}]", *pair) for i, pair in enumerate(surfaces)] + [("balls", *of_balls)]
     for name, mu, beta0 in pairs:
@@ -72,12 +72,12 @@ def checked_friction(friction: Friction, tags: int) -> Friction:
 def new_friction_state(
     friction: Friction, spins: np.ndarray, radius: float, tags_of_rows: np.ndarray
 ) -> FrictionState:
-    """The state of balls in flight.
+    """The friction state of balls in flight.
 
     Args:
-        friction: as checked_friction gives it.
-        spins: of the balls [rad/s], shape (n, 3).
-        radius: of the balls [m].
+        friction: coefficients from checked_friction.
+        spins: spins of the balls [rad/s], shape (n, 3).
+        radius: radius of the balls [m].
         tags_of_rows: tag of each obstacle that a ball can stand on, shape (obstacles,).
     """
     surfaces, mu_and_beta0 = np.asarray(friction.surfaces), friction.balls
@@ -88,7 +88,7 @@ def new_friction_state(
 
 @jit
 def friction_of(friction: FrictionState, tag: int) -> tuple[float, float]:
-    """mu and beta0 of a surface, or of ball on ball for OF_BALLS."""
+    """mu and beta0 of a surface, or of ball on ball if ``tag`` is OF_BALLS."""
     if tag == OF_BALLS:
         return friction.mu, friction.beta0
     return friction.surfaces[tag, 0], friction.surfaces[tag, 1]
@@ -107,7 +107,7 @@ def spin_at(friction: FrictionState, ball: int, time: float) -> Vec3:
 
 @jit
 def set_spin(friction: FrictionState, ball: int, time: float, spin: Vec3, twist: Vec3) -> None:
-    """Set the ``spin`` [rad/s] at ``time`` and ``twist`` [rad/s²] of a ball without slip."""
+    """Set the ``spin`` [rad/s] at ``time`` and ``twist`` [rad/s²] of a ball that does not slip."""
     for axis in range(3):
         friction.spins[ball, axis] = spin[axis] - time * twist[axis]
         friction.twists[ball, axis] = twist[axis]
@@ -125,7 +125,7 @@ def set_slip(friction: FrictionState, ball: int, time: float, slip: Vec3, change
 
 @inlined
 def shift_spins(friction: FrictionState | None, window: float) -> None:
-    """Move the clock's zero forward by ``window`` [s]."""
+    """Move the clock's zero of spins and slips forward by ``window`` [s]."""
     if friction is None:
         return
     for ball in range(len(friction.spins)):

@@ -22,7 +22,7 @@ class Gravity(NamedTuple):
 
 
 def checked_gravity(gravity: Gravity | None) -> Gravity | None:
-    """The same as plain floats, as compiled code needs them; raises SceneError if not finite."""
+    """Gravity as plain floats for compiled code; raises SceneError if it is not finite."""
     if gravity is None:
         return None
     try:

@@ -1,8 +1,8 @@
-"""A part that turns about an axis, steadily or to and fro, and a ball's flight relative to it.
+"""A part that turns about an axis, steadily or to and fro, and flights relative to it.
 
-In the part's frame its triangles stand still, so their tree is built once. A ball's parabola
-becomes a curve there, whose position, velocity and acceleration are those of a turning frame, with
-Coriolis, centrifugal and Euler terms.
+The triangles of the part stand still in its frame, so that their tree is built once. In this frame
+a ball's parabola becomes a curve. Its position, velocity and acceleration follow from the turning
+frame, with Coriolis, centrifugal and Euler terms.
 
 Notation:
     phi: angle of the part [rad]; phi = psi, or A sin(psi) where it turns to and fro
@@ -24,7 +24,7 @@ from sim_core.errors import SceneError, number
 from sim_core.numerics.jit import inlined, jit
 from sim_core.numerics.vec3 import Flight, Vec3, add_scaled, cross, dot, sub
 
-MAX_RPM = 1e5  # also the limit of the speed to and fro; no peened part turns a tenth as fast
+MAX_RPM = 1e5  # 1/min; also the limit of the speed to and fro; no peened part turns a tenth as fast
 MAX_AMPLITUDE = 100.0 * math.pi  # rad
 TURN = 2.0 * math.pi
 MORE_THAN_ONE = 1.01  # turns
@@ -33,17 +33,17 @@ MORE_THAN_ONE = 1.01  # turns
 class PartRotation(NamedTuple):
     """Rotation of the surface ``tag`` about an axis: steady (``rpm``) or to and fro.
 
-    At angle 0 the part is where the mesh has it. Impacts on it are logged in its own frame, that
-    is, on the part as the mesh has it.
+    At angle 0 the part is placed as in the mesh. Impacts on the part are logged in its own frame,
+    that is, on the part as placed in the mesh.
 
     Args:
         tag: surface tag of the part.
         axis_point: a point of the axis [m].
-        axis: direction of the axis; angles are right-handed about it.
-        rpm: steady rotation [1/min]: the angle is 2π rpm/60 t + phase.
-        amplitude: zero-to-peak angle [rad] of a rotation to and fro, with ``frequency``: the angle
-            is amplitude sin(2π frequency t + phase).
-        frequency: of the rotation to and fro [Hz].
+        axis: direction of the axis. Angles are right-handed about it.
+        rpm: speed of a steady rotation [1/min]. The angle is 2π rpm/60 t + phase.
+        amplitude: zero-to-peak angle [rad] of a rotation to and fro. The angle is amplitude sin(2π
+            frequency t + phase).
+        frequency: frequency of a rotation to and fro [Hz].
         phase: angle, or phase of the sine, at time 0 [rad].
     """
 
@@ -57,7 +57,7 @@ class PartRotation(NamedTuple):
 
 
 class RotationAxis(NamedTuple):
-    """What the obstacles of the part depend on; hashable."""
+    """The properties of a rotation on which the part's obstacles depend; hashable."""
 
     tag: int  # surface tag of the part
     point: tuple[float, float, float]  # a point of the axis [m]
@@ -69,20 +69,23 @@ class RotationState(NamedTuple):
     """PartRotation as compiled code needs it."""
 
     axis: Vec3  # unit vector
-    point: Vec3  # of the axis, relative to the mesh's middle [m]
-    rate: float  # growth of the argument [rad/s]
-    amplitude: float  # of a rotation to and fro [rad]
-    to_and_fro: bool  # whether the angle is ``amplitude`` times the sine of the argument
+    point: Vec3  # a point of the axis, relative to the mesh's middle [m]
+    rate: float  # growth of the argument psi [rad/s]
+    amplitude: float  # amplitude of a rotation to and fro [rad]
+    to_and_fro: bool  # True if the angle is ``amplitude`` times the sine of the argument
     speed: float  # bound on the angle's first derivative [rad/s]
     acceleration: float  # bound on its second derivative [rad/s²]
     jerk: float  # bound on its third derivative [rad/s³]
-    # at the window's start [rad], shape (1,); carried from window to window, so that the angle
-    # has no step there however long the simulation is
+    # Argument psi at the window's start [rad], shape (1,). It is carried from window to window, so
+    # that the angle has no step there however long the simulation is.
     argument: np.ndarray
 
 
 def new_rotation_state(turn: PartRotation | None, middle: np.ndarray) -> RotationState | None:
-    """The rotation at time 0; ``middle`` (3,) [m] is the mesh's. Raises SceneError, see below."""
+    """The rotation at time 0; raises SceneError as checked_axis does.
+
+    ``middle``: middle of the mesh [m], (3,).
+    """
     if turn is None:
         return None
     axis = checked_axis(turn)
@@ -161,7 +164,7 @@ def rotate_points(
 
 @jit
 def shift_rotation(rotation: RotationState | None, window: float) -> None:
-    """Move the clock's zero forward by ``window`` [s]; the angle is continuous there."""
+    """Move the clock's zero of the rotation forward by ``window`` [s]. The angle is continuous."""
     if rotation is None:
         return
     rotation.argument[0] = (rotation.argument[0] + rotation.rate * window) % TURN
@@ -169,9 +172,9 @@ def shift_rotation(rotation: RotationState | None, window: float) -> None:
 
 @inlined
 def time_of_one_turn(rotation: RotationState | None, length: float) -> float:
-    """Time [s], at least ``length``, within which the part has been everywhere it gets.
+    """Time [s], at least ``length``, within which the part reaches each of its angles.
 
-    A ball that lies still and has not been touched by then never will be.
+    A still ball that the part has not touched by then will never be touched.
     """
     if rotation is None:
         return length
@@ -182,7 +185,7 @@ def time_of_one_turn(rotation: RotationState | None, length: float) -> float:
 
 @jit
 def _turn_back(rotation: RotationState, vector: Vec3, c: float, s: float) -> Vec3:
-    """A vector turned about the axis by minus the angle whose cosine is c and whose sine is s."""
+    """The vector turned about the axis by minus the angle with cosine ``c`` and sine ``s``."""
     lift = (1.0 - c) * dot(rotation.axis, vector)
     side = cross(rotation.axis, vector)
     return Vec3(
@@ -194,7 +197,7 @@ def _turn_back(rotation: RotationState, vector: Vec3, c: float, s: float) -> Vec
 
 @jit
 def relative_flight(rotation: RotationState, flight: Flight, time: float) -> Flight:
-    """The flight in the part's frame at ``time`` [s]; the given one is in the room's frame."""
+    """The flight in the part's frame at ``time`` [s], from the ``flight`` in the room's frame."""
     argument = rotation.argument[0] + rotation.rate * time
     angle, speed, change = argument, rotation.rate, 0.0
     if rotation.to_and_fro:
@@ -214,7 +217,7 @@ def relative_flight(rotation: RotationState, flight: Flight, time: float) -> Fli
 
 @jit
 def to_room_frame(rotation: RotationState, vector: Vec3, time: float) -> Vec3:
-    """A vector of the part's frame in the room's frame."""
+    """Transform a vector from the part's frame to the room's frame."""
     argument = rotation.argument[0] + rotation.rate * time
     angle = rotation.amplitude * math.sin(argument) if rotation.to_and_fro else argument
     return _turn_back(rotation, vector, math.cos(angle), -math.sin(angle))
@@ -222,14 +225,14 @@ def to_room_frame(rotation: RotationState, vector: Vec3, time: float) -> Vec3:
 
 @jit
 def slip_velocity(rotation: RotationState, flight: Flight, away: Vec3, time: float) -> Vec3:
-    """The ball's velocity relative to the surface it touches [m/s], in the part's frame.
+    """Velocity of the ball relative to the touched surface [m/s], in the part's frame.
 
     Args:
-        rotation: of the part.
-        flight: the ball in the part's frame, whose own velocity is that at the ball's centre; the
-            normal component is the same at both.
-        away: from the touched point to the ball's centre [m].
-        time: of the window [s].
+        rotation: rotation of the part.
+        flight: flight of the ball in the part's frame. Its velocity is relative to the frame at the
+            ball's centre, and its normal component is the same at the touched point.
+        away: vector from the touched point to the ball's centre [m].
+        time: time of the window [s].
     """
     speed = rotation.rate
     if rotation.to_and_fro:
@@ -239,13 +242,13 @@ def slip_velocity(rotation: RotationState, flight: Flight, away: Vec3, time: flo
 
 @jit
 def jerk_bound(rotation: RotationState, reach: float, speed: float, acceleration: float) -> float:
-    """J [m/s³] of a flight near the axis.
+    """Bound J [m/s³] of a flight near the axis.
 
     Args:
-        rotation: of the part.
-        reach: the flight stays within this distance of the axis [m].
-        speed: bound on its speed across the axis, in the room [m/s].
-        acceleration: across the axis, in the room [m/s²].
+        rotation: rotation of the part.
+        reach: largest distance of the flight from the axis [m].
+        speed: bound on the ball's speed across the axis, in the room [m/s].
+        acceleration: acceleration across the axis, in the room [m/s²].
     """
     first = rotation.speed
     second = rotation.acceleration + first * first

@@ -1,15 +1,17 @@
-"""Random arrival: each ball that comes to the vibrating face finds it at a phase drawn at random.
+"""Random arrival: each ball that comes to the vibrating face finds it at a random phase.
 
-From there to contact the face's path is exact. With the plain sinusoid a single ball that loses
-energy can fall into step with the face and hit it at the same phase for ever; in a chamber its
-collisions with others and with slanted walls decorrelate it. Where that is so the two agree in mean
-speeds and impact rates (tests/sim_core/effects/test_random_phase.py). A uniform phase at the edge
-of the band that the face moves in is what a ball finds that arrives at any time; the phase at
-contact is not uniform, because a rising face is met more often.
+From the arrival to the contact the face's path is exact. With the plain sinusoid a single ball that
+loses energy can fall into step with the face and hit it at the same phase for ever. In a chamber,
+collisions with other balls and slanted walls decorrelate the phase. The two models then agree in
+mean speeds and impact rates (tests/sim_core/effects/test_random_phase.py).
 
-The phase stays while the ball is within reach of the face, so that a second impact before it gets
-away finds the face continuing as it did. A draw is a hash of seed, ball and number of the draw: no
-state is shared, and the same scene gives the same bits on any thread.
+A ball that arrives at any time finds a uniform phase at the edge of the band that the face moves
+in. The phase at contact is not uniform, because a rising face is met more often. The phase stays
+while the ball is within reach of the face, so that a second impact finds the face's motion
+continued.
+
+A draw is a hash of seed, ball and number of the draw. No state is shared, and the same scene gives
+the same bits on any thread.
 
 Source: C. Wellons, "Prospecting for hash functions" (2018), 32 bits, multipliers below 2^31.
 """
@@ -24,8 +26,8 @@ from sim_core.numerics.jit import inlined, jit
 from sim_core.numerics.roots import first_approach
 from sim_core.numerics.vec3 import Flight, Vec3, dot
 
-# A ball this far [m] above the band that the face moves in is out of it. Less would be rounding in
-# a chamber a kilometre wide.
+# A ball this far [m] above the band that the face moves in is out of reach. A smaller distance
+# would be rounding in a chamber a kilometre wide.
 CLEAR = 1e-9
 SEEDS = 2**32
 WORD = SEEDS - 1
@@ -33,7 +35,7 @@ TURN = 2.0 * np.pi
 
 
 class RandomPhase(NamedTuple):
-    """Random arrival phases for a Vibration; ``seed`` is a whole number from 0 to 2**32 - 1."""
+    """Random arrival phases for a Vibration. ``seed`` is a whole number from 0 to 2**32 - 1."""
 
     seed: int = 0
 
@@ -41,13 +43,13 @@ class RandomPhase(NamedTuple):
 class RandomPhaseState(NamedTuple):
     """RandomPhase as compiled code needs it, for n balls."""
 
-    phase: np.ndarray  # of the face as each ball finds it [rad], shape (n,)
-    draws: np.ndarray  # how often it was drawn, shape (n,) int64
-    # a ball whose centre is further along ``up`` is out of the band that the face moves in [m],
-    # shape (n,)
+    phase: np.ndarray  # phase of the face as each ball finds it [rad], shape (n,)
+    draws: np.ndarray  # number of draws of each ball, shape (n,) int64
+    # Distance along ``up`` [m] beyond which a ball's centre is out of the band that the face moves
+    # in, shape (n,)
     top: np.ndarray
     up: Vec3  # unit vector along the vibration, towards the shot
-    seed: int  # of the draws
+    seed: int  # seed of the draws
 
 
 def checked_random_phase(random_phase: RandomPhase | None, sonotrodes: int) -> RandomPhase | None:
@@ -73,13 +75,13 @@ def checked_random_phase(random_phase: RandomPhase | None, sonotrodes: int) -> R
 def new_random_phase_state(
     random_phase: RandomPhase | None, wave: Wave | None, face: np.ndarray, radii: np.ndarray
 ) -> RandomPhaseState | None:
-    """Every ball at the phase of the wave itself.
+    """The state in which every ball has the phase of the wave itself.
 
     Args:
         random_phase: the effect.
-        wave: of the sonotrode.
+        wave: wave of the sonotrode.
         face: corners of the vibrating triangles [m], shape (m, 3, 3), normals away from the shot.
-        radii: of the balls [m], shape (n,).
+        radii: radii of the balls [m], shape (n,).
     """
     if random_phase is None or wave is None:
         return None
@@ -93,7 +95,7 @@ def new_random_phase_state(
 
 @jit
 def hash_word(x: int) -> int:
-    """A hash of 32 bits; int64 holds every product."""
+    """Hash a 32-bit number. Every product fits in an int64."""
     x = ((x ^ (x >> 15)) * 0x2C1B3C6D) & WORD
     x = ((x ^ (x >> 12)) * 0x297A2D39) & WORD
     return x ^ (x >> 15)
@@ -101,7 +103,7 @@ def hash_word(x: int) -> int:
 
 @jit
 def draw_phase(seed: int, ball: int, draw: int) -> float:
-    """A phase [rad], uniform in [0, 2π)."""
+    """Draw a phase [rad], uniform in [0, 2π)."""
     mixed = hash_word(hash_word(hash_word(seed) ^ int(ball)) ^ (int(draw) & WORD))
     return TURN * (mixed / SEEDS)
 
@@ -112,9 +114,10 @@ def update_phase(
 ) -> float:
     """Draw a new phase for a ball that is out of reach of the face.
 
+    A ball within reach keeps its phase until it gets out.
+
     Returns:
-        How long the phase holds [s], at most ``length``. A ball within reach of the face keeps its
-        phase until it gets out.
+        Time for which the phase holds [s], at most ``length``.
     """
     if random_phase is None:
         return length
@@ -132,7 +135,7 @@ def update_phase(
 def wave_of_ball(
     random_phase: RandomPhaseState | None, wave: Wave | None, ball: int
 ) -> Wave | None:
-    """The wave of the face as the ball finds it."""
+    """The wave of the face with the phase that the ball finds."""
     if random_phase is None or wave is None:
         return wave
     return Wave(wave.amplitude, wave.omega, random_phase.phase[ball], wave.axis)

@@ -3,7 +3,7 @@
 Notation:
     v: relative speed along the normal [m/s], ``speed``
     e(v): coefficient of restitution [-]
-    v_1 < ... < v_n, e_1 ... e_n: speeds [m/s] at which e is given, and e there
+    v_1 < ... < v_n, e_1 ... e_n: speeds [m/s] with a given e, and e at these speeds
     q: exponent of the fall above v_n [-]
 
 One law holds for every surface and for ball on ball:
@@ -12,20 +12,20 @@ One law holds for every surface and for ball on ball:
     e = linear in v                from each v_i to v_(i+1)
     e = e_n (v / v_n)^(-q)         for v >= v_n
 
-A power law (C0, v0, q) is one point, e = C0 below v0 and C0 (v / v0)^(-q) above; a constant is one
-point with q = 0; a table is many points with q = 0.
+A power law (C0, v0, q) is a single point: e = C0 below v0 and C0 (v / v0)^(-q) above. A constant is
+a single point with q = 0. A table has many points and q = 0.
 
-Sources: q = 1/4 is Badreddine et al., "CAD based simulation of ultrasonic shot peening", eq. 2,
-after McNamara & Falcon, Phys. Rev. E 71 (2005) 031302; it is that of a fully plastic contact, K. L.
-Johnson, Contact Mechanics (1985), section 11.5. Other laws are tables, such as that of viscoelastic
-balls, 1 - e ~ v^(1/5) for small v (Ramirez et al., Phys. Rev. E 60 (1999) 4465), and that of Bizon
-et al., Phys. Rev. Lett. 80 (1998) 57, for shaken layers: e = 1 - (1 - e0) (v / v_0)^(3/4) up to v_0
-and e0 above.
+Sources: q = 1/4 is in Badreddine et al., "CAD based simulation of ultrasonic shot peening", eq. 2,
+after McNamara & Falcon, Phys. Rev. E 71 (2005) 031302. It belongs to a fully plastic contact, K. L.
+Johnson, Contact Mechanics (1985), section 11.5. Other laws are given as tables. Viscoelastic balls
+have 1 - e ~ v^(1/5) for small v (Ramirez et al., Phys. Rev. E 60 (1999) 4465). Shaken layers have
+e = 1 - (1 - e0) (v / v_0)^(3/4) up to v_0 and e0 above (Bizon et al., Phys. Rev. Lett. 80 (1998)
+57).
 
 Impacts slower than ``elastic_below`` lose nothing. Without such a limit a ball that comes to rest
-bounces infinitely often in finite time; with it the number of bounces is bounded, and what is
-neglected is below v²/2 per impact. This is the idea of the TC model of Luding & McNamara, Granular
-Matter 1 (1998) 113, with a speed in place of a time.
+bounces infinitely often in finite time. The limit bounds the number of bounces and neglects an
+energy per mass below elastic_below²/2 per impact. The idea is from the TC model of Luding &
+McNamara, Granular Matter 1 (1998) 113, with a speed in place of a time.
 """
 
 import math
@@ -38,20 +38,22 @@ from sim_core.errors import SceneError, number
 from sim_core.numerics.jit import jit
 
 # m/s: a thousandth of the shot's speed. Mean speeds change by less than 3 % between 1 and 100 mm/s.
-# Lower values spend events on chatter: 2 % of the impacts on the sonotrode here, 20 % at 1 mm/s.
+# Lower values spend events on chatter: 2 % of the impacts on the sonotrode at this value, 20 % at 1
+# mm/s.
 ELASTIC_BELOW = 0.01
 
-EXPONENT = 0.25  # of a law that is given without one; two square roots are faster than a power
-BALLS = -1  # in place of a surface's tag: ball on ball has the last law
+# exponent of a law that is given without one; two square roots are faster than a power
+EXPONENT = 0.25
+BALLS = -1  # stands for ball on ball, the last law, in place of a surface's tag
 V, E, Q = 0, 1, 2  # columns of the points of a law
 
 
 class TabulatedRestitution(NamedTuple):
-    """Restitution at given speeds: linear in speed between them, constant beyond both ends.
+    """Restitution at given speeds, linear between them and constant beyond both ends.
 
     Args:
-        speeds: [m/s], ascending, 0 or more, shape (n,).
-        e: the coefficient at each, in [0, 1], shape (n,).
+        speeds: ascending speeds [m/s], 0 or more, shape (n,).
+        e: coefficient of restitution at each speed, in [0, 1], shape (n,).
     """
 
     speeds: Sequence[float] | np.ndarray
@@ -65,16 +67,21 @@ LAW_FORMS = "(C0, v0), (C0, v0, exponent) or a TabulatedRestitution"
 class Restitution(NamedTuple):
     """Coefficients of restitution.
 
-    Each law is one of
+    Each law has one of these forms:
 
-    - (C0, v0): C0 up to v0 [m/s] and C0 (v / v0)^(-1/4) above;
-    - (C0, v0, exponent): with another exponent than 1/4; 0 makes C0 hold at all speeds;
+    - (C0, v0): C0 up to v0 [m/s] and C0 (v / v0)^(-1/4) above v0;
+    - (C0, v0, exponent): an exponent other than 1/4. With 0, C0 holds at all speeds;
     - a TabulatedRestitution.
 
     Args:
         surfaces: the law of each surface, by tag number.
         balls: the law of ball on ball.
-        elastic_below: impacts slower than this lose nothing [m/s].
+        elastic_below: speed [m/s] below which impacts lose nothing.
+
+    Example:
+        >>> steel = (0.9, 1.0)  # 0.9 up to 1 m/s, falling above
+        >>> Restitution(surfaces=[steel, steel], balls=steel, elastic_below=0.01)
+        Restitution(surfaces=[(0.9, 1.0), (0.9, 1.0)], balls=(0.9, 1.0), elastic_below=0.01)
     """
 
     surfaces: Sequence[RestitutionLaw] | np.ndarray
@@ -85,14 +92,15 @@ class Restitution(NamedTuple):
 class RestitutionState(NamedTuple):
     """Restitution as compiled code needs it: one array, which every impact is handed."""
 
-    # v_i [m/s], e_i and q of the points of each law, by surface tag, and last of the law of the
-    # balls; one of fewer than n points repeats its last; shape (laws, n, 3)
+    # v_i [m/s], e_i and q of the points of each law, shape (laws, n, 3). Laws are ordered by
+    # surface tag, and the last law is for ball on ball. A law with fewer than n points repeats its
+    # last point.
     points: np.ndarray
-    elastic_below: float  # [m/s]
+    elastic_below: float  # speed [m/s] below which impacts lose nothing
 
 
 def checked_restitution(restitution: Restitution, tags: int) -> RestitutionState:
-    """The points of the laws of all tags, or more; raises SceneError if one is bad."""
+    """The points of the laws of all tags, or more; raises SceneError for a bad law."""
     form = f"give {LAW_FORMS} for each of the tags 0 to {tags - 1}"
     if isinstance(restitution.surfaces, TabulatedRestitution):
         raise SceneError(f"restitution.surfaces is one table: {form}")
@@ -163,13 +171,13 @@ def restitution_law(points: np.ndarray, law: int, speed: float) -> float:
         return points[law, 0, E] if speed <= points[law, 0, V] else _between(points, law, speed)
     e, exponent = points[law, last, E], points[law, last, Q]
     if exponent == EXPONENT:
-        return e / math.sqrt(math.sqrt(speed / points[law, last, V]))
-    return e if exponent == 0.0 else e / (speed / points[law, last, V]) ** exponent
+        return float(e / math.sqrt(math.sqrt(speed / points[law, last, V])))
+    return float(e if exponent == 0.0 else e / (speed / points[law, last, V]) ** exponent)
 
 
 @jit
 def _between(points: np.ndarray, law: int, speed: float) -> float:
-    """e between the first and the last point of a law."""
+    """e at a speed between the first and the last point of a law."""
     low, high = 0, points.shape[1] - 1
     while high - low > 1:
         middle = (low + high) // 2
@@ -179,7 +187,7 @@ def _between(points: np.ndarray, law: int, speed: float) -> float:
             low = middle
     rise = points[law, high, E] - points[law, low, E]
     wide = points[law, high, V] - points[law, low, V]
-    return points[law, low, E] + rise * (speed - points[law, low, V]) / wide
+    return float(points[law, low, E] + rise * (speed - points[law, low, V]) / wide)
 
 
 @jit
@@ -203,13 +211,13 @@ def ball_restitution(restitution: RestitutionState | None, speed: float) -> floa
 
 
 def restitution_at(speed: np.ndarray, law: RestitutionLaw) -> np.ndarray:
-    """e of a law on an array of speeds [m/s] of any shape; SceneError for a bad law."""
+    """e by a law at speeds [m/s] of any shape; raises SceneError for a bad law."""
     speed = np.asarray(speed, dtype=np.float64)
     points = _points("law", law)
     e, exponent = np.interp(speed, points[:, V], points[:, E]), points[-1, Q]
     if exponent == 0.0:
         return np.asarray(e)
     ratio = np.maximum(speed / points[-1, V], 1.0)
-    # math.sqrt and numpy's round alike, so that this is the e that a simulation takes
+    # math.sqrt and numpy's sqrt round alike, so that a simulation finds the same e
     fall = np.sqrt(np.sqrt(ratio)) if exponent == EXPONENT else ratio**exponent
     return np.asarray(e / fall)

@@ -1,14 +1,15 @@
-"""Faces whose phase does not repeat every window: several sonotrodes, or a slowly shaken one.
+"""Faces whose phase does not repeat every window: several sonotrodes, or a slowly shaken face.
 
-The clock's window is a whole number of periods of the fastest sonotrode, unless it is shorter than
-one: then it stays as it is, so that what is stored for a window is as small at any frequency. A
-face that does not make whole periods in a window carries its phase on: what it lacks is added at
-every window's end, counted in 2^-62 of a turn. Whole numbers are added without rounding, so that a
-phase is off by at most 2^-63 of a turn a window: 3e-11 rad after the longest simulation.
+The clock's window is a whole number of periods of the fastest sonotrode. A window shorter than one
+period keeps its length, so that the arrays of a window stay as small at any frequency.
+
+A face that does not make whole periods in a window carries its phase on. The missing phase is added
+at every window's end, counted in 2^-62 of a turn. Whole numbers are added without rounding, so that
+a phase is off by at most 2^-63 of a turn a window: 3e-11 rad after the longest simulation.
 """
 
 from fractions import Fraction
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
@@ -16,33 +17,37 @@ from sim_core.effects.vibration import Vibration, Wave
 from sim_core.numerics.jit import inlined, jit
 from sim_core.numerics.vec3 import Vec3
 
-PARTS = 2**62  # of a turn: the sum of two is still an int64
+# The type of a wave, which may be None in a scene without vibration.
+AnyWave = TypeVar("AnyWave", Wave, Wave | None)
+
+PARTS = 2**62  # parts of a turn: the sum of two turns still fits in an int64
 PART = PARTS - 1
 TURN = 2.0 * np.pi
-ROUNDING = 2.0**-52  # of a window made of whole periods
+ROUNDING = 2.0**-52  # share of a window made of whole periods
 
 
 class SonotrodeWaves(NamedTuple):
     """The waves of k sonotrodes."""
 
-    # amplitude [m], omega [rad/s], phase [rad] at the window's start, and axis of each, shape (k,
-    # 6)
+    # amplitude [m], omega [rad/s], phase [rad] at the window's start, and axis of each sonotrode,
+    # shape (k, 6)
     numbers: np.ndarray
     first: np.ndarray  # phase at the scene's start [rad], shape (k,)
-    gone: np.ndarray  # phase since then without whole turns, in PARTS of a turn, shape (k,) int64
+    # phase since the scene's start without whole turns, in PARTS of a turn, shape (k,) int64
+    gone: np.ndarray
     step: np.ndarray  # growth of ``gone`` each window, shape (k,) int64
     faces: np.ndarray  # the sonotrode of each obstacle, shape (obstacles,) int64
 
 
 def carry_phases(vibrations: tuple[Vibration, ...], window: float) -> bool:
-    """True when a window of about this length [s] is not whole periods of every vibration."""
+    """True if a window of about this length [s] is not whole periods of every vibration."""
     return len(vibrations) > 1 or any(window * one.frequency < 1.0 for one in vibrations)
 
 
 def clock_window(vibrations: tuple[Vibration, ...], window: float) -> float:
     """The window [s] nearest to the given one that is whole periods of the fastest vibration.
 
-    The given one if it is shorter than a period.
+    A window shorter than a period is returned unchanged.
     """
     fastest = max((one.frequency for one in vibrations), default=0.0)
     if window * fastest < 1.0:
@@ -53,13 +58,13 @@ def clock_window(vibrations: tuple[Vibration, ...], window: float) -> float:
 def new_waves(
     vibrations: tuple[Vibration, ...], waves: tuple[Wave, ...], window: float, tags: np.ndarray
 ) -> SonotrodeWaves | None:
-    """The waves at the scene's start; None for one that makes whole periods in a window.
+    """The waves at the scene's start; None for a single wave with whole periods in a window.
 
     Args:
-        vibrations: the sonotrodes.
-        waves: of the sonotrodes.
-        window: as clock_window gives it [s].
-        tags: of all obstacles, shape (obstacles,).
+        vibrations: vibrations of the sonotrodes.
+        waves: waves of the sonotrodes.
+        window: length of the window from clock_window [s].
+        tags: tags of all obstacles, shape (obstacles,).
     """
     fastest = Fraction(float(max((one.frequency for one in vibrations), default=0.0)))
     of_fastest = Fraction(window) * fastest
@@ -83,8 +88,8 @@ def new_waves(
 
 
 @inlined
-def wave_of_face(waves: SonotrodeWaves | None, wave: Wave | None, face: int) -> Wave | None:
-    """The wave of a vibrating face, given by its number among the obstacles."""
+def wave_of_face(waves: SonotrodeWaves | None, wave: AnyWave, face: int) -> AnyWave:
+    """The wave of a vibrating face, which is given by its obstacle number."""
     if waves is None or wave is None:
         return wave
     k, numbers = waves.faces[face], waves.numbers
@@ -94,7 +99,7 @@ def wave_of_face(waves: SonotrodeWaves | None, wave: Wave | None, face: int) -> 
 
 @inlined
 def same_sonotrode(waves: SonotrodeWaves | None, face: int, other: int) -> bool:
-    """True when two vibrating faces belong to the same sonotrode."""
+    """True if two vibrating faces belong to the same sonotrode."""
     if waves is None:
         return True
     return bool(waves.faces[face] == waves.faces[other])
@@ -102,7 +107,7 @@ def same_sonotrode(waves: SonotrodeWaves | None, face: int, other: int) -> bool:
 
 @jit
 def shift_phases(waves: SonotrodeWaves | None) -> None:
-    """Move the phases on by one window."""
+    """Move the phases of the sonotrodes on by one window."""
     if waves is None:
         return
     for k in range(len(waves.step)):

@@ -18,17 +18,17 @@ from sim_core.errors import SceneError, number
 from sim_core.numerics.jit import jit
 from sim_core.numerics.vec3 import Vec3, scaled
 
-MAX_FREQUENCY = 1e9  # Hz: generators have 1e5 at most; 1e300 would be searched without end
+MAX_FREQUENCY = 1e9  # Hz: generators have 1e5 at most; the search at 1e300 would not end
 
 
 class Vibration(NamedTuple):
     """Harmonic motion of one surface.
 
     Args:
-        tag: of the surface.
-        amplitude: zero-to-peak [m].
-        frequency: in Hz.
-        phase: at time 0 [rad].
+        tag: tag of the surface.
+        amplitude: zero-to-peak amplitude [m].
+        frequency: frequency [Hz].
+        phase: phase at time 0 [rad].
         axis: direction of the motion.
     """
 
@@ -50,7 +50,7 @@ class Vibration(NamedTuple):
 
 
 class Wave(NamedTuple):
-    """Vibration as compiled code needs it: amplitude [m], omega [rad/s], phase [rad], unit axis."""
+    """Vibration for compiled code: amplitude [m], omega [rad/s], phase [rad] and unit axis."""
 
     amplitude: float
     omega: float
@@ -62,7 +62,7 @@ def checked_waves(vibration: Vibration | tuple[Vibration, ...] | None) -> tuple[
     """The wave of each vibrating surface.
 
     Raises:
-        SceneError: for numbers out of range, and for a tag given twice.
+        SceneError: for numbers out of range, and for a repeated tag.
     """
     if vibration is None:
         return ()
@@ -84,7 +84,7 @@ def checked_waves(vibration: Vibration | tuple[Vibration, ...] | None) -> tuple[
 
 
 def _checked_wave(which: str, vibration: Vibration) -> Wave:
-    """The wave of one surface; ``which`` is its name in messages."""
+    """The wave of one surface, which messages call ``which``."""
     for name in ("amplitude", "frequency", "phase"):
         number(f"{which}.{name}", getattr(vibration, name))
     if not 0.0 <= vibration.amplitude < math.inf:

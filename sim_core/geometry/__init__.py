@@ -1,1 +1,1 @@
-"""What balls can hit: meshes, analytical cavities, obstacles and their tree."""
+"""Objects that balls can hit: meshes, analytical cavities, obstacles and their tree."""

@@ -10,8 +10,8 @@ This is the first system of Badreddine et al., "CAD based simulation of ultrason
 Being convex it has no edge that a ball could hit, so its planes need no borders. All effects are
 simulated except contact mode and a turning part.
 
-A box may be periodic along x, y or both: it has no sides there, and what leaves it on one side
-comes in on the other (numerics/periodic_sides.py).
+A box may be periodic along x, y or both: it has no sides there, and a ball that leaves it on one
+side comes in on the other (numerics/periodic_sides.py).
 """
 
 from collections.abc import Sequence
@@ -31,11 +31,14 @@ from sim_core.geometry.obstacles import (
     face_overlap_of,
 )
 
-FLOOR, CEILING, SIDE = 0, 1, 2  # numbers of the surfaces; SIDE is the first of the sides
-MIN_CORNER_SINE = 1e-9  # of the angle at an outline's corner; less is a corner on a straight line
-# m: how far floor and ceiling of a periodic box go on. A ball at MAX_SPEED flies 2e4 m in a window.
+FLOOR, CEILING, SIDE = 0, 1, 2  # numbers of the surfaces; SIDE is the first side
+# sine of the angle at an outline's corner; a smaller sine is a corner on a straight line
+MIN_CORNER_SINE = 1e-9
+# m: half width of the floor and ceiling of a periodic box. A ball at MAX_SPEED flies 2e4 m in a
+# window.
 UNBOUNDED = 1e5
-MAX_OPPOSITE_COSINE = -1.0 + 1e-9  # between the normals of two opposite sides, as in narrow_gaps.py
+# cosine between the normals of two opposite sides, as in narrow_gaps.py
+MAX_OPPOSITE_COSINE = -1.0 + 1e-9
 
 
 class CylinderAxis(NamedTuple):
@@ -45,11 +48,11 @@ class CylinderAxis(NamedTuple):
     y: float
 
 
-@dataclass(frozen=True, eq=False)  # hashed by identity, so that what is built from it can be cached
+@dataclass(frozen=True, eq=False)  # hashed by identity, so that objects built from it can be cached
 class AnalyticCavity:
-    """An upright cylinder or convex prism; it takes the place of a TriangleMesh in a Scene.
+    """An upright cylinder or convex prism, in place of a TriangleMesh in a Scene.
 
-    Use ``cylinder_cavity``, ``prism_cavity`` or ``periodic_box`` to make one.
+    Use ``cylinder_cavity``, ``prism_cavity`` or ``periodic_box`` to make a cavity.
 
     Args:
         bottom: height of the floor [m].
@@ -57,8 +60,8 @@ class AnalyticCavity:
         tags: surface tags, shape (k,) uint8.
         outline: corners of a prism [m], shape (n, 2), anticlockwise seen from above.
         centre: axis of a cylinder [m], shape (2,).
-        radius: of a cylinder [m]; None for a prism.
-        periodic: axes along which a box is periodic, of 0 (x) and 1 (y).
+        radius: radius of a cylinder [m]; None for a prism.
+        periodic: periodic axes of a box, 0 for x and 1 for y.
     """
 
     bottom: float
@@ -71,12 +74,12 @@ class AnalyticCavity:
 
     @property
     def periods(self) -> np.ndarray:
-        """Sides of a box along which it is periodic [m], 0 where it is not, shape (3,)."""
+        """Side lengths of a box along its periodic axes [m], 0 along the other axes, shape (3,)."""
         sides = np.ptp(self.bounds, axis=0)
         return np.where(np.isin(np.arange(3), self.periodic), sides, 0.0)
 
     def put_back(self, points: np.ndarray) -> np.ndarray:
-        """The images in the box of points (..., 3) [m], where it is periodic."""
+        """The images of points (..., 3) [m] inside a periodic box."""
         if not self.periodic:
             return points
         sides = self.periods
@@ -136,7 +139,7 @@ class AnalyticCavity:
     def corners(self) -> np.ndarray:
         """A triangle in each plane surface [m], wound as in a mesh, shape (k, 3, 3).
 
-        That of a cylinder wall has no area.
+        The triangle of a cylinder wall has no area.
         """
         (x, y, z), (u, v, w) = self.bounds
         flat = [[[x, y, z], [x, v, z], [u, y, z]], [[x, y, w], [u, y, w], [x, v, w]]]
@@ -155,13 +158,13 @@ class AnalyticCavity:
         return np.column_stack([flat, wall])
 
     def contains(self, points: np.ndarray, amplitude: float = 0.0) -> np.ndarray:
-        """Which points (n, 3) [m] are inside, (n,) bool, with the floor one amplitude down."""
+        """True for points (n, 3) [m] inside with the floor one amplitude down, (n,) bool."""
         gaps = self.gaps(points)
         gaps[:, FLOOR] += amplitude
         return np.asarray((gaps > 0.0).all(axis=1))
 
     def narrowest(self) -> tuple[float, int, int]:
-        """Smallest distance [m] between two opposite sides, and which two."""
+        """Smallest distance [m] between two opposite sides, and the numbers of these sides."""
         if self.radius is not None:
             return 2.0 * self.radius, SIDE, SIDE
         normals, offsets = (values[SIDE:] for values in self.planes)
@@ -198,13 +201,13 @@ def cylinder_cavity(
     tags: Sequence[int],
     centre: tuple[float, float] = (0.0, 0.0),
 ) -> AnalyticCavity:
-    """An upright cylinder.
+    """Make an upright cylinder.
 
     Args:
-        diameter: of the cylinder [m].
+        diameter: diameter of the cylinder [m].
         bottom: height of the floor [m].
         top: height of the ceiling [m].
-        tags: of floor, ceiling and wall.
+        tags: tags of floor, ceiling and wall.
         centre: position x, y of the axis [m].
 
     Raises:
@@ -221,13 +224,13 @@ def cylinder_cavity(
 def prism_cavity(
     outline: np.ndarray, bottom: float, top: float, tags: Sequence[int]
 ) -> AnalyticCavity:
-    """An upright prism over a convex outline; a box has four corners.
+    """Make an upright prism over a convex outline; a box has four corners.
 
     Args:
         outline: corners [m], shape (n, 2), anticlockwise seen from above.
         bottom: height of the floor [m].
         top: height of the ceiling [m].
-        tags: of floor, ceiling and sides; one for all sides or one each.
+        tags: tags of floor, ceiling and sides. Give one tag for all sides, or a tag for each side.
 
     Raises:
         SceneError: for an outline that is not convex, naming the corner, and for numbers that do
@@ -259,16 +262,16 @@ def prism_cavity(
 def periodic_box(
     low: Sequence[float], high: Sequence[float], tags: Sequence[int], periodic: str = "xy"
 ) -> AnalyticCavity:
-    """A box with floor and ceiling whose sides are periodic: a ball that leaves it comes in again.
+    """Make a box with floor and ceiling and periodic sides: a ball that leaves comes in again.
 
     Args:
         low: lowest corner [m], shape (3,).
         high: highest corner [m], shape (3,).
-        tags: of floor and ceiling, and with "x" or "y" of the two walls that are left.
-        periodic: "xy", or along "x" or "y" alone.
+        tags: tags of floor and ceiling. With "x" or "y", also the tags of the two remaining walls.
+        periodic: periodic axes: "xy", "x" or "y".
 
     Raises:
-        SceneError: for corners that do not span a box, and for other directions.
+        SceneError: for corners that do not span a box, and for other axes.
     """
     try:
         corners = np.array([low, high], dtype=np.float64)
@@ -290,12 +293,12 @@ def periodic_box(
 
 
 def periods_of(room: TriangleMesh | AnalyticCavity) -> np.ndarray:
-    """Sides along which a cavity is periodic [m], 0 where it is not, shape (3,)."""
+    """Side lengths of a cavity along its periodic axes [m], 0 along the other axes, shape (3,)."""
     return room.periods if isinstance(room, AnalyticCavity) else np.zeros(3)
 
 
 def _all_tags(tags: Sequence[int], sides: int) -> np.ndarray:
-    """One tag for each surface; the tag of the first side is that of all, if only one is given."""
+    """One tag for each surface. If only the first side has a tag, all sides get it."""
     each = [*tags, *([tags[-1]] * (sides - 1) if sides and len(tags) == SIDE + 1 else [])]
     valid = all(tag == int(tag) and 0 <= tag < MAX_TAGS for tag in each)
     if len(each) != SIDE + sides or not valid:
@@ -328,14 +331,14 @@ def build_analytic_table(
 ) -> ObstacleTable:
     """Obstacles of a cavity for balls of one radius, relative to its middle: one row a surface.
 
-    A plane is a face without borders: in a convex cavity no ball gets to what lies beyond. All
-    boxes are the cavity's own, except floor and ceiling, which are flat, and plane sides.
+    A plane is a face without borders, because no ball in a convex cavity gets beyond them. The
+    bounding box of floor, ceiling and plane sides is flat. Any other surface has the cavity's box.
 
     Args:
         cavity: the cavity.
-        radius: of the balls [m].
-        vibrating_tag: the floor vibrates if it has this tag.
-        amplitude: of the floor [m].
+        radius: radius of the balls [m].
+        vibrating_tag: tag of the vibrating surface. The floor vibrates if it has this tag.
+        amplitude: amplitude of the floor [m].
     """
     count, middle = len(cavity.tags), cavity.middle
     normals, offsets = cavity.planes

@@ -1,7 +1,7 @@
-"""Balls of several sizes or densities: what differs from ball to ball; None where all are alike.
+"""Sizes and masses of balls that are not all alike. They are None where all balls are alike.
 
-Each size has obstacles of its own, the mesh moved out by its own radius, all in one tree with a
-root for each size.
+Each size has its own obstacles, the mesh moved out by its own radius. All obstacles are in one tree
+with a root for each size.
 """
 
 from typing import NamedTuple
@@ -17,11 +17,11 @@ from sim_core.numerics.vec3 import Vec3, scaled
 class BallSizes(NamedTuple):
     """Sizes and masses of n balls of k sizes."""
 
-    size: np.ndarray  # which of the sizes each ball has, shape (n,) int32
+    size: np.ndarray  # size number of each ball, shape (n,) int32
     root: np.ndarray  # node of the tree where each size's obstacles begin, shape (k,) int64
-    radius: np.ndarray  # of each size [m], shape (k,)
-    face_overlap: np.ndarray  # of each size [m], shape (k,)
-    mass: np.ndarray  # of each ball [kg], shape (n,)
+    radius: np.ndarray  # radius of each size [m], shape (k,)
+    face_overlap: np.ndarray  # overlap of neighbouring faces for each size [m], shape (k,)
+    mass: np.ndarray  # mass of each ball [kg], shape (n,)
 
 
 def new_ball_sizes(balls: Balls, roots: np.ndarray) -> BallSizes | None:
@@ -39,30 +39,30 @@ def root_of_ball(sizes: BallSizes | None, ball: int) -> int:
     """Node of the tree where the ball's obstacles begin."""
     if sizes is None:
         return 0
-    return sizes.root[sizes.size[ball]]
+    return int(sizes.root[sizes.size[ball]])
 
 
 @inlined
 def radius_of_ball(sizes: BallSizes | None, radius: float, ball: int) -> float:
-    """Radius of a ball [m]; ``radius`` if all are alike."""
+    """Radius of a ball [m]; ``radius`` if all balls are alike."""
     if sizes is None:
         return radius
-    return sizes.radius[sizes.size[ball]]
+    return float(sizes.radius[sizes.size[ball]])
 
 
 @inlined
 def face_overlap_of_ball(sizes: BallSizes | None, face_overlap: float, ball: int) -> float:
-    """How far faces overlap for a ball [m]; ``face_overlap`` if all are alike."""
+    """Overlap of neighbouring faces for a ball [m]; ``face_overlap`` if all balls are alike."""
     if sizes is None:
         return face_overlap
-    return sizes.face_overlap[sizes.size[ball]]
+    return float(sizes.face_overlap[sizes.size[ball]])
 
 
 @inlined
 def share_by_mass(sizes: BallSizes | None, ball: int, other: int, change: Vec3) -> Vec3:
-    """Velocity change [m/s] of one ball of a pair, from the ``change`` if both had equal mass.
+    """Velocity change [m/s] of the first ball of a pair, from the ``change`` at equal masses.
 
-    The reduced mass is m1 m2 / (m1 + m2), half a mass if they are equal; momentum is kept.
+    The reduced mass is m1 m2 / (m1 + m2), half a mass for equal balls. Momentum is kept.
     """
     if sizes is None:
         return change

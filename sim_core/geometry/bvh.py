@@ -1,10 +1,10 @@
-"""An eight-wide tree of bounding boxes over the obstacles; each leaf is one obstacle.
+"""An eight-wide tree of bounding boxes over the obstacles. Each leaf is one obstacle.
 
-The tree is built top down by the surface area heuristic: a group of boxes is cut where the areas of
-the two halves' boxes, weighted by the number of obstacles in them, are least, because a box is
-entered in proportion to its area. Eight groups make a node: the largest is cut again until there
-are eight. Leaves hold a single obstacle so that the box test, eight at once, decides which exact
-tests are worth their cost.
+The tree is built top down by the surface area heuristic. A group of boxes is cut where the areas of
+the two halves' boxes, weighted by their numbers of obstacles, have the least sum, because flights
+enter a box in proportion to its area. Eight groups make a node: the largest group is cut again
+until there are eight. Leaves hold a single obstacle, so that the box test, eight at once, decides
+which exact tests are worth their cost.
 
 Sources: Goldsmith & Salmon, IEEE Computer Graphics and Applications 7(5) (1987) 14; Wald, Benthin &
 Boulos, IEEE Symposium on Interactive Ray Tracing 2008.
@@ -31,7 +31,7 @@ class _Boxes(NamedTuple):
 
     low: np.ndarray  # lowest corners [m], shape (k, 3)
     high: np.ndarray  # highest corners [m], shape (k, 3)
-    order: np.ndarray  # the obstacle of each leaf, shape (k,); sorted as the tree grows
+    order: np.ndarray  # obstacle of each leaf, shape (k,); sorted as the tree grows
 
 
 class Tree(NamedTuple):
@@ -43,15 +43,16 @@ class Tree(NamedTuple):
     # low x, y, z and high x, y, z of each node's children, shape (nodes, 6, 8) float32, padded
     # outward
     bounds: np.ndarray
-    children: np.ndarray  # a node where >= 0, else obstacle -1 - child, shape (nodes, 8) int32
+    # node number if >= 0, else the obstacle -1 - child, shape (nodes, 8) int32
+    children: np.ndarray
     numbers: np.ndarray  # as in ObstacleTable, shape (k, 20)
     kinds: np.ndarray  # as in ObstacleTable, shape (k,)
     triangles: np.ndarray  # as in ObstacleTable, shape (k, 2)
-    radius: float  # of the balls that the obstacles are for [m]
+    radius: float  # radius of the balls that the obstacles are for [m]
 
 
 def build_tree(table: ObstacleTable, radius: float) -> Tree:
-    """The tree over the obstacles for balls of this radius [m]."""
+    """Build the tree over the obstacles for balls of this radius [m]."""
     count = len(table.low)
     size = max(np.abs(table.low).max(), np.abs(table.high).max())
     # float32 boxes are never smaller than the float64 ones
@@ -80,7 +81,10 @@ def build_tree(table: ObstacleTable, radius: float) -> Tree:
 
 
 def join_trees(trees: list[Tree]) -> tuple[Tree, np.ndarray]:
-    """Several trees as one with the last one's radius, and the node each begins at, shape (k,)."""
+    """Join several trees, with the radius of the last tree.
+
+    Returns: the tree, and the node at which each tree begins, shape (k,).
+    """
     if len(trees) == 1:
         return trees[0], np.zeros(1, dtype=np.int64)
     roots = np.cumsum([0, *(len(tree.children) for tree in trees[:-1])])
@@ -116,7 +120,7 @@ def _grow(
 ) -> int:
     """Fill bounds and children, and sort ``order`` so that leaf i holds obstacle order[i].
 
-    Returns the number of nodes.
+    Returns: the number of nodes.
     """
     low, high, order = boxes.low, boxes.high, boxes.order
     ranges[0, 0], ranges[0, 1], ranges[0, 2] = 0, len(order), 1
@@ -173,7 +177,7 @@ def _area_of(boxes: _Boxes, start: int, end: int) -> float:
 @jit
 def _half_area(box: np.ndarray, row: int) -> float:
     x, y, z = box[row, 3] - box[row, 0], box[row, 4] - box[row, 1], box[row, 5] - box[row, 2]
-    return x * y + y * z + z * x
+    return float(x * y + y * z + z * x)
 
 
 @jit
@@ -193,7 +197,10 @@ def _merge(box: np.ndarray, row: int, other: np.ndarray, other_row: int) -> None
 
 @jit
 def _cheapest(bins: np.ndarray, left: np.ndarray) -> tuple[float, int]:
-    """Least area times count of the two sides, and the last bin of the left side."""
+    """Find the cut with the least sum of area times count on both sides.
+
+    Returns: this sum, and the last bin of the left side.
+    """
     _clear(left)
     for b in range(BINS):  # left[b]: all bins up to b
         if b > 0:
@@ -229,7 +236,7 @@ def _bin_of(boxes: _Boxes, i: int, axis: int, first: float, scale: float) -> int
 def _cut(boxes: _Boxes, start: int, end: int, bins: np.ndarray, sweep: np.ndarray) -> int:
     """Sort a group into two at the cheapest of BINS - 1 cuts along each axis.
 
-    Returns where the second part begins.
+    Returns: the start of the second part.
     """
     low, high, order = boxes.low, boxes.high, boxes.order
     best, best_axis, best_bin, best_first, best_scale = np.inf, -1, 0, 0.0, 0.0
@@ -251,7 +258,7 @@ def _cut(boxes: _Boxes, start: int, end: int, bins: np.ndarray, sweep: np.ndarra
         if cost < best:
             best, best_axis, best_bin, best_first, best_scale = cost, axis, place, first, scale
     if best_axis < 0:
-        return (start + end) // 2  # all centres in one point
+        return (start + end) // 2  # all centres lie in one point
     left, right = start, end - 1
     while left <= right:
         if _bin_of(boxes, order[left], best_axis, best_first, best_scale) <= best_bin:

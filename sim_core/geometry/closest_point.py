@@ -1,7 +1,7 @@
-"""The surface point closest to a place in the cavity, for many places at once.
+"""Search for the surface points closest to many places in the cavity at once.
 
-The walk through the tree of boxes leaves out what is farther than the closest point found so far.
-The distance is also the radius of the largest ball that fits there.
+The walk through the tree of boxes leaves out boxes that are farther than the closest point found so
+far. The distance is also the radius of the largest ball that fits at the place.
 
 Source: C. Ericson, Real-Time Collision Detection (2005), section 5.1.5, for the closest point of a
 triangle.
@@ -23,14 +23,15 @@ from sim_core.numerics.vec3 import Vec3, add_scaled, dot, sub
 
 
 class ClosestPoints(NamedTuple):
-    """Closest points to n places.
+    """Surface points closest to n places.
 
-    For a place with nothing within its reach: the reach, -1, and the place itself.
+    A place without surface within its reach has the reach as distance, -1 as triangle and itself as
+    point.
 
     Args:
-        distance: from the place [m], shape (n,).
-        triangle: of the surface, shape (n,) int32.
-        point: on the triangle [m], shape (n, 3).
+        distance: distance from the place [m], shape (n,).
+        triangle: triangle of the surface, shape (n,) int32.
+        point: point on the triangle [m], shape (n, 3).
     """
 
     distance: np.ndarray
@@ -41,13 +42,13 @@ class ClosestPoints(NamedTuple):
 def closest_points(
     mesh: TriangleMesh, places: np.ndarray, reach: float | np.ndarray, tag: int | None = None
 ) -> ClosestPoints:
-    """The surface point closest to each place.
+    """Find the surface point closest to each place.
 
     Args:
         mesh: the surface.
         places: positions [m], shape (n, 3).
-        reach: largest distance that is searched [m], one for all or shape (n,).
-        tag: only triangles with this tag count; all if None.
+        reach: largest distance that is searched [m], one for all places or shape (n,).
+        tag: surface tag of the triangles that count; None means all triangles.
     """
     middle = mesh.middle
     found = ClosestPoints(
@@ -61,7 +62,7 @@ def closest_points(
 
 @computed_once(8)
 def _tree_of(mesh: TriangleMesh, tag: int | None) -> Tree:
-    """A tree of the triangles themselves: their nine numbers are their corners."""
+    """A tree of the triangles themselves. Each obstacle holds a triangle's nine coordinates."""
     own = np.flatnonzero((mesh.tags == tag) | (tag is None)).astype(np.int32)
     if not len(own):
         raise SceneError(f"the mesh has no triangle of tag {tag}")
@@ -77,7 +78,7 @@ def _tree_of(mesh: TriangleMesh, tag: int | None) -> Tree:
 def _find(tree: Tree, found: ClosestPoints, stack: np.ndarray, entry: np.ndarray) -> None:
     """Replace reaches and places in ``found`` by the closest points.
 
-    ``stack`` and ``entry`` are working space: nodes, and their squared distances [m²].
+    ``stack`` and ``entry``: working arrays for nodes and their squared distances [m²].
     """
     for i in range(len(found.distance)):
         at = Vec3(found.point[i, 0], found.point[i, 1], found.point[i, 2])
@@ -122,7 +123,7 @@ def _box_distance_squared(bounds: np.ndarray, node: int, child: int, at: Vec3) -
     x = max(bounds[node, 0, child] - at.x, at.x - bounds[node, 3, child], 0.0)
     y = max(bounds[node, 1, child] - at.y, at.y - bounds[node, 4, child], 0.0)
     z = max(bounds[node, 2, child] - at.z, at.z - bounds[node, 5, child], 0.0)
-    return x * x + y * y + z * z
+    return float(x * x + y * y + z * z)
 
 
 @jit
@@ -138,7 +139,8 @@ def _point_on_triangle(numbers: np.ndarray, row: int, at: Vec3) -> Vec3:
         v, w = (cc * pb - bc * pc) / det, (bb * pc - bc * pb) / det
         if v >= 0.0 and w >= 0.0 and v + w <= 1.0:
             return add_scaled(add_scaled(a, v, ab), w, ac)
-    best = _point_on_side(a, b, at)  # outside the face: on the closest of its three sides
+    # the place is outside the face: take the closest point of its three sides
+    best = _point_on_side(a, b, at)
     for other in (_point_on_side(b, c, at), _point_on_side(c, a, at)):
         offset, so_far = sub(at, other), sub(at, best)
         if dot(offset, offset) < dot(so_far, so_far):

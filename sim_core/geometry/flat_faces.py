@@ -1,10 +1,10 @@
 """Flat faces: connected triangles of one surface in one plane are one face for the ball.
 
-A fine mesh on a flat wall is there to show coverage, not a shape. A flat face is found by growing
-from its largest triangle over edges whose far corner lies in that triangle's plane up to rounding.
-Its outline is then cut, square by square, into convex quadrangles. These need not share corners, as
-the triangles of a mesh do, since faces overlap; so they are large inside and small along a curved
-border, and their number follows the outline, not the mesh.
+A fine mesh on a flat wall serves to show coverage and adds no shape. A flat face grows from its
+largest triangle over edges whose far corner lies in that triangle's plane up to rounding. Its
+outline is then cut, square by square, into convex quadrangles. Faces overlap, so that the
+quadrangles need not share corners as the triangles of a mesh do. They are therefore large inside
+and small along a curved border, and their number follows the outline, not the mesh.
 """
 
 from itertools import pairwise
@@ -16,45 +16,46 @@ import shapely
 from sim_core.geometry.mesh import TriangleMesh, edge_partners, normals_towards_shot
 from sim_core.numerics.jit import jit
 
-# A corner this near the plane [m] lies in it: below the 1e-12 m within which contacts are promised
-# to be exact, above the rounding of coordinates in a chamber (1e-17 m). Far from the origin the
-# rounding of the coordinates themselves is larger.
+# A corner this near the plane [m] lies in it. The value is below the promised accuracy of contacts,
+# 1e-12 m, and above the rounding of coordinates in a chamber, 1e-17 m. Far from the origin the
+# rounding of the coordinates is larger.
 IN_PLANE = 1e-13
 MAX_IN_PLANE = 5e-13
 ROUNDINGS = 4.0
-MIN_TRIANGLES = 3  # of a flat face: two are not worth a search for their outline
-LONE = -1  # number of the flat face of a triangle that belongs to none
+MIN_TRIANGLES = 3  # smallest flat face: two triangles are not worth a search for their outline
+LONE = -1  # flat face number of a triangle that belongs to none
 
-MAX_PIECE_CORNERS = 6  # a piece with more is cut; 4 to 8 gave the same query times
-MAX_HALVINGS = 16  # a square of 1e-5 of the flat face
-# An outline corner nearer than this [m] to the line of its neighbours is left out; a hundredth of
-# the overlap between faces.
+MAX_PIECE_CORNERS = 6  # a piece with more corners is cut; 4 to 8 gave the same query times
+MAX_HALVINGS = 16  # the last square has 1e-5 of the flat face's size
+# An outline corner nearer than this [m] to the line of its neighbours is left out. The value is a
+# hundredth of the overlap between faces.
 STRAIGHT = 1e-10
 
 
 class FlatFaces(NamedTuple):
     """The k flat faces of a mesh of m triangles."""
 
-    of_triangle: np.ndarray  # the flat face of each triangle, LONE if none, shape (m,) int32
-    seed: np.ndarray  # the triangle whose plane each flat face has, shape (k,) int32
-    # a corner [m] and two unit vectors in the plane, shape (k, 3, 3); the first vector runs along
-    # the longest edge of the outline, their cross product points towards the shot
+    of_triangle: np.ndarray  # flat face of each triangle, LONE if none, shape (m,) int32
+    seed: np.ndarray  # triangle that gives each flat face its plane, shape (k,) int32
+    # A corner [m] and two unit vectors in the plane, shape (k, 3, 3). The first vector runs along
+    # the longest edge of the outline. The cross product of the two points towards the shot.
     frames: np.ndarray
     outlines: list[np.ndarray]  # directed edges (3 triangle + corner) that border each flat face
 
 
 class _Triangles(NamedTuple):
-    """What the search for flat faces reads of each triangle."""
+    """Data of each triangle that the search for flat faces reads."""
 
     corners: np.ndarray  # corner positions [m], shape (m, 3, 3)
     normals: np.ndarray  # unit normals, shape (m, 3), zero where a triangle has no area
     doubled: np.ndarray  # doubled areas [m²], shape (m,)
     partners: np.ndarray  # opposite of each directed edge, shape (3 m,)
-    surface: np.ndarray  # only triangles of the same number join, shape (m,)
+    # number of the surface; only triangles of the same surface join, shape (m,)
+    surface: np.ndarray
 
 
 def in_plane_tolerance(vertices: np.ndarray) -> float:
-    """Distance from a plane [m] up to which a corner lies in it, for vertices (n, 3) [m]."""
+    """Largest distance from a plane [m] of a corner in the plane, for vertices (n, 3) [m]."""
     rounding = ROUNDINGS * float(np.finfo(np.float64).eps * np.abs(vertices).max())
     return min(max(IN_PLANE, rounding), MAX_IN_PLANE)
 
@@ -62,13 +63,13 @@ def in_plane_tolerance(vertices: np.ndarray) -> float:
 def find_flat_faces(
     corners: np.ndarray, partners: np.ndarray, surface: np.ndarray, tolerance: float
 ) -> FlatFaces:
-    """Flat faces of MIN_TRIANGLES triangles and more.
+    """Find flat faces of MIN_TRIANGLES triangles and more.
 
     Args:
         corners: corner positions [m], shape (m, 3, 3).
-        partners: as edge_partners gives them, shape (3 m,).
-        surface: only triangles of the same number join, shape (m,).
-        tolerance: see in_plane_tolerance [m].
+        partners: opposite directed edges from edge_partners, shape (3 m,).
+        surface: number of the surface. Only triangles of the same surface join. Shape (m,).
+        tolerance: tolerance from in_plane_tolerance [m].
     """
     count = len(corners)
     normals, doubled = normals_towards_shot(corners)
@@ -112,7 +113,10 @@ def _grow(
     queue: np.ndarray,
     tried: np.ndarray,
 ) -> int:
-    """Fill ``of_triangle`` and ``seeds``; returns the number of flat faces."""
+    """Fill ``of_triangle`` and ``seeds``.
+
+    Returns: the number of flat faces.
+    """
     count = 0
     for k in range(len(largest_first)):
         seed = largest_first[k]
@@ -148,7 +152,7 @@ def _grow(
 
 @jit
 def _lies_in_plane(mesh: _Triangles, triangle: int, seed: int, tolerance: float) -> bool:
-    """True when the triangle lies in the seed's plane and faces the same way."""
+    """True if the triangle lies in the seed's plane and faces the same way."""
     corners, normals = mesh.corners, mesh.normals
     facing = 0.0
     for axis in range(3):
@@ -166,16 +170,16 @@ def _lies_in_plane(mesh: _Triangles, triangle: int, seed: int, tolerance: float)
 
 
 def cover_with_quadrangles(outline: np.ndarray, area: float) -> np.ndarray | None:
-    """Few convex quadrangles that cover the inside of an outline.
+    """Cover the inside of an outline with few convex quadrangles.
 
     Args:
-        outline: segments of the border [m], shape (n, 2, 2), in any order; holes are what lies
-            inside an odd number of them.
-        area: of the inside [m²]; a border that crosses itself has a different area.
+        outline: segments of the border [m], shape (n, 2, 2), in any order. Loops of the
+            border inside other loops are holes.
+        area: area of the inside [m²]. A border that crosses itself has a different area.
 
     Returns:
-        Corners [m], shape (k, 4, 2), counter-clockwise, a triangle with its last corner twice; None
-        if the area does not match.
+        Corners [m], shape (k, 4, 2), counter-clockwise. A triangle has its last corner twice. The
+        result is None if the area does not match.
     """
     region = shapely.build_area(shapely.multilinestrings(shapely.linestrings(outline)))
     region = shapely.simplify(region, STRAIGHT)
@@ -188,7 +192,7 @@ def cover_with_quadrangles(outline: np.ndarray, area: float) -> np.ndarray | Non
     if abs(covered.sum() - area) > 1e-9 * area:
         return None
     longest = np.linalg.norm(np.roll(pieces, -1, axis=1) - pieces, axis=2).max(axis=1)
-    # A piece thinner than that is covered by the overlap of its neighbours.
+    # The overlap of neighbouring pieces covers a piece that is thinner than that.
     return np.asarray(pieces[covered > STRAIGHT * longest])
 
 
@@ -199,20 +203,20 @@ def _doubled_area(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
 
 
 def _cut(region: shapely.Geometry) -> list[shapely.Geometry]:
-    """Pieces of a region: those of its four quarters, and so on until each has few corners."""
+    """Cut a region into quarters, and each quarter again, until each piece has few corners."""
     simple = []
     todo = [(region, 0)]
     while todo:
         piece, depth = todo.pop()
         for polygon in shapely.get_parts(piece):
             if shapely.get_dimensions(polygon) < 2 or shapely.is_empty(polygon):
-                continue  # a quarter that misses the piece, or touches it in a point or a line
+                continue  # the quarter misses the piece, or touches it in a point or a line
             corners = shapely.get_num_coordinates(polygon) - 1
             if depth == MAX_HALVINGS or corners <= MAX_PIECE_CORNERS:
                 simple.append(polygon)
                 continue
             x0, y0, x1, y1 = shapely.bounds(polygon)
-            # a strip is cut across only
+            # a strip is only cut across
             wide, high = x1 - x0 >= 0.5 * (y1 - y0), y1 - y0 >= 0.5 * (x1 - x0)
             x = [x0, 0.5 * (x0 + x1), x1] if wide else [x0, x1]
             y = [y0, 0.5 * (y0 + y1), y1] if high else [y0, y1]
@@ -228,14 +232,14 @@ def _cut(region: shapely.Geometry) -> list[shapely.Geometry]:
 def _quadrangles(polygon: shapely.Geometry) -> np.ndarray:
     """Convex quadrangles (k, 4, 2) of a polygon, with no corner added.
 
-    A cut that passes a corner by a rounding leaves a side of 1e-17 m, whose direction is none and
-    would shut balls out of the piece: such corners are left out.
+    A cut that passes a corner by a rounding leaves a side of 1e-17 m. Such a side has no direction
+    and would shut balls out of the piece, so that its corner is left out.
     """
     polygon = shapely.simplify(polygon, STRAIGHT)
     ring = shapely.get_coordinates(shapely.orient_polygons(polygon))[:-1]
     turns = _doubled_area(np.roll(ring, 1, axis=0), ring, np.roll(ring, -1, axis=0))
     if shapely.get_num_interior_rings(polygon) == 0 and (turns >= 0.0).all():
-        last = len(ring) - 1  # convex: a fan of quadrangles
+        last = len(ring) - 1  # a convex polygon becomes a fan of quadrangles
         return np.array([ring[[0, k, k + 1, min(k + 2, last)]] for k in range(1, last, 2)])
     parts = shapely.get_parts(shapely.constrained_delaunay_triangles(polygon))
     corners = np.array(
@@ -245,14 +249,14 @@ def _quadrangles(polygon: shapely.Geometry) -> np.ndarray:
 
 
 class SurfaceTriangles(NamedTuple):
-    """The m triangles of a mesh with all that obstacles are made from."""
+    """The m triangles of a mesh with all data that obstacles are made from."""
 
     mesh: TriangleMesh  # the mesh
     corners: np.ndarray  # corner positions relative to the mesh's middle [m], shape (m, 3, 3)
     # unit normals towards the shot, shape (m, 3), zero where a triangle has no area
     normals: np.ndarray
     doubled: np.ndarray  # doubled areas [m²], shape (m,)
-    vibrating: np.ndarray  # whether each triangle vibrates, shape (m,) bool
+    vibrating: np.ndarray  # True for each vibrating triangle, shape (m,) bool
     amplitude: np.ndarray  # zero-to-peak [m], 0 for triangles that stand still, shape (m,)
     flat_faces: FlatFaces  # the flat faces of the mesh
 
@@ -260,7 +264,7 @@ class SurfaceTriangles(NamedTuple):
 def surface_triangles(
     mesh: TriangleMesh, vibrating_tags: tuple[int, ...] = (), amplitudes: tuple[float, ...] = ()
 ) -> SurfaceTriangles:
-    """The triangles of a mesh; those with ``vibrating_tags`` move by ``amplitudes`` [m]."""
+    """The triangles of a mesh. Triangles with ``vibrating_tags`` move by ``amplitudes`` [m]."""
     corners = mesh.corners - mesh.middle
     amplitude = np.zeros(len(corners))
     for tag, largest in zip(vibrating_tags, amplitudes, strict=True):

@@ -10,7 +10,7 @@ from sim_core.errors import SceneError
 MAX_TAGS = 256
 
 
-@dataclass(frozen=True, eq=False)  # hashed by identity, so that what is built from it can be cached
+@dataclass(frozen=True, eq=False)  # hashed by identity, so that objects built from it can be cached
 class TriangleMesh:
     """Surface of a cavity.
 
@@ -84,7 +84,7 @@ class TriangleMesh:
     def middle(self) -> np.ndarray:
         """Middle of the bounding box [m], shape (3,).
 
-        Coordinates relative to it lose no digits where the mesh is far from the origin.
+        Coordinates relative to the middle lose no digits where the mesh is far from the origin.
         """
         return np.asarray(0.5 * (self.vertices.min(axis=0) + self.vertices.max(axis=0)))
 
@@ -100,7 +100,7 @@ class TriangleMesh:
 
 
 def _whole_numbers(name: str, numbers: np.ndarray) -> np.ndarray:
-    """The numbers as int64; raises SceneError for one that is not whole, or beyond int32."""
+    """The numbers as int64; raises SceneError for a number that is not whole or beyond int32."""
     try:
         whole = (numbers == np.floor(numbers)) & (np.abs(numbers) <= np.iinfo(np.int32).max)
     except TypeError:
@@ -114,7 +114,7 @@ def _whole_numbers(name: str, numbers: np.ndarray) -> np.ndarray:
 
 
 def enclosed_volume(vertices: np.ndarray, triangles: np.ndarray) -> float:
-    """Volume [m³] enclosed by a closed surface; negative if it is inside out."""
+    """Volume [m³] enclosed by a closed surface; negative if the surface is inside out."""
     a, b, c = np.moveaxis(vertices[triangles] - vertices.mean(axis=0), 1, 0)
     return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6.0)
 

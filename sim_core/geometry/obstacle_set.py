@@ -21,19 +21,20 @@ from sim_core.geometry.turning_part import PartTree, build_part_tree, part_rows,
 
 
 class ObstacleSet(NamedTuple):
-    """What balls can hit; coordinates are relative to the middle of the mesh or cavity.
+    """All obstacles of a scene, with coordinates relative to the middle of the mesh or cavity.
 
     In an analytical cavity the "triangles" are its surfaces.
     """
 
     tree: Tree  # obstacles that do not turn
-    lookup: TriangleLookup  # finds the triangle of a flat face at a point
+    lookup: TriangleLookup  # search for the triangle of a flat face at a point
     tags: np.ndarray  # surface tag of each triangle, shape (m,)
-    face_overlap: float  # how far faces overlap, for the largest balls [m]
-    part: PartTree | None  # the part, if it turns; its obstacles are not in ``tree``
+    face_overlap: float  # overlap of neighbouring faces for the largest balls [m]
+    part: PartTree | None  # the turning part, whose obstacles are not in ``tree``; None without it
     roots: np.ndarray  # nodes of the tree where the obstacles of each radius begin, shape (radii,)
     cylinder: CylinderAxis | None  # axis of an analytical cylinder
-    # lowest and highest corner of all that holds the balls, as far as it moves [m], shape (2, 3)
+    # lowest and highest corner of the room that holds the balls, with the motion of its surfaces
+    # [m], shape (2, 3)
     bounds: np.ndarray
 
 
@@ -44,14 +45,14 @@ def build_obstacle_set(
     amplitudes: tuple[float, ...] = (),
     axis: RotationAxis | None = None,
 ) -> ObstacleSet:
-    """The obstacles of a scene.
+    """Build the obstacles of a scene.
 
     Args:
         mesh: the cavity.
-        radii: of the balls [m], ascending; one radius only with a turning part.
+        radii: radii of the balls [m], ascending. A turning part allows only one radius.
         vibrating_tags: tags of the surfaces that vibrate.
-        amplitudes: zero-to-peak, one for each of ``vibrating_tags`` [m].
-        axis: of the part that turns.
+        amplitudes: zero-to-peak amplitude of each of ``vibrating_tags`` [m].
+        axis: axis of the turning part.
     """
     overlap = face_overlap_of(radii[-1])
     bounds = _swept_bounds(mesh, max(amplitudes, default=0.0), axis)
@@ -70,7 +71,7 @@ def build_obstacle_set(
     if axis is None:
         tree, roots = join_trees([build_tree(*pair) for pair in zip(tables, radii, strict=True)])
         return ObstacleSet(tree, lookup, mesh.tags, overlap, None, roots, None, bounds)
-    (table,), (radius,) = tables, radii  # a part that turns is not supported with several sizes
+    (table,), (radius,) = tables, radii  # a turning part is not supported with several sizes
     turns = part_rows(table, mesh, axis, radius)
     part = build_part_tree(select_rows(table, turns), mesh, axis, radius)
     tree = build_tree(select_rows(table, ~turns), radius)
@@ -81,7 +82,7 @@ def build_obstacle_set(
 def _swept_bounds(
     mesh: TriangleMesh | AnalyticCavity, amplitude: float, axis: RotationAxis | None
 ) -> np.ndarray:
-    """The mesh's bounding box (2, 3) [m] about its middle, with all that its surfaces sweep."""
+    """Bounding box (2, 3) [m] of the mesh about its middle, with all that its surfaces sweep."""
     low, high = mesh.bounds - mesh.middle
     periodic = periods_of(mesh) > 0.0
     low[periodic], high[periodic] = -UNBOUNDED, UNBOUNDED

@@ -1,9 +1,9 @@
-"""The mesh as the centre of a ball meets it: every surface moved out by the ball's radius.
+"""Obstacles for the centre of a ball: every surface of the mesh moved out by the ball's radius.
 
 A ball touching a triangle has its centre on the triangle's Minkowski sum with the ball: the face
 moved by r along its normal, and a capsule of radius r about each edge. Only edges that are convex
-towards the shot can be touched first; on a cylinder's inside there are none. A capsule's round ends
-are the corners.
+towards the shot can be touched first. The inside of a cylinder has no such edge. The round ends of
+the capsules cover the corners.
 
         ______ moved face ______                  convex edge: the capsule ( closes the gap
        /                        \\   capsule       concave edge: the moved faces cross,
@@ -21,37 +21,39 @@ from sim_core.geometry.mesh import edge_partners
 from sim_core.geometry.sonotrode_border import SonotrodeBorder, find_border, require_room_at_joints
 from sim_core.numerics.jit import jit
 
-NUMBERS = 20  # of each obstacle, see ObstacleTable
+NUMBERS = 20  # numbers of each obstacle, see ObstacleTable
 TRIANGLE = [0, 1, 2, 2]  # the four corners of a face that has only three
 
 FACE = 0
 CAPSULE = 1
-VIBRATING_FACE = 2  # of a sonotrode
-CYLINDER_WALL = 3  # of an upright cylinder, hit from inside
+VIBRATING_FACE = 2  # face of a sonotrode
+CYLINDER_WALL = 3  # wall of an upright cylinder, hit from inside
 
 # Faces reach this far over their borders [m], so that rounding leaves no crack between neighbours.
-# It moves contact at a convex edge by FACE_OVERLAP²/2r = 3e-14 m for a 3 mm ball. Less than 1e-12
-# would be of the size of rounding itself.
+# This moves contact at a convex edge by FACE_OVERLAP²/2r = 3e-14 m for a 3 mm ball. An overlap
+# below 1e-12 would be of the size of rounding.
 FACE_OVERLAP = 1e-8
-FACE_OVERLAP_PER_RADIUS = 1e-5  # the same for balls so small that FACE_OVERLAP would show
-# A face reaches past its corners by at most this many overlaps, where the overlaps of two borders
-# cross; at a needle's tip they cross far outside. Six almost flat edges that meet in a convex
-# corner need two.
+FACE_OVERLAP_PER_RADIUS = 1e-5  # the overlap for balls so small that FACE_OVERLAP would show
+# Largest distance of a face's tip past its corner, in overlaps. The overlaps of two borders cross
+# at the tip, and at a needle's tip they would cross far outside. Six almost flat edges that meet in
+# a convex corner need two overlaps.
 MAX_CORNER_OVERLAPS = 3.0
 
 
 class ObstacleTable(NamedTuple):
-    """What the centre of a ball can hit, one row an obstacle; k = faces + capsules."""
+    """Obstacles that the centre of a ball can hit, one row an obstacle; k = faces + capsules."""
 
-    # geometry [m], shape (k, 20). A face holds its unit normal towards the shot (0:3), the offset
-    # of its moved plane (3), and four inward in-plane border normals with their offsets (4:20);
-    # the fourth of a triangle is zero. A capsule holds its start (0:3), unit direction (3:6),
-    # length (6), and the normal of its first neighbour minus that of its second (7:10). A
-    # cylinder wall holds how far from the axis the centre gets (3)
+    # Geometry [m], shape (k, 20).
+    # A face holds its unit normal towards the shot (0:3), the offset of its moved plane (3), and
+    # four inward in-plane border normals with their offsets (4:20). The fourth border of a triangle
+    # is zero.
+    # A capsule holds its start (0:3), unit direction (3:6), length (6), and the normal of its first
+    # neighbour minus the normal of its second neighbour (7:10).
+    # A cylinder wall holds the largest distance of the centre from the axis (3).
     numbers: np.ndarray
     kinds: np.ndarray  # FACE, CAPSULE, VIBRATING_FACE or CYLINDER_WALL, shape (k,) uint8
-    # mesh triangles on which an impact is recorded, shape (k, 2) int32: a capsule's two
-    # neighbours, or a face twice
+    # mesh triangles on which an impact is recorded, shape (k, 2) int32: a capsule's two neighbours,
+    # or the triangle of a face twice
     triangles: np.ndarray
     low: np.ndarray  # lowest corner of the bounding box [m], shape (k, 3)
     high: np.ndarray  # highest corner of the bounding box [m], shape (k, 3)
@@ -59,8 +61,8 @@ class ObstacleTable(NamedTuple):
 
 @jit
 def same_plane(numbers: np.ndarray, row: int, other: int) -> bool:
-    """True when two faces hold the same plane, bit for bit, as those of a flat sonotrode do."""
-    return (
+    """True if two faces hold the same plane, bit for bit, as the faces of a flat sonotrode do."""
+    return bool(
         numbers[row, 0] == numbers[other, 0]
         and numbers[row, 1] == numbers[other, 1]
         and numbers[row, 2] == numbers[other, 2]
@@ -74,10 +76,11 @@ def face_overlap_of(radius: float) -> float:
 
 
 def build_obstacle_table(surface: SurfaceTriangles, radius: float) -> ObstacleTable:
-    """Obstacles for balls of one radius [m], relative to the mesh's middle.
+    """Build the obstacles for balls of one radius [m], relative to the mesh's middle.
 
     The boxes of vibrating faces hold the whole vibration. A flat face has fewer faces here than
-    triangles, and impacts on them are recorded on its seed; triangle_lookup.py finds the triangle.
+    triangles. Impacts on it are recorded on its seed triangle, and triangle_lookup.py finds the
+    triangle.
     """
     require_room_at_joints(surface, radius)
     border = find_border(surface, radius)
@@ -145,13 +148,13 @@ def _few_faces(
 
 
 def _box_area(pieces: np.ndarray) -> float:
-    """Area [m²] of the boxes round some pieces (k, 4, 3): how often a flight enters them."""
+    """Area [m²] of the boxes round pieces (k, 4, 3), a measure of how often flights enter them."""
     x, y, z = np.ptp(pieces, axis=1).T
     return float((x * y + y * z + z * x).sum())
 
 
 def _share_plane(numbers: np.ndarray, vibrating: np.ndarray) -> None:
-    """Give vibrating faces in one plane up to rounding the same plane, to solve it once for all."""
+    """Give vibrating faces in one plane up to rounding the same plane, to solve it once."""
     rows = np.flatnonzero(vibrating)
     while len(rows):
         first = numbers[rows[0], 0:4]
@@ -164,11 +167,12 @@ def _share_plane(numbers: np.ndarray, vibrating: np.ndarray) -> None:
 def _capsules(surface: SurfaceTriangles, radius: float, border: SonotrodeBorder) -> ObstacleTable:
     """One capsule for each convex edge, or straight run of edges between two flat faces.
 
-    And one for each edge that goes on beneath a vibrating face.
+    Each edge that goes on beneath a vibrating face has a capsule too.
     """
     mesh, corners, normals = surface.mesh, surface.corners, surface.normals
     of_triangle, vibrating = surface.flat_faces.of_triangle, surface.vibrating
-    solid = surface.doubled > 0.0  # a triangle without area has no face; its neighbours' edges have
+    # a triangle without area has no face; the edges of its neighbours have one
+    solid = surface.doubled > 0.0
     two = edge_partners(mesh.triangles)
     # each edge once, as two directed edges 3 t + k; all edges between two flat faces in one order
     one = np.flatnonzero(np.arange(len(two)) < two)
@@ -179,14 +183,14 @@ def _capsules(surface: SurfaceTriangles, radius: float, border: SonotrodeBorder)
     start, end = corners[t_one, k_one], corners[t_one, (k_one + 1) % 3]
     length = np.linalg.norm(end - start, axis=1)
     far_corner = corners[t_two, (k_two + 2) % 3]
-    # convex towards the shot: the neighbour falls away behind this face's plane
+    # the edge is convex towards the shot if the neighbour falls away behind this face's plane
     bend = np.linalg.norm(np.cross(normals[t_one], normals[t_two]), axis=1)
     behind = np.einsum("ij,ij->i", normals[t_one], far_corner - start) < 0.0
     folded = np.einsum("ij,ij->i", normals[t_one], normals[t_two]) < 0.0
     flat = (bend < 2.0 * face_overlap_of(radius) / radius) & ~folded
     convex = (behind & ~flat) | ~solid[t_one] | ~solid[t_two]
-    # Where many flat edges meet, the moved faces part further than they overlap: the end of a
-    # capsule then stands for the corner. ``around`` is at least four times how far they part.
+    # The moved faces part by more than they overlap where many flat edges meet. The end of a
+    # capsule then covers the corner. ``around`` is at least four times the gap between the faces.
     turn = np.where(flat & behind & ~vibrating[t_one] & ~vibrating[t_two], bend, 0.0)
     tips = np.stack([mesh.triangles[t_one, k_one], mesh.triangles[t_two, k_two]])
     around = np.bincount(tips.ravel(), np.tile(turn, 2))
@@ -235,11 +239,11 @@ def _straight_runs(
         triangles: vertex indices, shape (m, 3).
         corners: corner positions [m], shape (m, 3, 3).
         of_triangle: flat face of each triangle, shape (m,).
-        one: one side of each edge as a directed edge, shape (n,).
-        two: the other side of each edge, shape (n,).
+        one: first side of each edge as a directed edge, shape (n,).
+        two: second side of each edge as a directed edge, shape (n,).
 
     Returns:
-        Which edges begin a run, shape (k,), and where each run ends [m], shape (k, 3).
+        The first edge of each run, shape (k,), and the end of each run [m], shape (k, 3).
     """
     head = triangles.reshape(-1)[one].tolist()
     tail = triangles[one // 3, (one % 3 + 1) % 3].tolist()
@@ -251,7 +255,7 @@ def _straight_runs(
     first, finish = [], []
     for i, pair in enumerate(pairs):
         if in_run[i] and (head[i], pair) in begun:
-            continue  # it continues another edge of the run
+            continue  # the edge continues another edge of the run
         last = i
         while in_run[i] and (tail[last], pair) in follower:
             last = follower[tail[last], pair]

@@ -1,9 +1,9 @@
-"""What stands beside a vibrating face: walls, and edges where two of them meet, go on beneath it.
+"""Extension of the walls, and of the edges where two walls meet, beneath a vibrating face.
 
-A ball's centre is a radius R from the face. On a face lowered by A it touches a wall that rises at
-a right angle at R - A above the wall's lower end: beneath it where A > R, and on gentle slopes
-sooner. So walls, and the edges of what sticks out of them, are extended down as far as the face
-goes; and the face is extended under gentle slopes, onto which a ball could otherwise come below the
+A ball's centre is a radius R from the face. On a face lowered by A the centre is R - A above the
+lower end of a wall that rises at a right angle. It is beneath this end if A > R, and on gentle
+slopes for smaller A. Walls and their edges are therefore extended down as far as the face goes. The
+face is extended under gentle slopes, because a ball on such a slope could otherwise get below the
 raised face. Where the faces would part all the same, the amplitude is too large.
 
              ball's centre meets     ....... raised face, extended under the slope
@@ -12,7 +12,7 @@ raised face. Where the faces would part all the same, the amplitude is too large
 
 Notation: n normal of the vibrating face, m of a wall beside it, both towards the shot.
 run = n m, cosine of the angle by which the wall rises: 0 upright, negative where it leans over.
-rise = |n x m|, its sine.
+rise = |n x m|, sine of this angle.
 """
 
 from typing import NamedTuple
@@ -36,21 +36,21 @@ class _Beside(NamedTuple):
 
 
 class SonotrodeBorder(NamedTuple):
-    """What stands beside vibrating faces where balls get beneath its end."""
+    """Surfaces beside vibrating faces, where balls get beneath the end of a wall."""
 
-    overhang: float  # how far the vibrating faces are extended [m]
-    # the walls beneath their ends: four corners of each [m], wound like the mesh, shape (k, 4, 3),
-    # and the triangle above, shape (k,)
+    overhang: float  # extension of the vibrating faces over their borders [m]
+    # The walls beneath the ends of the faces: four corners of each [m], wound like the mesh, shape
+    # (k, 4, 3), and the triangle above, shape (k,)
     walls: np.ndarray
     above: np.ndarray
-    # the edges beneath their ends: both ends of each [m], shape (j, 2, 3), and the triangles on
-    # both sides, shape (j, 2)
+    # The edges beneath the ends of the faces: both ends of each [m], shape (j, 2, 3), and the
+    # triangles on both sides, shape (j, 2)
     edges: np.ndarray
     sides: np.ndarray
 
 
 def find_border(surface: SurfaceTriangles, radius: float) -> SonotrodeBorder:
-    """What balls of one radius [m] meet beneath the ends of walls.
+    """Find the surfaces that balls of one radius [m] meet beneath the ends of walls.
 
     Raises:
         SceneError: where the amplitude is so large that a face would part from a wall.
@@ -77,11 +77,11 @@ def find_border(surface: SurfaceTriangles, radius: float) -> SonotrodeBorder:
 
 
 def largest_amplitude(mesh: TriangleMesh, tag: int, radius: float) -> tuple[float, np.ndarray, str]:
-    """How far the surface of a tag may vibrate beside its walls, for balls of one radius [m].
+    """Largest amplitude of a surface beside its walls, for balls of one radius [m].
 
     Returns:
-        Zero-to-peak amplitude [m], inf where every wall is upright; the place [m], shape (3,),
-        that limits it; and how the wall rises there, in words.
+        Zero-to-peak amplitude [m], inf where every wall is upright; the place [m] that limits it,
+        shape (3,); and the slope of the wall there, in words.
     """
     normals, _ = normals_towards_shot(mesh.corners)
     beside = _beside(mesh.triangles, normals, mesh.tags == tag)
@@ -107,8 +107,8 @@ def _beside(triangles: np.ndarray, normals: np.ndarray, vibrating: np.ndarray) -
 def _largest_amplitude(run: np.ndarray, rise: np.ndarray, radius: float) -> np.ndarray:
     """Amplitude [m], shape (k,), beyond which a face and the wall beside it part.
 
-    The raised face comes out of a slope that rises outwards; under a wall that leans over it, a
-    ball on the lowered face gets past the face's border.
+    Beside a slope that rises outwards, the raised face comes out of the slope. Under a wall that
+    leans over it, a ball on the lowered face gets past the face's border.
     """
     limit = np.full(len(run), np.inf)
     out, over = run > LEVEL, run < -LEVEL
@@ -119,7 +119,7 @@ def _largest_amplitude(run: np.ndarray, rise: np.ndarray, radius: float) -> np.n
 
 
 def _leaning(angle: float) -> str:
-    """How a wall rises, by its angle [degrees] to the face's plane, for messages."""
+    """Slope of a wall in words, by its angle [degrees] to the face's plane."""
     if angle < 90.0:
         return f"lies flat or rises by only {angle:.3g} degrees"
     return f"leans over it by {angle - 90.0:.3g} degrees"
@@ -128,11 +128,11 @@ def _leaning(angle: float) -> str:
 def _beneath(
     surface: SurfaceTriangles, beside: _Beside, radius: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """The walls and edges beneath the ends of those beside vibrating faces, as SonotrodeBorder.
+    """The walls and edges beneath surfaces beside vibrating faces, as in SonotrodeBorder.
 
-    A wall goes on in its plane to the line that its plane has in common with the next one's. There,
-    convex towards the shot, is an edge; a concave corner is behind both walls, which may go on past
-    it, as where a cone ends in a point.
+    A wall goes on in its plane to the line that this plane has in common with the next wall's
+    plane. A convex corner towards the shot is an edge there. A concave corner is behind both walls,
+    which may go on past it, as where a cone ends in a point.
     """
     corners, normals, two = surface.corners, surface.normals, edge_partners(surface.mesh.triangles)
     walls: list[list[np.ndarray]] = []
@@ -140,7 +140,8 @@ def _beneath(
     for e, moving in zip(beside.edge.tolist(), beside.face.tolist(), strict=True):
         here, ends = e // 3, corners[e // 3, [e % 3, (e % 3 + 1) % 3]]
         along, down = ends[1] - ends[0], -normals[moving] * surface.amplitude[moving]
-        straight = np.cross(normals[here], along)  # away from the triangle: it is wound clockwise
+        # vector away from the triangle, which is wound clockwise
+        straight = np.cross(normals[here], along)
         straight *= down @ down / (straight @ down)
         drops = []
         for last in (0, 1):
@@ -174,7 +175,7 @@ def _next_wall(
     """The wall beside the next edge of the border, round the first or ``last`` end of an edge.
 
     Returns:
-        Its triangle, and which of its sides lies on the border.
+        The wall's triangle, and the number of its side on the border.
     """
     step = 1 if last else 2
     while True:
@@ -185,10 +186,11 @@ def _next_wall(
 
 
 def require_room_at_joints(surface: SurfaceTriangles, radius: float) -> None:
-    """Raise SceneError where two sonotrodes meet in an edge so blunt that one emerges at the other.
+    """Raise SceneError for sonotrodes that meet in an edge so blunt that balls get through.
 
-    A ball of this radius [m] that touches both has its centre radius (1 - cos) / sin from the ends
-    of their moved faces; the vibrations take at most the sum of their amplitudes off the numerator.
+    A ball of this radius [m] that touches both sonotrodes has its centre radius (1 - cos) / sin
+    from the ends of their moved faces. The vibrations take at most the sum of their amplitudes off
+    the numerator.
     """
     normals, amplitude, tags = surface.normals, surface.amplitude, surface.mesh.tags
     two = edge_partners(surface.mesh.triangles)

@@ -1,4 +1,4 @@
-"""Which triangle of a flat face a ball has hit: a grid of squares over each flat face."""
+"""Search for the triangle of a flat face that a ball has hit, in a grid over each face."""
 
 from typing import NamedTuple
 
@@ -18,8 +18,9 @@ class TriangleLookup(NamedTuple):
     of_triangle: np.ndarray  # flat face of each triangle, shape (m,) int32, as in FlatFaces
     frames: np.ndarray  # frames of the flat faces, shape (k, 3, 3), as in FlatFaces
     origin: np.ndarray  # lower corner of each grid [m], shape (k, 2)
-    squares_per_metre: np.ndarray  # of each grid along both axes [1/m], shape (k, 2)
-    shape: np.ndarray  # squares of each grid along both axes, shape (k, 2) int32
+    # squares of each grid per metre along both axes [1/m], shape (k, 2)
+    squares_per_metre: np.ndarray
+    shape: np.ndarray  # number of squares of each grid along both axes, shape (k, 2) int32
     first: np.ndarray  # number of each grid's first square, shape (k,) int32
     starts: np.ndarray  # first entry of each square in ``members``, shape (squares + 1,) int32
     members: np.ndarray  # the triangles that reach each square, int32
@@ -27,12 +28,12 @@ class TriangleLookup(NamedTuple):
 
 
 def build_lookup(corners: np.ndarray, flat_faces: FlatFaces, face_overlap: float) -> TriangleLookup:
-    """The grids over all flat faces.
+    """Build the grids over all flat faces.
 
     Args:
         corners: corner positions of the mesh [m], shape (m, 3, 3).
         flat_faces: the flat faces of the mesh.
-        face_overlap: how far outside its flat face an impact may lie [m].
+        face_overlap: largest distance of an impact outside its flat face [m].
     """
     count = len(flat_faces.seed)
     inside = np.flatnonzero(flat_faces.of_triangle != LONE)
@@ -78,7 +79,7 @@ def build_lookup(corners: np.ndarray, flat_faces: FlatFaces, face_overlap: float
 
 @jit
 def find_triangle(lookup: TriangleLookup, seed: int, at: Vec3) -> int:
-    """The triangle of the seed's flat face that holds a point of its plane, or is nearest to it."""
+    """The triangle of the seed's flat face that holds a point of its plane, or is nearest."""
     flat = lookup.of_triangle[seed]
     if flat == LONE:
         return seed
@@ -101,12 +102,12 @@ def find_triangle(lookup: TriangleLookup, seed: int, at: Vec3) -> int:
 
 
 def find_triangles(corners: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """The triangle of a plane that holds each point, or is nearest to it.
+    """Find the triangle of a plane that holds each point, or is nearest to the point.
 
     Args:
-        corners: corner positions of triangles of one plane [m], shape (m, 3, 3), wound as in a
+        corners: corner positions of triangles in one plane [m], shape (m, 3, 3), wound as in a
             TriangleMesh: normals away from the shot.
-        points: positions [m], shape (n, 3); off the plane, a point is projected along its normal.
+        points: positions [m], shape (n, 3). A point off the plane is projected along its normal.
 
     Returns:
         Index of the triangle, shape (n,).
@@ -132,7 +133,7 @@ def _find_each(lookup: TriangleLookup, seed: int, points: np.ndarray, found: np.
 
 @jit
 def _distance_outside(corners: np.ndarray, triangle: int, u: float, v: float) -> float:
-    """How far a point lies outside a clockwise triangle's sides [m]; negative inside."""
+    """Distance of a point outside the sides of a clockwise triangle [m]; negative inside."""
     worst = -np.inf
     for k in range(3):
         a, b = 2 * k, 2 * ((k + 1) % 3)

@@ -1,4 +1,4 @@
-"""The obstacles of a part that turns, in a tree of their own, and whether it can turn."""
+"""Tree of the obstacles of a turning part, and the check that the part can turn in its chamber."""
 
 import math
 from typing import NamedTuple
@@ -14,31 +14,33 @@ from sim_core.numerics.computed_once import computed_once
 from sim_core.numerics.jit import jit
 from sim_core.numerics.vec3 import Vec3, add_scaled, dot, sub
 
-# Of a radius: how far the joint between part and chamber may open while the part turns. A ball's
-# centre stays a radius off the wall, so that a slit no wider than this does not matter to it.
+# Share of a radius: largest opening of the joint between part and chamber while the part turns. A
+# ball's centre stays a radius off the wall, so that a slit no wider than this does not matter.
 MAX_OPENING = 0.9
 ROUNDINGS = 16.0
-TOUCH = 1e-9  # m: a corner's path this near a triangle's border touches it and does not cross
+# m: a corner's path this near a triangle's border touches the triangle and does not cross it
+TOUCH = 1e-9
 
 
 class PartTree(NamedTuple):
-    """Obstacles of the part, relative to the mesh's middle, where the part is at angle 0."""
+    """Obstacles of the part at angle 0, relative to the mesh's middle."""
 
     tree: Tree  # the obstacles
     # least distance along the axis, from its point, at which a ball's centre can touch [m]
     low: float
-    high: float  # largest such distance [m]
+    # largest distance along the axis, from its point, at which a ball's centre can touch [m]
+    high: float
     reach: float  # largest distance across the axis at which a ball's centre can touch [m]
 
 
 def part_rows(
     table: ObstacleTable, mesh: TriangleMesh, axis: RotationAxis, radius: float
 ) -> np.ndarray:
-    """Which obstacles turn with the part, shape (k,) bool, for balls of this radius [m].
+    """True for obstacles that turn with the part, shape (k,) bool, for balls of this radius [m].
 
     Raises:
-        SceneError: where the part cannot turn, see require_free_axis, or meets the chamber in an
-            edge that balls can touch.
+        SceneError: for a part that cannot turn, see require_free_axis, and for a part that meets
+            the chamber in an edge that balls can touch.
     """
     require_free_axis(mesh, axis, radius)
     sides = (mesh.tags == axis.tag)[table.triangles]
@@ -57,11 +59,11 @@ def part_rows(
 def require_free_axis(mesh: TriangleMesh, axis: RotationAxis, radius: float) -> None:
     """Raise SceneError if the part cannot turn in its chamber, for balls of this radius [m].
 
-    The line where part and chamber are one surface must stay where it is up to MAX_OPENING of the
-    radius: a circle about the axis, as where a round shaft goes through a wall. Elsewhere no corner
-    of the part may pass through a triangle of the chamber as it turns, nor one of the chamber
-    through the part. Two edges that cross, with no corner of either passing through the other
-    side, are not noticed.
+    The line where part and chamber are one surface must stay in place up to MAX_OPENING of the
+    radius. It is then a circle about the axis, as where a round shaft goes through a wall.
+    Elsewhere no corner of the part may pass through a triangle of the chamber as it turns, and no
+    corner of the chamber through the part. Two edges that cross are not noticed if no corner of
+    either passes through the other side.
     """
     turning = mesh.tags == axis.tag
     joint = _joint(mesh, turning)
@@ -72,10 +74,10 @@ def require_free_axis(mesh: TriangleMesh, axis: RotationAxis, radius: float) -> 
 def build_part_tree(
     table: ObstacleTable, mesh: TriangleMesh, axis: RotationAxis, radius: float
 ) -> PartTree:
-    """The tree of the part's own obstacles for balls of this radius [m]."""
+    """Build the tree of the part's own obstacles for balls of this radius [m]."""
     place = _in_axis_frame(mesh.corners[mesh.tags == axis.tag].reshape(-1, 3), axis)
     height, across = place[:, 2], np.linalg.norm(place[:, :2], axis=1)
-    margin = 1.001 * radius  # and what faces overlap
+    margin = 1.001 * radius  # the radius and the overlap of faces
     # Boxes are padded for float32 rounding at the size of chamber and axis, not of the part,
     # because the part may be that far from a ball.
     furthest = (
@@ -89,7 +91,7 @@ def build_part_tree(
 
 
 def select_rows(table: ObstacleTable, rows: np.ndarray) -> ObstacleTable:
-    """The given rows of a table."""
+    """The rows of a table that ``rows`` selects."""
     return ObstacleTable(*(np.ascontiguousarray(column[rows]) for column in table))
 
 
@@ -140,11 +142,11 @@ def _require_round_joint(
 
 
 class _Sweep(NamedTuple):
-    """How far corners turn, and where they may pass through triangles."""
+    """Range of the corners' rotation, and places where corners may pass through triangles."""
 
     joint: np.ndarray  # edges in the frame of the axis [m], shape (n, 2, 3)
     amplitude: float  # largest angle to each side [rad]
-    beside: float  # crossings this near the joint do not count [m]
+    beside: float  # distance from the joint within which crossings do not count [m]
 
 
 def _require_free_corners(
@@ -153,11 +155,12 @@ def _require_free_corners(
     """Raise SceneError if a corner of part or chamber passes through the other as the part turns.
 
     Args:
-        mesh: of the chamber.
-        turning: which triangles turn, shape (m,) bool.
-        joint: beside these edges [m] a corner may pass through what it is joined to, (n, 2, 3).
-        axis: of the part.
-        radius: of the balls [m].
+        mesh: mesh of the chamber.
+        turning: True for triangles that turn, shape (m,) bool.
+        joint: edges of the joint [m], (n, 2, 3). Beside them a corner may pass through the other
+            body.
+        axis: axis of the part.
+        radius: radius of the balls [m].
     """
     part, chamber = np.unique(mesh.triangles[turning]), np.unique(mesh.triangles[~turning])
     sweep = _Sweep(_in_axis_frame(joint, axis), axis.amplitude, MAX_OPENING * radius)
@@ -177,7 +180,7 @@ def _require_free_corners(
 def _passes_through(
     corners: np.ndarray, triangles: np.ndarray, sweep: _Sweep, place: np.ndarray
 ) -> bool:
-    """True when a corner's arc about the axis crosses a triangle; ``place`` is set to the two."""
+    """True if a corner's arc about the axis crosses a triangle. ``place`` gets their indices."""
     for t in range(len(triangles)):
         a, b, c = triangles[t, 0, 2], triangles[t, 1, 2], triangles[t, 2, 2]
         low, high = min(a, b, c) + TOUCH, max(a, b, c) - TOUCH
@@ -190,7 +193,7 @@ def _passes_through(
 
 @jit
 def _crosses(triangles: np.ndarray, t: int, corners: np.ndarray, i: int, sweep: _Sweep) -> bool:
-    """True when the arc of corner i crosses triangle t away from the joint."""
+    """True if the arc of corner i crosses triangle t away from the joint."""
     height = corners[i, 2]
     found = 0  # the triangle's cut at the corner's height is a segment
     x0, y0, x1, y1 = 0.0, 0.0, 0.0, 0.0
@@ -213,7 +216,7 @@ def _crosses(triangles: np.ndarray, t: int, corners: np.ndarray, i: int, sweep: 
     dx, dy = dx / length, dy / length
     cx, cy = corners[i, 0], corners[i, 1]
     middle = -(x0 * dx + y0 * dy)
-    side = abs(x0 * dy - y0 * dx)  # of the segment's line from the axis
+    side = abs(x0 * dy - y0 * dx)  # distance of the segment's line from the axis, times its length
     radius = math.sqrt(cx * cx + cy * cy)
     if side >= radius - TOUCH:
         return False
@@ -229,7 +232,7 @@ def _crosses(triangles: np.ndarray, t: int, corners: np.ndarray, i: int, sweep: 
 
 @jit
 def _near(sweep: _Sweep, at: Vec3) -> bool:
-    """True when a point is too near the joint to count."""
+    """True if a point is too near the joint to count."""
     joint = sweep.joint
     for k in range(len(joint)):
         start = Vec3(joint[k, 0, 0], joint[k, 0, 1], joint[k, 0, 2])

@@ -1,13 +1,13 @@
 """Velocity changes at a collision without friction.
 
-The normal relative velocity is reversed and multiplied by e, the tangential is kept; effects/
-restitution.py gives e. Two equal balls keep their momentum; geometry/ball_sizes.py has unequal
-ones.
+The normal relative velocity is reversed and multiplied by e. The tangential velocity is kept.
+effects/restitution.py gives e. Two equal balls keep their momentum here, and geometry/ball_sizes.py
+corrects the change for unequal balls.
 
 A ball that circles in a cylinder and loses the last of its normal speed to restitution would hit
 the wall infinitely often in finite time, and slide on it from then on. Instead it goes on leaving
-and meeting the wall at a small angle: no energy comes in or goes, and friction finds the same
-force, m v²/R on average. The sides of a mesh are flat and need none of this.
+and meeting the wall at a small angle. No energy comes in or goes, and friction finds the same
+force, m v²/R on average. The sides of a mesh are flat and need no such angle.
 """
 
 import math
@@ -18,14 +18,15 @@ from sim_core.geometry.obstacles import CYLINDER_WALL
 from sim_core.numerics.jit import jit
 from sim_core.numerics.vec3 import Vec3, add_scaled, dot, scaled
 
-# Smallest angle [rad] at which a ball leaves a cylinder wall: it moves R angle²/2 = 0.2 nm away. A
-# ball of 5 m/s hits the wall a million times a second, a hundredth of what counts as a jam.
+# Smallest angle [rad] at which a ball leaves a cylinder wall: the ball moves R angle²/2 = 0.2 nm
+# away. A ball of 5 m/s hits the wall a million times a second, a hundredth of the rate that counts
+# as a jam.
 RECONTACT_ANGLE = 1e-4
 
 
 @jit
 def pair_velocity_change(apart: Vec3, closing: Vec3, restitution: RestitutionState | None) -> Vec3:
-    """Velocity change [m/s] of the first of two equal balls, and minus that of the second.
+    """Velocity change [m/s] of the first of two equal balls; the second has minus this change.
 
     Dividing by |apart|² keeps the energy of an elastic collision to rounding, where a rounded unit
     normal would drift.
@@ -36,7 +37,7 @@ def pair_velocity_change(apart: Vec3, closing: Vec3, restitution: RestitutionSta
         restitution: None for elastic balls.
 
     Returns:
-        The change; zero when the balls separate.
+        The change; zero if the balls separate.
     """
     rate = dot(apart, closing)
     if rate >= 0.0:
@@ -50,13 +51,13 @@ def pair_velocity_change(apart: Vec3, closing: Vec3, restitution: RestitutionSta
 def surface_velocity_change(
     away: Vec3, relative: Vec3, restitution: RestitutionState | None, tag: int
 ) -> Vec3:
-    """Velocity change [m/s] of a ball at a surface; zero when it separates.
+    """Velocity change [m/s] of a ball at a surface; zero if the ball separates.
 
     Args:
         away: any vector along the normal, from the surface to the ball.
         relative: the ball's velocity minus the surface's [m/s].
         restitution: None for an elastic ball.
-        tag: of the surface.
+        tag: tag of the surface.
     """
     rate = dot(away, relative)
     if rate >= 0.0:
@@ -70,14 +71,14 @@ def surface_velocity_change(
 def leave_cylinder_wall(
     cylinder: CylinderAxis | None, kind: int, away: Vec3, relative: Vec3, change: Vec3
 ) -> Vec3:
-    """Velocity change that makes a ball leave a cylinder wall at no less than RECONTACT_ANGLE.
+    """Velocity change that makes a ball leave a cylinder wall at RECONTACT_ANGLE or more.
 
     Args:
-        cylinder: None in a mesh.
-        kind: of the obstacle; ``change`` stands for any other than a cylinder wall.
+        cylinder: axis of the cylinder; None in a mesh.
+        kind: kind of the obstacle. Other kinds than a cylinder wall return ``change``.
         away: unit normal of the wall towards the ball.
-        relative: the ball's velocity before [m/s].
-        change: of its velocity by restitution and friction [m/s].
+        relative: the ball's velocity before the hit [m/s].
+        change: velocity change by restitution and friction [m/s].
     """
     if cylinder is None:
         return change
@@ -90,8 +91,7 @@ def leave_cylinder_wall(
     if departure >= least:
         return change
     rate = away.x * relative.x + away.y * relative.y
-    # the energy that the departure needs beyond that of the approach comes from the tangential
-    # speed
+    # The departure may need more energy than the approach had. The tangential speed provides it.
     borrowed = max(least * least - rate * rate, 0.0)
     slower = math.sqrt(tangential * tangential - borrowed)
     lost = math.copysign(slower, tangential) - tangential

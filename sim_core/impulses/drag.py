@@ -1,10 +1,10 @@
-"""Drag impulses: in the middle of each piece of a flight, and corrected when an event comes before.
+"""Drag impulses in the middle of each piece of a flight, corrected when an event comes before.
 
-A ball gets no impulse on leaving what it has hit. Where it bounces a thousand times on its way up
-with the sonotrode, an impulse that is taken back at the next bounce, in the opposite direction,
-would take energy from each bounce and leave none. A ball in contact mode gets none either, because
-it is slow: 3 mm steel that rolls at 1.7 m/s loses to the air what it loses by default to rolling
-(Rest.resistance).
+A ball gets no impulse on leaving an obstacle. A ball can bounce a thousand times on its way up with
+the sonotrode. If an impulse were taken back at the next bounce, in the opposite direction, it would
+take energy from each bounce and leave none. A ball in contact mode gets no impulse either, because
+it is slow: 3 mm steel that rolls at 1.7 m/s loses as much to the air as it loses by default to
+rolling (Rest.resistance).
 """
 
 import math
@@ -29,7 +29,7 @@ def time_to_next_drag(
     """Time [s] until the ball's next drag impulse; NEVER without one."""
     if drag is None or not is_flying(contact, ball):
         return NEVER
-    return max(drag.acted_until[ball] + drag.half - time, 0.0)
+    return float(max(drag.acted_until[ball] + drag.half - time, 0.0))
 
 
 @inlined
@@ -42,7 +42,7 @@ def _change(
     gravity: Gravity | None,
     span: float,
 ) -> Vec3:
-    """Velocity change [m/s] by ``span`` [s] of air."""
+    """Velocity change [m/s] by ``span`` [s] in air."""
     velocity = state_under(motion, ball, time, ball_acceleration(contact, ball, gravity)).velocity
     speed = math.sqrt(dot(velocity, velocity))
     return scaled(remaining_speed(drag, ball, speed, span) - 1.0, velocity)
@@ -76,7 +76,7 @@ def apply_drag_piece(
     time: float,
     gravity: Gravity | None,
 ) -> bool:
-    """Give a ball in the middle of a piece its impulse; False if it is not there."""
+    """Give a ball in the middle of a piece its impulse; False if the ball is not there."""
     if drag is None:
         return False
     span = time + drag.half - drag.acted_until[ball]

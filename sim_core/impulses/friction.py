@@ -1,7 +1,7 @@
-"""Friction at a collision: a tangential velocity change against the slip, and spin.
+"""Friction at a collision: a tangential velocity change against the slip, and a change of spin.
 
-The formulas and their source are in effects/friction.py. Impulses are per mass, that is, velocity
-changes; a change j on the surface of a solid sphere of radius R, at -R n from its centre, changes
+effects/friction.py has the formulas and their source. Impulses are per mass, that is, velocity
+changes. A change j on the surface of a solid sphere of radius R, at -R n from its centre, changes
 its spin by -5/(2R) n x j.
 """
 
@@ -11,8 +11,8 @@ from sim_core.effects.friction import OF_BALLS, FrictionState, friction_of, spin
 from sim_core.numerics.jit import inlined, jit
 from sim_core.numerics.vec3 import Vec3, add_scaled, cross, dot, scaled, sub
 
-# Of solid spheres: the share of v_t by which the centre's velocity changes when the touching point
-# stops.
+# Share of v_t by which the centre's velocity changes when the touching point stops, for solid
+# spheres.
 STICK = 2.0 / 7.0
 ALONE, PAIR = 1.0, 0.5  # m_eff over m
 
@@ -27,16 +27,17 @@ def add_surface_friction(
     change: Vec3,
     tag: int,
 ) -> Vec3:
-    """Velocity change [m/s] of a ball at a surface with friction; its spin is changed here.
+    """Velocity change [m/s] of a ball at a surface with friction. The ball's spin is changed here.
 
     Args:
         friction: None without the effect.
         ball: number of the ball.
-        time: of the window [s].
+        time: time of the window [s].
         away: any vector along the normal, from the surface to the ball, in the room's frame.
-        relative: the ball's velocity minus that of the touched point, in the room's frame [m/s].
-        change: of the velocity without friction [m/s].
-        tag: of the surface.
+        relative: the ball's velocity minus the velocity of the touched point, in the room's frame
+            [m/s].
+        change: velocity change without friction [m/s].
+        tag: tag of the surface.
     """
     if friction is None:
         return change
@@ -57,23 +58,23 @@ def add_pair_friction(
     closing: Vec3,
     change: Vec3,
 ) -> Vec3:
-    """Velocity change [m/s] of the first of two balls with friction, and minus that of the second.
+    """Velocity change [m/s] with friction of the first ball; the second has minus this change.
 
     Args:
         friction: None without the effect.
         one: number of the first ball.
         two: number of the second ball.
-        time: of the window [s].
+        time: time of the window [s].
         apart: second position minus first [m].
         closing: second velocity minus first [m/s].
-        change: of the first velocity without friction [m/s].
+        change: velocity change of the first ball without friction [m/s].
     """
     if friction is None:
         return change
     normal = _unit(apart)
     spin = add_scaled(spin_at(friction, one, time), 1.0, spin_at(friction, two, time))
     slip = add_scaled(closing, -friction.radius, cross(spin, normal))
-    # of the second ball
+    # change of the second ball
     tangential = _tangential_change(slip, normal, change, friction_of(friction, OF_BALLS), PAIR)
     # the opposite change on the opposite side gives the first ball the same spin
     _add_spin(friction, one, normal, tangential)
@@ -90,7 +91,7 @@ def _unit(away: Vec3) -> Vec3:
 def _tangential_change(
     slip: Vec3, normal: Vec3, push: Vec3, coefficients: tuple[float, float], mass: float
 ) -> Vec3:
-    """Tangential velocity change [m/s] that goes with the normal one ``push`` [m/s]."""
+    """Tangential velocity change [m/s] that belongs to the normal change ``push`` [m/s]."""
     mu, beta0 = coefficients
     slip = add_scaled(slip, -dot(slip, normal), normal)
     speed = math.sqrt(dot(slip, slip))

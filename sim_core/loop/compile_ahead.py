@@ -20,13 +20,13 @@ from sim_core.numerics.jit import CACHE_FOLDER, CACHED, compilations_counted
 from sim_core.scene.physics import Physics
 from sim_core.scene.scene import Scene
 
-# How many functions are compiled for the first set of effects, and for a further one, roughly:
-# most of them serve all sets.
+# Approximate number of functions that are compiled for the first set of effects, and for a further
+# set. Most functions serve all sets.
 FIRST_SET, FURTHER_SET = 200, 50
 
 
 def _marker(physics: Physics, balls: int, alike: bool, cylinder: bool) -> Path:
-    """File that marks a set of effects as compiled: each set has machine code of its own."""
+    """File that marks a set of effects as compiled. Each set has its own machine code."""
     effects = {**physics._asdict(), **physics.surface._asdict()}
     present = [name for name, effect in effects.items() if effect is not None]
     kind = ["many" if balls >= MIN_BALLS else "few", "alike" if alike else "mixed"]
@@ -38,7 +38,7 @@ def _marker(physics: Physics, balls: int, alike: bool, cylinder: bool) -> Path:
 
 
 def is_compiled(physics: Physics, balls: int, alike: bool = True, cylinder: bool = False) -> bool:
-    """True when compile_simulator has compiled this before, with this version of the sources."""
+    """True if compile_simulator has compiled this set before, with this version of the sources."""
     return _marker(physics, balls, alike, cylinder).exists()
 
 
@@ -49,20 +49,22 @@ def compile_simulator(
     cylinder: bool = False,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> float:
-    """Compile what a scene with these effects needs, or load it from the cache.
+    """Compile the code of a scene with these effects, or load it from the cache.
 
     Args:
-        balls: their number. alike: of one size and density.
-        cylinder: in an analytical cylinder, not in a mesh or a prism.
-        progress: called as progress(done, total) after each function that is compiled; how many
-            there will be is a guess.
+        balls: number of balls.
+        alike: True if all balls have one size and density.
+        cylinder: True in an analytical cylinder, False in a mesh or a prism.
+        progress: called as progress(done, total) after each compiled function. ``total`` is a
+            guess.
 
     Returns:
-        The time that it took [s].
+        Duration of the compilation [s].
     """
     start = time.perf_counter()
     if len(physics.vibrations) > 2:
-        physics = physics._replace(vibration=physics.vibrations[:2])  # the same machine code
+        # more sonotrodes use the same machine code
+        physics = physics._replace(vibration=physics.vibrations[:2])
     shaken = [one.tag for one in physics.vibrations]
     vertices = np.array([[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)])
     quads = np.array(
@@ -103,7 +105,7 @@ def compile_simulator(
 
 @contextlib.contextmanager
 def _few_collections() -> Iterator[None]:
-    """Have Python look for garbage rarely: what the compiler makes lasts, and looking took 7 %."""
+    """Have Python look for garbage rarely. The compiler's objects last, and looking took 7 %."""
     before = gc.get_threshold()
     gc.set_threshold(max(before[0], 100_000), 50, 1000)
     try:
@@ -115,7 +117,7 @@ def _few_collections() -> Iterator[None]:
 def _with_a_turning_box(
     physics: Physics, vertices: np.ndarray, triangles: np.ndarray, tags: np.ndarray
 ) -> tuple[Physics, np.ndarray, np.ndarray, np.ndarray]:
-    """The cube with a small box in a corner, which turns."""
+    """The cube with a small turning box in a corner."""
     turn = physics.part_rotation
     assert turn is not None
     shaken = [one.tag for one in physics.vibrations]

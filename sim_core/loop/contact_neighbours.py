@@ -1,7 +1,7 @@
 """Pairs with a ball in contact, and waking the neighbours of a ball that begins to move.
 
-Balls in contact fly no straight lines in the free-fall frame, so the filter of neighbours.py leaves
-them out, and they are examined here one by one, exactly.
+Balls in contact do not fly along straight lines in the free-fall frame. The filter of neighbours.py
+leaves them out, and they are examined here individually and exactly.
 """
 
 import numpy as np
@@ -19,13 +19,14 @@ from sim_core.numerics.jit import inlined, jit
 from sim_core.numerics.roots import NEVER
 from sim_core.numerics.vec3 import Flight, Vec3, dot, sub, vec3_at
 
-# m. A ball held still is this near to what holds it, or nearer: hops at 10 mm/s are 5 um high.
+# m. Largest gap between a ball that is held still and the objects that hold it. Hops at 10 mm/s are
+# 5 um high.
 MAX_JAM_GAP = 2e-5
 
 
 @inlined
 def hide(contact: ContactState | None, neighbours: NeighbourFilter | None, ball: int) -> None:
-    """Leave a ball in contact out of the filter: as NaN it meets no other."""
+    """Leave a ball in contact out of the filter: as NaN it meets no other ball."""
     if contact is None or neighbours is None:
         return
     if contact.mode[ball] != FLYING:
@@ -50,7 +51,10 @@ def first_meeting(
     time: float,
     before: float,
 ) -> tuple[float, int]:
-    """What next_meeting returns, among all balls, whether in flight or in contact."""
+    """Time [s] and partner of the first meeting with any ball, in flight or in contact.
+
+    The result is as in next_meeting.
+    """
     if contact is None:
         return next_meeting(neighbours, motion, ball, time, before)
     meeting, partner = NEVER, -1
@@ -71,9 +75,9 @@ def _with_contact(
     meeting: float,
     partner: int,
 ) -> tuple[float, int]:
-    """The earlier of a meeting with a ball in flight and those with balls in contact.
+    """The earlier of a meeting with a ball in flight and the meetings with balls in contact.
 
-    For a ball that is in contact itself: the earliest meeting with any ball.
+    For a ball in contact, the result is the earliest meeting with any ball.
     """
     best = min(meeting, before) - time
     here = place(contact, motion, ball, time)
@@ -103,7 +107,7 @@ def _with_contact(
 def wake_if_it_moves(
     contact: ContactState | None, queue: EventQueue, motion: np.ndarray, event: BallEvent
 ) -> None:
-    """Wake what leans on a ball that lay still, if it has begun to move."""
+    """Wake the neighbours of a ball that lay still, if it has begun to move."""
     if contact is None:
         return
     if contact.mode[event.ball] < ASLEEP:
@@ -114,10 +118,10 @@ def wake_if_it_moves(
 def wake_neighbours(
     contact: ContactState, queue: EventQueue, motion: np.ndarray, event: BallEvent
 ) -> None:
-    """Wake the balls that stand on one that has begun to move, and those held still beside it.
+    """Wake the balls on a ball that has begun to move, and balls held still beside it.
 
-    They are marked besides: what meets one of them at this very time has its events predicted
-    again, and the wake-up must not be lost with the old ones.
+    The balls are marked as well: a ball that is met at this very time has its events predicted
+    again, and the wake-up must not be lost with the old events.
     """
     ball, time = event.ball, event.time
     here = place(contact, motion, ball, time).position
@@ -129,7 +133,8 @@ def wake_neighbours(
         if leans:
             contact.wake_pending[other] = 1
             if contact.stays_until[other] > event.time_since_start:
-                _drop_supports_on(contact, other, ball)  # until then they are an ordinary pair
+                # until then the two balls are an ordinary pair
+                _drop_supports_on(contact, other, ball)
                 search_wall_again(queue, other, time)
             else:
                 schedule_now(queue, other, time, WAKES)
@@ -139,7 +144,7 @@ def wake_neighbours(
 def _is_near(
     contact: ContactState, motion: np.ndarray, ball: int, time: float, position: Vec3
 ) -> bool:
-    """True when a ball is so near to another at ``position`` [m] that it may hold it."""
+    """True if a ball is so near to another ball at ``position`` [m] that it may hold it."""
     apart = sub(place(contact, motion, ball, time).position, position)
     return dot(apart, apart) < (contact.reach + MAX_JAM_GAP) ** 2
 
@@ -154,11 +159,11 @@ def _drop_supports_on(contact: ContactState, ball: int, other: int) -> None:
 
 @jit
 def count_neighbours(contact: ContactState, motion: np.ndarray, event: BallEvent) -> bool:
-    """Note which balls are around a jammed one, if any of them moves.
+    """Note the balls around a jammed ball, if any of them moves.
 
-    Once one of them has gone, the ball may not be held any more.
+    Once a neighbour has gone, the ball may have lost its hold.
 
-    Returns: True when they are not the ones noted before.
+    Returns: True if the neighbours are not the noted ones.
     """
     ball, jams = event.ball, contact.jams
     here = place(contact, motion, ball, event.time).position
@@ -171,4 +176,4 @@ def count_neighbours(contact: ContactState, motion: np.ndarray, event: BallEvent
     changed = count != jams.neighbour_count[ball] or numbers != jams.neighbour_sum[ball]
     jams.neighbour_count[ball] = count if moves else 0
     jams.neighbour_sum[ball] = numbers
-    return changed
+    return bool(changed)

@@ -1,7 +1,7 @@
-"""What an event does: a ball meets a surface or another ball, or its path in contact ends.
+"""Handlers of events: a ball meets a surface or another ball, or its path in contact ends.
 
 Every hit on a surface, still, vibrating or turning, is resolved in _resolve_contact. New effects of
-the contact between a ball and a surface are added in effects/surface/surface_effects.py.
+the contact between a ball and a surface belong into effects/surface/surface_effects.py.
 """
 
 import math
@@ -65,7 +65,8 @@ from sim_core.numerics.jit import inlined
 from sim_core.numerics.periodic_sides import nearest_image
 from sim_core.numerics.vec3 import Flight, Touch, Vec3, dot, sub
 
-# Events of one ball in one window after which contact mode holds it still, and again after as many.
+# Number of events of one ball in one window after which contact mode holds it still. The ball is
+# held again after as many further events.
 JAM_EVENTS = 5_000
 
 
@@ -81,9 +82,9 @@ def _resolve_contact(
     """Velocity change [m/s], in the room's frame, of a ball that hits a surface and bounces.
 
     Args:
-        rotation: of the part, if the surface belongs to a turning part.
-        touch: in the frame of the surface.
-        law: the restitution that holds there.
+        rotation: rotation of the part, if the surface belongs to a turning part.
+        touch: the contact in the frame of the surface.
+        law: restitution law of the surface.
         approach: normal speed before the hit [m/s].
     """
     change = surface_velocity_change(touch.away, touch.relative, law, touch.tag)
@@ -103,7 +104,7 @@ def _resolve_contact(
 
 @inlined
 def _in_room(rotation: RotationState | None, vector: Vec3, time: float) -> Vec3:
-    """A vector of the surface's frame in the room's."""
+    """Transform a vector from the surface's frame to the room's frame."""
     if rotation is None:
         return vector
     return to_room_frame(rotation, vector, time)
@@ -131,13 +132,13 @@ def _here(state: SimulationState, event: BallEvent) -> BallState:
 
 @inlined
 def hit_surface(state: SimulationState, event: BallEvent) -> Impact:
-    """The ball meets a still or vibrating surface now: change its velocity, count the hit."""
+    """Resolve a hit on a still or vibrating surface: change the velocity and count the hit."""
     obstacles, ball = state.obstacles, event.ball
     tree, obstacle = obstacles.tree, int(np.int64(state.queue.obstacle[ball]))
     here = _here(state, event)
     kind = tree.kinds[obstacle]
     side = 0
-    touched = here.position  # or where the ball's centre is seen in the face's plane
+    touched = here.position  # the touched point, or the ball's centre projected on the face's plane
     if kind == CAPSULE:
         away = away_from_capsule(tree.numbers, obstacle, here.position)
         side = nearer_neighbour(tree.numbers, obstacle, away)
@@ -175,7 +176,7 @@ def hit_surface(state: SimulationState, event: BallEvent) -> Impact:
 def hit_part(
     rotation: RotationState | None, part: PartTree | None, state: SimulationState, event: BallEvent
 ) -> Impact:
-    """The same for the turning part; the impact is seen in the part's frame."""
+    """Resolve a hit on the turning part. The impact is logged in the part's frame."""
     if rotation is None or part is None:
         return no_impact()
     tree = part.tree
@@ -205,7 +206,7 @@ def hit_part(
 def collide(
     contact: ContactState | None, state: SimulationState, one: BallEvent, partner: int
 ) -> None:
-    """Two balls meet now."""
+    """Resolve the meeting of two balls."""
     motion, queue, time = state.motion, state.queue, one.time
     two = BallEvent(partner, time, one.time_since_start)
     state.counts[BALLS] += 1
@@ -242,7 +243,7 @@ def collide(
 def end_contact_path(
     contact: ContactState | None, state: SimulationState, event: BallEvent
 ) -> bool:
-    """A ball in contact comes to a border or a stop, or is woken; False if its path goes on."""
+    """Resolve a border, a stop or a wake-up of a ball in contact; False if its path goes on."""
     if contact is None:
         return False
     reason = int(np.int64(state.queue.obstacle[event.ball]))
@@ -260,13 +261,13 @@ def end_contact_path(
 
 @inlined
 def _face_under(ride: Ride | None, state: SimulationState, event: BallEvent, at: BallState) -> int:
-    """The face, of the plane that a ball rides on, that it is on now; -1 beside them all."""
+    """Number of the face under a riding ball; -1 if the ball is beside all faces of the plane."""
     if ride is None:
         return -1
     tree, overlap = state.obstacles.tree, state.obstacles.face_overlap
     flight, last = Flight(at.position, at.velocity, at.velocity), ride.face[event.ball]
     for k in range(-1, len(tree.kinds)):
-        row = int(np.int64(last)) if k < 0 else k  # most likely it is still on the same
+        row = int(np.int64(last)) if k < 0 else k  # most likely the ball is still on the same face
         if is_of_plane(ride, tree, last, row):
             wave = wave_of_face(ride.waves, ride.wave, row)
             if within_moved_borders(tree.numbers, row, flight, overlap, wave, event.time, 0.0):
@@ -276,21 +277,22 @@ def _face_under(ride: Ride | None, state: SimulationState, event: BallEvent, at:
 
 @inlined
 def gives_up(contact: ContactState | None, queue: EventQueue, ball: int) -> bool:
-    """True for a ball in a jam that contact mode cannot resolve; it is to be held still."""
+    """True for a ball in an unresolved jam, which contact mode must hold still."""
     if contact is None:
         return False
     if queue.events[ball] % JAM_EVENTS != 0 or contact.mode[ball] >= ASLEEP:
         return False
     if rides(contact.ride, ball):
         return False
-    return contact.slow_hits.part_contact[ball] == UNTOUCHED  # else the part would go through it
+    # otherwise the part would go through the ball
+    return bool(contact.slow_hits.part_contact[ball] == UNTOUCHED)
 
 
 @inlined
 def hold_jammed_ball(
     contact: ContactState | None, state: SimulationState, event: BallEvent
 ) -> None:
-    """Hold a ball that gives up still where it is."""
+    """Hold a ball in an unresolved jam still where it is."""
     if contact is None:
         return
     hold_still(contact, state.motion, event, _here(state, event).position)

@@ -1,4 +1,4 @@
-"""The next event of every ball, and whose comes first: a knock-out tournament over the balls."""
+"""The next event of every ball, and the earliest event, found by a knock-out tournament."""
 
 from typing import NamedTuple
 
@@ -7,18 +7,18 @@ import numpy as np
 from sim_core.numerics.jit import inlined, jit
 from sim_core.numerics.roots import NEVER
 
-# in place of the obstacle that a ball meets next (contact/landing_and_lift_off.py has more)
-SEARCH_ON = -1  # none until wall_time: search on from there
+# values in place of the obstacle that a ball meets next (contact/landing_and_lift_off.py has more)
+SEARCH_ON = -1  # no obstacle until wall_time: search on from there
 UNKNOWN = -2  # nothing has been predicted for this ball yet
 
 
 class Meetings(NamedTuple):
     """The next meeting of each of n balls with another ball.
 
-    time: [s on the window's clock], (n,), NEVER for none.
+    time: time of the meeting [s on the window's clock], (n,), NEVER for none.
     partner: the other ball, (n,) int32, -1 for none.
-    partner_path: the partner's path_number when the meeting was found, (n,) int32. The meeting is
-        stale once the partner's number has moved on.
+    partner_path: the partner's path_number at the prediction of the meeting, (n,) int32. The
+        meeting is stale once the partner's number has changed.
     """
 
     time: np.ndarray
@@ -29,14 +29,15 @@ class Meetings(NamedTuple):
 class EventQueue(NamedTuple):
     """The next events of n balls.
 
-    wall_time: when the ball meets an obstacle or its path ends [s on the window's clock], (n,).
+    wall_time: time at which the ball meets an obstacle or its path ends [s on the window's clock],
+        (n,).
     obstacle: the obstacle, or SEARCH_ON, UNKNOWN or the end of a path in contact, (n,) int32.
-    path_number: how often the ball's path has changed, (n,) int32.
+    path_number: number of changes of the ball's path, (n,) int32.
     events: events of the ball in this window, (n,) int32.
-    meetings: None where balls do not collide with one another.
-    next_time: the earlier of the two times [s], (m,), where m is the next power of two; padded
-        with NEVER.
-    winners: (2 m,) int32; winners[1] is the ball whose event is next.
+    meetings: None if balls do not collide with one another.
+    next_time: the earlier of wall time and meeting time [s], (m,), padded with NEVER. m is the next
+        power of two.
+    winners: balls that win the matches, (2 m,) int32. winners[1] is the ball with the next event.
     """
 
     wall_time: np.ndarray
@@ -77,10 +78,10 @@ def new_event_queue(balls: int, pairs: bool = True) -> EventQueue:
 
 @inlined
 def meeting_time(meetings: Meetings | None, ball: int) -> float:
-    """When the ball meets another [s]; NEVER where balls do not."""
+    """Time of the ball's next meeting [s]; NEVER if balls do not meet."""
     if meetings is None:
         return NEVER
-    return meetings.time[ball]
+    return float(meetings.time[ball])
 
 
 @inlined
@@ -101,7 +102,7 @@ def _shift_meetings(meetings: Meetings | None, window: float) -> None:
 
 @inlined
 def reschedule(queue: EventQueue, ball: int) -> None:
-    """Enter the ball's earlier event and replay its matches; ties go to the lower ball."""
+    """Enter the ball's earlier event and replay its matches. The lower ball wins a tie."""
     queue.next_time[ball] = min(meeting_time(queue.meetings, ball), queue.wall_time[ball])
     match = (len(queue.next_time) + ball) // 2
     while match >= 1:
@@ -113,13 +114,13 @@ def reschedule(queue: EventQueue, ball: int) -> None:
 
 @jit
 def forget_events(queue: EventQueue, ball: int, time: float) -> None:
-    """Drop what was predicted for the ball: it is due now to search again."""
+    """Drop the predictions for the ball. It is due now to search again."""
     schedule_now(queue, ball, time, UNKNOWN)
 
 
 @jit
 def schedule_now(queue: EventQueue, ball: int, time: float, what: int) -> None:
-    """Make an event of kind ``what`` (see EventQueue.obstacle) the ball's next, now."""
+    """Make an event of kind ``what`` (see EventQueue.obstacle) the ball's next event, now."""
     _forget_meeting(queue.meetings, ball)
     queue.wall_time[ball] = time
     queue.obstacle[ball] = what
@@ -128,7 +129,7 @@ def schedule_now(queue: EventQueue, ball: int, time: float, what: int) -> None:
 
 @jit
 def search_wall_again(queue: EventQueue, ball: int, time: float) -> None:
-    """Have the ball search again, now, for how its own path ends; its meeting stands."""
+    """Have the ball search again, now, for the end of its own path. Its meeting stands."""
     queue.wall_time[ball] = time
     queue.obstacle[ball] = SEARCH_ON
     reschedule(queue, ball)
@@ -136,7 +137,7 @@ def search_wall_again(queue: EventQueue, ball: int, time: float) -> None:
 
 @jit
 def shift_queue(queue: EventQueue, window: float) -> None:
-    """Move the clock's zero forward by ``window`` [s]; the order of events stays."""
+    """Move the clock's zero of the queue forward by ``window`` [s]. The order of events stays."""
     _shift_meetings(queue.meetings, window)
     for ball in range(len(queue.wall_time)):
         queue.wall_time[ball] -= window

@@ -1,8 +1,8 @@
-"""The event loop, compiled: next event, move, resolve, log, predict.
+"""The compiled event loop: find the next event, move, resolve, log, predict.
 
-All predictions are made in _predict. If the partner of a meeting has collided with something since
-the meeting was found, the meeting is stale: it is dropped and only the search among balls is
-repeated, because the ball's own path, and with it its wall contact, still stands.
+All predictions are made in _predict. A meeting is stale if its partner has had another event since
+the meeting was found. A stale meeting is dropped and only the search among balls is repeated,
+because the ball's own path, and with it its wall contact, still stands.
 """
 
 import math
@@ -58,28 +58,28 @@ from sim_core.numerics.profiler import add_time
 from sim_core.numerics.roots import NEVER
 from sim_core.numerics.vec3 import Flight, add_scaled, sub
 
-# status of advance(): why it has stopped
+# status of advance(), the reason why it has stopped
 DONE = 0  # the clock has come to clock.stop
 BUFFER_FULL = 1  # the buffers of impacts and collisions must be emptied
-TOO_MANY_EVENTS = 2  # of one ball in one window: it is jammed
+TOO_MANY_EVENTS = 2  # one ball has too many events in one window: it is jammed
 TOO_FAST = 3  # a ball is faster than the neighbour filter allows for
 HAS_LEFT = 4  # a ball is outside the chamber's bounding box
 
 # s. Longest arc searched at once. Its chord is off by g PIECE²/8 = 0.12 mm, so boxes stay tight.
 PIECE = 0.01
-# Of one ball a second, counted over a window: so many are no gas but a jam. A row of balls that is
-# pressed flat between two walls, in a dense layer, has a tenth as many for a while.
+# Events of one ball a second, counted over a window: so many are not a gas but a jam. A row of
+# balls that is pressed flat between two walls, in a dense layer, has a tenth as many for a while.
 EVENT_LIMIT = 1e8
 
 # kinds of event
 HOLD = 0  # a ball in a jam that contact mode cannot resolve is held still
 MEETING = 1  # two balls meet
-STALE_MEETING = 2  # a meeting whose partner has another path by now
+STALE_MEETING = 2  # the partner of the meeting has another path by now
 SURFACE = 3  # a ball meets a surface
 PIECE_ENDS = 4  # nothing happens: the search goes on from here
 PATH_ENDS = 5  # a path in contact ends, or nothing is known of the ball yet
 
-# what to predict
+# kinds of prediction
 ALL, PAIRS, WALL = 0, 1, 2
 
 NEVER_BEFORE = 1e300  # finite, so that differences with it stay numbers
@@ -87,9 +87,9 @@ NEVER_BEFORE = 1e300  # finite, so that differences with it stay numbers
 
 @jit
 def advance(state: SimulationState) -> tuple[int, int]:
-    """Simulate until ``clock.stop``, or until something stops the loop.
+    """Simulate until ``clock.stop``, or until an event stops the loop.
 
-    Returns: why it has stopped, see the status above, and the ball concerned, -1 for any.
+    Returns: the reason for the stop (see the status values above), and its ball, -1 for any ball.
     """
     queue, clock, buffer = state.queue, state.clock, state.buffer
     event_limit = EVENT_LIMIT * clock.window
@@ -97,7 +97,7 @@ def advance(state: SimulationState) -> tuple[int, int]:
     while True:
         # 1 next event
         left = clock.stop - clock.now[1] * clock.window
-        ball = int(np.int64(queue.winners[1]))  # one integer type: functions compile once
+        ball = int(np.int64(queue.winners[1]))  # one integer type, so that functions compile once
         time = queue.next_time[ball]
         if time >= min(left, clock.window):
             if left <= clock.window:
@@ -174,7 +174,7 @@ def advance(state: SimulationState) -> tuple[int, int]:
 
 @inlined
 def _begin_window(state: SimulationState) -> None:
-    """Move the clock's zero forward by one window."""
+    """Begin the next window of the clock."""
     window = state.clock.window
     shift_motion(state.motion, window, state.gravity, state.contact)
     shift_sorting(state.neighbours)
@@ -190,7 +190,7 @@ def _begin_window(state: SimulationState) -> None:
 
 @jit
 def _sort_neighbours(state: SimulationState, time: float) -> None:
-    """Read the paths of all balls again, and sort many into blocks."""
+    """Read the paths of all balls again, and sort many balls into blocks."""
     put_back(state.sides, state.motion, time)
     refresh_neighbours(state.neighbours, state.motion, time)
     hide_all(state.contact, state.neighbours)
@@ -198,7 +198,7 @@ def _sort_neighbours(state: SimulationState, time: float) -> None:
 
 @inlined
 def _kind_of_event(meetings: Meetings | None, state: SimulationState, ball: int) -> tuple[int, int]:
-    """What happens to the ball next, and the ball that it meets (or -1)."""
+    """Kind of the ball's next event, and the ball that it meets (or -1)."""
     queue = state.queue
     if gives_up(state.contact, queue, ball):
         return HOLD, -1
@@ -213,7 +213,7 @@ def _kind_of_event(meetings: Meetings | None, state: SimulationState, ball: int)
 
 @inlined
 def _move(state: SimulationState, event: BallEvent, kind: int, partner: int) -> None:
-    """Take the balls of an event to its time: paths need no step, but drag is to be caught up."""
+    """Take the balls of an event to its time. Paths need no step, but drag is caught up."""
     in_contact = kind == PATH_ENDS and not is_flying(state.contact, event.ball)
     moves = kind in (MEETING, SURFACE) or in_contact
     ball = event.ball if moves else -1
@@ -226,7 +226,7 @@ def _move(state: SimulationState, event: BallEvent, kind: int, partner: int) -> 
 def _log_meeting(
     buffer: CollisionBuffer | None, state: SimulationState, event: BallEvent, partner: int
 ) -> None:
-    """Log a collision of balls before it changes their paths, if that is asked for."""
+    """Log a collision of balls before it changes their paths, if collisions are logged."""
     if buffer is None:
         return
     ball, motion, gravity = event.ball, state.motion, state.gravity
@@ -254,15 +254,15 @@ def _note_path(state: SimulationState, ball: int, time: float) -> None:
 @inlined
 def _speed_squared(state: SimulationState, ball: int) -> float:
     motion = state.motion
-    return motion[ball, 3] ** 2 + motion[ball, 4] ** 2 + motion[ball, 5] ** 2
+    return float(motion[ball, 3] ** 2 + motion[ball, 4] ** 2 + motion[ball, 5] ** 2)
 
 
 @inlined
 def _has_left(state: SimulationState, ball: int, time: float) -> bool:
     """True for a ball outside the chamber's bounding box.
 
-    A ball that has left meets no more surfaces: it is enough to ask when it met none on a whole
-    piece of its path.
+    A ball that has left meets no more surfaces. It is enough to check a ball that met no surface on
+    a whole piece of its path.
     """
     acceleration = ball_acceleration(state.contact, ball, state.gravity)
     here = state_under(state.motion, ball, time, acceleration).position
@@ -274,7 +274,7 @@ def _has_left(state: SimulationState, ball: int, time: float) -> bool:
 
 @inlined
 def _predict(state: SimulationState, ball: int, time: float, what: int) -> None:
-    """Find the ball's next events from ``time`` on and enter the earlier one in the queue."""
+    """Find the ball's next events from ``time`` on and enter the earlier event in the queue."""
     queue = state.queue
     if what != WALL:
         _predict_meeting(state.neighbours, queue.meetings, state, ball, time, what)
@@ -296,7 +296,7 @@ def _predict_meeting(
     time: float,
     what: int,
 ) -> None:
-    """Find the ball that it meets next, if balls meet."""
+    """Find the ball's next meeting with a ball, if balls meet."""
     if neighbours is None or meetings is None:
         return
     queue = state.queue
@@ -310,7 +310,7 @@ def _predict_meeting(
 
 @inlined
 def _until_meeting(meetings: Meetings | None, ball: int, time: float) -> float:
-    """How far [s] to search for a wall: until the ball's known meeting, or for one piece."""
+    """Duration [s] of the search for a wall: until the ball's known meeting, or for one piece."""
     if meetings is None:
         return PIECE
     return min(PIECE, meetings.time[ball] - time) if meetings.partner[ball] >= 0 else PIECE
@@ -318,7 +318,7 @@ def _until_meeting(meetings: Meetings | None, ball: int, time: float) -> float:
 
 @inlined
 def _predict_wall(state: SimulationState, ball: int, time: float) -> None:
-    """Find the obstacle that the ball meets next, or what else ends its path."""
+    """Find the next obstacle of the ball, or another end of its path."""
     queue, clock, obstacles = state.queue, state.clock, state.obstacles
     face_overlap = face_overlap_of_ball(state.sizes, obstacles.face_overlap, ball)
     event = BallEvent(ball, time, clock.now[1] * clock.window + time)
@@ -330,9 +330,10 @@ def _predict_wall(state: SimulationState, ball: int, time: float) -> None:
     length = update_phase(state.random_phase, flight, ball, length)
     wave = wave_of_ball(state.random_phase, state.wave, ball)
     length, end = end_of_path(state.contact, obstacles.tree, face_overlap, event, flight, length)
-    look = length  # how long to search for what moves towards the ball
+    look = length  # duration of the search for objects that move towards the ball
     if end == LIES_STILL:
-        # What does not touch it in one oscillation, or one turn of the part, never will.
+        # An object that does not touch the ball in one oscillation, or one turn of the part, never
+        # will.
         length = _oscillation_time(wave)
         look = time_of_one_turn(state.rotation, length)
     delay, obstacle = first_contact(

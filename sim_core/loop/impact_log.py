@@ -1,4 +1,4 @@
-"""The impacts of the shot on the recorded surfaces, and the collisions of balls, if asked for.
+"""Logs of the shot's impacts on the recorded surfaces and, on request, of collisions between balls.
 
 Both logs have one array a quantity, and a buffer that the compiled loop fills.
 """
@@ -15,15 +15,18 @@ from sim_core.motion import BallEvent
 from sim_core.numerics.jit import inlined
 from sim_core.numerics.vec3 import Vec3, dot, scaled, set_vec3
 
-BUFFER_SIZE = 65_536  # rows that the compiled loop writes before handing them over
+BUFFER_SIZE = 65_536  # rows that the compiled loop writes before it hands them over
 
 
 class Impact(NamedTuple):
-    """A hit on a surface, in the frame of that surface; no hit if the speed is 0.
+    """A hit on a surface, in the frame of that surface. A speed of 0 means no hit.
 
-    tag: of the surface. triangle: one of the flat face that was hit; ``touched``, a point [m] of
-    the face, tells which. position: of the ball's centre [m]. velocity: of the ball relative to
-    the surface, before [m/s]. normal_speed [m/s].
+    tag: tag of the surface.
+    triangle: a triangle of the flat face that was hit.
+    touched: a point [m] of the face, which tells the exact triangle.
+    position: position of the ball's centre [m].
+    velocity: velocity of the ball relative to the surface, before the hit [m/s].
+    normal_speed: normal component of this velocity [m/s].
     """
 
     tag: int
@@ -35,9 +38,10 @@ class Impact(NamedTuple):
 
 
 class ImpactBuffer(NamedTuple):
-    """What the compiled loop writes: arrays of BUFFER_SIZE rows, see ImpactLog.
+    """Buffer of impacts that the compiled loop writes: arrays of BUFFER_SIZE rows, see ImpactLog.
 
-    filled: rows written, (1,). record: whether the surface of a tag is recorded, (MAX_TAGS,) bool.
+    filled: number of rows written, (1,).
+    record: True if the surface of a tag is recorded, (MAX_TAGS,) bool.
     """
 
     time: np.ndarray
@@ -66,7 +70,7 @@ def new_impact_buffer(record: np.ndarray) -> ImpactBuffer:
 
 @inlined
 def no_impact() -> Impact:
-    """What an event leaves in the log that is no hit on a surface."""
+    """The impact of an event that is not a hit on a surface."""
     zero = Vec3(0.0, 0.0, 0.0)
     return Impact(0, 0, zero, zero, zero, 0.0)
 
@@ -75,7 +79,7 @@ def no_impact() -> Impact:
 def log_impact(
     buffer: ImpactBuffer, event: BallEvent, origin: float, impact: Impact, lookup: TriangleLookup
 ) -> None:
-    """Write an impact down if its surface is recorded; ``origin`` [s]: zero of the impact times."""
+    """Log an impact if its surface is recorded. ``origin``: zero of the impact times [s]."""
     if not (impact.normal_speed > 0.0 and buffer.record[impact.tag]):
         return
     row = buffer.filled[0]
@@ -90,17 +94,17 @@ def log_impact(
 
 @dataclass(frozen=True)
 class ImpactLog:
-    """One row an impact, in order of time.
+    """The logged impacts, one row an impact, in order of time.
+
+    On a turning part, position and velocity are in the part's own frame, with the part placed as in
+    the mesh.
 
     time: [s] since the end of the warm-up, (n,).
     ball, triangle: indices into the scene's balls and mesh, (n,) int32. An impact on an edge counts
-        for the neighbour that faces the ball more.
-    position: of the ball's centre [m], (n, 3).
-    velocity: before the impact, relative to the surface [m/s], (n, 3).
-    normal_speed: positive [m/s], (n,).
-
-    On a turning part position and velocity are in its own frame: where the part, as the mesh has
-    it, was hit, and how.
+        for the neighbour triangle that faces the ball more.
+    position: position of the ball's centre [m], (n, 3).
+    velocity: velocity before the impact, relative to the surface [m/s], (n, 3).
+    normal_speed: positive normal speed [m/s], (n,).
     """
 
     time: np.ndarray
@@ -114,14 +118,15 @@ class ImpactLog:
         return len(self.time)
 
     def only(self, rows: np.ndarray) -> "ImpactLog":
-        """Some of the impacts: those marked (n,) bool, or by index."""
+        """The impacts that ``rows`` selects, as a mask (n,) bool or as indices."""
         return ImpactLog(**{name: column[rows] for name, column in vars(self).items()})
 
 
 class CollisionBuffer(NamedTuple):
-    """What the compiled loop writes: arrays of BUFFER_SIZE rows, see CollisionLog.
+    """Buffer of collisions that the compiled loop writes, BUFFER_SIZE rows; see CollisionLog.
 
-    filled: rows written, (1,). record: whether collisions are logged now, (1,) bool.
+    filled: number of rows written, (1,).
+    record: True if collisions are logged now, (1,) bool.
     """
 
     time: np.ndarray
@@ -154,17 +159,18 @@ def new_collision_buffer(wanted: bool) -> CollisionBuffer | None:
 
 @inlined
 def is_full(buffer: CollisionBuffer | None) -> bool:
-    """True when no further collision can be written."""
+    """True if no further collision can be written."""
     if buffer is None:
         return False
     return bool(buffer.filled[0] == len(buffer.time))
 
 
 class Collision(NamedTuple):
-    """Two balls that meet; no collision if they are in touch and part.
+    """Two balls that meet. It is not a collision if the balls are in touch and part.
 
-    position: where they touch [m]. apart: from ball one to ball two [m]. velocity: of ball two
-    relative to ball one, before [m/s].
+    position: point where the balls touch [m].
+    apart: vector from ball one to ball two [m].
+    velocity: velocity of ball two relative to ball one, before the collision [m/s].
     """
 
     one: int
@@ -176,7 +182,7 @@ class Collision(NamedTuple):
 
 @inlined
 def log_collision(buffer: CollisionBuffer, time: float, collision: Collision) -> None:
-    """Write a collision down; ``time`` [s] as in CollisionLog."""
+    """Log a collision. ``time`` [s]: as in CollisionLog."""
     apart = collision.apart
     distance = np.sqrt(dot(apart, apart))
     speed = -dot(apart, collision.velocity) / distance
@@ -195,14 +201,15 @@ def log_collision(buffer: CollisionBuffer, time: float, collision: Collision) ->
 
 @dataclass(frozen=True)
 class CollisionLog:
-    """One row a collision of two balls, in order of time.
+    """The logged collisions, one row a collision of two balls, in order of time.
 
     time: [s] since the end of the warm-up, (n,).
-    one, two: the balls, (n,) int32.
-    position: of the point where they touch [m], (n, 3).
+    one, two: numbers of the balls, (n,) int32.
+    position: point where the balls touch [m], (n, 3).
     normal: unit vector from ball one to ball two, (n, 3).
-    velocity: of ball two relative to ball one, before, without spins [m/s], (n, 3).
-    normal_speed: at which they approach each other, before; positive [m/s], (n,).
+    velocity: velocity of ball two relative to ball one before the collision, without spins [m/s],
+        (n, 3).
+    normal_speed: positive speed of approach before the collision [m/s], (n,).
     """
 
     time: np.ndarray
@@ -221,7 +228,7 @@ Log = TypeVar("Log", ImpactLog, CollisionLog)
 
 
 def empty_buffer(buffer: ImpactBuffer | CollisionBuffer, kind: type[Log]) -> Log:
-    """Copy what is logged out of a buffer, which is empty then."""
+    """Copy the logged rows out of a buffer and empty it."""
     rows = int(buffer.filled[0])
     buffer.filled[0] = 0
     names = kind.__dataclass_fields__
@@ -229,7 +236,7 @@ def empty_buffer(buffer: ImpactBuffer | CollisionBuffer, kind: type[Log]) -> Log
 
 
 def joined(logs: list[Log], room: TriangleMesh | AnalyticCavity) -> Log:
-    """Several logs as one, in order, with positions in the room."""
+    """Several logs joined in order, with positions in the room."""
     kind = type(logs[0])
     names = kind.__dataclass_fields__
     whole = kind(**{name: np.concatenate([vars(log)[name] for log in logs]) for name in names})

@@ -10,7 +10,7 @@ from sim_core.scene.invariants import clearance
 from sim_core.scene.narrow_gaps import surface_name
 from sim_core.scene.scene import Scene
 
-MAX_NAMED = 4  # of the surfaces, and of the balls, nearest first
+MAX_NAMED = 4  # largest number of named surfaces, and of named balls, nearest first
 ENDLESS_BELOW = 1e-6  # m/s: with a lower Restitution.elastic_below slow bounces hardly ever end
 SAME_FACING = 0.99  # cosine: triangles that face alike are one surface
 
@@ -18,11 +18,11 @@ SAME_FACING = 0.99  # cosine: triangles that face alike are one surface
 def jam_message(
     scene: Scene, corners: np.ndarray | None, positions: np.ndarray, ball: int, when: str
 ) -> str:
-    """Why a ball jams, and what helps.
+    """Message with the cause of a jam and its remedy.
 
     Args:
-        corners: of the triangles where they are now [m], (m, 3, 3), if some of them turn.
-        positions: of all balls [m], (n, 3).
+        corners: present corners of the triangles [m], (m, 3, 3), if some triangles turn.
+        positions: positions of all balls [m], (n, 3).
         when: time of the jam, in words.
     """
     between, by_part = touching(scene, corners, positions, ball)
@@ -53,9 +53,9 @@ def jam_message(
 def touching(
     scene: Scene, corners: np.ndarray | None, positions: np.ndarray, ball: int
 ) -> tuple[str, bool]:
-    """What touches the ball, and whether the turning part does.
+    """Names of the surfaces and balls that touch a ball; True if the turning part touches it.
 
-    The first is such as "triangle 7, the turning part (triangle 12) and ball 3".
+    Example of the names: "triangle 7, the turning part (triangle 12) and ball 3".
     """
     physics, radii, here = scene.physics, 0.5 * scene.balls.diameters, positions[[ball]]
     radius = float(radii[ball])
@@ -73,14 +73,17 @@ def touching(
 def _surfaces(
     scene: Scene, corners: np.ndarray | None, here: np.ndarray, radius: float
 ) -> tuple[list[str], bool]:
-    """The surfaces that touch a ball ``here`` (1, 3) [m], nearest first; does the turning part?"""
+    """Names of the surfaces that touch a ball, nearest first; True if the turning part does.
+
+    ``here``: position of the ball (1, 3) [m].
+    """
     physics = scene.physics
     if isinstance(scene.mesh, AnalyticCavity):
         swing = max((one.amplitude for one in physics.vibrations), default=0.0)
         return scene.mesh.touched(here[0], radius + MAX_JAM_GAP, swing), False
     corners = scene.mesh.corners if corners is None else corners
     slack = np.full(len(corners), MAX_JAM_GAP)
-    for vibration in physics.vibrations:  # it is given where the mesh has it
+    for vibration in physics.vibrations:  # the vibration is given where the mesh has the surface
         slack[scene.mesh.tags == vibration.tag] += vibration.amplitude
     box = np.abs(here - np.clip(here, corners.min(axis=1), corners.max(axis=1))).max(axis=1)
     near = [int(t) for t in np.flatnonzero(box <= radius + slack)]

@@ -1,12 +1,12 @@
-"""Which balls can meet: all balls, sixteen at a time through a float32 filter, then exactly.
+"""Search for balls that can meet: sixteen at a time through a float32 filter, then exactly.
 
 Notation: in the free-fall frame the paths of two balls are straight lines, whatever gravity is.
-b: difference of their base positions [m]. w: difference of their velocities [m/s]. Then the square
-of the distance at which they pass each other is b² - (b w)² / w², at any time, and they still
+b: difference of their base positions [m]. w: difference of their velocities [m/s]. The square of
+the distance at which the balls pass each other is b² - (b w)² / w², at any time. The balls still
 approach each other at time t while b w + t w² < 0.
 
-The filter keeps every pair whose paths could come within reach, rounding included. What it lets
-through is decided in float64, so results do not depend on it.
+The filter keeps every pair whose paths could come within reach, rounding included. The pairs that
+pass the filter are decided in float64, so that results do not depend on the filter.
 """
 
 from typing import NamedTuple
@@ -47,15 +47,16 @@ from sim_core.numerics.simd import (
 )
 from sim_core.numerics.vec3 import Vec3, sub
 
-FAR_SHARE = np.float32(1.0 - 1e-6)  # of distance²: float32 loses 2e-7 of it in the miss distance
-SLACK = np.float32(1.000001)  # on float32 times: ten times their rounding
-# of the largest number in a sum of three products, with a reserve
+# share of distance²: float32 loses 2e-7 of it in the miss distance
+FAR_SHARE = np.float32(1.0 - 1e-6)
+SLACK = np.float32(1.000001)  # factor on float32 times: ten times their rounding
+# share of the largest number in a sum of three products, with a reserve
 ROUNDINGS = 16.0 * float(np.finfo(np.float32).eps)
-# of the square of the largest number in a distance², a sum of three squares of which each is up to
-# (3.5 + 3.5)² times as large, with a dozen roundings
+# Share of the square of the largest number in a distance². The distance² is a sum of three squares,
+# each up to (3.5 + 3.5)² times as large, with a dozen roundings.
 SQUARE_ROUNDINGS = 16.0 * ROUNDINGS
-MAX_FINITE_SPEED = 1e150  # m/s: its square is finite
-TINY = 1e-30  # stands for a velocity component of zero, whose inverse would be infinite
+MAX_FINITE_SPEED = 1e150  # m/s: the square of this speed is finite
+TINY = 1e-30  # replaces a velocity component of zero, whose inverse would be infinite
 
 
 class NeighbourFilter(NamedTuple):
@@ -63,12 +64,14 @@ class NeighbourFilter(NamedTuple):
 
     paths: base position and velocity, a column a ball, (6, m) float32, padded with NaN, which meets
         nothing.
-    probe: the column of the ball whose meetings are searched, its time, and what the filter allows
-        for rounding; when the search ends, and the square of a distance within reach; for
-        periodic sides see simd.py, (17,) float32.
-    reach: sum of two radii [m]; of several sizes that of the largest.
-    max_speed: speed up to which the margins for rounding are good [m/s].
-    window: [s]. blocks: only for many balls. radii: only for several sizes [m], (n,).
+    probe: data of the present search, (17,) float32: the column of the ball, the present time, the
+        allowances for rounding, the end of the search, and the square of a distance within reach.
+        simd.py describes the entries for periodic sides.
+    reach: sum of two radii [m]; of several sizes, the largest sum.
+    max_speed: speed up to which the margins for rounding hold [m/s].
+    window: length of a window [s].
+    blocks: None unless there are many balls.
+    radii: radii of balls of several sizes [m], (n,); None for one size.
     sides: None unless the box is periodic.
     """
 
@@ -94,12 +97,12 @@ def new_neighbour_filter(
 ) -> NeighbourFilter:
     """The filter for balls with this motion (n, 6) in a room from ``low`` to ``high`` (3,) [m]."""
     # A base position lies up to one window's flight outside the room, and up to two where the ball
-    # itself may be outside it.
+    # may be outside the room.
     flights = 1.0 if sides is None else 2.0
     farthest = float(np.max(high - low)) + flights * max_speed * window
     margin = ROUNDINGS * farthest
     probe = np.zeros(17, dtype=np.float32)
-    # the last: up to this b w + t w² may be of a ball that still approaches
+    # the last entry: largest b w + t w² of a ball that still approaches
     probe[7:10] = (FAR_SHARE, -((reach + margin) ** 2), margin * max_speed)
     if sides is not None:
         probe[13:17] = sides[:4]
@@ -128,7 +131,7 @@ def refresh_neighbours(neighbours: NeighbourFilter | None, motion: np.ndarray, t
 
 @inlined
 def sort_is_due(neighbours: NeighbourFilter | None, time: float) -> bool:
-    """True when refresh_neighbours is to be called before what happens at ``time`` [s]."""
+    """True if refresh_neighbours must be called before the event at ``time`` [s]."""
     if neighbours is None:
         return False
     return blocks_are_worn(neighbours.blocks, time)
@@ -136,7 +139,7 @@ def sort_is_due(neighbours: NeighbourFilter | None, time: float) -> bool:
 
 @inlined
 def shift_sorting(neighbours: NeighbourFilter | None) -> None:
-    """Move the clock's zero forward by one window."""
+    """Move the clock's zero of the sorting forward by one window."""
     if neighbours is None:
         return
     shift_blocks(neighbours.blocks, neighbours.window)
@@ -154,7 +157,7 @@ def follow(neighbours: NeighbourFilter | None, motion: np.ndarray, ball: int, ti
 
 @inlined
 def speed_limit(neighbours: NeighbourFilter | None) -> float:
-    """Speed [m/s] up to which the filter's margins are good; every finite one without it."""
+    """Speed [m/s] up to which the filter's margins hold; any finite speed without the filter."""
     if neighbours is None:
         return MAX_FINITE_SPEED
     return neighbours.max_speed
@@ -162,10 +165,10 @@ def speed_limit(neighbours: NeighbourFilter | None) -> float:
 
 @inlined
 def _pair_reach(radii: np.ndarray | None, reach: float, one: int, two: int) -> float:
-    """Distance [m] at which these two touch."""
+    """Distance [m] at which these two balls touch."""
     if radii is None:
         return reach
-    return radii[one] + radii[two]
+    return float(radii[one] + radii[two])
 
 
 @inlined
@@ -186,9 +189,9 @@ def next_meeting(
 ) -> tuple[float, int]:
     """Time [s] and partner of the ball's first meeting after ``time`` and before ``before``.
 
-    If there is none, the partner is -1 and the time is that up to which this is known: NEVER for
-    few balls, for many that until which their blocks hold, and no later than the horizon of
-    periodic sides.
+    Without a meeting the partner is -1, and the time is the end of the known future. This is NEVER
+    for few balls, and the time until which their blocks hold for many balls. It is no later than
+    the horizon of periodic sides.
     """
     probe = neighbours.probe
     column = column_of(neighbours.blocks, ball)
@@ -202,7 +205,7 @@ def next_meeting(
 
 @inlined
 def _aim_at_images(sides: PeriodicSides | None, probe: np.ndarray) -> None:
-    """Let the filter count time from now on, as it takes the nearest images of now."""
+    """Let the filter count time from now on, because it takes the nearest images of now."""
     if sides is None:
         return
     probe[12] = probe[6]
@@ -242,7 +245,7 @@ def _search(
     before: float,
     known: float,
 ) -> tuple[float, int]:
-    """What next_meeting returns, from all columns or the blocks that the ball's path enters.
+    """Find the first meeting as in next_meeting, in all columns or the blocks on the ball's path.
 
     Args:
         known: end of the horizon [s].
@@ -272,7 +275,8 @@ def _search(
     best, partner = min(before, known) - time, -1
     _aim(blocks.ray, motion, ball, time)
     column = column_of(blocks, ball)
-    own = column // LANES  # first: whom it meets there leaves a shorter path to look along
+    # searched first, because a meeting there leaves a shorter path to look along
+    own = column // LANES
     best, partner = _best_in_block(neighbours, motion, ball, time, own, best, partner)
     x, last_x, first_y, last_y = images(neighbours.sides, motion, ball, time, time + best)
     while x <= last_x:
@@ -309,7 +313,7 @@ def _best_in_block(
     best: float,
     partner: int,
 ) -> tuple[float, int]:
-    """The earlier of the best meeting so far (a delay [s]) and those in a block."""
+    """The earlier of the best meeting so far (a delay [s]) and the meetings in a block."""
     first = LANES * block
     near = _near_until(neighbours.sides, neighbours.paths, first, neighbours.probe, time, best)
     near = _without(near, column_of(neighbours.blocks, ball) - first)
@@ -320,13 +324,13 @@ def _best_in_block(
 
 @inlined
 def _without(near: int, lane: int) -> int:
-    """The bits of the columns without the ball's own, if it is among them."""
+    """The bits of the columns without the ball's own column."""
     return near & ~(1 << lane) if 0 <= lane < LANES else near
 
 
 @inlined
 def _aim(ray: np.ndarray, motion: np.ndarray, ball: int, time: float) -> None:
-    """Set ``ray`` to the ball's straight path from now on, as boxes_hit takes it."""
+    """Set ``ray`` to the ball's straight path from now on, in the form that boxes_hit takes."""
     here = free_fall_position(motion, ball, time)
     for axis in range(3):
         speed = motion[ball, 3 + axis]
@@ -344,7 +348,7 @@ def _aim_from_image(
     x: int,
     y: int,
 ) -> None:
-    """Move the origin of ``ray`` to an image of the ball, so many sides away along x and y."""
+    """Move the origin of ``ray`` to an image of the ball, ``x`` and ``y`` sides away."""
     if sides is None:
         return
     here = free_fall_position(motion, ball, time)
@@ -363,9 +367,9 @@ def _nearest(
     best: float,
     partner: int,
 ) -> tuple[float, int]:
-    """The earlier of the best meeting so far (a delay [s]) and those in the columns of ``near``.
+    """The earlier of the best meeting so far (a delay [s]) and meetings in columns ``near``.
 
-    Ties go to the lower ball, so that the order of the columns does not matter.
+    The lower ball wins a tie, so that the order of the columns does not matter.
     """
     here = free_fall_position(motion, ball, time)
     velocity = Vec3(motion[ball, 3], motion[ball, 4], motion[ball, 5])

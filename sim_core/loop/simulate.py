@@ -1,4 +1,4 @@
-"""Simulate a scene: set up its arrays, run the compiled event loop, check what must never break."""
+"""Simulation of a scene: set up its arrays, run the compiled event loop, check the invariants."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -51,7 +51,7 @@ CHECK_EVERY = 1.0
 
 @dataclass(frozen=True)
 class Collisions:
-    """How many collisions there were, warm-up included, and how often the loop searched for one."""
+    """Numbers of collisions, warm-up included, and of searches by the loop."""
 
     walls: int
     balls: int
@@ -61,19 +61,22 @@ class Collisions:
 
     @property
     def total(self) -> int:
-        """Real collisions."""
+        """Number of real collisions."""
         return self.walls + self.balls + self.sonotrode
 
 
 @dataclass(frozen=True)
 class SimulationResult:
-    """What a simulation gives.
+    """The result of a simulation.
 
-    impacts: on the recorded surfaces. balls: at the end. collisions: their numbers.
+    impacts: impacts on the recorded surfaces.
+    balls: the balls at the end.
+    collisions: numbers of collisions.
     resting: the balls that lie still at the end.
     frames: the balls at the requested times.
-    ball_collisions: of balls with one another; None unless Scene.record_collisions is True.
-    time: at the end [s], on the clock of Scene.start_time.
+    ball_collisions: collisions of balls with one another; None unless Scene.record_collisions is
+        True.
+    time: end of the simulation [s], on the clock of Scene.start_time.
     """
 
     impacts: ImpactLog
@@ -92,16 +95,17 @@ def simulate(
 ) -> SimulationResult:
     """Simulate the scene from its start to the end of its duration.
 
-    The GIL is released meanwhile. The same scene gives the same bits on any thread.
+    The GIL is released meanwhile. The same scene gives the same bits on any thread. The module
+    docstring of sim_core has an example.
 
     Args:
-        frames: times, ascending [s since the end of the warm-up], (f,), at which the balls are
-            noted, each on its flight at that very time. They change no bit of the rest.
-        progress: called about every simulated second with the time since the start, which is that
-            of the warm-up [s].
+        frames: ascending times [s since the end of the warm-up], (f,), at which the balls are
+            noted, each on its flight at that very time. They change no bit of the other results.
+        progress: called about every simulated second with the time since the start, including the
+            warm-up [s].
 
     Raises:
-        SimulationError: when a ball is lost, jams, or stops being a number.
+        SimulationError: if a ball is lost, jams, or stops being a number.
     """
     times = _checked_frames(frames, scene)
     run = Simulation(scene, progress)
@@ -122,10 +126,7 @@ def simulate(
 
 
 def _checked_frames(frames: Sequence[float] | np.ndarray, scene: Scene) -> np.ndarray:
-    """Frame times as an array (f,).
-
-    Raises SceneError for times that are not ascending or not within the duration.
-    """
+    """Frame times as an array (f,); raises SceneError unless they ascend within the duration."""
     times = np.array(frames, dtype=float).reshape(-1)
     if not np.isfinite(times).all() or (np.diff(scene.warmup + times) <= 0.0).any():
         raise SceneError("frames: not ascending times; give each once, in order")
@@ -137,11 +138,11 @@ def _checked_frames(frames: Sequence[float] | np.ndarray, scene: Scene) -> np.nd
     return times
 
 
-_obstacle_set = computed_once(8)(build_obstacle_set)  # replicas of one chamber share it
+_obstacle_set = computed_once(8)(build_obstacle_set)  # replicas of one chamber share the set
 
 
 class Simulation:
-    """A scene being simulated: the state that the loop works on, and what is logged so far."""
+    """A scene being simulated: the state that the loop works on, and the log so far."""
 
     def __init__(
         self, scene: Scene, progress: Callable[[float], None] = lambda seconds: None
@@ -276,7 +277,7 @@ class Simulation:
             self.meetings.append(empty_buffer(self.state.collision_buffer, CollisionLog))
 
     def advance_to(self, stop: float) -> None:
-        """Run the event loop until a time [s], and attend to what makes it pause."""
+        """Run the event loop until a time [s], and handle each reason for a pause."""
         self.state = self.state._replace(clock=self.state.clock._replace(stop=stop))
         while True:
             status, ball = advance(self.state)
@@ -312,7 +313,7 @@ class Simulation:
         )
 
     def _positions_and_velocities(self) -> tuple[np.ndarray, np.ndarray]:
-        """Positions [m] and velocities [m/s] now, (n, 3) each: point_at for all balls at once."""
+        """Present positions [m] and velocities [m/s] of all balls, (n, 3) each."""
         state, now = self.state, self.state.clock.now[0]
         acceleration = np.array(gravity_acceleration(state.gravity))
         if state.contact is not None:
@@ -345,7 +346,7 @@ class Simulation:
             )
 
     def _inside(self, points: np.ndarray) -> np.ndarray:
-        """Which centres of balls (n, 3) [m] are in the chamber."""
+        """True for ball centres (n, 3) [m] in the chamber."""
         mesh, corners, vibrations = self.scene.mesh, self._corners(), self.scene.physics.vibrations
         if isinstance(mesh, AnalyticCavity):
             return mesh.contains(points, max((one.amplitude for one in vibrations), default=0.0))
@@ -355,7 +356,7 @@ class Simulation:
         return inside
 
     def _corners(self) -> np.ndarray | None:
-        """The triangles where they are now, if some of them turn."""
+        """Present corners of the triangles, if some triangles turn; otherwise None."""
         part_rotation, mesh = self.scene.physics.part_rotation, self.scene.mesh
         state = self.state
         if part_rotation is None or state.rotation is None or isinstance(mesh, AnalyticCavity):
@@ -364,7 +365,7 @@ class Simulation:
         return turned_corners(mesh, part_rotation, angle)
 
     def balls(self) -> Balls:
-        """The balls as they are now."""
+        """The balls in their present state."""
         friction_state, spins = self.state.friction_state, None
         if friction_state is not None:
             spins = friction_state.spins + self.state.clock.now[0] * friction_state.twists

@@ -1,10 +1,11 @@
 """Many balls in blocks of sixteen neighbours, each with a box around its balls' paths for a while.
 
-In the free-fall frame a path is a straight line, so the box of a block grows only when one of its
-balls is hit. Balls are sorted into blocks again, along a curve that keeps neighbours together,
-before the boxes have grown much: every window, and where balls are hit often, more often. A ball
-then looks only through blocks whose boxes its own path enters, eight boxes at once, as in the tree
-of obstacles: first boxes around eight nodes of eight blocks each, then those of the blocks.
+In the free-fall frame a path is a straight line, so that the box of a block grows only when a ball
+in it is hit. Balls are sorted into blocks along a curve that keeps neighbours together. They are
+sorted again before the boxes have grown much: every window, and more often where balls are hit
+often. A ball then searches only blocks whose boxes its own path enters, eight boxes at once, as in
+the tree of obstacles: first boxes around eight nodes of eight blocks each, then the boxes of the
+blocks.
 
 Source: J. Skilling, Programming the Hilbert curve, AIP Conf. Proc. 707 (2004) 381.
 """
@@ -17,29 +18,32 @@ from sim_core.numerics.jit import inlined, jit
 from sim_core.numerics.periodic_sides import PeriodicSides, forget_extent, note_extent, time_in_box
 from sim_core.numerics.simd import BOXES, LANES
 
-# Number of balls from which blocks pay. With fewer, in a chamber that the shot crosses in one
+# Number of balls from which blocks pay. With fewer balls, in a chamber that the shot crosses in one
 # window, no block is left out.
 MIN_BALLS = 1024
-BITS = 5  # of the curve's code along each axis
-# Changes of path of a ball, on average, after which balls are sorted again. With fewer the searches
-# that end where knowledge does cost more, with more the boxes are wider.
+BITS = 5  # bits of the curve's code along each axis
+# Mean number of path changes of a ball after which balls are sorted again. With fewer changes, the
+# searches that end where knowledge ends cost more. With more changes, the boxes are wider.
 CHANGES = 8
-FAR = np.float32(1e30)  # an empty box is one that no path reaches
+FAR = np.float32(1e30)  # corner of an empty box, which no path reaches
 
 
 class Blocks(NamedTuple):
-    """Which ball is in which column of the filter, and the boxes around sixteen columns each.
+    """The order of the balls in the columns of the filter, and boxes around sixteen columns.
 
-    column: of each ball, (n,) int32. ball: in each column, -1 for none, (columns,) int32.
-    boxes: low x, y, z and high x, y, z of eight boxes [m], (k, 6, 8) float32; they are larger by
-        ``margin`` [m], which is the balls' reach and the rounding.
-    groups: the same of boxes around eight nodes of ``boxes`` each.
-    sorted_at, until: when the balls were sorted, and until when the boxes hold their paths [s on
-        the window's clock], (1,).
-    interval: how long that was meant to be [s], (1,). changes: of paths since then, (1,) int64.
-    low, scale: where the curve begins [m], (3,), and its steps [1/m].
+    column: column of each ball, (n,) int32.
+    ball: ball in each column, -1 for none, (columns,) int32.
+    boxes: low x, y, z and high x, y, z of eight boxes [m], (k, 6, 8) float32, widened by
+        ``margin``.
+    margin: reach of the balls and rounding [m].
+    groups: boxes around eight nodes of ``boxes`` each, in the same form.
+    sorted_at: time at which the balls were sorted [s on the window's clock], (1,).
+    until: time until which the boxes hold the paths [s on the window's clock], (1,).
+    interval: intended time between two sorts [s], (1,).
+    changes: number of path changes since the last sort, (1,) int64.
+    low, scale: start of the curve [m], (3,), and its steps [1/m].
     sides: None unless the box is periodic.
-    code, starts, ray, enter: working space.
+    code, starts, ray, enter: working arrays.
     """
 
     column: np.ndarray
@@ -68,7 +72,7 @@ def new_blocks(
     window: float,
     sides: PeriodicSides | None = None,
 ) -> Blocks:
-    """Blocks of balls in a room from ``low`` to ``high`` (3,) [m]; to be sorted before use."""
+    """Unsorted blocks of balls in a room from ``low`` to ``high`` (3,) [m]."""
     columns = -(-balls // LANES) * LANES
     nodes = -(-columns // (LANES * BOXES))
     return Blocks(
@@ -96,7 +100,7 @@ def column_of(blocks: Blocks | None, ball: int) -> int:
     """The column of a ball."""
     if blocks is None:
         return ball
-    return blocks.column[ball]
+    return int(blocks.column[ball])
 
 
 @inlined
@@ -104,23 +108,23 @@ def ball_in_column(blocks: Blocks | None, column: int) -> int:
     """The ball in a column."""
     if blocks is None:
         return column
-    return blocks.ball[column]
+    return int(blocks.ball[column])
 
 
 @inlined
 def blocks_are_worn(blocks: Blocks | None, time: float) -> bool:
-    """True when the balls are to be sorted again before what happens at ``time`` [s]."""
+    """True if the balls must be sorted again before the event at ``time`` [s]."""
     if blocks is None:
         return False
-    return time >= blocks.until[0] or blocks.changes[0] > 2 * CHANGES * len(blocks.column)
+    return bool(time >= blocks.until[0] or blocks.changes[0] > 2 * CHANGES * len(blocks.column))
 
 
 @jit
 def sort_blocks(blocks: Blocks | None, motion: np.ndarray, time: float, window: float) -> None:
     """Put balls that are near each other at ``time`` [s] into one block, and set its box.
 
-    It holds until each ball is expected to have changed its path CHANGES times, at most until the
-    window ends.
+    The box holds until each ball is expected to have changed its path CHANGES times, at most until
+    the window ends.
     """
     if blocks is None:
         return
@@ -155,7 +159,7 @@ def sort_blocks(blocks: Blocks | None, motion: np.ndarray, time: float, window: 
 
 @inlined
 def _cell(blocks: Blocks, motion: np.ndarray, ball: int, axis: int, time: float) -> int:
-    """Which step of the curve's grid a ball is in along an axis."""
+    """Step of the curve's grid that holds a ball along an axis."""
     now = motion[ball, axis] + motion[ball, 3 + axis] * time
     return min(max(int((now - blocks.low[axis]) * blocks.scale), 0), (1 << BITS) - 1)
 
@@ -195,7 +199,7 @@ def _place_on_curve(x: int, y: int, z: int) -> int:
 
 @jit
 def shift_blocks(blocks: Blocks | None, window: float) -> None:
-    """Move the clock's zero forward by ``window`` [s]."""
+    """Move the clock's zero of the blocks forward by ``window`` [s]."""
     if blocks is None:
         return
     blocks.sorted_at[0] -= window
@@ -203,7 +207,7 @@ def shift_blocks(blocks: Blocks | None, window: float) -> None:
 
 @inlined
 def widen(blocks: Blocks | None, motion: np.ndarray, ball: int, time: float) -> None:
-    """Widen the boxes that the ball is in to hold its path from ``time`` [s] on."""
+    """Widen the boxes of a ball so that they hold its path from ``time`` [s] on."""
     if blocks is None:
         return
     blocks.changes[0] += 1
@@ -224,7 +228,7 @@ def widen(blocks: Blocks | None, motion: np.ndarray, ball: int, time: float) -> 
 def _stretch(
     boxes: np.ndarray, node: int, axis: int, child: int, low: np.float32, high: np.float32
 ) -> None:
-    if boxes[node, 3 + axis, child] == FAR:  # empty
+    if boxes[node, 3 + axis, child] == FAR:  # an empty box
         boxes[node, axis, child] = low
         boxes[node, 3 + axis, child] = high
         return

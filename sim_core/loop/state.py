@@ -1,4 +1,4 @@
-"""What the event loop works on: every array of a scene being simulated, in one tuple."""
+"""State of the event loop: every array of a scene being simulated, in one tuple."""
 
 from typing import NamedTuple
 
@@ -23,17 +23,17 @@ from sim_core.loop.neighbours import NeighbourFilter
 from sim_core.numerics.periodic_sides import PeriodicSides
 from sim_core.numerics.profiler import Profiler
 
-# places in SimulationState.counts: hits on walls, on balls and on the sonotrode, searches for a
-# surface, and meetings that were stale
+# Places in SimulationState.counts: hits on walls, on balls and on the sonotrode, searches for a
+# surface, and stale meetings.
 WALLS, BALLS, SONOTRODE, SEARCHES, STALE = 0, 1, 2, 3, 4
 
 
 class Clock(NamedTuple):
     """Time in a scene.
 
-    now: time on the window's clock [s], and the number of windows gone by, (2,).
+    now: time on the window's clock [s], and number of past windows, (2,).
     window: length of a window [s].
-    stop: when to pause [s since the start].
+    stop: time of the next pause [s since the start].
     origin: zero of the impact times [s since the start].
     """
 
@@ -44,11 +44,11 @@ class Clock(NamedTuple):
 
 
 class SimulationState(NamedTuple):
-    """Everything that the event loop works on; an effect that is absent is None.
+    """All data that the event loop works on. An absent effect is None.
 
     motion: base position [m] and velocity [m/s] of each ball in the free-fall frame, (n, 6).
-    neighbours: the filter made of it, None where balls do not collide with one another.
-    counts: of events, (5,) int64, see WALLS.
+    neighbours: the filter made from the motion, None if balls do not collide with one another.
+    counts: numbers of events, (5,) int64, see WALLS.
     collision_buffer: None unless collisions of balls are logged.
     sides: None unless the box is periodic.
     profiler: None unless the loop is measured.

@@ -1,5 +1,7 @@
-"""Files of compiled code that are whole: numba would run what a damaged one holds, or end in a
-traceback each time.
+"""Checked files of compiled code.
+
+A damaged file would run as it is, or end in a traceback each time, because numba does not check its
+files.
 """
 
 import io
@@ -23,7 +25,7 @@ DIGEST_BYTES = 32
 
 
 class _InChosenFolder(CompileResultCacheImpl):
-    """Code in other folders of numba would outlive edits of the sources."""
+    """Cache in the folder of jit.py, because other folders' code would outlive source edits."""
 
     _locator_classes = [UserProvidedCacheLocator]  # noqa: RUF012
 
@@ -63,7 +65,7 @@ class CheckedCache(FunctionCache):
 
 
 def is_private(folder: Path) -> bool:
-    """Whether nobody else can put files there, which would be run."""
+    """True if nobody else can put files into the folder, whose code would be run."""
     if not hasattr(os, "getuid"):
         return True
     found = folder.lstat()
@@ -71,14 +73,14 @@ def is_private(folder: Path) -> bool:
 
 
 def _is_whole(path: Path) -> bool:
-    """Whether a file is there and has its digest; a damaged one is removed."""
+    """True if a file exists and matches its digest. A damaged file is removed."""
     try:
         content = path.read_bytes()
     except OSError:
         return False
     if sha256(content[:-DIGEST_BYTES]).digest() == content[-DIGEST_BYTES:]:
         return True
-    _report_damage(path.parents[2])  # of steps and entries alike
+    _report_damage(path.parents[2])  # folder of steps and entries alike
     with suppress(OSError):
         path.unlink()
     return False

@@ -13,7 +13,7 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar, cast
 
 import numba
 from numba.core import event
@@ -24,6 +24,8 @@ from sim_core.numerics.compile_cache import CheckedCache, is_private
 # Both are untyped, or typed without the attributes used here.
 _settings: Any = numba.config
 _njit: Any = numba.njit
+
+F = TypeVar("F", bound=Callable[..., Any])
 
 MAX_CACHES = 4  # older folders are removed: each holds a few MB that nothing reads any more
 
@@ -36,7 +38,7 @@ def _cache_root() -> Path:
     try:
         Path.home()
     except RuntimeError:  # a user without a home, as in some containers
-        return Path(os.devnull)  # no cache: a shared folder is open to other users' code
+        return Path(os.devnull)  # no cache, because a shared folder is open to other users' code
     if sys.platform == "darwin":
         return Path.home() / "Library" / "Caches" / "chamberopt"
     if sys.platform == "win32":
@@ -58,7 +60,7 @@ CACHE_FOLDER = _cache_root() / f"sim_core-{_sources_digest()}"
 
 
 def _remove_old_caches() -> None:
-    """Remove all but the newest few folders; a process that still uses one makes it again."""
+    """Remove all but the newest few folders. A process that uses an old one makes it again."""
     folders = sorted(
         CACHE_FOLDER.parent.glob("sim_core-*"), key=lambda f: f.stat().st_mtime, reverse=True
     )
@@ -67,10 +69,7 @@ def _remove_old_caches() -> None:
 
 
 def _cache_is_usable() -> bool:
-    """True when the folder can be written, by this user only.
-
-    Otherwise every process compiles for itself.
-    """
+    """True if this user, and nobody else, can write to the folder of compiled code."""
     try:
         if not CACHE_FOLDER.exists():
             CACHE_FOLDER.mkdir(0o700, parents=True, exist_ok=True)
@@ -85,22 +84,22 @@ CACHED = _USABLE and not _settings.DISABLE_JIT
 
 
 def user_cache() -> Path | None:
-    """This user's own folder for what can be made again; None where there is none."""
+    """This user's own folder for files that can be made again; None if there is no such folder."""
     return CACHE_FOLDER.parent if _USABLE and is_private(CACHE_FOLDER.parent) else None
 
 
-# Threads take turns: one that restored numba's folder while another read it sent compiled code to
-# the current folder.
+# Threads take turns: a thread that restored numba's folder while another read it sent compiled code
+# to the current folder.
 _DECORATING = threading.RLock()
 
 
 class Step(CPUDispatcher):
     """A compiled function that other compiled functions call.
 
-    numba makes three modules of machine code for each function: itself, and two wrappers for calls
-    from Python and from C. Nobody calls those of a step of the event loop, and they took 43 % of
-    the compilation. A step that is called from Python after all is compiled a second time, with
-    its wrapper.
+    numba makes three modules of machine code for each function: the function itself, and two
+    wrappers for calls from Python and from C. Nobody calls the wrappers of a step of the event
+    loop, and they took 43 % of the compilation. A step that is called from Python after all is
+    compiled a second time, with its wrapper.
     """
 
     def __call__(self, *arguments: Any) -> Any:
@@ -111,8 +110,8 @@ class Step(CPUDispatcher):
 
 
 def _compiled(function: Callable[..., Any], inline: bool, from_python: bool = False) -> Any:
-    # numba reads the folder when the decorator runs; other packages keep theirs. Its files do not
-    # tell functions with wrappers from those without.
+    # numba reads the folder when the decorator runs. Other packages keep their own folder. The file
+    # names do not tell functions with wrappers from functions without wrappers.
     options = {"nogil": True, "error_model": "numpy", "fastmath": False, "_nrt": False}
     if not from_python:
         options |= {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
@@ -144,25 +143,26 @@ class _Counter(event.Listener):
 
 @contextmanager
 def compilations_counted(count: Callable[[int], None]) -> Iterator[None]:
-    """In a `with` block, call `count` after each function with how many were compiled so far."""
+    """Call `count` after each compiled function with the number of functions compiled so far."""
     with event.install_listener("numba:compile", _Counter(count)):
         yield
 
 
-def jit(function: Callable[..., Any]) -> Callable[..., Any]:
+def jit(function: F) -> F:
     """Compile a function in nopython mode, cached by the digest of the sources.
 
-    fastmath is off, because results are promised bit for bit; the GIL is released. ``_nrt=False``:
-    compiled code cannot make arrays, and in return does not count references to them. Counting is
-    atomic and took half of the event loop's time. All arrays of the loop are made before it starts.
+    fastmath is off, because results are promised bit for bit. The GIL is released. With
+    ``_nrt=False`` compiled code cannot make arrays and does not count references to them. Counting
+    is atomic and took half of the event loop's time. All arrays of the loop are made before it
+    starts.
     """
-    return _compiled(function, inline=False)
+    return cast(F, _compiled(function, inline=False))
 
 
-def inlined(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Compile a step of the event loop that has one call site, as a part of its caller.
+def inlined(function: F) -> F:
+    """Compile a step of the event loop that has one call site as a part of its caller.
 
-    A call passes every array as seven words or more, a hundred for a step; that took a fifth of
+    A call passes every array as seven words or more, a hundred for a step, which took a fifth of
     the loop's time.
     """
-    return _compiled(function, inline=True)
+    return cast(F, _compiled(function, inline=True))

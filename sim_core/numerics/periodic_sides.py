@@ -1,17 +1,17 @@
 """Periodic sides: balls that leave a box on one side come in on the other.
 
-Nothing happens at a border. Places are taken modulo the sides: two balls meet as their nearest
-images do, and balls are put back into the box where paths are read again anyway.
+Nothing happens at a border. Places are taken modulo the sides. Two balls meet as their nearest
+images do, and balls are put back into the box whenever paths are read again.
 
 Notation:
     L: side of the box along x or y [m]; 0 where there are walls
     r: reach, the sum of two radii [m]
-    v, V: speed of a ball along that direction, and the largest of any ball [m/s]
+    v, V: speed of a ball along that direction, and the largest speed of any ball [m/s]
 
-Of two balls the nearest images now are those that can meet next: any others are L/2 or more apart
-along x or y, and need (L/2 - r) / (v + V) to meet. A prediction looks no farther ahead than that
-(``horizon``). V is kept up to date as paths change: of two balls, the one whose path changed last
-has looked at the other with a V that holds for both.
+Only the nearest images of two balls can meet next. Any other images are L/2 or more apart along x
+or y, and need (L/2 - r) / (v + V) to meet. A prediction looks no farther ahead than that
+(``horizon``). V is kept up to date as paths change. The ball of a pair whose path changed last has
+searched for the other with a V that holds for both.
 """
 
 from typing import NamedTuple
@@ -22,18 +22,20 @@ from sim_core.numerics.jit import inlined, jit
 from sim_core.numerics.roots import NEVER
 from sim_core.numerics.vec3 import Vec3
 
-SLACK = 1.0 - 1e-6  # on the horizon, for rounding
-SHORT = 0.125  # of a side: longer paths widen boxes and meet more images, shorter are sorted more
+SLACK = 1.0 - 1e-6  # share of the horizon, for rounding
+# share of a side: longer paths widen boxes and meet more images, and shorter paths are sorted more
+SHORT = 0.125
 FAR = 1e30
 
 
 class PeriodicSides(NamedTuple):
     """A box that is periodic along x, y or both, about its middle.
 
-    x, y: L along each [m]. per_x, per_y: 1/L, and 0 where L is.
-    fastest: V along each [m/s], (2,).
-    low, high: what the boxes of all balls' paths reach along each [m], (2,), where there are many
-        balls (loop/spatial_blocks.py).
+    x, y: L along each direction [m].
+    per_x, per_y: 1/L, and 0 where L is 0.
+    fastest: V along each direction [m/s], (2,).
+    low, high: extent of the boxes of all balls' paths along each direction [m], (2,), where there
+        are many balls (loop/spatial_blocks.py).
     """
 
     x: float
@@ -46,7 +48,7 @@ class PeriodicSides(NamedTuple):
 
 
 def new_periodic_sides(sides: np.ndarray) -> PeriodicSides | None:
-    """The sides (3,) [m] as compiled code needs them; None if none is periodic."""
+    """The sides (3,) [m] as compiled code needs them; None if no side is periodic."""
     if not sides.any():
         return None
     x, y = (float(side) for side in sides[:2])
@@ -68,7 +70,7 @@ def nearest_image(sides: PeriodicSides | None, apart: Vec3) -> Vec3:
 
 @jit
 def put_back(sides: PeriodicSides | None, motion: np.ndarray, time: float) -> None:
-    """Put all balls into the box in which they are at ``time`` [s]; ``motion`` as in motion.py."""
+    """Put all balls into the box at their places at ``time`` [s]. ``motion``: as in motion.py."""
     if sides is None:
         return
     for ball in range(len(motion)):
@@ -88,7 +90,7 @@ def note_speed(sides: PeriodicSides | None, motion: np.ndarray, ball: int) -> No
 
 @inlined
 def note_all_speeds(sides: PeriodicSides | None, motion: np.ndarray) -> None:
-    """Set V to the speed of the balls as they are now."""
+    """Set V to the present largest speed of the balls."""
     if sides is None:
         return
     sides.fastest[:] = 0.0
@@ -101,12 +103,12 @@ def top_speed(sides: PeriodicSides | None) -> float:
     """V [m/s], which gravity along a periodic direction raises without end; 0 without sides."""
     if sides is None:
         return 0.0
-    return max(sides.fastest[0], sides.fastest[1])
+    return float(max(sides.fastest[0], sides.fastest[1]))
 
 
 @inlined
 def horizon(sides: PeriodicSides | None, motion: np.ndarray, ball: int, reach: float) -> float:
-    """How long [s] the ball's meetings are those of the nearest images now."""
+    """Time [s] for which the ball's meetings are with the present nearest images."""
     if sides is None:
         return NEVER
     x = sides.fastest[0] + abs(motion[ball, 3])
@@ -121,7 +123,7 @@ def horizon(sides: PeriodicSides | None, motion: np.ndarray, ball: int, reach: f
 
 @inlined
 def time_in_box(sides: PeriodicSides | None) -> float:
-    """How long [s] paths may be so that they reach few images of the box."""
+    """Largest duration of paths [s] with which they reach few images of the box."""
     if sides is None:
         return NEVER
     time = NEVER
@@ -134,7 +136,7 @@ def time_in_box(sides: PeriodicSides | None) -> float:
 
 @inlined
 def forget_extent(sides: PeriodicSides | None) -> None:
-    """What the boxes reach is that of the paths noted from now on."""
+    """Forget the extent of the boxes. It is then the extent of the paths noted from now on."""
     if sides is None:
         return
     sides.low[:] = FAR
@@ -142,8 +144,8 @@ def forget_extent(sides: PeriodicSides | None) -> None:
 
 
 @inlined
-def note_extent(sides: PeriodicSides | None, axis: int, low: float, high: float) -> None:
-    """Widen what the boxes reach along x, y or z [m]."""
+def note_extent(sides: PeriodicSides | None, axis: int, low: np.float32, high: np.float32) -> None:
+    """Widen the extent of the boxes along x, y or z [m]."""
     if sides is None:
         return
     if axis < 2:
@@ -158,7 +160,8 @@ def images(
     """First and last of the ball's images along x, and along y, whose paths get into the boxes.
 
     Args:
-        start, end: of the path [s].
+        start: start of the path [s].
+        end: end of the path [s].
     """
     if sides is None:
         return 0, 0, 0, 0

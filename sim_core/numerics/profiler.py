@@ -1,4 +1,4 @@
-"""Time spent in each part of the event loop; not in the machine code unless it is requested."""
+"""Time spent in each part of the event loop. Machine code has no profiler unless requested."""
 
 from typing import NamedTuple
 
@@ -15,7 +15,7 @@ class Profiler(NamedTuple):
     """Clock readings [ticks of the processor]."""
 
     spent: np.ndarray  # time in each of PARTS, shape (parts,) int64
-    last: np.ndarray  # when the last part ended, shape (1,) int64
+    last: np.ndarray  # end of the last part, shape (1,) int64
 
 
 def new_profiler() -> Profiler:
@@ -25,7 +25,7 @@ def new_profiler() -> Profiler:
 
 @inlined
 def add_time(profiler: Profiler | None, part: int) -> None:
-    """Book the time since the last call on this part; a negative part only starts the clock."""
+    """Add the time since the last call to this part. A negative part only starts the clock."""
     if profiler is None:
         return
     now = ticks()

@@ -1,4 +1,4 @@
-"""When a gap closes: the first time a function of time is at or below zero *and* falling.
+"""Closing time of a gap: the first time a function of time is at or below zero *and* falling.
 
 A gap that opens again is never a contact, whatever rounding did to its sign: an overlapping pair
 that approaches collides now, one that separates does not (Bannerman, Strobl, Formella & Pöschel,
@@ -23,8 +23,8 @@ from sim_core.numerics.jit import jit
 
 NEVER = math.inf
 
-# Newton stops at a gap of this size [m], which is contact. Rounding of a 0.1 m coordinate is
-# 1e-17 m; a larger value makes contacts early, a smaller one spends steps on rounding.
+# Newton stops at a gap of this size [m], which is contact. Rounding of a 0.1 m coordinate is 1e-17
+# m. A larger value makes contacts early, and a smaller value spends steps on rounding.
 GAP_TOLERANCE = 1e-15
 NEWTON_STEPS = 60  # quadratic convergence needs 6; a double root halves the error a step, so 50
 
@@ -41,13 +41,14 @@ def first_approach(c: float, b: float, a: float, depth: float) -> float:
         if disc <= 0.0:  # a tangent touch does not approach
             return NEVER
         if b < 0.0:
-            return 2.0 * c / (np.sqrt(disc) - b)  # holds for either sign of a, no cancellation
-        return -(b + np.sqrt(disc)) / (2.0 * a)
+            # this form holds for either sign of a, without cancellation
+            return float(2.0 * c / (np.sqrt(disc) - b))
+        return float(-(b + np.sqrt(disc)) / (2.0 * a))
     if b <= 0.0:
         return NEVER
     if disc > 0.0:  # overlapping and receding: the gap opens, and closes again later
-        return -(b + np.sqrt(disc)) / (2.0 * a)
-    return -b / (2.0 * a) if c > -depth else NEVER  # turns while it still overlaps
+        return float(-(b + np.sqrt(disc)) / (2.0 * a))
+    return -b / (2.0 * a) if c > -depth else NEVER  # the gap turns while it still overlaps
 
 
 class WaveGap(NamedTuple):
@@ -130,7 +131,7 @@ def _concave_approach(w: WaveGap, start: float, end: float) -> float:
         return start
     if _gap(w, end) > 0.0:
         return NEVER
-    if gap <= 0.0:  # overlaps by rounding, and recedes
+    if gap <= 0.0:  # the gap overlaps by rounding, and recedes
         if _rate(w, end) >= 0.0:
             return NEVER
         top = _time_of_largest_gap(w, start, end)
@@ -151,11 +152,11 @@ def _concave_approach(w: WaveGap, start: float, end: float) -> float:
 
 @jit
 def _time_to_band(w: WaveGap, depth: float) -> float:
-    """A time before which there is no approach: when the ball reaches the band the face moves in.
+    """Earliest time of an approach: the ball reaches the band that the face moves in.
 
-    Inside the band that is now, unless the ball leaves it faster than the face ever moves: its
-    speed is least now or on leaving. A ball more than ``depth`` behind the band must first come
-    out over the highest position of the face.
+    Inside the band this is the present, unless the ball leaves the band faster than the face ever
+    moves: its speed is least now or on leaving. A ball more than ``depth`` behind the band must
+    first come out over the highest position of the face.
     """
     height = w.c - w.amplitude
     if height > 0.0 or w.c <= -w.amplitude - depth:
@@ -170,9 +171,10 @@ def _time_to_band(w: WaveGap, depth: float) -> float:
 def first_wave_approach(w: WaveGap, limit: float, depth: float) -> float:
     """First s in [0, limit] at which the ball meets the vibrating face and approaches it, or NEVER.
 
-    The search starts where the ball reaches the band the face moves in. Inside it the gap is split
-    where its curvature changes sign, sin(angle) = -2a / (A omega²). Each piece then has at most one
-    approach, and Newton started from the safe side can neither miss it nor come early.
+    The search starts where the ball reaches the band that the face moves in. Inside the band the
+    gap is split where its curvature changes sign, sin(angle) = -2a / (A omega²). Each piece then
+    has at most one approach, and Newton started from the safe side can neither miss it nor come
+    early.
     """
     s = _time_to_band(w, depth)
     if s >= limit:
@@ -190,7 +192,7 @@ def first_wave_approach(w: WaveGap, limit: float, depth: float) -> float:
             if s >= limit:
                 return NEVER
         angle = w.omega * s + w.theta
-        # pieces begin at half π ± alpha; even ones are convex
+        # pieces begin at half π ± alpha; even pieces are convex
         half = float(math.floor((angle - alpha) / math.pi))
         while _piece_start(half + 1.0, alpha) <= angle:
             half += 1.0
@@ -209,7 +211,7 @@ def first_wave_approach(w: WaveGap, limit: float, depth: float) -> float:
 
 @jit
 def next_wave_approach(w: WaveGap, s: float, limit: float, depth: float) -> float:
-    """First approach before ``limit`` after the one at s, if the ball passes through the face."""
+    """First approach before ``limit`` after one at s, if the ball passes through the face."""
     # seen from behind the face, the ball comes out where the gap with its sign changed closes
     behind = WaveGap(-w.c, -w.b, -w.a, w.amplitude, w.omega, w.theta + math.pi)
     out = s + first_wave_approach(_shifted(behind, s), limit - s, math.inf)
@@ -220,7 +222,7 @@ def next_wave_approach(w: WaveGap, s: float, limit: float, depth: float) -> floa
 
 @jit
 def _shifted(w: WaveGap, s: float) -> WaveGap:
-    """The same gap with its time counted from s on."""
+    """The gap with its time counted from s on."""
     height, rate = w.c + s * (w.b + w.a * s), w.b + 2.0 * w.a * s
     return WaveGap(height, rate, w.a, w.amplitude, w.omega, w.theta + w.omega * s)
 

@@ -1,7 +1,7 @@
 """Eight comparisons in one instruction: float32 filters in front of the exact float64 tests.
 
 A filter may let through too much but never too little, so that results do not depend on it, bit for
-bit. Each has a numpy version that replaces it when numba's JIT is off.
+bit. Each filter has a numpy version that replaces it when numba's JIT is off.
 """
 
 import time
@@ -38,12 +38,12 @@ class _Vectors:
         return self.builder.shuffle_vector(one, ir.Constant(self.type, ir.Undefined), mask)
 
     def load(self, data: Any, index: Any) -> Any:
-        """``width`` consecutive numbers from data[index]."""
+        """Load ``width`` consecutive numbers from data[index]."""
         address = self.builder.bitcast(self.builder.gep(data, [index]), self.type.as_pointer())
         return self.builder.load(address, align=4)
 
     def store(self, vector: Any, data: Any, index: Any) -> None:
-        """``width`` consecutive numbers to data[index]."""
+        """Store ``width`` consecutive numbers to data[index]."""
         address = self.builder.bitcast(self.builder.gep(data, [index]), self.type.as_pointer())
         self.builder.store(vector, address, align=4)
 
@@ -132,7 +132,11 @@ def _boxes_hit_numpy(bounds: Any, node: int, ray: Any, longest: Any, enter: Any)
 def _near_filter(
     lanes: Any, probe: Any, limited: bool, periodic: bool = False
 ) -> tuple[Any, Callable[[Any, Any, Any, Any], Any]]:
-    """Signature and code of balls_near or images_near, or if ``limited`` of the other two."""
+    """Signature and code of a filter of pairs.
+
+    limited: True for balls_near_until and images_near_until.
+    periodic: True for images_near and images_near_until.
+    """
     signature = types.int64(lanes, types.int64, probe)
 
     def codegen(context: Any, builder: Any, _: Any, arguments: Any) -> Any:
@@ -263,25 +267,31 @@ def _ticks(typing_context: Any) -> Any:
     return signature, codegen
 
 
+Filter = Callable[..., int]
+
 _settings: Any = numba.config
 _plain = _settings.DISABLE_JIT
 
 # boxes_hit(bounds, node, ray, longest, enter) -> bit mask of the children that a flight enters
-#   bounds: boxes of the tree, shape (nodes, 6, 8) float32; ray: see detect/ball_mesh.py, shape (9,)
-#   longest: end of the flight [s] float32; enter: entry times [s], shape (8,) float32, written
-boxes_hit: Any = _boxes_hit_numpy if _plain else _boxes_hit
+#   bounds: boxes of the tree, shape (nodes, 6, 8) float32
+#   ray: see detect/ball_mesh.py, shape (9,)
+#   longest: end of the flight [s] float32
+#   enter: entry times [s], shape (8,) float32, written
+boxes_hit: Filter = _boxes_hit_numpy if _plain else _boxes_hit
 # balls_near(lanes, first, probe) -> bit mask of the LANES balls that may meet the probe
-#   lanes: positions and velocities, shape (6, n) float32; first: lane; probe: shape (17,) float32
-balls_near: Any = _balls_near_numpy if _plain else _balls_near
-# balls_near_until: the same without those that cannot meet before the time probe[10]
-balls_near_until: Any = partial(_balls_near_numpy, limited=True) if _plain else _balls_near_until
-# images_near, images_near_until: the same for the nearest images, at the time probe[12], in a box
-#   with sides probe[13:15] along x and y, whose inverses are probe[15:17]; all other times count
-#   from there
-images_near: Any = partial(_balls_near_numpy, periodic=True) if _plain else _images_near
-images_near_until: Any = (
+#   lanes: positions and velocities, shape (6, n) float32
+#   first: first lane
+#   probe: shape (17,) float32
+balls_near: Filter = _balls_near_numpy if _plain else _balls_near
+# balls_near_until leaves out balls that cannot meet the probe before the time probe[10].
+balls_near_until: Filter = partial(_balls_near_numpy, limited=True) if _plain else _balls_near_until
+# images_near and images_near_until take the nearest images at the time probe[12], in a box with
+# sides probe[13:15] along x and y, whose inverses are probe[15:17]. All other times count from
+# probe[12].
+images_near: Filter = partial(_balls_near_numpy, periodic=True) if _plain else _images_near
+images_near_until: Filter = (
     partial(_balls_near_numpy, limited=True, periodic=True) if _plain else _images_near_until
 )
-lowest_bit: Any = _lowest_bit_numpy if _plain else _lowest_bit
+lowest_bit: Callable[..., int] = _lowest_bit_numpy if _plain else _lowest_bit
 # ticks() -> the processor's clock, in its own unit
-ticks: Any = time.perf_counter_ns if _plain else _ticks
+ticks: Callable[..., int] = time.perf_counter_ns if _plain else _ticks

@@ -8,7 +8,7 @@ from sim_core.numerics.jit import jit
 
 
 class Vec3(NamedTuple):
-    """A vector (x, y, z). Its unit, if any, is given where it is used."""
+    """A vector (x, y, z). Its unit, if any, is given where the vector is used."""
 
     x: float
     y: float
@@ -24,12 +24,12 @@ class Flight(NamedTuple):
 
 
 class Touch(NamedTuple):
-    """A ball touches a surface.
+    """Contact of a ball with a surface.
 
     away: any vector along the normal, from the surface to the ball.
-    relative: velocity of the ball minus that of the surface, before the hit [m/s].
-    tag: of the surface.
-    kind: of the obstacle.
+    relative: velocity of the ball minus the velocity of the surface, before the hit [m/s].
+    tag: tag of the surface.
+    kind: kind of the obstacle.
     """
 
     away: Vec3
@@ -40,19 +40,19 @@ class Touch(NamedTuple):
 
 @jit
 def sub(a: Vec3, b: Vec3) -> Vec3:
-    """a - b."""
+    """Difference a - b."""
     return Vec3(a.x - b.x, a.y - b.y, a.z - b.z)
 
 
 @jit
 def add_scaled(a: Vec3, s: float, b: Vec3) -> Vec3:
-    """a + s b."""
+    """Sum a + s b."""
     return Vec3(a.x + s * b.x, a.y + s * b.y, a.z + s * b.z)
 
 
 @jit
 def scaled(s: float, a: Vec3) -> Vec3:
-    """s a."""
+    """Product s a."""
     return Vec3(s * a.x, s * a.y, s * a.z)
 
 
@@ -96,5 +96,5 @@ def velocity_after(flight: Flight, delay: float) -> Vec3:
 
 @jit
 def flight_after(flight: Flight, delay: float) -> Flight:
-    """The same flight ``delay`` [s] later."""
+    """The flight ``delay`` [s] later."""
     return Flight(position_after(flight, delay), velocity_after(flight, delay), flight.acceleration)

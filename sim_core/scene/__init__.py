@@ -1,1 +1,1 @@
-"""What is simulated: the scene, its effects, packing, and what is refused."""
+"""The simulated scene: cavity, balls, effects, packing, and checks that refuse bad scenes."""

@@ -9,8 +9,8 @@ from sim_core.geometry.analytic import CEILING, FLOOR, AnalyticCavity
 from sim_core.scene.narrow_gaps import TIGHT
 from sim_core.scene.physics import Physics
 
-# Of the largest ball, the smallest side of a periodic box. From two on, no ball can touch another
-# on both sides, but the closer to two, the shorter is what a prediction can look ahead.
+# Smallest side of a periodic box, in diameters of the largest ball. From two on, no ball can touch
+# another on both sides. Near two, predictions look only a short time ahead.
 MIN_DIAMETERS = 3.0
 
 
@@ -36,7 +36,7 @@ def require_supported(cavity: AnalyticCavity, physics: Physics) -> None:
 
 
 def _require_floor(cavity: AnalyticCavity, vibration: Vibration, remedy: str) -> None:
-    """Raise SceneError unless it is the floor alone that vibrates, along z."""
+    """Raise SceneError unless only the floor vibrates, along z."""
     if not (vibration.axis[0] == 0.0 and vibration.axis[1] == 0.0):
         raise SceneError(
             f"vibration.axis is {vibration.axis}: not supported with an analytical cavity unless "
@@ -56,8 +56,8 @@ def require_clear(
 ) -> None:
     """Raise SceneError for a ball that does not fit.
 
-    That is one outside the cavity, one that overlaps a surface by more than ``touch`` [m], and one
-    wider than the cavity where it is narrowest. The vibrating floor is where its phase has it.
+    Such a ball is outside the cavity, overlaps a surface by more than ``touch`` [m], or is wider
+    than the cavity at its narrowest. The vibrating floor is placed by its phase.
     """
     _require_inside_periods(cavity, balls)
     gap, radii = cavity.gaps(balls.positions), 0.5 * balls.diameters

@@ -18,9 +18,10 @@ class Frames:
     """All n balls at f times, each on its flight at that very time.
 
     time: [s] since the end of the warm-up, (f,).
-    positions: of the centres [m], (f, n, 3).
-    velocities: in m/s, (f, n, 3); at the time of an impact those before it.
-    spins: in rad/s, (f, n, 3); None without Physics.friction.
+    positions: positions of the centres [m], (f, n, 3).
+    velocities: velocities [m/s], (f, n, 3). At the time of an impact they are the velocities before
+        it.
+    spins: angular velocities [rad/s], (f, n, 3); None without Physics.friction.
     """
 
     time: np.ndarray
@@ -33,7 +34,7 @@ class Frames:
 
 
 def frames_of(time: np.ndarray, noted: list[Balls], balls: Balls) -> Frames:
-    """Frames of the balls as they were at each time; ``balls``: as they are at any."""
+    """Frames of the balls noted at each time. ``balls``: the balls at any time, for their spins."""
 
     def column(name: str) -> np.ndarray:
         each = [getattr(one, name) for one in noted]
@@ -45,7 +46,7 @@ def frames_of(time: np.ndarray, noted: list[Balls], balls: Balls) -> Frames:
 
 @dataclass(frozen=True)
 class Energies:
-    """Energies of all balls together [J], a number a frame, (f,) each.
+    """Energies of all balls together [J], one number a frame, (f,) each.
 
     The potential energy is 0 where all centres are at the origin.
     """
@@ -56,19 +57,20 @@ class Energies:
 
     @property
     def total(self) -> np.ndarray:
-        """The sum of the three."""
+        """Sum of translational, rotational and potential energy."""
         return np.asarray(self.translational + self.rotational + self.potential)
 
 
 def energies(frames: Frames, balls: Balls, gravity: Gravity | None = None) -> Energies:
-    """The energies in each frame.
+    """Energies of the balls in each frame.
 
     Args:
-        frames: of a simulation.
-        balls: of the same simulation, for diameters and densities.
-        gravity: of the scene; without it the potential energy is 0.
+        frames: frames of a simulation.
+        balls: balls of the same simulation, for diameters and densities.
+        gravity: gravity of the scene. Without it the potential energy is 0.
     """
-    moment = 0.4 * balls.masses * (0.5 * balls.diameters) ** 2  # of inertia, of a solid sphere
+    # moment of inertia of a solid sphere
+    moment = 0.4 * balls.masses * (0.5 * balls.diameters) ** 2
     rotational, potential = np.zeros(len(frames)), np.zeros(len(frames))
     if frames.spins is not None:
         rotational = 0.5 * np.square(frames.spins).sum(axis=2) @ moment

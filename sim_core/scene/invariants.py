@@ -30,13 +30,13 @@ if TYPE_CHECKING:
     from scipy.spatial import KDTree
 
 Room = TriangleMesh | AnalyticCavity
-# Directions that no designer's edge is parallel to, so that a ray through an edge or corner is
-# rare; where it happens, the next direction is tried.
+# Directions that no designer's edge is parallel to, so that a ray rarely passes through an edge or
+# corner. If it does, the next direction is tried.
 RAYS = np.array([[0.3671, 0.2113, 0.9058], [-0.5317, 0.7411, 0.4098], [0.6119, -0.4733, -0.6337]])
-LIFT = 1e-3  # of a radius: how far above a plane a point beneath it is lifted
-BENEATH = 1e-9  # m: beneath the lowest place of a face that is taken for rounding
-BORDER = 1e-12  # of the mesh's size squared: a ray that passes an edge by less is undecided
-IN_CELL, IN_CELLS = 8, 16  # triangles in a cell that are aimed at, and cells of a triangle at most
+LIFT = 1e-3  # share of a radius: height above a plane to which a point beneath it is lifted
+BENEATH = 1e-9  # m: depth beneath the lowest place of a face that counts as rounding
+BORDER = 1e-12  # share of the mesh's size squared: a ray that passes an edge by less is undecided
+IN_CELL, IN_CELLS = 8, 16  # intended triangles in a cell, and largest number of cells of a triangle
 
 
 class _Projection(NamedTuple):
@@ -44,13 +44,13 @@ class _Projection(NamedTuple):
 
     corners: np.ndarray  # corner positions with the ray as third axis [m], shape (m, 3, 3)
     boxes: np.ndarray  # low and high of the first axis and of the second [m], shape (m, 4)
-    cells: "_Cells"  # of a grid over the boxes
-    axes: np.ndarray  # of the projection, shape (3, 3), one a row
+    cells: "_Cells"  # cells of a grid over the boxes
+    axes: np.ndarray  # axes of the projection, shape (3, 3), one a row
     border: float  # a doubled area smaller than this is undecided [m²]
 
 
 class _Cells(NamedTuple):
-    """A grid of s by s cells, and the boxes that meet each of them.
+    """A grid of s by s cells, and the boxes that meet each cell.
 
     Cell (i, j) has the members from first[i s + j] up to first[i s + j + 1].
     """
@@ -63,7 +63,7 @@ class _Cells(NamedTuple):
 
 
 def _cells_of(boxes: np.ndarray, side: int) -> _Cells:
-    """Put boxes (m, 4) into cells; a grid finer than IN_CELLS cells a box is made coarser."""
+    """Put boxes (m, 4) into cells. A grid finer than IN_CELLS cells a box is made coarser."""
     low, high = boxes[:, ::2].min(axis=0), boxes[:, 1::2].max(axis=0)
     while True:
         size: np.ndarray = np.maximum((high - low) / side, np.finfo(float).tiny)
@@ -88,7 +88,7 @@ def _projection(mesh: TriangleMesh, k: int) -> _Projection:
 
 
 def _project(triangles: np.ndarray, mesh: TriangleMesh, k: int, cells: int = 1) -> _Projection:
-    """The triangles (m, 3, 3) projected along ray k, in cells² cells; the mesh gives the scale."""
+    """Project the triangles (m, 3, 3) along ray k, in cells² cells. The mesh gives the scale."""
     ray = RAYS[k] / np.linalg.norm(RAYS[k])
     side = np.cross(ray, [1.0, 0.0, 0.0])
     side /= np.linalg.norm(side)
@@ -102,7 +102,7 @@ def _project(triangles: np.ndarray, mesh: TriangleMesh, k: int, cells: int = 1) 
 
 @jit
 def _crossings(projection: _Projection, u: float, v: float, w: float) -> int:
-    """Number of triangles that the ray from (u, v, w) along axis 3 crosses; -1: undecided."""
+    """Number of triangles that the ray from (u, v, w) along axis 3 crosses; -1 if undecided."""
     crossed = 0
     corners, boxes, cells = projection.corners, projection.boxes, projection.cells
     i, j = _cell(cells, 0, u), _cell(cells, 1, v)
@@ -151,9 +151,9 @@ def _mark_near(projection: _Projection, points: np.ndarray, reach: float, near: 
 
 
 def triangles_near(mesh: TriangleMesh, points: np.ndarray, reach: float) -> np.ndarray:
-    """Numbers of all triangles within reach [m] of any of the points (n, 3), and of some others."""
+    """Numbers of all triangles within reach [m] of any of the points (n, 3), and of some more."""
     projection, near = _projection(mesh, 0), np.zeros(len(mesh.triangles), dtype=np.bool_)
-    wide = reach * (1.0 + 1e-9) + 1e-12 * float(np.abs(mesh.bounds).max())  # for rounding
+    wide = reach * (1.0 + 1e-9) + 1e-12 * float(np.abs(mesh.bounds).max())  # widened for rounding
     _mark_near(projection, np.ascontiguousarray(points @ projection.axes.T), wide, near)
     return np.flatnonzero(near)
 
@@ -167,15 +167,16 @@ def _count(projection: _Projection, points: np.ndarray, crossed: np.ndarray) -> 
 def contained(
     mesh: TriangleMesh, points: np.ndarray, corners: np.ndarray | None = None
 ) -> np.ndarray:
-    """Which points lie inside the mesh, by the parity of crossings along a ray.
+    """True for points inside the mesh, by the parity of crossings along a ray.
 
-    Where a turned part goes through a wall the surface has slits: a point outside by the parity is
-    outside only if the surface's solid angle, which a slit hardly changes, agrees.
+    A turned part that goes through a wall leaves slits in the surface. A point outside by the
+    parity is then outside only if the surface's solid angle, which a slit hardly changes, agrees.
 
     Args:
         mesh: the surface.
         points: positions [m], shape (n, 3).
-        corners: where the triangles are now [m], shape (m, 3, 3), if not where the mesh has them.
+        corners: present corners of the triangles [m], shape (m, 3, 3), if these differ from the
+            mesh.
 
     Returns:
         Shape (n,) bool.
@@ -203,17 +204,17 @@ def beneath_mean_plane(
     radii: np.ndarray,
     corners: np.ndarray | None = None,
 ) -> np.ndarray:
-    """Which centres of balls are where a vibrating face lets them get by swinging wider than they.
+    """True for ball centres that a vibrating face can let beneath its mean plane.
 
-    That is beneath its mean plane by less than the amplitude exceeds the radius, and inside the
-    mesh once lifted above it.
+    The face swings wider than the balls' radius. Such a centre is beneath the mean plane by less
+    than the amplitude minus the radius, and inside the mesh once lifted above the plane.
 
     Args:
         mesh: the surface.
-        vibrations: of its faces.
-        points: centres [m], shape (n, 3).
-        radii: of the balls [m], shape (n,).
-        corners: where the triangles are now [m], as for ``contained``.
+        vibrations: vibrations of its faces.
+        points: ball centres [m], shape (n, 3).
+        radii: radii of the balls [m], shape (n,).
+        corners: present corners of the triangles [m], as for ``contained``.
 
     Returns:
         Shape (n,) bool.
@@ -235,7 +236,7 @@ def beneath_mean_plane(
 
 
 def enclosed(corners: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Which points (n, 3) [m] the triangles (m, 3, 3) [m] enclose, (n,) bool, by solid angle."""
+    """True for points (n, 3) [m] enclosed by triangles (m, 3, 3) [m], by solid angle, (n,)."""
     angle = np.zeros(len(points))
     _solid_angles(
         np.ascontiguousarray(corners), np.ascontiguousarray(points, dtype=np.float64), angle
@@ -265,7 +266,7 @@ def turned_corners(
 ) -> np.ndarray:
     """Corners (m, 3, 3) [m] of the mesh with the part turned by ``angle`` [rad].
 
-    Without an angle the part is where it is at the start.
+    Without an angle the part is at its angle at the start.
     """
     rotation = new_rotation_state(turn, mesh.middle)
     assert rotation is not None
@@ -298,9 +299,9 @@ def _distance_squared(corners: np.ndarray, t: int, px: float, py: float, pz: flo
         v, w = (cc * xb - bc * xc) / det, (bb * xc - bc * xb) / det
     if v >= 0.0 and w >= 0.0 and v + w <= 1.0:
         dx, dy, dz = x - v * bx - w * cx, y - v * by - w * cy, z - v * bz - w * cz
-        return dx * dx + dy * dy + dz * dz
+        return float(dx * dx + dy * dy + dz * dz)
     nearest = math.inf
-    for side in range(3):  # outside the face: the closest of the three borders
+    for side in range(3):  # the point is outside the face: take the closest of the three borders
         if side == 0:
             ox, oy, oz, ex, ey, ez = x, y, z, bx, by, bz
         elif side == 1:
@@ -347,26 +348,26 @@ def clearance(corners: np.ndarray, points: np.ndarray, reach: float) -> np.ndarr
 
 
 def closest_pair(balls: Balls, room: Room | None = None) -> tuple[float, int, int]:
-    """Smallest centre distance [m], and of which two balls; (inf, -1, -1) for a single ball.
+    """Smallest centre distance [m] and its two balls; (inf, -1, -1) for a single ball.
 
     Args:
-        balls: any.
-        room: counts where it is periodic.
+        balls: any balls.
+        room: the cavity, which matters if it is periodic.
     """
     if len(balls) < 2:
         return math.inf, -1, -1
     tree = _pair_tree(balls, room)
     distance, partner = tree.query(tree.data, k=2)
     one = int(distance[:, 1].argmin())
-    two = int(partner[one, 1])  # of balls in one place, the first may be either one
+    two = int(partner[one, 1])  # if balls share a place, the first neighbour may be either ball
     return float(distance[one, 1]), one, two if two != one else int(partner[one, 0])
 
 
 def narrowest_gap(balls: Balls, room: Room | None = None) -> tuple[float, int, int]:
-    """Smallest gap [m] between two balls, negative when they overlap, and which two.
+    """Smallest gap [m] between two balls, negative when they overlap, and its two balls.
 
-    (inf, -1, -1) for a single ball, and for balls of several sizes if no two are nearer than the
-    largest diameter. The room counts where it is periodic.
+    The result is (inf, -1, -1) for a single ball, and for balls of several sizes if no two are
+    nearer than the largest diameter. The room matters if it is periodic.
     """
     if np.ndim(balls.diameter) == 0:
         distance, one, two = closest_pair(balls, room)
@@ -383,20 +384,20 @@ def narrowest_gap(balls: Balls, room: Room | None = None) -> tuple[float, int, i
 
 
 def _pair_tree(balls: Balls, room: Room | None) -> "KDTree":
-    """A tree of the centres, on a torus where the room is periodic."""
+    """A tree of the centres, on a torus if the room is periodic."""
     from scipy.spatial import KDTree
 
     if not isinstance(room, AnalyticCavity) or not room.periods.any():
         return KDTree(balls.positions)
     places, sides = balls.positions - room.bounds[0], room.periods
-    for axis in room.periodic:  # below the side, where rounding would put them on it
+    for axis in room.periodic:  # below the side, because rounding would put points on it
         within = np.mod(places[:, axis], sides[axis])
         places[:, axis] = np.minimum(within, np.nextafter(sides[axis], 0.0))
     return KDTree(places, boxsize=sides)
 
 
 def energy(balls: Balls, gravity: Gravity | None = None) -> float:
-    """Kinetic energy, with that of spins, plus potential energy [J], which is 0 at the origin."""
+    """Kinetic energy, with spins, plus potential energy [J], which is 0 at the origin."""
     spins = None if balls.spins is None else balls.spins[None]
     now = Frames(np.zeros(1), balls.positions[None], balls.velocities[None], spins)
     return float(energies(now, balls, gravity).total[0])

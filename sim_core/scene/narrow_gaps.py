@@ -1,8 +1,8 @@
-"""Gaps narrower than the ball that starts in them, or about to become so.
+"""Search for gaps that are narrower than the ball that starts in them, or will become narrower.
 
-No motion of a rigid ball there is right. Two surfaces are checked that the ball touches on opposite
-sides; from a wedge it could still move out. A vibrating surface counts where its vibration brings
-it nearest, and two of them where both do.
+No motion of a rigid ball in such a gap is right. The search checks pairs of surfaces that the ball
+touches on opposite sides, because a ball in a wedge can still move out. A vibrating surface counts
+at the place where its vibration brings it nearest. Two vibrating surfaces both do.
 """
 
 from typing import NamedTuple
@@ -14,7 +14,7 @@ from sim_core.geometry.mesh import TriangleMesh
 from sim_core.scene.invariants import clearance
 from sim_core.scene.physics import Physics
 
-TIGHT = 1e-13  # m: narrower by less is rounding; a contact is found as exactly
+TIGHT = 1e-13  # m: a gap narrower by less is rounding; a contact is found as exactly
 # Cosine of normals: parallel up to 0.05 mrad. A ball that overlaps by 1 nm there could move out 40
 # um.
 OPPOSED = -1.0 + 1e-9
@@ -23,9 +23,9 @@ OPPOSED = -1.0 + 1e-9
 class NearSurface(NamedTuple):
     """The triangles near the balls of a scene, k of them."""
 
-    number: np.ndarray  # in the mesh, shape (k,)
-    tags: np.ndarray  # shape (k,)
-    corners: np.ndarray  # where they are at the start [m], shape (k, 3, 3)
+    number: np.ndarray  # numbers in the mesh, shape (k,)
+    tags: np.ndarray  # surface tags, shape (k,)
+    corners: np.ndarray  # corners at the start [m], shape (k, 3, 3)
 
 
 class NarrowGap(NamedTuple):
@@ -34,18 +34,19 @@ class NarrowGap(NamedTuple):
     ball: int  # number of the ball
     one: int  # triangle on one side
     two: int  # triangle on the other side
-    narrower: float  # how much narrower than the ball the gap is [m]
-    vibrates: bool  # whether that is so when the vibrating surfaces come nearest, not at the start
+    narrower: float  # diameter of the ball minus the width of the gap [m]
+    # True if the gap is narrow when the vibrating surfaces come nearest, not at the start
+    vibrates: bool
 
 
 def find_narrow_gap(surface: NearSurface, physics: Physics, balls: Balls) -> NarrowGap | None:
-    """The first ball that does not fit where it starts.
+    """The first ball that does not fit at its start.
 
     Args:
         surface: all triangles that are nearer to a ball than its radius and `largest_approach`.
     """
     radius, approach = 0.5 * balls.diameters, largest_approach(physics)
-    # two such gaps, or one of more than that
+    # a gap of -TIGHT: overlaps by half of it on two sides, or by more on one side
     near = clearance(surface.corners, balls.positions, balls.radius) < radius - 0.5 * TIGHT
     for vibration in physics.vibrations:
         vibrating, reach = surface.tags == vibration.tag, balls.radius + approach
@@ -75,14 +76,18 @@ def vibrating_name(physics: Physics, tag: int) -> str:
 
 
 def largest_approach(physics: Physics) -> float:
-    """Bound on how much nearer [m] two surfaces come to each other than at the start."""
+    """Bound on the distance [m] by which two surfaces approach each other after the start."""
     return sum(2.0 * one.amplitude for one in physics.vibrations)
 
 
 def _tightest(
     surface: NearSurface, physics: Physics, here: np.ndarray, radius: float
 ) -> tuple[int, int, float, bool] | None:
-    """The two triangles that leave a ball the least room, how much it lacks [m], and when."""
+    """The two triangles that leave a ball the least room.
+
+    Returns: the numbers of the triangles, the missing width [m], and True if the gap is narrow by
+    vibration.
+    """
     turn, reach = physics.part_rotation, radius + largest_approach(physics)
     corners, tags = surface.corners, surface.tags
     box = np.abs(here - np.clip(here, corners.min(axis=1), corners.max(axis=1))).max(axis=1)
@@ -118,7 +123,7 @@ def _nearest_points(corners: np.ndarray, point: np.ndarray) -> np.ndarray:
     share = np.einsum("mki,mki->mk", point - a, edge) / square
     border = a + np.clip(share, 0.0, 1.0)[..., None] * edge
     nearest = np.linalg.norm(point - border, axis=2).argmin(axis=1)
-    found = border[np.arange(len(corners)), nearest]
+    found = np.asarray(border[np.arange(len(corners)), nearest])
     normal = np.cross(edge[:, 0], edge[:, 1])
     square = np.einsum("mi,mi->m", normal, normal)
     height = np.einsum("mi,mi->m", point - a[:, 0], normal) / np.maximum(square, tiny)

@@ -18,8 +18,8 @@ from sim_core.scene.invariants import clearance, contained, enclosed, triangles_
 
 BATCH = 256  # positions tried at once
 MAX_FAILURES = 40  # batches without a free place before the shot is refused
-GROWTH = 1.3  # of the layer's height
-FIRST_LAYER = 1.5  # diameters
+GROWTH = 1.3  # growth factor of the layer's height
+FIRST_LAYER = 1.5  # height of the first layer in diameters
 # m: distance between neighbours and from surfaces, so that rounding cannot make them overlap
 GAP = 1e-6
 
@@ -33,25 +33,30 @@ def pack_balls(
     part_rotation: PartRotation | None = None,
     floor: float = -np.inf,
 ) -> np.ndarray:
-    """Positions of balls inside the cavity, no two overlapping.
+    """Positions of balls inside the cavity, without overlaps.
 
-    "Low" is along -z. The larger balls are placed first.
+    Balls are placed from low z upwards, and the larger balls first.
 
     Args:
         mesh: the cavity.
         count: number of balls.
-        diameter: one number [m], or one for each ball, shape (count,).
+        diameter: one diameter [m] for all balls, or an array of shape (count,).
         rng: source of the random positions.
-        clear: distance from every surface [m]; at least the largest amplitude, if any.
-        part_rotation: the part is placed as its phase at the start has it.
-        floor: nothing is placed lower than this [m].
+        clear: distance from every surface [m], at least the largest amplitude, if any.
+        part_rotation: rotation of the part, which is placed by its phase at the start.
+        floor: lowest height of a placed ball [m].
 
     Returns:
         Positions [m], shape (count, 3).
 
     Raises:
-        SceneError: when they do not fit; random placement reaches about 30 % of the volume that a
-            ball can use.
+        SceneError: if the balls do not fit. Random placement reaches about 30 % of the volume that
+            a ball can use.
+
+    Example:
+        >>> box = cylinder_cavity(diameter=0.1, bottom=0.0, top=0.1, tags=[0, 1, 2])
+        >>> pack_balls(box, 20, 0.003, np.random.default_rng(seed=1)).shape
+        (20, 3)
     """
     sizes = np.asarray(diameter, dtype=np.float64)
     shaped = sizes.shape in ((), (count,))
@@ -75,7 +80,10 @@ def pack_balls(
 def _free_selector(
     mesh: TriangleMesh | AnalyticCavity, part_rotation: PartRotation | None
 ) -> Callable[[np.ndarray, float], np.ndarray]:
-    """A function of points (n, 3) [m] and a distance [m]: those inside, that far from surfaces."""
+    """A function that selects free points, from points (n, 3) [m] and a distance [m].
+
+    A free point is inside the cavity and at least the distance away from every surface.
+    """
     if isinstance(mesh, AnalyticCavity):
         return lambda points, reach: points[(mesh.gaps(points) >= reach).all(axis=1)]
     if part_rotation is None:
@@ -83,27 +91,27 @@ def _free_selector(
         def free(points: np.ndarray, reach: float) -> np.ndarray:
             near = mesh.corners[triangles_near(mesh, points, reach)]
             points = points[clearance(near, points, reach) >= reach]
-            return points[contained(mesh, points)]
+            return np.asarray(points[contained(mesh, points)])
 
         return free
     corners = turned_corners(mesh, part_rotation)
 
     def free_of_turned(points: np.ndarray, reach: float) -> np.ndarray:
         points = points[clearance(corners, points, reach) >= reach]
-        return points[enclosed(corners, points)]
+        return np.asarray(points[enclosed(corners, points)])
 
     return free_of_turned
 
 
 class _Layer(NamedTuple):
-    """Where balls of one size are placed."""
+    """The layer in which balls of one size are placed."""
 
     mesh: TriangleMesh | AnalyticCavity  # the cavity
-    # selects points that are inside and far enough from every surface
+    # function that selects points inside the cavity and far enough from every surface
     select_free: Callable[[np.ndarray, float], np.ndarray]
-    diameter: float  # of the balls [m]
+    diameter: float  # diameter of the balls [m]
     clear: float  # distance from every surface [m]
-    floor: float  # nothing is placed lower than this [m]
+    floor: float  # lowest height of a placed ball [m]
 
 
 def _place(placed: "_PlacedBalls", layer: _Layer, count: int, rng: np.random.Generator) -> None:
@@ -139,12 +147,12 @@ def _place(placed: "_PlacedBalls", layer: _Layer, count: int, rng: np.random.Gen
 
 
 class _PlacedBalls:
-    """Balls that do not overlap, in chains of those whose centres are in grid cells of one hash."""
+    """Balls without overlaps. Balls whose centres are in grid cells of one hash form a chain."""
 
     def __init__(self, most: int, edge: float, periods: np.ndarray) -> None:
-        """Make room for so many balls in cells ``edge`` [m] wide, twice the largest radius.
+        """Make room for ``most`` balls in cells of width ``edge`` [m], twice the largest radius.
 
-        ``periods`` (3,) [m]: sides along which the room is periodic, else 0.
+        ``periods``: periodic side lengths of the room [m], else 0, (3,).
         """
         self.count, self.edge, self.periods = 0, edge, periods
         self.points, self.radii = np.zeros((most, 3)), np.zeros(most)
@@ -152,7 +160,7 @@ class _PlacedBalls:
         self.older = np.full(most, -1)  # the next ball of its chain
 
     def add(self, points: np.ndarray, radius: float, most: int) -> None:
-        """Add those of the points (n, 3) in turn that overlap no ball, up to a number of balls."""
+        """Add the points (n, 3) in turn that overlap no ball, up to a number of ``most`` balls."""
         at = self.points, self.radii, self.newest, self.older
         grid = self.edge, self.periods
         self.count = _add(np.ascontiguousarray(points), radius, most, self.count, *grid, *at)
@@ -171,7 +179,10 @@ def _add(
     newest: np.ndarray,
     older: np.ndarray,
 ) -> int:
-    """The number of balls when the new ones are added, see `_PlacedBalls`."""
+    """Add new balls, see `_PlacedBalls`.
+
+    Returns: the number of balls afterwards.
+    """
     for n in range(len(new)):
         if count == most:
             break

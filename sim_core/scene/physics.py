@@ -1,4 +1,4 @@
-"""Which effects a scene has, one optional field an effect.
+"""The effects of a scene, one optional field an effect.
 
 An effect that is None is absent from memory and machine code.
 """
@@ -21,9 +21,9 @@ from sim_core.effects.vibration import Vibration
 class BallCollisions(NamedTuple):
     """Collisions of balls with one another.
 
-    Without them a single ball, or shot so thin that its balls hardly ever meet, spends no time on
-    pairs: there is no neighbour filter, and overlaps are not checked. What a collision does is up
-    to the other effects.
+    Without this effect there is no neighbour filter, and overlaps are not checked. A single ball,
+    or shot so thin that its balls hardly ever meet, then spends no time on pairs. The other effects
+    decide the result of a collision.
     """
 
 
@@ -31,16 +31,21 @@ class Physics(NamedTuple):
     """Effects of a scene. With the defaults balls fly straight and collide elastically.
 
     Args:
-        gravity: uniform.
-        restitution: of surfaces and balls.
-        vibration: of one surface, or of several in a tuple.
+        gravity: uniform gravity.
+        restitution: restitution of surfaces and balls.
+        vibration: vibration of one surface, or a tuple for several surfaces.
         rest: contact mode.
-        part_rotation: of one part.
-        friction: of surfaces and balls, with spin.
-        random_phase: of the vibration, for each ball.
-        ball_collisions: present unless it is None; balls then fly through each other.
-        drag: of still air.
+        part_rotation: rotation of one part.
+        friction: friction of surfaces and balls, with spin.
+        random_phase: random phase of the vibration, for each ball.
+        ball_collisions: collisions of balls. With None, balls fly through each other.
+        drag: drag of still air.
         surface: further effects of hits on surfaces.
+
+    Example:
+        >>> shaken_floor = Vibration(tag=0, amplitude=50e-6, frequency=20e3)
+        >>> Physics(gravity=Gravity(), vibration=shaken_floor).vibrations == (shaken_floor,)
+        True
     """
 
     gravity: Gravity | None = None
@@ -62,10 +67,10 @@ class Physics(NamedTuple):
         return (self.vibration,) if isinstance(self.vibration, Vibration) else self.vibration
 
     def begun_at(self, time: float) -> "Physics":
-        """The same effects on a clock that begins ``time`` [s] later.
+        """These effects on a clock that begins ``time`` [s] later.
 
-        Vibrations and the turning part have gone on. Turns are counted as fractions, so that no
-        digits of the phase are lost to their number.
+        Vibrations and the turning part have gone on. Turns are counted as fractions, so that their
+        number takes no digits from the phase.
         """
         if time == 0.0:
             return self

@@ -1,4 +1,4 @@
-"""Everything a simulation needs, checked once."""
+"""Complete input of a simulation, checked once."""
 
 from dataclasses import dataclass
 
@@ -38,12 +38,11 @@ from sim_core.scene.narrow_gaps import (
 from sim_core.scene.physics import BallCollisions, Physics
 
 MAX_DURATION = 1e6  # s: eleven days of peening
-STEP = 1e-4  # of a triangle's size: distance to the points on both its sides that are tested
-# m: overlap at the start that is taken for rounding of the input; ten thousand times less than a
-# dent
+STEP = 1e-4  # share of a triangle's size: distance to the tested points on both its sides
+# m: overlap at the start that counts as rounding of the input; ten thousand times less than a dent
 TOUCH = 1e-9
 
-# Effects whose type is checked; gravity may be any three numbers.
+# Effects whose type is checked. Gravity may be any three numbers.
 EFFECT_TYPES = {
     "restitution": Restitution,
     "rest": Rest,
@@ -63,20 +62,24 @@ class Scene:
         mesh: a closed mesh or an analytical cavity.
         balls: the shot at the start.
         physics: the effects.
-        duration: of the recorded simulation [s].
-        warmup: simulated before, without recording [s].
-        record: tags of the surfaces whose impacts are logged; all if None.
-        record_collisions: whether collisions of balls with one another are logged too.
-        start_time: of the first instant on the clock of the vibrations and the turning part [s]:
-            their phases are those at time 0. A scene that goes on with the balls of an earlier
+        duration: duration of the recorded simulation [s].
+        warmup: duration of the simulation before recording starts [s].
+        record: tags of the surfaces whose impacts are logged; None means all.
+        record_collisions: True to log collisions of balls with one another too.
+        start_time: time of the first instant on the clock of the vibrations and the turning part
+            [s]. Their phases are given at time 0. A scene that goes on with the balls of an earlier
             result has that result's ``time``.
 
     Raises:
-        SceneError: naming the ball, triangle or field, for a ball outside the mesh, overlapping a
-            surface or another ball, or in a gap narrower than itself; a body in the mesh that is
-            inside out; a tag without restitution; a vibrating or turning tag that the mesh lacks; a
-            part that cannot turn; numbers out of range; an analytical cavity with contact mode, a
-            turning part, or, in a cylinder, gravity across it.
+        SceneError: naming the ball, triangle or field, for
+            a ball outside the mesh, overlapping a surface or another ball, or in a gap narrower
+                than itself,
+            a body in the mesh that is inside out,
+            a tag without restitution, or a vibrating or turning tag that the mesh lacks,
+            a part that cannot turn,
+            numbers out of range,
+            an analytical cavity with contact mode, a turning part, or, in a cylinder, gravity
+                across it.
     """
 
     mesh: TriangleMesh | AnalyticCavity
@@ -109,7 +112,7 @@ class Scene:
 
     @property
     def physics_at_start(self) -> Physics:
-        """The effects with phases as they are at the scene's start."""
+        """The effects with their phases at the scene's start."""
         return self.physics.begun_at(self.start_time)
 
     def _require_physics(self) -> None:
@@ -211,7 +214,7 @@ class Scene:
             raise SceneError(
                 f"ball {outside[0]} at {where} m is outside the mesh ({len(outside)} in all)"
             )
-        # a turning part is where its phase has it; vibrating faces are checked at theirs below
+        # a turning part is at its phase; vibrating faces are checked at theirs below
         near = self._near(corners)
         still = ~np.isin(near.tags, [one.tag for one in self.physics.vibrations])
         gap = clearance(near.corners[still], balls.positions, balls.radius) - 0.5 * balls.diameters
@@ -225,10 +228,10 @@ class Scene:
         self._require_room_between(near)
 
     def _near(self, corners: np.ndarray | None) -> NearSurface:
-        """The triangles that balls may touch or that may come near them, where they are at rest.
+        """The triangles that balls may touch or that may come near balls, at their rest positions.
 
         Args:
-            corners: of all triangles [m], shape (m, 3, 3), if some of them are turned.
+            corners: corners of all triangles [m], shape (m, 3, 3), if some triangles are turned.
         """
         assert isinstance(self.mesh, TriangleMesh)
         reach = self.balls.radius + largest_approach(self.physics)
@@ -239,7 +242,7 @@ class Scene:
         return NearSurface(number, self.mesh.tags[number], corners[number])
 
     def _require_room_above_sonotrode(self, near: NearSurface) -> None:
-        """Check the balls against vibrating surfaces, and displace these by their phases."""
+        """Check the balls against vibrating surfaces, which are displaced by their phases."""
         balls = self.balls
         for vibration in self.physics_at_start.vibrations:
             vibrating = near.tags == vibration.tag
@@ -271,7 +274,7 @@ class Scene:
 def require_free_rotation(mesh: TriangleMesh, turn: PartRotation, diameter: float) -> None:
     """Raise SceneError if a part cannot turn in its chamber, with balls of this diameter [m].
 
-    This is the part of a Scene's check that needs no balls; it covers numbers out of range too.
+    This is the part of a Scene's check that needs no balls. It covers numbers out of range too.
     """
     axis = checked_axis(turn)
     assert axis is not None
@@ -282,9 +285,9 @@ def require_free_rotation(mesh: TriangleMesh, turn: PartRotation, diameter: floa
 def _inside_out(mesh: TriangleMesh) -> int:
     """A triangle whose own closed shell is wound the wrong way round; -1 if there is none.
 
-    The mesh as a whole encloses a positive volume whichever way a small body in it is wound. A
-    shell is tested at its largest triangle, and is wrong only if the cavity is behind that triangle
-    and not in front of it.
+    The mesh as a whole encloses a positive volume for either winding of a small body in it. A shell
+    is tested at its largest triangle, and is wrong only if the cavity is behind that triangle and
+    not in front of it.
     """
     edges = np.concatenate([mesh.triangles[:, :2], mesh.triangles[:, 1:]])
     shell = connected_components(edges, len(mesh.vertices))[mesh.triangles[:, 0]]

@@ -1,8 +1,8 @@
-"""Further effects of a hit on a surface: which there are, and the order in which they act.
+"""Further effects of a hit on a surface, and the order in which they act.
 
-This is the one place of the simulator that a new effect of the contact between a ball and a surface
-changes. The effect itself, a NamedTuple of numbers and a compiled function, is a file beside this
-one. Restitution, friction and contact mode have files of their own, because they keep state.
+A new effect of the contact between ball and surface changes only this place of the simulator. The
+effect itself, a NamedTuple of numbers and a compiled function, is a file beside this one.
+Restitution, friction and contact mode have their own files, because they keep state.
 """
 
 from collections.abc import Callable
@@ -13,11 +13,11 @@ from sim_core.numerics.vec3 import Touch, Vec3
 
 
 class SurfaceEffects(NamedTuple):
-    """The further effects of a scene, a field each; None is absent from the compiled code."""
+    """The further effects of a scene, a field each. None is absent from machine code."""
 
 
-# By the name of the field: makes the effect from its parameters, and raises SceneError if they are
-# wrong.
+# Functions that make an effect from its parameters, by the name of its field. They raise SceneError
+# for wrong parameters.
 MAKERS: dict[str, Callable[..., Any]] = {}
 
 
@@ -30,17 +30,17 @@ def surface_effects(**parameters: dict[str, float]) -> SurfaceEffects:
 def apply_surface_effects(
     effects: SurfaceEffects, ball: int, time_since_start: float, touch: Touch, change: Vec3
 ) -> Vec3:
-    """Apply the effects to a hit, after restitution and friction and in the frame of the room.
+    """Apply the effects to a hit, after restitution and friction, in the frame of the room.
 
     The velocity after the hit, relative to the surface, is ``touch.relative`` plus the change.
-    Effects act on hits that bounce: contact mode has decided before whether a ball lands.
+    Effects act on hits that bounce: contact mode has already decided if the ball lands.
 
     Args:
-        effects: of the scene. Each field goes to its function, which begins with
-            ``if effect is None: return change``.
+        effects: effects of the scene. Each field goes to its function, which begins with ``if
+            effect is None: return change``.
         ball: number of the ball.
-        time_since_start: of the hit [s].
-        touch: what the ball touches.
+        time_since_start: time of the hit [s].
+        touch: the contact between ball and surface.
         change: velocity change by restitution and friction [m/s].
 
     Returns:
