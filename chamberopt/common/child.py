@@ -23,6 +23,8 @@ from inspect import isgenerator
 from queue import SimpleQueue
 from typing import Any, Self
 
+from chamberopt.common.errors import InputError
+
 ENDED = 130  # exit status of a child whose parent has ended, as after Ctrl-C
 GRACE_S = 2.0  # in which an interrupted command removes what it has not finished
 TOO_MUCH_CPU = -getattr(signal, "SIGXCPU", math.inf)  # exit status at limits.limit_cpu_time
@@ -205,9 +207,11 @@ def _send(content: bytes, pipe: Any) -> None:
 
 
 def _picklable(error: Exception) -> Exception:
-    """Return the error, or a RuntimeError with its text if its pickle cannot be read."""
+    """Return the error, or one with its text if its class takes other arguments than it stores."""
     try:
         pickle.loads(pickle.dumps(error))
     except Exception:
+        if isinstance(error, InputError):
+            return InputError(str(error))
         return RuntimeError(f"{type(error).__name__}: {error}")
     return error

@@ -102,7 +102,7 @@ def open_nothing(folder: Path) -> bytes:
     return (folder / "nothing").read_bytes()
 
 
-class AwkwardError(InputError):
+class AwkwardError(Exception):
     """Cannot be unpickled: its class takes two arguments and stores one."""
 
     def __init__(self, text: str, more: int) -> None:
@@ -110,8 +110,12 @@ class AwkwardError(InputError):
         self.more = more
 
 
-def refuse_awkwardly() -> None:
-    raise AwkwardError("open edges", 3)
+class AwkwardInputError(AwkwardError, InputError):
+    pass
+
+
+def refuse_awkwardly(kind: type[AwkwardError]) -> None:
+    raise kind("open edges", 3)
 
 
 class Counted:

@@ -64,9 +64,19 @@ def test_an_error_of_the_system_is_the_tasks_own_and_no_lost_worker(
     assert worker_jobs.marks(tmp_path) == {"tried": 1}
 
 
-def test_an_error_that_cannot_be_pickled_arrives_as_text(processes: Executor) -> None:
-    with pytest.raises(RuntimeError, match=r"^AwkwardError: open edges$"):
-        processes.submit(worker_jobs.refuse_awkwardly).result()
+@pytest.mark.parametrize(
+    ("kind", "as_kind", "text"),
+    [
+        (worker_jobs.AwkwardInputError, InputError, "^open edges$"),
+        (worker_jobs.AwkwardError, RuntimeError, "^AwkwardError: open edges$"),
+    ],
+)
+def test_an_error_that_cannot_be_pickled_arrives_as_text(
+    kind: type, as_kind: type[Exception], text: str, processes: Executor
+) -> None:
+    with pytest.raises(as_kind, match=text) as raised:
+        processes.submit(worker_jobs.refuse_awkwardly, kind).result()
+    assert type(raised.value) is as_kind
 
 
 def test_a_lost_process_costs_its_task_alone(processes: Executor, tmp_path: Path) -> None:
