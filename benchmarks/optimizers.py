@@ -27,6 +27,7 @@ import argparse
 import os
 import time
 import warnings
+from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from itertools import product
@@ -37,10 +38,10 @@ import numpy as np
 from benchmarks.noisy_problems import ASIDE, REPLICAS, Problem, problems
 from benchmarks.table import print_table, write_csv
 from chamberopt.common.estimate import Estimate, estimate
-from chamberopt.search.evaluate_candidate import evaluation_cost
+from chamberopt.search.candidate import evaluation_cost
 from chamberopt.search.optimiser.acquisition import recommend_points
 from chamberopt.search.optimiser.gaussian_process import moderate_variances
-from chamberopt.search.optimiser.point_search import PointSearch, Scored, run_search
+from chamberopt.search.optimiser.point_search import PointSearch
 from chamberopt.search.optimiser.search_model import LimitedFigure, Observations, SearchModel
 from chamberopt.search.study import Limits, schema
 from chamberopt.search.study.constraints import (
@@ -97,14 +98,14 @@ class Record:
             self.figures.append(estimate(figure))
         return self.penalised(-1)
 
-    def ask_geometry_first(self, point: np.ndarray, first_replicas: int) -> Scored:
+    def ask_geometry_first(self, point: np.ndarray, first_replicas: int) -> tuple[float, float]:
         """As `ask`, unless geometry alone shows that the point is no better than the best."""
         bound = self.problem.bound(point) if self.problem.bound and self.scores else np.inf
         if bound < self._best_low:
             self._keep(point, Estimate(bound, 0.0), spared=True)
-            return Scored(bound, 0.0)
+            return bound, 0.0
         before = self.left
-        return Scored(self.ask(point, first_replicas), before - self.left)
+        return self.ask(point, first_replicas), before - self.left
 
     @property
     def _best_low(self) -> float:
@@ -164,10 +165,14 @@ Optimizer = Callable[[Record], None]
 def ours_with(**settings: Any) -> Optimizer:
     def search(record: Record) -> None:
         optimizer = schema.Optimizer(evaluations=record.evaluations, seed=record.seed, **settings)
-        run_search(
-            PointSearch(record.start, optimizer, record.seen, record.problem.domain),
-            lambda point: lambda: record.ask_geometry_first(point, optimizer.first_replicas),
-        )
+        points = PointSearch(record.start, optimizer, record.seen, record.problem.domain)
+        running: deque[np.ndarray] = deque()
+        while (point := points.ask()) is not None or running:
+            if point is not None:
+                running.append(point)
+                continue
+            told = record.ask_geometry_first(running.popleft(), optimizer.first_replicas)
+            points.tell(*told)
 
     return search
 

@@ -22,9 +22,9 @@ import numpy as np
 
 from benchmarks.table import print_table, write_csv
 from chamberopt.common.executor import local_executor
-from chamberopt.search import run_study
+from chamberopt.search import ask_and_tell, run_study
 from chamberopt.search.optimiser.domain import Domain
-from chamberopt.search.optimiser.point_search import PointSearch, Scored
+from chamberopt.search.optimiser.point_search import PointSearch
 from chamberopt.search.study import load_study
 from chamberopt.search.study.schema import Optimizer
 from chamberopt.search.study_folder import open_study_folder
@@ -47,7 +47,7 @@ class OptunaSearch:
         self._start, self._left, self._most = start, settings.evaluations, 4 * settings.evaluations
         self.points: list[np.ndarray] = []
         self.scores: list[float] = []
-        self.phases = ["optuna"]
+        self.phases, self.spent = ["optuna"], 0.0
 
     def ask(self) -> np.ndarray | None:
         running = len(self.points) > len(self.scores)
@@ -58,10 +58,11 @@ class OptunaSearch:
         self.points.append(np.round(point, 4) if self.points else self._start)
         return self.points[-1]
 
-    def tell(self, _: np.ndarray, scored: Scored) -> None:
-        self._study.tell(self._trial, scored.score)
-        self.scores.append(scored.score)
-        self._left -= scored.cost
+    def tell(self, score: float, cost: float) -> None:
+        self._study.tell(self._trial, score)
+        self.scores.append(score)
+        self._left -= cost
+        self.spent += cost
 
 
 def confirmed(file: Path, seed: int, evaluations: int | None, search: Any) -> dict[str, Any]:
@@ -78,7 +79,7 @@ def confirmed(file: Path, seed: int, evaluations: int | None, search: Any) -> di
     with (
         tempfile.TemporaryDirectory() as folder,
         local_executor(None) as executor,
-        patch.object(run_study, "PointSearch", search),
+        patch.object(ask_and_tell, "PointSearch", search),
         open_study_folder(study, Path(folder) / "study") as opened,
     ):
         result = run_study.run_study(study, opened, executor)

@@ -6,9 +6,18 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from chamberopt.api import Design, Study, load_design, load_study, optimise, show, simulate
+    from chamberopt.api import (
+        Design,
+        Search,
+        Study,
+        load_design,
+        load_study,
+        optimise,
+        show,
+        simulate,
+    )
 
-__all__ = ["Design", "Study", "load_design", "load_study", "optimise", "show", "simulate"]
+__all__ = ["Design", "Search", "Study", "load_design", "load_study", "optimise", "show", "simulate"]
 
 
 def __getattr__(name: str) -> Any:

@@ -8,6 +8,8 @@
     result.notes                               # what to know before trusting it
     chamberopt.show(result, "more-shot.png")
 
+A laboratory that measures instead of simulating asks a Search and tells it figures: docs/search.md.
+
 Coverage is in the result's coverage.vtp, a mesh that suits it, and in part.vtp as means over the
 part's own triangles; pyvista and ParaView read both.
 """
@@ -22,13 +24,14 @@ from typing import TYPE_CHECKING
 from chamberopt.common.errors import InputError
 from chamberopt.design.design import Design
 from chamberopt.design.load import load_design
+from chamberopt.search.ask_and_tell import Search
 from chamberopt.search.study import Study, load_study
 
 if TYPE_CHECKING:
     from chamberopt.common.progress import Progress
     from chamberopt.results.load import Result
 
-__all__ = ["Design", "Study", "load_design", "load_study", "optimise", "show", "simulate"]
+__all__ = ["Design", "Search", "Study", "load_design", "load_study", "optimise", "show", "simulate"]
 
 
 def simulate(

@@ -37,7 +37,7 @@ ORDER = {
     "chamberopt/peening": "strip+calibration_errors kirk_fit+strip_holder responses tolerances "
     "measured probes virtual_strip posterior setups calibrate next_measurement",
     "chamberopt/search": "study+optimiser trial_log study_folder "
-    "sensitivity+evaluate_candidate candidates run_study pareto+run_sweep",
+    "sensitivity+observe+candidate judge ask_and_tell run_study pareto+run_sweep",
     "chamberopt/results": (
         "vtp_files records load chamber_file write rebuild flight+impacts compare command_records"
     ),

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import threading
 import time
-from concurrent.futures import Executor
+from collections import deque
+from collections.abc import Callable
+from concurrent.futures import Executor, Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,20 +14,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from chamberopt.chamber.scene import chamber_mesh
-from chamberopt.common.errors import InputError
+from chamberopt.common.errors import InputError, WorkerLostError
 from chamberopt.common.estimate import Estimate, estimate, paired_difference
 from chamberopt.common.files import write_text
 from chamberopt.common.progress import Progress
 from chamberopt.design.load import save_design
 from chamberopt.peening.calibration_errors import evaluate_calibrated
-from chamberopt.search.candidates import Candidates, ConfirmedCandidate, Stop
-from chamberopt.search.evaluate_candidate import Simulator
+from chamberopt.search.ask_and_tell import Search
+from chamberopt.search.candidate import Candidate, CandidateEvaluator, ConfirmedCandidate, Simulator
 from chamberopt.search.optimiser.gaussian_process import one_thread
-from chamberopt.search.optimiser.point_search import PARETO_PHASES, PointSearch, run_search
 from chamberopt.search.sensitivity import Sensitivity, analyse_sensitivity
 from chamberopt.search.study.constraints import NOT_KNOWN
 from chamberopt.search.study_folder import STUDY, StudyFolder
-from chamberopt.search.trial_log import HISTORY, Trial
+from chamberopt.search.trial_log import Trial
 from chamberopt.simulation.evaluate import ReplicaPlan, evaluate, prepare_target
 from chamberopt.simulation.evaluation import Evaluation
 from chamberopt.simulation.replicas import ReplicaSet
@@ -35,6 +36,9 @@ if TYPE_CHECKING:
     from chamberopt.design.design import Design
     from chamberopt.search.study import Study
 
+Outcome = Evaluation | InputError
+Stop = Callable[[], bool]
+"""Returns True when the user wants to stop the study."""
 
 TOLERANCES = (
     "what the [tolerances] do to the best design: chamberopt simulate best.toml --tolerances"
@@ -134,52 +138,75 @@ def run_study(
     folder.begin()
     save_inputs(study, folder.path)
     target = fixed_target(study)
-    simulator = simulator or ChamberSimulator(study, executor, target)
-    settings = study.optimizer
-    if study.objective.pareto and settings.algorithm == "auto" and not settings.phases:
-        settings = settings.model_copy(update={"phases": PARETO_PHASES})
-    # The model's threads are limited during all evaluations: a limit is one of the whole process.
-    with one_thread(), Candidates(study, folder, simulator, progress, stop, at_once) as candidates:
-        space = candidates.space
-        first = [space.domain.snap(space.point_of(one)[None])[0] for one in study.begin_with]
-        points = PointSearch(space.start, settings, candidates.observations, space.domain, first)
-        run_search(points, candidates.begin)
-        confirmed = candidates.confirm()
-    folder.recorded.require_end(len(candidates.trials))
-    if not confirmed or confirmed[0].searched != 0:
-        reason = next(one.reason for one in candidates.trials if one.stage == "confirm")
-        text = "the start could not be simulated with the seeds of the confirmation"
-        raise InputError(f"{text}: {reason}")
-    start = confirmed[0]
-    unknown = [one for one in confirmed if one.feasibility == NOT_KNOWN]
-    winners = [one for one in confirmed if one.feasible] or unknown
-    if not winners:
-        raise InputError(
-            f"constraints: no candidate meets them (the start: {start.reason}); loosen them, "
-            "widen [vary] or raise optimizer.evaluations; every evaluation is in "
-            f"{folder.path / HISTORY}"
-        )
-    best = max(winners, key=lambda one: one.goals[0].value - one.lost_to_tolerances)
+    evaluator = CandidateEvaluator(study, simulator or ChamberSimulator(study, executor, target))
+    search = Search(study, folder, progress, has_promise=evaluator.has_promise)
+    # With fewer threads than a batch has candidates, some of them wait: figures are the same.
+    batch = study.optimizer.batch
+    threads = ThreadPoolExecutor(min(batch, at_once or batch), "candidate")
+    try:
+        # The model's threads are limited during all evaluations: a limit is of the whole process.
+        with one_thread():
+            run_search(search, lambda one: threads.submit(evaluator.evaluate, one), stop)
+    finally:  # after an error those that run are not waited for
+        threads.shutdown(wait=False, cancel_futures=True)
+    folder.recorded.require_end(len(search.trials))
+    best, start, model = search.best, search.confirmed[0], search.objective_model
     is_gain = best is not start
     gain = paired_difference(best.goals[0], start.goals[0]) if is_gain else Estimate(0.0, 0.0)
     if is_gain and not (best.goals[0].has_number and start.goals[0].has_number):
         gain = gain.not_known(NOT_KNOWN)
-    model = candidates.objective_model
-    noise = estimate(best.evaluation.objective.pseudovalues).half_width
-    sensitivity = analyse_sensitivity(model, space, best.parameters, noise) if model else None
+    noise, values = estimate(best.goals[0].pseudovalues).half_width, best.parameters
     return StudyResult(
         study=study,
         folder=folder.path,
-        algorithm=", then ".join(points.phases),
-        trials=tuple(candidates.trials),
+        algorithm=search.phases,
+        trials=tuple(search.trials),
         start=start,
-        confirmed=tuple(confirmed),
+        confirmed=search.confirmed,
         best=best,
         gain=gain,
         seconds=folder.seconds,
         target=target,
-        sensitivity=sensitivity,
+        sensitivity=analyse_sensitivity(model, search.space, values, noise) if model else None,
     )
+
+
+def run_search(
+    search: Search, submit: Callable[[Candidate], Future[Outcome]], stop: Stop | None = None
+) -> None:
+    """Ask, evaluate and tell until a search ends.
+
+    Args:
+        submit: begins an evaluation.
+        stop: as of run_study; the evaluations that run are finished and told first.
+    """
+    running: deque[tuple[Candidate, Future[Outcome]]] = deque()
+    try:
+        while (candidate := search.ask()) is not None or running:
+            if candidate is None:
+                search.tell(running[0][0], _outcome(*running[0]))
+                running.popleft()
+            elif stop and stop():
+                for one in running:
+                    search.tell(one[0], _outcome(*one))
+                raise KeyboardInterrupt
+            else:
+                running.append((candidate, submit(candidate)))
+    finally:
+        for _, evaluation in running:
+            evaluation.cancel()
+
+
+def _outcome(candidate: Candidate, evaluation: Future[Outcome]) -> Outcome:
+    # A signal that another thread was given wakes nobody who waits without end.
+    while not evaluation.done():
+        wait([evaluation], timeout=0.2)
+    try:
+        return evaluation.result()
+    except WorkerLostError as error:
+        if candidate.stage == "sweep":  # a row with this reason
+            return InputError(str(error))
+        raise
 
 
 def tolerance_notes(lost: float, which: str = "mean") -> list[str]:

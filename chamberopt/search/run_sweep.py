@@ -1,36 +1,40 @@
 """Run a sweep: evaluate candidates on a grid, or spread evenly, over the bounds of a study.
 
-Each candidate is one task: a worker builds its chamber, simulates its replicas and returns a row
-of figures.
+Each candidate is one task: a worker builds its chamber, simulates its replicas and returns the
+figures.
 """
 
 from __future__ import annotations
 
 import math
-import time
 import warnings
-from collections.abc import Iterator
-from concurrent.futures import Executor
-from dataclasses import dataclass
+from concurrent.futures import Executor, Future
+from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from chamberopt.common.errors import InputError, WorkerLostError
+from chamberopt.common.errors import InputError
 from chamberopt.common.executor import SerialExecutor, share
 from chamberopt.common.progress import Progress
 from chamberopt.design.design import SHAPE
-from chamberopt.search.evaluate_candidate import CandidateEvaluator, Simulator
-from chamberopt.search.run_study import ChamberSimulator, fixed_target, save_inputs
+from chamberopt.search.ask_and_tell import Search
+from chamberopt.search.candidate import Candidate, CandidateEvaluator, Simulator
+from chamberopt.search.run_study import (
+    ChamberSimulator,
+    Outcome,
+    fixed_target,
+    run_search,
+    save_inputs,
+)
 from chamberopt.search.study.parameters import ParameterSpace
 from chamberopt.search.trial_log import HISTORY, Trial
 
 if TYPE_CHECKING:
     from chamberopt.search.study import Study
     from chamberopt.search.study_folder import StudyFolder
-    from chamberopt.simulation.evaluation import Evaluation
 
 MAX_CANDIDATES = 100_000
 
@@ -146,48 +150,21 @@ def run_sweep(
     """
     folder.begin()
     save_inputs(study, folder.path)
-    trials: list[Trial] = []
-    for number, point in enumerate(plan.points):
-        recorded = folder.recorded.find(number, "sweep", point.tolist())
-        if recorded is None:
-            break
-        trials.append(recorded)
-    best = max((one.score for one in trials if one.feasible), default=-np.inf)
-    for trial, seconds in _evaluate_from(study, plan, len(trials), executor, simulator):
-        folder.append(trial, None, seconds)
-        trials.append(trial)
-        best = max(best, trial.score) if trial.feasible else best
-        if progress:
-            progress(len(trials), len(plan.points), best if best > -np.inf else None)
+    search = Search(study, folder, progress, plan.points)
+    target = share(executor, fixed_target(study) if simulator is None else None)
+
+    def submit(one: Candidate) -> Future[Outcome]:
+        return executor.submit(evaluate_point, study, one.number, one.point, target, simulator)
+
+    run_search(search, submit)
+    trials = tuple(search.trials)
     if all(trial.objective is None for trial in trials):
         raise InputError(
             "no candidate of the sweep could be simulated, the first because: "
             f"{trials[0].reason}; change [vary] or the design; every candidate is in "
             f"{folder.path / HISTORY}"
         )
-    return SweepResult(study, plan, folder.path, tuple(trials), folder.seconds)
-
-
-def _evaluate_from(
-    study: Study, plan: SweepPlan, first: int, executor: Executor, simulator: Simulator | None
-) -> Iterator[tuple[Trial, float]]:
-    """The trials from number `first` on, in the order of the plan, and the seconds of each.
-
-    All tasks are submitted at once, so that no worker waits for another.
-    """
-    target = share(executor, fixed_target(study) if simulator is None else None)
-    tasks = list(enumerate(plan.points))[first:]
-    futures = [executor.submit(evaluate_point, study, *one, target, simulator) for one in tasks]
-    try:
-        for task, future in zip(tasks, futures, strict=True):
-            try:
-                yield future.result()
-            except WorkerLostError as error:  # a row with this reason
-                lost = _failing_simulator(str(error))
-                yield evaluate_point(study, *task, None, lost)[0], 0.0
-    finally:
-        for future in futures:
-            future.cancel()
+    return SweepResult(study, plan, folder.path, trials, folder.seconds)
 
 
 def evaluate_point(
@@ -196,21 +173,14 @@ def evaluate_point(
     point: np.ndarray,
     target: np.ndarray | None = None,
     simulator: Simulator | None = None,
-) -> tuple[Trial, float]:
-    """Evaluate one candidate on one worker; the trial, and its wall-clock time [s]."""
-    began = time.perf_counter()
-    simulator = simulator or ChamberSimulator(study, SerialExecutor(), target)
-    evaluator = CandidateEvaluator(study, simulator)
-    evaluation = evaluator.evaluate(number, point, "sweep")
-    trial = evaluator.trial(number, point, "sweep", evaluation)
-    return trial, time.perf_counter() - began
-
-
-def _failing_simulator(reason: str) -> Simulator:
-    def fail(*_: object) -> Evaluation:
-        raise InputError(reason)
-
-    return fail
+) -> Outcome:
+    """Evaluate one candidate on one worker; its impacts, or an error's own class, stay there."""
+    evaluator = CandidateEvaluator(
+        study, simulator or ChamberSimulator(study, SerialExecutor(), target)
+    )
+    space = ParameterSpace(study.design, study.vary)
+    found = evaluator.evaluate(Candidate(number, "sweep", point, space))
+    return InputError(str(found)) if isinstance(found, InputError) else replace(found, hits=())
 
 
 def _require_few(count: int, what: str) -> None:

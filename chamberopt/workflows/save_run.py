@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
     from chamberopt.design.load import Design
     from chamberopt.peening.tolerances import ToleranceResult
-    from chamberopt.search.candidates import ConfirmedCandidate
+    from chamberopt.search.candidate import ConfirmedCandidate
     from chamberopt.search.run_study import StudyResult
     from chamberopt.search.run_sweep import SweepResult
     from chamberopt.simulation.effect_pilot import Advice

@@ -36,14 +36,13 @@ class NloptThread:
             run: the arguments of run_nlopt after the function, whose errors are raised.
         """
         self._told.put(run)
-        while isinstance(asked := self._asked.get(), np.ndarray):
-            try:
-                score = yield asked
-            except GeneratorExit:
-                self._told.put(None)
-                self._asked.get()
-                raise
-            self._told.put(score)
+        try:
+            while isinstance(asked := self._asked.get(), np.ndarray):
+                self._told.put((yield asked))
+        except GeneratorExit:
+            self._told.put(None)
+            self._asked.get()
+            raise
         if asked is not None:
             raise asked
 
@@ -60,10 +59,10 @@ class NloptThread:
 
     def _score(self, point: np.ndarray) -> float:
         self._asked.put(point)
-        score = self._told.get()
+        score: float | None = self._told.get()
         if score is None:
             raise InterruptedError("nobody waits for this run any more")
-        return float(score)
+        return score
 
 
 def run_nlopt(

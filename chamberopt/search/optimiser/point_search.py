@@ -9,7 +9,7 @@ A search ends for one of these reasons:
 2. All points were evaluated, where every parameter has levels.
 3. It has converged: the last phase ends because the steps of its local algorithm are below
    `optimizer.tolerance` (nlopt_search.py), or rounds of local searches find no new point.
-4. The user stops it: `run_search` asks `stop()` before each evaluation, finishes those that run and
+4. The user stops it: run_study.py asks `stop()` before each evaluation, finishes those that run and
    raises KeyboardInterrupt. The study can be resumed.
 5. An error ends it: the start cannot be simulated, an algorithm cannot take the parameters, the
    disk is full, or workers are lost. A candidate that cannot be simulated does not end it.
@@ -20,10 +20,8 @@ A phase ends in the same way, at its share of the budget.
 from __future__ import annotations
 
 import math
-from collections import deque
 from collections.abc import Callable, Generator, Sequence
 from contextlib import closing, suppress
-from typing import Any, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 
@@ -52,59 +50,12 @@ ROUNDING = 1e-9  # of a sum of costs
 
 Observe = Callable[[], Observations]
 """Returns what the model learns from the first points, those with scores."""
-Question = TypeVar("Question")
-Answer = TypeVar("Answer", contravariant=True)
 Wait = Generator[np.ndarray | None, None, None]
 """Yields points to evaluate, and None where it needs one more score first."""
 
 
-class Scored(NamedTuple):
-    """A score, a finite number to be maximised, and its cost: 1 for a whole evaluation, or less."""
-
-    score: float
-    cost: float = 1.0
-
-
 class BudgetSpentError(Exception):
     """Ends a phase, or the search, from inside an algorithm."""
-
-
-class AskAndTell(Protocol[Question, Answer]):
-    """A search that proposes questions, and takes their answers in the same order."""
-
-    def ask(self) -> Question | None:
-        """The next question; None if answers are missing, or at the end."""
-
-    def tell(self, asked: Question, answer: Answer, /) -> Any:
-        """Take the answer of the first question that has none."""
-
-
-def run_search(
-    search: AskAndTell[Question, Answer],
-    begin: Callable[[Question], Callable[[], Answer]],
-    stop: Callable[[], bool] = lambda: False,
-) -> None:
-    """Ask, evaluate and tell until the search ends.
-
-    Args:
-        begin: starts an evaluation, and returns a function that waits for its answer.
-        stop: whether to stop, asked before each evaluation. Those that run are then finished and
-            told, and KeyboardInterrupt is raised.
-    """
-    running: deque[tuple[Question, Callable[[], Answer]]] = deque()
-    stopped = False
-    while True:
-        question = None if stopped else search.ask()
-        stopped = stopped or (question is not None and stop())
-        if question is not None and not stopped:
-            running.append((question, begin(question)))
-        elif running:
-            asked, wait = running.popleft()
-            search.tell(asked, wait())
-        elif stopped:
-            raise KeyboardInterrupt
-        else:
-            return
 
 
 class PointSearch:
@@ -149,10 +100,19 @@ class PointSearch:
         """
         return next(self._steps, None)
 
-    def tell(self, _: np.ndarray, scored: Scored) -> None:
-        """Take the score of the first point that has none."""
-        self.scores.append(scored.score)
-        self._costs.append(scored.cost)
+    def tell(self, score: float, cost: float = 1.0) -> None:
+        """Take the score of the first point that has none, a finite number to be maximised.
+
+        Args:
+            cost: 1 for a whole evaluation, or less.
+        """
+        self.scores.append(score)
+        self._costs.append(cost)
+
+    @property
+    def spent(self) -> float:
+        """Cost of all points with scores."""
+        return sum(self._costs)
 
     def _search(self, first: Sequence[np.ndarray]) -> Wait:
         settings = self._settings

@@ -16,7 +16,7 @@ from chamberopt.coverage.coverage_intervals import NOT_RESOLVED
 from chamberopt.coverage.metrics import metric_names
 from chamberopt.design.load import load_design
 from chamberopt.results.load import load_result
-from chamberopt.search.evaluate_candidate import FAILURE_PENALTY
+from chamberopt.search.judge import FAILURE_PENALTY
 from chamberopt.search.run_study import fixed_target, tolerance_notes
 from chamberopt.search.study import Limits, Study, load_study
 from chamberopt.search.trial_log import read_trials, trials_as_csv

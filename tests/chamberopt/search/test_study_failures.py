@@ -23,7 +23,7 @@ from chamberopt.cli import main
 from chamberopt.cli.interrupt import EARLY, FIRST, SECOND
 from chamberopt.common.estimate import Estimate
 from chamberopt.results.load import load_result
-from chamberopt.search.evaluate_candidate import FAILURE_PENALTY
+from chamberopt.search.judge import FAILURE_PENALTY
 from chamberopt.search.study import load_study
 from tests.helpers.results.resumable_study import calls, history, logged, run, study
 from tests.helpers.synthetic import DESIGNS, plate_design, poisson_evaluation

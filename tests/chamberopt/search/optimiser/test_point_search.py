@@ -1,5 +1,6 @@
 """The phases of a search keep their budget, improve on the start and are reproducible."""
 
+from collections import deque
 from collections.abc import Callable
 
 import numpy as np
@@ -7,22 +8,26 @@ import pytest
 
 from chamberopt.common.errors import InputError
 from chamberopt.search.optimiser.domain import Axis, Domain
-from chamberopt.search.optimiser.point_search import PointSearch, Scored, run_search
+from chamberopt.search.optimiser.point_search import PointSearch
 from chamberopt.search.study.schema import Optimizer
 from tests.helpers.known_optima import PEAK, bowl, hill
 
-Begin = Callable[[np.ndarray], Callable[[], Scored]]
+Begin = Callable[[np.ndarray], Callable[[], tuple[float, ...]]]
 
 
 def one_by_one(score: Callable[[np.ndarray], float]) -> Begin:
     """Evaluations that run when their scores are waited for."""
-    return lambda point: lambda: Scored(score(point))
+    return lambda point: lambda: (score(point),)
 
 
 def maximise(begin: Begin, *search, **more) -> list[str]:
     """Search to the end; the phases that ran."""
-    points = PointSearch(*search, **more)
-    run_search(points, begin)
+    points, running = PointSearch(*search, **more), deque()
+    while (point := points.ask()) is not None or running:
+        if point is None:
+            points.tell(*running.popleft()())
+        else:
+            running.append(begin(point))
     assert len(points.points) == len(points.scores)
     return points.phases
 
@@ -97,15 +102,15 @@ def test_a_batch_is_proposed_before_the_others_have_scores() -> None:
     points: list[np.ndarray] = []
     scored: list[int] = []
 
-    def begin(point: np.ndarray) -> Callable[[], Scored]:
+    def begin(point: np.ndarray) -> Callable[[], tuple[float, ...]]:
         number = len(points)
         assert number - len(scored) <= 2
         points.append(point)
 
-        def wait() -> Scored:
+        def wait() -> tuple[float, ...]:
             assert number == len(scored)
             scored.append(number)
-            return Scored(hill(point))
+            return (hill(point),)
 
         return wait
 
@@ -120,15 +125,15 @@ def test_what_cannot_be_simulated_costs_nothing() -> None:
     """Half of the cube cannot be simulated: there are as many evaluations as without it."""
     simulated: list[bool] = []
 
-    def begin(point: np.ndarray) -> Callable[[], Scored]:
+    def begin(point: np.ndarray) -> Callable[[], tuple[float, ...]]:
         simulated.append(bool(point[0] < 0.5))
-        return lambda: Scored(hill(point) if point[0] < 0.5 else -1.0, float(point[0] < 0.5))
+        return lambda: (hill(point) if point[0] < 0.5 else -1.0, float(point[0] < 0.5))
 
     maximise(begin, np.full(3, 0.4), Optimizer(evaluations=20))
     assert sum(simulated) == 20
     assert 0 < simulated.count(False) <= 20
     simulated.clear()
-    maximise(lambda x: lambda: Scored(hill(x), float(bool(simulated.append(False)))),
+    maximise(lambda x: lambda: (hill(x), float(bool(simulated.append(False)))),
              np.full(3, 0.4), Optimizer(evaluations=6))  # fmt: skip
     assert len(simulated) == 12  # nowhere: it ends
 
@@ -137,10 +142,10 @@ def test_what_costs_a_part_of_an_evaluation_leaves_room_for_others() -> None:
     """The sum of the costs is the budget, but for less than one evaluation."""
     costs: list[float] = []
 
-    def begin(point: np.ndarray) -> Callable[[], Scored]:
+    def begin(point: np.ndarray) -> Callable[[], tuple[float, ...]]:
         costs.append(1.0 if len(costs) % 3 == 0 else 0.4)
         cost = costs[-1]
-        return lambda: Scored(hill(point), cost)
+        return lambda: (hill(point), cost)
 
     maximise(begin, np.full(3, 0.4), Optimizer(evaluations=20))
     assert 19.0 < sum(costs) <= 20.0

@@ -1,0 +1,420 @@
+"""A search as questions and answers: it asks for candidates, and is told their figures.
+
+    search = Search(study)
+    while (candidate := search.ask()) is not None:
+        search.tell(candidate, measure(candidate.design))
+    search.best.parameters
+
+The figures may come from a simulation or from experiments. First come the candidates of the search,
+then the best of them again, to be confirmed. A sweep asks for a list of candidates.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from chamberopt.common.errors import InputError, UnreadableError
+from chamberopt.common.estimate import Estimate
+from chamberopt.common.progress import Progress
+from chamberopt.search.candidate import (
+    Candidate,
+    ConfirmedCandidate,
+    Figures,
+    close_to_best,
+    simulated_figures,
+)
+from chamberopt.search.judge import Judge
+from chamberopt.search.observe import FIRST_OBJECTIVE, observe
+from chamberopt.search.optimiser.acquisition import recommend_points
+from chamberopt.search.optimiser.point_search import PARETO_PHASES, PointSearch
+from chamberopt.search.optimiser.scalarisation import draw_weights
+from chamberopt.search.optimiser.search_model import Observations, SearchModel
+from chamberopt.search.study.constraints import NOT_KNOWN, assess_feasibility
+from chamberopt.search.study.parameters import ParameterSpace
+from chamberopt.search.trial_log import HISTORY, Trial
+from chamberopt.simulation.evaluation import Evaluation
+
+if TYPE_CHECKING:
+    from chamberopt.search.study import Study
+    from chamberopt.search.study_folder import StudyFolder
+
+# Candidates nearer to each other than this share of the bounds count as one in the confirmation.
+MIN_DISTANCE = 0.02
+# With fewer points for each parameter the length scales of a model are not determined.
+POINTS_PER_PARAMETER = 4
+
+Answer = Evaluation | Mapping[str, Estimate | float] | InputError | str
+"""The evaluation of a simulation, measured figures by their names, or why there are none."""
+Place = tuple[int | None, np.ndarray]
+"""The number of a trial in the search, or None, and its point (d,)."""
+
+
+@dataclass
+class _Asked:
+    """A candidate that was asked for and is not on the list of trials yet."""
+
+    candidate: Candidate
+    began: float  # by the clock [s]
+    recorded: Trial | None = None
+    # What is known without an evaluation: its answer on record, or why there cannot be one.
+    answer: Figures | InputError | None = None
+
+
+class Search:
+    """A study that asks for candidates and is told their figures.
+
+    Up to `optimizer.batch` candidates may be out at a time. They are told in the order in which
+    they were asked for, and what is asked next follows from what was told, so that nothing depends
+    on speed. `trials` are all that were told, `confirmed` those of the confirmation.
+
+    Args:
+        folder: where trials are recorded; those on record are not asked for again. By default
+            nothing is recorded.
+        progress: called after each trial.
+        points: the candidates of a sweep, shape (n, d), instead of a search.
+        has_promise: whether a candidate that was never evaluated is worth a confirmation.
+    """
+
+    def __init__(
+        self,
+        study: Study,
+        folder: StudyFolder | None = None,
+        progress: Progress | None = None,
+        points: np.ndarray | None = None,
+        has_promise: Callable[[Candidate], bool] | None = None,
+    ) -> None:
+        self._study, self._folder, self._progress = study, folder, progress
+        self._has_promise = has_promise or (lambda one: _why_impossible(one) is None)
+        self._judge = Judge(study)
+        counts_worst = study.objective.over_tolerances == "worst"
+        self.space = ParameterSpace(study.design, study.vary, counts_worst)
+        self.trials: list[Trial] = []
+        self.confirmed: tuple[ConfirmedCandidate, ...] = ()
+        self._asked: deque[_Asked] = deque()
+        self._answers: dict[int, Figures] = {}  # of confirmations, by number
+        self._best: dict[str, float] = {}  # score among the feasible trials of each stage
+        self._last_end = 0.0  # of an evaluation, by the clock
+        settings = study.optimizer
+        if study.objective.pareto and settings.algorithm == "auto" and not settings.phases:
+            settings = settings.model_copy(update={"phases": PARETO_PHASES})
+        snap, first = self.space.domain.snap, [self.space.point_of(x) for x in study.begin_with]
+        self._search = PointSearch(
+            self.space.start,
+            settings,
+            self.observations,
+            self.space.domain,
+            [snap(point[None])[0] for point in first],
+        )
+        self._sweep = points
+        self._steps = (
+            self._begin_search()
+            if points is None
+            else (self._candidate("sweep", point) for point in points)
+        )
+
+    def ask(self) -> Candidate | None:
+        """The next candidate; None if those that are out must be told first, or at the end.
+
+        InputError if an algorithm cannot take the study's parameters.
+        """
+        while True:
+            candidate = next(self._steps, None)
+            if candidate is not None:
+                asked = self._with_answer(candidate)
+                self._asked.append(asked)
+                if asked.answer is None:
+                    return candidate
+            elif self._asked and self._asked[0].answer is not None:
+                self._take(self._asked[0].answer)
+            else:
+                return None
+
+    def tell(self, candidate: Candidate, answer: Answer) -> Trial:
+        """Take the figures of the candidate that was asked for first; returns its trial.
+
+        Args:
+            answer: measured figures have those of `figures` at least; plain numbers are exact.
+        Raises:
+            InputError: it is not this candidate's turn, a figure is missing or not finite, or the
+                start has none.
+        """
+        self._require_turn(candidate)
+        given = self._read(answer)
+        if candidate.is_start and isinstance(given, InputError):
+            text = f"tell: the design as it is has no figures ({given}), which all others are"
+            raise InputError(f"{text} compared with; change the design")
+        while self._asked[0].answer is not None:
+            self._take(self._asked[0].answer)
+        return self._take(given)
+
+    @property
+    def figures(self) -> tuple[str, ...]:
+        """The names of the figures to tell: objectives, and metrics with limits."""
+        return self._judge.names
+
+    @property
+    def phases(self) -> str:
+        """The phases of the search that ran, e.g. "sobol, then surrogate"."""
+        return ", then ".join(self._search.phases)
+
+    @property
+    def best(self) -> ConfirmedCandidate:
+        """The best confirmed candidate that meets the constraints, or may; of the first objective.
+
+        InputError if the search has not ended, the start was not confirmed, or there is none.
+        """
+        start = self.confirmed[0] if self.confirmed else None
+        if start is None or start.searched != 0:
+            reasons = [one.reason for one in self.trials if one.stage == "confirm"]
+            text = "the start could not be simulated with the seeds of the confirmation"
+            raise InputError(f"{text}: {reasons[0]}" if reasons else "best: the search goes on")
+        unknown = [one for one in self.confirmed if one.feasibility == NOT_KNOWN]
+        winners = [one for one in self.confirmed if one.feasible] or unknown
+        if not winners:
+            history = self._folder.path / HISTORY if self._folder else None
+            where = f"; every evaluation is in {history}" if history else ""
+            raise InputError(
+                f"constraints: no candidate meets them (the start: {start.reason}); loosen them, "
+                f"widen [vary] or raise optimizer.evaluations{where}"
+            )
+        return max(winners, key=lambda one: one.goals[0].value - one.lost_to_tolerances)
+
+    def observations(self, weight: np.ndarray | None = None) -> Observations:
+        """What the trials of the search tell a model.
+
+        The weights of two objectives are by default random ones for this step.
+        """
+        if weight is None:
+            weight = draw_weights(self._study.optimizer.seed, len(self._search.points))
+        searched = [trial for trial in self.trials if trial.stage == "search"]
+        return observe(searched, self._study.all_constraints, weight)
+
+    @cached_property
+    def objective_model(self) -> SearchModel | None:
+        """A model of the first objective when the search has ended, with all that bounds it.
+
+        None with too few points.
+        """
+        return self._model(FIRST_OBJECTIVE, learns_bounds=True)
+
+    def _model(self, weight: np.ndarray, learns_bounds: bool = False) -> SearchModel | None:
+        """A model of the whole search; None if there are too few points."""
+        seen = self.observations(weight)
+        scores = seen.scores[seen.simulated]
+        if len(scores) < POINTS_PER_PARAMETER * len(self.space.names) or np.ptp(scores) == 0.0:
+            return None
+        points = np.array(self._search.points)
+        return SearchModel(self.space.domain, points, seen, learns_bounds=learns_bounds)
+
+    # Questions. None where the candidates that are out must be told first.
+
+    def _candidate(
+        self, stage: str, point: np.ndarray, replicas: int | None = None, bar: float | None = None
+    ) -> Candidate:
+        number = len(self.trials) + len(self._asked)
+        return Candidate(number, stage, point, self.space, replicas, bar)
+
+    def _begin_search(self) -> Iterator[Candidate | None]:
+        while (point := self._search.ask()) is not None or self._asked:
+            if point is None:
+                yield None
+            else:
+                bar = self._best_low if self.trials else None
+                yield self._candidate("search", point, bar=bar)
+        yield from self._confirm()
+
+    @property
+    def _best_low(self) -> float:
+        """The highest lower end of the objective's intervals so far."""
+        lows = (t.objective.low for t in self.trials if t.feasible and t.objective)
+        return max(lows, default=-np.inf)
+
+    def _confirm(self) -> Iterator[Candidate | None]:
+        """Ask for the start and the best candidates with new seeds and the design's own accuracy.
+
+        They get more replicas than in the search, unless the design asks for an accuracy, which
+        then sets the number. While the best cannot be told from the next, and the study has rounds
+        left, these and the start get twice the replicas. Failures are left out.
+        """
+        settings = self._study.optimizer
+        asks_for_accuracy = self._study.design.process.accuracy.objective_half_width is not None
+        replicas = None if asks_for_accuracy else settings.confirm_replicas
+        places = self._promising(settings.confirm)
+        confirmed: dict[int, ConfirmedCandidate] = {}  # by position in places
+        again = list(range(len(places)))
+        for _ in range(settings.confirm_rounds):
+            begun = []
+            for i in again:
+                while len(self._asked) >= settings.batch:
+                    yield None
+                begun.append(self._candidate("confirm", places[i][1], replicas))
+                yield begun[-1]
+            while self._asked:
+                yield None
+            for i, candidate in zip(again, begun, strict=True):
+                if (one := self._confirmed(places[i][0], candidate)) is not None:
+                    confirmed[i] = one
+            best = close_to_best(list(confirmed.values())) if replicas else []
+            again = [i for i, one in confirmed.items() if i == 0 or any(one is x for x in best)]
+            replicas = 2 * (replicas or 0)
+            if not best:
+                break
+        self.confirmed = tuple(confirmed.values())
+
+    def _confirmed(self, searched: int | None, candidate: Candidate) -> ConfirmedCandidate | None:
+        """The candidate as it was confirmed; None if its evaluation failed."""
+        figures = self._answers.pop(candidate.number, None)
+        if figures is None:
+            return None
+        limited = self._judge.limited(candidate, figures)
+        standing = assess_feasibility(self._study.all_constraints, limited)
+        lost = self._lost_to_tolerances(candidate.point)
+        return ConfirmedCandidate(searched, candidate, figures, *standing, figures.goals, lost)
+
+    def _lost_to_tolerances(self, point: np.ndarray) -> float:
+        model = self.objective_model
+        if model is None or not model.domain.has_misses:
+            return 0.0
+        lost = float(model.score(point[None])[0][0] - model.expected(point[None])[0][0])
+        return max(0.0, lost)  # where the model rises beyond a bound, nobody has looked
+
+    def _promising(self, count: int) -> list[Place]:
+        """The start and up to `count` distinct others, each with its trial number.
+
+        For one objective: the best feasible candidates and the two that the model recommends, of
+        which one was evaluated. For two: what the model recommends for `count` weights, from one
+        end of the front to the other.
+        """
+        points, best_low = self._search.points, self._best_low
+        chosen: list[Place] = [(0, points[0])]
+        numbers = {point.tobytes(): i for i, point in reversed(list(enumerate(points)))}
+        for point in self._wanted(count):
+            number = numbers.get(point.tobytes())
+            is_new = all(np.abs(point - other).max() > MIN_DISTANCE for _, other in chosen)
+            if (
+                len(chosen) <= count
+                and is_new
+                and (
+                    number is not None
+                    or self._has_promise(self._candidate("search", point, bar=best_low))
+                )
+            ):
+                chosen.append((number, point))
+        return chosen
+
+    def _wanted(self, count: int) -> list[np.ndarray]:
+        """The points (d,) to confirm, if they differ, the most promising first."""
+        has_two_objectives = len(self._study.objective.goals) > 1
+        first = (np.arange(count) + 0.5) / count
+        weights = np.stack([first, 1.0 - first], axis=1) if has_two_objectives else FIRST_OBJECTIVE
+        models = [self._model(weight) for weight in np.atleast_2d(weights)]
+        seed, points = self._study.optimizer.seed, self._search.points
+        recommended = [recommend_points(model, seed) for model in models if model is not None]
+        best_first = np.argsort(-np.array(self._search.scores), kind="stable").tolist()
+        seen = [points[i] for i in best_first if self.trials[i].feasible]
+        if has_two_objectives:
+            return [new for _, new in recommended] or seen
+        # The luckiest one first, then what the model recommends, then the next ones.
+        by_model = (one for both in recommended for one in reversed(both))
+        return [*seen[:1], *by_model, *seen[1:]]
+
+    # Answers.
+
+    def _with_answer(self, candidate: Candidate) -> _Asked:
+        """A candidate with its answer, if that is on record or its design is impossible."""
+        asked = _Asked(candidate, time.perf_counter())
+        if self._folder:
+            place = candidate.number, candidate.stage, candidate.point.tolist()
+            asked.recorded = self._folder.recorded.find(*place)
+        if asked.recorded is not None:
+            in_file = candidate.stage == "confirm" and asked.recorded.objective is not None
+            found = self._folder.evaluation(asked.recorded) if self._folder and in_file else None
+            asked.answer = self._read(found or asked.recorded.reason)
+        elif candidate.stage != "sweep" and not candidate.is_start:  # workers make those of a sweep
+            asked.answer = _why_impossible(candidate)
+        return asked
+
+    def _require_turn(self, candidate: Candidate) -> None:
+        """Raise InputError unless the candidate is the first of those that are out."""
+        first = next((one.candidate for one in self._asked if one.answer is None), None)
+        if first is not None and candidate is first:
+            return
+        if getattr(candidate, "space", None) is not self.space:
+            raise InputError(f"tell: given {candidate!r}; give a candidate that ask returned")
+        number = candidate.number + 1
+        if first is None or not any(candidate is one.candidate for one in self._asked):
+            raise InputError(f"tell: candidate {number} was told already")
+        raise InputError(
+            f"tell: candidate {number} comes after {first.number + 1}, which has no figures yet; "
+            "tell in the order of ask"
+        )
+
+    def _read(self, answer: Answer) -> Figures | InputError:
+        if isinstance(answer, Evaluation):
+            return simulated_figures(self._study, answer)
+        if isinstance(answer, Mapping):
+            return self._judge.measured(answer)
+        return InputError(answer) if isinstance(answer, str) else answer
+
+    def _take(self, answer: Figures | InputError) -> Trial:
+        """Put the first candidate that was asked for on the list of trials, with its answer."""
+        asked = self._asked[0]
+        trial = asked.recorded or self._record(asked, answer)
+        self._asked.popleft()
+        self.trials.append(trial)
+        self._learn(asked.candidate, trial, answer)
+        # Trials from the record but the last one are not shown.
+        known = len(self._folder.recorded.trials) if self._folder else 0
+        if self._progress and len(self.trials) >= known:
+            self._progress(len(self.trials), self._expected(), self._best.get(trial.stage))
+        return trial
+
+    def _record(self, asked: _Asked, answer: Figures | InputError) -> Trial:
+        trial = self._judge.trial(asked.candidate, answer)
+        # The clock's seconds of evaluations that run at a time count once.
+        now = time.perf_counter()
+        seconds, self._last_end = now - max(asked.began, self._last_end), now
+        if self._folder:
+            whole = answer.evaluation if isinstance(answer, Figures) else None
+            self._folder.append(trial, whole, seconds)
+        return trial
+
+    def _learn(self, candidate: Candidate, trial: Trial, answer: Figures | InputError) -> None:
+        if candidate.is_start:
+            self._judge.reference = trial.score
+            self._judge.unit = self._judge.unit_of(Figures(trial.goals, trial.metrics))
+        if candidate.stage == "search":
+            self._search.tell(trial.score, self._judge.cost(trial))
+        elif candidate.stage == "confirm" and isinstance(answer, Figures):
+            self._answers[candidate.number] = answer
+        if trial.feasible:
+            self._best[trial.stage] = max(trial.score, self._best.get(trial.stage, -math.inf))
+
+    def _expected(self) -> int:
+        """How many trials there will be, at most: some will cost a part of an evaluation."""
+        if self._sweep is not None:
+            return len(self._sweep)
+        settings, searched = self._study.optimizer, len(self._search.scores)
+        expected = searched + 1 + settings.confirm
+        if self.trials[-1].stage == "search":
+            expected += math.ceil(settings.evaluations - self._search.spent)
+        return max(len(self.trials), expected)
+
+
+def _why_impossible(candidate: Candidate) -> InputError | None:
+    """Why the study's design cannot have a candidate's parameters; None if it can."""
+    try:
+        _ = candidate.design
+    except UnreadableError:
+        raise
+    except InputError as error:
+        return error
+    return None

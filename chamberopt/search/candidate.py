@@ -1,0 +1,225 @@
+"""Candidates: points of a study with their designs, their evaluation, and those confirmed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import BrokenExecutor
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from chamberopt.common.errors import InputError, UnreadableError, WorkerLostError
+from chamberopt.common.estimate import Estimate, paired_difference
+from chamberopt.coverage.metrics import highest_objective, parse_objective
+from chamberopt.search.study.constraints import FEASIBLE, INFEASIBLE, Violation
+from chamberopt.simulation.estimates import weighted_sum
+from chamberopt.simulation.evaluation import Evaluation
+
+if TYPE_CHECKING:
+    from chamberopt.design.design import Design
+    from chamberopt.search.study import Study
+    from chamberopt.search.study.parameters import ParameterSpace
+
+
+# Share of an evaluation with all its replicas that is spent before the first of them ends: chamber,
+# search tree, reach (benchmarks/study_cores.py).
+SET_UP = 0.25
+
+Simulator = Callable[["Design", str, "int | None"], Evaluation]
+"""simulator(design, stream of seeds, number of replicas or None) evaluates one candidate; it raises
+InputError or an error of sim_core for a candidate that cannot be simulated."""
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """A point of a study with its design, to be evaluated once."""
+
+    number: int  # of its trial
+    stage: str  # "search", "sweep", or "confirm" for one with new seeds, or to be measured anew
+    point: np.ndarray  # place in the unit cube, (d,)
+    space: ParameterSpace = field(repr=False)
+    replicas: int | None = None  # that a confirmation gets; by default as the design says
+    # Lower end of the best objective's interval so far: a candidate of a search that is clearly
+    # below it gets only a few replicas.
+    bar: float | None = None
+
+    @cached_property
+    def parameters(self) -> dict[str, float | str]:
+        """Values of what varies, in the units of the file, by dotted name."""
+        return self.space.values_at(self.point)
+
+    @cached_property
+    def design(self) -> Design:
+        """The design to evaluate; InputError if the study's design cannot have the parameters."""
+        return self.space.design_at(self.point)
+
+    @property
+    def is_start(self) -> bool:
+        """Whether this is the first candidate of a search, the design as it is."""
+        return self.number == 0 and self.stage == "search"
+
+
+@dataclass(frozen=True)
+class Figures:
+    """The figures of an evaluated candidate."""
+
+    goals: tuple[Estimate, ...]  # of each objective of the study
+    metrics: Mapping[str, Estimate]
+    # Both None if they were measured.
+    replicas: int | None = None
+    evaluation: Evaluation | None = field(default=None, repr=False)
+
+
+def simulated_figures(study: Study, evaluation: Evaluation) -> Figures:
+    """The figures of a simulated candidate."""
+    metrics, (_, *others) = evaluation.metrics, study.objective.goals
+    more = (weighted_sum(parse_objective(name), metrics) for name in others)
+    return Figures((evaluation.objective, *more), metrics, evaluation.replicas, evaluation)
+
+
+@dataclass(frozen=True)
+class ConfirmedCandidate:
+    """A candidate evaluated again, with new seeds."""
+
+    searched: int | None  # number of its trial in the search; None if the model recommended it
+    candidate: Candidate
+    figures: Figures
+    # FEASIBLE if the whole intervals of the constrained figures are within their limits, INFEASIBLE
+    # if one is outside, else NOT_KNOWN.
+    feasibility: str
+    violations: tuple[Violation, ...]  # of limits, certain or possible
+    goals: tuple[Estimate, ...]  # of each objective of the study
+    # What the design's tolerances cost of the first objective on average, by the search's model;
+    # those of numbers that do not vary are not in it. 0 if there is no model.
+    lost_to_tolerances: float = 0.0
+
+    @property
+    def parameters(self) -> dict[str, float | str]:
+        return self.candidate.parameters
+
+    @property
+    def design(self) -> Design:
+        return self.candidate.design
+
+    @property
+    def evaluation(self) -> Evaluation:
+        """The whole evaluation of a candidate that was simulated."""
+        assert self.figures.evaluation is not None
+        return self.figures.evaluation
+
+    @property
+    def feasible(self) -> bool:
+        return self.feasibility == FEASIBLE
+
+    @property
+    def reason(self) -> str:
+        """The limits that are, or may be, violated, in words."""
+        return "; ".join(one.text for one in self.violations)
+
+
+def close_to_best(confirmed: Sequence[ConfirmedCandidate]) -> list[ConfirmedCandidate]:
+    """The best candidate and those within the noise of it; empty if it stands alone."""
+    feasible = [one for one in confirmed if one.feasibility != INFEASIBLE]
+    if not feasible:
+        return []
+    best = max(feasible, key=lambda one: one.goals[0].value)
+    others = [one for one in feasible if one is not best]
+    close = [one for one in others if paired_difference(best.goals[0], one.goals[0]).low <= 0.0]
+    return [best, *close] if close else []
+
+
+class NoPromiseError(InputError):
+    """A candidate is not worth a simulation: its objective is at most `highest`."""
+
+    def __init__(self, text: str, highest: float) -> None:
+        super().__init__(text)
+        self.highest = highest
+
+
+class CandidateEvaluator:
+    """Evaluates the candidates of a study by a simulator."""
+
+    def __init__(self, study: Study, simulator: Simulator) -> None:
+        self._study, self._simulator = study, simulator
+        self._first_look = study.first_look
+
+    def evaluate(self, candidate: Candidate) -> Evaluation | InputError:
+        """Simulate a candidate; the error with the reason if that is impossible.
+
+        All but confirmations are evaluated at the accuracy and with the seeds of a search. Several
+        threads may call this at a time.
+
+        Raises:
+            InputError or an error of sim_core: the start of a search cannot be simulated.
+            UnreadableError: a file that the design names cannot be read now.
+        """
+        from sim_core import SceneError, SimulationError
+
+        try:
+            evaluation = self._evaluate(candidate)
+            goals = simulated_figures(self._study, evaluation).goals
+            if not all(math.isfinite(goal.value) for goal in goals):
+                raise InputError(f"its objective is {goals[0].value}, not a number to compare")
+        except (InputError, SceneError, SimulationError) as error:
+            if candidate.is_start or isinstance(error, UnreadableError):
+                raise
+            return error if isinstance(error, InputError) else InputError(str(error))
+        except Exception as error:
+            # A fault of the program or the machine, not of the candidate: it is not recorded.
+            values = ", ".join(f"{name} = {one!r}" for name, one in candidate.parameters.items())
+            error.add_note(f"in evaluation {candidate.number + 1} ({candidate.stage}): {values}")
+            raise
+        return evaluation
+
+    def has_promise(self, candidate: Candidate) -> bool:
+        """Whether a candidate can be built and may be above its bar, as far as reach tells."""
+        try:
+            self._require_promise(self._study.at_search_accuracy(candidate.design), candidate.bar)
+        except UnreadableError:
+            raise
+        except InputError:
+            return False
+        return True
+
+    def _evaluate(self, candidate: Candidate) -> Evaluation:
+        if candidate.stage == "confirm":
+            return self._simulate(candidate.design, "confirm", candidate.replicas)
+        design, bar = self._study.at_search_accuracy(candidate.design), candidate.bar
+        self._require_promise(design, bar)
+        if bar is not None and self._first_look is not None:
+            first = self._simulate(design, "search", self._first_look)
+            if first.objective.high < bar:
+                return first
+        return self._simulate(design, "search", candidate.replicas)
+
+    def _require_promise(self, design: Design, bar: float | None) -> None:
+        """Raise NoPromiseError if reach alone shows that a candidate is below the bar."""
+        find_reachable = getattr(self._simulator, "reachable", None)
+        goals = self._study.objective.goals
+        if bar is None or find_reachable is None or len(goals) > 1:
+            return
+        reachable = find_reachable(design)
+        highest = highest_objective(goals[0], reachable)
+        if highest < bar:
+            raise NoPromiseError(
+                f"not simulated: {1.0 - reachable:.1%} of the target is out of reach of the balls, "
+                f"so that the objective is at most {highest:.4g}, and the best's is at least "
+                f"{bar:.4g}",
+                highest,
+            )
+
+    def _simulate(self, design: Design, stream: str, replicas: int | None) -> Evaluation:
+        try:
+            return self._simulator(design, stream, replicas)
+        except WorkerLostError:  # the executor has tried twice already
+            raise
+        except BrokenExecutor:  # the executor may have recovered from a lost worker
+            return self._simulator(design, stream, replicas)
+
+
+def evaluation_cost(replicas: int, all_replicas: int) -> float:
+    """The cost of so many replicas of a candidate, where that of all of them is 1."""
+    return SET_UP + (1.0 - SET_UP) * replicas / all_replicas

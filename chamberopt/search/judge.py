@@ -1,0 +1,121 @@
+"""The judge of a study: from the figures of a candidate to its row of the trial log."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from chamberopt.common.errors import InputError
+from chamberopt.common.estimate import Estimate
+from chamberopt.coverage.metrics import find_metric, parse_objective
+from chamberopt.search.candidate import Candidate, Figures, NoPromiseError, evaluation_cost
+from chamberopt.search.study.constraints import describe_violations, exact, expected_violation
+from chamberopt.search.trial_log import Trial
+
+if TYPE_CHECKING:
+    from chamberopt.search.study import Study
+
+# Score of a candidate that cannot be simulated: this many units of the objective below the start.
+# It is finite, because NLopt's models fail with inf and NaN.
+FAILURE_PENALTY = 2.0
+
+
+class Judge:
+    """The objectives, limits and costs of a study.
+
+    Scores are measured by the start: a search sets `reference` to its score, and `unit` to the size
+    of its objective, see `unit_of`.
+    """
+
+    def __init__(self, study: Study) -> None:
+        self._study, self.reference, self.unit = study, 0.0, 1.0
+        self._replicas = study.at_search_accuracy(study.design).process.accuracy.replicas
+        self._first_look = study.first_look
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The figures that a candidate must have: objectives, and metrics with limits."""
+        limited = (name for name in self._study.all_constraints if find_metric(name))
+        return tuple(dict.fromkeys((*self._study.objective.goals, *limited)))
+
+    def measured(self, told: Mapping[str, Estimate | float]) -> Figures:
+        """The figures of a measured candidate; InputError unless `names` are there and finite."""
+        if missing := [name for name in self.names if name not in told]:
+            raise InputError(f"tell: {missing[0]} is missing; give {', '.join(self.names)}")
+        figures = {name: _finite(name, one) for name, one in told.items()}
+        return Figures(tuple(figures[name] for name in self._study.objective.goals), figures)
+
+    def limited(self, candidate: Candidate, figures: Figures) -> dict[str, Estimate]:
+        """The figures with limits: metrics, and numbers of the design, which are exact."""
+        known = exact(candidate.parameters) | dict(figures.metrics)
+        return {
+            name: known[name] if name in known else Estimate(self._study.design.value(name), 0.0)
+            for name in self._study.all_constraints
+        }
+
+    def cost(self, trial: Trial) -> float:
+        """Cost of a trial of the search, where that of all replicas is 1; 0 if not simulated.
+
+        It follows from the number of replicas, not from a clock, so that it is the same everywhere.
+        """
+        if not trial.goals:
+            return 0.0
+        few = self._first_look
+        return 1.0 if few is None or trial.replicas != few else evaluation_cost(few, self._replicas)
+
+    def trial(self, candidate: Candidate, answer: Figures | InputError) -> Trial:
+        """The row of a candidate, or of the reason why it has no figures."""
+        worst = self.reference - FAILURE_PENALTY * self.unit
+        at = candidate.number, candidate.stage, tuple(candidate.point.tolist())
+        failed = Trial(*at, candidate.parameters, (), {}, 0.0, worst, False, "")
+        if isinstance(answer, InputError):
+            highest = answer.highest if isinstance(answer, NoPromiseError) else None
+            score = worst if highest is None else highest
+            return replace(failed, reason=str(answer), score=score, highest=highest)
+        unit = self.unit_of(answer) if candidate.is_start else self.unit
+        figures, constraints = self.limited(candidate, answer), self._study.all_constraints
+        penalty = sum(expected_violation(figures[k], limits) for k, limits in constraints.items())
+        violations = [
+            text
+            for name, limits in constraints.items()
+            for text in describe_violations(name, figures[name], limits)
+        ]
+        return replace(
+            failed,
+            goals=answer.goals,
+            # Without pseudo-values, which a confirmation has in a file of its own.
+            metrics={
+                name: replace(one, pseudovalues=(), bias=0.0, shared=())
+                for name, one in answer.metrics.items()
+            },
+            penalty=penalty,
+            score=answer.goals[0].value - unit * penalty,
+            feasible=not violations,
+            reason="; ".join(violations),
+            replicas=answer.replicas,
+        )
+
+    def unit_of(self, figures: Figures) -> float:
+        """Size of one unit of the first objective: that of its largest term.
+
+        For a metric between 0 and 1 this is its weight, for another also the size of the metric, or
+        of the objective where the metric was not measured.
+        """
+        sizes = []
+        for name, weight in parse_objective(self._study.objective.goals[0]).terms.items():
+            metric, figure = find_metric(name), figures.metrics.get(name, figures.goals[0])
+            is_share = metric is not None and metric.highest <= 1.0
+            sizes.append(abs(weight) * (1.0 if is_share else abs(figure.value)))
+        return max(sizes) or 1.0
+
+
+def _finite(name: str, given: Estimate | float) -> Estimate:
+    """The estimate of a figure that was told; plain numbers are exact."""
+    if isinstance(given, Estimate):
+        if math.isfinite(given.value) and given.half_width >= 0.0:
+            return given
+    elif isinstance(given, (int, float)) and math.isfinite(given):
+        return Estimate(float(given), 0.0)
+    raise InputError(f"tell: {name}: given {given!r}; give a finite number, or an Estimate of it")

@@ -1,0 +1,94 @@
+"""Observations: what the models of a search learn from its trials."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from chamberopt.common.estimate import CONFIDENCE, Estimate, normal_quantile, student_quantile
+from chamberopt.coverage.coverage_intervals import NOT_RESOLVED
+from chamberopt.search.optimiser.gaussian_process import moderate_variances
+from chamberopt.search.optimiser.scalarisation import scalarise
+from chamberopt.search.optimiser.search_model import LimitedFigure, Observations
+from chamberopt.search.study.constraints import Limits, exact
+
+if TYPE_CHECKING:
+    from chamberopt.search.trial_log import Trial
+
+# A figure counts as at most so many times as far outside its limit as the median candidate is away
+# from it.
+MAX_OUTSIDE = 3.0
+FIRST_OBJECTIVE = np.array([1.0, 0.0])  # weights of two objectives
+
+
+def observe(
+    trials: Sequence[Trial], constraints: Mapping[str, Limits], weight: np.ndarray
+) -> Observations:
+    """What the trials of a search have shown.
+
+    Args:
+        weight: of two objectives, (2,); not looked at where there is one.
+    """
+    simulated = np.array([bool(trial.goals) for trial in trials])
+    spared = np.array([trial.highest is not None for trial in trials])
+    some = next(trial.goals for trial in trials if trial.goals)
+    rows = [trial.goals or some for trial in trials]
+    values = np.array([[goal.value for goal in goals] for goals in rows])
+    variances = np.array([_variances([goals[k] for goals in rows]) for k in range(len(some))]).T
+    score, variance = values[:, 0], variances[:, 0]
+    if len(some) > 1 and weight is not FIRST_OBJECTIVE:
+        score, variance = scalarise(values, variances, weight, simulated)
+    score = np.where(spared, [trial.score for trial in trials], score)
+    # A limited number of the design that does not vary is the same in all trials, and not in them.
+    known = next(trial.metrics.keys() | trial.parameters.keys() for trial in trials if trial.goals)
+    limited = ((name, limits) for name, limits in constraints.items() if name in known)
+    figures = (_limited_figure(name, limits, trials) for name, limits in limited)
+    return Observations(score, variance, simulated, tuple(figures), spared)
+
+
+def _limited_figure(name: str, limits: Limits, trials: Sequence[Trial]) -> LimitedFigure:
+    """A figure of the trials with limits, as a model learns it.
+
+    One that is not resolved tells next to nothing. One far outside, such as a time that stands for
+    never, is brought nearer to its limit: how far outside it is decides nothing, and would bend the
+    model.
+    """
+    figures = [(trial.metrics | exact(trial.parameters)).get(name) for trial in trials]
+    known = np.array([one.value if one else np.nan for one in figures])
+    errors = np.array([_error(one, trial) for one, trial in zip(figures, trials, strict=True)])
+    unresolved = np.array([one is not None and one.in_words == NOT_RESOLVED for one in figures])
+    low = -np.inf if limits.min is None else limits.min
+    high = np.inf if limits.max is None else limits.max
+    outside = np.maximum(np.maximum(low - known, known - high), 0.0)
+    inside = float(np.nanmedian(np.minimum(np.abs(known - low), np.abs(known - high))))
+    far = MAX_OUTSIDE * (inside or 1.0)
+    values = np.clip(known, low - far, high + far)
+    usual = errors[np.isfinite(errors) & (outside < far)]
+    errors = np.where(np.isfinite(errors), errors, usual.max() if len(usual) else 0.0)
+    errors = np.where(unresolved, far, np.minimum(errors, far))
+    return LimitedFigure(np.nan_to_num(values), errors**2, low, high)
+
+
+def _error(figure: Estimate | None, trial: Trial) -> float:
+    """Standard error of a figure, whose pseudo-values the log does not keep."""
+    if figure is None or not math.isfinite(figure.half_width):
+        return math.nan
+    if trial.replicas is None:  # measured, or not varied by chance
+        return figure.half_width / normal_quantile(CONFIDENCE)
+    return figure.half_width / student_quantile(max(1, trial.replicas - 1))
+
+
+def _variances(goals: list[Estimate]) -> np.ndarray:
+    """Squared standard errors (n,) of one objective.
+
+    Those of replicas are drawn towards those of all candidates; without, intervals tell.
+    """
+    samples = [goal.pseudovalues for goal in goals]
+    spreads = [float(np.var(one, ddof=1)) if len(one) > 1 else np.nan for one in samples]
+    counts = np.array([max(1, len(one)) for one in samples])
+    told = np.array([np.nan if goal.pseudovalues else goal.half_width for goal in goals])
+    variances = moderate_variances(np.array(spreads), counts)
+    return np.where(np.isfinite(told), (told / normal_quantile(CONFIDENCE)) ** 2, variances)
