@@ -1,1 +1,1 @@
-"""Results folders: written, and read back."""
+"""Results folders: writing them and reading them back."""

@@ -1,6 +1,6 @@
-"""chamber.npz: a result's cavity, part and target, bit for bit as they were simulated.
+"""chamber.npz: cavity, part and target of a result, bit for bit as they were simulated.
 
-It takes the place of the files that the design names, which are never looked for again.
+A finished result reads only chamber.npz, never again the files that its design names.
 """
 
 from __future__ import annotations
@@ -23,15 +23,18 @@ if TYPE_CHECKING:
     from chamberopt.results.load import Result
 
 CHAMBER_FILE = "chamber.npz"
-LARGEST = 1e4  # m and m²: no part or chamber is larger
-STEEPEST = 1e12  # 1/m: no hollow is more curved, nor a unit vector longer
+LARGEST = 1e4  # m, m² or m³; every part and chamber is smaller
+STEEPEST = 1e12  # 1/m; every curvature is smaller, and so is every component of a normal
 REMEDY = "restore the file, or simulate again"
 
 
 def load_chamber(result: Result) -> Chamber:
-    """The chamber of a result as it was simulated; InputError for a file that is not what it was.
+    """Load the chamber of a result as it was simulated.
 
-    It is checked as a whole, because compiled functions trust their input.
+    The whole chamber is checked, because compiled functions trust their input.
+
+    Raises:
+        InputError: the file is missing, damaged or not the file that was written.
     """
     path = result.path(CHAMBER_FILE)
     parts = Part, PartOfFile, PartMesh, ElementNumbers, SmoothingFacts
@@ -44,7 +47,7 @@ def load_chamber(result: Result) -> Chamber:
 
 
 def _require_sound(chamber: Chamber) -> None:
-    """Raise an error unless all arrays have the types, shapes and ranges that kernels expect."""
+    """Raise ValueError unless all arrays have the types, shapes and ranges that kernels expect."""
     part, file = chamber.part, chamber.part.file
     if not isinstance(part, Part) or not isinstance(file, PartOfFile):
         raise ValueError("without its part")

@@ -1,6 +1,6 @@
-"""The records of commands that make no candidate: strip, calibration, accuracy and comparison.
+"""Records of the commands strip, calibrate, accuracy and compare.
 
-Each is the whole of a JSON file, which is written and never read back.
+A record is the whole content of a JSON file. The program writes these files and never reads them.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ class ArcHeight(Table):
 
 
 class KirkFitRecord(Table):
-    """A curve through the five arc heights; peening/kirk_fit.py has its formula."""
+    """A curve through the five arc heights. Its formula is in peening/kirk_fit.py."""
 
     a: float
     b: float
@@ -61,7 +61,7 @@ class CurvePoint(Table):
 
 
 class StripRecord(Table):
-    """A virtual strip; arc heights and the intensity are in `unit`."""
+    """A virtual strip. Arc heights and the intensity are in `unit`."""
 
     format: int
     type: str
@@ -124,7 +124,7 @@ def strip_record(strip: VirtualStrip) -> StripRecord:
 
 
 class ParameterRecord(Table):
-    """The logarithm of a parameter before measuring and now."""
+    """Mean and standard deviation of a parameter's logarithm, before and after the calibration."""
 
     log_mean_before: float
     log_sd_before: float
@@ -133,7 +133,7 @@ class ParameterRecord(Table):
 
 
 class MisfitRecord(Table):
-    """How well the model explains the measurements of one kind."""
+    """The misfit between the model and the measurements of one kind."""
 
     kind: str
     chi2: float
@@ -143,7 +143,7 @@ class MisfitRecord(Table):
 
 
 class MeasuredRecord(Table):
-    """Measurements of one kind in one set-up, with the prediction of each."""
+    """Measurements of one kind in one set-up, each with its prediction."""
 
     kind: str
     label: str
@@ -155,7 +155,7 @@ class MeasuredRecord(Table):
 
 
 class PredictionRecord(Table):
-    """A figure of the design, with the standard deviations of its logarithm."""
+    """A predicted figure of the design, with standard deviations of its logarithm."""
 
     value: float
     log_sd_before: float
@@ -166,7 +166,7 @@ class PredictionRecord(Table):
 
 
 class CalibrationRecord(Table):
-    """A calibration of the model to one machine; `machine` is the content of machine.toml."""
+    """A calibration of the model to one machine. `machine` is the content of machine.toml."""
 
     format: int
     machine: dict[str, Any]
@@ -235,14 +235,14 @@ def calibration_record(
 
 
 class ReferenceRecord(Table):
-    """The run that all others are compared with."""
+    """The reference run, with which all other runs are compared."""
 
     text: str
     settings: dict[str, Any]
 
 
 class ErrorLawRecord(Table):
-    """error = scale cost^-power; the half-width is null if it is infinite."""
+    """The law error = scale cost^-power. An infinite half-width is null."""
 
     scale: float
     power: float
@@ -250,7 +250,7 @@ class ErrorLawRecord(Table):
 
 
 class HalvingRecord(Table):
-    """The cost of half the error over that of the error; null where no cost halves it."""
+    """The factor in cost that halves the error. Null if no cost halves the error."""
 
     times: float | None
     low: float | None
@@ -259,7 +259,7 @@ class HalvingRecord(Table):
 
 
 class RecommendationRecord(Table):
-    """The settings for one accuracy; 0 replicas if it is out of reach."""
+    """The settings for one accuracy. 0 replicas if the accuracy is out of reach."""
 
     accuracy: float
     settings: dict[str, Any]
@@ -270,7 +270,7 @@ class RecommendationRecord(Table):
 
 
 class ConvergenceRecord(Table):
-    """A convergence study; each row is a run or a number of replicas."""
+    """A convergence study. Each row is a run or a number of replicas."""
 
     format: int
     reference: ReferenceRecord
@@ -285,7 +285,7 @@ class ConvergenceRecord(Table):
 
 
 class DifferenceRecord(Table):
-    """A difference to the first candidate, and how much longer shows it."""
+    """A difference to the first candidate, and the simulation time that would show it."""
 
     value: float | None
     half_width: float | None
@@ -297,7 +297,7 @@ class DifferenceRecord(Table):
 
 
 class HistogramRecord(Table):
-    """A share of each candidate in each bin."""
+    """The share of each candidate in each bin."""
 
     unit: str
     edges: list[float]
@@ -305,7 +305,7 @@ class HistogramRecord(Table):
 
 
 class DistributionsRecord(Table):
-    """Distributions over the target; means are null where nothing was hit."""
+    """Distributions over the target. Means are null for a candidate without impacts."""
 
     coverage: HistogramRecord
     normal_speed: HistogramRecord

@@ -1,6 +1,6 @@
-"""Some milliseconds of shot flight, frame by frame.
+"""Some milliseconds of ball flight, frame by frame.
 
-Every position is the simulator's own at the time of its frame; nothing is interpolated.
+The simulator computes every position at the time of its frame. No position is interpolated.
 """
 
 from __future__ import annotations
@@ -22,23 +22,23 @@ if TYPE_CHECKING:
 MIN_SPAN = 1e-6  # s
 MAX_FRAMES = 2000
 TRAIL = 4
-MAX_POSITIONS = 10_000_000  # of all balls in all frames and their trails: 480 MB with velocities
+MAX_POSITIONS = 10_000_000  # balls × frames × trail; 480 MB together with the velocities
 
 
 @dataclass(frozen=True)
 class FlightFrames:
-    """Frames of one replica; times count from the end of its warm-up, as in its impact log.
+    """Frames of one replica. Times count from the end of its warm-up, as in its impact log.
 
-    time: of the frames [s], shape (f,).
-    balls: centres [m], shape (f, n, 3).
-    trail: centres at k times since the frame before [m], shape (f, k, n, 3); NaN in the first.
-    diameter: of the balls [m], shape (n,).
-    sonotrodes: displacement of each face by its tag [m], shape (f, 3); faces of which each ball
-        meets another phase (motion "random_phase") are left out.
-    amplitude: the largest of the sonotrodes [m].
+    time: time of each frame [s], shape (f,).
+    balls: centres of the balls [m], shape (f, n, 3).
+    trail: centres at k times since the previous frame [m], shape (f, k, n, 3). NaN in frame 0.
+    diameter: diameters of the balls [m], shape (n,).
+    sonotrodes: displacement of each vibrating face by its tag [m], shape (f, 3). Empty for the
+        motion "random_phase", in which every ball meets a phase of its own.
+    amplitude: largest amplitude of all sonotrodes [m].
     part_angle: rotation of the part [rad], shape (f,).
-    part_axis: of the rotation, a point [m] and a direction; None where the part stands still.
-    dents, impacts: on the part within the time shown, in the part's frame.
+    part_axis: point [m] and direction of the rotation axis. None if the part stands still.
+    dents, impacts: dents and impacts on the part within the time shown, in the part's frame.
     """
 
     time: np.ndarray
@@ -61,18 +61,18 @@ def simulate_flight(
     trail: int = TRAIL,
     progress: Callable[[float], None] = lambda seconds: None,
 ) -> FlightFrames:
-    """Simulate a replica again and record evenly spaced frames, the first and last at its ends.
+    """Simulate a replica again and record evenly spaced frames from `start` to `start + span`.
 
     Args:
-        replica: to simulate.
+        replica: replica to simulate.
         start: time of the first frame after the warm-up [s].
         span: time from the first to the last frame [s].
-        frames: how many.
-        trail: positions of each ball recorded from one frame to the next, the frame's included.
-        progress: as for sim_core.simulate.
+        frames: number of frames.
+        trail: positions of each ball recorded per frame, with the position in the frame itself.
+        progress: function that sim_core.simulate calls.
 
     Raises:
-        InputError: the replica did not simulate that time, or there are too many frames.
+        InputError: the frames lie outside the recorded time, or there are too many.
         sim_core.SimulationError: the simulation had to stop.
     """
     from sim_core import simulate
@@ -81,7 +81,7 @@ def simulate_flight(
     require_simulated(scene, start, span, frames, trail)
     end = min(start + span, scene.duration)
     times = np.linspace(start, end, (frames - 1) * trail + 1)
-    # Cut short at `end`, a scene gives the same bits up to there as the whole one.
+    # A scene that is cut short at `end` gives the same bits up to `end` as the whole scene.
     simulated = simulate(replace(scene, duration=end), times, progress)
     impacts = replica.on_chamber(simulated.impacts)
     on_part = replica.chamber.source[impacts.triangle] >= 0
@@ -110,13 +110,13 @@ def simulate_flight(
 
 
 def face_displacement(vibration: Vibration, time: np.ndarray) -> np.ndarray:
-    """Displacement of a vibrating face [m], shape (f, 3), at times from the scene's start [s]."""
+    """Displacement of a vibrating face [m], shape (f, 3), at times since the scene's start [s]."""
     phase = 2.0 * math.pi * vibration.frequency * time + vibration.phase
     return np.asarray(np.sin(phase)[:, None] * vibration.peak)
 
 
 def rotation_angle(rotation: PartRotation | None, time: np.ndarray) -> np.ndarray:
-    """Angle of a part [rad], shape (f,), at times from the scene's start [s]; 0 if it is fixed."""
+    """Angle of a part [rad], shape (f,), at times since the scene's start [s]. 0 if it is fixed."""
     if rotation is None:
         return np.zeros(len(time))
     if rotation.rpm is not None:
@@ -130,7 +130,7 @@ def rotation_angle(rotation: PartRotation | None, time: np.ndarray) -> np.ndarra
 def require_simulated(
     scene: Scene, start: float, span: float, frames: int, trail: int = TRAIL
 ) -> None:
-    """Raise InputError for a time that a replica did not simulate, or too many frames."""
+    """Raise InputError for frames outside a replica's recorded time, or for too many frames."""
     duration, positions = scene.duration, trail * len(scene.balls)
     if not 0.0 <= start < duration:
         raise InputError(

@@ -1,8 +1,8 @@
 """Impacts of a result, simulated again.
 
-Results keep figures, not impact logs. The same design, chamber and seed give the same impacts to
-the last bit, so replicas are simulated again when their impacts are wanted, and compared with what
-the result keeps of them: their triangles and speeds.
+A result does not store its impact logs. The same design, chamber and seed give the same impacts to
+the last bit. A command that needs impacts therefore simulates the replicas again. It compares the
+triangles and speeds of the new impacts with hits.npz of the result.
 """
 
 from __future__ import annotations
@@ -31,18 +31,18 @@ if TYPE_CHECKING:
     from chamberopt.results.load import Result
     from sim_core import ImpactLog
 
-MAX_SIMULATED_TREATMENT = 600.0  # s; a dent map of more takes minutes to compute
-COSTED = 0.02  # share of a simulation by which its cost is foretold
-SAMPLES = 200_000  # points of the target, for the share inside dents
-MAX_IMPACTS_IN_MEMORY = 4e6  # of all replicas being simulated; each takes about 200 bytes
+MAX_SIMULATED_TREATMENT = 600.0  # s; a longer dent map takes minutes to compute
+COSTED = 0.02  # share of a simulation that is run to predict its cost
+SAMPLES = 200_000  # sample points on the target, for the share inside dents
+MAX_IMPACTS_IN_MEMORY = 4e6  # in all replicas being simulated; an impact takes about 200 bytes
 
 
 @dataclass(frozen=True)
 class ReplicaImpacts:
     """Impacts on the part in one replica, in order of time.
 
-    number: of the replica, from 0.
-    log: as the simulator wrote it; its triangles are those of the chamber.
+    number: number of the replica, from 0.
+    log: log of the simulator; its triangles are numbered as in the chamber.
     part_triangle: triangle that was hit, numbered as in part.vtp, int32, shape (n,).
     """
 
@@ -63,15 +63,15 @@ def simulate_impacts(
     Only a few replicas are in memory at a time.
 
     Args:
-        result: of a simulation or study.
-        rebuilt: what rebuild_chamber returned for it.
-        executor: runs the replicas.
-        replicas: how many, from the first; None for all.
+        result: result of a simulation or study.
+        rebuilt: chamber of the result, from rebuild_chamber.
+        executor: executor that runs the replicas.
+        replicas: number of replicas, from the first; None for all.
         progress: called after each replica.
 
     Raises:
-        InputError: after the last of all replicas, unless they gave the result's own impacts with
-            the same speeds. Fewer replicas cannot be compared.
+        InputError: the new impacts or their speeds differ from those of the result. It is raised
+            after the last replica, and only if all replicas were simulated.
     """
     design, chamber = result.design, rebuilt.chamber
     count = replica_count(result, replicas)
@@ -92,7 +92,7 @@ def simulate_impacts(
 
 
 def replica_count(result: Result, replicas: int | None) -> int:
-    """How many replicas to simulate: all unless fewer are wanted. InputError for more or none."""
+    """Number of replicas to simulate, by default all. Raise InputError for 0 or too many."""
     there = result.record.replicas
     if replicas is not None and not 1 <= replicas <= there:
         raise InputError(f"--replicas: given {replicas}; the result has {there}, give 1 to {there}")
@@ -102,13 +102,13 @@ def replica_count(result: Result, replicas: int | None) -> int:
 def simulate_dents(
     replica: RebuiltReplica, time: float, progress: Callable[[float], None] = lambda seconds: None
 ) -> Dents:
-    """Return the dents of a replica simulated for a time [s], even longer than the result's.
+    """Dents of a replica, simulated for a time [s] that may exceed the recorded time.
 
     Args:
-        progress: as for sim_core.simulate.
+        progress: function that sim_core.simulate calls.
 
     Raises:
-        InputError: as require_dent_time.
+        InputError: the time is too long, see require_dent_time.
         sim_core.SimulationError: the simulation had to stop.
     """
     from sim_core import simulate
@@ -129,7 +129,7 @@ def require_dent_time(time: float) -> None:
 
 
 def simulation_seconds(replica: RebuiltReplica, time: float) -> float:
-    """About how long simulating a replica for a time [s] takes, from the beginning of it."""
+    """Approximate run time [s] of simulating a replica for a time [s], from a short trial run."""
     from sim_core import simulate
 
     scene, seconds = replica.scene, 0.0
@@ -141,7 +141,7 @@ def simulation_seconds(replica: RebuiltReplica, time: float) -> float:
 
 
 def dented_share(dents: Dents, chamber: Chamber) -> float:
-    """Share of the target inside dents, by sample points; hidden places are not peened."""
+    """Share of the target inside dents, from sample points. Dents cover only what faces them."""
     from chamberopt.coverage.field.windows import Places, Windows
 
     if not len(dents):
@@ -160,7 +160,7 @@ def dented_share(dents: Dents, chamber: Chamber) -> float:
 
 
 def _replicas_ahead(result: Result) -> int:
-    """Replicas to begin before the one that is yielded: one a core, unless their logs are long."""
+    """Number of replicas to begin ahead: one per core, fewer if the impact logs are long."""
     part = load_part(result)
     impacts = float(part["impacts"].sum()) / result.record.replicas
     return max(0, min(core_count(), int(MAX_IMPACTS_IN_MEMORY / max(impacts, 1.0)) - 1))

@@ -47,7 +47,7 @@ if TYPE_CHECKING:
     from chamberopt.simulation.evaluation import Evaluation
 
 START = "start"
-# Folders of other commands, by the file that each has: what they are, and where that can be seen.
+# Folders of other commands, recognised by a file: name of the folder, and how to look at it.
 OTHER_FOLDERS = {
     "calibration.json": "a calibration: see calibration.txt and calibration.png in it; designs "
     "take its machine.toml",
@@ -61,10 +61,10 @@ RESTORE = "restore the folder from where it came, or simulate again"
 
 @dataclass(frozen=True)
 class Result:
-    """A results folder that has been read; a study stands for its best design as confirmed.
+    """A results folder that has been read.
 
-    design: the candidate that the figures belong to.
-    record: everything in result.json.
+    design: the simulated design. For a study it is the best design, with its confirmed figures.
+    record: the content of result.json.
     """
 
     folder: Path
@@ -73,7 +73,7 @@ class Result:
 
     @property
     def study(self) -> StudyRecord | None:
-        """The record of the study; None for a simulation."""
+        """The record of the study. None for a simulation."""
         return self.record.study
 
     @property
@@ -86,7 +86,7 @@ class Result:
 
     @cached_property
     def metrics(self) -> dict[str, Estimate]:
-        """The metrics that this version of the program knows."""
+        """The metrics that this version of the program knows, by name."""
         return {name: one for name, one in self.record.metrics.items() if find_metric(name)}
 
     @property
@@ -105,25 +105,28 @@ class Result:
 
     @property
     def resolves_places(self) -> bool:
-        """Whether the windows have the dents that figures of single places take."""
+        """True if the windows have enough dents for figures of single places."""
         field = self.record.field
         return field.dents_in_median_window >= (field.dents_needed.p05_times_intensity or 0.0)
 
     def path(self, name: str) -> Path:
-        """Path of a data file of the result; InputError unless it is the file that was written."""
+        """Path of a data file of the result. Raise InputError if the file was changed."""
         return unchanged_file(self.folder, name, self.record.files)
 
 
 def load_result(path: str | Path) -> Result:
-    """Read a results folder, given itself or its result.json.
+    """Read a results folder.
+
+    Args:
+        path: the folder or its result.json.
 
     Raises:
-        InputError: it is not a results folder, or unfinished, or damaged.
+        InputError: the folder is no results folder, is unfinished or is damaged.
     """
     path = Path(path)
     if path.name != RESULT and path.is_symlink():
         try:
-            path = path.resolve()  # who asks for it gave the link, and learns where results are
+            path = path.resolve()  # messages then name the folder behind a link
         except (OSError, RuntimeError):  # RuntimeError before Python 3.13
             raise InputError(f"{path}: a link that leads back to itself; remove it") from None
     file = path if path.name == RESULT else path / RESULT
@@ -152,15 +155,16 @@ def load_result(path: str | Path) -> Result:
 
 
 def load_start(study: Result) -> Result:
-    """Read the results folder of a study's start, which is inside that of the study."""
+    """Read the results folder of a study's start, which is inside the study's folder."""
     with _damage_explained(study.folder / START):
         return load_result(require_plain_folder(study.folder / START, RESTORE))
 
 
 def load_trials(folder: Path) -> list[dict[str, Any]]:
-    """The trial log of a study or sweep, finished or not; InputError where there is none.
+    """Load the trial log of a study or sweep, finished or not.
 
-    If it is finished, its files must be those that were written with its result.
+    Raises:
+        InputError: the folder has no trial log, or a file of a finished study was changed.
     """
     file = folder / RESULT
     if file.is_file():
@@ -172,10 +176,10 @@ def load_trials(folder: Path) -> list[dict[str, Any]]:
 
 
 def unchanged_file(folder: Path, name: str, sha256: Mapping[str, str]) -> Path:
-    """Path of a data file in a results folder; InputError unless it has its digest in result.json.
+    """Path of a data file in a results folder. Raise InputError if its digest is wrong.
 
     Args:
-        sha256: of each data file by its name, as in result.json.
+        sha256: digest of each data file by its name, from result.json.
     """
     path = folder / name
     if name not in sha256:
@@ -192,7 +196,7 @@ def unchanged_file(folder: Path, name: str, sha256: Mapping[str, str]) -> Path:
 
 
 def file_sha256(path: Path) -> str:
-    """Digest of a file; InputError if it cannot be read."""
+    """Digest of a file. Raise InputError if the file cannot be read."""
     try:
         with open_plain(path) as file:
             return hashlib.file_digest(file, "sha256").hexdigest()
@@ -203,22 +207,22 @@ def file_sha256(path: Path) -> str:
 
 
 def load_part(result: Result) -> Surface:
-    """Read the part.vtp of a result; InputError if missing, damaged or another result's."""
+    """Read part.vtp. Raise InputError if it is missing, damaged or from another result."""
     return read_part(result.path(PART))
 
 
 def load_field(result: Result, part: Surface) -> Surface:
-    """Read coverage.vtp; InputError as load_part."""
+    """Read coverage.vtp. Raise InputError as load_part does."""
     return read_field(result.path(COVERAGE), part)
 
 
 def load_cavity(result: Result) -> Surface:
-    """Read chamber.vtp; InputError as load_part."""
+    """Read chamber.vtp. Raise InputError as load_part does."""
     return read_surface(result.path(CHAMBER), ("tag",))
 
 
 def read_part(path: Path) -> Surface:
-    """Read part.vtp; InputError unless it has values wherever the shot can come."""
+    """Read part.vtp. Raise InputError if a triangle within reach of the shot lacks values."""
     part = read_surface(path, ELEMENT_COLUMNS)
     exposed = np.asarray(part["exposed_area_mm2"])
     if not np.isfinite(exposed).all() or np.isnan(part["coverage"][exposed > 0.0]).any():
@@ -229,7 +233,7 @@ def read_part(path: Path) -> Surface:
 
 
 def read_field(path: Path, part: Surface) -> Surface:
-    """Read coverage.vtp; InputError unless it belongs to this part.vtp."""
+    """Read coverage.vtp. Raise InputError unless it belongs to this part.vtp."""
     field = read_surface(path, ("triangle", *OF_ELEMENT), FIELD_COLUMNS)
     triangle = np.asarray(field["triangle"])
     covers_all = np.array_equal(np.unique(triangle), np.arange(part.n_cells))
@@ -248,7 +252,7 @@ def read_field(path: Path, part: Surface) -> Surface:
 
 
 def summary(evaluation: Evaluation | Result) -> str:
-    """Return one line with the objective and its interval, and mean and spread of coverage."""
+    """One line of text: the objective with its interval, and mean and spread of coverage."""
     mean, spread = (evaluation.metrics[name] for name in ("mean_coverage", "std_coverage"))
     name = evaluation.objective_name.replace("_", " ")
     shares = f"mean {estimate_text(mean, 100.0, '%')}   std {estimate_text(spread, 100.0, '%')}"
@@ -258,7 +262,7 @@ def summary(evaluation: Evaluation | Result) -> str:
 
 @contextmanager
 def _damage_explained(file: Path) -> Iterator[None]:
-    """Report what is wrong with a result.json as InputError."""
+    """Turn the errors of reading a result.json into InputError."""
     try:
         yield
     except OSError as error:
@@ -272,7 +276,7 @@ def _damage_explained(file: Path) -> Iterator[None]:
 
 
 def _read_record(file: Path) -> ResultRecord:
-    """The content of a result.json that this version of the program reads whole; or InputError."""
+    """Read a result.json. Raise InputError for another format or a damaged file."""
     content = read_limited(file, MAX_RESULT_BYTES, "file of a result")
     data = parse_json(content)
     if not isinstance(data, dict):
@@ -297,6 +301,6 @@ def _of_another_format(file: Path, data: dict[str, Any]) -> InputError:
 
 
 def content_sha256(data: Mapping[str, Any]) -> str:
-    """sha256 of the content of a result.json but for its own key, in whatever order it stands."""
+    """Digest of a result.json without its key sha256. The order of keys does not matter."""
     rest = {name: value for name, value in data.items() if name != "sha256"}
     return hashlib.sha256(json.dumps(rest, sort_keys=True).encode()).hexdigest()

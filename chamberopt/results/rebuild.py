@@ -1,4 +1,4 @@
-"""The replicas of a result, ready to be simulated again exactly as they were."""
+"""Replicas of a result, rebuilt to be simulated again bit for bit."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ REMEDY = "simulate the design again, and use that result"
 
 @dataclass(frozen=True)
 class RebuiltChamber:
-    """Chamber of a result.
+    """The chamber of a result.
 
-    cavity: the analytical cavity that was simulated in place of the chamber's mesh, if it was.
+    cavity: analytical cavity that was simulated in place of the mesh; None if the mesh was.
     """
 
     chamber: Chamber
@@ -36,7 +36,7 @@ class RebuiltChamber:
 
 @dataclass(frozen=True)
 class RebuiltReplica:
-    """One replica of a result, ready to be simulated again; cavity as in RebuiltChamber."""
+    """One replica of a result, ready to be simulated again. `cavity` is as in RebuiltChamber."""
 
     result: Result
     chamber: Chamber
@@ -48,10 +48,11 @@ class RebuiltReplica:
         return self.result.design
 
     def on_chamber(self, impacts: ImpactLog) -> ImpactLog:
-        """Impacts with the triangles of the chamber, also where an analytical cavity has others.
+        """Convert impacts on an analytical cavity to impacts on the triangles of the chamber.
 
-        InputError unless each on the part, within the recorded time, is one of the result's own:
-        triangle and speed tell, to the last bit.
+        Raises:
+            InputError: an impact on the part within the recorded time is not in hits.npz of the
+                result. Triangle and speed must agree to the last bit.
         """
         impacts = impacts_on_chamber(impacts, self.chamber) if self.cavity else impacts
         source = self.chamber.source[impacts.triangle]
@@ -71,7 +72,7 @@ class RebuiltReplica:
 
 
 def rebuild_chamber(result: Result) -> RebuiltChamber:
-    """The chamber of a result from its own folder; InputError if its file is not as it was."""
+    """Load the chamber of a result. Raise InputError if its file was changed."""
     chamber = load_chamber(result)
     return RebuiltChamber(
         chamber, analytic_cavity(result.design, chamber) if result.record.analytic else None
@@ -82,7 +83,7 @@ def rebuild_replica(result: Result, number: int = 0) -> RebuiltReplica:
     """Build one replica of a result again, numbered from 0.
 
     Raises:
-        InputError: the result has no such replica, or its chamber's file is not as it was.
+        InputError: the result has no such replica, or the file of its chamber was changed.
     """
     there = result.record.replicas
     if not 0 <= number < there:
@@ -97,13 +98,13 @@ def rebuild_replica(result: Result, number: int = 0) -> RebuiltReplica:
 
 
 def _identity(triangle: np.ndarray, speed: np.ndarray) -> np.ndarray:
-    """One number for each impact, (n,) int64, from its triangle and the bits of its speed."""
+    """A number for each impact, shape (n,) int64, from its triangle and the bits of its speed."""
     bits = speed.astype(np.float32).view(np.int32).astype(np.int64)
     return np.asarray((triangle.astype(np.int64) << 32) + bits)
 
 
 def made_by(result: Result) -> str:
-    """Versions of the programs that made a result, for messages."""
+    """Text with the versions of the programs that made a result."""
     made = result.record.versions
     names = ("chamberopt", "manifold3d", "numba", "numpy", "system")
     return ", ".join(f"{name} {made[name]}" for name in names if name in made)

@@ -1,8 +1,8 @@
-"""The record of a result: all of its result.json, typed.
+"""The record of a result: the typed content of result.json.
 
-Writers build a record and readers load one, so both follow from its fields. A result comes from
-elsewhere, and its digests tell only that it is whole. Nothing of it is used before every value was
-found to have its type.
+Writers and readers of result.json share the fields of these classes. A results folder may come from
+another person, and its digests only prove that it is complete. The type of every value is therefore
+checked before any value is used.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ Share = Annotated[float, Field(ge=0.0, le=1.0)]
 Positive = Annotated[float, Field(ge=0.0)]
 Count = Annotated[int, Field(ge=0)]
 Digest = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
-FileName = Annotated[str, Field(pattern=r"^[^/\\:]+$")]  # in the folder itself
+FileName = Annotated[str, Field(pattern=r"^[^/\\:]+$")]  # no path to another folder
 Bounds = Annotated[list[float], Field(min_length=2, max_length=2)]
 Texts = Annotated[list[str], Field(min_length=1)]
 Curve = Annotated[list[float], Field(min_length=1)]
@@ -47,17 +47,17 @@ def _dated(text: str) -> str:
 
 
 class Table(BaseModel):
-    """A table of result.json; further keys are no fault."""
+    """A table of result.json. Unknown keys are allowed and ignored."""
 
     model_config = ConfigDict(strict=True, allow_inf_nan=False)
 
     def as_json(self) -> dict[str, Any]:
-        """The table as JSON values; keys that its writer left out are left out."""
+        """The table as JSON values, without the keys that its writer did not set."""
         return self.model_dump(mode="json", exclude_unset=True)
 
 
 class _IntervalValues(Table):
-    """A value and its half-width; null where there is none, with words in its place."""
+    """A value and its half-width. An unknown number is null, and `in_words` tells why."""
 
     value: float | None
     half_width: Positive | None
@@ -68,7 +68,7 @@ class _IntervalValues(Table):
 
 
 class _KnownValues(_IntervalValues):
-    """An interval that has a value, and a half-width unless words stand in its place."""
+    """An interval with a value, and with a half-width or words in its place."""
 
     @model_validator(mode="after")
     def _is_known(self) -> Self:
@@ -79,7 +79,7 @@ class _KnownValues(_IntervalValues):
 
 class _EstimateValues(_KnownValues):
     pseudovalues: list[float]
-    bias: float | None  # none if infinite, where there is no dent at all
+    bias: float | None  # None if it is infinite, because there are no dents
     shared: list[float]
 
     def estimate(self) -> Estimate:
@@ -95,16 +95,16 @@ if TYPE_CHECKING:
     KnownInterval: TypeAlias = Estimate
     WholeEstimate: TypeAlias = Estimate
     Ends: TypeAlias = list[float | str]
-else:  # estimates, each stored with so much of it as is needed
+else:  # an estimate is stored with fewer or more of its numbers, as readers need them
     _READ, _AS_INTERVAL = WrapValidator(_estimate), PlainSerializer(Estimate.interval_json)
     Interval = Annotated[_IntervalValues, _READ, _AS_INTERVAL]
     KnownInterval = Annotated[_KnownValues, _READ, _AS_INTERVAL]
     WholeEstimate = Annotated[_EstimateValues, _READ, PlainSerializer(Estimate.to_json)]
-    Ends = Bounds | Texts  # of a number, or all that a text may be
+    Ends = Bounds | Texts  # bounds of a number, or the allowed texts
 
 
 def _with_units(metrics: dict[str, Estimate]) -> dict[str, dict[str, Any]]:
-    """The metrics as JSON values, each with its unit."""
+    """Metrics as JSON values, each with its unit."""
 
     def unit(name: str) -> str:
         metric = find_metric(name)
@@ -114,7 +114,7 @@ def _with_units(metrics: dict[str, Estimate]) -> dict[str, dict[str, Any]]:
 
 
 class Objective(Table):
-    """The figure that a study maximises, or that a simulation is judged by."""
+    """The objective: the figure that a study maximises."""
 
     name: str
     estimate: WholeEstimate
@@ -159,7 +159,7 @@ class FieldRecord(Table):
 
 
 class CoverageAtTime(Table):
-    """One row of the coverage against time."""
+    """Coverage after one peening time."""
 
     time_s: Positive
     mean_coverage: Share
@@ -176,7 +176,7 @@ class ZoneLimit(Table):
 
 
 class ZoneRecord(Table):
-    """A zone of the part, and whether its figures meet its limits."""
+    """A zone of the part, with its limits and whether they are met."""
 
     name: str
     triangles: Count
@@ -188,8 +188,8 @@ class ZoneRecord(Table):
 class ChamberRecord(Table):
     """The chamber as simulated.
 
-    pieces_in_air: pieces of the part that reach no wall.
-    facets_left: the coverage of the target is that of its coarse facets.
+    pieces_in_air: number of pieces of the part that reach no wall.
+    facets_left: True if the coarse facets of the part's file were not divided.
     """
 
     volume_mm3: Positive
@@ -200,7 +200,7 @@ class ChamberRecord(Table):
 
 
 class AdviceRecord(Table):
-    """Why an effect was chosen by pilot runs."""
+    """The advice of pilot runs on one effect, with the reason."""
 
     effect: str
     on: bool
@@ -250,7 +250,7 @@ class FrontPoint(CandidatePoint):
 
 
 class ViolationRecord(Table):
-    """A limit that is, or may be, violated: by which figure, and in words."""
+    """A limit that is certainly or possibly violated: the figure, and the violation in words."""
 
     figure: str
     text: str
@@ -272,7 +272,7 @@ class StartRecord(CandidatePoint):
 
 
 class AccuracyRecord(Table):
-    """How accurately candidates were simulated: process.accuracy of the design."""
+    """The accuracy of a candidate's simulation: process.accuracy of the design."""
 
     model_config = ConfigDict(extra="allow")
 
@@ -306,7 +306,7 @@ class StudyRecord(Table):
 
     @property
     def on_bounds(self) -> list[str]:
-        """The numbers of the best design that lie on a bound of the search."""
+        """Names of the numbers of the best design that lie on a bound of the search."""
         return [
             name
             for name, ends in self.vary.items()
@@ -317,14 +317,14 @@ class StudyRecord(Table):
     def _has_the_same_parameters(self) -> Self:
         candidates = self.best, self.start, *self.front, *self.confirmed
         names = [set(one.parameters) for one in candidates]
-        modelled = set(self.model.parameters) if self.model else set()  # those of the best's shape
+        modelled = set(self.model.parameters) if self.model else set()  # of the best chamber shape
         if any(one != set(self.vary) for one in names) or not modelled <= set(self.vary):
             raise ValueError("other parameters than vary")
         return self
 
 
 class ToleratedRange(Table):
-    """A number with a tolerance, and the value at which it was simulated too."""
+    """A number with a tolerance, and the changed value that was also simulated."""
 
     low: int | float
     nominal: int | float
@@ -354,7 +354,7 @@ class ToleratedFigureRecord(Table):
 
 
 class TolerancesRecord(Table):
-    """Figures over the box of tolerances."""
+    """Figures over the box that the tolerances of all numbers span."""
 
     box: dict[str, ToleratedRange]
     worst_for: str
@@ -374,7 +374,7 @@ class TolerancesRecord(Table):
 
 
 class ResultRecord(Table):
-    """Any result."""
+    """The keys that every result.json has."""
 
     kind: Literal["simulation", "study", "sweep"]
     format: int
@@ -384,7 +384,7 @@ class ResultRecord(Table):
     effects: list[AdviceRecord] = []
     files: dict[FileName, Digest]
     versions: dict[str, str]
-    sha256: str = ""  # of all the rest
+    sha256: str = ""  # of all other keys
 
     @model_validator(mode="after")
     def _is_of_a_version(self) -> Self:
@@ -410,13 +410,13 @@ class SweepFacts(Table):
 
 
 class SweepRecord(ResultRecord):
-    """The result of a sweep, which nothing reads but its digests."""
+    """The result of a sweep. The program reads only its digests again."""
 
     sweep: SweepFacts
 
 
 class CandidateRecord(ResultRecord):
-    """The result of a candidate: a simulation, or the best of a study."""
+    """The result of a simulation, or of the best design of a study."""
 
     REQUIRED: ClassVar = [name for name, metric in METRICS.items() if metric.required]
 
@@ -464,7 +464,7 @@ class CandidateRecord(ResultRecord):
 
 
 def read_record(data: dict[str, Any]) -> ResultRecord:
-    """The record of a result.json; ValueError names a key that is not as its writer makes it."""
+    """Check the content of a result.json. Raise ValueError that names the first wrong key."""
     model = ResultRecord if data.get("kind") == "sweep" else CandidateRecord
     try:
         return model.model_validate(data)

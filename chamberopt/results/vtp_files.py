@@ -1,7 +1,8 @@
 """Write and read the surfaces of a results folder, which also open in ParaView.
 
-part.vtp is the part in its own triangles with their values, coverage.vtp the same surface in
-triangles that suit the field, with its values at their corners, chamber.vtp the closed cavity.
+part.vtp: the part in its own triangles, with a value for each triangle.
+coverage.vtp: the same surface in triangles that suit the field, with a value for each corner.
+chamber.vtp: the closed cavity.
 """
 
 from __future__ import annotations
@@ -32,14 +33,15 @@ if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
     from chamberopt.coverage.field.display_mesh import DisplayField
 
-# Read the .vtp files that are written here, without VTK, which a damaged or forged file can end.
+# Reader of the .vtp files that this module writes. It does not use VTK, because a damaged or forged
+# file can make VTK end the process.
 #
 #     <VTKFile><PolyData><Piece NumberOfPoints="n" NumberOfPolys="m"> PointData, CellData, Points,
 #     Polys with connectivity and offsets, each of them with DataArrays in base64:
 #     [number of blocks, bytes of a block, bytes of the last one, packed bytes of each], blocks
 #
-# The header and all blocks together are encoded each on its own. What a file says of its size is
-# compared with what it holds before memory is taken.
+# The header is encoded on its own, and so are all blocks together. The sizes that a file states are
+# compared with its content before memory is allocated.
 #
 # Source: VTK file formats, https://docs.vtk.org/en/latest/vtk_file_formats, XML file formats.
 
@@ -48,22 +50,22 @@ TYPES = {
     "Int64": "<i8",
 }  # fmt: skip
 HEADER = np.dtype("<u4")
-MAX_COORDINATE = 1e7  # mm, either way: no part or chamber is larger
+MAX_COORDINATE = 1e7  # mm, positive or negative; every part and chamber is smaller
 NORMALS = "Normals"
 
 
 class DamagedSurfaceError(ValueError):
-    """A file that is not a surface as it is written here; the message says why."""
+    """A file that this module did not write, or that was damaged. The message says why."""
 
 
 @dataclass(frozen=True)
 class SurfaceArrays:
-    """A surface of triangles, all of it checked.
+    """A checked surface of triangles.
 
-    points: [mm], finite, shape (n, 3), as float32 or float64.
-    triangles: shape (m, 3), from 0 to n - 1.
-    cells, vertices: columns by their names, (m,) and (n,) each; NaN where a value is not known.
-    normals: at the points, shape (n, 3); None if there are none.
+    points: corners of the triangles [mm], finite, shape (n, 3), float32 or float64.
+    triangles: numbers of the corners, 0 to n - 1, shape (m, 3).
+    cells, vertices: columns by name, shape (m,) and (n,). Unknown values are NaN.
+    normals: normals at the points, shape (n, 3), or None.
     """
 
     points: np.ndarray
@@ -77,12 +79,12 @@ def read_arrays(path: Path) -> SurfaceArrays:
     """Read a .vtp file.
 
     Raises:
-        DamagedSurfaceError: it is none, or was altered.
-        InputError: it cannot be read, or is too large.
+        DamagedSurfaceError: the file is no .vtp file, or was altered.
+        InputError: the file cannot be read, or is too large.
     """
     content = read_limited(path, MAX_MESH_BYTES, "surface of a result")
     try:
-        if b"<!" in content:  # entities, of which a few lines make gigabytes
+        if b"<!" in content:  # a few lines of XML entities can expand to gigabytes
             raise DamagedSurfaceError("it declares a document type")
         piece = ElementTree.fromstring(content).find("./PolyData/Piece")
         if piece is None:
@@ -93,7 +95,7 @@ def read_arrays(path: Path) -> SurfaceArrays:
 
 
 def _surface(piece: ElementTree.Element, most: int) -> SurfaceArrays:
-    """Check and convert; `most`: bytes that points and triangles together may take."""
+    """Check and convert a surface. Points and triangles may take `most` bytes together."""
     count, faces = _count(piece, "NumberOfPoints"), _count(piece, "NumberOfPolys")
     if not count or not faces:
         raise DamagedSurfaceError("no triangles could be read")
@@ -135,7 +137,7 @@ def _count(piece: ElementTree.Element, name: str) -> int:
 def _columns(
     piece: ElementTree.Element, place: str, rows: int, others: dict[str, int] | None = None
 ) -> dict[str, np.ndarray]:
-    """Arrays of one element of the file by their names; `others` have another number of rows."""
+    """Arrays of one XML element by name. `others` gives the arrays with another number of rows."""
     found: dict[str, np.ndarray] = {}
     for one in piece.iterfind(f"./{place}/DataArray"):
         name = one.get("Name", "")
@@ -157,7 +159,7 @@ def _array(element: ElementTree.Element, rows: int) -> np.ndarray:
 
 
 def _unpacked(text: str, name: str, size: int) -> bytes:
-    """The bytes of an array, of which there must be `size`."""
+    """Unpack the bytes of an array. Raise DamagedSurfaceError unless there are `size` bytes."""
     packed = "".join(text.split())
     try:
         count = int(np.frombuffer(base64.b64decode(packed[:8])[:4], HEADER)[0])
@@ -187,7 +189,7 @@ def _unpacked(text: str, name: str, size: int) -> bytes:
 
 
 PART, COVERAGE, CHAMBER = "part.vtp", "coverage.vtp", "chamber.vtp"
-# Cell data of coverage.vtp, and their columns in part.vtp.
+# Names of cell data in coverage.vtp, and names of the same columns in part.vtp.
 OF_ELEMENT = {
     "element": "element",
     "target": "target",
@@ -195,13 +197,13 @@ OF_ELEMENT = {
     "element_interval": "coverage_interval",
     "element_impacts": "impacts",
 }
-ZONE = "zone"  # one more column of both, in results with zones
-# Columns without which files cannot be used: cell data of part.vtp, point data of coverage.vtp.
+ZONE = "zone"  # a column of both files, in results with zones
+# Required columns: cell data of part.vtp and point data of coverage.vtp.
 ELEMENT_COLUMNS = ("coverage", "impacts", "dents", "exposed_area_mm2", "target", "element")
 FIELD_COLUMNS = ("coverage", "dent_density", "coverage_interval", "reachable", "resolved")
 WHOLE_NUMBERS = ("impacts", "dents", "target", "element", "triangle", "element_impacts", "tag",
                  "source", "fitting", ZONE)  # fmt: skip
-# Columns that are shares, from 0 to 1, and others that are never negative.
+# Columns with shares from 0 to 1, and columns without negative numbers.
 SHARES = ("coverage", "coverage_interval", "reachable", "resolved", "element_coverage",
           "element_interval")  # fmt: skip
 NOT_NEGATIVE = ("impacts", "dents", "target", "triangle", "element_impacts", "tag", "dent_density",
@@ -212,11 +214,11 @@ ROUNDING = 1e-6  # of single precision
 MM = 1e3
 
 Surface = Any
-"""A pyvista.PolyData; pyvista's own annotations do not fit numpy's."""
+"""A pyvista.PolyData. It is Any, because pyvista's annotations do not fit numpy's."""
 
 
 def pyvista() -> Any:
-    """Import pyvista only where it is used, because that takes half a second."""
+    """Import pyvista only when it is used, because the import takes half a second."""
     import pyvista
 
     return pyvista
@@ -228,11 +230,11 @@ def write_coverage(
     """Write the part, posed in the chamber [mm], as part.vtp and as coverage.vtp.
 
     Args:
-        values: of each triangle of the part, by name, (m,) each: the cell data of part.vtp.
-        display: fields at the vertices of a mesh to draw: the point data of coverage.vtp. Its
-            triangles have the number of the part's triangle in which they lie (triangle), and of
-            that its element, target, element_coverage, element_interval, element_impacts and,
-            where there are zones, zone.
+        values: cell data of part.vtp: columns by name, shape (m,), with a value for each triangle.
+        display: point data of coverage.vtp: fields at the vertices of a mesh to draw. Each
+            triangle of this mesh lies in a triangle of the part. The cell data of coverage.vtp are
+            the number of the part's triangle (triangle) and its values in the columns OF_ELEMENT,
+            with zones also ZONE.
     """
     part, mesh = chamber.part, display.mesh
     _write_surface(folder / PART, part.vertices, part.triangles, values)
@@ -253,7 +255,7 @@ def write_chamber(folder: Path, chamber: Chamber) -> None:
 
     tag: 0 part, 1 sonotrode, 2 wall, 3 and more further sonotrodes.
     source: triangle of the part, -1 elsewhere.
-    fitting: number of the hole or deflector, -1 elsewhere; only in chambers that have some.
+    fitting: number of the hole or deflector, -1 elsewhere. Only chambers with fittings have it.
     """
     fields = {"tag": chamber.tags, "source": chamber.source}
     if chamber.fitting is not None:
@@ -281,8 +283,9 @@ def _write_surface(
 def save_surface(path: Path, surface: Surface) -> None:
     """Write a surface as .vtp or .vtkhdf, whole or not at all.
 
-    Where a file has no room, VTK's writer of .vtp ends the process, and that of .vtkhdf leaves a
-    damaged file. So the one writes into memory; for the other, room is reserved first.
+    On a full disk VTK's writer of .vtp ends the process, and its writer of .vtkhdf leaves a
+    damaged file. A .vtp file is therefore written into memory first. For a .vtkhdf file, room on
+    the disk is reserved first.
     """
     if path.suffix.lower() == ".vtp":
         writer = pyvista()._vtk.vtkXMLPolyDataWriter()
@@ -310,7 +313,7 @@ def read_surface(path: Path, cells: Sequence[str] = (), points: Sequence[str] = 
     """Read a .vtp of a results folder.
 
     Raises:
-        InputError: it is missing or damaged, or lacks one of these columns.
+        InputError: the file is missing or damaged, or lacks a column of `cells` or `points`.
     """
     if not path.is_file():
         raise InputError(
@@ -337,13 +340,13 @@ def read_surface(path: Path, cells: Sequence[str] = (), points: Sequence[str] = 
 
 
 def size_text(surface: Surface) -> str:
-    """Length, width and height of a surface."""
+    """Length, width and height of a surface, as text."""
     x, y, z = np.ptp(np.reshape(surface.bounds, (3, 2)), axis=1)
     return f"{x:.4g} × {y:.4g} × {z:.4g} mm"
 
 
 def _require_sound(name: str, column: np.ndarray) -> None:
-    """Raise DamagedSurfaceError for a column that has no such values in any result."""
+    """Raise DamagedSurfaceError for a column with values of a wrong type or range."""
     if name in WHOLE_NUMBERS and column.dtype.kind not in "iu":
         raise DamagedSurfaceError(f"{name} are no whole numbers")
     known = column[~np.isnan(column)] if column.dtype.kind == "f" else column

@@ -69,7 +69,7 @@ if TYPE_CHECKING:
 def write_simulation(
     folder: Path, candidate: CandidateResult, tolerances: ToleranceResult | None = None
 ) -> CandidateRecord:
-    """Write the data files of a simulation into its empty folder; return its record."""
+    """Write the data files of a simulation into an empty folder and return its record."""
     save_design(candidate.design, folder / "design.toml")
     more = {"tolerances": _about_tolerances(tolerances)} if tolerances else {}
     return _write_candidate(folder, candidate, kind="simulation", **more)
@@ -78,12 +78,12 @@ def write_simulation(
 def write_study(
     folder: Path, study_result: StudyResult, start: CandidateResult, best: CandidateResult
 ) -> CandidateRecord:
-    """Add the data files of a study that has ended to its folder.
+    """Add the data files of a finished study to its folder.
 
-    run_study has written design.toml, study.toml and history.jsonl. This adds best.toml,
-    history.csv, pareto.csv (of two objectives), the best design's coverage.vtp, part.vtp, hits.npz,
-    chamber.npz, chamber.stl and chamber.vtp, and start/, a results folder of the start as confirmed
-    on the same seeds.
+    run_study has written design.toml, study.toml and history.jsonl. write_study adds best.toml,
+    history.csv and, for two objectives, pareto.csv. It adds coverage.vtp, part.vtp, hits.npz,
+    chamber.npz, chamber.stl and chamber.vtp of the best design. The folder start/ is the results
+    folder of the start, confirmed on the same seeds.
 
     Returns:
         The study's record, which `write_result` writes.
@@ -98,10 +98,10 @@ def write_study(
 
 
 def write_sweep(folder: Path, sweep: SweepResult) -> SweepRecord:
-    """Add the data files of a sweep that has ended to its folder; return its record.
+    """Add the data files of a finished sweep to its folder and return its record.
 
-    run_sweep has written design.toml, study.toml and history.jsonl. This adds history.csv and,
-    unless no candidate is feasible, best.toml.
+    run_sweep has written design.toml, study.toml and history.jsonl. write_sweep adds history.csv
+    and, if a candidate is feasible, best.toml.
     """
     write_text(folder / "history.csv", trials_as_csv(read_trials(folder)))
     if sweep.best is not None:
@@ -110,7 +110,7 @@ def write_sweep(folder: Path, sweep: SweepResult) -> SweepRecord:
 
 
 def best_row_note(sweep: SweepResult) -> str:
-    """Explain what the best row of a sweep is worth."""
+    """Explain why the figures of the best row of a sweep are too good, or why there is none."""
     if sweep.best is None:
         return (
             "no candidate meets the constraints, so there is no best.toml: loosen the constraints "
@@ -132,9 +132,9 @@ def write_result(
     """Write result.json, the file that makes a folder a finished result.
 
     Args:
-        folder: of the result.
-        record: what write_simulation, write_study or write_sweep returned.
-        advice: why effects were chosen, if the design left the choice to the program.
+        folder: folder of the result.
+        record: record from write_simulation, write_study or write_sweep.
+        advice: reasons for the effects, if the design left their choice to the program.
         warned: warnings of `chamberopt check`; None if it was not run.
     """
     more: dict[str, Any] = {"files": data_digests(folder)}
@@ -148,7 +148,7 @@ def write_result(
 
 
 def advice_record(advice: Advice) -> AdviceRecord:
-    """The record of why an effect was chosen."""
+    """The record of an advice on an effect."""
     return AdviceRecord(
         effect=advice.effect,
         on=advice.on,
@@ -159,7 +159,7 @@ def advice_record(advice: Advice) -> AdviceRecord:
 
 
 def data_digests(folder: Path) -> dict[str, str]:
-    """sha256 of each data file of a results folder; pictures, which nothing reads, are left out."""
+    """Digest of each data file of a results folder, without pictures, which no code reads."""
     files = (one for one in sorted(folder.iterdir()) if one.is_file())
     skipped = RESULT, ".png"
     return {
@@ -170,7 +170,7 @@ def data_digests(folder: Path) -> dict[str, str]:
 
 
 def _write_candidate(folder: Path, candidate: CandidateResult, **more: Any) -> CandidateRecord:
-    """Write the surfaces and impacts of one candidate; return the record, with `more` of it."""
+    """Write the surfaces and impacts of a candidate. Return its record with the fields `more`."""
     design, chamber, evaluation = candidate.design, candidate.chamber, candidate.evaluation
     write_coverage(folder, chamber, candidate.element_values, candidate.display)
     hits = sort_hits_by_triangle(evaluation.hits, len(chamber.part.triangles))
@@ -208,14 +208,14 @@ def _write_candidate(folder: Path, candidate: CandidateResult, **more: Any) -> C
         design=_design_values(design, folder),
         part_sha256=chamber.part.sha256,
         part_unit=chamber.part.unit,
-        files={},  # known when all are written
+        files={},  # filled in when all files are written
         versions=versions(),
         **more,
     )
 
 
 def _about_zones(design: Design, chamber: Chamber, evaluation: Evaluation) -> list[ZoneRecord]:
-    """Each zone, and whether its figures meet its limits; the figures are among the metrics."""
+    """Records of the zones, with their limits. The figures of zones are among the metrics."""
     judged = judge_zones(design, evaluation.metrics)
     return [
         ZoneRecord(
@@ -230,7 +230,7 @@ def _about_zones(design: Design, chamber: Chamber, evaluation: Evaluation) -> li
 
 
 def _about_field(design: Design, evaluation: Evaluation) -> FieldRecord:
-    """The windows that the figures of coverage belong to, and the figures of twice the radius."""
+    """Record of the windows that measure coverage, with the figures in windows twice as wide."""
     found = evaluation.resolution
     return FieldRecord(
         gauge_mm2=design.process.accuracy.gauge_mm2,
@@ -251,12 +251,12 @@ def _about_field(design: Design, evaluation: Evaluation) -> FieldRecord:
 
 
 def _number(value: float) -> float | None:
-    """None in the place of infinity, which JSON does not have."""
+    """The value, or None for infinity, which JSON does not have."""
     return value if math.isfinite(value) else None
 
 
 def study_record(result: StudyResult) -> StudyRecord:
-    """The record of a study that has ended."""
+    """The record of a finished study."""
     study, replicas = result.study, result.best.evaluation.replicas
     search = [trial for trial in result.trials if trial.stage == "search"]
     more: dict[str, Any] = {}
@@ -323,7 +323,7 @@ def _about_model(found: Sensitivity) -> ModelRecord:
 
 
 def _about_front(result: StudyResult) -> list[FrontPoint]:
-    """The confirmed front, from the best by the first objective to the best by the second."""
+    """The confirmed Pareto front, in falling order of the first objective."""
     names = result.study.objective.goals
     points = pareto.pareto_points(result)
     front = [one for one in points if one.on_front and one.stage == "confirm"]
@@ -408,7 +408,7 @@ def _accuracy(design: Design) -> AccuracyRecord:
 
 
 def _design_values(design: Design, folder: Path) -> dict[str, Any]:
-    """Values of the design as in its file, with paths relative to the folder."""
+    """Values of the design as in its file, with paths relative to `folder`."""
     values: dict[str, Any] = with_paths_from(
         folder.resolve(), design.model_dump(mode="json", exclude_none=True)
     )

@@ -1,1 +1,1 @@
-"""Candidates compared with one another, figure by figure and place by place."""
+"""Comparison of candidates, figure by figure and place by place."""

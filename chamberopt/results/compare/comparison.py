@@ -1,4 +1,4 @@
-"""Compare results: what differs in the designs, and how the figures differ."""
+"""Compare results: the different values of their designs, and the differences of their figures."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ if TYPE_CHECKING:
 
     from chamberopt.design.design import Design
 
-# Checks that candidates can be compared: the same surface, peened for the same time.
+# Checks whether candidates can be compared: the same surface, peened for the same time.
 
 
 def require_several(paths: Sequence[Path]) -> None:
-    """Raise InputError for fewer than two candidates, or for one given twice."""
+    """Raise InputError for fewer than two candidates, or for a candidate given twice."""
     if len(paths) < 2:
         raise InputError(
             f"compare: {len(paths)} candidate given; give two or more designs (.toml) or "
@@ -53,7 +53,7 @@ def require_same_time(paths: Sequence[Path], designs: Sequence[Design]) -> None:
 
 
 def require_same_gauge(paths: Sequence[Path], designs: Sequence[Design]) -> None:
-    """Raise InputError if coverage is looked at through windows of different areas."""
+    """Raise InputError if coverage is measured in windows of different areas."""
     first = designs[0].process.accuracy.gauge_mm2
     for path, design in zip(paths, designs, strict=True):
         gauge = design.process.accuracy.gauge_mm2
@@ -67,7 +67,7 @@ def require_same_gauge(paths: Sequence[Path], designs: Sequence[Design]) -> None
 def require_same_machine(paths: Sequence[Path], designs: Sequence[Design]) -> None:
     """Raise InputError if designs have calibrations of different machines.
 
-    What a calibration leaves open is common to the designs that have it, and cancels.
+    Errors of a calibration cancel in a difference only if both designs share the calibration.
     """
     calibrated = [pair for pair in zip(paths, designs, strict=True) if pair[1].calibration]
     for path, design in calibrated[1:]:
@@ -81,12 +81,14 @@ def require_same_machine(paths: Sequence[Path], designs: Sequence[Design]) -> No
 def require_same_part(
     paths: Sequence[Path], designs: Sequence[Design], meshes: Sequence[tuple[str, str]]
 ) -> None:
-    """Raise InputError if part, unit or target differ from the first's; poses may differ.
+    """Raise InputError if a part, unit or target differs from the first candidate's.
+
+    Poses of the part may differ.
 
     Args:
-        paths: of the candidates.
-        designs: of the candidates.
-        meshes: for each candidate the sha256 of the part's file, and the unit it was read in.
+        paths: paths of the candidates.
+        designs: designs of the candidates.
+        meshes: sha256 and unit of the part's file, for each candidate.
     """
     for path, design, mesh in zip(paths[1:], designs[1:], meshes[1:], strict=True):
         if mesh[0] != meshes[0][0]:
@@ -122,7 +124,7 @@ def require_same_triangles(path: Path, target: np.ndarray, first: Path, wanted: 
 
 
 TIME = "time_to_98_s"
-# The number of replicas tells more than the rule that decided it.
+# The number of replicas says more than the rule by which it was chosen.
 REPLICAS = "process.accuracy.replicas"
 STOPPING_RULES = ("process.accuracy.objective_half_width", "process.accuracy.max_replicas")
 
@@ -133,12 +135,12 @@ class Comparison:
 
     Args:
         results: the results.
-        labels: their short names.
-        parameters: dotted design values that differ, one for each result.
-        metrics: the objective, then every metric; one Estimate for each result.
+        labels: short names of the results.
+        parameters: design values that differ, by dotted name, with a value for each result.
+        metrics: the objective, then every metric, with an Estimate for each result.
         differences: each later result minus the first, by metric.
-        confidence: of the interval of each difference, chosen so that the intervals of one figure
-            hold together with 95 %.
+        confidence: confidence of the interval of each difference. It is chosen so that all
+            intervals of a figure hold together with 95 %.
     """
 
     results: tuple[Result, ...]
@@ -153,8 +155,8 @@ def compare(paths: Sequence[str | Path]) -> Comparison:
     """Compare results folders of the same part and target with the first of them.
 
     Raises:
-        InputError: there are fewer than two, one is given twice, one is not a result, or parts,
-            targets or treatment times differ.
+        InputError: there are fewer than two results, a result is given twice, a folder is no
+            result, or parts, targets or treatment times differ.
     """
     folders = [Path(path) for path in paths]
     require_several(folders)
@@ -162,9 +164,10 @@ def compare(paths: Sequence[str | Path]) -> Comparison:
 
 
 def comparison_of(results: Sequence[Result], names: Sequence[str]) -> Comparison:
-    """Compare results under these names; raises InputError as `compare` does.
+    """Compare results under these names. Raise InputError as `compare` does.
 
-    Results on the same seeds are compared replica by replica, others as independent (Welch).
+    Results on the same seeds are compared replica by replica. Other results are compared as
+    independent samples (Welch).
     """
     first, folders = results[0], [result.folder for result in results]
     designs = [result.design for result in results]
@@ -195,7 +198,7 @@ def comparison_of(results: Sequence[Result], names: Sequence[str]) -> Comparison
 
 
 def part_unit(result: Result) -> str:
-    """Return the unit in which the part's file was read."""
+    """The unit in which the part's file was read."""
     return result.record.part_unit or result.design.part.unit
 
 
@@ -207,17 +210,17 @@ def _difference(name: str, first: Result, other: Result, confidence: float) -> D
     found = difference(after, before, other.seeds == first.seeds, confidence)
     if found.time_ratio is None:
         return found
-    # An estimate knows batches of replicas, not how many replicas there were.
+    # An estimate stores batches of replicas, not the number of replicas.
     return replace(found, replicas=math.ceil(found.time_ratio * other.record.replicas))
 
 
 def _metal(design: Design) -> tuple[Any, ...]:
-    """What an error in Estimate.shared of the part's metal belongs to."""
+    """Key of the part's metal. Results with equal keys share its error in Estimate.shared."""
     return design.materials.part, design.shot.density, set(design.shot.diameters)
 
 
 def labels(paths: Sequence[Path]) -> tuple[str, ...]:
-    """Return the last part of each path, with as much of what precedes it as makes it unique."""
+    """The last names of each path, as few as make it unique."""
     resolved = [path.resolve() for path in paths]
     for depth in range(1, max(len(path.parts) for path in resolved) + 1):
         names = tuple("/".join(path.parts[-depth:]) for path in resolved)
@@ -227,20 +230,20 @@ def labels(paths: Sequence[Path]) -> tuple[str, ...]:
 
 
 def _differing_values(results: Sequence[Result]) -> dict[str, tuple[Any, ...]]:
-    """Return the dotted design values that are not the same in all results; None where missing."""
+    """Design values that differ between the results, by dotted name. Missing values are None."""
     designs = [_design_values(result) for result in results]
-    # v0_for repeats what v0_m_s, the ball, the hardness and C0 say.
+    # v0_for repeats the values of v0_m_s, the ball, the hardness and C0.
     all_names = (name for design in designs for name in design)
     names = dict.fromkeys(name for name in all_names if not name.endswith(".v0_for"))
     rows = {name: tuple(design.get(name) for design in designs) for name in names}
     found = {name: values for name, values in rows.items() if len(set(map(str, values))) > 1}
-    if "chamber.shape" in found:  # which says it already
+    if "chamber.shape" in found:  # the name of the shape says it already
         found.pop("shape_sha256", None)
     return found
 
 
 def _design_values(result: Result) -> dict[str, Any]:
-    """Return all values of a result's design, and those that a design does not contain."""
+    """All values of a result's design, and settings of the result that its design lacks."""
     values = _flattened(result.design.model_dump(mode="json", exclude={"part": {"mesh", "unit"}}))
     for name in STOPPING_RULES:
         values.pop(name, None)
@@ -255,7 +258,7 @@ def _design_values(result: Result) -> dict[str, Any]:
 
 
 def _flattened(table: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
-    """Return nested tables, and lists of tables, as one table with dotted names."""
+    """Nested tables and lists of tables as a single table with dotted names."""
     flat: dict[str, Any] = {}
     for name, value in table.items():
         if isinstance(value, list | tuple) and any(isinstance(one, Mapping) for one in value):

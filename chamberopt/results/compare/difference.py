@@ -1,4 +1,4 @@
-"""The difference of a figure between two candidates: is it real, and what would show it?"""
+"""Difference of a figure between two candidates, and the replicas that would show it is real."""
 
 from __future__ import annotations
 
@@ -20,23 +20,23 @@ from chamberopt.common.estimate import (
     welch_half_width,
 )
 
-MAX_TIME_RATIO = 1000  # no forecast beyond this many times the simulated time
+MAX_TIME_RATIO = 1000  # times the simulated time; the largest forecast
 
 
 @dataclass(frozen=True)
 class Difference:
-    """The figure of a later candidate minus that of the first.
+    """A figure of a later candidate minus the same figure of the first candidate.
 
     Args:
         value: the difference.
-        half_width: of its interval.
-        paired: whether replicas were compared pair by pair on the same seeds; else the samples are
-            taken as independent (Welch).
-        time_ratio: replicas over the number of replicas there are.
+        half_width: half-width of its interval.
+        paired: True if replicas were compared pair by pair on the same seeds. False if the samples
+            were compared as independent (Welch).
+        time_ratio: `replicas` over the number of simulated replicas.
         replicas: number of replicas of the later candidate that would show the difference if it is
-            as large as it looks. None, as is time_ratio, where the difference is real or 0, or
-            beyond MAX_TIME_RATIO.
-        in_words: what stands in the place of the number where one of the figures is not a number.
+            as large as it looks. `replicas` and `time_ratio` are None if the difference is real or
+            0, or if the ratio exceeds MAX_TIME_RATIO.
+        in_words: text in place of the number, if a figure is not a number.
     """
 
     value: float
@@ -48,7 +48,7 @@ class Difference:
 
     @property
     def real(self) -> bool:
-        """Whether the difference is larger than its half-width."""
+        """True if the difference is larger than its half-width."""
         return not self.in_words and abs(self.value) > self.half_width
 
     @property
@@ -58,7 +58,7 @@ class Difference:
 
 
 def confidence_of_each(comparisons: int) -> float:
-    """Confidence of each interval such that all of them hold together with 95 %.
+    """Confidence of each interval with which all intervals hold together with 95 %.
 
     Source: Bonferroni's inequality, O. J. Dunn, "Multiple comparisons among means",
     J. Am. Stat. Assoc. 56 (1961) 52.
@@ -69,9 +69,9 @@ def confidence_of_each(comparisons: int) -> float:
 def difference(
     after: Estimate, before: Estimate, same_seeds: bool, confidence: float = CONFIDENCE
 ) -> Difference:
-    """Return after - before with its interval.
+    """The difference `after` - `before` with its interval.
 
-    Replicas are compared pair by pair where both have the same number on the same seeds.
+    Replicas are compared pair by pair if both results have the same seeds and number of replicas.
     """
     count = len(after.pseudovalues)
     paired = same_seeds and count == len(before.pseudovalues) > 0
@@ -88,7 +88,7 @@ def difference(
     else:
         scatter = partial(welch_half_width, after.pseudovalues, before.pseudovalues, confidence)
     lasting = shared_half_width(gap.shared, confidence)
-    # The bias comes from having few dents, so it is assumed to shrink as the scatter does.
+    # The bias comes from too few dents, so it is assumed to shrink like the scatter.
     needed = _smallest_number(
         lambda n: math.hypot(scatter(n / count), lasting) + gap.bias * math.sqrt(count / n),
         count,
@@ -98,7 +98,7 @@ def difference(
 
 
 def _paired_half_width(gap: Estimate, confidence: float) -> Callable[[float], float]:
-    """Return the half-width as a function of the number of pairs, as a multiple of today's."""
+    """The half-width as a function of the number of pairs over the present number."""
     count, deviation = len(gap.pseudovalues), float(np.std(gap.pseudovalues, ddof=1))
     return lambda ratio: (
         student_quantile(count * ratio - 1.0, confidence) * deviation / math.sqrt(count * ratio)
@@ -106,9 +106,9 @@ def _paired_half_width(gap: Estimate, confidence: float) -> Callable[[float], fl
 
 
 def _smallest_number(half_width: Callable[[float], float], count: int, gap: float) -> int | None:
-    """Return the smallest number of replicas above count whose half-width is below the gap.
+    """The smallest number of replicas above `count` whose half-width is below the gap.
 
-    None if that is more than MAX_TIME_RATIO * count.
+    None if the number exceeds MAX_TIME_RATIO * count.
     """
     low, high = count, MAX_TIME_RATIO * count
     if half_width(high) >= gap:

@@ -17,9 +17,9 @@ class Histogram:
     """A histogram of several results.
 
     Args:
-        unit: of the edges.
-        edges: of the bins, shape (n + 1,).
-        shares: for each result the share of its area or impacts in each bin, shape (n,).
+        unit: unit of the edges.
+        edges: edges of the bins, shape (n + 1,).
+        shares: share of the area or impacts in each bin, shape (n,), for each result.
     """
 
     unit: str
@@ -32,12 +32,12 @@ class Distributions:
     """Distributions of several results over one target.
 
     Args:
-        coverage: shares of the target's area; what no ball can touch has coverage 0.
+        coverage: shares of the target's area. Area that no ball can touch has coverage 0.
         speed: shares of the impacts by normal speed.
         angle: shares of the impacts by angle.
         impacts: number of impacts of each result.
-        mean_speed: [m/s], of each result, or None if nothing was hit.
-        mean_angle: [degrees], of each result, or None if nothing was hit.
+        mean_speed: mean normal speed of each result [m/s]. None for a result without impacts.
+        mean_angle: mean angle of each result [degrees]. None for a result without impacts.
     """
 
     coverage: Histogram
@@ -49,7 +49,7 @@ class Distributions:
 
 
 def distributions(candidates: Sequence[TargetSurface]) -> Distributions:
-    """Compute the distributions of results of one part and target."""
+    """Compute the distributions of results with the same part and target."""
     speeds = [one.hits.speed.astype(float) for one in candidates]
     angles = [one.hits.angle.astype(float) for one in candidates]
     top_speed = max([0.1, *(float(np.quantile(one, 0.999)) for one in speeds if len(one))])
@@ -64,7 +64,7 @@ def distributions(candidates: Sequence[TargetSurface]) -> Distributions:
 
 
 def _coverage_histogram(candidates: Sequence[TargetSurface]) -> Histogram:
-    """Shares of area by coverage in per cent."""
+    """Histogram of the target's area by coverage in per cent."""
     values = [100.0 * one.coverage for one in candidates]
     low = 5.0 * np.floor(min(one.min() for one in values) / 5.0)
     high = 5.0 * np.ceil(max(one.max() for one in values) / 5.0)
@@ -77,7 +77,7 @@ def _coverage_histogram(candidates: Sequence[TargetSurface]) -> Histogram:
 
 
 def _impact_histogram(unit: str, edges: np.ndarray, columns: Sequence[np.ndarray]) -> Histogram:
-    """Shares of impacts; values beyond the last edge are in the last bin."""
+    """Histogram of impacts. Values beyond the last edge count in the last bin."""
     shares = [
         np.histogram(np.minimum(one, edges[-1]), edges)[0] / max(1, len(one)) for one in columns
     ]

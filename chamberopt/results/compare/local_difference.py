@@ -1,4 +1,4 @@
-"""Where one candidate covers more than another, and where the difference is not noise."""
+"""Differences in coverage between two candidates at each place of the target."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from chamberopt.coverage.part_impacts import HITS_FILE, Hits, load_matching_hits
 from chamberopt.geometry.triangles import areas
 from chamberopt.results.load import Result, load_field, load_part
 
-# The target of one result as stored in its folder: its field, and the impacts on it.
+# The target of a result as its folder stores it: the field and the impacts.
 
-MIN_COSINE = 0.7  # between normals of places that count as near each other
-NEIGHBOURS = 8  # vertices that are looked at for a place
-NEAREST = 3  # of these, facing the same way, give its value
+MIN_COSINE = 0.7  # between the normals of two places that count as neighbours
+NEIGHBOURS = 8  # vertices that are examined for a place
+NEAREST = 3  # nearest examined vertices with a similar normal; they give the value of the place
 
 
 @dataclass(frozen=True)
@@ -24,16 +24,16 @@ class TargetSurface:
     """The field of a result on the target.
 
     Args:
-        corners: of the part's triangles in the chamber [mm], shape (m, 3, 3).
-        target: which triangles of the part belong to the target, shape (m,) bool.
+        corners: corners of the part's triangles in the chamber [mm], shape (m, 3, 3).
+        target: True for triangles of the target, shape (m,) bool.
         place: vertices of the display mesh on the target [mm], shape (v, 3).
-        normal: unit vectors there, shape (v, 3).
-        area: share of the target's area that each vertex stands for, shape (v,).
-        coverage: 0 to 1, 0 out of reach, shape (v,).
-        interval: width of its 95 % interval, 0 out of reach, shape (v,).
-        resolved: whether the dents there are enough to tell; so they are out of reach, shape (v,).
-        window_radius: of the windows [mm].
-        dents: simulated, in the median window.
+        normal: unit normals at the vertices, shape (v, 3).
+        area: share of the target's area that belongs to each vertex, shape (v,).
+        coverage: coverage from 0 to 1, shape (v,). 0 at vertices out of reach.
+        interval: width of the 95 % interval of coverage, shape (v,). 0 at vertices out of reach.
+        resolved: True at vertices with enough dents, and at vertices out of reach, shape (v,).
+        window_radius: radius of the windows [mm].
+        dents: number of simulated dents in the median window.
         hits: single impacts on the target.
     """
 
@@ -50,7 +50,7 @@ class TargetSurface:
     hits: Hits
 
     def at(self, other: TargetSurface) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Coverage, interval and whether it is resolved at the vertices of another result."""
+        """Coverage, interval and `resolved` at the vertices of another result."""
         from scipy.spatial import cKDTree
 
         place, normal = self._moved(other)
@@ -69,9 +69,10 @@ class TargetSurface:
         return coverage, interval, resolved > 0.5
 
     def _moved(self, other: TargetSurface) -> tuple[np.ndarray, np.ndarray]:
-        """Vertices and normals of another result as its part stands here.
+        """Vertices and normals of another result, moved to the pose of the part in this result.
 
-        The rotation fits its triangles to those here (W. Kabsch, Acta Cryst. A32 (1976) 922).
+        The rotation fits the triangles of one result to the triangles of the other
+        (W. Kabsch, Acta Cryst. A32 (1976) 922).
         """
         here, there = (one.corners.reshape(-1, 3) for one in (self, other))
         u, _, v = np.linalg.svd((there - there.mean(axis=0)).T @ (here - here.mean(axis=0)))
@@ -82,7 +83,7 @@ class TargetSurface:
 
 
 def read_target_surface(result: Result) -> TargetSurface:
-    """Read the target of a results folder; InputError if files are missing or damaged."""
+    """Read the target of a result. Raise InputError if files are missing or damaged."""
     part = load_part(result)
     field = load_field(result, part)
     triangles = np.asarray(field.regular_faces)[np.asarray(field["target"]) > 0]
@@ -108,23 +109,23 @@ def read_target_surface(result: Result) -> TargetSurface:
     )
 
 
-# A difference is smaller than either coverage and has more noise: discs hold as many dents.
+# Dents in a disc: a difference is smaller than either coverage and has more noise.
 DENTS = 60.0
-# Upper limit of their radius, as a share of the target's size: a wider disc could hide a pattern.
+# Largest radius of a disc as a share of the target's size: a wider disc could hide a pattern.
 MAX_RADIUS_SHARE = 0.06
 
 
 @dataclass(frozen=True)
 class LocalDifference:
-    """Coverage of a later candidate minus that of the first, at places of the target.
+    """Coverage of a later candidate minus coverage of the first, at places of the target.
 
     Args:
         value: the difference, -1 to 1, at the vertices of the first candidate's field, shape (v,).
-        radius: both are averaged over discs of this radius [mm]; 0 if they are not averaged.
-        real: whether it exceeds its 95 % interval, shape (v,) bool. The intervals hold for each
-            place alone, so one place in twenty exceeds its own by chance.
-        more: share of the target's area where the later candidate really covers more.
-        less: share of the target's area where it really covers less.
+        radius: radius of the discs over which both are averaged [mm]. 0 without averaging.
+        real: True where the difference exceeds its 95 % interval, shape (v,) bool. Each interval
+            holds for a single place, so by chance a place in twenty exceeds its interval.
+        more: share of the target's area with really more coverage in the later candidate.
+        less: share of the target's area with really less coverage in the later candidate.
     """
 
     value: np.ndarray
@@ -135,12 +136,12 @@ class LocalDifference:
 
 
 def local_difference(first: TargetSurface, other: TargetSurface) -> LocalDifference:
-    """Compute other - first for two results of one part and target.
+    """Compute `other` - `first` for two results of the same part and target.
 
-    Both are averaged over the same discs, wide enough for DENTS dents. The interval of the
-    difference follows from those of the two coverages, which assume independent dents: averages of
-    windows of radius l over discs of radius R scatter as in windows of radius sqrt(l² + R²). Where
-    either has too few dents, no difference is real.
+    Both coverages are averaged over the same discs, wide enough for DENTS dents. The interval of
+    the difference follows from the intervals of the two coverages, which assume independent dents.
+    The average of windows of radius l over a disc of radius R scatters as a window of radius
+    sqrt(l² + R²). At places with too few dents in a result, no difference is real.
 
     Source: G. Y. Zou and A. Donner, "Construction of confidence limits about effect measures",
     Statistics in Medicine 27 (2008) 1693.
@@ -159,7 +160,7 @@ def local_difference(first: TargetSurface, other: TargetSurface) -> LocalDiffere
 
 
 def _averages(surface: TargetSurface, radius: float) -> Callable[[np.ndarray], np.ndarray]:
-    """A function that averages values (v,) over the disc round each place that faces its way."""
+    """A function that averages values (v,) over a disc round each place, on similar normals."""
     if radius == 0.0:
         return np.asarray
     from scipy.spatial import cKDTree
