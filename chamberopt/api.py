@@ -86,24 +86,17 @@ def optimise(
         InputError: the folder is another study's, the start cannot be simulated, or no candidate
             meets the constraints.
     """
-    from chamberopt.chamber.build import build_chamber
     from chamberopt.common.executor import local_executor
     from chamberopt.results.load import load_result
-    from chamberopt.search.run_study import run_study
     from chamberopt.search.study_folder import open_study_folder
-    from chamberopt.simulation.effect_pilot import with_effects_resolved
-    from chamberopt.workflows.save_run import save_study
+    from chamberopt.workflows.optimise import optimise_study
+    from chamberopt.workflows.simulate import Teller
 
     _require("study", study, Study, "load_study")
     with open_study_folder(study, out) as folder, local_executor(workers) as executor:
         if not folder.finished:
-            start = build_chamber(study.design)
-            study, advice = folder.with_effects_resolved(
-                lambda design: with_effects_resolved(design, start, executor)
-            )
-            result = run_study(study, folder, executor, progress)
-            remarks = save_study(out, result, advice)
-            _warn([*map(str, advice), *remarks])
+            done = optimise_study(folder, executor, Teller(progress))
+            _warn([*map(str, done.advice), *done.remarks])
     return load_result(out)
 
 

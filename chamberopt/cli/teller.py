@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, contextmanager
 from typing import TYPE_CHECKING
 
-from chamberopt.cli.console import print_warnings
+from chamberopt.cli.console import print_remarks, print_warnings
 from chamberopt.cli.prepare import compile_with_message
 from chamberopt.common.progress import step
 from chamberopt.workflows.simulate import Teller
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from chamberopt.chamber.build import Chamber
+    from chamberopt.cli.interrupt import Interrupt
     from chamberopt.common.progress import Progress
     from chamberopt.design.load import Design
     from sim_core import AnalyticCavity
@@ -26,5 +29,23 @@ class TerminalTeller(Teller):
     def compile(self, design: Design, chamber: Chamber, cavity: AnalyticCavity | None) -> None:
         compile_with_message(design, chamber, cavity)
 
-    def check(self, design: Design, chamber: Chamber) -> list[str] | None:
-        return print_warnings(design, chamber)
+    def check(self, design: Design, chamber: Chamber, which: str = "") -> list[str] | None:
+        return print_warnings(design, chamber, which)
+
+    def tell(self, text: str) -> None:
+        print_remarks([text])
+
+
+class SearchTeller(TerminalTeller):
+    """Lets Ctrl-C wait for the running evaluations of a search, and says how to resume it."""
+
+    def __init__(self, interrupt: Interrupt, how_to_resume: str) -> None:
+        super().__init__()
+        self._interrupt, self._how_to_resume = interrupt, how_to_resume
+
+    @contextmanager
+    def step(self, what: str, total: int | None = None) -> Iterator[Progress]:
+        with step(what, total) as progress:
+            if what == "evaluations":
+                self._interrupt.wait_for_evaluation(self._how_to_resume)
+            yield progress

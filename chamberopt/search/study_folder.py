@@ -236,7 +236,7 @@ class StudyFolder:
     """An open study folder, see open_study_folder; `recorded` are the trials that it held then."""
 
     def __init__(self, study: Study, path: Path, plan: Mapping[str, Any] | None = None) -> None:
-        self.path, self._study, self._inputs = path, study, study_inputs(study, plan)
+        self.path, self.study, self._inputs = path, study, study_inputs(study, plan)
         self._history = JsonLines(path / HISTORY)
         self._timings = JsonLines(path / TIMINGS, survives_power_cut=False)
         if self.begun:
@@ -278,9 +278,9 @@ class StudyFolder:
 
         `resolve` is called once and its answer is stored, because a pilot run takes minutes.
         """
-        design = self._study.design
+        design = self.study.design
         if not design.effects.auto:
-            return self._study, []
+            return self.study, []
         self.begin()
         path = self.path / EFFECTS
         if not path.is_file():
@@ -298,7 +298,7 @@ class StudyFolder:
             raise _damaged(path, first_wrong_value(error)) from None
         except (KeyError, TypeError, ValueError, InputError) as error:
             raise _damaged(path, error) from None
-        return self._study.model_copy(update={"design": resolved}), advice
+        return self.study.model_copy(update={"design": resolved}), advice
 
     def evaluation(self, trial: Trial) -> Evaluation:
         """The evaluation of a recorded confirmation; InputError unless its file has its figures."""
@@ -323,7 +323,7 @@ class StudyFolder:
 
         OSError if they cannot be written, InputError if a file that the design names has changed.
         """
-        require_same_files(self._study.design, self._inputs, self.path)
+        require_same_files(self.study.design, self._inputs, self.path)
         if trial.stage == "confirm" and isinstance(evaluation, Evaluation):
             path = self._evaluation_path(trial.number)
             make_folder(path.parent)

@@ -45,9 +45,16 @@ class Teller:
     def compile(self, design: Design, chamber: Chamber, cavity: AnalyticCavity | None) -> None:
         """Compile the simulator before the first replica needs it."""
 
-    def check(self, design: Design, chamber: Chamber) -> list[str] | None:
-        """Warnings on the design; None where it is not checked."""
+    def check(self, design: Design, chamber: Chamber, which: str = "") -> list[str] | None:
+        """Warnings on the design; None where it is not checked.
+
+        Args:
+            which: name of the design where there are several, such as " of the best design".
+        """
         return None
+
+    def tell(self, text: str) -> None:
+        """Tell the user a sentence."""
 
 
 def _uncounted(done: int, total: int, best: float | None) -> None:

@@ -216,7 +216,7 @@ class TestCommandLine:
 
         self.at: dict[int, Callable[[], None]] = {}
         monkeypatch.setattr("chamberopt.search.run_study.ChamberSimulator", lambda *_: simulator)
-        monkeypatch.setattr("chamberopt.cli.commands.run.compile_with_message", lambda *_: None)
+        monkeypatch.setattr("chamberopt.cli.teller.compile_with_message", lambda *_: None)
         monkeypatch.setattr("chamberopt.pictures.coverage.draw_coverage", lambda *_: None)
         return done
 
@@ -291,14 +291,14 @@ class TestCommandLine:
         An exception would be dropped during an import, and would crash the compiler.
         """
         monkeypatch.setattr(
-            "chamberopt.cli.commands.run.compile_with_message",
+            "chamberopt.cli.teller.compile_with_message",
             lambda *_: os.kill(os.getpid(), signal.SIGINT),
         )
         child = fork.Process(target=main, args=(["run", "small.toml"],))
         child.start()
         child.join(60)
         assert (child.exitcode, EARLY in capfd.readouterr().err) == (130, True)
-        monkeypatch.setattr("chamberopt.cli.commands.run.compile_with_message", lambda *_: None)
+        monkeypatch.setattr("chamberopt.cli.teller.compile_with_message", lambda *_: None)
         assert main(["run", "small.toml"]) == 0
         assert [path.name for path in Path("results").iterdir()] == ["small"]
 
