@@ -1,6 +1,6 @@
 """Run replicas and candidates on a Dask cluster.
 
-This is the only file that imports distributed, which the extra `dask` installs.
+Only this file imports the package distributed, which the extra `dask` installs.
 """
 
 from __future__ import annotations
@@ -39,24 +39,25 @@ class DaskExecutor(Executor):
 
         Args:
             cluster: tcp://HOST:PORT, or a scheduler file (.json).
-            timeout: seconds to wait for a worker.
+            timeout: longest wait for a worker [s]; None for WORKER_TIMEOUT_S.
 
         Raises:
             InputError: if Dask is not installed, no scheduler answers, it has no workers, or its
                 workers run another program.
         """
         try:
-            from distributed import Client
+            import distributed
         except ImportError:
             text = "needs Dask, which is not installed; pip install 'chamberopt[dask]'"
             raise InputError(f"--cluster: {text}") from None
         quiet = "distributed", "distributed.client", "tornado", "tornado.application", "asyncio"
         for name in quiet:
-            logging.getLogger(name).setLevel(logging.CRITICAL)  # an error here has one message
+            logging.getLogger(name).setLevel(logging.CRITICAL)  # the InputError tells it once
         address = _scheduler_address(cluster)
         try:
             _require_scheduler(address)
-            self._client = Client(address, timeout=TIMEOUT_S, set_as_default=False)
+            dask: Any = distributed  # whose functions state no types
+            self._client = dask.Client(address, timeout=TIMEOUT_S, set_as_default=False)
         except (OSError, ValueError) as error:
             raise InputError(
                 f"--cluster: no scheduler answers at {address} within {2 * TIMEOUT_S:g} s "
@@ -81,7 +82,7 @@ class DaskExecutor(Executor):
         future: Future[Any] = Future()
 
         def copy_outcome(_: Future[Any]) -> None:
-            if future.set_running_or_notify_cancel():  # from here on nobody can cancel it
+            if future.set_running_or_notify_cancel():  # a future that runs cannot be cancelled
                 _copy_outcome(dask_future, future)
 
         dask_future.add_done_callback(copy_outcome)
@@ -97,6 +98,7 @@ class DaskExecutor(Executor):
         self.shutdown(cancel_futures=error[0] is not None)
 
     def _require_workers(self, address: str, timeout: float) -> None:
+        """Raise InputError unless the scheduler has workers, and all run this same program."""
         try:
             self._client.wait_for_workers(1, timeout=timeout)
         except TimeoutError:
@@ -118,7 +120,7 @@ class DaskExecutor(Executor):
 
 
 def _scheduler_address(cluster: str) -> str:
-    """The scheduler's address, as given or from its file."""
+    """Return the scheduler's address: `cluster` itself, or the address in the scheduler file."""
     if "://" in cluster:
         return cluster
     try:
@@ -153,15 +155,18 @@ def _require_scheduler(address: str) -> None:
 
 
 async def _kind_of_server(address: str) -> str:
-    """What a Dask server says that it is: Scheduler, Worker or Nanny."""
-    from distributed.core import rpc
-    from distributed.security import Security
+    """Ask a Dask server for its kind: Scheduler, Worker or Nanny."""
+    import distributed.core
+    import distributed.security
 
-    async with rpc(address, connection_args=Security().get_connection_args("client")) as server:
+    dask: Any = distributed
+    security = dask.security.Security().get_connection_args("client")
+    async with dask.core.rpc(address, connection_args=security) as server:
         return str((await server.identity())["type"])
 
 
 def _copy_outcome(dask_future: Future[Any], future: Future[Any]) -> None:
+    """Set a future to the result or error of Dask's future, with Dask's errors translated."""
     from distributed import KilledWorker
 
     try:

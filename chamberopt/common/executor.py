@@ -1,7 +1,7 @@
 """Choose where replicas and candidates run: threads or processes here, a Dask cluster, or serially.
 
-Everything that takes an executor takes a `concurrent.futures.Executor`. `share` sends an argument
-that many tasks have in common, such as a chamber, once to each worker and not with every task.
+All are a `concurrent.futures.Executor`. `share` sends an argument that many tasks have in common,
+such as a chamber, once to each worker and not with every task.
 """
 
 import os
@@ -14,13 +14,13 @@ from chamberopt.common.errors import InputError
 WorkerKind = Literal["threads", "processes"]
 
 # A replica holds Python's lock for 14 % of its time (gear: 0.2 s of CPU time for packing the shot
-# and tallies), so that seven threads already keep the lock busy. Processes do not share a lock, but
-# each takes some 2 s of CPU time to import everything and load compiled code.
+# and tallies), so seven threads keep the lock busy. Processes share no lock, but each process takes
+# some 2 s of CPU time to import modules and load compiled code.
 MAX_THREADS = 8
 
 
 def core_count() -> int:
-    """Cores that this process may use; an affinity mask or a batch system can leave fewer."""
+    """Number of cores that this process may use, of which a batch system may leave only some."""
     if hasattr(os, "sched_getaffinity"):
         return max(1, len(os.sched_getaffinity(0)))
     return max(1, os.cpu_count() or 1)
@@ -30,7 +30,13 @@ def local_executor(workers: int | None = None, kind: WorkerKind = "threads") -> 
     """Make workers on this machine, for use in a `with` block.
 
     Threads share the chamber and start at once, and the simulator releases Python's lock. Processes
-    also run in parallel what needs the lock. There is one worker per core if their number is None.
+    also run code in parallel that needs the lock.
+
+    Args:
+        workers: number of workers; None for one per core.
+
+    Raises:
+        InputError: `workers` is less than 1.
     """
     if workers is not None and workers < 1:
         remedy = "give at least 1, or leave it out for one per core"
@@ -46,9 +52,15 @@ def local_executor(workers: int | None = None, kind: WorkerKind = "threads") -> 
 def open_executor(
     workers: int | None, cluster: str | None, kind: WorkerKind | None = None
 ) -> Executor:
-    """Make the workers of --workers, or connect to those of --cluster.
+    """Make workers on this machine, or connect to the workers of a cluster.
 
-    `kind` is that of workers on this machine; if None, processes where threads would be too many.
+    Args:
+        workers: --workers, None if it is not given.
+        cluster: --cluster, None if it is not given.
+        kind: of workers on this machine; None for threads up to MAX_THREADS, else processes.
+
+    Raises:
+        InputError: both options are given, or an option cannot be used.
     """
     if cluster is None:
         few = (workers or core_count()) <= MAX_THREADS
@@ -62,7 +74,7 @@ def open_executor(
 
 
 def share(executor: Executor, value: Any) -> Any:
-    """Prepare an argument for many tasks of an executor; the tasks receive the value itself."""
+    """Return a stand-in for a value among the arguments of many tasks; they receive the value."""
     share_with_workers = getattr(executor, "share", None)
     return value if share_with_workers is None else share_with_workers(value)
 
@@ -70,7 +82,7 @@ def share(executor: Executor, value: Any) -> Any:
 class ThreadExecutor(ThreadPoolExecutor):
     """Worker threads; an exception that leaves the `with` block cancels the tasks that wait.
 
-    Ctrl-C does not wait for the tasks that run either: the command line ends their process.
+    Ctrl-C leaves the block at once: the command line then ends the process, and the tasks with it.
     """
 
     def __exit__(self, *error: Any) -> None:
@@ -79,7 +91,7 @@ class ThreadExecutor(ThreadPoolExecutor):
 
 
 class SerialExecutor(Executor):
-    """Runs each task in the calling thread: on cluster workers, in tests, debuggers, profilers."""
+    """The calling thread as the worker: for cluster workers, tests, debuggers and profilers."""
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
         future: Future[Any] = Future()

@@ -28,6 +28,7 @@ def free_memory() -> float:
 
 
 def _free_of_machine() -> float:
+    """Free bytes of the machine; its whole memory on macOS, infinite on Windows."""
     with suppress(OSError, LookupError, ValueError):
         for line in Path("/proc/meminfo").read_text().splitlines():
             if line.startswith("MemAvailable:"):
@@ -62,7 +63,7 @@ def _free_of_group(group: Path, limit: str, used: str) -> float:
 
 
 class MemoryBudget:
-    """Bytes of arrays that are kept although they could be computed again.
+    """The bytes that this process may spend on arrays that could be computed again.
 
     The budget is a share of the free memory when the first array is kept. The worker processes of
     one command divide it among them.

@@ -1,4 +1,4 @@
-"""What the page of one design can do: each act takes a question and gives an answer."""
+"""Acts of the page of one design: each act takes a question and gives an answer."""
 
 from __future__ import annotations
 
@@ -27,14 +27,12 @@ from chamberopt.results.compare.comparison import compare
 from chamberopt.results.load import load_result, summary
 from chamberopt.search.study import load_study
 
-# Results below the design's folder: their list, one or two in 3D, and their difference.
-
 RESULT = "result.json"
-DEEPEST = 4  # folders below the design's in which results are looked for
+DEEPEST = 4  # levels of folders below the design's folder that are searched for results
 
 
 def list_results(folder: Path) -> list[dict[str, Any]]:
-    """Results below a folder, the newest first, each with its figures in one line."""
+    """List the results below a folder, the newest first, each with its figures in one line."""
     found = []
     for depth in range(1, DEEPEST + 1):
         found += list(folder.glob("/".join(["*"] * depth + [RESULT])))
@@ -55,27 +53,28 @@ def list_results(folder: Path) -> list[dict[str, Any]]:
 
 
 def shown(folders: Sequence[Path]) -> dict[str, Any]:
-    """Content of the 3D view of results, side by side; of several, also how they differ.
+    """Content of the 3D view of results, side by side, and the text of their comparison.
 
     Raises:
-        InputError: one is no usable result, or they cannot be compared.
+        InputError: a folder has no usable result, or the results cannot be compared.
     """
     html, content = parts_content(folders)
     text = comparison_text(compare(folders)) if len(folders) > 1 else ""
     return {"content": content, "html": html, "comparison": text}
 
 
-MOST_FILES = 20  # texts of the file that pages may have read
+MOST_FILES = 20  # versions of the design's text that are kept for the pages that read them
 STUDY_NAME = re.compile(r"\w[\w .+-]{0,100}\.toml")
 COMMANDS = ("simulate", "run", "sweep", "report", "sheet")
 
 
 class Acts:
-    """The acts of the page of one design, each with the name of its address.
+    """The acts of the page of one design. An act has the name of its address.
 
-    A question says by its `read` which text of the file its page read.
+    The `read` of a question is the digest of the file's text that its page has read.
 
     Args:
+        path: the design file.
         trusted: whether designs may have a Python file as their shape, which is run.
     """
 
@@ -93,7 +92,7 @@ class Acts:
             self._command.end()
 
     def read(self, _: Any) -> dict[str, Any]:
-        """The file as it is now, for a page that begins or begins again."""
+        """The design file as it is now, for a page that begins or begins again."""
         return self._as_read(self._read())
 
     def part(self, asked: Any) -> bytes:
@@ -104,7 +103,7 @@ class Acts:
 
     def cavity(self, asked: Any) -> bytes:
         file = self._file(asked)
-        file.with_changes(asked["changes"])  # its message comes at once
+        file.with_changes(asked["changes"])  # so that a wrong value is told at once
         number, answer = self._checker.cavity(file.changed_text(asked["changes"]))
         return number.to_bytes(4, "little") + answer
 
@@ -135,7 +134,7 @@ class Acts:
         return file
 
     def _file(self, asked: Any) -> EditedFile:
-        """The file as the page that asks read it."""
+        """The design file as the asking page has read it."""
         file = self._files.get(str(asked["read"]))
         if file is None:
             raise InputError("this page has read an older file: reload it")
@@ -157,7 +156,7 @@ class Acts:
         }
 
     def study(self, asked: Any) -> dict[str, Any]:
-        """Write a study beside the design; it must load."""
+        """Write a study beside the design, and remove it if it is no valid study."""
         name, evaluations = str(asked["name"]), float(asked["evaluations"])
         if not STUDY_NAME.fullmatch(name):
             raise InputError(f"{name!r}: give a name of letters and digits that ends in .toml")
@@ -196,7 +195,7 @@ class Acts:
             return self._command.status()
 
     def _refuse_shape(self, file: Path) -> None:
-        """Raise InputError for a design, or a study of one, whose shape is run and not trusted."""
+        """Raise InputError if a design, or a study's design, has a shape that is not trusted."""
         data = read_toml(file, "design")[1]
         if is_study(data) and isinstance(data.get("design"), str):
             data = read_toml(file.parent / data["design"], "design")[1]
@@ -222,21 +221,21 @@ class Acts:
         return shown([self.inside(str(one)) for one in asked["folders"][:2]])
 
     def inside(self, name: str) -> Path:
-        """A path that is inside the design's folder; InputError otherwise."""
+        """The path of a name in the design's folder; InputError if the path leads out of it."""
         path = (self._path.parent / name).resolve()
         if not path.is_relative_to(self._path.parent):
             raise InputError(f"{name}: outside the design's folder")
         return path
 
     def _free_folder(self, name: str) -> str:
-        """The first of results/NAME, NAME-2 ... that is free."""
+        """The first free folder of results/NAME, results/NAME-2, ..."""
         folders = (Path("results", f"{name}-{k}" if k > 1 else name) for k in count(1))
-        self.inside("results")  # which may be a link to elsewhere
+        self.inside("results")  # the folder may be a link to elsewhere
         return next(one for one in folders if is_new_or_empty(self._path.parent / one)).as_posix()
 
 
 def _files_beside(design: Path) -> list[dict[str, str]]:
-    """The designs and studies in a design's folder, itself first, as far as they can be read."""
+    """The readable designs and studies in a design's folder, the design itself first."""
     rows = []
     for path in sorted(design.parent.glob("*.toml"), key=lambda one: (one != design, one.name)):
         with suppress(InputError):

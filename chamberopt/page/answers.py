@@ -1,4 +1,4 @@
-"""What the page draws and says of a design: the part, its shape, the cavity, what is reached."""
+"""Answers on a design that the page draws and shows: part, shape, cavity and reach."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ from chamberopt.design.design import Design
 from chamberopt.design.shapes import TAG_PART, is_sonotrode
 from chamberopt.geometry.triangles import areas, sharp_edges
 
-# What a triangle of the part is, for its colour; see scene.js.
+# Kinds of the part's triangles, by which scene.js colours them.
 REST, TARGET, OUTSIDE, MISSED, ZONE = range(5)
-# Three.js takes single precision (about 1e-5 mm) and unsigned numbers of points.
+# Types of arrays that Three.js takes; single precision is about 1e-5 mm.
 KINDS = {"f": "<f4", "i": "<u4", "u": "<u4", "b": "u1"}
 
 
@@ -66,7 +66,7 @@ def shape_answer(design: Design) -> bytes:
 
 
 def check_answers(design: Design) -> Iterator[bytes]:
-    """As `check` says: first the cavity with facts and warnings at once, then what is reached."""
+    """Yield the facts of `check` in two answers: the cavity at once, then the reach of the shot."""
     chamber = build_chamber(design)
     mesh = chamber_mesh(chamber)
     head: dict[str, Any] = {
@@ -112,8 +112,10 @@ def _surface(
 
 
 def packed(head: Mapping[str, Any], **arrays: np.ndarray) -> bytes:
-    """Length of the head (4 bytes), the head with kind and length of each array, the arrays; each
-    begins at a multiple of 4 bytes."""
+    """Bytes of an answer: the length of the head (4 bytes), the head as JSON, and the arrays.
+
+    The head also gives each array's kind and length. Each array begins at a multiple of 4 bytes.
+    """
     blocks = []
     for values in arrays.values():
         flat = np.ascontiguousarray(values).ravel()

@@ -1,4 +1,4 @@
-"""The design file being edited: its text with changes, and saving it line by line."""
+"""The design file that pages edit: its text with changes, its fields, and saving."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ from chamberopt.common.toml_fields import read_toml
 from chamberopt.design.design import Design, validate
 from chamberopt.design.shapes.base import is_custom
 
-# By dotted name, in the file's units; None takes a key out of the file.
+# New values of keys by their dotted names, in the file's units; None takes a key out of the file.
 Changes = Mapping[str, Any]
-LONGEST_SAVE_S = 5.0  # of another page, which takes a tenth of a second
-LATE_WRITE_S = 0.05  # from an editor's opening of the file to its writing, by far
-# What is changed beside the fields of the page: a target or zone, and what it chooses.
+LONGEST_SAVE_S = 5.0  # wait for another page's save, which takes a tenth of a second
+LATE_WRITE_S = 0.05  # an editor takes far less from opening a file to writing it
+# Keys that the page changes beside its fields: zones, and the choices of a target or zone.
 PICKED = re.compile(
     r"(part\.target|zones\.\d+\.target)\.(surface|faces|direction|angle_deg|box_mm|radius_mm)"
     r"|zones\.\d+"
@@ -36,10 +36,11 @@ class EditedFile:
     """A design file as one page read it.
 
     Args:
-        trusted: whether its shape may be a Python file, which is run.
+        path: the design file.
+        trusted: whether the design's shape may be a Python file, which is run.
 
     Raises:
-        InputError: it is a link, does not load, or has a shape of the user's that is not trusted.
+        InputError: the file is a link or no valid design, or its shape is not trusted.
     """
 
     def __init__(self, path: Path, trusted: bool) -> None:
@@ -61,11 +62,11 @@ class EditedFile:
 
     @property
     def digest(self) -> str:
-        """By which a page says what it read."""
+        """Digest of the text, by which a page names the text that it read."""
         return hashlib.sha256(self.text.encode()).hexdigest()
 
     def with_changes(self, changes: Changes) -> Design:
-        """The design that the file would hold; InputError names every problem."""
+        """The design of the text with changes; InputError names every problem."""
         text = self.changed_text(changes)
         return validate(Design, tomllib.loads(text), self.path, text)
 
@@ -73,8 +74,8 @@ class EditedFile:
         """The text of the file with changes; comments, order and other lines stay.
 
         Raises:
-            InputError: a name is not one that the page may change, or the file says it in a way
-                that cannot be changed by itself.
+            InputError: the page may not change a key, or the key stands in the file in a form that
+                cannot be changed alone.
         """
         import tomlkit
         from tomlkit.exceptions import TOMLKitError
@@ -93,8 +94,12 @@ class EditedFile:
         return tomlkit.dumps(document) if changes else self.text
 
     def save(self, changes: Changes) -> None:
-        """Write the file; InputError, and nothing written, if it was changed elsewhere meanwhile,
-        may not be written, or would not load."""
+        """Write the file with changes.
+
+        Raises:
+            InputError: the file has changed since it was read, is read-only, or would be no valid
+                design; it stays as it is.
+        """
         text = self.changed_text(changes)
         self.with_changes(changes)
         if not self.path.stat().st_mode & stat.S_IWUSR:
@@ -104,8 +109,8 @@ class EditedFile:
             write_bytes(self.path, text.encode(), self._look_at_replaced)
 
     def _look_at_replaced(self, path: Path) -> None:
-        """Raise InputError unless what was replaced is what was read, and stays so."""
-        time.sleep(LATE_WRITE_S)  # an editor that had opened it before may write to it now
+        """Raise InputError unless the replaced file still holds the text that was read."""
+        time.sleep(LATE_WRITE_S)  # an editor that opened the file before may write to it now
         self._require_unchanged(path)
 
     def _require_unchanged(self, path: Path) -> None:
@@ -121,7 +126,7 @@ class EditedFile:
             )
 
     def is_fixed(self, name: str) -> bool:
-        """Whether a number is not the file's own, as of a metal that it takes by its name."""
+        """Whether a text of the file, such as a metal's name, stands for a number's table."""
         inner: Any = tomllib.loads(self.text)
         for step in name.split(".")[:-1]:
             inner = inner.get(step, {}) if isinstance(inner, dict) else {}
@@ -130,7 +135,7 @@ class EditedFile:
         return False
 
     def _change(self, document: Any, name: str, value: Any) -> None:
-        """Set or remove one key, making the tables and lists on the way to it."""
+        """Set or remove one key, and make the tables and lists on the way to it."""
         import tomlkit
 
         steps, table = name.split("."), document
@@ -164,7 +169,7 @@ class EditedFile:
             table.append(_table(value))
 
     def _present(self, steps: list[str]) -> Any:
-        """The value of the design at the end of a path."""
+        """The design's value at the end of a path of names."""
         value: Any = self.design
         for step in steps:
             value = getattr(value, step)
@@ -172,14 +177,14 @@ class EditedFile:
 
 
 def custom_shape(data: Mapping[str, Any]) -> str:
-    """The Python file that is the shape of a design's values; "" if it is none."""
+    """The Python file that a design's data name as the chamber's shape; "" if they name none."""
     chamber = data.get("chamber")
     shape = chamber.get("shape") if isinstance(chamber, Mapping) else None
     return str(shape) if is_custom(shape) else ""
 
 
 def _inline(value: Any) -> Any:
-    """A list of tables with each on one line; other values as they are."""
+    """The value with each table on one line of its own; a value without tables as it is."""
     import tomlkit
 
     if isinstance(value, dict):
@@ -202,10 +207,10 @@ def _table(value: dict[str, Any]) -> Any:
     return table
 
 
-# What the page asks of a design: each number and choice with unit, bounds and description.
+# Fields of the page: each number and choice of a design with unit, bounds and description.
 
-# Tables whose numbers are measured, not chosen; those that the page changes by picking; and what
-# the part is meshed by, which would make it another part.
+# Tables without fields: their numbers are measured, or chosen by clicks on the part, or mesh the
+# part, which would become another part.
 NOT_SHOWN = ("calibration.", "part.target.", "zones.", "tolerances.", "part.tessellation.")
 
 
@@ -228,12 +233,12 @@ def design_fields(file: EditedFile) -> list[dict[str, Any]]:
 
 
 def field_names(design: Design) -> set[str]:
-    """The names of these numbers and choices: nothing else is a field of the page."""
+    """The names of the fields that `design_fields` gives."""
     return {*(name for name, _ in _numbers(design)), *_choices(design)}
 
 
 def _numbers(design: Design) -> Iterator[tuple[str, FieldInfo]]:
-    """Every number, but for parts of a list in a table that the design does not have."""
+    """Names and fields of the shown numbers, without items of lists that the design leaves out."""
     for name, field in numeric_fields(design):
         in_list = name.rpartition(".")[2].isdecimal()
         if not name.startswith(NOT_SHOWN) and (not in_list or _value(design, name) is not None):
@@ -241,14 +246,14 @@ def _numbers(design: Design) -> Iterator[tuple[str, FieldInfo]]:
 
 
 def _choices(design: Design) -> dict[str, tuple[str, ...]]:
-    """Texts to choose from; a shape is none of them, because it has keys of its own."""
+    """Allowed texts of each key with a choice, but not of the shape, which has keys of its own."""
     tables = {"chamber": design.chamber, "sonotrode": design.sonotrode}
     found = (one for name, table in tables.items() for one in text_choices(table, name))
     return {name: texts for name, texts in found if name not in ("chamber.unit", "chamber.shape")}
 
 
-def _value(design: Design, name: str) -> float | None:
-    """The number of a design, None where it is not set."""
+def _value(design: Design, name: str) -> Any:
+    """A number of the design, None where it is not set."""
     value: Any = design
     for step in name.split("."):
         value = value[int(step)] if isinstance(value, tuple) else getattr(value, step, None)
@@ -256,7 +261,7 @@ def _value(design: Design, name: str) -> float | None:
 
 
 def _bounds(field: FieldInfo) -> dict[str, float]:
-    """Least and largest value that the schema allows, as far as it has them."""
+    """The least and largest allowed value of a field, if it has such bounds."""
     found: dict[str, float] = {}
     for constraint in field.metadata:
         for key, name in (("ge", "least"), ("le", "most")):
@@ -266,6 +271,6 @@ def _bounds(field: FieldInfo) -> dict[str, float]:
 
 
 def _unit(name: str) -> str:
-    """The unit that the name of a list ends in."""
+    """The unit at the end of a list's name; "" if there is none."""
     key = name.rstrip("0123456789.").rpartition(".")[2]
     return {"mm": "mm", "deg": "degrees", "um": "µm", "s": "s"}.get(key.rpartition("_")[2], "")

@@ -1,4 +1,4 @@
-"""Choose target, zones and pose by clicking on the part: changes of the design's keys."""
+"""Changes of a design's keys that choose target, zones and pose by clicks on the part."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from chamberopt.design.part import MAX_FACES, FaceAt, Selection
 from chamberopt.geometry.faces import Faces
 from chamberopt.geometry.meshes.part_mesh import PartMesh
 
-DIGITS = 4  # of a place in mm: a tenth of a micrometre
+DIGITS = 4  # decimals of a place [mm]: a tenth of a micrometre
 TARGET_TABLE = "part.target"
 OTHER_WAYS = ("surface", "direction", "angle_deg", "box_mm", "radius_mm")
 Row = dict[str, Any]  # an item of `faces` in a target's table
 
 
 class Picker:
-    """Faces of the part, found once for each crease angle."""
+    """The faces of the part, found once for each crease angle, and changes that use them."""
 
     def __init__(self) -> None:
         self._known: dict[tuple[int, float], tuple[PartMesh, Faces]] = {}
@@ -29,24 +29,26 @@ class Picker:
     def with_face(
         self, design: Design, table: str, triangle: int, crease_deg: float, alike: bool, add: bool
     ) -> dict[str, Any]:
-        """Changes that add the face of a triangle to a target, or take it away.
+        """Changes that add the face of a triangle to a target, or take the face away.
 
         A target that is chosen in another way becomes the list of its faces.
 
         Args:
             table: dotted name of the target, e.g. part.target.
-            triangle: of the part, in the file's order.
-            alike: with all faces that are congruent with it.
+            triangle: number of the triangle in the part's file.
+            crease_deg: angle at which faces meet [degrees].
+            alike: whether all congruent faces come or go too.
+            add: whether the face is added.
 
         Raises:
-            InputError: nothing would change or be left, or the target's border follows no faces.
+            InputError: the target would stay as it is or be empty, or its border follows no faces.
         """
         preview = preview_part(design)
         mesh, faces = preview.mesh, self._faces(preview.mesh, crease_deg)
         selection, chosen = _selection(design, table, preview.target, preview.zones)
         default = Selection()
         ways = [key for key in OTHER_WAYS if getattr(selection, key) != getattr(default, key)]
-        if not ways and not selection.faces and add:  # the whole surface, which the first replaces
+        if not ways and not selection.faces and add:  # the first face replaces the whole surface
             chosen = np.zeros_like(chosen)
         face = _face_of(faces, triangle)
         row = _row(faces, face, crease_deg, alike)
@@ -96,15 +98,15 @@ class Picker:
             if len(self._known) > 8:
                 self._known.clear()
             faces = Faces(mesh.vertices, mesh.triangles, crease_deg)
-            self._known[key] = mesh, faces  # which keeps the mesh, and so its id
+            self._known[key] = mesh, faces  # a mesh that is kept keeps its id
         return self._known[key][1]
 
     def _mask(self, row: Row, mesh: PartMesh) -> np.ndarray:
-        """The triangles (m,) that an item of `faces` chooses."""
+        """Mask (m,) of the triangles that an item of `faces` chooses."""
         faces = self._faces(mesh, row.get("crease_deg", 30.0))
         face, _ = faces.at(1e-3 * np.array(row["at_mm"]))
         if row.get("alike"):
-            return faces.alike(face)[faces.of_triangle]
+            return np.asarray(faces.alike(face)[faces.of_triangle])
         return np.asarray(faces.of_triangle == face)
 
     def _within(self, row: Row, mesh: PartMesh, mask: np.ndarray) -> bool:
@@ -114,7 +116,7 @@ class Picker:
 def _selection(
     design: Design, table: str, target: np.ndarray, zones: dict[str, np.ndarray]
 ) -> tuple[Selection, np.ndarray]:
-    """A target's table, and the triangles (m,) that it chooses."""
+    """A target's table, and the mask (m,) of the triangles that the table chooses."""
     if table == TARGET_TABLE:
         return design.part.target, target
     places = {f"zones.{k}.target": zone for k, zone in enumerate(design.zones)}

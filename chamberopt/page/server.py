@@ -1,4 +1,4 @@
-"""The page's server: what is at each of its addresses, on this machine only."""
+"""The page's server, for one person on this machine: its addresses and who may use them."""
 
 from __future__ import annotations
 
@@ -32,20 +32,20 @@ from chamberopt.page.checker import SupersededError
 from chamberopt.printers.report_page import POLICY
 from sim_core import SceneError
 
-# Who may talk to the page's server: one person's browser on this machine, and no other page in it.
+# One person's browser on this machine may talk to the server, and no other page in that browser.
 #
-# The server listens on the loopback address only. The printed address holds a token, which
-# becomes a cookie that scripts cannot read and other sites cannot send; the names of hosts are
-# checked against rebinding of DNS, and the origin of what changes anything. See OWASP, "Cross-
-# Site Request Forgery Prevention" and "DNS rebinding".
+# The server listens on the loopback address only. The printed address holds a token, which becomes
+# a cookie that scripts cannot read and other sites cannot send. The host's name is checked against
+# rebinding of DNS, and the origin of each request that changes anything. See OWASP, "Cross-Site
+# Request Forgery Prevention" and "DNS rebinding".
 
 EDITOR_POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data: "
     "blob:; connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
 UNKNOWN = "open the address that chamberopt edit printed, with its token"
-# Browsers send cookies to every port of a host, so that another server on this machine could learn
-# the cookie. What asks or changes anything takes a key too, which the page alone keeps.
+# Browsers send cookies to every port of a host, so another server on this machine could learn the
+# cookie. A request that asks or changes anything also takes a key, which only the page keeps.
 KEY, OPEN = "x-chamberopt-key", ("/browser/", "/files/")
 HEADERS = {
     "X-Content-Type-Options": "nosniff",
@@ -87,7 +87,7 @@ class OnePerson:
         await self._app(scope, receive, send_with_headers)
 
     def _refusal(self, request: Request) -> Response | None:
-        """Why a request is not served, or how a browser that knows the token gets its cookie."""
+        """The refusal of a request, or a cookie for the right token; None to serve the request."""
         if request.headers.get("host") not in self._hosts:
             return _refused("this server is for this machine only")
         origin = request.headers.get("origin")
@@ -120,10 +120,10 @@ def _refused(why: str) -> Response:
 
 
 BROWSER = Path(__file__).parent / "browser"
-# A report runs scripts of its own: it is shown as a page of nobody, which cannot use this server.
+# A report runs scripts of its own. In the sandbox it has no origin, and cannot use this server.
 FILE_POLICY = "sandbox allow-scripts allow-modals allow-popups allow-downloads"
 SHOWN_FILES = {".html": "text/html", ".pdf": "application/pdf", ".png": "image/png"}
-# Names of acts; those that need no question are asked by GET.
+# Names of acts; LOOKS need no question and are asked by GET.
 QUESTIONS = ("read", "part", "shape", "cavity", "reach", "pick")
 ACTS = ("save", "study", "start", "stop", "shown")
 LOOKS = "status", "results"
@@ -136,12 +136,12 @@ NONSENSE = (
     RecursionError,
     OSError,
 )
-MOST_BYTES = 2_000_000  # of a question
+MOST_BYTES = 2_000_000  # bytes of a question
 TOO_LONG = f"this question has more than {1e-6 * MOST_BYTES:g} MB; ask for less at a time"
 
 
 def make_app(acts: Acts, port: int) -> OnePerson:
-    """The server's application."""
+    """Make the server's application, with an address for each act, the page and its files."""
 
     def route(name: str, method: str) -> Route:
         act = getattr(acts, name)
@@ -191,7 +191,7 @@ def make_app(acts: Acts, port: int) -> OnePerson:
 
 
 async def _body(request: Request) -> bytes | None:
-    """The body of a request; None as soon as it is, or says that it will be, too long."""
+    """Read the body of a request; None if it is too long, or announces such a length."""
     if int(request.headers.get("content-length", 0)) > MOST_BYTES:
         return None
     body = bytearray()
@@ -206,13 +206,17 @@ def serve(path: Path, port: int, trusted: bool, tell: Callable[[str], None]) -> 
     """Serve the page of a design until Ctrl-C.
 
     Args:
+        path: the design file.
+        port: number of the port; 0 for any free port.
         trusted: whether designs may have a Python file as their shape.
-        port: of the loopback address; 0 for a free one.
-        tell: called with the address once the server answers there.
+        tell: called with the page's address when the server answers there.
+
+    Raises:
+        InputError: the design cannot be edited, or the port cannot be used.
     """
     acts = Acts(path, trusted)
     listening = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
-    if os.name == "posix":  # a port that was just left; elsewhere this shares one that is in use
+    if os.name == "posix":  # takes a port just left; Windows would share a port in use
         listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
         try:
