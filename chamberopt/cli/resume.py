@@ -47,8 +47,9 @@ def unfinished(study: Path, name: str) -> list[str]:
     Args:
         name: of the folder in results/ that the command would use.
     """
+    from chamberopt.common.files import INPUTS
     from chamberopt.common.limits import MAX_RESULT_BYTES, read_limited
-    from chamberopt.search.study_folder import INPUTS, is_finished, is_study_folder
+    from chamberopt.search.study_folder import is_finished, is_study_folder
 
     results, remarks = Path("results"), []
     for folder in (results / name, *sorted(results.glob(f"{name}-[0-9]*"))):

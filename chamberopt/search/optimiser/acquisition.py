@@ -107,7 +107,7 @@ def _knowledge_gradient(model: SearchModel, leaders: np.ndarray) -> Function:
         own = np.diag(model.covariance(at, at)) / scatter
         best = [np.maximum((before + moves * z).max(axis=1), above + own * z) for z in outcomes]
         rise = np.mean(best, axis=0) - before.max()
-        return np.log(np.maximum(model.feasible(at) * rise, 1e-300))
+        return np.asarray(np.log(np.maximum(model.feasible(at) * rise, 1e-300)))
 
     return log_gradient
 

@@ -99,7 +99,7 @@ class Domain:
             return points[None]
         at_0, at_1 = np.where(self.free, self._misses, 0.0)[:, :, None, :]
         low, high = at_0 + points * (at_1 - at_0)
-        return low + self._shares[:, None, :] * (high - low) + points
+        return np.asarray(low + self._shares[:, None, :] * (high - low) + points)
 
     @cached_property
     def _shares(self) -> np.ndarray:

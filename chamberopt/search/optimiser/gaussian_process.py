@@ -158,7 +158,7 @@ def moderate_variances(spreads: np.ndarray, replicas: np.ndarray) -> np.ndarray:
         common = float(np.exp(logs.mean() + digamma(prior) - np.log(prior)))
     moderated = np.full(len(spreads), common)
     moderated[known] = (prior * common + own * spreads[known]) / (prior + own)
-    return moderated / replicas
+    return np.asarray(moderated / replicas)
 
 
 def _fit(points: np.ndarray, values: np.ndarray, noise: np.ndarray, length_factor: float) -> Any:

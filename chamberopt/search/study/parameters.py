@@ -335,7 +335,7 @@ class ParameterSpace:
         """Places of parameter k at shares (n,) of its bounds; between two levels in proportion."""
         levels, (low, high) = self._levels[k], self.bounds[k]
         if len(levels):
-            return np.interp(shares, np.linspace(0.0, 1.0, len(levels)), levels)
+            return np.asarray(np.interp(shares, np.linspace(0.0, 1.0, len(levels)), levels))
         # BOBYQA can leave the bounds by rounding.
         values: np.ndarray = np.clip(low + shares * (high - low), low, high)
         return values
