@@ -1,17 +1,17 @@
-"""Use from Python: load a design or study, simulate or optimise it, show the result.
+"""Python interface: load a design or study, simulate or optimise it, show the result.
 
     import chamberopt
 
     design = chamberopt.load_design("designs/gear.toml")
     result = chamberopt.simulate(design.changed({"shot.mass_g": 8}), "results/more-shot")
     result.metrics["mean_coverage"]            # Estimate(value=..., half_width=...), 95 % interval
-    result.notes                               # what to know before trusting it
+    result.notes                               # cautions about the figures
     chamberopt.show(result, "more-shot.png")
 
 A laboratory that measures instead of simulating asks a Search and tells it figures: docs/search.md.
 
-Coverage is in the result's coverage.vtp, a mesh that suits it, and in part.vtp as means over the
-part's own triangles; pyvista and ParaView read both.
+The result's coverage.vtp has the coverage on a mesh that suits it. part.vtp has mean coverage over
+each of the part's own triangles. pyvista and ParaView read both files.
 """
 
 from __future__ import annotations
@@ -43,13 +43,14 @@ def simulate(
     workers: int | None = None,
     progress: Progress | None = None,
 ) -> Result:
-    """Simulate one design into a folder, and return the result as read back from there.
+    """Simulate one design into a folder, and return the result that is read from the folder.
 
     Args:
         out: new or empty folder.
         analytic: use the exact cylinder, box or prism instead of its mesh, if the chamber is one.
-        tolerances: also simulate what the design's tolerances do; see result.record.tolerances.
-        workers: number of threads, by default one per core; it does not change the result.
+        tolerances: also simulate the effect of the design's tolerances. The figures are in
+            result.record.tolerances.
+        workers: number of threads, by default one per core. It does not change the result.
         progress: called as progress(done, total, None) after each replica.
     Raises:
         InputError: the chamber cannot be built, has no room for the shot or is not analytic.
@@ -75,12 +76,12 @@ def simulate(
 def optimise(
     study: Study, out: str | Path, *, workers: int | None = None, progress: Progress | None = None
 ) -> Result:
-    """Run a study into a folder; the result is that of its best design, as confirmed.
+    """Run a study into a folder, and return the confirmed result of its best design.
 
     Args:
-        out: new, empty, or the folder of the same study. An interrupted study is resumed; of a
-            finished one the result is read.
-        workers: number of threads, by default one per core; it does not change the result.
+        out: new or empty folder, or the folder of the same study. An interrupted study is resumed.
+            The result of a finished study is only read.
+        workers: number of threads, by default one per core. It does not change the result.
         progress: called as progress(done, total, best) after each evaluation.
     Raises:
         InputError: the folder is another study's, the start cannot be simulated, or no candidate
@@ -116,7 +117,7 @@ def show(result: Result, screenshot: str | Path | None = None) -> None:
 
 
 def _require(name: str, given: object, kind: type, source: str) -> None:
-    """Raise InputError unless the argument is of this kind; a path is a common mistake."""
+    """Raise InputError unless the argument is of this kind. A path is a common mistake."""
     if not isinstance(given, kind):
         raise InputError(
             f"{name}: given {given!r}; give a {kind.__name__}, as chamberopt.{source} returns it"

@@ -1,1 +1,1 @@
-"""What is said of a result: its sentences, tables and charts, one file for each capability."""
+"""Documents: the sentences, tables and charts about a result, in a file for each capability."""

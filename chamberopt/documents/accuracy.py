@@ -1,4 +1,4 @@
-"""What is said of a convergence study: its reference, the error law, biases, recommendations."""
+"""Text about a convergence study: its reference, the error law, biases, recommendations."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def accuracy_lines(study: ConvergenceStudy) -> list[str]:
-    """The lines that the command prints."""
+    """Lines that the command `accuracy` prints."""
     lines = [
         describe_reference(study),
         "",
@@ -48,7 +48,7 @@ def _signed(bias: Estimate) -> str:
 
 
 def describe_reference(study: ConvergenceStudy) -> str:
-    """Settings and estimates of the reference."""
+    """Sentence with the settings and estimates of the reference."""
     run = study.reference
     settings = ", ".join(
         f"{short_name(name)} {setting_text(value)}" for name, value in study.settings.items()
@@ -63,7 +63,7 @@ def describe_reference(study: ConvergenceStudy) -> str:
 
 
 def describe_error_law(study: ConvergenceStudy) -> str:
-    """The cost of halving the error, and the reason if it is not 4."""
+    """Sentence with the cost of halving the error, and the reason if the factor is not 4."""
     law, sizes = study.law, study.sizes
     middle, low, high = law.halving
     unresolved = [str(size.replicas) for size in sizes if not size.is_resolved]

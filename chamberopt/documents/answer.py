@@ -1,4 +1,4 @@
-"""The answer of a result in one sentence, and the sentences that belong to it."""
+"""The answer of a result in one sentence, with the sentences on its limits."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 def answer(result: Result, start: Result | None, gain: Estimate | None) -> str:
     """The answer in one sentence, with its uncertainty.
 
-    For a study: objective of start and best, and whether the change is more than noise. For a
-    simulation: its coverage.
+    Study: the objective of start and best, and whether the change is more than noise.
+    Simulation: the coverage.
     """
     label = objective_label(result.objective_name)
     if start is None or gain is None:
@@ -67,7 +67,7 @@ def answer(result: Result, start: Result | None, gain: Estimate | None) -> str:
 
 
 def answer_lines(result: Result) -> list[AnswerLine]:
-    """The sentences on zones, on constraints, and on doubts of a calibration."""
+    """Sentences on zones, on constraints, and on doubts about the calibration."""
     lines = [*zone_lines(result), *_constraint_lines(result)]
     calibration = result.design.calibration
     doubts = [*misfit_texts(calibration), calibration.not_mmA] if calibration else []
@@ -77,9 +77,9 @@ def answer_lines(result: Result) -> list[AnswerLine]:
 
 
 def _constraint_lines(result: Result) -> Iterator[AnswerLine]:
-    """Which constraints the best, the start and candidates better than the best may not meet.
+    """Sentences on violated constraints of the best, the start and candidates better than the best.
 
-    The zones of the best have sentences of their own.
+    Limits of the best design's zones are left out, because zone_lines speaks of them.
     """
     limited = {limit.metric for zone in result.record.zones for limit in zone.limits}
     study, label = result.study, objective_label(result.objective_name)
@@ -103,7 +103,7 @@ def _constraint_lines(result: Result) -> Iterator[AnswerLine]:
 
 
 def full_coverage(result: Result) -> str:
-    """Half a sentence: when 95 % of the target is covered to 98 %, as far as that is known."""
+    """Half a sentence with the time at which 95 % of the target's area is covered to 98 %."""
     time = result.metrics.get("time_to_98_s")
     if time is None:
         return "this older result does not say when it would be covered to 98 %"

@@ -1,4 +1,4 @@
-"""What is said of a calibration: parameters, misfits, predictions, what to know before trusting."""
+"""Text about a calibration: parameters, misfits, predictions, cautions."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ WORDS: dict[Parameter, tuple[str, str]] = {
     "K": ("K", "mmA/mm"),
     "beta": ("dents on strips, times", ""),
 }
-UNKNOWN = 1.5  # standard deviation of a logarithm: a factor of 20 to each side in 95 %
+UNKNOWN = 1.5  # standard deviation of a logarithm: a 95 % interval of a factor of 20 either way
 NOT_SETTLED = 0.5  # standard deviations
-FAR = 3.0  # standard deviations from what was known before
+FAR = 3.0  # standard deviations from the prior mean
 
 
 def calibration_lines(found: Calibrated, predictions: Sequence[Prediction]) -> list[str]:
-    """The lines that the command prints: parameters, misfits, predictions, what to measure next."""
+    """Lines that `calibrate` prints: parameters, misfits, predictions, the next measurement."""
     prior, table = found.posterior.prior, found.table
     lines = [f"{'parameter':32}{'before':>20}{'now':>20}    (median ± standard deviation)"]
     for k, name in enumerate(prior.names):
@@ -61,7 +61,7 @@ def calibration_lines(found: Calibrated, predictions: Sequence[Prediction]) -> l
 
 
 def calibration_notes(found: Calibrated) -> list[str]:
-    """What to know before trusting the calibration."""
+    """Cautions to read before trusting the calibration."""
     kinds, prior = {one.kind for one in found.data}, found.posterior.prior
     off = np.abs(found.posterior.mean - prior.mean) / prior.sd
     texts = [
@@ -108,7 +108,7 @@ def _value(log_mean: float, log_sd: float, unit: str) -> str:
 
 
 def _percent(log_sd: float) -> str:
-    """A standard deviation of a logarithm as percent; a factor, or none, where it is large."""
+    """A standard deviation of a logarithm as percent. A large one is a factor or "not known"."""
     if log_sd > UNKNOWN:
         return "not known"
     if log_sd > 0.5:

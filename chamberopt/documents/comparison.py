@@ -1,4 +1,4 @@
-"""A comparison as text: what differs, every figure, and whether each difference is real."""
+"""A comparison as text: different values, every figure, and whether each difference is real."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ HEADER = ("difference", "real", "to know: simulate")
 
 
 def comparison_text(comparison: Comparison) -> str:
-    """Return one table for two candidates; for more, one of figures and then one of differences."""
+    """A single table for two candidates. For more, a table of figures, then of differences."""
     first, *later = comparison.labels
     rows = [
         [name, *(_shown(value) for value in values)]
@@ -79,7 +79,7 @@ def _legend(comparison: Comparison) -> list[str]:
 
 
 def _cells(gap: Difference) -> list[str]:
-    """Cells of a difference: its value, whether it is real, and what it takes to know."""
+    """Cells of a difference: its value, whether it is real, and the replicas that would show it."""
     shown = estimate_text(Estimate(gap.value, gap.half_width, in_words=gap.in_words), sign=True)
     if gap.half_width == 0.0 and not gap.in_words:
         return [shown, "exact", ""]
@@ -101,7 +101,7 @@ def _shown(value: Any) -> str:
 
 
 def _aligned(rows: Sequence[Sequence[str]]) -> list[str]:
-    """Align the cells of rows; the first row is the header."""
+    """Align the cells of rows. The first row is the header."""
     count = max(map(len, rows))
     whole = [[*row, *[""] * (count - len(row))] for row in rows]
     widths = [max(len(row[i]) for row in whole) for i in range(count)]

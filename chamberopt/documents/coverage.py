@@ -1,4 +1,4 @@
-"""What is said of coverage: the figures of the result, and of its start, with their change."""
+"""Text about coverage: the figures of the result and of its start, with their change."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ if TYPE_CHECKING:
     from chamberopt.results.load import Result
     from chamberopt.results.records import CoverageAtTime, FieldRecord
 
-SHOWN_AS_TILES = ("mean_coverage", "p05_coverage", "time_to_98_s")  # beside the objective
+SHOWN_AS_TILES = ("mean_coverage", "p05_coverage", "time_to_98_s")  # besides the objective
 
 
 @dataclass(frozen=True)
 class Figure:
-    """A figure of the result as computed, with that of the start and the change between them."""
+    """A figure of the result in its stored unit, with its value at the start and the change."""
 
     name: str
     label: Label
@@ -41,7 +41,7 @@ class Figure:
 
 
 def figures(result: Result, start: Result | None) -> list[Figure]:
-    """The objective and the metrics; metrics of zones and the objective's own are left out."""
+    """The objective and the metrics, without metrics of zones and the objective's own metric."""
     label = objective_label(result.objective_name)
     before = None if start is None else start.objective
     entries = [(result.objective_name, label, result.objective, before)]
@@ -59,8 +59,8 @@ def figures(result: Result, start: Result | None) -> list[Figure]:
 
 
 def change(after: Estimate, before: Estimate, result: Result, start: Result) -> Estimate:
-    """The difference, from pairs of replicas where both ran on the same seeds."""
-    if after == before:  # the start is the best: nothing that is shown of it is uncertain
+    """The difference, from pairs of replicas if both results ran on the same seeds."""
+    if after == before:  # the start is the best: the change is exactly 0
         return Estimate(0.0, 0.0) if after.has_number else Estimate(0.0, 0.0).not_known("not known")
     same_seeds = result.seeds == start.seeds
     found = (paired_difference if same_seeds else independent_difference)(after, before)
@@ -85,11 +85,11 @@ def tiles(shown: Sequence[Figure]) -> Tiles:
 def coverage_section(
     shown: Sequence[Figure], of: Mapping[str, Result], scenes: Mapping[str, PartScene]
 ) -> Section:
-    """Figures, the windows in which they are measured, and coverage over area and over time.
+    """Section with figures, their windows, and coverage over area and over time.
 
     Args:
-        of: the result by its name, after its start where it has one.
-        scenes: the part of each result by the same name.
+        of: results by name: the start, if there is one, then the result.
+        scenes: parts in three dimensions, by the name of their result.
     """
     *_, result = of.values()
     has_start = len(of) > 1
@@ -147,7 +147,7 @@ def _compared(shown: Sequence[Figure]) -> Table:
 
 
 def _standing(changed: Estimate) -> str:
-    """Whether a change is more than noise, in one word."""
+    """A word for a change: "exact", "yes" if it is more than noise, or "no"."""
     if changed.half_width == 0.0 and not changed.in_words:
         return "exact"
     return "yes" if abs(changed.value) > changed.half_width else "no"
@@ -164,7 +164,7 @@ def _over_time(curves: Mapping[str, Sequence[CoverageAtTime]], treatment_time: f
 
 
 def _windows(field: FieldRecord) -> tuple[Sentence, Fold]:
-    """The windows in which coverage is measured, and its figures in windows of twice the radius."""
+    """Text about the windows that measure coverage, and figures of windows twice as wide."""
     text = (
         f"Coverage is the share dented in a window of {plain(field.gauge_mm2)} mm² round each "
         f"point of the target. The median window has {plain(field.dents_in_median_window, 2)} "

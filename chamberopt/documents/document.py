@@ -1,6 +1,6 @@
 """A document: sections of sentences, tables and charts, which any printer can show.
 
-Documents know no printer, and printers know no capability.
+Documents import no printer. Printers know only the blocks of this module, not their subjects.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Sentence:
-    """A paragraph; `kind` says how much it matters to the reader."""
+    """A paragraph. `kind` says how much the paragraph matters to the reader."""
 
     text: str
     kind: Literal["", "sentence", "warning", "soft"] = ""
@@ -34,8 +34,8 @@ class Items:
 class Table:
     """A table whose first column heads its row.
 
-    head: names of the columns; empty for a table of names and values.
-    numbers: the other columns hold numbers, set to the right.
+    head: names of the columns. Empty for a table of names and values.
+    numbers: True if the other columns hold numbers, which are aligned to the right.
     """
 
     caption: str
@@ -48,7 +48,7 @@ class Table:
 class Chart:
     """A chart with its caption.
 
-    name: unique in the document.
+    name: name that is unique in the document.
     tooltips: texts at the markers of a line, by the gid of the line.
     """
 
@@ -84,21 +84,21 @@ class TextFile:
 
 @dataclass(frozen=True)
 class PartView:
-    """Parts in their chambers in three dimensions, side by side, which turn together."""
+    """Parts in their chambers in three dimensions. They stand side by side and turn together."""
 
     scenes: Sequence[PartScene]
 
 
 @dataclass(frozen=True)
 class Beside:
-    """Columns of blocks, side by side where the page is wide enough."""
+    """Columns of blocks, side by side if the page is wide enough."""
 
     columns: Sequence[Sequence[Block]]
 
 
 @dataclass(frozen=True)
 class Fold:
-    """Blocks that are hidden until their title is chosen; `printed` shows them on paper."""
+    """Blocks that are hidden until the reader opens their title. `printed` shows them on paper."""
 
     title: str
     content: Sequence[Block]
@@ -110,7 +110,7 @@ Block: TypeAlias = Sentence | Items | Table | Chart | Tiles | TextFile | PartVie
 
 @dataclass(frozen=True)
 class Section:
-    """Blocks below a title; the answer stands out."""
+    """Blocks below a title. The section of the answer stands out."""
 
     title: str
     content: Sequence[Block]
@@ -121,8 +121,8 @@ class Section:
 class AnswerLine:
     """A sentence that belongs to the answer.
 
-    about: the candidate or thing that the sentence speaks of; "best" is the result itself.
-    warns: a limit is not certainly met, or the calibration has something to know.
+    about: subject of the sentence. "best" is the result itself.
+    warns: True if a limit is not certainly met, or for a caution about the calibration.
     """
 
     about: Literal["zone", "best", "start", "other", "calibration"]
@@ -132,10 +132,10 @@ class AnswerLine:
 
 @dataclass(frozen=True)
 class Document:
-    """All that is said of a result.
+    """The whole report of a result.
 
     answer: the answer in one sentence.
-    answer_lines: sentences that belong to it.
+    answer_lines: further sentences that belong to the answer.
     """
 
     name: str
@@ -151,7 +151,7 @@ class Document:
         return [scene for view in views for scene in view.scenes]
 
     def blocks(self) -> Iterator[Block]:
-        """Every block, also those inside others."""
+        """Every block, also the blocks inside other blocks."""
         for section in self.sections:
             yield from _inside(section.content)
 

@@ -1,4 +1,4 @@
-"""The report of a result: everything that is said of it, as a document."""
+"""The report of a result as a document."""
 
 from __future__ import annotations
 
@@ -122,7 +122,7 @@ def notes_of(result: Result) -> list[str]:
 
 
 def limits_of_intervals(result: Result) -> str:
-    """What the intervals of a result do not cover."""
+    """Sentence on errors that the intervals of a result do not cover."""
     return LIMITS_OF_INTERVALS if result.design.calibration is None else LIMITS_OF_CALIBRATED
 
 
@@ -147,7 +147,7 @@ def _accuracy_and_cost(result: Result, trials: Sequence[Mapping[str, Any]]) -> S
 
 
 def _accuracy(result: Result) -> dict[str, str]:
-    """The intervals of the answer, and the replicas behind them."""
+    """Rows on the intervals of the answer, and the replicas behind the intervals."""
     objective, mean = objective_label(result.objective_name), metric_label("mean_coverage")
     record, field = result.record, result.record.field
     needed = field.simulated_s_needed.p05_times_intensity
@@ -173,7 +173,7 @@ def _accuracy(result: Result) -> dict[str, str]:
 
 
 def _cost_of_answer(result: Result) -> dict[str, str]:
-    """Simulated time, collisions and run time of the result itself."""
+    """Rows on simulated time, collisions and run time of the result itself."""
     record, collisions = result.record, result.record.collisions
     kinds = [
         f"{_count(collisions[name])} {kind}"
@@ -188,7 +188,7 @@ def _cost_of_answer(result: Result) -> dict[str, str]:
 
 
 def _cost_of_study(study: StudyRecord, trials: Sequence[Mapping[str, Any]]) -> dict[str, str]:
-    """Numbers of evaluations, and the run time of all."""
+    """Rows on the evaluations of the study, and the run time of all evaluations."""
     return {
         "in the search": _count(study.evaluations),
         "of these not simulated": _count(study.failed),
@@ -204,7 +204,7 @@ def _count(number: float) -> str:
 
 
 def _effects(result: Result) -> Section:
-    """Which effects are on, and what a pilot run estimated of each where it was made."""
+    """Section on the effects: their settings, and the estimates of a pilot run."""
     effects = result.design.effects.model_dump(mode="json", exclude={"auto"})
     switched = [(name, _effect_text(name, value)) for name, value in effects.items()]
     in_result = Table("In this result", (), switched, numbers=False)
@@ -256,7 +256,7 @@ def _notes(result: Result) -> Section:
 
 
 def _design(result: Result, start: Result | None) -> Section:
-    """What differs from the start, every value by its dotted name, and the file."""
+    """Section on the design: changes from the start, every value by dotted name, and the file."""
     values = _design_values(result)
     before = _design_values(start) if start else values
     changed = [
@@ -278,9 +278,9 @@ def _design(result: Result, start: Result | None) -> Section:
 
 
 def _design_values(result: Result) -> dict[str, str]:
-    """Each value of the design by its dotted name; of the mesh only the name of its file.
+    """Each value of the design by its dotted name.
 
-    The folder of the mesh is private to the machine.
+    The folder of the mesh is private to the machine, so only the file's name is shown.
     """
     values = dict(_flatten(result.record.design))
     values["part.mesh"] = result.design.part.mesh_path.name
@@ -315,5 +315,5 @@ def _made_with(result: Result) -> Section:
 
 
 def seed_text(result: Result) -> str:
-    """The seed and the random stream."""
+    """Text with the seed and the name of the random stream."""
     return f"{result.seeds[0]}, stream “{result.seeds[1]}”"

@@ -1,4 +1,4 @@
-"""What a process sheet says: blocks of names and values, from what a result holds."""
+"""The content of a process sheet: blocks of names and values from a result."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ if TYPE_CHECKING:
     from chamberopt.results.load import Result
     from chamberopt.results.records import CoverageAtTime
 
-# What the figures of a process sheet do not hold, in words for a shop, before its warnings.
+# Cautions about the figures of a process sheet, in words for a workshop, shown before its warnings.
 
 TIME = "time_to_98_s"
 
 
 def cautions(result: Result) -> Iterator[str]:
-    """Sentences on what is simulated otherwise than it is done, and on what is not reached."""
+    """Sentences on differences between simulation and machine, and on goals not reached."""
     yield from _time(result)
     if result.design.effects.friction is None:
         yield (
@@ -53,7 +53,7 @@ def cautions(result: Result) -> Iterator[str]:
 
 
 def _time(result: Result) -> Iterator[str]:
-    """Whether the peening time is shorter than what covers the target."""
+    """A sentence if the peening time is too short to cover the target."""
     time, planned = result.metrics.get(TIME), result.design.process.treatment_time
     if time is None or time.in_words == "not resolved" or time.value <= planned:
         return
@@ -67,8 +67,8 @@ def _time(result: Result) -> Iterator[str]:
     )
 
 
-MOST_ROWS = 4  # of zones, tolerances, sizes of shot: more are left to the report
-MOST_KEYS = 8  # of the chamber
+MOST_ROWS = 4  # rows of zones, tolerances or sizes of shot; the report has all rows
+MOST_KEYS = 8  # numbers of the chamber
 MOST_WARNINGS = 2
 UNITS = {"_mm": "mm", "_deg": "degrees", "_um": "µm"}
 EXPECTED = (
@@ -83,14 +83,14 @@ EXPECTED = (
     "saturation_time_s",
     "compression_depth_um",
 )
-DROP_SPEED = 3.0  # m/s, as of a ball that falls 0.46 m; docs/peening.md
+DROP_SPEED = 3.0  # m/s, the speed of a ball that falls 0.46 m; docs/peening.md
 SHEETS_OF = {
     "study": "The best chamber of a study, confirmed on fresh seeds",
     "simulation": "One simulated chamber",
 }
 KINDS = ("arc heights", "coverage", "dent diameters", "ball drops", "amplitude", "impact rates")
 
-Row = tuple[str, str]  # a name and its value; with the name "" a sentence
+Row = tuple[str, str]  # a name and its value, or "" and a sentence
 
 
 @dataclass(frozen=True)
@@ -103,7 +103,7 @@ class Block:
 
 @dataclass(frozen=True)
 class Check:
-    """What to measure before production, and what is expected of it."""
+    """A quantity to measure before production, and its expected value."""
 
     what: str
     expected: str
@@ -111,12 +111,12 @@ class Check:
 
 @dataclass(frozen=True)
 class Sheet:
-    """All that a sheet says.
+    """The content of a process sheet.
 
-    name: of the result.
-    kind: what it is.
-    answer: as in the report.
-    calibration: what the machine was calibrated by.
+    name: name of the part and the result.
+    kind: kind of the result, with its date.
+    answer: the sentence of the report.
+    calibration: sentence on the measurements that the machine was calibrated by.
     """
 
     name: str
@@ -147,7 +147,7 @@ def process_sheet(result: Result, face_mm: tuple[float, ...]) -> Sheet:
 
 
 def setting_blocks(result: Result, face_mm: tuple[float, ...]) -> list[Block]:
-    """What is built and set, expected and allowed.
+    """Blocks on the chamber and its settings, expected figures and allowed tolerances.
 
     Args:
         face_mm: size of the sonotrode, as face_size_mm gives it.
@@ -214,7 +214,7 @@ def _chamber(result: Result) -> Iterator[Row]:
 
 
 def _key_row(key: str, value: Any) -> Row:
-    """A number of the chamber by its name in the file, with its unit apart."""
+    """A number of the chamber with its name in the file. The unit is moved to the value."""
     unit = next((unit for end, unit in UNITS.items() if key.endswith(end)), "")
     name = key.removesuffix(next(end for end in UNITS if UNITS[end] == unit)) if unit else key
     if isinstance(value, bool):
@@ -267,7 +267,7 @@ def _weighed_g(result: Result) -> float:
 
 
 def _expected(result: Result) -> Iterator[Row]:
-    """Peening time and figures; where the design is not calibrated, why there is no mmA."""
+    """Peening time and figures. Without a calibration, the reason why there is no mmA."""
     yield "peening time", f"{plain(result.design.process.treatment_time)} s"
     objective, *others = figures(result, None)
     calibration = result.design.calibration
@@ -280,13 +280,13 @@ def _expected(result: Result) -> Iterator[Row]:
     if reason := why_no_intensity(calibration):
         yield "", f"{reason[0].upper()}{reason[1:]}."
     for one in answer_lines(result):
-        if one.about in ("best", "calibration"):  # zones have a block of their own
+        if one.about in ("best", "calibration"):  # zones have their own block
             yield "", one.text
     yield "", f"± 95 % intervals. {limits_of_intervals(result)}"
 
 
 def _zones(result: Result) -> Iterator[Row]:
-    """A sentence for each zone, those whose limits are not met first."""
+    """A sentence for each zone. Zones with limits that are not met come first."""
     lines = [one for one in answer_lines(result) if one.about == "zone"]
     lines.sort(key=lambda line: not line.warns)
     for one in lines[:MOST_ROWS]:
@@ -295,7 +295,7 @@ def _zones(result: Result) -> Iterator[Row]:
 
 
 def _tolerances(result: Result) -> Iterator[Row]:
-    """Ranges, and what they cost if the result holds that."""
+    """Ranges of the tolerances, and their cost if the result has simulated it."""
     box = tolerance_box(result.design)
     for name, (low, high) in [*box.items()][:MOST_ROWS]:
         yield name, f"{plain(low)} to {plain(high)}, as designed {plain(result.design.value(name))}"
@@ -339,7 +339,7 @@ def _identity(result: Result) -> Iterator[Row]:
 
 
 def first_checks(result: Result) -> list[Check]:
-    """What to measure first, with what is expected of it."""
+    """Quantities to measure first, each with its expected value."""
     design, calibration = result.design, result.design.calibration
     wanted = 2.0 * design.sonotrode.zero_to_peak_um
     expected = f"{plain(wanted)} µm peak to valley"
@@ -353,7 +353,7 @@ def first_checks(result: Result) -> list[Check]:
         what = f"ball drop: one ball at {plain(DROP_SPEED)} m/s, speed after over speed before"
         found.append(Check(what, ", ".join(f"{k} {_restitution(x)}" for k, x in laws.items())))
     row = _half_covered(result.record.coverage_against_time)
-    # Where the mean at the end is not resolved, its curve is not to be relied on either.
+    # If the mean coverage at the end is not resolved, its curve is not reliable either.
     if row and result.metrics["mean_coverage"].has_number:
         share = Estimate(row.mean_coverage, row.half_width)
         what = f"mean coverage of the target after {plain(row.time_s, 3)} s"
@@ -372,7 +372,10 @@ def first_checks(result: Result) -> list[Check]:
 
 
 def calibrated_to(result: Result) -> str:
-    """What the machine was calibrated by, and what else could be measured; "" if it was not."""
+    """Sentence on the measurements that the machine was calibrated by, and on missing kinds.
+
+    An empty text without a calibration.
+    """
     if result.design.calibration is None:
         return ""
     kinds = {misfit.kind for misfit in result.design.calibration.misfits}
@@ -388,7 +391,7 @@ def _restitution(law: Any) -> str:
 
 
 def _half_covered(rows: list[CoverageAtTime]) -> CoverageAtTime | None:
-    """The row of the curve nearest to half coverage, where counting tells most."""
+    """The row of the curve nearest to half coverage, where a measurement is most informative."""
     return min(rows, key=lambda row: abs(row.mean_coverage - 0.5), default=None)
 
 

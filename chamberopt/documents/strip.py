@@ -1,4 +1,4 @@
-"""What is said of a virtual strip."""
+"""Text about a virtual strip."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def strip_lines(strip: VirtualStrip) -> list[str]:
-    """The lines that the command prints."""
+    """Lines that the command `strip` prints."""
     first = "intensity I" if strip.is_calibrated else "peening strength S"
     lines = [
         f"{strip.setting.type} strip, {strip.setting.place}",

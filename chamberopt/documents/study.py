@@ -1,4 +1,4 @@
-"""What is said of a study: its question, its search, its front, and which parameters mattered."""
+"""Text about a study: its question, its search, its front, and the influence of parameters."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ NO_CONSTRAINTS = "There were no constraints."
 
 
 def question_section(result: Result) -> Section:
-    """What was asked: of one chamber its coverage, of a study the best chamber."""
+    """Section on the question: the coverage of a single chamber, or the best chamber of a study."""
     design, study = result.design, result.study
     part, reach = design.part.mesh_path.name, ""
     if area := result.record.chamber.target_exposed_area_mm2:
@@ -81,7 +81,7 @@ def question_section(result: Result) -> Section:
 
 
 def _constraints(result: Result) -> list[str]:
-    """The limits of the study file, and those of the zones."""
+    """The limits of the study file and of the zones, as text."""
     tables: dict[str, Any] = {}
     if STUDY in result.record.files:
         tables = tomllib.loads(read_file(result.path(STUDY)).decode())
@@ -98,7 +98,7 @@ def _constraints(result: Result) -> list[str]:
 
 
 def front_section(study: StudyRecord) -> Section | None:
-    """The Pareto front; None for a study of one objective."""
+    """Section on the Pareto front. None for a study with a single objective."""
     if not study.front:
         return None
     labels = {name: objective_label(name) for name in study.front[0].objectives}
@@ -121,7 +121,7 @@ def front_section(study: StudyRecord) -> Section | None:
 
 
 def search_section(result: Result, trials: Sequence[Mapping[str, Any]]) -> Section | None:
-    """Every evaluation in its order, and why some were not simulated."""
+    """Section on every evaluation in its order, and the reasons for failed evaluations."""
     if not trials:
         return None
     label = objective_label(result.objective_name)
@@ -151,12 +151,13 @@ def _evaluated(row: Mapping[str, Any], label: Label) -> EvaluatedCandidate:
 
 @dataclass(frozen=True)
 class Influence:
-    """The cost of one parameter, by the study's model of all its evaluations.
+    """The influence of a parameter on the objective, by the study's model of all evaluations.
 
     curve: the model along the parameter, in the unit of the label.
     loss: cost of moving the parameter alone from its best value to the worst within its bounds.
-    half_width: of the loss; None where the loss may be larger.
-    surely: cost of such a move that is certain; 0 if the intervals reach zero.
+    half_width: half-width of the loss. None if the loss may be larger than stated.
+    surely: certain cost of moving the parameter to any value. 0 if all intervals reach zero.
+    label: label of the objective.
     """
 
     curve: Slice
@@ -177,7 +178,7 @@ class Influence:
 
 
 def influence_section(study: StudyRecord, label: Label) -> Section:
-    """Which parameters mattered."""
+    """Section on the influence of each parameter."""
     rows = influences(study, label)
     content: list[Block] = [Items(influence_sentences(study, rows, label))]
     if rows:
@@ -218,10 +219,10 @@ def influence_section(study: StudyRecord, label: Label) -> Section:
 
 
 def influences(study: StudyRecord, label: Label) -> list[Influence]:
-    """The influence of each parameter, the most important first; none without a model.
+    """The influence of each parameter, the most important first. Empty without a model.
 
     Args:
-        label: of the objective; numbers are returned in its unit.
+        label: label of the objective, in whose unit numbers are returned.
     """
     if not study.model:
         return []
@@ -255,7 +256,7 @@ def _influence(name: str, model: ModelRecord, label: Label) -> Influence:
 
 
 def influence_sentences(study: StudyRecord, rows: Sequence[Influence], label: Label) -> list[str]:
-    """What the model tells, or why there is none."""
+    """Sentences on the result of the model, or on the reason why there is no model."""
     model, count = study.model, study.evaluations
     if not model:
         return [_reason_without_model(count, study.failed, len(study.vary))]
@@ -285,7 +286,7 @@ def influence_sentences(study: StudyRecord, rows: Sequence[Influence], label: La
 
 
 def _shares(rows: Sequence[Influence]) -> str:
-    """How much single parameters explain of the variance over the bounds."""
+    """Sentence on the share of the variance over the bounds that single parameters explain."""
     shares, rest = sum(row.curve.share for row in rows), ""
     if shares < 0.8:
         rest = (

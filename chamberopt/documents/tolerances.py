@@ -1,4 +1,4 @@
-"""What is said of the tolerances of a design."""
+"""Text about the tolerances of a design."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ MAX_CHARTS = 3
 
 
 def tolerated_figures(found: TolerancesRecord) -> list[tuple[Label, ToleratedFigureRecord]]:
-    """Each figure with its label; the figure that the worst corner belongs to comes first."""
+    """Each figure with its label. The figure of the worst corner comes first."""
     names = sorted(found.figures, key=lambda name: name != found.worst_for)
     return [(metric_label(name), found.figures[name]) for name in names]
 
 
 def tolerance_section(found: TolerancesRecord | None) -> Section | None:
-    """The section on tolerances; None for a result without tolerances."""
+    """The section on tolerances. None for a result without tolerances."""
     if not found:
         return None
     text = (

@@ -17,9 +17,9 @@ class Label:
 
     Args:
         text: name in plain words.
-        unit: of the number shown.
-        factor: number shown over number stored; negative for an objective that falls with a metric.
-        meaning: explanation, where the text needs one.
+        unit: unit of the number shown.
+        factor: number shown over number stored. Negative for an objective that falls with a metric.
+        meaning: explanation, if the text needs any.
     """
 
     text: str
@@ -29,32 +29,32 @@ class Label:
 
     @property
     def in_full(self) -> str:
-        """Such as "weighted sum (mean coverage − 0.001 × ...)"."""
+        """The text with its meaning, e.g. "weighted sum (mean coverage − 0.001 × ...)"."""
         return f"{self.text} ({self.meaning})" if self.meaning else self.text
 
     @property
     def with_unit(self) -> str:
-        """Such as "mean coverage [%]"."""
+        """The text with its unit, e.g. "mean coverage [%]"."""
         return f"{self.text} [{self.unit}]" if self.unit else self.text
 
     def format(self, estimate: Estimate, sign: bool = False) -> str:
-        """The estimate with its interval, in the unit shown."""
+        """The estimate with its interval and unit, as text."""
         return number_text.typeset(
             number_text.estimate_text(estimate, self.factor, self.unit, sign)
         )
 
     def number(self, estimate: Estimate, sign: bool = False) -> str:
-        """The estimate with its interval, in the unit shown but without its name."""
+        """The estimate with its interval in the unit shown, as text without the unit."""
         return number_text.typeset(number_text.estimate_text(estimate, self.factor, sign=sign))
 
     def scale(self, estimate: Estimate) -> Estimate:
-        """The interval in the unit shown."""
+        """The estimate in the unit shown."""
         value, half_width = self.factor * estimate.value, abs(self.factor) * estimate.half_width
         return Estimate(value, half_width, in_words=estimate.in_words)
 
 
 def metric_label(name: str) -> Label:
-    """The label of a metric; shares of the surface are shown in per cent."""
+    """The label of a metric. Shares of the surface are shown in per cent."""
     metric = find_metric(name)
     if metric is None:
         return Label(name.replace("_", " "))
@@ -64,7 +64,7 @@ def metric_label(name: str) -> Label:
 
 
 def objective_label(name: str) -> Label:
-    """The label of an objective: the metric's label where it is a multiple of one metric."""
+    """The label of an objective. A multiple of a single metric has the metric's label."""
     try:
         objective = parse_objective(name)
     except InputError:  # written by another version of the program
@@ -79,7 +79,7 @@ def objective_label(name: str) -> Label:
 
 
 def _sum_text(terms: Mapping[str, float]) -> str:
-    """Such as "mean coverage of the target − 0.001 × number of balls"; shares are 0 to 1."""
+    """A sum as text, e.g. "mean coverage of the target − 0.001 × number of balls"."""
     text = ""
     for name, weight in terms.items():
         metric = find_metric(name)
@@ -94,22 +94,22 @@ def _sum_text(terms: Mapping[str, float]) -> str:
 
 
 def plain(value: float | str, digits: int = 4) -> str:
-    """The number to a number of significant digits, without an exponent if it is of usual size."""
+    """A number with `digits` significant digits. Numbers of usual size have no exponent."""
     return number_text.typeset(number_text.plain(value, digits))
 
 
 def with_unit(value: float, unit: str = "") -> str:
-    """The number to two significant digits, with its unit."""
+    """A number with two significant digits and its unit."""
     return f"{plain(value, 2)} {unit}".rstrip()
 
 
 def with_interval(value: float, half_width: float, unit: str = "", sign: bool = False) -> str:
-    """Such as "0.809 ± 0.004 mm"; exact values stand alone."""
+    """A value with its interval, e.g. "0.809 ± 0.004 mm". Exact values have no interval."""
     return number_text.typeset(number_text.with_interval(value, half_width, unit, sign))
 
 
 def interval_text(shown: Estimate, unit: str = "", sign: bool = False) -> str:
-    """An interval in the unit shown, as text."""
+    """An estimate in the unit shown, as text."""
     return number_text.typeset(number_text.estimate_text(shown, unit=unit, sign=sign))
 
 

@@ -1,4 +1,4 @@
-"""What is said of zones: their figures, and whether they meet their limits."""
+"""Text about zones: their figures, and whether they meet their limits."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ SIGNS = {"min": "≥", "max": "≤"}
 
 
 def limit_text(limit: ZoneLimit) -> str:
-    """Such as "coverage_min = 0.98"; each end of a band has its sign, as "intensity_mmA ≥ 0.1"."""
+    """A limit as text, e.g. "coverage_min = 0.98". An end of a band is "intensity_mmA ≥ 0.1"."""
     sides = dict(LIMITED[limit.key])
     sign = "=" if len(sides) == 1 else SIGNS[sides[limit.metric.rpartition(".")[2]]]
     return f"{limit.key} {sign} {limit.limit:g}"
 
 
 def zone_lines(result: Result) -> list[AnswerLine]:
-    """A sentence on each zone for the answer, which warns if a limit is not certainly met."""
+    """A sentence on each zone for the answer. It warns if a limit is not certainly met."""
     lines = []
     for zone in result.record.zones:
         judged = "; ".join(
@@ -43,7 +43,7 @@ def zone_lines(result: Result) -> list[AnswerLine]:
 
 
 def zones_section(result: Result) -> Section | None:
-    """The figures of all zones beside each other, and whether they meet their limits."""
+    """Section with the figures of all zones side by side, and whether they meet their limits."""
     zones = result.record.zones
     if not zones:
         return None
@@ -82,6 +82,6 @@ def _limit_label(limit: ZoneLimit) -> Label:
 
 
 def _of_zone(name: str) -> Label:
-    """The label of a metric of the target, as that of a zone."""
+    """The label of a metric, with "the zone" in place of "the target"."""
     label = metric_label(name)
     return replace(label, text=label.text.replace("the target", "the zone"))

@@ -1,1 +1,1 @@
-"""Documents as a terminal, an HTML page, a printed sheet and CSV tables show them."""
+"""Printers: documents as an HTML page, a printed sheet and JSON values."""

@@ -1,4 +1,4 @@
-"""A document as HTML. All text is escaped here: names of folders and files may hold markup."""
+"""A document as HTML. This module escapes all text: names of files may hold markup."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ NUMBER = ' class="number"'
 
 
 def text(value: object) -> str:
-    """The value as escaped text; a number and its interval stay on one line."""
+    """The value as escaped text. A number and its interval stay on one line."""
     return html.escape(str(value), quote=True).replace(" ± ", "\u00a0±\u00a0")
 
 
@@ -38,16 +38,16 @@ def paragraph(value: object, kind: str = "") -> str:
 
 
 def items(values: Iterable[object]) -> str:
-    """An HTML list; an empty string for no items."""
+    """An HTML list, or an empty text without items."""
     rows = "".join(f"<li>{text(value)}</li>" for value in values)
     return f"<ul>{rows}</ul>" if rows else ""
 
 
 def section(printed: Section, view: Callable[[Sequence[PartScene]], str]) -> str:
-    """A section with its title.
+    """A section with its title, as HTML.
 
     Args:
-        view: HTML of parts in 3D.
+        view: function that gives the HTML of parts in 3D.
     """
     kind = "answer" if printed.is_answer else ""
     content = "".join(block(one, view) for one in printed.content)
@@ -55,7 +55,7 @@ def section(printed: Section, view: Callable[[Sequence[PartScene]], str]) -> str
 
 
 def block(printed: Block, view: Callable[[Sequence[PartScene]], str]) -> str:
-    """Any block of a section."""
+    """A block of a section, as HTML."""
     match printed:
         case Sentence():
             return paragraph(printed.text, printed.kind)
@@ -110,7 +110,7 @@ def _text_file(printed: TextFile) -> str:
 
 
 def _chart(printed: Chart) -> str:
-    """A chart whose caption is also its description for screen readers."""
+    """A chart as HTML. Its caption is also its description for screen readers."""
     name, caption = text(printed.name), text(printed.caption)
     svg = svg_text(printed.figure, printed.name, printed.tooltips)
     place = f'<div id="{name}" class="chart" role="img" aria-label="{caption}">{svg}'
@@ -118,7 +118,7 @@ def _chart(printed: Chart) -> str:
 
 
 def embedded_json(value: Any, name: str) -> str:
-    """JSON in a script element with this id, which no text in it can end."""
+    """A value as JSON in a script element with the id `name`. No text in it can end the element."""
     inside = json.dumps(value, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
     return f'<script type="application/json" id="{text(name)}">{inside}</script>'
 

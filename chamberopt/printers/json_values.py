@@ -1,4 +1,4 @@
-"""A document as JSON values; charts and views of parts are told by their names."""
+"""A document as JSON values. A chart becomes its name, a view of parts their number."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from chamberopt.documents.document import Chart, Document, PartView
 
 
 def json_values(document: Document) -> dict[str, Any]:
-    """Everything that the document says, as it is shown, and remarks on its views of parts."""
+    """All texts of the document, and remarks on its views of parts."""
     values: dict[str, Any] = _values(document)
     remarks = [remark for scene in document.scenes for remark in scene.remarks]
     return {**values, "remarks": remarks}

@@ -1,4 +1,4 @@
-"""The HTML pages of results: one file each, which no part of is fetched from anywhere."""
+"""The HTML pages of results. A page is a single file and fetches nothing from a network."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from chamberopt.results.load import START, Result, load_result, summary
 
 REPORT = "report.html"
 GENERATOR = '<meta name="generator" content="chamberopt'
-# The browser enforces that nothing is fetched, even if a text of the result held markup.
+# The policy lets the browser fetch nothing, even if a text of the result held markup.
 POLICY = (
     "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; "
     "img-src data: blob:; worker-src blob:; font-src data:; base-uri 'none'; form-action 'none'"
@@ -36,10 +36,10 @@ HELP = (
 
 @dataclass(frozen=True)
 class PageFile:
-    """A kind of file that replaces older ones of its kind, and no others.
+    """A kind of file. A new file may replace an older file of the same kind, but no other file.
 
-    endings: of its name, the usual one first.
-    is_one: whether the content of a file is of this kind.
+    endings: allowed endings of the file's name, the usual ending first.
+    is_one: function that tells from a file's content whether the file is of this kind.
     """
 
     name: str
@@ -56,7 +56,7 @@ def write_report(result: str | Path, path: str | Path | None = None) -> tuple[Pa
     """Write the report of a results folder.
 
     Args:
-        path: of the page; RESULT/report.html if left out.
+        path: path of the page, by default RESULT/report.html.
 
     Returns:
         Path of the page, and the document on it.
@@ -82,13 +82,13 @@ def _write_document(path: Path, document: Document) -> None:
 
 
 def write_part_page(results: Sequence[Path], path: Path) -> list[str]:
-    """Write a page of parts in three dimensions only, side by side, which turn together.
+    """Write a page with parts in three dimensions. They stand side by side and turn together.
 
     Returns:
-        Remarks, such as triangles left out.
+        Remarks, e.g. on triangles that were left out.
 
     Raises:
-        InputError: as write_report, and for a part that is too large for a page.
+        InputError: a part is too large for a page, or a reason of write_report.
     """
     with claim_file(require_free_page(path)):
         return _write_part_page([load_result(one) for one in results], path)
@@ -105,17 +105,17 @@ def _write_part_page(loaded: Sequence[Result], path: Path) -> list[str]:
 
 
 def parts_content(results: Sequence[Path]) -> tuple[str, dict[str, Any]]:
-    """HTML of the parts of results in 3D, and what `showParts` of part.js fills it with.
+    """HTML of the parts of results in 3D, and the data that `showParts` of part.js draws.
 
     Raises:
-        InputError: as write_part_page.
+        InputError: a folder is no finished result, or a part is too large for a page.
     """
     _, scenes = _scenes([load_result(one) for one in results])
     return viewer(scenes), _content([scene.data for scene in scenes if scene.data])
 
 
 def _scenes(loaded: Sequence[Result]) -> tuple[list[str], list[PartScene]]:
-    """Names of results, and their parts, each remark with the name where there are several."""
+    """Names of results, and their parts in 3D. For several results, remarks begin with the name."""
     names = _unique_names([one.folder.resolve() for one in loaded])
     scenes = [part_scene(one, name) for one, name in zip(loaded, names, strict=True)]
     for scene, one in zip(scenes, loaded, strict=True):
@@ -130,14 +130,14 @@ def _scenes(loaded: Sequence[Result]) -> tuple[list[str], list[PartScene]]:
 
 
 def _unique_names(folders: Sequence[Path]) -> list[str]:
-    """The folders' names; with the folder above if two are the same or one is a study's start."""
+    """Names of folders, with the parent folder if two names are equal or a name is "start"."""
     names = [folder.name for folder in folders]
     unique = len(set(names)) == len(names) and START not in names
     return names if unique else ["/".join(folder.parts[-2:]) for folder in folders]
 
 
 def require_free_page(path: str | Path, file: PageFile = REPORT_FILE) -> Path:
-    """Return the path; raise InputError unless it is free or holds an older page of the kind."""
+    """Return the path. Raise InputError unless it is free or holds an older page of this kind."""
     path, first = Path(path), file.endings[0]
     remedy = f"give another name (--out FILE{first})"
     if path.suffix.lower() not in file.endings:
@@ -157,7 +157,7 @@ def require_free_page(path: str | Path, file: PageFile = REPORT_FILE) -> Path:
 
 
 def viewer(scenes: Sequence[PartScene]) -> str:
-    """HTML for the parts in 3D and their controls, which part.js fills."""
+    """HTML of the parts in 3D and their controls. part.js draws the parts."""
     drawn = [scene.data for scene in scenes if scene.data]
     remarks = "".join(
         html.paragraph(remark, "soft") for scene in scenes for remark in scene.remarks
@@ -196,7 +196,7 @@ def viewer(scenes: Sequence[PartScene]) -> str:
 
 
 def write_page(path: Path, title: str, body: str, scenes: Sequence[PartScene]) -> None:
-    """Put a page together and write it, whole or not at all."""
+    """Compose a page and write it, whole or not at all."""
     data = ""
     if drawn := [scene.data for scene in scenes if scene.data]:
         data = html.embedded_json(_content(drawn), "parts")
@@ -214,7 +214,7 @@ def write_page(path: Path, title: str, body: str, scenes: Sequence[PartScene]) -
 
 
 def _content(drawn: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """The scenes, their quantities and the colours of these, for part.js."""
+    """Data for part.js: the scenes, their quantities and the colours of the quantities."""
     quantities = quantities_in_all(drawn)
     scales = {name: hex_colours(name) for name in {one["colours"] for one in quantities}}
     return {"quantities": quantities, "scenes": drawn, "scales": scales}

@@ -26,19 +26,19 @@ if TYPE_CHECKING:
 
     from chamberopt.chamber.build import Chamber
 
-# Text on a page: lines broken to a width, and blocks of names and values in two columns.
+# Text on a page: lines of limited width, and blocks of names and values in two columns.
 
 MM_PER_PT = 25.4 / 72.0
 LEADING = 1.25  # height of a line over the size of its letters
 NAMES = 0.52  # share of a column's width that names may take at most
-MOST_LINES = 4  # of one text: more end in an ellipsis
+MOST_LINES = 4  # lines of a text; a longer text ends in an ellipsis
 
 
 class Writer:
-    """Writes text from its top left corner, in page mm; without axes it only measures."""
+    """Writer of text at the top left corner of its place [mm]. Without axes it only measures."""
 
     def __init__(self, axes: Axes | None, size: float) -> None:
-        """size: of the letters [pt]."""
+        """Prepare to write letters of this size [pt]."""
         self.axes, self.size = axes, size
 
     @property
@@ -49,7 +49,7 @@ class Writer:
     def write(
         self, text: str, x: float, top: float, width: float, bold: bool = False, grey: bool = False
     ) -> float:
-        """Write a text in lines no wider than a width; return where its bottom is."""
+        """Write a text in lines of limited width and return the height of its bottom."""
         lines = broken(text, width, self.size, bold)
         for number, one in enumerate(lines):
             if self.axes is not None:
@@ -66,7 +66,7 @@ class Writer:
         return top - len(lines) * self.line
 
     def block(self, block: Block, x: float, top: float, width: float) -> float:
-        """Write a block; return where its bottom is."""
+        """Write a block and return the height of its bottom."""
         y = self.write(block.title, x, top, width, bold=True) - 0.1 * self.line
         if self.axes is not None:
             self.axes.plot([x, x + width], [y, y], color=GREY, lw=0.5)
@@ -84,10 +84,10 @@ class Writer:
     def columns(
         self, blocks: Sequence[Block], x: float, top: float, sizes: tuple[float, float]
     ) -> float:
-        """Write blocks in two columns as even as can be; return where the longer one ends.
+        """Write blocks in two columns of similar length and return the bottom of the longer column.
 
         Args:
-            sizes: width of a column, and the gap between them.
+            sizes: width of a column, and the gap between the columns.
         """
         width, gap = sizes
         measure = Writer(None, self.size)
@@ -101,9 +101,9 @@ class Writer:
 
 
 def broken(text: str, width: float, size: float, bold: bool = False) -> list[str]:
-    """Lines of a text that are no wider than a width [mm]; words that are wider are cut.
+    """Break a text into lines no wider than `width` [mm]. Wider words are cut.
 
-    A number stays on one line with its interval and its unit. A letter that the font lacks is "?".
+    A number stays on a line with its interval and unit. A letter that the font lacks becomes "?".
     """
     lines, line = [], ""
     known = "".join(one if ord(one) in _letters(bold) else "?" for one in " ".join(text.split()))
@@ -141,7 +141,7 @@ def text_width(text: str, size: float, bold: bool = False) -> float:
 
 @cache
 def _width_over_size(text: str, bold: bool) -> float:
-    """Width of a line of text over the size of its letters: the same for all sizes."""
+    """Width of a line of text over the size of its letters. It is the same for all sizes."""
     from matplotlib.textpath import TextToPath
 
     font = _font(bold)
@@ -164,26 +164,26 @@ def _font(bold: bool) -> FontProperties:
 
 
 SHEET = "process_sheet.pdf"
-CREATOR = "chamberopt process sheet"  # by which an older sheet is known
+CREATOR = "chamberopt process sheet"  # marks a sheet, so that a newer sheet may replace it
 SHEET_FILE = PageFile("process sheet", (".pdf",), lambda content: CREATOR.encode() in content)
 WIDTH, HEIGHT, MARGIN, GAP = 210.0, 297.0, 12.0, 6.0  # mm
 INNER = WIDTH - 2.0 * MARGIN
-SIZES = (8.0, 7.5, 7.0, 6.5, 6.0, 5.5, 5.0)  # pt of the text; the largest with which all fits
-# Height of the drawing with its caption [mm]: at least, for each pt of the text; and at most.
+SIZES = (8.0, 7.5, 7.0, 6.5, 6.0, 5.5, 5.0)  # pt of the text; the largest size that fits is used
+# Height of the drawing with its caption [mm]: the least for each pt of the text, and the most.
 DRAWING_PER_PT, MOST_DRAWING = 13.0, 125.0
 CAPTION, SIGNATURES = 7.0, 14.0  # mm
 SIGNED = ("Set up by", "Date", "Checked by", "Date")
-EXPECTED, MEASURED = 88.0, 150.0  # mm from the margin: columns of what to measure first
+EXPECTED, MEASURED = 88.0, 150.0  # mm from the margin; columns of the table "Measure first"
 
 
 def write_sheet(result: str | Path, path: str | Path | None = None) -> tuple[Path, Sheet]:
     """Write the process sheet of a results folder.
 
     Args:
-        path: of the page; RESULT/process_sheet.pdf if left out.
+        path: path of the page, by default RESULT/process_sheet.pdf.
 
     Returns:
-        Path of the page, and what it says.
+        Path of the page, and its content.
 
     Raises:
         InputError: the folder is no finished result, or the path holds anything but a sheet.
@@ -198,7 +198,7 @@ def write_sheet(result: str | Path, path: str | Path | None = None) -> tuple[Pat
 
 
 def draw_sheet(sheet: Sheet, chamber: Chamber) -> Figure:
-    """The page: heading, drawing, blocks in two columns, what to measure first, signatures."""
+    """Draw the page: heading, drawing, blocks in two columns, first measurements, signatures."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -222,7 +222,7 @@ def draw_sheet(sheet: Sheet, chamber: Chamber) -> Figure:
 
 
 def _heading(axes: Axes, sheet: Sheet) -> float:
-    """Title, name and answer; returns where they end."""
+    """Write title, name and answer. Return the height of their bottom."""
     y = Writer(axes, 15.0).write("Process sheet", MARGIN, HEIGHT - MARGIN, 60.0, bold=True)
     beside, width = MARGIN + 62.0, INNER - 62.0
     name = Writer(axes, 9.0).write(sheet.name, beside, HEIGHT - MARGIN, width, bold=True)
@@ -233,7 +233,7 @@ def _heading(axes: Axes, sheet: Sheet) -> float:
 
 
 def _text(write: Writer, sheet: Sheet, top: float) -> float:
-    """The blocks, and the table of what to measure first; returns where they end."""
+    """Write the blocks and the table "Measure first". Return the height of their bottom."""
     column = 0.5 * (INNER - GAP)
     y = write.columns(sheet.blocks, MARGIN, top, (column, GAP)) - 0.3 * write.line
     head = ("Measure first", "expected", "measured")
@@ -251,7 +251,7 @@ def _text(write: Writer, sheet: Sheet, top: float) -> float:
 
 
 def _signatures(axes: Axes) -> None:
-    """Lines to sign on at the foot of the page."""
+    """Draw lines for signatures at the foot of the page."""
     width = (INNER - 3.0 * GAP) / len(SIGNED)
     for number, what in enumerate(SIGNED):
         x = MARGIN + number * (width + GAP)
@@ -265,7 +265,7 @@ def _save(path: Path, figure: Figure, title: str) -> None:
 
     content = io.BytesIO()
     with rc_context({"pdf.fonttype": 42}):
-        title = title.encode(errors="replace").decode()  # of a folder's name, which may be no text
+        title = title.encode(errors="replace").decode()  # the name of a folder may be no valid text
         about = {"Creator": CREATOR, "Title": f"{title}: process sheet"}
         figure.savefig(content, format="pdf", metadata=about)
     write_bytes(path, content.getvalue())

@@ -1,1 +1,1 @@
-"""What a command does from a design to a saved result, without words on the terminal."""
+"""Workflows from a design to a saved result. They print nothing on the terminal."""

@@ -1,4 +1,4 @@
-"""The candidates of `compare`: designs, which are simulated, and results."""
+"""The candidates of `compare`: results, and designs, which are simulated first."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from sim_core import AnalyticCavity
 
 Prepare = Callable[[Design, "Chamber", "AnalyticCavity | None"], "tuple[Design, list[Advice]]"]
-"""Chooses the effects of a design with effects = "auto", and compiles the simulator."""
+"""Function that chooses effects that are "auto" and compiles the simulator."""
 
 
 @dataclass(frozen=True)
@@ -71,12 +71,12 @@ class SeedSettings(NamedTuple):
 def read_candidates(
     paths: Sequence[str | Path], treatment_time_s: float | None = None
 ) -> list[Candidate]:
-    """Read the candidates, without simulating anything.
+    """Read the candidates without simulating them.
 
     Args:
         paths: design files and results folders.
-        treatment_time_s: peening time of all candidates; results of another time are marked to be
-            simulated again.
+        treatment_time_s: peening time of all candidates. A result with another time is marked as
+            missing, so that it is simulated again.
 
     Raises:
         InputError: a candidate cannot be read, built or compared with the first.
@@ -163,7 +163,7 @@ def _with_seeds(design: Design, settings: SeedSettings) -> Design:
 
 
 def _overridden(one: Candidate, settings: SeedSettings) -> list[str]:
-    """Remarks on values of a design that the first candidate's settings replace."""
+    """Remarks on values of a design that are replaced by the first candidate's settings."""
     process, accuracy = one.design.process, one.design.process.accuracy
     changes = []
     if process.seed != settings.seed:

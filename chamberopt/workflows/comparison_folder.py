@@ -27,9 +27,11 @@ COMPARE, DIFFERENCE = "compare.json", "difference.vtp"
 def write_comparison(folder: str | Path, comparison: Comparison) -> list[str]:
     """Write a comparison into a folder and return remarks, such as why an image was skipped.
 
-    Files: compare.txt; compare.png, the parts side by side on one colour scale; distributions.png;
-    difference.vtp and difference.png, the coverage of each later candidate minus that of the first;
-    compare.json, which is written last.
+    compare.txt: the comparison as text.
+    compare.png: the parts side by side on one colour scale.
+    distributions.png: histograms of the candidates.
+    difference.vtp, difference.png: coverage of each later candidate minus coverage of the first.
+    compare.json: the record, which is written last.
     """
     folder = Path(folder)
     if (folder / COMPARE).exists():
@@ -37,7 +39,7 @@ def write_comparison(folder: str | Path, comparison: Comparison) -> list[str]:
             f"{folder}: holds a comparison, and nothing is ever overwritten: choose another folder"
         )
     for result in comparison.results:
-        result.path(CHAMBER)  # for the picture; what else is drawn is read now
+        result.path(CHAMBER)  # read for the picture at the end; the other surfaces are read next
     surfaces = [read_target_surface(result) for result in comparison.results]
     for result, one in zip(comparison.results[1:], surfaces[1:], strict=True):
         require_same_triangles(
@@ -55,7 +57,7 @@ def write_comparison(folder: str | Path, comparison: Comparison) -> list[str]:
 
 
 def comparison_picture(picture: str | Path, comparison: Comparison) -> str | None:
-    """Draw the parts side by side on one colour scale; returns None, or why there is no image."""
+    """Draw the parts side by side on one colour scale. Return why there is no image, or None."""
     titles = [
         f"{label}\n{summary(result)}"
         for label, result in zip(comparison.labels, comparison.results, strict=True)
@@ -66,7 +68,7 @@ def comparison_picture(picture: str | Path, comparison: Comparison) -> str | Non
 def _draw_differences(
     folder: Path, comparison: Comparison, local: list[LocalDifference]
 ) -> str | None:
-    """Write the map of differences and draw it; returns None, or why there is no image."""
+    """Write the map of differences and draw it. Return why there is no image, or None."""
     first, *later = comparison.labels
     columns = [(one.value, one.real) for one in local]
     write_differences(folder / DIFFERENCE, comparison.results[0].folder / COVERAGE, columns)

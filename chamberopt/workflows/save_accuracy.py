@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 def save_accuracy(folder: Path, study: ConvergenceStudy) -> None:
-    """Leave accuracy.json, accuracy.csv, accuracy.png and the design in an empty folder."""
+    """Write accuracy.json, accuracy.csv, accuracy.png and design.toml into an empty folder."""
     save_design(study.design, folder / "design.toml")
     write_text(folder / "accuracy.csv", csv_text(rows(study)))
     write_record(folder / "accuracy.json", convergence_record(study))
@@ -55,7 +55,7 @@ def convergence_record(study: ConvergenceStudy) -> ConvergenceRecord:
 
 
 def _finite(value: float) -> float | None:
-    """The value; None if it is infinite, which JSON does not have."""
+    """The value, or None for infinity, which JSON does not have."""
     return value if math.isfinite(value) else None
 
 
@@ -69,7 +69,7 @@ def _recommendation(advice: Recommendation) -> RecommendationRecord:
 
 
 def rows(study: ConvergenceStudy) -> list[dict[str, Any]]:
-    """One row a run and a batch size, with the same columns; None where a column does not apply."""
+    """Rows of all runs and all numbers of replicas. None where a column does not apply."""
     runs, sizes = [], []
     for run in (study.reference, *study.runs):
         row: dict[str, Any] = {

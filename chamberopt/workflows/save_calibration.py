@@ -26,7 +26,7 @@ HEADER = """\
 
 
 def save_calibration(folder: Path, found: Calibrated) -> list[str]:
-    """Leave machine.toml, design.toml and calibration.txt, .png and .json in a folder.
+    """Write machine.toml, design.toml and calibration.txt, .png and .json into a folder.
 
     Returns:
         The lines of calibration.txt.

@@ -1,4 +1,4 @@
-"""Save a finished simulation, study or sweep: data, pictures and, last of all, result.json."""
+"""Save a finished simulation, study or sweep: data, pictures and, as the last file, result.json."""
 
 from __future__ import annotations
 
@@ -42,19 +42,19 @@ def save_simulation(
     result.json and coverage.png.
 
     Args:
-        folder: must be new or empty.
-        design: as simulated, its effects chosen.
-        chamber: of the design.
-        evaluation: of the design.
-        advice: why effects were chosen, if the design left the choice to the program.
+        folder: new or empty folder.
+        design: the simulated design, with its effects chosen.
+        chamber: chamber of the design.
+        evaluation: evaluation of the design.
+        advice: reasons for the effects, if the design left their choice to the program.
         warned: warnings of `chamberopt check`; None if it was not run.
-        tolerances: what its tolerances do, if that was simulated.
+        tolerances: effect of the design's tolerances, if it was simulated.
 
     Returns:
         Remarks for the user, such as why a picture was skipped.
     """
     folder = make_output_folder(folder)
-    with whole_or_nothing(folder):  # without its result.json, what was written is of no use
+    with whole_or_nothing(folder):  # a folder without result.json is of no use
         completed = complete_result(design, chamber, evaluation)
         write_result(folder, write_simulation(folder, completed, tolerances), advice, warned)
     return _draw_coverage([folder], [evaluation], [folder.resolve().name], folder / "coverage.png")
@@ -66,17 +66,17 @@ def save_study(
     advice: Sequence[Advice] = (),
     warned: Sequence[str] | None = None,
 ) -> list[str]:
-    """Complete the folder of a study that has ended.
+    """Complete the folder of a finished study.
 
     Adds the files of results.write.write_study and the pictures coverage.png (the best design),
-    before_after.png, convergence.png, slices.png (if a model could be fitted) and pareto.png (of
-    two objectives). result.json is written last, so a study that is stopped while it is being saved
-    counts as unfinished and is saved again when it is resumed.
+    before_after.png, convergence.png, slices.png (if a model could be fitted) and pareto.png (for
+    two objectives). result.json is written last. A study that is stopped while it is being saved
+    therefore counts as unfinished, and is saved again when it is resumed.
 
     Args:
-        folder: the study's folder.
-        study_result: of the study.
-        advice: why effects were chosen, if the design left the choice to the program.
+        folder: folder of the study.
+        study_result: result of the study.
+        advice: reasons for the effects, if the design left their choice to the program.
         warned: warnings of `chamberopt check` on the best design; None if it was not run.
 
     Returns:
@@ -88,8 +88,7 @@ def save_study(
         chamber = build_chamber(one.design, study_result.target)
         return complete_result(one.design, chamber, one.evaluation)
 
-    # The search keeps all cores busy; so that its end does too, start and best are worked out in
-    # threads beside the diagrams.
+    # Start and best are completed in threads while the diagrams are drawn, to keep all cores busy.
     with ThreadPoolExecutor(2) as threads:
         results = threads.map(complete, (study_result.start, study_result.best))
         _draw_diagrams(folder, study_result)
@@ -101,9 +100,9 @@ def save_study(
 
 
 def save_sweep(folder: str | Path, sweep: SweepResult) -> list[str]:
-    """Complete the folder of a sweep that has ended; return remarks for the user.
+    """Complete the folder of a finished sweep and return remarks for the user.
 
-    Adds the files of results.write.write_sweep, map.png and, last of all, result.json.
+    Adds the files of results.write.write_sweep, map.png and, as the last file, result.json.
     """
     folder = Path(folder)
     record = write_sweep(folder, sweep)
@@ -113,7 +112,7 @@ def save_sweep(folder: str | Path, sweep: SweepResult) -> list[str]:
 
 
 def _draw_diagrams(folder: Path, study_result: StudyResult) -> None:
-    """Draw what the trials and the model of a study give."""
+    """Draw the diagrams of a study's trials and of its model."""
     convergence_picture(folder / "convergence.png", study_result)
     if study_result.sensitivity:
         slices_picture(folder / "slices.png", study_result, study_result.sensitivity)
@@ -122,7 +121,7 @@ def _draw_diagrams(folder: Path, study_result: StudyResult) -> None:
 
 
 def _draw_start_and_best(folder: Path, study_result: StudyResult, threads: Executor) -> list[str]:
-    """Draw the coverage of a study whose data is written; return remarks on skipped pictures."""
+    """Draw the coverage of a study from its data files. Return remarks on skipped pictures."""
     start, best = study_result.start.evaluation, study_result.best.evaluation
     folders, names = [folder / START, folder], ["start", "best design"]
     pictures = [

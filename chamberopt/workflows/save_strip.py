@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def save_strip(folder: Path, strip: VirtualStrip) -> None:
-    """Leave design.toml, strip.csv, strip.png and, last of all, strip.json in a folder."""
+    """Write design.toml, strip.csv, strip.png and, as the last file, strip.json into a folder."""
     record = strip_record(strip)
     save_design(strip.setting.design, folder / "design.toml")
     write_text(folder / "strip.csv", csv_text([one.as_json() for one in record.arc_heights]))

@@ -1,6 +1,7 @@
-"""Simulate a design into a folder: the one workflow of Python, of the command line and of others.
+"""Simulate a design into a folder. Python users and the command line share this workflow.
 
-A Teller hears of its steps. The one here is silent, that of the command line prints.
+The workflow reports its steps to a Teller. The Teller of this module is silent. The command line
+has a Teller that prints.
 """
 
 from __future__ import annotations
@@ -32,18 +33,18 @@ if TYPE_CHECKING:
 
 
 class Teller:
-    """The listener of a workflow; this one tells nothing but the progress of counted steps."""
+    """A listener of a workflow. This class reports only the progress of counted steps."""
 
     def __init__(self, progress: Progress | None = None) -> None:
         self._progress = progress
 
     def step(self, what: str, total: int | None = None) -> AbstractContextManager[Progress]:
-        """Begin a named step; the context is the function that counts in it."""
+        """Begin a named step. The context gives the function that counts the step's progress."""
         is_counted = self._progress is not None and total is not None
         return nullcontext(self._progress if is_counted and self._progress else _uncounted)
 
     def compile(self, design: Design, chamber: Chamber, cavity: AnalyticCavity | None) -> None:
-        """Compile the simulator before the first replica needs it."""
+        """Compile the simulator before the first replica. This class leaves that to the replica."""
 
     def check(self, design: Design, chamber: Chamber, which: str = "") -> list[str] | None:
         """Warnings on the design; None where it is not checked.
@@ -58,16 +59,16 @@ class Teller:
 
 
 def _uncounted(done: int, total: int, best: float | None) -> None:
-    """Count nothing."""
+    """Ignore the progress of a step."""
 
 
 @dataclass(frozen=True)
 class Simulated:
     """A design that was simulated and saved.
 
-    design: with its effects chosen.
-    advice: the reasons for effects that the design left to the program.
-    remarks: of the saving, such as why a picture was skipped.
+    design: the design with its effects chosen.
+    advice: reasons for the effects, if the design left their choice to the program.
+    remarks: remarks of the saving, such as why a picture was skipped.
     """
 
     design: Design
@@ -95,7 +96,7 @@ def simulate_design(
 
     Raises:
         InputError: the chamber cannot be built, has no room for the shot, is not analytic or needs
-            more memory than there is.
+            too much memory.
     """
     with teller.step("building the chamber"):
         chamber = build_chamber(design)
@@ -118,7 +119,7 @@ def simulate_design(
 def resolve_effects(
     design: Design, chamber: Chamber, executor: Executor, teller: Teller
 ) -> tuple[Design, list[Advice]]:
-    """Replace each effect that is "auto" by what pilot runs advise, with the advice."""
+    """Choose effects that are "auto" by pilot runs. Return the new design and the advice."""
     if not design.effects.auto:
         return design, []
     with teller.step("pilot runs") as progress:
