@@ -1,8 +1,14 @@
-"""The command line: one file for each command in commands/, what they share beside it.
+"""The command line. commands/ has a file for each command, and this folder their common code.
 
-Results go to stdout; progress, remarks and errors go to stderr. Exit status: 0 done; 1 the
-simulation, a worker process or the disk failed; 2 the input must be corrected; 130 interrupted.
-Heavy packages (numba, trimesh, pyvista, sklearn) are imported inside the commands, so that
+Results go to stdout. Progress, remarks and errors go to stderr.
+
+Exit status:
+    0: the command is done.
+    1: the simulation, a worker process or the disk failed.
+    2: the input must be corrected.
+    130: the user interrupted the command.
+
+Commands import heavy packages (numba, trimesh, pyvista, sklearn) inside their functions, so that
 --help answers at once.
 """
 
@@ -18,10 +24,10 @@ __all__ = ["main"]
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command, which Ctrl-C ends from its first moment; return its exit status."""
-    # What is imported and compiled stays: looking through it again and again took 7 % of the time.
+    """Run one command and return its exit status. Ctrl-C ends it from its first moment."""
+    # Imported modules and compiled code stay in memory. Scanning them for garbage took 7 % of time.
     gc.set_threshold(100_000, 50, 1000)
-    # No process that is started here imports modules that lie in the folder where it is started.
+    # Child processes must not import modules from the folder in which they are started.
     os.environ["PYTHONSAFEPATH"] = "1"
     with interruptible():
         from chamberopt.cli.command_line import run_command

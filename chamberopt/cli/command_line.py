@@ -1,4 +1,4 @@
-"""Run one command: every error that the user can correct is one message and an exit status."""
+"""Run one command. An error that the user can correct becomes one message and an exit status."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ UNUSABLE_NAME = (errno.ENAMETOOLONG, errno.ELOOP)
 
 
 def run_command(arguments: Sequence[str] | None = None) -> int:
-    """Run one command, by default that of sys.argv, and return its exit status."""
+    """Run one command, by default with the arguments of sys.argv, and return its exit status."""
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):
-            # A terminal that cannot show ± must not end the command before its results are printed.
+            # A terminal that cannot show "±" must not end the command before it prints its results.
             stream.reconfigure(errors="backslashreplace")
-    # It warns on stderr where it cannot keep its own cache, as without a home.
+    # matplotlib warns on stderr if it cannot keep its cache, for example without a home folder.
     logging.getLogger("matplotlib").setLevel(logging.ERROR)
     try:
         given = _without_progress(list(sys.argv[1:] if arguments is None else arguments))
@@ -60,7 +60,7 @@ def run_command(arguments: Sequence[str] | None = None) -> int:
             return _fail(str(error), 2, error)
         if isinstance(error, sim_core.SimulationError):
             return _fail(f"the simulation stopped: {error}", 1, error)
-        raise  # a fault of ours
+        raise  # a fault of the program, not of the user
     return 0
 
 
@@ -76,6 +76,9 @@ def _without_progress(given: list[str]) -> list[str]:
 
 
 def _fail(message: str, status: int, error: BaseException | None = None) -> int:
-    """Print the message and the notes of the error: the candidate concerned, how to go on."""
+    """Print the message and the notes of the error, and return the exit status.
+
+    Notes name the candidate concerned and how to go on.
+    """
     show([message, *getattr(error, "__notes__", ())], sys.stderr)
     return status

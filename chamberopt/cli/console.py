@@ -1,4 +1,4 @@
-"""What commands print, and the folder they write to: results to stdout, remarks to stderr."""
+"""Output of commands: results on stdout, remarks on stderr, files in a results folder."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ if TYPE_CHECKING:
     from chamberopt.design.load import Design
 
 T = TypeVar("T")
-RESULTS = Path("results")  # where results go without --out
+RESULTS = Path("results")  # parent folder of results without --out
 
 
 def results_folder(out: Path | None, name: str) -> AbstractContextManager[Path]:
-    """Claim --out, which must be new or empty, or the first free of results/NAME, NAME-2 ..."""
+    """Claim --out, a new or empty folder. By default claim a free results/NAME, NAME-2 ..."""
     from chamberopt.common.files import claim_folder
 
     return claimed_folder(out, name, claim_folder)
@@ -33,7 +33,7 @@ def results_folder(out: Path | None, name: str) -> AbstractContextManager[Path]:
 def claimed_folder(
     out: Path | None, name: str, claim: Callable[[Path], AbstractContextManager[T]]
 ) -> Iterator[T]:
-    """Claim --out or the first free folder with `claim`, which may accept more for --out."""
+    """Claim --out or the first free folder with `claim`, which may accept other --out folders."""
     from chamberopt.common.errors import OutputTakenError
     from chamberopt.common.files import is_new_or_empty, require_plain_folder
 
@@ -55,9 +55,9 @@ def claimed_folder(
 
 
 def show(lines: Iterable[str], to: TextIO | None = None) -> None:
-    """Print lines to stdout, or `to`, with control characters in names made visible.
+    """Print lines to stdout, or to `to`, and make control characters visible.
 
-    Names of files, keys and groups come from elsewhere, and a terminal would obey them.
+    Names of files, keys and groups may hold control characters, which a terminal would obey.
     """
     print(visible("\n".join(lines)), file=to or sys.stdout, flush=True)
 
@@ -71,7 +71,7 @@ def print_remarks(remarks: Iterable[str]) -> None:
 def print_warnings(design: Design, chamber: Chamber, which: str = "") -> list[str]:
     """Print the warnings of `check` to stderr, and return them for result.json.
 
-    `which` names the design where there are several, e.g. " of the best design".
+    `which` names the design if there are several, e.g. " of the best design".
     """
     from chamberopt.chamber.checks.check import warnings
 
@@ -85,7 +85,7 @@ def print_json(values: Mapping[str, Any]) -> None:
 
 
 def _json_value(value: Any) -> Any:
-    """An estimate or a record as JSON values; TypeError for anything else."""
+    """An estimate or a record as JSON values. Raise TypeError for other types."""
     from chamberopt.common.estimate import Estimate
     from chamberopt.results.records import Table
 
@@ -101,7 +101,7 @@ def _json_value(value: Any) -> Any:
 def print_result(
     lines: Sequence[str], folder: Path, as_json: bool, file: str = "result.json"
 ) -> None:
-    """Print the result and its folder on stdout: the lines, or the content of a JSON file."""
+    """Print the folder and its result on stdout, as lines or as the content of a JSON file."""
     if as_json:
         from chamberopt.common.limits import MAX_RESULT_BYTES, read_limited
 
@@ -112,14 +112,14 @@ def print_result(
 
 
 def print_finished(folder: Path, what: str, lines: Sequence[str], as_json: bool) -> None:
-    """Print the result of a study or sweep that is finished already."""
+    """Print the result of a study or sweep that was already finished."""
     again = "to run it again, give another folder (--out)"
     print_remarks([f"{folder}: this {what} is finished, nothing was run; {again}"])
     print_result(lines, folder, as_json)
 
 
 def table_lines(table: Mapping[str, Any], prefix: str = "") -> list[str]:
-    """A nested table as aligned lines; each of its notes and warnings is a line."""
+    """A nested table as aligned lines. Each of its notes and warnings is a line."""
     lines: list[str] = []
     for name, value in table.items():
         label = f"{prefix + name:33} "
@@ -138,7 +138,7 @@ def table_lines(table: Mapping[str, Any], prefix: str = "") -> list[str]:
 
 
 def _list_text(values: list[Any], name: str) -> str:
-    """Sizes as 1 x 2 x 3, other numbers and names separated by commas."""
+    """A list as text. Sizes are written "1 x 2 x 3", other values are separated by commas."""
     if values and isinstance(values[0], float):
         separator = " x " if name.startswith("bounding_box") else ", "
         return separator.join(f"{value:g}" for value in values)

@@ -1,4 +1,4 @@
-"""Ctrl-C: it ends every command at once, and a study after the running evaluations."""
+"""Ctrl-C: it ends a command at once, and a study after its running evaluations."""
 
 from __future__ import annotations
 
@@ -18,17 +18,18 @@ EARLY = "interrupted; no evaluation was running"
 SHOW_CURSOR = "\033[?25h"  # a progress bar hides it
 
 
-# In the midst of these an exception is lost, or leaves what it interrupts in pieces.
+# An exception that is raised inside this code is lost, or leaves a module half imported.
 IMPORTS, COMPILERS = "<frozen importlib", ("numba", "llvmlite")
 
 
 @contextmanager
 def interruptible() -> Iterator[None]:
-    """Let Ctrl-C end the command: by KeyboardInterrupt, or at once where that would be lost.
+    """Let Ctrl-C end the command, by KeyboardInterrupt or by ending the process at once.
 
-    It is lost where a module is imported, which is what a command begins with, and where something
-    held it back before. Nothing else is: files get their names when they are whole. Threads that
-    simulate end with the process, at once.
+    The process ends at once if KeyboardInterrupt would be lost. It would be lost during an import,
+    and a command begins with imports. It was lost if the user presses Ctrl-C a second time. No file
+    is damaged, because files get their names when they are complete. Threads that simulate end with
+    the process.
     """
     requested = False
 
@@ -56,9 +57,9 @@ def interruptible() -> Iterator[None]:
 
 
 def ignore_late_ctrl_c() -> None:
-    """Let Ctrl-C change nothing at the end of a process, whose command is done.
+    """Ignore Ctrl-C at the end of a process whose command is done.
 
-    Its threads are still joined then, and the signal would end it with another exit status.
+    Python still joins threads at this point, and the signal would change the exit status.
     """
     if threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -74,13 +75,15 @@ def _would_be_lost(frame: FrameType | None) -> bool:
 
 
 class Interrupt:
-    """Handle SIGINT in a study's `with` block; `requested` is True once the user wants to stop.
+    """A handler of SIGINT for a study's `with` block.
+
+    requested: True once the user wants to stop.
 
     Until `wait_for_evaluation` is called, Ctrl-C ends the process with os._exit. An exception would
-    not do: Python drops one that comes while a module is imported, one during compilation can crash
-    the compiler, and replicas that run in threads would be waited for. Nothing can be lost: trials
-    are on disk as soon as they and those before them are finished, and files are written
-    atomically.
+    not work. Python drops an exception during the import of a module. An exception during
+    compilation can crash the compiler. Python would also wait for replicas that run in threads.
+    No finished trial is lost: a trial is on disk as soon as the trial and all earlier trials are
+    finished, and files are written atomically.
     """
 
     def __init__(self) -> None:
@@ -98,7 +101,7 @@ class Interrupt:
         signal.signal(signal.SIGINT, self._before)
 
     def wait_for_evaluation(self, how_to_resume: str) -> None:
-        """From now on finish the running evaluations first, unless Ctrl-C comes twice."""
+        """Let Ctrl-C wait for the running evaluations from now on, unless it comes twice."""
         self._waits, self._how_to_resume = True, how_to_resume
 
     def _on_signal(self, number: int, frame: FrameType | None) -> None:
@@ -111,6 +114,6 @@ class Interrupt:
 
 
 def _write(text: str) -> None:
-    """Write to the terminal without `print`: the signal can come in the middle of one."""
+    """Write to the terminal without `print`, because the signal can interrupt a `print`."""
     cursor = SHOW_CURSOR if sys.stderr.isatty() else ""
     os.write(2, f"\n{text}{cursor}\n".encode(errors="backslashreplace"))

@@ -9,7 +9,7 @@ from cyclopts import App, CoercionError, Parameter, Token, convert
 
 
 def _convert(kind: Any, tokens: Sequence[Token]) -> Any:
-    """The value of an option; refuses 1.5 as a whole number, which cyclopts would round."""
+    """Convert the value of an option. Refuse 1.5 as a whole number, which cyclopts would round."""
     if int in (kind, *get_args(kind)):
         for token in tokens:
             if "." in token.value and token.value.rpartition(".")[2].strip("0"):

@@ -1,4 +1,4 @@
-"""What precedes a simulation: compilation with a message, pilot runs, and the replica to repeat."""
+"""Steps before a simulation: compilation with a message, pilot runs, loading a replica."""
 
 from __future__ import annotations
 
@@ -21,9 +21,10 @@ if TYPE_CHECKING:
 def compile_with_message(
     design: Design, chamber: Chamber, cavity: AnalyticCavity | None = None
 ) -> None:
-    """Compile what a design needs, as a step with a message: the first time takes a minute.
+    """Compile the simulator for a design, with a message because the first time takes a minute.
 
-    InputError before that if its shot does not fit, or its part cannot turn.
+    Raises:
+        InputError: the shot does not fit, or the part cannot turn. It is raised before compiling.
     """
     import sim_core
     from chamberopt.chamber.part import turning_axis
@@ -45,7 +46,7 @@ def compile_with_message(
 
 
 def advise_effects(design: Design, chamber: Chamber) -> list[dict[str, Any]]:
-    """Find by pilot runs which effects a design needs; the advice as plain JSON values."""
+    """Find by pilot runs which effects a design needs. Return the advice as JSON values."""
     from chamberopt.common.executor import local_executor
     from chamberopt.common.progress import step
     from chamberopt.results.write import advice_record
@@ -75,18 +76,22 @@ def advise_effects(design: Design, chamber: Chamber) -> list[dict[str, Any]]:
 
 
 def seconds_of(progress: Progress, whole: float) -> Callable[[float], None]:
-    """Count simulated seconds, as sim_core.simulate tells them, of a whole [s]."""
+    """Convert a progress to the function of simulated seconds that sim_core.simulate calls.
+
+    Args:
+        whole: simulated time of the whole step [s].
+    """
     return lambda seconds: progress(round(seconds), max(1, round(whole)), None)
 
 
 def load_replica(folder: Path, number: int) -> tuple[Result, RebuiltReplica]:
-    """A result and one of its replicas, to be compiled and simulated again."""
+    """Load a result and one of its replicas, ready to be compiled and simulated again."""
     from chamberopt.coverage.part_impacts import HITS_FILE
     from chamberopt.results.load import load_result
     from chamberopt.results.rebuild import rebuild_replica
     from chamberopt.results.vtp_files import CHAMBER, COVERAGE, PART
 
     loaded = load_result(folder)
-    for name in (PART, COVERAGE, CHAMBER, HITS_FILE):  # they are read after the simulation
+    for name in (PART, COVERAGE, CHAMBER, HITS_FILE):  # a missing file is told at once
         loaded.path(name)
     return loaded, rebuild_replica(loaded, number)

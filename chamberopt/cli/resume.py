@@ -1,4 +1,4 @@
-"""How a study or sweep that was interrupted is resumed: the command, and when it is printed."""
+"""Resuming an interrupted study or sweep: the command, and the remarks that name it."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def resume_command(study: Path, folder: Path, plan: Mapping[str, Any] | None = None) -> str:
-    """The command that resumes a study, or the sweep with this plan, quoted for a shell."""
+    """The command that resumes a study, or a sweep with this plan, quoted for a shell."""
     if plan is None:
         return quoted("run", study, "--out", folder)
     seed = () if plan["seed"] is None else ("--seed", plan["seed"])
@@ -30,7 +30,7 @@ def quoted(*words: object) -> str:
 
 @contextmanager
 def resume_note(folder: StudyFolder, command: str) -> Iterator[None]:
-    """Add to any error but a wrong input how to resume, if anything is there to resume from."""
+    """Add a note on how to resume to any error but InputError, if the study has begun."""
     try:
         yield
     except InputError:
@@ -42,10 +42,10 @@ def resume_note(folder: StudyFolder, command: str) -> Iterator[None]:
 
 
 def unfinished(study: Path, name: str) -> list[str]:
-    """Remarks on earlier runs of a study that were interrupted, because a new one begins now.
+    """Remarks on interrupted runs of a study, for a command that begins a new run.
 
     Args:
-        name: of the folder in results/ that the command would use.
+        name: name of the folder in results/ that the command would use.
     """
     from chamberopt.common.files import INPUTS
     from chamberopt.common.limits import MAX_RESULT_BYTES, read_limited
@@ -58,7 +58,7 @@ def unfinished(study: Path, name: str) -> list[str]:
         try:
             inputs = read_limited(folder / INPUTS, MAX_RESULT_BYTES, "file of a study")
             command = resume_command(study, folder, json.loads(inputs)["sweep"])
-        except (InputError, ValueError, LookupError, TypeError):  # damaged: `--out` will say so
+        except (InputError, ValueError, LookupError, TypeError):  # damaged; --out reports it
             command = resume_command(study, folder)
         remarks.append(f"{folder}: not finished; to resume it: {command}")
     return remarks

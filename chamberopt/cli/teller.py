@@ -1,4 +1,4 @@
-"""The listener that tells on the terminal how a workflow goes."""
+"""The listener that shows the progress of a workflow on the terminal."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 class TerminalTeller(Teller):
-    """Shows steps, compilation and warnings on stderr."""
+    """A listener that shows steps, compilation and warnings on stderr."""
 
     def step(self, what: str, total: int | None = None) -> AbstractContextManager[Progress]:
         return step(what, total)

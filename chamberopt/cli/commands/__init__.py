@@ -1,4 +1,4 @@
-"""The commands, one file each; importing this package registers them all with the application."""
+"""The commands, in a file each. Importing this package registers all commands with `app`."""
 
 from importlib import import_module
 from pkgutil import walk_packages

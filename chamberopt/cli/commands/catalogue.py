@@ -97,7 +97,7 @@ def _text(number: Any) -> str:
 
 
 def _columns(rows: Sequence[Sequence[str]]) -> list[str]:
-    """Rows of cells in columns: the first to the left, the others to the right."""
+    """Align rows of cells: the first column to the left, the other columns to the right."""
     first, *others = (max(map(len, column)) for column in zip(*rows, strict=True))
     return [
         "  ".join([row[0].ljust(first), *map(str.rjust, row[1:], others)]).rstrip() for row in rows

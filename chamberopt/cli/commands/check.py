@@ -1,4 +1,4 @@
-"""The command `check`: what a design or study file describes, and which effects it needs."""
+"""The command `check`: the content of a design or study file, and the effects it needs."""
 
 from __future__ import annotations
 
@@ -69,17 +69,17 @@ def _check(file: Path, pilot: bool, screenshot: Path | None, json: bool, out: Pa
         with step("building the chamber"):
             chamber = build_chamber(design)
     except SurfaceError as error:
-        if screenshot is not None:  # the faults in red; the message itself follows on stderr
+        if screenshot is not None:  # draws the faults in red; the message follows on stderr
             from chamberopt.pictures.part import draw_part
 
             with step("drawing"):
                 remark = draw_part(error.corners, str(error), screenshot, edges=error.edges)
             print_remarks([remark or f"picture in {screenshot}"])
-            error.__notes__.clear()  # how to see it
+            error.__notes__.clear()  # the notes tell how to see the faults
         raise
     first_lines = table_lines(first_facts(design, chamber))
     if not json:
-        show(first_lines)  # the rest takes longer, above all the first time
+        show(first_lines)  # the other facts take longer, above all the first time
     with step("finding what the shot reaches"):
         reach = shot_reach(design, chamber)
         facts = describe(design, chamber, reach)
@@ -110,7 +110,7 @@ def _check(file: Path, pilot: bool, screenshot: Path | None, json: bool, out: Pa
 
 
 def draw_target(chamber: Chamber, reach: Reach, screenshot: Path) -> None:
-    """Draw the part with its target, and the target's triangles that hardly a ball can touch."""
+    """Draw the part with its target, and mark triangles of the target that are out of reach."""
     from chamberopt.chamber.reach import reached_part_share
     from chamberopt.pictures.part import draw_part
 

@@ -1,4 +1,4 @@
-"""The command `compare`: designs and results against the first of them."""
+"""The command `compare`: designs and results, compared with the first candidate."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def compare(
 def _results(
     candidates: list[Candidate], folder: Path, workers: int | None, cluster: str | None
 ) -> list[Result]:
-    """The results of all candidates; missing ones are simulated."""
+    """The results of all candidates. Missing results are simulated."""
     from chamberopt.cli.teller import TerminalTeller
     from chamberopt.common.executor import open_executor
     from chamberopt.workflows.compared_candidates import simulate_missing

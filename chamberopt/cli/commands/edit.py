@@ -32,7 +32,7 @@ def edit(
     from chamberopt.common.errors import InputError
     from chamberopt.common.progress import step
 
-    file = _trusted(design, trust_shape)  # what is wrong with it is told before anything starts
+    file = _trusted(design, trust_shape)  # reports a wrong design before the server starts
     try:
         with step("starting"):
             from chamberopt.page.server import serve
@@ -48,7 +48,7 @@ def edit(
 
 
 def _trusted(path: Path, trusted: bool) -> bool:
-    """Whether the design's shape may be a Python file; InputError if it does not load."""
+    """True if the design may run its shape, a Python file. Raise InputError for a wrong design."""
     from chamberopt.common.toml_fields import read_toml
     from chamberopt.page.edited_file import EditedFile, custom_shape
 

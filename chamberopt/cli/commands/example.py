@@ -8,8 +8,8 @@ from typing import Literal
 from chamberopt.cli.console import show
 from chamberopt.cli.options import Out, app
 
-CAD_FILE = "fir_tree"  # without a design: `chamberopt new` proposes one
-STUDIES = {"gear": "quickstart", "plate": "plate", "blade": "blade"}  # file of each one's study
+CAD_FILE = "fir_tree"  # has no design; `chamberopt new` proposes it
+STUDIES = {"gear": "quickstart", "plate": "plate", "blade": "blade"}  # study file of each example
 
 
 @app.command
@@ -58,7 +58,7 @@ def example(name: Literal["gear", "plate", "blade", "fir_tree"], /, *, out: Out 
 
 
 def shipped_files() -> Path:
-    """The folder that holds designs/ and studies/: of the wheel, or the root of a checkout."""
+    """The folder that holds designs/ and studies/, in the wheel or at the root of a checkout."""
     import chamberopt
 
     package = Path(chamberopt.__file__).parent

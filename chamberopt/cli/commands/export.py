@@ -77,8 +77,8 @@ def export(
             if one.writer is not None:
                 with step(name):
                     remarks += one.write(folder, files[name])
-        print_remarks(dict.fromkeys(remarks))  # several formats leave out the same
-        # Impacts come last: to simulate them takes long, and what else is wrong is told before.
+        print_remarks(dict.fromkeys(remarks))  # several formats may have the same remark
+        # Impacts come last, because simulating them takes long. Other errors are reported before.
         if loaded and from_impacts:
             tables = [files[name] for name in from_impacts]
             counts["impacts"] = _write_impacts(loaded, tables, frame or "part", replicas, workers)
@@ -94,7 +94,7 @@ def export(
 def _files(
     formats: dict[str, ExportFormat], out: Path | None, name: str
 ) -> Iterator[dict[str, Path]]:
-    """The file of each format: --out itself if it is a file, else one in a new folder."""
+    """The file of each format: --out itself if it is a file, else a file in a new folder."""
     from chamberopt.common.files import check_new_file, claim_file, whole_or_nothing
 
     if out is not None and export_formats.is_file(out, formats):
@@ -121,7 +121,7 @@ def _write_impacts(
     require_writable(files)
     recorded = result.record.replicas
     count = replica_count(result, replicas)
-    for name in (PART, HITS_FILE):  # the impacts are compared with them at the end
+    for name in (PART, HITS_FILE):  # the impacts are compared with these files at the end
         result.path(name)
     ground = rebuild_chamber(result)
     with open_executor(workers, None) as executor:

@@ -54,7 +54,7 @@ def new(
     unit
         Of the numbers in the part's file; by default what the file states, or its size suggests.
     """
-    import chamberopt.pictures.part  # noqa: F401  # loaded before the folder is held
+    import chamberopt.pictures.part  # noqa: F401  # imported before the folder is claimed
     from chamberopt.chamber.propose.proposal import Wanted, propose
     from chamberopt.chamber.propose.text import design_text, study_text
     from chamberopt.cli.commands.check import draw_target
@@ -78,9 +78,9 @@ def new(
 
     out = out or Path(part.stem if part.suffix else f"{part.name}_chamber")
     with claim_folder(out):
-        pass  # what is wrong with it is told before the work
+        pass  # reports a folder that is taken before the work begins
     made = propose(part, Wanted(unit, shape, material, shot, ball_mm), choose)
-    pyvista()  # not while the folder is held: Ctrl-C ends an import at once, and would leave it
+    pyvista()  # before the folder is claimed: Ctrl-C during an import would leave the folder behind
     with claim_folder(out) as folder, whole_or_nothing(folder):
         write_text(folder / "design.toml", design_text(made, folder))
         write_text(folder / "study.toml", study_text(made, "design.toml"))
@@ -108,7 +108,7 @@ def _require_file(part: Path) -> None:
 
 
 def _picked(known: Sequence[Surface]) -> Sequence[str]:
-    """The names that the user chooses of the surfaces."""
+    """Ask the user for surfaces and return their names."""
     from chamberopt.common.errors import InputError
 
     show(_listed(known, len(known)))
@@ -116,13 +116,13 @@ def _picked(known: Sequence[Surface]) -> Sequence[str]:
         answer = input("to be peened, separated by commas: ").strip()
     except EOFError:
         raise InputError("--target: pick got no answer; answer, or give names or faces") from None
-    if any(one.name == answer for one in known):  # a name can have commas
+    if any(one.name == answer for one in known):  # a single name with commas
         return [answer]
     return [name.strip() for name in answer.split(",") if name.strip()]
 
 
 def _summary(made: Proposal) -> list[str]:
-    """What is proposed and why, a line each, and what else could be the target."""
+    """Lines with each proposed number and its reason, and other possible targets."""
     lines = [f"{'part.target':38}{one_line(made.reasons['part.target'])}"]
     for table, values in made.tables.items():
         for key, value in values.items():
@@ -134,7 +134,7 @@ def _summary(made: Proposal) -> list[str]:
 
 
 def _listed(known: Sequence[Surface], most: int) -> list[str]:
-    """The surfaces to choose from."""
+    """Lines with the surfaces to choose from."""
     lines = []
     for one in known[:most]:
         place = f", one at {one.keys['faces'][0]['at_mm']} mm" if "faces" in one.keys else ""

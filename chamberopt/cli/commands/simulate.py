@@ -42,7 +42,7 @@ def simulate(
 
     candidate = load_design(design)
     if tolerances:
-        plan_tolerances(candidate)  # before any work: they may be wrong
+        plan_tolerances(candidate)  # reports wrong tolerances before the work begins
     elif candidate.tolerances:
         console.print_remarks(["the design has [tolerances]; --tolerances simulates them too"])
     with (

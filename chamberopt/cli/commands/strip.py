@@ -100,7 +100,7 @@ def strip(
 
 
 def _size(disc_mm: float | None, size_mm: tuple[float, float] | None) -> StripSize:
-    """The strip's size; InputError if both are given or a number is out of range."""
+    """The strip's size. Raise InputError if both are given or a number is out of range."""
     from chamberopt.peening.strip import StripSize
 
     if disc_mm is not None and size_mm is not None:
@@ -116,7 +116,7 @@ def _size(disc_mm: float | None, size_mm: tuple[float, float] | None) -> StripSi
 
 
 def _require_zone(at: str, design: Design, of_lids: Mapping[str, object]) -> None:
-    """Raise InputError unless the design has the zone, and no option of a lid is given."""
+    """Raise InputError if the design lacks the zone, or if an option for lids is given."""
     from chamberopt.design.zones import LID
 
     names = [zone.name for zone in design.zones]

@@ -93,7 +93,7 @@ def sweep(
 
 
 def _workers_that_fit(study: Study, chamber: Chamber, wanted: int | None) -> int | None:
-    """How many of the wanted worker processes fit into memory; InputError if one does not."""
+    """Number of wanted worker processes that fit into memory. Raise InputError if none fits."""
     from chamberopt.common.executor import core_count
     from chamberopt.coverage.field.memory import PROCESS, evaluation_bytes, how_many_fit
     from chamberopt.simulation.replicas import most_replicas
