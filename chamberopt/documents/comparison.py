@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
 
 from chamberopt.common.estimate import CONFIDENCE, Estimate
 from chamberopt.common.number_text import estimate_text
@@ -96,7 +95,7 @@ def _times(times: float) -> str:
     return f"{times:.1f}" if times < 10.0 else f"{math.ceil(times)}"
 
 
-def _shown(value: Any) -> str:
+def _shown(value: object) -> str:
     return "-" if value is None else f"{value:g}" if isinstance(value, float) else str(value)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sized
 from dataclasses import dataclass
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any
@@ -395,7 +395,7 @@ def _half_covered(rows: list[CoverageAtTime]) -> CoverageAtTime | None:
     return min(rows, key=lambda row: abs(row.mean_coverage - 0.5), default=None)
 
 
-def _more(several: Any, most: int, what: str) -> Iterator[Row]:
+def _more(several: Sized, most: int, what: str) -> Iterator[Row]:
     if len(several) > most:
         more = len(several) - most
         yield "", f"{more} {what if more > 1 else what.removesuffix('s')} in the report."

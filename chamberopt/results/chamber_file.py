@@ -5,7 +5,7 @@ A finished result reads only chamber.npz, never again the files that its design 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
@@ -26,6 +26,8 @@ CHAMBER_FILE = "chamber.npz"
 LARGEST = 1e4  # m, m² or m³; every part and chamber is smaller
 STEEPEST = 1e12  # 1/m; every curvature is smaller, and so is every component of a normal
 REMEDY = "restore the file, or simulate again"
+_Column: TypeAlias = tuple[str, np.ndarray, str, tuple[int, ...], tuple[int, int] | None]
+"""Name, values, type, shape, and first number and end of whole numbers."""
 
 
 def load_chamber(result: Result) -> Chamber:
@@ -53,7 +55,7 @@ def _require_sound(chamber: Chamber) -> None:
         raise ValueError("without its part")
     corners, faces = len(chamber.vertices), len(chamber.triangles)
     points, own = len(part.vertices), len(part.triangles)
-    columns = [
+    columns: list[_Column] = [
         ("vertices", chamber.vertices, "f8", (corners, 3), None),
         ("triangles", chamber.triangles, "i4", (faces, 3), (0, corners)),
         ("tags", chamber.tags, "u1", (faces,), None),
@@ -114,7 +116,7 @@ def _require_sound(chamber: Chamber) -> None:
         raise ValueError("the part in its file's frame has normals")
 
 
-def _mesh_columns(name: str, vertices: np.ndarray, triangles: np.ndarray) -> list[Any]:
+def _mesh_columns(name: str, vertices: np.ndarray, triangles: np.ndarray) -> list[_Column]:
     limits = 0, len(vertices)
     return [
         (f"{name}'s vertices", vertices, "f8", (len(vertices), 3), None),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from textwrap import wrap
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from chamberopt.cli.console import print_json, show
 from chamberopt.cli.options import Json, app
@@ -92,7 +92,7 @@ def _wrapped(text: str) -> list[str]:
     return wrap(text, 100, initial_indent="    ", subsequent_indent="    ")
 
 
-def _text(number: Any) -> str:
+def _text(number: float | None) -> str:
     return "-" if number is None else f"{number:g}"
 
 
