@@ -8,7 +8,8 @@ import numpy as np
 
 from chamberopt.chamber.analytic import analytic_cavity, impacts_on_chamber
 from chamberopt.chamber.build import Chamber, build_chamber
-from chamberopt.chamber.scene import build_scene, chamber_mesh, replica_seed
+from chamberopt.chamber.replica_seed import replica_seed
+from chamberopt.chamber.scene import build_scene, chamber_mesh
 from chamberopt.common.estimate import Estimate, estimate
 from chamberopt.coverage.dents import impact_angle_deg
 from chamberopt.coverage.part_impacts import Hits, hits_on_part

@@ -23,7 +23,8 @@ import numpy as np
 
 from benchmarks.table import print_table, write_csv
 from chamberopt.chamber.build import Chamber, build_chamber
-from chamberopt.chamber.scene import chamber_mesh, replica_seed
+from chamberopt.chamber.replica_seed import replica_seed
+from chamberopt.chamber.scene import chamber_mesh
 from chamberopt.common.executor import core_count
 from chamberopt.coverage.coverage_from_impacts import find_footprints
 from chamberopt.coverage.part_impacts import Hits, hits_on_part

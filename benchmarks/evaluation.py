@@ -83,7 +83,8 @@ def replica_shares(design: Any, chamber: Any) -> dict[str, float]:
 
     Measured with replicas that have neither warm-up nor recorded time, the first, and both.
     """
-    from chamberopt.chamber.scene import chamber_mesh, replica_seed
+    from chamberopt.chamber.replica_seed import replica_seed
+    from chamberopt.chamber.scene import chamber_mesh
     from chamberopt.simulation.convergence import TIME, WARM_UP
     from chamberopt.simulation.replicas import ReplicaSetting, simulate_replica
 

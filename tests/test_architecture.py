@@ -27,7 +27,7 @@ ORDER = {
         "almen_strip+calibration+tolerances+zones design load"
     ),
     "chamberopt/chamber": (
-        "bores_and_deflectors part reach+largest_ball build dimensionless scene "
+        "replica_seed bores_and_deflectors part reach+largest_ball build dimensionless scene "
         "analytic checks propose"
     ),
     "chamberopt/coverage": "dents part_impacts+metrics field coverage_from_impacts "
@@ -41,7 +41,7 @@ ORDER = {
     "chamberopt/results": (
         "vtp_files records load chamber_file write rebuild flight+impacts compare command_records"
     ),
-    "chamberopt/pictures": "charts camera drawn_part actors+overlay+subprocess_drawing "
+    "chamberopt/pictures": "charts+quantities camera drawn_part actors+overlay+subprocess_drawing "
     "view picture_page panels coverage+dents+difference+film+part+part3d "
     "section part_drawing comparison",
     "chamberopt/cli": "interrupt+options+resume console prepare teller commands command_line",

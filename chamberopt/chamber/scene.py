@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,21 +18,6 @@ if TYPE_CHECKING:
     from chamberopt.chamber.part import Axis
     from chamberopt.design.load import Design
     from sim_core import AnalyticCavity, PartRotation, Physics, Scene, TriangleMesh, Vibration
-
-STREAMS = ("search", "confirm")
-
-
-def replica_seed(seed: int, replica: int, stream: str = "search") -> int:
-    """The random seed of one replica, 128 bits.
-
-    It is the same for every candidate of a study (common random numbers). It differs between
-    replicas and between streams, so a candidate that is chosen on "search" is confirmed on other
-    seeds. It comes from sha256, because hash() differs between Python processes.
-    """
-    if stream not in STREAMS:
-        raise ValueError(f"stream {stream!r}: one of {', '.join(STREAMS)}")
-    digest = hashlib.sha256(f"chamberopt/{stream}/{seed}/{replica}".encode()).digest()
-    return int.from_bytes(digest[:16], "big")
 
 
 def start_velocities(rng: np.random.Generator, count: int, rms_speed: float) -> np.ndarray:

@@ -28,7 +28,8 @@ def compile_with_message(
     """
     import sim_core
     from chamberopt.chamber.part import turning_axis
-    from chamberopt.chamber.scene import build_scene, chamber_mesh, replica_seed
+    from chamberopt.chamber.replica_seed import replica_seed
+    from chamberopt.chamber.scene import build_scene, chamber_mesh
     from chamberopt.common.progress import step
 
     room, seed = cavity or chamber_mesh(chamber), replica_seed(design.process.seed, 0)

@@ -19,7 +19,7 @@ from chamberopt.documents.document import (
     Tiles,
 )
 from chamberopt.documents.wording import Label, metric_label, objective_label, per_cent, plain
-from chamberopt.pictures.charts.result_charts import coverage_over_time_figure, histogram_figure
+from chamberopt.pictures.charts.coverage import coverage_over_time_figure, histogram_figure
 
 if TYPE_CHECKING:
     from chamberopt.pictures.part3d import PartScene

@@ -31,8 +31,11 @@ from chamberopt.documents.wording import (
     with_unit,
 )
 from chamberopt.documents.zones import limit_text
-from chamberopt.pictures.charts.result_charts import convergence_figure, influence_figure
-from chamberopt.pictures.charts.study import EvaluatedCandidate
+from chamberopt.pictures.charts.study import (
+    EvaluatedCandidate,
+    convergence_figure,
+    influence_figure,
+)
 from chamberopt.search.ask_and_tell import POINTS_PER_PARAMETER
 from chamberopt.search.sensitivity import Slice
 from chamberopt.search.study_folder import STUDY

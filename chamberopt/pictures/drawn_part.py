@@ -10,7 +10,7 @@ from chamberopt.common.errors import InputError
 from chamberopt.coverage.coverage_from_impacts import coverage_from_dent_density
 from chamberopt.design.shapes import TAG_PART
 from chamberopt.geometry.triangles import area_vectors
-from chamberopt.pictures.charts.quantities import QUANTITIES, Quantity
+from chamberopt.pictures.quantities import QUANTITIES, Quantity
 from chamberopt.results.vtp_files import ZONE, Surface, pyvista
 
 NEARLY_ALL = (0.01, 0.985)  # shares of the area below the ends of the colour scale

@@ -12,7 +12,7 @@ import numpy as np
 from chamberopt.geometry.triangles import unit_normals
 from chamberopt.pictures.actors import DARK, NO_RENDER, colour_bar_ticks, escape_dollars
 from chamberopt.pictures.camera import Room
-from chamberopt.pictures.charts.quantities import Quantity
+from chamberopt.pictures.quantities import Quantity
 from chamberopt.results.vtp_files import pyvista
 
 SMALL_FONT, LARGE_FONT = 9, 11  # in views of at least FULL_WIDTH pixels

@@ -16,8 +16,8 @@ import numpy as np
 
 from chamberopt.design.shapes import TAG_PART, TAG_WALL, is_sonotrode
 from chamberopt.pictures.charts.colours import FEW_DENTS, UNREACHED
-from chamberopt.pictures.charts.quantities import QUANTITIES
 from chamberopt.pictures.drawn_part import DrawnPart, point_areas
+from chamberopt.pictures.quantities import QUANTITIES
 from chamberopt.results.load import Result, load_cavity, load_field, load_part
 from chamberopt.results.vtp_files import Surface
 

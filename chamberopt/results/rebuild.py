@@ -9,7 +9,8 @@ import numpy as np
 
 from chamberopt.chamber.analytic import analytic_cavity, impacts_on_chamber
 from chamberopt.chamber.part import turning_axis
-from chamberopt.chamber.scene import build_scene, chamber_mesh, replica_seed
+from chamberopt.chamber.replica_seed import replica_seed
+from chamberopt.chamber.scene import build_scene, chamber_mesh
 from chamberopt.common.errors import InputError
 from chamberopt.coverage.part_impacts import HITS_FILE, load_hits
 from chamberopt.results.chamber_file import load_chamber

@@ -18,7 +18,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from chamberopt.chamber.scene import chamber_mesh, replica_seed
+from chamberopt.chamber.replica_seed import replica_seed
+from chamberopt.chamber.scene import chamber_mesh
 from chamberopt.common.errors import InputError
 from chamberopt.common.estimate import Estimate, estimate, paired_difference
 from chamberopt.common.executor import core_count

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 from chamberopt.chamber.analytic import impacts_on_chamber
 from chamberopt.chamber.part import turning_axis
-from chamberopt.chamber.scene import build_scene, replica_seed
+from chamberopt.chamber.replica_seed import replica_seed
+from chamberopt.chamber.scene import build_scene
 from chamberopt.common.errors import WorkerLostError
 from chamberopt.common.executor import share
 from chamberopt.coverage.part_impacts import Hits, hits_on_part

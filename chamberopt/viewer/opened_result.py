@@ -12,8 +12,8 @@ import numpy as np
 from chamberopt.common.errors import InputError
 from chamberopt.coverage.coverage_from_impacts import coverage_from_dent_density
 from chamberopt.coverage.part_impacts import HITS_FILE, HitsByTriangle, load_matching_hits
-from chamberopt.pictures.charts.quantities import QUANTITIES
 from chamberopt.pictures.drawn_part import DrawnPart, colour_range
+from chamberopt.pictures.quantities import QUANTITIES
 from chamberopt.results.load import Result, read_field, read_part, summary, unchanged_file
 from chamberopt.results.vtp_files import CHAMBER, COVERAGE, PART, ZONE, read_surface
 from chamberopt.viewer.view_state import ViewState

@@ -33,7 +33,7 @@ from chamberopt.pictures.camera import (
     target_in_chamber,
 )
 from chamberopt.pictures.charts.colours import zone_colour
-from chamberopt.pictures.charts.quantities import QUANTITIES
+from chamberopt.pictures.quantities import QUANTITIES
 from chamberopt.results.vtp_files import pyvista, size_text
 from chamberopt.viewer.opened_result import (
     OpenedResult,

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 from chamberopt.common.errors import InputError
 from chamberopt.pictures.camera import Vector
-from chamberopt.pictures.charts.quantities import OTHER_NAMES, QUANTITIES
+from chamberopt.pictures.quantities import OTHER_NAMES, QUANTITIES
 
 Plane = tuple[Vector, Vector | None]
 """Normal of a cutting plane, towards what is cut away, and a point of it [mm]; None: the middle."""

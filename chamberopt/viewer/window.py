@@ -12,7 +12,7 @@ from typing import Any
 from chamberopt.common.errors import InputError
 from chamberopt.common.files import claim_file
 from chamberopt.pictures.actors import DARK
-from chamberopt.pictures.charts.quantities import QUANTITIES
+from chamberopt.pictures.quantities import QUANTITIES
 from chamberopt.pictures.subprocess_drawing import (
     draw_in_subprocess,
     picture_path,

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from chamberopt.coverage.metrics import FULL_COVERAGE
-from chamberopt.pictures.charts.colours import DARK_GREY, GREY
+from chamberopt.pictures.charts.colours import BLUE, DARK_GREY, GREEN, GREY, ORANGE
 from chamberopt.pictures.charts.figure_style import (
     SMALL,
     literal,
@@ -23,12 +23,20 @@ from chamberopt.pictures.charts.figure_style import (
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
     from chamberopt.common.estimate import Estimate
     from chamberopt.results.records import CoverageAtTime
 
 MAX_HALF_WIDTH = 0.15  # largest half-width of an interval at which a curve is still drawn
 MAX_BANDS = 3  # results with a band around the 5th percentile; more bands would hide each other
+NARROW = (5.5, 4.0)  # inch, in a report
+BIN_EDGES = np.linspace(0.0, 100.0, 41)  # of a coverage histogram in a report [%]
+STYLES = {
+    "start": {"color": ORANGE, "ls": "--"},
+    "best": {"color": GREEN, "ls": "-"},
+    "result": {"color": BLUE, "ls": "-"},
+}
 
 
 @dataclass(frozen=True)
@@ -179,3 +187,38 @@ def _draw_time_to_98(axes: Axes, curve: CoverageCurve, end: float, height: float
         return
     x_error = [[min(time, half_width)], [half_width]]
     axes.errorbar(time, height, xerr=x_error, fmt="D", ms=5, lw=1.2, capsize=2, color=colour)
+
+
+def coverage_over_time_figure(
+    curves: Mapping[str, Sequence[CoverageAtTime]], treatment_time: float
+) -> Figure:
+    """Mean and 5th percentile of coverage over peening time [s], by name of the result."""
+    figure = new_figure(*NARROW)
+    axes = figure.subplots()
+    drawn = [CoverageCurve(name, rows, STYLES[name]) for name, rows in curves.items()]
+    draw_coverage_over_time(axes, drawn, treatment_time)
+    axes.set_title("thick: mean; thin: 95 % of the area has more", loc="left", fontsize=SMALL)
+    if len(drawn) > 1:
+        axes.legend(fontsize=SMALL, frameon=False, loc="lower right")
+    return figure
+
+
+def histogram_figure(coverage_and_area: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> Figure:
+    """Share of the target's area by its coverage.
+
+    Args:
+        coverage_and_area: for each result by name, coverage 0..1 and area of triangles, (k,) each.
+    """
+    shares = [
+        np.histogram(100.0 * coverage, BIN_EDGES, weights=area)[0] / max(area.sum(), 1e-300)
+        for coverage, area in coverage_and_area.values()
+    ]
+    figure = new_figure(*NARROW)
+    axes = figure.subplots()
+    names = list(coverage_and_area)
+    styles = [STYLES[name] for name in names]
+    labels = "coverage [%]", "share of the target's area [%]"
+    draw_histogram(axes, HistogramData(BIN_EDGES, shares, names, styles, *labels))
+    if len(names) > 1:
+        axes.legend(fontsize=SMALL, frameon=False)
+    return figure

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
+from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -32,6 +33,8 @@ if TYPE_CHECKING:
     from chamberopt.search.sensitivity import Sensitivity, Slice
 
 MAX_COLUMNS = 4  # panels side by side
+WIDE = (11.0, 3.8)  # inch
+Y_LABEL = 40  # letters of a line that fit beside a chart
 
 
 @dataclass(frozen=True)
@@ -300,3 +303,26 @@ def pareto_picture(path: Path, result: StudyResult) -> None:
     style_axes(axes, f"{x_name}, better to the right", f"{y_name}, better upwards")
     axes.legend(fontsize=SMALL, frameon=False)
     save_picture(figure, path)
+
+
+def convergence_figure(
+    candidates: Sequence[EvaluatedCandidate], y_label: str, smaller_is_better: bool
+) -> tuple[Figure, dict[str, list[str]]]:
+    """Every evaluation in its order, and tooltips with the parameters of each."""
+    figure = new_figure(*WIDE)
+    axes = figure.subplots()
+    tooltips = draw_convergence(axes, candidates, fill(y_label, Y_LABEL), smaller_is_better)
+    handles, labels = axes.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper left", ncols=5, fontsize=SMALL, frameon=False)
+    return figure, tooltips
+
+
+def influence_figure(
+    slices: Sequence[Slice],
+    start: Mapping[str, float | str],
+    best: Mapping[str, float | str],
+    y_label: str,
+) -> Figure:
+    """The objective over each parameter by the study's model."""
+    label = fill(y_label, Y_LABEL)
+    return slices_figure(slices, start, best, "loses no more than the noise", label)

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from chamberopt.chamber.build import build_chamber
-from chamberopt.chamber.scene import build_scene, chamber_mesh, replica_seed, start_velocities
+from chamberopt.chamber.replica_seed import replica_seed
+from chamberopt.chamber.scene import build_scene, chamber_mesh, start_velocities
 from chamberopt.common.errors import InputError
 from chamberopt.design.effects import Effects, FrictionTable, SurfaceEffectTable
 from chamberopt.design.load import load_design

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from chamberopt.chamber.scene import replica_seed
+from chamberopt.chamber.replica_seed import replica_seed
 from chamberopt.cli import main
 from chamberopt.common.errors import InputError, WorkerLostError
 from chamberopt.common.executor import SerialExecutor, local_executor, open_executor, share

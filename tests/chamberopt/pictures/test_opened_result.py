@@ -7,7 +7,7 @@ import pytest
 
 from chamberopt.common.errors import InputError
 from chamberopt.coverage.part_impacts import save_hits, sort_hits_by_triangle
-from chamberopt.pictures.charts.quantities import QUANTITIES
+from chamberopt.pictures.quantities import QUANTITIES
 from chamberopt.viewer.opened_result import OpenedResult, ResultInfo, colour_limits, same_part
 from chamberopt.viewer.view_state import ViewState
 from tests.helpers.results.sphere_in_sphere import TREATMENT, ball_result

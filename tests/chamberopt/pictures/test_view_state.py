@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from chamberopt.common.errors import InputError
-from chamberopt.pictures.charts.quantities import QUANTITIES
+from chamberopt.pictures.quantities import QUANTITIES
 from chamberopt.viewer.view_state import ViewState, parse_clip, parse_view, state_after_key
 
 ALL = list(QUANTITIES)

@@ -7,7 +7,7 @@ import pytest
 from matplotlib.axes import Axes
 
 from chamberopt.common.estimate import Estimate
-from chamberopt.pictures.charts import result_charts
+from chamberopt.pictures.charts import coverage, study
 from chamberopt.pictures.charts.coverage import HistogramData, draw_histogram
 from chamberopt.pictures.charts.figure_style import SVG, new_figure, svg_text
 from chamberopt.pictures.charts.study import EvaluatedCandidate, draw_convergence
@@ -22,7 +22,7 @@ def evaluation(
 
 
 def svg_of_search(rows: list[EvaluatedCandidate], smaller_is_better: bool) -> str:
-    figure, tooltips = result_charts.convergence_figure(rows, "time [s]", smaller_is_better)
+    figure, tooltips = study.convergence_figure(rows, "time [s]", smaller_is_better)
     return svg_text(figure, "convergence", tooltips)
 
 
@@ -77,9 +77,9 @@ def test_a_search_in_which_all_failed_is_drawn() -> None:
 
 
 def test_ids_are_unique_on_a_page_with_several_charts() -> None:
-    coverage = {"result": (np.array([0.0, 0.5, 1.0]), np.array([1.0, 2.0, 1.0]))}
+    shown = {"result": (np.array([0.0, 0.5, 1.0]), np.array([1.0, 2.0, 1.0]))}
     first, second = (
-        svg_text(result_charts.histogram_figure(coverage), "histogram"),
+        svg_text(coverage.histogram_figure(shown), "histogram"),
         svg_of_search(ROWS, False),
     )
     ids = [
@@ -89,8 +89,8 @@ def test_ids_are_unique_on_a_page_with_several_charts() -> None:
 
 
 def test_a_histogram_holds_all_of_the_area() -> None:
-    shares = np.histogram([0.0, 50.0, 100.0], result_charts.BIN_EDGES, weights=[0.25, 0.5, 0.25])[0]
+    shares = np.histogram([0.0, 50.0, 100.0], coverage.BIN_EDGES, weights=[0.25, 0.5, 0.25])[0]
     axes = new_figure(4.0, 3.0).subplots()
-    draw_histogram(axes, HistogramData(result_charts.BIN_EDGES, [shares], [""], [{}], "", ""))
+    draw_histogram(axes, HistogramData(coverage.BIN_EDGES, [shares], [""], [{}], "", ""))
     (steps,) = axes.patches
     assert sum(steps.get_data().values) == pytest.approx(100.0)

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from chamberopt.chamber.build import build_chamber
-from chamberopt.chamber.scene import build_scene, chamber_mesh, replica_seed
+from chamberopt.chamber.replica_seed import replica_seed
+from chamberopt.chamber.scene import build_scene, chamber_mesh
 from chamberopt.common.errors import InputError
 from chamberopt.results.load import Result
 from chamberopt.results.rebuild import rebuild_replica

@@ -8,7 +8,7 @@ import pytest
 from benchmarks.facet_invariance import cases
 from chamberopt.chamber.build import build_chamber
 from chamberopt.coverage.coverage_from_impacts import coverage_from_dent_density
-from chamberopt.pictures.charts.quantities import QUANTITIES
+from chamberopt.pictures.quantities import QUANTITIES
 from chamberopt.simulation.evaluation import Evaluation
 from chamberopt.simulation.field_values import PartField, _quantile, density_bounds
 from tests.helpers.synthetic import (

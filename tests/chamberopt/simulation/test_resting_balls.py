@@ -6,7 +6,8 @@ import trimesh
 
 from chamberopt.chamber.build import Chamber, build_chamber
 from chamberopt.chamber.part import Part
-from chamberopt.chamber.scene import build_scene, chamber_mesh, replica_seed
+from chamberopt.chamber.replica_seed import replica_seed
+from chamberopt.chamber.scene import build_scene, chamber_mesh
 from chamberopt.design.effects import FrictionTable
 from chamberopt.simulation.resting_balls import (
     RestingBalls,

@@ -12,7 +12,7 @@ import trimesh
 
 from chamberopt.coverage.field.display_mesh import DisplayField, DisplayMesh
 from chamberopt.coverage.part_impacts import Hits, save_hits, sort_hits_by_triangle
-from chamberopt.pictures.charts.quantities import QUANTITIES
+from chamberopt.pictures.quantities import QUANTITIES
 from chamberopt.results.vtp_files import pyvista, write_chamber, write_coverage
 from chamberopt.results.write import data_digests
 from chamberopt.viewer.opened_result import ResultInfo

@@ -1,0 +1,18 @@
+"""The random seed of a replica."""
+
+import hashlib
+
+STREAMS = ("search", "confirm")
+
+
+def replica_seed(seed: int, replica: int, stream: str = "search") -> int:
+    """The random seed of one replica, 128 bits.
+
+    It is the same for every candidate of a study (common random numbers). It differs between
+    replicas and between streams, so a candidate that is chosen on "search" is confirmed on other
+    seeds. It comes from sha256, because hash() differs between Python processes.
+    """
+    if stream not in STREAMS:
+        raise ValueError(f"stream {stream!r}: one of {', '.join(STREAMS)}")
+    digest = hashlib.sha256(f"chamberopt/{stream}/{seed}/{replica}".encode()).digest()
+    return int.from_bytes(digest[:16], "big")
