@@ -319,7 +319,8 @@ class TestWrongCalls:
         def ctrl_c(*_: object) -> None:
             raise KeyboardInterrupt
 
-        monkeypatch.setattr("chamberopt.chamber.build.build_chamber", ctrl_c)
+        for module in ("workflows.simulate", "workflows.optimise", "chamber.build"):
+            monkeypatch.setattr(f"chamberopt.{module}.build_chamber", ctrl_c)
         status, _, err = chamberopt("check", copies / "designs" / "gear.toml")
         assert (status, "interrupted" in err) == (130, True)
 

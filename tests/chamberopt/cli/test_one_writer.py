@@ -58,7 +58,8 @@ def test_the_second_is_told_at_once(
         pytest.fail("it worked before it claimed its output")
 
     monkeypatch.chdir(folder)
-    monkeypatch.setattr("chamberopt.chamber.build.build_chamber", never)
+    for module in ("workflows.simulate", "workflows.optimise", "chamber.build"):
+        monkeypatch.setattr(f"chamberopt.{module}.build_chamber", never)
     monkeypatch.setattr("chamberopt.common.child.subprocess.Popen", never)
     before = sorted(folder.rglob("*"))
     with claimed(Path(output)):
@@ -90,7 +91,8 @@ def test_a_default_folder_that_is_held_is_passed_over(
         raise Begun
 
     monkeypatch.chdir(folder)
-    monkeypatch.setattr("chamberopt.chamber.build.build_chamber", begin)
+    for module in ("workflows.simulate", "workflows.optimise", "chamber.build"):
+        monkeypatch.setattr(f"chamberopt.{module}.build_chamber", begin)
     monkeypatch.setattr("chamberopt.simulation.convergence.run_convergence_study", begin)
     seen: list[list[Path]] = []
     real = ExitStack.enter_context

@@ -37,7 +37,8 @@ def no_work(monkeypatch: pytest.MonkeyPatch) -> None:
     for module in ("export", "replay", "dents", "accuracy"):
         monkeypatch.setattr(f"chamberopt.cli.commands.{module}.compile_with_message", work)
     monkeypatch.setattr("chamberopt.cli.teller.compile_with_message", work)
-    monkeypatch.setattr("chamberopt.chamber.build.build_chamber", work)
+    for module in ("workflows.simulate", "workflows.optimise", "chamber.build"):
+        monkeypatch.setattr(f"chamberopt.{module}.build_chamber", work)
     monkeypatch.setattr("chamberopt.peening.calibrate.prepare", work)
     monkeypatch.setattr("chamberopt.common.child.subprocess.Popen", work)
     monkeypatch.setattr("chamberopt.printers.report_page.report", work)

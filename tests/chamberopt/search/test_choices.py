@@ -6,13 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from chamberopt.documents.conclusions import influence
 
 from chamberopt.common.errors import InputError
 from chamberopt.common.executor import SerialExecutor
 from chamberopt.design.design import Design, validate
 from chamberopt.design.load import load_design, save_design
 from chamberopt.design.materials import ball_sizes
+from chamberopt.documents.study import influences
 from chamberopt.documents.wording import Label
 from chamberopt.pictures.charts.study import convergence_picture, slices_figure, slices_picture
 from chamberopt.pictures.charts.sweep import sweep_map
@@ -105,10 +105,9 @@ def test_the_report_has_the_texts(searched: StudyResult) -> None:
     assert searched.sensitivity is not None
     about = study_record(searched)
     assert about.vary["shot.material"] == ["steel", "zirconia", "silicon_nitride"]
-    rows = {row["name"]: row for row in influence(about, Label("score"))["parameters"]}
-    assert rows["shot.material"]["texts"] == about.vary["shot.material"]
-    assert rows["shot.material"]["best"] == "zirconia"
-    assert rows["shot.mass_g"]["texts"] == []
+    texts = {one.name: list(one.curve.texts) for one in influences(about, Label("score"))}
+    assert texts == {"shot.material": about.vary["shot.material"], "shot.mass_g": []}
+    assert about.best.parameters["shot.material"] == "zirconia"
 
 
 def test_a_grid_has_all_texts_and_its_map_names_them(tmp_path: Path) -> None:
