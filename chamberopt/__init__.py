@@ -10,14 +10,31 @@ if TYPE_CHECKING:
         Design,
         Search,
         Study,
+        calibrate,
+        compare,
         load_design,
         load_study,
+        measure_accuracy,
         optimise,
+        peen_strip,
         show,
         simulate,
     )
 
-__all__ = ["Design", "Search", "Study", "load_design", "load_study", "optimise", "show", "simulate"]
+__all__ = [
+    "Design",
+    "Search",
+    "Study",
+    "calibrate",
+    "compare",
+    "load_design",
+    "load_study",
+    "measure_accuracy",
+    "optimise",
+    "peen_strip",
+    "show",
+    "simulate",
+]
 
 
 def __getattr__(name: str) -> Any:

@@ -17,7 +17,8 @@ each of the part's own triangles. pyvista and ParaView read both files.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -29,9 +30,27 @@ from chamberopt.search.study import Study, load_study
 
 if TYPE_CHECKING:
     from chamberopt.common.progress import Progress
+    from chamberopt.design.calibration import Calibration
+    from chamberopt.peening.virtual_strip import VirtualStrip
+    from chamberopt.results.compare.comparison import Comparison
     from chamberopt.results.load import Result
+    from chamberopt.simulation.convergence import ConvergenceStudy
+    from chamberopt.workflows.strip import StripPlace
 
-__all__ = ["Design", "Search", "Study", "load_design", "load_study", "optimise", "show", "simulate"]
+__all__ = [
+    "Design",
+    "Search",
+    "Study",
+    "calibrate",
+    "compare",
+    "load_design",
+    "load_study",
+    "measure_accuracy",
+    "optimise",
+    "peen_strip",
+    "show",
+    "simulate",
+]
 
 
 def simulate(
@@ -99,6 +118,114 @@ def optimise(
             done = optimise_study(folder, executor, Teller(progress))
             _warn([*map(str, done.advice), *done.remarks])
     return load_result(out)
+
+
+def compare(
+    candidates: Sequence[str | Path],
+    out: str | Path,
+    *,
+    treatment_time_s: float | None = None,
+    workers: int | None = None,
+) -> Comparison:
+    """Compare designs and results with the first of them, and write the comparison into a folder.
+
+    Args:
+        candidates: design files, which are simulated, and results folders.
+        out: new or empty folder.
+        treatment_time_s: peening time of all candidates; results of another time are simulated
+            again.
+        workers: number of threads, by default one per core; it does not change the result.
+    Raises:
+        InputError: a candidate cannot be read, or not be compared with the first.
+    """
+    from chamberopt.common.executor import local_executor
+    from chamberopt.common.files import claim_folder
+    from chamberopt.workflows.comparison_folder import compare_candidates
+    from chamberopt.workflows.simulate import Teller
+
+    with claim_folder(out) as folder:
+        found, remarks = compare_candidates(
+            candidates, folder, partial(local_executor, workers), Teller(), treatment_time_s
+        )
+    _warn(remarks)
+    return found
+
+
+def peen_strip(
+    design: Design,
+    out: str | Path,
+    place: StripPlace | None = None,
+    *,
+    workers: int | None = None,
+    progress: Progress | None = None,
+) -> VirtualStrip:
+    """Peen a virtual Almen strip in place of the part, and save it in a folder.
+
+    Args:
+        out: new or empty folder.
+        place: kind and place of the strip; None: a whole A strip as the lid.
+        workers: number of threads, by default one per core; it does not change the result.
+        progress: called as progress(done, total, None) after each replica.
+    Raises:
+        InputError: the strip does not fit, or the design lacks the zone.
+    """
+    from chamberopt.common.executor import local_executor
+    from chamberopt.common.files import claim_folder
+    from chamberopt.workflows.simulate import Teller
+    from chamberopt.workflows.strip import StripPlace, peen_strip_in
+
+    _require("design", design, Design, "load_design")
+    with claim_folder(out) as folder, local_executor(workers) as executor:
+        peened, advice = peen_strip_in(
+            design, place or StripPlace(), folder, executor, Teller(progress)
+        )
+    _warn(map(str, advice))
+    return peened
+
+
+def calibrate(measured: str | Path, out: str | Path, *, workers: int | None = None) -> Calibration:
+    """Calibrate the model to the measurements in a file, and save the machine in a folder.
+
+    Args:
+        measured: file of measurements (.toml), see docs/peening.md.
+        out: new or empty folder; machine.toml in it is for designs.
+        workers: number of threads, by default one per core; it does not change the result.
+    Raises:
+        InputError: the measurements or a design of theirs cannot be used.
+    """
+    from chamberopt.common.executor import local_executor
+    from chamberopt.common.files import claim_folder
+    from chamberopt.peening.measured import load_measured
+    from chamberopt.workflows.calibrate import calibrate_machine
+    from chamberopt.workflows.simulate import Teller
+
+    loaded, designs = load_measured(Path(measured))
+    with claim_folder(out) as folder, local_executor(workers) as executor:
+        found, _ = calibrate_machine(loaded, designs, folder, executor, Teller())
+    return found.table
+
+
+def measure_accuracy(
+    design: Design, out: str | Path, *, budget_s: float = 300.0
+) -> ConvergenceStudy:
+    """Measure error against computing time for the numerical parameters of a design.
+
+    Args:
+        out: new or empty folder.
+        budget_s: CPU seconds to spend on simulations.
+    Raises:
+        InputError: the budget is not positive, or the design cannot be simulated.
+    """
+    from chamberopt.common.executor import local_executor
+    from chamberopt.common.files import claim_folder
+    from chamberopt.simulation.convergence import require_budget
+    from chamberopt.workflows.accuracy import measure_accuracy as measure
+    from chamberopt.workflows.simulate import Teller
+
+    _require("design", design, Design, "load_design")
+    require_budget(budget_s)
+    with claim_folder(out) as folder, local_executor() as executor:
+        return measure(design, budget_s, folder, executor, Teller())
 
 
 def show(result: Result, screenshot: str | Path | None = None) -> None:

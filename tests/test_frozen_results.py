@@ -196,7 +196,7 @@ def patch_surroundings(patch: pytest.MonkeyPatch, sheets: list[Figure]) -> None:
     patch.setattr(convergence_study, "core_count", lambda: 1)
     still = SimpleNamespace(thread_time=lambda: 0.0, perf_counter=lambda: 0.0)
     patch.setattr(convergence_study, "time", still)
-    patch.setattr("chamberopt.cli.commands.accuracy.compile_with_message", lambda *_: None)
+    patch.setattr("chamberopt.cli.teller.compile_with_message", lambda *_: None)
 
     def save_charts(figure: Figure, *given: Any, **named: Any) -> None:
         if named.get("format") == "svg":  # in a page, as text

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -12,7 +12,6 @@ import numpy as np
 
 from chamberopt.chamber.analytic import analytic_cavity
 from chamberopt.chamber.build import build_chamber
-from chamberopt.common.progress import step
 from chamberopt.design.design import Design
 from chamberopt.design.load import load_design
 from chamberopt.peening.calibration_errors import evaluate_calibrated
@@ -30,14 +29,10 @@ from chamberopt.results.compare.comparison import (
 from chamberopt.results.load import Result, load_part, load_result
 from chamberopt.simulation.evaluate import ReplicaPlan
 from chamberopt.workflows.save_run import save_simulation
+from chamberopt.workflows.simulate import Teller, resolve_effects
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
-    from chamberopt.simulation.effect_pilot import Advice
-    from sim_core import AnalyticCavity
-
-Prepare = Callable[[Design, "Chamber", "AnalyticCavity | None"], "tuple[Design, list[Advice]]"]
-"""Function that chooses effects that are "auto" and compiles the simulator."""
 
 
 @dataclass(frozen=True)
@@ -108,7 +103,7 @@ def read_candidates(
 
 
 def simulate_missing(
-    candidates: Sequence[Candidate], folder: Path, executor: Executor, prepare: Prepare
+    candidates: Sequence[Candidate], folder: Path, executor: Executor, teller: Teller
 ) -> tuple[list[Result], list[str]]:
     """Simulate where needed; the result of each candidate, and remarks for the user.
 
@@ -131,21 +126,23 @@ def simulate_missing(
         elif results:
             settings = _seed_settings(results[0])
             remarks += _overridden(one, settings)
-        new, more = _simulate(one, settings, folder / name, executor, prepare)
+        new, more = _simulate(one, settings, folder / name, executor, teller)
         results.append(new)
         remarks += more
     return results, remarks
 
 
 def _simulate(
-    one: Candidate, settings: SeedSettings, folder: Path, executor: Executor, prepare: Prepare
+    one: Candidate, settings: SeedSettings, folder: Path, executor: Executor, teller: Teller
 ) -> tuple[Result, list[str]]:
     assert one.chamber is not None
     design = _with_seeds(one.design, settings)
     analytic = one.result is not None and one.result.record.analytic
     cavity = analytic_cavity(design, one.chamber) if analytic else None
-    design, advice = prepare(design, one.chamber, cavity)
-    with step(f"{one.label}: replicas", design.process.accuracy.replicas) as progress:
+    teller.check(design, one.chamber)
+    design, advice = resolve_effects(design, one.chamber, executor, teller)
+    teller.compile(design, one.chamber, cavity)
+    with teller.step(f"{one.label}: replicas", design.process.accuracy.replicas) as progress:
         evaluation = evaluate_calibrated(
             design, one.chamber, executor, progress, settings.plan, cavity
         )

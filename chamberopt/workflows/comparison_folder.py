@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+from concurrent.futures import Executor
+from contextlib import AbstractContextManager
 from pathlib import Path
 
 from chamberopt.common.errors import InputError
@@ -11,7 +14,7 @@ from chamberopt.pictures.comparison import draw_distributions
 from chamberopt.pictures.coverage import draw_coverage
 from chamberopt.pictures.difference import draw_difference, write_differences
 from chamberopt.results.command_records import comparison_record, write_record
-from chamberopt.results.compare.comparison import Comparison, require_same_triangles
+from chamberopt.results.compare.comparison import Comparison, comparison_of, require_same_triangles
 from chamberopt.results.compare.distributions import distributions
 from chamberopt.results.compare.local_difference import (
     LocalDifference,
@@ -20,8 +23,42 @@ from chamberopt.results.compare.local_difference import (
 )
 from chamberopt.results.load import summary
 from chamberopt.results.vtp_files import CHAMBER, COVERAGE
+from chamberopt.workflows.compared_candidates import read_candidates, simulate_missing
+from chamberopt.workflows.simulate import Teller
 
 COMPARE, DIFFERENCE = "compare.json", "difference.vtp"
+
+
+def compare_candidates(
+    paths: Sequence[str | Path],
+    folder: Path,
+    open_workers: Callable[[], AbstractContextManager[Executor]],
+    teller: Teller,
+    treatment_time_s: float | None = None,
+) -> tuple[Comparison, list[str]]:
+    """Compare designs and results with the first of them, and write the comparison into a folder.
+
+    Args:
+        paths: design files, which are simulated, and results folders.
+        open_workers: begins the executor; called only if a candidate has to be simulated.
+        treatment_time_s: peening time of all candidates; results of another time are simulated
+            again.
+
+    Returns:
+        The comparison, and remarks for the user.
+    """
+    with teller.step("reading and building"):
+        candidates = read_candidates(paths, treatment_time_s)
+    results = [one.result for one in candidates if one.result is not None]
+    remarks: list[str] = []
+    if any(one.missing for one in candidates):
+        with open_workers() as executor:
+            results, remarks = simulate_missing(candidates, folder, executor, teller)
+    for text in remarks:
+        teller.tell(text)
+    with teller.step("comparing and drawing"):
+        comparison = comparison_of(results, [one.label for one in candidates])
+        return comparison, write_comparison(folder, comparison)
 
 
 def write_comparison(folder: str | Path, comparison: Comparison) -> list[str]:

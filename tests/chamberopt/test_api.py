@@ -6,6 +6,10 @@ import pytest
 
 import chamberopt
 from chamberopt.common.errors import InputError
+from chamberopt.design.load import load_design, save_design
+from chamberopt.peening.strip import StripSize
+from chamberopt.workflows.strip import StripPlace
+from tests.helpers.synthetic import plate_design
 
 
 def test_the_names_are_listed() -> None:
@@ -24,3 +28,27 @@ def test_what_is_none_is_named_with_its_maker(name, call, tmp_path: Path) -> Non
     with pytest.raises(InputError, match=rf"^{name}: given .*chamberopt\.(load_{name}|simulate)"):
         call(tmp_path / "out")
     assert not (tmp_path / "out").exists()
+
+
+def test_designs_are_compared_and_a_strip_is_peened(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The same workflows as those of the command line, in folders of their own."""
+    for module in ("save_run", "comparison_folder"):
+        monkeypatch.setattr(f"chamberopt.workflows.{module}.draw_coverage", lambda *_: None)
+    brief = {"replicas": 4, "simulated_time_s": 0.05, "warmup_time_s": 0.01}
+    values = {f"process__accuracy__{name}": value for name, value in brief.items()}
+    paths = [tmp_path / "first.toml", tmp_path / "second.toml"]
+    for path, mass in zip(paths, (4.0, 6.0), strict=True):
+        save_design(plate_design(shot__mass_g=mass, **values), path)
+
+    found = chamberopt.compare(paths, tmp_path / "compared", workers=1)
+    assert found.labels == ("first", "second")
+    assert found.parameters["shot.mass_g"] == (4.0, 6.0)
+    assert (tmp_path / "compared" / "compare.json").is_file()
+
+    place = StripPlace(size=StripSize(0.03, 0.03, is_disc=True))
+    peened = chamberopt.peen_strip(load_design(paths[0]), tmp_path / "strip", place, workers=1)
+    assert not peened.is_calibrated
+    assert peened.intensity.value > 0.0
+    assert (tmp_path / "strip" / "strip.json").is_file()

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from chamberopt.cli.console import print_remarks, print_result, results_folder
+from chamberopt.cli.console import print_result, results_folder
 from chamberopt.cli.options import Json, Out, app
-from chamberopt.cli.prepare import compile_with_message
 
 
 @app.command
@@ -24,23 +23,15 @@ def accuracy(
     budget_s
         CPU seconds to spend on simulations; with more, smaller errors become visible.
     """
+    from chamberopt.cli.teller import TerminalTeller
     from chamberopt.common.executor import local_executor
-    from chamberopt.common.progress import step
     from chamberopt.design.load import load_design
     from chamberopt.documents.accuracy import accuracy_lines
-    from chamberopt.simulation.convergence import (
-        describe_cost,
-        require_budget,
-        run_convergence_study,
-    )
-    from chamberopt.workflows.save_accuracy import save_accuracy
+    from chamberopt.simulation.convergence import require_budget
+    from chamberopt.workflows.accuracy import measure_accuracy
 
     require_budget(budget_s)
-    one = load_design(design)
-    with results_folder(out, f"{design.stem}-accuracy") as folder:
-        print_remarks([describe_cost(one, budget_s)])
-        with local_executor() as executor:
-            study = run_convergence_study(one, budget_s, executor, compile_with_message)
-        with step("writing and drawing"):
-            save_accuracy(folder, study)
+    loaded = load_design(design)
+    with results_folder(out, f"{design.stem}-accuracy") as folder, local_executor() as executor:
+        study = measure_accuracy(loaded, budget_s, folder, executor, TerminalTeller())
     print_result(accuracy_lines(study), folder, json, "accuracy.json")

@@ -6,7 +6,6 @@ from pathlib import Path
 
 from chamberopt.cli import console
 from chamberopt.cli.options import Cluster, Json, Out, Workers, app
-from chamberopt.cli.prepare import compile_with_message
 
 
 @app.command
@@ -29,25 +28,15 @@ def calibrate(
     measured
         File of measurements (.toml), see docs/peening.md.
     """
+    from chamberopt.cli.teller import TerminalTeller
     from chamberopt.common.executor import open_executor
-    from chamberopt.common.files import private_folder
-    from chamberopt.common.progress import step
-    from chamberopt.peening.calibrate import calibrate as find
-    from chamberopt.peening.calibrate import prepare
     from chamberopt.peening.measured import load_measured
-    from chamberopt.workflows.save_calibration import save_calibration
+    from chamberopt.workflows.calibrate import calibrate_machine
 
     loaded, designs = load_measured(measured)
     with (
         console.results_folder(out, measured.stem) as folder,
         open_executor(workers, cluster) as executor,
     ):
-        with step("building the chambers"), private_folder() as lids:
-            prepared = prepare(loaded, designs, Path(lids))
-        for one in prepared.setups:
-            compile_with_message(one.design, one.chamber)
-        with step("simulations") as progress:
-            found = find(loaded, designs, prepared, executor, progress)
-        with step("writing and drawing"):
-            lines = save_calibration(folder, found)
+        _, lines = calibrate_machine(loaded, designs, folder, executor, TerminalTeller())
     console.print_result(lines, folder, json, "calibration.json")

@@ -9,7 +9,6 @@ from cyclopts import Parameter
 
 from chamberopt.cli import console
 from chamberopt.cli.options import Cluster, Json, Out, Workers, app
-from chamberopt.cli.prepare import compile_with_message
 from chamberopt.common.errors import InputError
 
 if TYPE_CHECKING:
@@ -57,20 +56,15 @@ def strip(
     size_mm
         Length and width of a small strip.
     """
-    from chamberopt.chamber.build import build_chamber
     from chamberopt.cli.teller import TerminalTeller
     from chamberopt.common.executor import open_executor
-    from chamberopt.common.files import whole_or_nothing
-    from chamberopt.common.progress import step
     from chamberopt.design.load import load_design
     from chamberopt.design.zones import LID
     from chamberopt.documents.strip import strip_lines
     from chamberopt.documents.terminal_lines import note_lines
-    from chamberopt.peening.virtual_strip import peen_strip, strip_in_lid, strip_in_zone
-    from chamberopt.workflows.save_strip import save_strip
-    from chamberopt.workflows.simulate import resolve_effects
+    from chamberopt.workflows.strip import StripPlace, peen_strip_in
 
-    size = _size(disc_mm, size_mm)
+    place = StripPlace(strip_type, at, _size(disc_mm, size_mm), distance_mm)
     loaded = load_design(design)
     if at != LID:
         _require_zone(at, loaded, {"--distance-mm": distance_mm, "--disc-mm": disc_mm,
@@ -78,23 +72,8 @@ def strip(
     with (
         console.results_folder(out, f"{design.stem}-strip") as folder,
         open_executor(workers, cluster) as executor,
-        whole_or_nothing(folder),
     ):
-        with step("building the chamber"):
-            if at == LID:
-                setting = strip_in_lid(loaded, strip_type, size, folder, distance_mm)
-                chamber = build_chamber(setting.design)
-            else:
-                chamber = build_chamber(loaded)
-                setting = strip_in_zone(loaded, strip_type, at, chamber)
-            console.print_warnings(setting.design, chamber)
-        resolved, advice = resolve_effects(setting.design, chamber, executor, TerminalTeller())
-        setting = setting._replace(design=resolved)
-        compile_with_message(resolved, chamber)
-        with step("replicas", resolved.process.accuracy.replicas) as progress:
-            peened = peen_strip(setting, chamber, executor, progress)
-        with step("writing and drawing"):
-            save_strip(folder, peened)
+        peened, advice = peen_strip_in(loaded, place, folder, executor, TerminalTeller())
     notes = note_lines([*map(str, advice), *peened.notes])
     console.print_result([*strip_lines(peened), *notes], folder, json, "strip.json")
 

@@ -93,7 +93,7 @@ def test_a_default_folder_that_is_held_is_passed_over(
     monkeypatch.chdir(folder)
     for module in ("workflows.simulate", "workflows.optimise", "chamber.build"):
         monkeypatch.setattr(f"chamberopt.{module}.build_chamber", begin)
-    monkeypatch.setattr("chamberopt.simulation.convergence.run_convergence_study", begin)
+    monkeypatch.setattr("chamberopt.workflows.accuracy.run_convergence_study", begin)
     seen: list[list[Path]] = []
     real = ExitStack.enter_context
 

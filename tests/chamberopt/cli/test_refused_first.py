@@ -34,12 +34,12 @@ def no_work(monkeypatch: pytest.MonkeyPatch) -> None:
     def work(*_: object, **__: object) -> None:
         raise AssertionError("work was begun")
 
-    for module in ("export", "replay", "dents", "accuracy"):
+    for module in ("export", "replay", "dents"):
         monkeypatch.setattr(f"chamberopt.cli.commands.{module}.compile_with_message", work)
     monkeypatch.setattr("chamberopt.cli.teller.compile_with_message", work)
     for module in ("workflows.simulate", "workflows.optimise", "chamber.build"):
         monkeypatch.setattr(f"chamberopt.{module}.build_chamber", work)
-    monkeypatch.setattr("chamberopt.peening.calibrate.prepare", work)
+    monkeypatch.setattr("chamberopt.workflows.calibrate.prepare", work)
     monkeypatch.setattr("chamberopt.common.child.subprocess.Popen", work)
     monkeypatch.setattr("chamberopt.printers.report_page.report", work)
 

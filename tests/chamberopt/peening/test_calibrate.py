@@ -27,7 +27,7 @@ from chamberopt.peening.posterior import TOGETHER, fit_surface
 from chamberopt.peening.probes import ArcProbe, Impacts, PartProbe
 from chamberopt.peening.setups import DropModel, Setup, exact_calibration
 from chamberopt.peening.strip import StripSize, strip_cells
-from chamberopt.workflows.save_calibration import save_calibration
+from chamberopt.workflows.calibrate import save_calibration
 from tests.helpers.synthetic import plate_design
 
 TRUTH: dict[Parameter, float] = {

@@ -22,7 +22,7 @@ from chamberopt.simulation.convergence import (
 )
 from chamberopt.simulation.error_law import BatchSize, ErrorLaw
 from chamberopt.simulation.recommendation import recommend, replicas_for
-from chamberopt.workflows.save_accuracy import convergence_record
+from chamberopt.workflows.accuracy import convergence_record
 from tests.helpers.synthetic import DESIGNS
 
 

@@ -53,7 +53,7 @@ def made_up_replica(setting: ReplicaSetting, target: TargetField, number: int) -
 @pytest.fixture
 def no_simulator(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("chamberopt.simulation.convergence.simulate_timed", made_up_replica)
-    monkeypatch.setattr("chamberopt.cli.commands.accuracy.compile_with_message", lambda *_: None)
+    monkeypatch.setattr("chamberopt.cli.teller.compile_with_message", lambda *_: None)
 
 
 def accuracy(folder: Path, budget: str, *options: str) -> int:

@@ -23,6 +23,7 @@ from chamberopt.results.load import load_result
 from chamberopt.workflows import compared_candidates
 from chamberopt.workflows.compared_candidates import read_candidates, simulate_missing
 from chamberopt.workflows.save_run import save_simulation
+from chamberopt.workflows.simulate import Teller
 from tests.helpers.synthetic import DESIGNS, plate_design, poisson_evaluation
 
 PLATE = plate_design()
@@ -68,13 +69,9 @@ def made(tmp_path: Path) -> Callable[..., Path]:
     return make
 
 
-def as_is(design: Design, *_: Any) -> tuple[Design, list[Any]]:
-    return design, []
-
-
 def run(paths: list[Path], out: Path, seconds: float | None = None) -> tuple[Any, list[str]]:
     found = read_candidates(paths, seconds)
-    results, remarks = simulate_missing(found, out, SerialExecutor(), as_is)
+    results, remarks = simulate_missing(found, out, SerialExecutor(), Teller())
     return comparison_of(results, [one.label for one in found]), remarks
 
 

@@ -1,4 +1,4 @@
-"""Save a convergence study: a table (.csv), the record as JSON, a picture."""
+"""Run a convergence study and save it: a table (.csv), the record as JSON, a picture."""
 
 from __future__ import annotations
 
@@ -20,10 +20,31 @@ from chamberopt.results.command_records import (
     ReferenceRecord,
     write_record,
 )
+from chamberopt.simulation.convergence import describe_cost, run_convergence_study
 from chamberopt.simulation.recommendation import ACCURACIES, Recommendation, recommend
+from chamberopt.workflows.simulate import Teller
 
 if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
+    from chamberopt.chamber.build import Chamber
+    from chamberopt.design.load import Design
     from chamberopt.simulation.convergence import ConvergenceStudy
+
+
+def measure_accuracy(
+    design: Design, budget_s: float, folder: Path, executor: Executor, teller: Teller
+) -> ConvergenceStudy:
+    """Run a convergence study for about a budget of CPU seconds, and save it in an empty folder."""
+
+    def compile_it(one: Design, chamber: Chamber) -> None:
+        teller.compile(one, chamber, None)
+
+    teller.tell(describe_cost(design, budget_s))
+    study = run_convergence_study(design, budget_s, executor, compile_it)
+    with teller.step("writing and drawing"):
+        save_accuracy(folder, study)
+    return study
 
 
 def save_accuracy(folder: Path, study: ConvergenceStudy) -> None:

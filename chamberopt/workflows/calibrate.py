@@ -1,20 +1,27 @@
-"""Save a calibration: machine.toml for designs, text to read, the record as JSON, a picture."""
+"""Calibrate a machine and save it: machine.toml for designs, text, JSON and a picture."""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from chamberopt.common.files import write_text
+from chamberopt.common.files import private_folder, write_text
 from chamberopt.design.load import save_design
 from chamberopt.documents.calibration import calibration_lines, calibration_notes
+from chamberopt.peening.calibrate import calibrate, prepare
 from chamberopt.peening.next_measurement import predict
 from chamberopt.pictures.charts.calibration import calibration_picture
 from chamberopt.results.command_records import calibration_record, write_record
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from concurrent.futures import Executor
+
     from chamberopt.design.calibration import Calibration
+    from chamberopt.design.load import Design
     from chamberopt.peening.calibrate import Calibrated
+    from chamberopt.peening.measured import Measured
+    from chamberopt.workflows.simulate import Teller
 
 MACHINE = "machine.toml"
 HEADER = """\
@@ -23,6 +30,32 @@ HEADER = """\
 # log_mean and log_covariance are of natural logarithms, in the order of parameters: factors on the
 # numbers of a design, and K [mmA per mm of strength].
 """
+
+
+def calibrate_machine(
+    measured: Measured,
+    designs: Mapping[str, Design],
+    folder: Path,
+    executor: Executor,
+    teller: Teller,
+) -> tuple[Calibrated, list[str]]:
+    """Calibrate the model to measurements, and save the machine in a new or empty folder.
+
+    Args:
+        measured, designs: as load_measured returns them.
+
+    Returns:
+        The calibration, and the lines of calibration.txt.
+    """
+    with teller.step("building the chambers"), private_folder() as lids:
+        prepared = prepare(measured, designs, Path(lids))
+    for one in prepared.setups:
+        teller.compile(one.design, one.chamber, None)
+    with teller.step("simulations") as progress:
+        found = calibrate(measured, designs, prepared, executor, progress)
+    with teller.step("writing and drawing"):
+        lines = save_calibration(folder, found)
+    return found, lines
 
 
 def save_calibration(folder: Path, found: Calibrated) -> list[str]:
