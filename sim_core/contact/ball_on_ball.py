@@ -37,7 +37,7 @@ PARTING = 1e-9
 
 @jit
 def place(contact: ContactState, motion: np.ndarray, ball: int, time: float) -> BallState:
-    """Position [m] and velocity [m/s] of a ball at a time of the window's clock."""
+    """Return a ball's position [m] and velocity [m/s] at ``time`` since the window's start [s]."""
     return state_under(motion, ball, time, vec3_at(contact.acceleration, ball))
 
 
@@ -49,7 +49,7 @@ def meet(
     two: BallEvent,
     restitution: RestitutionState | None,
 ) -> bool:
-    """Resolve the collision of two balls.
+    """Change the paths of two balls that collide, of which at least one is in contact mode.
 
     Returns: True if a ball that lay still has been moved, so that its neighbours must be woken.
     """
@@ -110,9 +110,16 @@ def _land_on_ball(
     normal: Vec3,
     rebound: float,
 ) -> None:
-    """Let a ball hit another ball that lies still and acts as a surface.
+    """Let a ball land on, or bounce off, another ball that lies still and acts as a surface.
 
-    ``rebound``: change of the normal speed [m/s].
+    Args:
+        contact: state of contact mode.
+        motion: base and velocity of each ball, shape (n, 6).
+        event: the ball that hits, and the time. Nothing happens if this ball lies still too.
+        other: number of the ball that lies still.
+        at: position and velocity of the ball that hits.
+        normal: unit vector from the other ball to the ball that hits.
+        rebound: change of the normal speed [m/s] if the ball bounces.
     """
     ball = event.ball
     if contact.mode[ball] >= ASLEEP:
@@ -133,9 +140,9 @@ def _land_on_ball(
 
 @jit
 def _of_balls(restitution: RestitutionState | None, speed: float) -> float:
-    """Coefficient of restitution of ball on ball at a speed [m/s]; 1 without the effect.
+    """Return the coefficient of restitution [-] of ball on ball at a ``speed`` [m/s].
 
-    The law also holds below elastic_below.
+    It is 1 in a scene without restitution. Hits slower than elastic_below lose speed here too.
     """
     if restitution is None:
         return 1.0
@@ -146,9 +153,10 @@ def _of_balls(restitution: RestitutionState | None, speed: float) -> float:
 def _press(
     friction_state: FrictionState | None, contact: ContactState, one: int, two: int, normal: Vec3
 ) -> float:
-    """Acceleration [m/s²] that presses two balls together.
+    """Return the acceleration [m/s²] that presses two balls together along ``normal``.
 
-    With friction it is at most twice the weight, because a slip that presses harder soon ends.
+    ``normal`` is the unit vector from ball ``one`` to ball ``two``. With friction the result is at
+    most twice gravity, because a slip that presses harder soon ends.
     """
     accelerations = contact.acceleration
     press = -dot(sub(vec3_at(accelerations, two), vec3_at(accelerations, one)), normal)

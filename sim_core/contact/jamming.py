@@ -1,4 +1,7 @@
-"""Holding of balls that keep bouncing in place, twice as long for each further jam at a place."""
+"""Hold balls still that keep bouncing at one place, about twice as long each further time there.
+
+A ball that makes many slow hits without leaving its place is jammed between its neighbours.
+"""
 
 import numpy as np
 
@@ -33,7 +36,7 @@ MAX_REPEATS = 40  # a ball with more jams at one place is held for ever
 
 @jit
 def hold_still(contact: ContactState, motion: np.ndarray, event: BallEvent, position: Vec3) -> None:
-    """Hold a ball still where it is, for longer if it was held there before."""
+    """Stop a ball at ``position`` [m] as jammed, for longer if it was jammed there before."""
     ball, jams = event.ball, contact.jams
     if _is_elsewhere(contact, jams.position, ball, position):
         set_vec3(jams.position, ball, position)
@@ -86,6 +89,9 @@ def count_slow_hit(
 
 @jit
 def _is_elsewhere(contact: ContactState, places: np.ndarray, ball: int, position: Vec3) -> bool:
-    """True if a position is further than SAME_PLACE from the ball's row of ``places``."""
+    """Return True if a ball has moved away from the place noted for it in ``places`` (n, 3) [m].
+
+    A ball has moved away if ``position`` is further from there than a hundredth of its radius.
+    """
     gone = sub(position, vec3_at(places, ball))
     return dot(gone, gone) > (SAME_PLACE * contact.radius) ** 2

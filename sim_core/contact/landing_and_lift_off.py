@@ -68,11 +68,11 @@ LAST_LEFT = -2
 
 @jit
 def settle(contact: ContactState, motion: np.ndarray, event: BallEvent, at: BallState) -> None:
-    """Let a ball go on from the state ``at`` on those supports that hold it.
+    """Set a ball's new path from the state ``at``, on those of its supports that still hold it.
 
-    A support that the ball hits faster than capture is dropped. The search for contacts then finds
-    it at once as a wall. A support on a ball that has begun to move is dropped too, because the two
-    balls are an ordinary pair again.
+    A support that the ball hits faster than ContactState.capture is dropped. The search for
+    contacts then finds it at once as a wall. A support that is another ball is dropped when that
+    ball has begun to move, because the two are an ordinary pair again.
     """
     ball, supports = event.ball, contact.supports
     contact.wake_pending[ball] = 0
@@ -116,7 +116,16 @@ def move_on(
     acceleration: Vec3,
     mode: int,
 ) -> None:
-    """Give a ball its path and its mode."""
+    """Set the path, acceleration, mode and spin with which a ball goes on after an event.
+
+    Args:
+        contact: state of contact mode.
+        motion: base and velocity of each ball, shape (n, 6).
+        event: the ball and the present time.
+        at: position and velocity of the ball now.
+        acceleration: acceleration of the ball from now on [m/s²].
+        mode: FLYING, SLIDING, ASLEEP (lies still) or JAMMED (is held still).
+    """
     ball = event.ball
     if mode >= ASLEEP and contact.mode[ball] < ASLEEP:
         contact.still_since[ball] = event.time_since_start
@@ -133,7 +142,10 @@ def move_on(
 def impart(
     contact: ContactState, motion: np.ndarray, event: BallEvent, at: BallState, change: Vec3
 ) -> None:
-    """Change a ball's velocity by ``change`` [m/s], projected onto the cone of its supports."""
+    """Add ``change`` [m/s] to the velocity of a ball in flight or on supports.
+
+    A ball on supports keeps only the part of its new velocity that the supports leave free.
+    """
     if contact.mode[event.ball] == FLYING:
         change_velocity(motion, event.ball, event.time, change)
     else:
@@ -144,7 +156,10 @@ def impart(
 def deflect(
     contact: ContactState | None, motion: np.ndarray, event: BallEvent, at: BallState, change: Vec3
 ) -> None:
-    """Change a ball's velocity after a hit on a surface, with contact mode or without it."""
+    """Add ``change`` [m/s] to a ball's velocity after a hit on a surface.
+
+    ``contact`` is None in a scene without contact mode.
+    """
     if contact is None:
         change_velocity(motion, event.ball, event.time, change)
         return
@@ -156,7 +171,7 @@ def deflect(
 def moved_off_edge(
     contact: ContactState | None, motion: np.ndarray, event: BallEvent, at: BallState, away: Vec3
 ) -> BallState:
-    """State of a ball after it is put back to one radius from an edge.
+    """Put a ball that overlaps an edge back to one radius from it, and return its new state.
 
     Rounding makes contact up to 1e-13 m deep, and thousands of small hops on one edge would add up.
     The ball is moved along the planes of its supports. ``away``: vector from the edge to the ball.
@@ -187,9 +202,20 @@ def land(
     at: BallState,
     away: Vec3,
 ) -> int:
-    """Result of a hit on a still surface: BOUNCES, ROLLS or CAUGHT.
+    """Let a ball land on a still surface if it can, and return BOUNCES, ROLLS or CAUGHT.
 
-    ROLLS means that the ball goes on as if this surface and its support were the same surface.
+    BOUNCES means that the ball does not stay on the surface, and its path is as before. CAUGHT
+    means that the ball now stands on the surface. ROLLS means that it goes on as if this surface
+    and the one it stood on were the same surface.
+
+    Args:
+        contact: state of contact mode. Without it every ball bounces.
+        tree: tree of the obstacles.
+        motion: base and velocity of each ball, shape (n, 6).
+        event: the ball and the present time.
+        obstacle: number of the obstacle that is hit.
+        at: position and velocity of the ball.
+        away: any vector along the normal, from the surface to the ball.
     """
     if contact is None:
         return BOUNCES
@@ -209,9 +235,18 @@ def touch_down(
     at: BallState,
     normal: Vec3,
 ) -> int:
-    """Result of a hit on any still object: BOUNCES, ROLLS or CAUGHT.
+    """Let a ball land on any still object if it can, and return BOUNCES, ROLLS or CAUGHT.
 
-    ``bend``: radius [m] of the centre's path round the object.
+    The three results are explained in ``land``.
+
+    Args:
+        contact: state of contact mode.
+        motion: base and velocity of each ball, shape (n, 6).
+        event: the ball and the present time.
+        obstacle: number of the obstacle, or ON_BALL minus the number of a ball that lies still.
+        bend: radius [m] of the path of the ball's centre round the object, infinite on a flat one.
+        at: position and velocity of the ball.
+        normal: unit normal of the object, towards the ball.
     """
     ball, supports, velocity = event.ball, contact.supports, at.velocity
     speed = math.sqrt(dot(velocity, velocity))
@@ -256,10 +291,12 @@ def touch_down(
 
 @jit
 def _smooth_neighbour(contact: ContactState, ball: int, normal: Vec3) -> tuple[int, Vec3]:
-    """The support, or the support that the ball has just left, that is most nearly in a plane.
+    """Find the support of a ball whose normal is nearest to ``normal``, at most 25° from it.
 
-    Returns: the support's number and its normal. The number is LAST_LEFT for the support just left,
-    and NO_SUPPORT if no support is nearly in the plane with this normal.
+    The support that the ball has just left counts too.
+
+    Returns: the support's number and its unit normal. The number is LAST_LEFT for the support just
+    left. It is NO_SUPPORT if no normal is near enough, and the normal has no meaning then.
     """
     found, best, last = NO_SUPPORT, ONE_SURFACE, normal
     for support in range(contact.supports.number[ball]):
@@ -275,7 +312,7 @@ def _smooth_neighbour(contact: ContactState, ball: int, normal: Vec3) -> tuple[i
 
 @jit
 def _lies_in_valley(contact: ContactState, one: Vec3, two: Vec3, velocity: Vec3) -> bool:
-    """True if both faces run down to their crease and the ball hardly moves across it.
+    """Return True if two faces run down to their common edge and the ball hardly moves across it.
 
     Such a ball stays on both faces. ``one``, ``two``: unit normals of the faces.
     """
@@ -294,7 +331,17 @@ def _lies_in_valley(contact: ContactState, one: Vec3, two: Vec3, velocity: Vec3)
 def end_path(
     contact: ContactState, motion: np.ndarray, event: BallEvent, reason: int, at: BallState
 ) -> bool:
-    """Let a ball go on at the end of its path in contact; False if the path does not end."""
+    """Set the new path of a ball that stands on supports, at the end of its present path.
+
+    Args:
+        contact: state of contact mode.
+        motion: base and velocity of each ball, shape (n, 6).
+        event: the ball and the present time.
+        reason: why the path ends: BRAKE_ENDS, WAKES, or LEAVES_SUPPORT minus a support's number.
+        at: position and velocity of the ball.
+
+    Returns: False, with nothing changed, if ``reason`` is none of these.
+    """
     ball = event.ball
     if reason <= LEAVES_SUPPORT:
         support = LEAVES_SUPPORT - reason

@@ -1,4 +1,7 @@
-"""End of a ball's path in contact: at the border of a face, off an edge, or at a stop."""
+"""Time and reason at which a ball that slides or rolls on supports needs a new path.
+
+The path ends at the border of a face, where the ball leaves an edge, or where the ball stops.
+"""
 
 import math
 
@@ -43,7 +46,7 @@ RECHECK_TIME = 2e-3
 def out_of_reach(
     contact: ContactState | None, tree: Tree, ball: int, position: Vec3, obstacle: int
 ) -> bool:
-    """True for an obstacle that a ball on supports cannot meet as it moves along their planes.
+    """Return True if a ball cannot meet an obstacle while it moves along its supports' planes.
 
     Such an obstacle is a support itself, or an edge behind the plane of a support.
     """
@@ -84,9 +87,18 @@ def end_of_path(
     flight: Flight,
     length: float,
 ) -> tuple[float, int]:
-    """Time [s], at most ``length``, for which the ball's path holds, and the reason for its end.
+    """Return the time [s] until a ball in contact needs a new path, and the reason.
 
-    ``event``: the ball and the present time. For the reason LIES_STILL the time has no meaning.
+    Args:
+        contact: state of contact mode.
+        tree: tree of the obstacles.
+        face_overlap: overlap of neighbouring faces [m].
+        event: the ball and the present time.
+        flight: position, velocity and acceleration of the ball now.
+        length: duration of the search [s].
+
+    Returns: (time, reason), with a time of at most ``length``. The reason is PATH_GOES_ON if the
+    path holds for ``length``. For the reason LIES_STILL the time has no meaning.
     """
     if contact is None:
         return length, PATH_GOES_ON
@@ -134,7 +146,7 @@ def _end_of_ride(
     flight: Flight,
     length: float,
 ) -> tuple[float, int]:
-    """Time [s] and reason of the end of the path of a ball that moves with a vibrating face."""
+    """Do the work of ``end_of_path`` for a ball that moves with a vibrating face."""
     if ride is None:
         return length, PATH_GOES_ON
     face = int(np.int64(ride.face[event.ball]))
@@ -159,10 +171,10 @@ def _leaves_face(numbers: np.ndarray, row: int, flight: Flight, over: float) -> 
 def _leaves_edge(
     supports: Supports, numbers: np.ndarray, ball: int, support: int, flight: Flight, over: float
 ) -> float:
-    """Time [s] at which a ball leaves an edge.
+    """Return the time [s] until a ball that stands on an edge leaves it.
 
-    The support is a plane that touches the edge's capsule. It holds for a short way across the
-    edge, and along the edge up to its ends.
+    The support is a plane that touches the tube of one ball radius round the edge. It holds for a
+    short way across the edge, and along the edge up to its ends.
     """
     row = supports.obstacles[ball, support]
     start = vec3_at(numbers, row)
@@ -182,9 +194,10 @@ def _leaves_edge(
 
 @jit
 def _leaves_round(supports: Supports, ball: int, support: int, flight: Flight, line: Vec3) -> float:
-    """Time [s] for which a plane can stand for a round object under a ball.
+    """Return the time [s] until a ball on a round object has moved too far along its support.
 
-    Motion along ``line`` (a unit vector, or zero) does not count.
+    The support is a plane, which stands for the object up to Supports.ranges. Motion along ``line``
+    (a unit vector, or zero) does not count.
     """
     origins = supports.origins
     origin = Vec3(origins[ball, support, 0], origins[ball, support, 1], origins[ball, support, 2])
@@ -207,9 +220,10 @@ def _leaves_round(supports: Supports, ball: int, support: int, flight: Flight, l
 def _brake_ends(
     friction_state: FrictionState | None, contact: ContactState, event: BallEvent, flight: Flight
 ) -> tuple[float, bool]:
-    """Time [s] for which the force against a ball's slip or motion keeps its direction.
+    """Return for how long [s] friction or resistance on a ball keeps its direction, and what then.
 
-    The second value is True if the force then turns, and False if it ends.
+    The second value is True if the force then has to turn, and False if it ends because the slip or
+    the motion has stopped.
     """
     if friction_state is not None:
         slips, ball = friction_state.slips, event.ball

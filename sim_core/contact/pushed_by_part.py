@@ -28,7 +28,10 @@ def constrained_change(
     approach: float,
     change: Vec3,
 ) -> Vec3:
-    """Velocity change [m/s] of a ball that the turning part hits, without friction.
+    """Return the velocity change [m/s] of a ball that the turning part hits, without friction.
+
+    A slow hit moves the ball only where its supports leave it free. For a fast hit the result is
+    ``change``.
 
     ``change``: velocity change [m/s] of a free ball.
     ``away``: vector from the touched point to the ball, in the part's frame.
@@ -55,14 +58,14 @@ def _constrained(contact: ContactState, ball: int, normal: Vec3, approach: float
 def push_ball(
     contact: ContactState | None, motion: np.ndarray, event: BallEvent, at: BallState, change: Vec3
 ) -> None:
-    """Change the velocity of a ball that the turning part hits by ``change`` [m/s]."""
+    """Add ``change`` [m/s] to the velocity of a ball that the turning part hits; note the hit."""
     deflect(contact, motion, event, at, change)
     note_touch(contact, event)
 
 
 @jit
 def note_touch(contact: ContactState | None, event: BallEvent) -> None:
-    """Note that the turning part, or a ball that the part presses, has touched a ball."""
+    """Write down that the turning part, or a ball that it presses, has touched a ball now."""
     if contact is None:
         return
     hits, ball = contact.slow_hits, event.ball
@@ -72,7 +75,10 @@ def note_touch(contact: ContactState | None, event: BallEvent) -> None:
 
 @jit
 def is_pressed(contact: ContactState, event: BallEvent) -> bool:
-    """True if the turning part pushes a blocked ball, so that the ball's neighbours must move."""
+    """Return True if the turning part presses a ball that cannot give way to it.
+
+    The ball's neighbours must then move.
+    """
     hits, ball = contact.slow_hits, event.ball
     recent = event.time_since_start - hits.touched_at[ball] < TOUCHING
     return bool(hits.part_contact[ball] == PRESSED and recent)
@@ -80,7 +86,10 @@ def is_pressed(contact: ContactState, event: BallEvent) -> bool:
 
 @jit
 def drop_pressed_balls(contact: ContactState, ball: int, push: Vec3) -> None:
-    """Drop the supports on balls that a push presses. Those balls must give way or press back."""
+    """Remove those supports of a ball that are other balls into which it is pushed.
+
+    Those balls must give way or press back. ``push``: direction in which the ball is pushed.
+    """
     supports = contact.supports
     for support in range(supports.number[ball] - 1, -1, -1):
         on_ball = supports.obstacles[ball, support] <= ON_BALL

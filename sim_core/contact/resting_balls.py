@@ -49,9 +49,11 @@ def resting(
     middle: np.ndarray,
     origin: float,
 ) -> Resting:
-    """Find the balls that lie still now.
+    """Find the balls that lie still now, and what is under them.
 
     Args:
+        contact: state of contact mode. Without it no ball lies still.
+        obstacles: still obstacles of the scene.
         positions: positions of all ball centres [m], (n, 3).
         middle: middle of the mesh [m], (3,).
         origin: end of the warm-up [s since the start].

@@ -54,7 +54,9 @@ PARTING = 1e-12
 
 @jit
 def time_to_let_go(weight: float, strength: float, omega: float, angle: float) -> float:
-    """Time [s] for which the face will press the ball; 0 if it does not, NEVER if it always does.
+    """Return how long [s] a vibrating face goes on pressing a ball; NEVER if it always does.
+
+    The time is 0 if the face does not press the ball now.
 
     Args:
         weight: w [m/s²].
@@ -73,7 +75,10 @@ def time_to_let_go(weight: float, strength: float, omega: float, angle: float) -
 
 @jit
 def _swing(ride: Ride, face: int, normal: Vec3, time: float) -> tuple[float, float, float]:
-    """Positive amplitude A [m], omega [rad/s] and present angle [rad] of a face."""
+    """Return how a vibrating face moves along its own normal.
+
+    Returns: amplitude [m], not negative, angular frequency [rad/s], and phase at ``time`` [rad].
+    """
     wave = wave_of_face(ride.waves, ride.wave, face)
     lift = dot(normal, wave.axis)
     angle = wave.omega * time + wave.phase
@@ -89,10 +94,11 @@ def stick(
     face: int,
     at: BallState,
 ) -> int:
-    """Result of a hit on a vibrating face: BOUNCES, ROLLS or CAUGHT.
+    """Let a ball stick to a vibrating face if it can, and return BOUNCES, ROLLS or CAUGHT.
 
-    CAUGHT means that the ball moves on with the face. ROLLS means that the face leaves a ball
-    behind that has no speed relative to it, which is not an impact.
+    BOUNCES means that the ball does not stick, and nothing has been changed. CAUGHT means that the
+    ball moves on with the face. ROLLS means that the face leaves a ball behind that has no speed
+    relative to it, which is not an impact.
     """
     if contact is None:
         return BOUNCES
@@ -137,7 +143,17 @@ def _go_on(
     at: BallState,
     speed: float,
 ) -> None:
-    """Let a ball go on from ``at``: with its face, or in flight off the face at ``speed`` [m/s]."""
+    """Set the next path of a ball on a vibrating face: further with the face, or in flight.
+
+    Args:
+        ride: state of the balls that move with a face.
+        contact: state of contact mode.
+        motion: base and velocity of each ball, shape (n, 6).
+        event: the ball and the present time.
+        at: position and velocity of the ball.
+        speed: speed [m/s] of the ball off the face. The ball stays on the face if the face presses
+            it and the speed lies between -capture and 0.
+    """
     ball, time = event.ball, event.time
     normal = support_normal(contact.supports, ball, 0)
     amplitude, omega, angle = _swing(ride, ride.face[ball], normal, time)
@@ -173,7 +189,11 @@ def _go_on(
 def settle_on_face(
     ride: Ride | None, contact: ContactState, motion: np.ndarray, event: BallEvent, at: BallState
 ) -> bool:
-    """Let a ball that rides go on from ``at`` after a hit; False if it does not ride."""
+    """Set the next path of a ball that moves with a vibrating face, after a hit.
+
+    ``at``: position and velocity after the hit. Returns: False, with nothing changed, if the ball
+    does not move with a face.
+    """
     if ride is None:
         return False
     if ride.face[event.ball] < 0:
@@ -195,7 +215,10 @@ def go_on_riding(
     at: BallState,
     face: int,
 ) -> None:
-    """Let a ball go on at its parabola's end: with ``face``, or in flight if ``face`` is -1."""
+    """Set the next path of a ball at the end of a piece of its path on a vibrating face.
+
+    ``face``: number of the face with which the ball moves on, or -1 if it flies off.
+    """
     if ride is None:
         return
     if face >= 0:
@@ -205,7 +228,7 @@ def go_on_riding(
 
 @jit
 def is_of_plane(ride: Ride, tree: Tree, face: int, row: int) -> bool:
-    """True if an obstacle lies in the plane of a face and moves with the face."""
+    """Return True if obstacle ``row`` is a face in the same plane and sonotrode as ``face``."""
     return (
         tree.kinds[row] == VIBRATING_FACE
         and same_plane(tree.numbers, face, row)
@@ -215,7 +238,7 @@ def is_of_plane(ride: Ride, tree: Tree, face: int, row: int) -> bool:
 
 @inlined
 def moves_with_face(contact: ContactState | None, tree: Tree, ball: int, row: int) -> bool:
-    """True if the ball rides on the plane of this vibrating face."""
+    """Return True if the ball moves with a face in the plane of the vibrating face ``row``."""
     if contact is None:
         return False
     return _is_ridden(contact.ride, tree, ball, row)
@@ -231,7 +254,11 @@ def _is_ridden(ride: Ride | None, tree: Tree, ball: int, row: int) -> bool:
 
 @inlined
 def seen_from_face(ride: Ride | None, ball: int, time: float, flight: Flight) -> Flight:
-    """The ball's flight relative to the face that it rides on, at the face's present velocity."""
+    """Return a ball's flight as seen from the vibrating face with which the ball moves.
+
+    The displacement and velocity of the face at ``time`` [s] are subtracted. The acceleration is
+    kept.
+    """
     if ride is None:
         return flight
     wave = wave_of_face(ride.waves, ride.wave, int(np.int64(ride.face[ball])))
@@ -253,7 +280,7 @@ def _shift_rides(ride: Ride | None, window: float) -> None:
 
 @inlined
 def shift_contact(contact: ContactState | None, window: float) -> None:
-    """Move the clock's zero of contact mode forward by ``window`` [s]."""
+    """Rewrite the times of contact mode for a clock whose zero lies ``window`` [s] later."""
     if contact is None:
         return
     _shift_rides(contact.ride, window)

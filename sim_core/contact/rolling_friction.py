@@ -56,8 +56,8 @@ ZERO = Vec3(0.0, 0.0, 0.0)
 class Stand(NamedTuple):
     """The plane or groove that bears the load of a ball.
 
-    normal: b.
-    arm: h [m].
+    normal: unit normal of the plane, or of the groove halfway between its two normals.
+    arm: distance of the ball's centre from the points or the line that it touches [m].
     max_friction: largest friction force per mass [m/s²].
     axis: direction of the line through the two touching points of a groove, zero on a plane.
     """
@@ -76,7 +76,9 @@ def braked(
     velocity: Vec3,
     acceleration: Vec3,
 ) -> tuple[Vec3, Vec3, int]:
-    """Velocity [m/s], acceleration [m/s²] and mode of a ball under resistance and friction.
+    """Return velocity [m/s], acceleration [m/s²] and mode of a ball on supports that slow it down.
+
+    Resistance and friction slow it down. With friction the ball's spin is set here.
 
     ``velocity`` and ``acceleration``: vectors that are already projected onto the cone of the
     supports.
@@ -164,7 +166,7 @@ def _rubbed(
 def _find_stand(
     friction_state: FrictionState, contact: ContactState, ball: int, push: Vec3
 ) -> Stand:
-    """Find the plane or groove that bears the load ``push`` [m/s²].
+    """Find the plane or groove that bears a ball, from the force ``push`` of its supports [m/s²].
 
     A ball on three supports cannot move, so that there is no friction.
     """
@@ -217,7 +219,7 @@ def stopped_if_creeping(
     velocity: Vec3,
     creeping: float,
 ) -> Vec3:
-    """The velocity [m/s] of a ball on its supports; zero if it is slower than ``creeping``.
+    """Return ``velocity`` [m/s], or zero for a ball with friction slower than ``creeping`` [m/s].
 
     Friction holds such a ball. Without this stop a ball between two surfaces would go on in ever
     smaller hops, kept up by its slip.
@@ -232,7 +234,10 @@ def stopped_if_creeping(
 
 @jit
 def reset_spin(friction_state: FrictionState | None, ball: int, time: float, mode: int) -> None:
-    """Keep the spin of a ball that begins to fly; stop the spin of a ball that lies still."""
+    """Make the spin of a ball constant if it flies now, and zero if it lies still now.
+
+    ``mode``: FLYING, SLIDING, ASLEEP or JAMMED. A sliding ball keeps its spin as it is.
+    """
     if friction_state is None:
         return
     if mode != SLIDING:
@@ -244,7 +249,9 @@ def reset_spin(friction_state: FrictionState | None, ball: int, time: float, mod
 def _with_supports_left(
     contact: ContactState, ball: int, velocity: Vec3, acceleration: Vec3
 ) -> tuple[Vec3, Vec3, int]:
-    """Velocity, acceleration and mode without the supports that friction leads the ball away from.
+    """Remove the supports from which a ball with friction moves away.
+
+    Returns: velocity [m/s], acceleration [m/s²] and mode with which the ball goes on.
 
     The ball may meet these supports again as walls.
     """
@@ -258,9 +265,10 @@ def _with_supports_left(
 
 @jit
 def _load(weight: float, size: float) -> float:
-    """Load on the supports [m/s²], where the supports leave ``size`` of the ``weight``.
+    """Return the load on a ball's supports per mass [m/s²].
 
-    The load and the remaining part of the weight are perpendicular (Moreau's polar cones).
+    ``weight``: gravity [m/s²]. ``size``: acceleration [m/s²] that the supports leave of it. The
+    load and that acceleration are perpendicular (Moreau's polar cones).
     """
     return math.sqrt(max(0.0, weight * weight - size * size))
 

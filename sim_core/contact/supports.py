@@ -1,9 +1,9 @@
 """The supports of a ball, and the projection of vectors onto the cone that the supports leave free.
 
 Notation: n_k: unit normal of support k, towards the ball. The supports leave the cone {x: n_k x >=
-0 for all k}. The vector of the cone that is nearest to x is x itself, or lies on the plane of one
-support, or on the planes of two supports. It is unique: it is the projection whose multipliers all
-push (conditions of Kuhn and Tucker).
+0 for all k}: the directions in which the ball can move. The vector of the cone that is nearest to x
+is x itself, or lies on the plane of one support, or on the planes of two supports. It is unique: it
+is the projection whose multipliers all push (conditions of Kuhn and Tucker).
 """
 
 import numpy as np
@@ -23,14 +23,14 @@ SHORTEST_HOP = 1e-4
 
 @jit
 def support_normal(supports: Supports, ball: int, support: int) -> Vec3:
-    """Unit normal of a support, towards the ball."""
+    """Return the unit normal of support number ``support`` of a ball, towards the ball."""
     normals = supports.normals
     return Vec3(normals[ball, support, 0], normals[ball, support, 1], normals[ball, support, 2])
 
 
 @jit
 def stands_on_ball(supports: Supports, ball: int, other: int) -> bool:
-    """True if a ball has a support on another ball."""
+    """Return True if ``ball`` stands on the ball ``other``."""
     stands = False
     for support in range(supports.number[ball]):
         stands |= supports.obstacles[ball, support] == ON_BALL - other
@@ -47,7 +47,7 @@ def _is_in_cone(supports: Supports, ball: int, x: Vec3, slack: float) -> bool:
 
 @jit
 def onto_cone(supports: Supports, ball: int, x: Vec3) -> Vec3:
-    """The vector nearest to x in the cone that the ball's supports leave."""
+    """Return the vector nearest to ``x`` that does not point into any support of the ball."""
     count = supports.number[ball]
     size = np.sqrt(dot(x, x))
     slack = ROUNDING * size
@@ -81,7 +81,10 @@ def onto_cone(supports: Supports, ball: int, x: Vec3) -> Vec3:
 
 @jit
 def response(contact: ContactState, ball: int, push: Vec3) -> Vec3:
-    """Velocity change of a ball, in flight or on supports, for a unit impulse per mass."""
+    """Return the velocity change of a ball that is pushed by a unit impulse per mass.
+
+    ``push``: unit vector of the impulse. A ball on supports moves only where they leave it free.
+    """
     if contact.mode[ball] == FLYING:
         return push
     return onto_cone(contact.supports, ball, push)
@@ -89,7 +92,7 @@ def response(contact: ContactState, ball: int, push: Vec3) -> Vec3:
 
 @jit
 def drop_support(supports: Supports, ball: int, support: int) -> None:
-    """Remove a support and move the later supports up."""
+    """Remove support number ``support`` of a ball. The later supports move up by one place."""
     last = supports.number[ball] - 1
     for k in range(support, last):
         supports.obstacles[ball, k] = supports.obstacles[ball, k + 1]
@@ -103,7 +106,10 @@ def drop_support(supports: Supports, ball: int, support: int) -> None:
 
 @jit
 def drop_supports_along(supports: Supports, ball: int, direction: Vec3, least: float) -> None:
-    """Remove the supports whose normal has more than ``least`` along ``direction``."""
+    """Remove those supports of a ball from which ``direction`` leads away by more than ``least``.
+
+    ``least`` has the unit of ``direction``, which is a velocity or an acceleration.
+    """
     for support in range(supports.number[ball] - 1, -1, -1):
         if dot(support_normal(supports, ball, support), direction) > least:
             drop_support(supports, ball, support)
@@ -113,7 +119,16 @@ def drop_supports_along(supports: Supports, ball: int, direction: Vec3, least: f
 def add_support(
     supports: Supports, ball: int, obstacle: int, normal: Vec3, position: Vec3, reach: float
 ) -> None:
-    """Add a support that holds up to ``reach`` [m] from here. A fifth replaces the oldest."""
+    """Add a support to a ball. A fifth support replaces the oldest.
+
+    Args:
+        supports: supports of all balls.
+        ball: number of the ball.
+        obstacle: number of the obstacle, or ON_BALL minus the number of a ball that lies still.
+        normal: unit normal of the obstacle, towards the ball.
+        position: position of the ball's centre [m].
+        reach: distance from ``position`` up to which the support holds [m].
+    """
     if supports.number[ball] == MAX_SUPPORTS:
         drop_support(supports, ball, 0)
     support = supports.number[ball]
@@ -127,7 +142,10 @@ def add_support(
 
 @jit
 def set_mode(contact: ContactState, ball: int, mode: int) -> None:
-    """Set how a ball moves, and update the list of the balls that are not in flight."""
+    """Set the mode of a ball (FLYING, SLIDING, ASLEEP or JAMMED) and update the contact list.
+
+    The contact list holds the balls that are not in flight.
+    """
     contact.mode[ball] = mode
     balls, places, length = contact.contact_list
     place = places[ball]
@@ -145,5 +163,5 @@ def set_mode(contact: ContactState, ball: int, mode: int) -> None:
 
 @jit
 def forget_left_support(contact: ContactState, ball: int) -> None:
-    """Forget the support that the ball left last."""
+    """Set the noted normal of the support that a ball has just left to zero, which means none."""
     set_vec3(contact.left_normal, ball, Vec3(0.0, 0.0, 0.0))
