@@ -81,7 +81,7 @@ class Balls:
 
     @property
     def alike(self) -> bool:
-        """True if all balls have the same diameter and density."""
+        """True if all balls have the same diameter and the same density."""
         return np.ndim(self.diameter) == 0 and np.ndim(self.density) == 0
 
     @property
@@ -91,7 +91,7 @@ class Balls:
 
     @property
     def sizes(self) -> np.ndarray:
-        """The different diameters [m], ascending."""
+        """The different ball diameters [m], each once, ascending."""
         return np.unique(self.diameter)
 
     @property
@@ -116,7 +116,16 @@ class Balls:
 
 
 def _one_or_each(name: str, given: object, count: tuple[int, ...]) -> float | np.ndarray:
-    """One positive number if all balls share it, otherwise an array of shape (n,)."""
+    """Return a diameter or density as one float if all balls share it, else as an array (n,).
+
+    Args:
+        name: name of the field in messages.
+        given: user input, one number or one for each ball.
+        count: number of balls, as the shape (n,).
+
+    Raises:
+        SceneError: for a wrong shape, and for a number that is not positive and finite.
+    """
     if np.ndim(given) == 0:  # type: ignore[arg-type]
         values = np.array([number(f"balls.{name}", given)])
     else:

@@ -13,11 +13,11 @@ class SceneError(ValueError):
 
 
 class SimulationError(RuntimeError):
-    """Error for a broken invariant or a lost ball. The message says what to try."""
+    """Error of a simulation that cannot go on, as after the loss of a ball, with what to try."""
 
 
 def number(name: str, value: object) -> float:
-    """The value as a float; raises SceneError, naming the field, if it is not a number."""
+    """Return ``value`` as a float. Raises SceneError that names the field if it is no number."""
     try:
         if isinstance(value, NOT_NUMBERS):
             raise TypeError
@@ -29,7 +29,9 @@ def number(name: str, value: object) -> float:
 def surface_table(
     effect: str, form: str, surfaces: Any, balls: Any, tags: int
 ) -> tuple[np.ndarray, tuple[float, float]]:
-    """Two coefficients of an effect for each surface tag, and for ball on ball.
+    """Check the two coefficients that an effect has for each surface, and for ball on ball.
+
+    An effect is, for example, friction. A tag is the number of a surface.
 
     Args:
         effect: name of the effect in messages.

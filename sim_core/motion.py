@@ -1,9 +1,10 @@
-"""Motion between events, in the free-fall frame.
+"""Motion of the balls between events, in a frame that falls freely with gravity.
 
 Notation:
     x(t) = base + velocity t + ½ a t²: position of a ball [m]; ``motion`` holds base (0:3) [m] and
         velocity (3:6) [m/s] of each ball, shape (n, 6)
-    t: time on the window's clock [s], one clock for all balls
+    t: time on the window's clock, that is, since the start of the present time window of
+        ``WINDOW`` seconds or so [s], one clock for all balls
     a: acceleration [m/s²], equal to gravity unless the ball is in contact mode
 
 The difference between two balls is a straight line in this frame. Pairs need no clock of their own,
@@ -26,10 +27,11 @@ WINDOW = 0.02
 
 
 class BallEvent(NamedTuple):
-    """A ball, and the time of its event.
+    """Number of a ball that collides or changes its path, and the time at which it does.
 
     Args:
-        time: time on the window's clock [s].
+        ball: number of the ball.
+        time: time since the start of the present time window [s].
         time_since_start: time since the start of the scene [s].
     """
 
@@ -39,7 +41,7 @@ class BallEvent(NamedTuple):
 
 
 class BallState(NamedTuple):
-    """Position of a ball's centre [m] and velocity [m/s] at some time."""
+    """Position of a ball's centre [m] and its velocity [m/s] at one time."""
 
     position: Vec3
     velocity: Vec3
@@ -47,7 +49,7 @@ class BallState(NamedTuple):
 
 @jit
 def free_fall_position(motion: np.ndarray, ball: int, time: float) -> Vec3:
-    """Position in the free-fall frame [m]: x(t) - ½ a t²."""
+    """Return a ball's position [m] at ``time`` without the share of its acceleration, ½ a t²."""
     return Vec3(
         motion[ball, 0] + motion[ball, 3] * time,
         motion[ball, 1] + motion[ball, 4] * time,
@@ -57,7 +59,7 @@ def free_fall_position(motion: np.ndarray, ball: int, time: float) -> Vec3:
 
 @inlined
 def state_under(motion: np.ndarray, ball: int, time: float, acceleration: Vec3) -> BallState:
-    """State of a ball under its own acceleration [m/s²] at a time of the window."""
+    """Return a ball's position and velocity at ``time`` [s], under its ``acceleration`` [m/s²]."""
     position = add_scaled(free_fall_position(motion, ball, time), 0.5 * time * time, acceleration)
     velocity = add_scaled(
         Vec3(motion[ball, 3], motion[ball, 4], motion[ball, 5]), time, acceleration
@@ -67,7 +69,7 @@ def state_under(motion: np.ndarray, ball: int, time: float, acceleration: Vec3) 
 
 @inlined
 def change_velocity(motion: np.ndarray, ball: int, time: float, change: Vec3) -> None:
-    """Change a ball's velocity by ``change`` [m/s] at ``time``, with its position kept."""
+    """Add ``change`` [m/s] to a ball's velocity at ``time`` [s] and keep its position there."""
     here = free_fall_position(motion, ball, time)
     for axis, (now, add) in enumerate(((here.x, change.x), (here.y, change.y), (here.z, change.z))):
         velocity = motion[ball, 3 + axis] + add
@@ -79,7 +81,15 @@ def change_velocity(motion: np.ndarray, ball: int, time: float, change: Vec3) ->
 def set_path(
     motion: np.ndarray, ball: int, time: float, here: BallState, acceleration: Vec3
 ) -> None:
-    """Give a ball the path through ``here`` at ``time`` under its own acceleration [m/s²]."""
+    """Set a ball's row of ``motion`` to the parabola with a given state at ``time`` [s].
+
+    Args:
+        motion: base and velocity of each ball, shape (n, 6).
+        ball: number of the ball.
+        time: time since the start of the present time window [s].
+        here: position and velocity of the ball at ``time``.
+        acceleration: acceleration of the ball from then on [m/s²].
+    """
     for axis in range(3):
         velocity = here.velocity[axis] - acceleration[axis] * time
         motion[ball, axis] = (
@@ -92,7 +102,10 @@ def set_path(
 def shift_motion(
     motion: np.ndarray, window: float, gravity: Gravity | None, contact: ContactState | None = None
 ) -> None:
-    """Move the clock's zero of the motion forward by ``window`` [s]."""
+    """Rewrite every ball's row of ``motion`` for a clock whose zero lies ``window`` [s] later.
+
+    The paths of the balls stay the same.
+    """
     for ball in range(len(motion)):
         acceleration = ball_acceleration(contact, ball, gravity)
         for axis, a in enumerate((acceleration.x, acceleration.y, acceleration.z)):
