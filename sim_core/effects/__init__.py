@@ -1,4 +1,4 @@
-"""Effects of a scene, each in its own file with source, formula and the result without the effect.
+"""Physical effects that a scene can have, such as gravity, each with its source and formula.
 
 An effect that is None is absent: numba removes its branches by type, so that it takes neither
 memory nor machine code.

@@ -1,4 +1,4 @@
-"""Options (Rest) and state (ContactState) of contact mode.
+"""Options (Rest) and state (ContactState) of contact mode, in which balls slide, roll and lie.
 
 The package sim_core.contact explains contact mode and holds all code that acts on this state.
 """
@@ -39,7 +39,7 @@ ON_BALL = -2
 
 
 class Rest(NamedTuple):
-    """Options of contact mode.
+    """Options of contact mode, in which balls slide, roll and lie still.
 
     capture: normal speed [m/s] below which a hit on a still surface ends in contact.
     resistance: deceleration of a ball in contact, as a share of the load on its supports.
@@ -86,7 +86,7 @@ class SlowHits(NamedTuple):
 
 
 class Jams(NamedTuple):
-    """Jams of each of n balls.
+    """Where and how often each of n balls was jammed, that is, held still by the balls round it.
 
     position: position at which the ball was last held [m], (n, 3).
     repeats: number of further jams at that position, (n,) int32.
@@ -101,7 +101,7 @@ class Jams(NamedTuple):
 
 
 class ContactList(NamedTuple):
-    """The balls that are not in flight.
+    """List of the balls that are not in flight.
 
     balls: ball numbers, (n,) int32. The first length[0] entries are in use.
     places: place of each ball in the list, -1 for a ball in flight, (n,) int32.
@@ -118,7 +118,8 @@ class Ride(NamedTuple):
 
     face: number of the obstacle that a ball rides on, -1 for none, (n,) int32.
     height: offset of the face's plane at rest, moved by a ball radius [m], (n,).
-    until: end of the ball's present parabola along the face [s on the window's clock], (n,).
+    until: end of the ball's present parabola along the face [s since the start of the present time
+        window], (n,).
     wave: wave of the only sonotrode.
     waves: waves of several sonotrodes.
     """
@@ -168,7 +169,11 @@ class ContactState(NamedTuple):
 
 
 def checked_rest(rest: Rest | None) -> Rest | None:
-    """The options as plain floats; raises SceneError for numbers out of range."""
+    """Return the options of contact mode as plain floats.
+
+    Raises:
+        SceneError: for numbers out of range.
+    """
     if rest is None:
         return None
     plain = Rest(
@@ -194,7 +199,17 @@ def new_contact_state(
     restitution: RestitutionState | None,
     friction_state: FrictionState | None,
 ) -> ContactState | None:
-    """The state with all balls in flight; None without the effect."""
+    """Return a new state of contact mode, with all balls in flight.
+
+    Args:
+        rest: options of contact mode. Without them the result is None.
+        balls: number of balls.
+        radius: radius of every ball [m].
+        reach: distance at which two balls touch [m], 0 if balls never touch.
+        gravity: acceleration of the balls in flight.
+        restitution: restitution of the scene.
+        friction_state: friction and spins of the balls.
+    """
     if rest is None:
         return None
     own = gravity_acceleration(gravity)
@@ -230,7 +245,10 @@ def new_contact_state(
 def new_ride(
     rest: Rest | None, balls: int, wave: Wave | None, waves: SonotrodeWaves | None
 ) -> Ride | None:
-    """The state of n balls of which none rides; None if balls never ride."""
+    """Return a new state of balls that may move with a vibrating face, but do not yet.
+
+    It is None if balls never stick to vibrating faces. ``balls``: number of balls.
+    """
     if rest is None or not rest.on_vibrating or wave is None:
         return None
     face = np.full(balls, -1, dtype=np.int32)
@@ -239,7 +257,7 @@ def new_ride(
 
 @inlined
 def rides(ride: Ride | None, ball: int) -> bool:
-    """True if the ball moves with a vibrating face."""
+    """Return True if a ball sticks to a vibrating face and moves with it."""
     if ride is None:
         return False
     return bool(ride.face[ball] >= 0)
@@ -247,7 +265,7 @@ def rides(ride: Ride | None, ball: int) -> bool:
 
 @inlined
 def ball_acceleration(contact: ContactState | None, ball: int, gravity: Gravity | None) -> Vec3:
-    """Acceleration of a ball [m/s²]: gravity in flight, or gravity limited by its supports."""
+    """Return a ball's acceleration [m/s²]: gravity, or on supports the one set by contact mode."""
     if contact is None:
         return gravity_acceleration(gravity)
     return vec3_at(contact.acceleration, ball)
@@ -255,7 +273,7 @@ def ball_acceleration(contact: ContactState | None, ball: int, gravity: Gravity 
 
 @inlined
 def is_flying(contact: ContactState | None, ball: int) -> bool:
-    """True if the ball is not in contact."""
+    """Return True if a ball is in flight, as every ball is without contact mode."""
     if contact is None:
         return True
     return bool(contact.mode[ball] == FLYING)
@@ -263,7 +281,7 @@ def is_flying(contact: ContactState | None, ball: int) -> bool:
 
 @inlined
 def is_still(contact: ContactState | None, ball: int) -> bool:
-    """True if the ball sleeps or is jammed."""
+    """Return True if a ball lies still, on supports or jammed between other balls."""
     if contact is None:
         return False
     return bool(contact.mode[ball] >= ASLEEP)
@@ -273,7 +291,10 @@ def is_still(contact: ContactState | None, ball: int) -> bool:
 def still_surface_restitution(
     contact: ContactState | None, restitution: RestitutionState | None
 ) -> RestitutionState | None:
-    """Restitution law for hits on still surfaces. In contact mode it has no elastic speeds."""
+    """Return the restitution for hits on still surfaces.
+
+    In contact mode slow hits lose speed too: the limit below which hits lose none is set to 0.
+    """
     if contact is None:
         return restitution
     if restitution is None:
@@ -285,7 +306,11 @@ def still_surface_restitution(
 def vibrating_restitution(
     contact: ContactState | None, restitution: RestitutionState | None
 ) -> RestitutionState | None:
-    """Restitution law for hits on vibrating faces. If balls stick, it has no elastic speeds."""
+    """Return the restitution for hits on vibrating faces.
+
+    If balls stick to these faces, slow hits lose speed too: the limit below which hits lose none is
+    set to 0.
+    """
     if contact is None:
         return restitution
     return _where_balls_stick(contact.ride, restitution)

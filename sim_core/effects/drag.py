@@ -41,7 +41,7 @@ MIN_DIVISOR = 0.5
 
 
 class Drag(NamedTuple):
-    """Still air, by default dry air at 20 °C and 1013 hPa.
+    """Options of air drag: properties of the still air, by default dry air at 20 °C and 1013 hPa.
 
     Args:
         density: density of the air [kg/m³].
@@ -55,7 +55,7 @@ class Drag(NamedTuple):
 
 
 class DragState(NamedTuple):
-    """Drag as compiled code needs it, for n balls."""
+    """Air drag on n balls, as numbers for compiled code."""
 
     # time up to which the air has acted [s on the window's clock], shape (n,)
     acted_until: np.ndarray
@@ -66,7 +66,11 @@ class DragState(NamedTuple):
 
 
 def checked_drag(drag: Drag | None) -> Drag | None:
-    """The drag as plain floats; raises SceneError for numbers out of range."""
+    """Return the options of air drag as plain floats.
+
+    Raises:
+        SceneError: for numbers out of range.
+    """
     if drag is None:
         return None
     given = drag._asdict().items()
@@ -85,7 +89,10 @@ def checked_drag(drag: Drag | None) -> Drag | None:
 def new_drag_state(
     drag: Drag | None, diameters: np.ndarray, densities: np.ndarray
 ) -> DragState | None:
-    """The drag state at time 0 for diameters [m] and densities [kg/m³] of shape (n,) each."""
+    """Return the air drag on balls at time 0, from their diameters [m] and densities [kg/m³].
+
+    Both have the shape (n,).
+    """
     if drag is None:
         return None
     return DragState(
@@ -98,7 +105,7 @@ def new_drag_state(
 
 
 def drag_coefficient(reynolds: float) -> float:
-    """Drag coefficient C_d of a sphere at a Reynolds number."""
+    """Return the drag coefficient [-] of a sphere at a Reynolds number ``reynolds`` [-]."""
     if reynolds >= TURBULENT:
         return NEWTON
     return float(24.0 / reynolds * (1.0 + INERTIA * reynolds**POWER))
@@ -106,7 +113,10 @@ def drag_coefficient(reynolds: float) -> float:
 
 @jit
 def remaining_speed(drag: DragState, ball: int, speed: float, span: float) -> float:
-    """Share of a speed [m/s] that remains after ``span`` [s] in air; above 1 if it is negative."""
+    """Return the share [-] of a ball's ``speed`` [m/s] that remains after ``span`` [s] in air.
+
+    A negative span undoes drag: the share is then above 1.
+    """
     reynolds = drag.reynolds[ball] * speed
     if reynolds >= TURBULENT:
         return float(1.0 / max(1.0 + drag.quadratic[ball] * speed * span, MIN_DIVISOR))
@@ -117,7 +127,7 @@ def remaining_speed(drag: DragState, ball: int, speed: float, span: float) -> fl
 
 @jit
 def shift_drag(drag: DragState | None, window: float) -> None:
-    """Move the clock's zero of the drag state forward by ``window`` [s]."""
+    """Rewrite the times of air drag for a clock whose zero lies ``window`` [s] later."""
     if drag is None:
         return
     for ball in range(len(drag.acted_until)):

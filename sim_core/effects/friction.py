@@ -30,7 +30,9 @@ OF_BALLS = -1  # stands for ball on ball in place of a surface's tag
 
 
 class Friction(NamedTuple):
-    """Coefficients of friction; mu >= 0, beta0 in [-1, 1].
+    """Coefficients of friction: mu of sliding, 0 or more, and beta0 of tangential restitution.
+
+    beta0 lies between -1 (smooth) and 1 (perfectly rough).
 
     Args:
         surfaces: (mu, beta0) of each surface, by tag number.
@@ -42,7 +44,10 @@ class Friction(NamedTuple):
 
 
 class FrictionState(NamedTuple):
-    """Friction as compiled code needs it, for n balls. Times are on the window's clock."""
+    """Friction and spins of n balls, as numbers for compiled code.
+
+    Time 0 is the start of the present time window.
+    """
 
     surfaces: np.ndarray  # (mu, beta0) of each surface, shape (tags, 2)
     mu: float  # coefficient of friction of ball on ball
@@ -57,7 +62,13 @@ class FrictionState(NamedTuple):
 
 
 def checked_friction(friction: Friction, tags: int) -> Friction:
-    """The coefficients as an array (tags, 2) and floats; raises SceneError for bad coefficients."""
+    """Return the coefficients of friction, as an array (tags, 2) and two floats.
+
+    ``tags``: number of surface tags in the scene.
+
+    Raises:
+        SceneError: for numbers out of range, and for a tag without coefficients.
+    """
     surfaces, of_balls = surface_table("friction", "(mu, beta0)", *friction, tags)
     pairs = [(f"surfaces[{i}]", *pair) for i, pair in enumerate(surfaces)] + [("balls", *of_balls)]
     for name, mu, beta0 in pairs:
@@ -72,7 +83,7 @@ def checked_friction(friction: Friction, tags: int) -> Friction:
 def new_friction_state(
     friction: Friction, spins: np.ndarray, radius: float, tags_of_rows: np.ndarray
 ) -> FrictionState:
-    """The friction state of balls in flight.
+    """Return the friction and spins of balls that are all in flight.
 
     Args:
         friction: coefficients from checked_friction.
@@ -88,7 +99,10 @@ def new_friction_state(
 
 @jit
 def friction_of(friction: FrictionState, tag: int) -> tuple[float, float]:
-    """mu and beta0 of a surface, or of ball on ball if ``tag`` is OF_BALLS."""
+    """Return mu and beta0 of the surface ``tag``, or of ball on ball if ``tag`` is OF_BALLS.
+
+    mu is the coefficient of friction, beta0 that of tangential restitution.
+    """
     if tag == OF_BALLS:
         return friction.mu, friction.beta0
     return friction.surfaces[tag, 0], friction.surfaces[tag, 1]
@@ -96,7 +110,7 @@ def friction_of(friction: FrictionState, tag: int) -> tuple[float, float]:
 
 @jit
 def spin_at(friction: FrictionState, ball: int, time: float) -> Vec3:
-    """Spin of a ball [rad/s] at a time of the window."""
+    """Return the spin [rad/s] of a ball at ``time`` since the start of the time window [s]."""
     spins, twists = friction.spins, friction.twists
     return Vec3(
         spins[ball, 0] + time * twists[ball, 0],
@@ -107,7 +121,10 @@ def spin_at(friction: FrictionState, ball: int, time: float) -> Vec3:
 
 @jit
 def set_spin(friction: FrictionState, ball: int, time: float, spin: Vec3, twist: Vec3) -> None:
-    """Set the ``spin`` [rad/s] at ``time`` and ``twist`` [rad/s²] of a ball that does not slip."""
+    """Set a ball's spin [rad/s] at ``time`` [s] and its constant change ``twist`` [rad/s²].
+
+    The ball's slip is set to zero.
+    """
     for axis in range(3):
         friction.spins[ball, axis] = spin[axis] - time * twist[axis]
         friction.twists[ball, axis] = twist[axis]
@@ -117,7 +134,7 @@ def set_spin(friction: FrictionState, ball: int, time: float, spin: Vec3, twist:
 
 @jit
 def set_slip(friction: FrictionState, ball: int, time: float, slip: Vec3, change: Vec3) -> None:
-    """Set the slip of a ball's touching points: ``slip`` [m/s] at ``time``, ``change`` [m/s²]."""
+    """Set the slip of a ball's touching points [m/s] at ``time`` [s], and its ``change`` [m/s²]."""
     for axis in range(3):
         friction.slips[ball, axis] = slip[axis] - time * change[axis]
         friction.slips[ball, 3 + axis] = change[axis]
@@ -125,7 +142,7 @@ def set_slip(friction: FrictionState, ball: int, time: float, slip: Vec3, change
 
 @inlined
 def shift_spins(friction: FrictionState | None, window: float) -> None:
-    """Move the clock's zero of spins and slips forward by ``window`` [s]."""
+    """Rewrite spins and slips for a clock whose zero lies ``window`` [s] later."""
     if friction is None:
         return
     for ball in range(len(friction.spins)):

@@ -1,4 +1,4 @@
-"""Uniform gravity: every flight is a parabola.
+"""Uniform gravity, under which every ball flies along a parabola.
 
 Source: Badreddine et al., "CAD based simulation of ultrasonic shot peening", eq. 1.
 """
@@ -14,7 +14,7 @@ STANDARD = 9.80665  # m/s², CGPM 1901
 
 
 class Gravity(NamedTuple):
-    """Acceleration of every ball [m/s²]."""
+    """Acceleration of every ball in flight [m/s²], by default 1 g downwards."""
 
     x: float = 0.0
     y: float = 0.0
@@ -22,7 +22,11 @@ class Gravity(NamedTuple):
 
 
 def checked_gravity(gravity: Gravity | None) -> Gravity | None:
-    """Gravity as plain floats for compiled code; raises SceneError if it is not finite."""
+    """Return gravity as plain floats for compiled code.
+
+    Raises:
+        SceneError: if it is not three finite numbers.
+    """
     if gravity is None:
         return None
     try:
@@ -37,7 +41,7 @@ def checked_gravity(gravity: Gravity | None) -> Gravity | None:
 
 @jit
 def gravity_acceleration(gravity: Gravity | None) -> Vec3:
-    """Acceleration in flight [m/s²]; zero without gravity."""
+    """Return the acceleration of a ball in flight [m/s²]; zero without gravity."""
     if gravity is None:
         return Vec3(0.0, 0.0, 0.0)
     return Vec3(gravity.x, gravity.y, gravity.z)

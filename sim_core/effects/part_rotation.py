@@ -57,7 +57,7 @@ class PartRotation(NamedTuple):
 
 
 class RotationAxis(NamedTuple):
-    """The properties of a rotation on which the part's obstacles depend; hashable."""
+    """Axis and range of a part's rotation, from which the part's obstacles are built; hashable."""
 
     tag: int  # surface tag of the part
     point: tuple[float, float, float]  # a point of the axis [m]
@@ -66,7 +66,7 @@ class RotationAxis(NamedTuple):
 
 
 class RotationState(NamedTuple):
-    """PartRotation as compiled code needs it."""
+    """Rotation of the part, as numbers for compiled code."""
 
     axis: Vec3  # unit vector
     point: Vec3  # a point of the axis, relative to the mesh's middle [m]
@@ -82,9 +82,12 @@ class RotationState(NamedTuple):
 
 
 def new_rotation_state(turn: PartRotation | None, middle: np.ndarray) -> RotationState | None:
-    """The rotation at time 0; raises SceneError as checked_axis does.
+    """Return the rotation of the part at time 0, as numbers for compiled code.
 
     ``middle``: middle of the mesh [m], (3,).
+
+    Raises:
+        SceneError: for numbers out of range.
     """
     if turn is None:
         return None
@@ -105,7 +108,11 @@ def new_rotation_state(turn: PartRotation | None, middle: np.ndarray) -> Rotatio
 
 
 def checked_axis(turn: PartRotation | None) -> RotationAxis | None:
-    """The axis of a rotation; raises SceneError, naming the field, for numbers out of range."""
+    """Check the rotation of the part, and return its axis and range.
+
+    Raises:
+        SceneError: for numbers out of range. It names the field.
+    """
     if turn is None:
         return None
     fastest = TURN * MAX_RPM / 60.0
@@ -146,7 +153,7 @@ def checked_axis(turn: PartRotation | None) -> RotationAxis | None:
 
 
 def angle_at(rotation: RotationState, time: float) -> float:
-    """The part's angle [rad] at a time of the current window."""
+    """Return the part's angle [rad] at ``time`` since the start of the present time window [s]."""
     argument = float(rotation.argument[0]) + rotation.rate * time
     return rotation.amplitude * math.sin(argument) if rotation.to_and_fro else argument
 
@@ -154,7 +161,14 @@ def angle_at(rotation: RotationState, time: float) -> float:
 def rotate_points(
     points: np.ndarray, point: np.ndarray, axis: np.ndarray, angle: float
 ) -> np.ndarray:
-    """Points (..., 3) [m] turned by an angle [rad] about a line, by the formula of Rodrigues."""
+    """Return points turned by an angle about a line, by the formula of Rodrigues.
+
+    Args:
+        points: points [m], shape (..., 3).
+        point: a point of the line [m].
+        axis: unit vector along the line.
+        angle: angle [rad], right-handed about ``axis``.
+    """
     offset = points - point
     lift = (offset @ axis)[..., None] * axis
     across = offset - lift
@@ -164,7 +178,7 @@ def rotate_points(
 
 @jit
 def shift_rotation(rotation: RotationState | None, window: float) -> None:
-    """Move the clock's zero of the rotation forward by ``window`` [s]. The angle is continuous."""
+    """Rewrite the part's rotation for a clock whose zero lies ``window`` [s] later."""
     if rotation is None:
         return
     rotation.argument[0] = (rotation.argument[0] + rotation.rate * window) % TURN
@@ -172,7 +186,7 @@ def shift_rotation(rotation: RotationState | None, window: float) -> None:
 
 @inlined
 def time_of_one_turn(rotation: RotationState | None, length: float) -> float:
-    """Time [s], at least ``length``, within which the part reaches each of its angles.
+    """Return a time [s], ``length`` or longer, within which the part reaches each of its angles.
 
     A still ball that the part has not touched by then will never be touched.
     """
@@ -185,7 +199,10 @@ def time_of_one_turn(rotation: RotationState | None, length: float) -> float:
 
 @jit
 def _turn_back(rotation: RotationState, vector: Vec3, c: float, s: float) -> Vec3:
-    """The vector turned about the axis by minus the angle with cosine ``c`` and sine ``s``."""
+    """Return a vector turned about the part's axis, backwards.
+
+    ``c`` and ``s`` are cosine and sine of the angle.
+    """
     lift = (1.0 - c) * dot(rotation.axis, vector)
     side = cross(rotation.axis, vector)
     return Vec3(
@@ -197,7 +214,10 @@ def _turn_back(rotation: RotationState, vector: Vec3, c: float, s: float) -> Vec
 
 @jit
 def relative_flight(rotation: RotationState, flight: Flight, time: float) -> Flight:
-    """The flight in the part's frame at ``time`` [s], from the ``flight`` in the room's frame."""
+    """Return position, velocity and acceleration of a ball as seen from the turning part.
+
+    ``flight``: the same three in the room, at ``time`` [s] since the start of the time window.
+    """
     argument = rotation.argument[0] + rotation.rate * time
     angle, speed, change = argument, rotation.rate, 0.0
     if rotation.to_and_fro:
@@ -217,7 +237,7 @@ def relative_flight(rotation: RotationState, flight: Flight, time: float) -> Fli
 
 @jit
 def to_room_frame(rotation: RotationState, vector: Vec3, time: float) -> Vec3:
-    """Transform a vector from the part's frame to the room's frame."""
+    """Return a vector of the turning part's frame as it points in the room at ``time`` [s]."""
     argument = rotation.argument[0] + rotation.rate * time
     angle = rotation.amplitude * math.sin(argument) if rotation.to_and_fro else argument
     return _turn_back(rotation, vector, math.cos(angle), -math.sin(angle))
@@ -225,14 +245,16 @@ def to_room_frame(rotation: RotationState, vector: Vec3, time: float) -> Vec3:
 
 @jit
 def slip_velocity(rotation: RotationState, flight: Flight, away: Vec3, time: float) -> Vec3:
-    """Velocity of the ball relative to the touched surface [m/s], in the part's frame.
+    """Return a ball's velocity [m/s] relative to the surface of the turning part that it touches.
+
+    The result is in the part's frame.
 
     Args:
         rotation: rotation of the part.
         flight: flight of the ball in the part's frame. Its velocity is relative to the frame at the
             ball's centre, and its normal component is the same at the touched point.
         away: vector from the touched point to the ball's centre [m].
-        time: time of the window [s].
+        time: time since the start of the present time window [s].
     """
     speed = rotation.rate
     if rotation.to_and_fro:
@@ -242,7 +264,7 @@ def slip_velocity(rotation: RotationState, flight: Flight, away: Vec3, time: flo
 
 @jit
 def jerk_bound(rotation: RotationState, reach: float, speed: float, acceleration: float) -> float:
-    """Bound J [m/s³] of a flight near the axis.
+    """Return a bound on the third derivative of a flight as seen from the turning part [m/s³].
 
     Args:
         rotation: rotation of the part.

@@ -35,13 +35,16 @@ TURN = 2.0 * np.pi
 
 
 class RandomPhase(NamedTuple):
-    """Random arrival phases for a Vibration. ``seed`` is a whole number from 0 to 2**32 - 1."""
+    """Option by which each ball meets the vibrating face at a random phase of its vibration.
+
+    ``seed``: whole number from 0 to 2**32 - 1 from which the phases follow.
+    """
 
     seed: int = 0
 
 
 class RandomPhaseState(NamedTuple):
-    """RandomPhase as compiled code needs it, for n balls."""
+    """Phases at which n balls meet the vibrating face, as numbers for compiled code."""
 
     phase: np.ndarray  # phase of the face as each ball finds it [rad], shape (n,)
     draws: np.ndarray  # number of draws of each ball, shape (n,) int64
@@ -53,7 +56,13 @@ class RandomPhaseState(NamedTuple):
 
 
 def checked_random_phase(random_phase: RandomPhase | None, sonotrodes: int) -> RandomPhase | None:
-    """The effect with a plain seed; raises SceneError for a bad seed or number of sonotrodes."""
+    """Return the option with its seed as a plain int.
+
+    ``sonotrodes``: number of sonotrodes of the scene.
+
+    Raises:
+        SceneError: for a bad seed, and for a scene that does not have just one sonotrode.
+    """
     if random_phase is None:
         return None
     seed = random_phase.seed
@@ -75,10 +84,10 @@ def checked_random_phase(random_phase: RandomPhase | None, sonotrodes: int) -> R
 def new_random_phase_state(
     random_phase: RandomPhase | None, wave: Wave | None, face: np.ndarray, radii: np.ndarray
 ) -> RandomPhaseState | None:
-    """The state in which every ball has the phase of the wave itself.
+    """Return the phases of all balls at the start, which are the phase of the vibration itself.
 
     Args:
-        random_phase: the effect.
+        random_phase: the option. Without it the result is None.
         wave: wave of the sonotrode.
         face: corners of the vibrating triangles [m], shape (m, 3, 3), normals away from the shot.
         radii: radii of the balls [m], shape (n,).
@@ -95,7 +104,10 @@ def new_random_phase_state(
 
 @jit
 def hash_word(x: int) -> int:
-    """Hash a 32-bit number. Every product fits in an int64."""
+    """Return a 32-bit number that looks random, always the same for the same 32-bit number ``x``.
+
+    Every product fits in an int64.
+    """
     x = ((x ^ (x >> 15)) * 0x2C1B3C6D) & WORD
     x = ((x ^ (x >> 12)) * 0x297A2D39) & WORD
     return x ^ (x >> 15)
@@ -103,7 +115,7 @@ def hash_word(x: int) -> int:
 
 @jit
 def draw_phase(seed: int, ball: int, draw: int) -> float:
-    """Draw a phase [rad], uniform in [0, 2π)."""
+    """Return a random phase [rad], uniform in [0, 2π), from seed, ball and number of the draw."""
     mixed = hash_word(hash_word(hash_word(seed) ^ int(ball)) ^ (int(draw) & WORD))
     return TURN * (mixed / SEEDS)
 
@@ -112,7 +124,7 @@ def draw_phase(seed: int, ball: int, draw: int) -> float:
 def update_phase(
     random_phase: RandomPhaseState | None, flight: Flight, ball: int, length: float
 ) -> float:
-    """Draw a new phase for a ball that is out of reach of the face.
+    """Draw a new phase of the vibrating face for a ball that is out of the face's reach.
 
     A ball within reach keeps its phase until it gets out.
 
@@ -135,7 +147,7 @@ def update_phase(
 def wave_of_ball(
     random_phase: RandomPhaseState | None, wave: Wave | None, ball: int
 ) -> Wave | None:
-    """The wave of the face with the phase that the ball finds."""
+    """Return the vibration of the face with the phase at which this ball finds it."""
     if random_phase is None or wave is None:
         return wave
     return Wave(wave.amplitude, wave.omega, random_phase.phase[ball], wave.axis)

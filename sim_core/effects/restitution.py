@@ -1,4 +1,4 @@
-"""Normal restitution as a function of impact speed.
+"""Normal restitution: the share of normal speed that a ball keeps in a hit, by impact speed.
 
 Notation:
     v: relative speed along the normal [m/s], ``speed``
@@ -49,7 +49,9 @@ V, E, Q = 0, 1, 2  # columns of the points of a law
 
 
 class TabulatedRestitution(NamedTuple):
-    """Restitution at given speeds, linear between them and constant beyond both ends.
+    """Coefficient of restitution at given impact speeds, linear between them.
+
+    Below the first and above the last speed it is constant.
 
     Args:
         speeds: ascending speeds [m/s], 0 or more, shape (n,).
@@ -65,7 +67,7 @@ LAW_FORMS = "(C0, v0), (C0, v0, exponent) or a TabulatedRestitution"
 
 
 class Restitution(NamedTuple):
-    """Coefficients of restitution.
+    """Laws for the coefficient of restitution, as a function of impact speed.
 
     Each law has one of these forms:
 
@@ -90,7 +92,7 @@ class Restitution(NamedTuple):
 
 
 class RestitutionState(NamedTuple):
-    """Restitution as compiled code needs it: one array, which every impact is handed."""
+    """Laws of restitution as one array for compiled code."""
 
     # v_i [m/s], e_i and q of the points of each law, shape (laws, n, 3). Laws are ordered by
     # surface tag, and the last law is for ball on ball. A law with fewer than n points repeats its
@@ -100,7 +102,13 @@ class RestitutionState(NamedTuple):
 
 
 def checked_restitution(restitution: Restitution, tags: int) -> RestitutionState:
-    """The points of the laws of all tags, or more; raises SceneError for a bad law."""
+    """Return the laws of restitution of all surfaces and of ball on ball, for compiled code.
+
+    ``tags``: number of surface tags in the scene. More laws may be given.
+
+    Raises:
+        SceneError: for a bad law, and for a tag without one.
+    """
     form = f"give {LAW_FORMS} for each of the tags 0 to {tags - 1}"
     if isinstance(restitution.surfaces, TabulatedRestitution):
         raise SceneError(f"restitution.surfaces is one table: {form}")
@@ -123,7 +131,14 @@ def checked_restitution(restitution: Restitution, tags: int) -> RestitutionState
 
 
 def _points(name: str, law: Any) -> np.ndarray:
-    """v_i [m/s], e_i and q of a law, (n, 3); raises SceneError, naming the law, if it is bad."""
+    """Return the points of a law of restitution, as an array (n, 3).
+
+    A row has speed [m/s], coefficient of restitution, and exponent of the fall above the last
+    speed.
+
+    Raises:
+        SceneError: if the law is bad. It calls the law ``name``.
+    """
     if isinstance(law, TabulatedRestitution):
         return _table(name, law)
     values = tuple(law) if isinstance(law, (tuple, list, np.ndarray)) else ()
@@ -165,7 +180,10 @@ def _table(name: str, table: TabulatedRestitution) -> np.ndarray:
 
 @jit
 def restitution_law(points: np.ndarray, law: int, speed: float) -> float:
-    """e at a relative normal speed [m/s], by the law of a surface's tag or of BALLS."""
+    """Return the coefficient of restitution [-] at a relative normal ``speed`` [m/s].
+
+    ``law``: tag of the surface that is hit, or BALLS for ball on ball.
+    """
     last = points.shape[1] - 1
     if speed < points[law, last, V]:
         return points[law, 0, E] if speed <= points[law, 0, V] else _between(points, law, speed)
@@ -177,7 +195,7 @@ def restitution_law(points: np.ndarray, law: int, speed: float) -> float:
 
 @jit
 def _between(points: np.ndarray, law: int, speed: float) -> float:
-    """e at a speed between the first and the last point of a law."""
+    """Return the coefficient of restitution at a speed between the first and last of a table."""
     low, high = 0, points.shape[1] - 1
     while high - low > 1:
         middle = (low + high) // 2
@@ -192,7 +210,10 @@ def _between(points: np.ndarray, law: int, speed: float) -> float:
 
 @jit
 def surface_restitution(restitution: RestitutionState | None, tag: int, speed: float) -> float:
-    """e of a ball on a surface; 1 without the effect."""
+    """Return the coefficient of restitution of a ball that hits a surface at ``speed`` [m/s].
+
+    It is 1 without restitution, and for hits slower than elastic_below.
+    """
     if restitution is None:
         return 1.0
     if speed < restitution.elastic_below:
@@ -202,7 +223,10 @@ def surface_restitution(restitution: RestitutionState | None, tag: int, speed: f
 
 @jit
 def ball_restitution(restitution: RestitutionState | None, speed: float) -> float:
-    """e of ball on ball; 1 without the effect."""
+    """Return the coefficient of restitution of two balls that meet at ``speed`` [m/s].
+
+    It is 1 without restitution, and for hits slower than elastic_below.
+    """
     if restitution is None:
         return 1.0
     if speed < restitution.elastic_below:
@@ -211,7 +235,11 @@ def ball_restitution(restitution: RestitutionState | None, speed: float) -> floa
 
 
 def restitution_at(speed: np.ndarray, law: RestitutionLaw) -> np.ndarray:
-    """e by a law at speeds [m/s] of any shape; raises SceneError for a bad law."""
+    """Return the coefficients of restitution that a law gives at speeds [m/s] of any shape.
+
+    Raises:
+        SceneError: for a bad law.
+    """
     speed = np.asarray(speed, dtype=np.float64)
     points = _points("law", law)
     e, exponent = np.interp(speed, points[:, V], points[:, E]), points[-1, Q]

@@ -1,4 +1,6 @@
-"""Faces whose phase does not repeat every window: several sonotrodes, or a slowly shaken face.
+"""Phases of sonotrodes that do not make whole periods in a time window of the simulation.
+
+These are several sonotrodes, or one that is shaken slowly.
 
 The clock's window is a whole number of periods of the fastest sonotrode. A window shorter than one
 period keeps its length, so that the arrays of a window stay as small at any frequency.
@@ -27,7 +29,7 @@ ROUNDING = 2.0**-52  # share of a window made of whole periods
 
 
 class SonotrodeWaves(NamedTuple):
-    """The waves of k sonotrodes."""
+    """Vibrations of k sonotrodes, as numbers for compiled code."""
 
     # amplitude [m], omega [rad/s], phase [rad] at the window's start, and axis of each sonotrode,
     # shape (k, 6)
@@ -40,12 +42,15 @@ class SonotrodeWaves(NamedTuple):
 
 
 def carry_phases(vibrations: tuple[Vibration, ...], window: float) -> bool:
-    """True if a window of about this length [s] is not whole periods of every vibration."""
+    """Return True if the phases must be carried on from one time window to the next.
+
+    This is so for several vibrations, and for one whose period is longer than ``window`` [s].
+    """
     return len(vibrations) > 1 or any(window * one.frequency < 1.0 for one in vibrations)
 
 
 def clock_window(vibrations: tuple[Vibration, ...], window: float) -> float:
-    """The window [s] nearest to the given one that is whole periods of the fastest vibration.
+    """Return the time [s] nearest to ``window`` [s] that is whole periods of the fastest vibration.
 
     A window shorter than a period is returned unchanged.
     """
@@ -58,7 +63,9 @@ def clock_window(vibrations: tuple[Vibration, ...], window: float) -> float:
 def new_waves(
     vibrations: tuple[Vibration, ...], waves: tuple[Wave, ...], window: float, tags: np.ndarray
 ) -> SonotrodeWaves | None:
-    """The waves at the scene's start; None for a single wave with whole periods in a window.
+    """Return the vibrations of all sonotrodes at the scene's start.
+
+    The result is None for a single sonotrode that makes whole periods in a time window.
 
     Args:
         vibrations: vibrations of the sonotrodes.
@@ -89,7 +96,10 @@ def new_waves(
 
 @inlined
 def wave_of_face(waves: SonotrodeWaves | None, wave: AnyWave, face: int) -> AnyWave:
-    """The wave of a vibrating face, which is given by its obstacle number."""
+    """Return the vibration of a face, which is given by its obstacle number.
+
+    ``wave``: vibration of the only sonotrode, returned if ``waves`` is None.
+    """
     if waves is None or wave is None:
         return wave
     k, numbers = waves.faces[face], waves.numbers
@@ -99,7 +109,7 @@ def wave_of_face(waves: SonotrodeWaves | None, wave: AnyWave, face: int) -> AnyW
 
 @inlined
 def same_sonotrode(waves: SonotrodeWaves | None, face: int, other: int) -> bool:
-    """True if two vibrating faces belong to the same sonotrode."""
+    """Return True if two vibrating faces, given by obstacle number, are of the same sonotrode."""
     if waves is None:
         return True
     return bool(waves.faces[face] == waves.faces[other])
@@ -107,7 +117,7 @@ def same_sonotrode(waves: SonotrodeWaves | None, face: int, other: int) -> bool:
 
 @jit
 def shift_phases(waves: SonotrodeWaves | None) -> None:
-    """Move the phases of the sonotrodes on by one window."""
+    """Move the phases of all sonotrodes on by one time window."""
     if waves is None:
         return
     for k in range(len(waves.step)):

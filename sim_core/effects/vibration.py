@@ -1,4 +1,4 @@
-"""The sonotrode: one tagged surface moves as a rigid body, exactly.
+"""Vibration of the sonotrode: one tagged surface moves to and fro as a rigid body.
 
 Notation:
     u(t) = A sin(omega t + phase): displacement along the axis [m]
@@ -22,7 +22,7 @@ MAX_FREQUENCY = 1e9  # Hz: generators have 1e5 at most; the search at 1e300 woul
 
 
 class Vibration(NamedTuple):
-    """Harmonic motion of one surface.
+    """Harmonic motion of one surface along a fixed axis.
 
     Args:
         tag: tag of the surface.
@@ -59,7 +59,7 @@ class Wave(NamedTuple):
 
 
 def checked_waves(vibration: Vibration | tuple[Vibration, ...] | None) -> tuple[Wave, ...]:
-    """The wave of each vibrating surface.
+    """Return the vibration of each vibrating surface, as numbers for compiled code.
 
     Raises:
         SceneError: for numbers out of range, and for a repeated tag.
@@ -84,7 +84,10 @@ def checked_waves(vibration: Vibration | tuple[Vibration, ...] | None) -> tuple[
 
 
 def _checked_wave(which: str, vibration: Vibration) -> Wave:
-    """The wave of one surface, which messages call ``which``."""
+    """Return the vibration of one surface, as numbers for compiled code.
+
+    Raises SceneError for numbers out of range. It calls the vibration ``which``.
+    """
     for name in ("amplitude", "frequency", "phase"):
         number(f"{which}.{name}", getattr(vibration, name))
     if not 0.0 <= vibration.amplitude < math.inf:
@@ -109,7 +112,10 @@ def _checked_wave(which: str, vibration: Vibration) -> Wave:
 
 @jit
 def surface_velocity(wave: Wave | None, time: float) -> Vec3:
-    """Velocity of the vibrating surface [m/s] at a time of the window; zero without vibration."""
+    """Return the velocity [m/s] of the vibrating surface; zero without vibration.
+
+    ``time``: time since the start of the present time window [s].
+    """
     if wave is None:
         return Vec3(0.0, 0.0, 0.0)
     speed = wave.amplitude * wave.omega * math.cos(wave.omega * time + wave.phase)

@@ -1,1 +1,4 @@
-"""Further effects of a hit on a surface, one a file, in the order of surface_effects.py."""
+"""Effects of a hit on a surface besides restitution and friction, each in its own file.
+
+surface_effects.py says in which order they act.
+"""

@@ -1,4 +1,4 @@
-"""Further effects of a hit on a surface, and the order in which they act.
+"""Effects of a hit on a surface besides restitution and friction, in the order in which they act.
 
 A new effect of the contact between ball and surface changes only this place of the simulator. The
 effect itself, a NamedTuple of numbers and a compiled function, is a file beside this one.
@@ -13,7 +13,10 @@ from sim_core.numerics.vec3 import Touch, Vec3
 
 
 class SurfaceEffects(NamedTuple):
-    """The further effects of a scene, a field each. None is absent from machine code."""
+    """Effects of hits besides restitution and friction that a scene has, a field each.
+
+    A field that is None takes no machine code.
+    """
 
 
 # Functions that make an effect from its parameters, by the name of its field. They raise SceneError
@@ -22,7 +25,7 @@ MAKERS: dict[str, Callable[..., Any]] = {}
 
 
 def surface_effects(**parameters: dict[str, float]) -> SurfaceEffects:
-    """Make the effects of a scene from their parameters, by name of the effect."""
+    """Return the effects of a scene, made from the parameters of each effect by its name."""
     return SurfaceEffects(**{name: MAKERS[name](**values) for name, values in parameters.items()})
 
 
@@ -30,7 +33,9 @@ def surface_effects(**parameters: dict[str, float]) -> SurfaceEffects:
 def apply_surface_effects(
     effects: SurfaceEffects, ball: int, time_since_start: float, touch: Touch, change: Vec3
 ) -> Vec3:
-    """Apply the effects to a hit, after restitution and friction, in the frame of the room.
+    """Return ``change``, the velocity change of a ball by a hit, with the further effects added.
+
+    They act after restitution and friction. Vectors are in the frame of the room.
 
     The velocity after the hit, relative to the surface, is ``touch.relative`` plus the change.
     Effects act on hits that bounce: contact mode has already decided if the ball lands.
