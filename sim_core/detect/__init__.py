@@ -1,1 +1,1 @@
-"""Search for the time at which a ball meets an obstacle or another ball."""
+"""Search for the time at which a ball first touches an obstacle or another ball."""

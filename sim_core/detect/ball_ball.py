@@ -16,7 +16,7 @@ STANDING = 1e-12  # m/s: rounding of a normal velocity that was removed
 
 @jit
 def pair_delay(apart: Vec3, closing: Vec3, reach: float) -> float:
-    """Time until two balls that fly straight touch.
+    """Return the time [s] until two balls that fly straight touch.
 
     Args:
         apart: relative position [m].
@@ -41,10 +41,16 @@ def pair_delay(apart: Vec3, closing: Vec3, reach: float) -> float:
 
 @jit
 def accelerated_pair_delay(relative: Flight, reach: float, limit: float) -> float:
-    """Time [s] until |relative position| = reach [m], within ``limit`` [s], or NEVER.
+    """Return the time [s] until two balls touch, of which at least one is in contact mode.
 
-    The steps are as in capsule_delay. ``relative``: relative flight of two balls of which at least
-    one is in contact mode.
+    The search goes forward in steps that end before the contact, as in capsule_delay.
+
+    Args:
+        relative: position, velocity and acceleration of the second ball relative to the first.
+        reach: distance of the centres at which the balls touch [m].
+        limit: duration of the search [s].
+
+    Returns: NEVER if the balls do not touch within ``limit``.
     """
     delay = 0.0
     for _ in range(MAX_STEPS):

@@ -19,7 +19,7 @@ from sim_core.numerics.vec3 import Flight, Vec3
 
 @jit
 def is_cylinder_wall(cylinder: CylinderAxis | None, kind: int) -> bool:
-    """True if the obstacle is a cylinder wall. A mesh has none."""
+    """Return True if an obstacle of this ``kind`` is a cylinder wall. A mesh has none."""
     if cylinder is None:
         return False
     return kind == CYLINDER_WALL
@@ -29,7 +29,7 @@ def is_cylinder_wall(cylinder: CylinderAxis | None, kind: int) -> bool:
 def cylinder_delay(
     cylinder: CylinderAxis | None, numbers: np.ndarray, row: int, ball: Flight
 ) -> float:
-    """Time [s] until the centre meets the cylinder wall from inside; NEVER if it does not."""
+    """Return the time [s] until a ball touches the cylinder wall from inside, or NEVER."""
     if cylinder is None:
         return math.inf
     x, y = ball.position.x - cylinder.x, ball.position.y - cylinder.y
@@ -43,7 +43,10 @@ def cylinder_delay(
 def normal_at(
     cylinder: CylinderAxis | None, numbers: np.ndarray, row: int, kind: int, at: Vec3
 ) -> Vec3:
-    """Unit normal towards the shot of a face, or of the cylinder wall at the ball centre ``at``."""
+    """Return the unit normal, towards the balls, of obstacle ``row``.
+
+    On a cylinder wall it is the normal next to a ball whose centre is ``at``.
+    """
     if cylinder is None:
         return face_normal(numbers, row)
     if kind != CYLINDER_WALL:

@@ -1,4 +1,4 @@
-"""Search for the first obstacle that a ball meets, down the tree along the ball's parabola."""
+"""Search for the first obstacle that a ball hits on its parabola, by a tree of boxes."""
 
 from typing import NamedTuple
 
@@ -31,7 +31,7 @@ TINY = 1e-30  # replaces a chord component of zero, whose inverse would be infin
 
 
 class Scratch(NamedTuple):
-    """Working arrays of one simulation, allocated once."""
+    """Working arrays for the search down the tree of boxes, allocated once a simulation."""
 
     ray: np.ndarray  # chord of a flight, see aim_ray, shape (9,) float32
     enter: np.ndarray  # entry times into the boxes of a node's children [s], shape (8,) float32
@@ -40,7 +40,7 @@ class Scratch(NamedTuple):
 
 
 def new_scratch() -> Scratch:
-    """Allocate the working arrays."""
+    """Return new working arrays for the search down the tree of boxes."""
     return Scratch(
         np.zeros(9, dtype=np.float32),
         np.zeros(BOXES, dtype=np.float32),
@@ -51,7 +51,9 @@ def new_scratch() -> Scratch:
 
 @jit
 def aim_ray(ray: np.ndarray, ball: Flight, length: float, error: float) -> None:
-    """Write the chord of a flight: upper and lower origins (0:3, 3:6) and inverse velocity (6:9).
+    """Write the straight line between the two ends of a flight, the chord, into ``ray``.
+
+    ``ray`` holds upper origin (0:3), lower origin (3:6) and inverse velocity (6:9).
 
     The arc lies between its chord and the chord shifted by -a T²/8. The two origins belong to these
     two lines, moved apart by ``error``.
@@ -76,9 +78,16 @@ def aim_ray(ray: np.ndarray, ball: Flight, length: float, error: float) -> None:
 
 @inlined
 def stack_children(tree: Tree, scratch: Scratch, node: int, depth: int, longest: np.float32) -> int:
-    """Stack the children that the flight enters within ``longest`` [s], nearest on top.
+    """Put those child boxes of a tree node that a flight enters on the stack, the first on top.
 
-    Returns: the new depth of the stack.
+    Args:
+        tree: tree of the obstacles.
+        scratch: working arrays with the stack. Its ``ray`` holds the flight.
+        node: number of the tree node.
+        depth: number of entries on the stack.
+        longest: boxes that are entered later than this [s] are left out.
+
+    Returns: the new number of entries on the stack.
     """
     hits = boxes_hit(tree.bounds, node, scratch.ray, longest, scratch.enter)
     floor = depth
@@ -112,22 +121,18 @@ def first_contact(
     time: float,
     length: float,
 ) -> tuple[float, int]:
-    """Find the first contact of a ball with an obstacle that does not turn.
+    """Find the first hit of a ball on any obstacle that does not belong to the turning part.
 
     The obstacle stored first wins a tie.
 
     Args:
-        contact: state of contact mode. Obstacles in contact with the ball are left out.
-        sizes: sizes of balls that are not all alike. Each size has its own obstacles.
-        cylinder: axis of an analytical cylinder.
-        number: number of the ball. It is unused if ``contact`` and ``sizes`` are None.
-        tree: tree of the obstacles.
-        scratch: working arrays.
-        ball: the ball's flight from now on, with its own acceleration.
-        wave: wave of the only sonotrode, or of the slowest one.
-        waves: waves of several sonotrodes.
-        face_overlap: overlap of neighbouring faces [m].
-        time: present time on the window's clock [s]. The phase of a sonotrode depends on it.
+        contact: state of contact mode. Obstacles in contact with the ball are left out. sizes:
+        sizes of balls that are not all alike. Each size has its own obstacles. cylinder: axis of an
+        analytical cylinder. number: number of the ball. It is unused if ``contact`` and ``sizes``
+        are None. tree: tree of the obstacles. scratch: working arrays. ball: the ball's flight from
+        now on, with its own acceleration. wave: wave of the only sonotrode, or of the slowest one.
+        waves: waves of several sonotrodes. face_overlap: overlap of neighbouring faces [m]. time:
+        time since the start of the present time window [s]. The phase of a sonotrode depends on it.
         length: duration of the search [s].
 
     Returns:

@@ -24,7 +24,11 @@ def vibrating_plane_delay(
     time: float,
     limit: float,
 ) -> float:
-    """Time [s] until the centre meets the moving plane of a face within ``limit`` [s], or NEVER."""
+    """Return the time [s] until a ball touches the plane of a vibrating face, beside the face too.
+
+    The result is NEVER if that does not happen within ``limit`` [s], or without vibration.
+    ``time``: time since the start of the present time window [s].
+    """
     if wave is None:
         return NEVER
     return first_wave_approach(_plane_gap(numbers, row, ball, wave, time), limit, HALF * radius)
@@ -32,7 +36,7 @@ def vibrating_plane_delay(
 
 @jit
 def _plane_gap(numbers: np.ndarray, row: int, ball: Flight, wave: Wave, time: float) -> WaveGap:
-    """The gap between the ball's centre and the face's moving plane."""
+    """Return the gap between a ball and the plane of a vibrating face, as a function of time."""
     normal = face_normal(numbers, row)
     lift = dot(normal, wave.axis)
     theta = wave.omega * time + wave.phase
@@ -58,7 +62,7 @@ def within_moved_borders(
     time: float,
     delay: float,
 ) -> bool:
-    """True if the centre is inside the moved face's borders ``delay`` [s] after ``time`` [s]."""
+    """Return True if a ball lies over a vibrating face, not beside it, after ``delay`` [s]."""
     if wave is None:
         return False
     shift = wave.amplitude * math.sin(wave.omega * (time + delay) + wave.phase)
@@ -79,7 +83,7 @@ def find_later_contact(
     delay: float,
     limit: float,
 ) -> tuple[float, int]:
-    """Find a contact after the ball has met the plane of a face beside the face.
+    """Find the hit of a ball on a vibrating plane that it has first met beside the plane's faces.
 
     Beside the sonotrode, over a pit, a ball can be below the plane. It may then come down on the
     plane later.
@@ -92,7 +96,7 @@ def find_later_contact(
         ball: the ball's flight from ``time`` on.
         radius: radius of the ball [m].
         face_overlap: overlap of neighbouring faces [m].
-        time: present time on the window's clock [s].
+        time: time since the start of the present time window [s].
         delay: delay of the meeting with the plane [s].
         limit: end of the search [s].
 

@@ -32,7 +32,7 @@ HALF = 0.5  # share of the radius: a deeper overlap means the far side of a one-
 
 @jit
 def within_borders(numbers: np.ndarray, row: int, at: Vec3, face_overlap: float) -> bool:
-    """True if a point in the face's plane is at most ``face_overlap`` outside the borders."""
+    """Return True if a point in a face's plane is at most ``face_overlap`` [m] outside the face."""
     over = False
     for k in range(4, 20, 4):
         inside = _inside_border(numbers, row, k, at)
@@ -49,13 +49,16 @@ def _inward(numbers: np.ndarray, row: int, border: int) -> Vec3:
 
 @jit
 def _inside_border(numbers: np.ndarray, row: int, border: int, at: Vec3) -> float:
-    """Distance of a point from a border [m], negative outside."""
+    """Return the distance [m] of a point from the border of a face, negative outside the face.
+
+    ``border``: first column of the border in ``numbers``.
+    """
     return float(dot(_inward(numbers, row, border), at) - numbers[row, border + 3])
 
 
 @jit
 def _near_corners(numbers: np.ndarray, row: int, at: Vec3, reach: float) -> bool:
-    """False for a point more than ``reach`` [m] past a corner, beyond the ends of both its borders.
+    """Return False if a point lies more than ``reach`` [m] beyond a corner of a face.
 
     The overlaps of two borders cross far beyond a corner that is as sharp as a needle's tip.
     """
@@ -76,7 +79,7 @@ def _near_corners(numbers: np.ndarray, row: int, at: Vec3, reach: float) -> bool
 
 @jit
 def face_normal(numbers: np.ndarray, row: int) -> Vec3:
-    """Unit normal of a face towards the shot."""
+    """Return the unit normal of a face, towards the balls."""
     return Vec3(numbers[row, 0], numbers[row, 1], numbers[row, 2])
 
 
@@ -84,7 +87,7 @@ def face_normal(numbers: np.ndarray, row: int) -> Vec3:
 def face_delay(
     numbers: np.ndarray, row: int, ball: Flight, radius: float, face_overlap: float
 ) -> float:
-    """Time [s] until the centre meets the moved face from its shot side; NEVER if it does not."""
+    """Return the time [s] until a ball touches a still face on the balls' side of it, or NEVER."""
     normal = face_normal(numbers, row)
     gap = dot(normal, ball.position) - numbers[row, 3]
     rate, bend = dot(normal, ball.velocity), 0.5 * dot(normal, ball.acceleration)
@@ -97,7 +100,7 @@ def face_delay(
 
 @jit
 def away_from_capsule(numbers: np.ndarray, row: int, at: Vec3) -> Vec3:
-    """Vector [m] from the nearest point of the capsule's segment to a point."""
+    """Return the vector [m] from the nearest point of an edge to the point ``at``."""
     start = Vec3(numbers[row, 0], numbers[row, 1], numbers[row, 2])
     direction = Vec3(numbers[row, 3], numbers[row, 4], numbers[row, 5])
     offset = sub(at, start)
@@ -107,7 +110,7 @@ def away_from_capsule(numbers: np.ndarray, row: int, at: Vec3) -> Vec3:
 
 @jit
 def nearer_neighbour(numbers: np.ndarray, row: int, away: Vec3) -> int:
-    """Index, 0 or 1, of the capsule's neighbour triangle that faces the ball more.
+    """Return which of the two triangles at an edge, 0 or 1, a ball at the edge faces more.
 
     This choice shares the impacts on an edge fairly between its two triangles.
     """
@@ -119,7 +122,9 @@ def nearer_neighbour(numbers: np.ndarray, row: int, away: Vec3) -> int:
 def capsule_delay(
     numbers: np.ndarray, row: int, ball: Flight, radius: float, limit: float
 ) -> float:
-    """Time [s] until the centre meets the capsule; NEVER if it does not within ``limit`` [s].
+    """Return the time [s] until a ball touches an edge, or NEVER if not within ``limit`` [s].
+
+    The ball's centre then meets the edge's capsule: the points one radius from the edge.
 
     The distance to a convex body is never below the distance to the plane that touches the body at
     the nearest point. Along the flight the plane distance is a quadratic in time. Each step goes to

@@ -53,7 +53,7 @@ def first_part_contact(
     known: int,
     first: int,
 ) -> tuple[float, int]:
-    """Find the first contact with the part before a known contact.
+    """Find the first hit of a ball on the turning part, up to the time of a hit already known.
 
     Args:
         part: obstacles of the part.
@@ -61,7 +61,7 @@ def first_part_contact(
         scratch: working arrays.
         ball: the ball's flight in the room from now on.
         face_overlap: overlap of neighbouring faces [m].
-        time: present time on the window's clock [s].
+        time: time since the start of the present time window [s].
         limit: delay of the known contact, or end of the search [s].
         known: obstacle of the known contact, negative for none.
         first: number of the part's first obstacle.
@@ -112,7 +112,10 @@ def first_part_contact(
 
 @jit
 def _jerk(part: PartTree, rotation: RotationState, ball: Flight, limit: float) -> float:
-    """Bound J of the path in the part's frame; -1 if the path stays clear of the part."""
+    """Return a bound on the third derivative of a ball's path as seen from the part [m/s³].
+
+    It is -1 if the ball cannot touch the part within ``limit`` [s].
+    """
     bulge = 0.125 * limit * limit
     start = sub(ball.position, rotation.point)
     halfway = add_scaled(ball.velocity, 0.5 * limit, ball.acceleration)
@@ -141,7 +144,10 @@ def _jerk(part: PartTree, rotation: RotationState, ball: Flight, limit: float) -
 
 @jit
 def _piece(relative: Flight, jerk: float, length: float, radius: float) -> float:
-    """Length [s] of the next piece, at most ``length``."""
+    """Return the duration [s] of the next piece of a path, short enough to count as a parabola.
+
+    It is at most ``length``.
+    """
     bend = np.sqrt(dot(relative.acceleration, relative.acceleration))
     while jerk * length * length * length > 6.0 * OFF_PARABOLA * radius or (
         bend * length * length > 8.0 * BULGE * radius
@@ -163,9 +169,11 @@ def _obstacle_delay(
     end: float,
     jerk: float,
 ) -> tuple[float, bool]:
-    """Delay [s] of the contact with one obstacle in a piece; True if the search is complete.
+    """Return when a ball touches one obstacle of the part within a piece of its path.
 
-    The delay is NEVER if there is no contact. Contact is a gap of at most CONTACT.
+    Returns: (delay, sure). The delay [s] is NEVER if the ball does not touch the obstacle. If
+    ``sure`` is False, the search ran out of steps, and a contact can only come later.
+    A gap of at most CONTACT counts as contact.
 
     Args:
         tree: tree of the part.
@@ -174,10 +182,10 @@ def _obstacle_delay(
         ball: the ball's flight in the room from now on.
         relative: the ball's flight in the part's frame at ``begin``.
         face_overlap: overlap of neighbouring faces [m].
-        time: present time on the window's clock [s].
+        time: time since the start of the present time window [s].
         begin: start of the piece [s].
         end: end of the piece [s].
-        jerk: J [m/s³].
+        jerk: bound on the third derivative of the path in the part's frame [m/s³].
     """
     radius = tree.radius
     round_edge = tree.kinds[row] == CAPSULE
