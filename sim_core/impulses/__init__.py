@@ -1,1 +1,1 @@
-"""Velocity changes at contacts and by the air."""
+"""Velocity changes of balls when they hit a surface or another ball, and by air drag."""

@@ -1,8 +1,8 @@
 """Velocity changes at a collision without friction.
 
-The normal relative velocity is reversed and multiplied by e. The tangential velocity is kept.
-effects/restitution.py gives e. Two equal balls keep their momentum here, and geometry/ball_sizes.py
-corrects the change for unequal balls.
+The normal relative velocity is reversed and multiplied by e, the coefficient of restitution from
+effects/restitution.py. The tangential velocity is kept. Two equal balls keep their momentum here,
+and geometry/ball_sizes.py corrects the change for unequal balls.
 
 A ball that circles in a cylinder and loses the last of its normal speed to restitution would hit
 the wall infinitely often in finite time, and slide on it from then on. Instead it goes on leaving
@@ -26,7 +26,9 @@ RECONTACT_ANGLE = 1e-4
 
 @jit
 def pair_velocity_change(apart: Vec3, closing: Vec3, restitution: RestitutionState | None) -> Vec3:
-    """Velocity change [m/s] of the first of two equal balls; the second has minus this change.
+    """Return the velocity change [m/s] of the first of two equal balls that collide.
+
+    The second ball has minus this change.
 
     Dividing by |apart|² keeps the energy of an elastic collision to rounding, where a rounded unit
     normal would drift.
@@ -51,7 +53,7 @@ def pair_velocity_change(apart: Vec3, closing: Vec3, restitution: RestitutionSta
 def surface_velocity_change(
     away: Vec3, relative: Vec3, restitution: RestitutionState | None, tag: int
 ) -> Vec3:
-    """Velocity change [m/s] of a ball at a surface; zero if the ball separates.
+    """Return the velocity change [m/s] of a ball that hits a surface; zero if it moves away.
 
     Args:
         away: any vector along the normal, from the surface to the ball.
@@ -71,7 +73,9 @@ def surface_velocity_change(
 def leave_cylinder_wall(
     cylinder: CylinderAxis | None, kind: int, away: Vec3, relative: Vec3, change: Vec3
 ) -> Vec3:
-    """Velocity change that makes a ball leave a cylinder wall at RECONTACT_ANGLE or more.
+    """Return ``change``, enlarged where a ball would leave a cylinder wall at too small an angle.
+
+    The smallest angle is RECONTACT_ANGLE. The tangential speed provides the energy that is missing.
 
     Args:
         cylinder: axis of the cylinder; None in a mesh.

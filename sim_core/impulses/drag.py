@@ -1,4 +1,6 @@
-"""Drag impulses in the middle of each piece of a flight, corrected when an event comes before.
+"""Slow balls down by air drag, with one impulse in the middle of each short piece of a flight.
+
+If an event comes before the end of a piece, the ball's velocity is corrected.
 
 A ball gets no impulse on leaving an obstacle. A ball can bounce a thousand times on its way up with
 the sonotrode. If an impulse were taken back at the next bounce, in the opposite direction, it would
@@ -26,7 +28,10 @@ ON_TIME = 1.999  # half pieces: an impulse that rounding makes early is on time
 def time_to_next_drag(
     drag: DragState | None, contact: ContactState | None, ball: int, time: float
 ) -> float:
-    """Time [s] until the ball's next drag impulse; NEVER without one."""
+    """Return the time [s] until the ball's next impulse by the air.
+
+    It is NEVER without drag, and for a ball that is not in flight.
+    """
     if drag is None or not is_flying(contact, ball):
         return NEVER
     return float(max(drag.acted_until[ball] + drag.half - time, 0.0))
@@ -42,7 +47,7 @@ def _change(
     gravity: Gravity | None,
     span: float,
 ) -> Vec3:
-    """Velocity change [m/s] by ``span`` [s] in air."""
+    """Return the velocity change [m/s] of a ball at ``time`` [s] by ``span`` [s] of air drag."""
     velocity = state_under(motion, ball, time, ball_acceleration(contact, ball, gravity)).velocity
     speed = math.sqrt(dot(velocity, velocity))
     return scaled(remaining_speed(drag, ball, speed, span) - 1.0, velocity)
@@ -57,7 +62,10 @@ def apply_drag_until(
     time: float,
     gravity: Gravity | None,
 ) -> None:
-    """Correct the ball's velocity at an event so that the air has acted until ``time`` [s]."""
+    """Correct a ball's velocity at an event so that the air has acted exactly until ``time`` [s].
+
+    Before, the air may have acted for too short or for too long a time.
+    """
     if drag is None:
         return
     if is_flying(contact, ball):
@@ -76,7 +84,10 @@ def apply_drag_piece(
     time: float,
     gravity: Gravity | None,
 ) -> bool:
-    """Give a ball in the middle of a piece its impulse; False if the ball is not there."""
+    """Change a ball's velocity by the air drag of one whole piece of its flight.
+
+    Returns: False, with nothing changed, if the ball is not in flight in the middle of a piece.
+    """
     if drag is None:
         return False
     span = time + drag.half - drag.acted_until[ball]
@@ -92,7 +103,10 @@ def apply_drag_piece(
 def apply_drag_to_all(
     drag: DragState | None, contact: ContactState | None, velocities: np.ndarray, time: float
 ) -> None:
-    """Correct velocities (n, 3) [m/s] of flying balls so that the air has acted until now."""
+    """Correct the velocities of all balls in flight so that the air has acted until ``time`` [s].
+
+    ``velocities``: velocities of the balls [m/s], shape (n, 3), changed in place.
+    """
     if drag is None:
         return
     for ball in range(len(velocities)):

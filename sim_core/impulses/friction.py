@@ -27,12 +27,12 @@ def add_surface_friction(
     change: Vec3,
     tag: int,
 ) -> Vec3:
-    """Velocity change [m/s] of a ball at a surface with friction. The ball's spin is changed here.
+    """Return ``change`` [m/s] plus friction, for a ball that hits a surface. Change its spin.
 
     Args:
         friction: None without the effect.
         ball: number of the ball.
-        time: time of the window [s].
+        time: time since the start of the present time window [s].
         away: any vector along the normal, from the surface to the ball, in the room's frame.
         relative: the ball's velocity minus the velocity of the touched point, in the room's frame
             [m/s].
@@ -58,13 +58,15 @@ def add_pair_friction(
     closing: Vec3,
     change: Vec3,
 ) -> Vec3:
-    """Velocity change [m/s] with friction of the first ball; the second has minus this change.
+    """Return ``change`` [m/s] plus friction, for the first of two balls. Change both spins.
+
+    The second ball has minus the returned velocity change.
 
     Args:
         friction: None without the effect.
         one: number of the first ball.
         two: number of the second ball.
-        time: time of the window [s].
+        time: time since the start of the present time window [s].
         apart: second position minus first [m].
         closing: second velocity minus first [m/s].
         change: velocity change of the first ball without friction [m/s].
@@ -91,7 +93,15 @@ def _unit(away: Vec3) -> Vec3:
 def _tangential_change(
     slip: Vec3, normal: Vec3, push: Vec3, coefficients: tuple[float, float], mass: float
 ) -> Vec3:
-    """Tangential velocity change [m/s] that belongs to the normal change ``push`` [m/s]."""
+    """Return the tangential velocity change [m/s] by friction in a hit.
+
+    Args:
+        slip: relative velocity of the touching points [m/s].
+        normal: unit normal of the contact.
+        push: normal velocity change in the same hit [m/s].
+        coefficients: mu and beta0 of the contact.
+        mass: m_eff over the ball's mass, 1 at a surface and 1/2 for two balls.
+    """
     mu, beta0 = coefficients
     slip = add_scaled(slip, -dot(slip, normal), normal)
     speed = math.sqrt(dot(slip, slip))
@@ -103,7 +113,10 @@ def _tangential_change(
 
 @jit
 def _add_spin(friction: FrictionState, ball: int, normal: Vec3, tangential: Vec3) -> None:
-    """Change the spin of a ball for a velocity change [m/s] at -R ``normal`` from its centre."""
+    """Change a ball's spin by a hit that adds ``tangential`` [m/s] to its velocity.
+
+    ``normal``: unit vector from the touched point to the ball's centre.
+    """
     torque = cross(normal, tangential)
     for axis in range(3):
         friction.spins[ball, axis] -= 2.5 / friction.radius * torque[axis]
