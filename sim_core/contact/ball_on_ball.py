@@ -1,4 +1,4 @@
-"""Collision of two balls of which at least one is in contact mode.
+"""Collision of two balls of which at least one is in contact mode: it slides, rolls or lies still.
 
 A fast hit is an ordinary collision. The reaction of a surface behind a ball is the next event.
 

@@ -1,4 +1,4 @@
-"""Capture of balls by surfaces, and choice of the supports that a ball keeps as it moves on.
+"""Landing of balls on surfaces, and choice of the surfaces on which a ball still stands later.
 
 The time at which a rolling ball leaves its support is computed in path_end.py.
 

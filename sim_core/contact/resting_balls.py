@@ -82,7 +82,7 @@ def resting(
 
 
 def can_rest(mesh: TriangleMesh | AnalyticCavity, gravity: Gravity | None, *moving: int) -> bool:
-    """True if gravity can press a ball onto a still triangle of the chamber.
+    """Return True if gravity can press a ball onto a triangle of the chamber that stands still.
 
     ``moving``: tags of the surfaces that vibrate or turn.
     """

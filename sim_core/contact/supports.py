@@ -1,4 +1,4 @@
-"""The supports of a ball, and the projection of vectors onto the cone that the supports leave free.
+"""Surfaces on which a ball stands, its supports, and the directions that they leave free to it.
 
 Notation: n_k: unit normal of support k, towards the ball. The supports leave the cone {x: n_k x >=
 0 for all k}: the directions in which the ball can move. The vector of the cone that is nearest to x
@@ -163,5 +163,5 @@ def set_mode(contact: ContactState, ball: int, mode: int) -> None:
 
 @jit
 def forget_left_support(contact: ContactState, ball: int) -> None:
-    """Set the noted normal of the support that a ball has just left to zero, which means none."""
+    """Delete the note of the support that a ball has just left, by setting its normal to zero."""
     set_vec3(contact.left_normal, ball, Vec3(0.0, 0.0, 0.0))
