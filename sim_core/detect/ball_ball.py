@@ -1,4 +1,4 @@
-"""Time at which two balls meet.
+"""Time at which two balls touch.
 
 In the free-fall frame both balls fly straight, with gravity or without it, unless a ball is in
 contact mode.

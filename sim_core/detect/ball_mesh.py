@@ -126,13 +126,18 @@ def first_contact(
     The obstacle stored first wins a tie.
 
     Args:
-        contact: state of contact mode. Obstacles in contact with the ball are left out. sizes:
-        sizes of balls that are not all alike. Each size has its own obstacles. cylinder: axis of an
-        analytical cylinder. number: number of the ball. It is unused if ``contact`` and ``sizes``
-        are None. tree: tree of the obstacles. scratch: working arrays. ball: the ball's flight from
-        now on, with its own acceleration. wave: wave of the only sonotrode, or of the slowest one.
-        waves: waves of several sonotrodes. face_overlap: overlap of neighbouring faces [m]. time:
-        time since the start of the present time window [s]. The phase of a sonotrode depends on it.
+        contact: state of contact mode. Obstacles in contact with the ball are left out.
+        sizes: sizes of balls that are not all alike. Each size has its own obstacles.
+        cylinder: axis of an analytical cylinder.
+        number: number of the ball. It is unused if ``contact`` and ``sizes`` are None.
+        tree: tree of the obstacles.
+        scratch: working arrays.
+        ball: the ball's flight from now on, with its own acceleration.
+        wave: vibration of the only sonotrode, or of the slowest one.
+        waves: vibrations of several sonotrodes.
+        face_overlap: overlap of neighbouring faces [m].
+        time: time since the start of the present time window [s]. The phase of a sonotrode depends
+            on it.
         length: duration of the search [s].
 
     Returns:
