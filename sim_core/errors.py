@@ -13,7 +13,7 @@ class SceneError(ValueError):
 
 
 class SimulationError(RuntimeError):
-    """Error of a simulation that cannot go on, as after the loss of a ball, with what to try."""
+    """Error of a simulation that has gone wrong, such as a lost ball. It says what to try."""
 
 
 def number(name: str, value: object) -> float:

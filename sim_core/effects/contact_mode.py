@@ -132,7 +132,7 @@ class Ride(NamedTuple):
 
 
 class ContactState(NamedTuple):
-    """State of contact mode for n balls.
+    """State of n balls that fly, slide, roll, lie still or are jammed.
 
     mode: FLYING, SLIDING, ASLEEP or JAMMED, (n,) int32.
     acceleration: acceleration of each ball [m/s²], (n, 3).
