@@ -58,7 +58,7 @@ Law = TypeVar("Law", bound=RestitutionTable)
 
 
 class Misfit(FileTable):
-    """Agreement of the model with the measurements of one kind."""
+    """How well the simulation agrees with the measurements of one kind, after calibration."""
 
     kind: str = Field(description="of measurement")
     chi2: float = quantity(0, 1e12, "", "sum of squared residuals over their variances")
@@ -126,25 +126,25 @@ class Calibration(FileTable):
             yield Problem("log_covariance", f"{text}; {again}")
 
     def factor(self, name: Parameter) -> float:
-        """The mean value of a parameter; 1 if it is not calibrated."""
+        """Return the calibrated value of a parameter; 1 if it is not calibrated."""
         if name not in self.parameters:
             return 1.0
         return math.exp(self.log_mean[self.parameters.index(name)])
 
     def log_sd(self, name: Parameter) -> float:
-        """Standard deviation of the logarithm of a parameter; 0 if it is not calibrated."""
+        """Return the standard deviation of a parameter's natural logarithm; 0 if uncalibrated."""
         if name not in self.parameters:
             return 0.0
         at = self.parameters.index(name)
         return math.sqrt(max(0.0, self.log_covariance[at][at]))
 
     def intensity_mmA(self, strength_um: float) -> float:  # noqa: N802
-        """Almen intensity [mmA] of a peening strength [µm]."""
+        """Return the Almen intensity [mmA] that a simulated peening strength [µm] stands for."""
         return self.factor("K") * 1e-3 * strength_um
 
     @property
     def not_mmA(self) -> str:  # noqa: N802
-        """Meaning of the intensities if they are not of whole strips; otherwise ""."""
+        """Return a note if intensities are not those of whole Almen strips; otherwise ""."""
         if not self.has_strips or self.strips == WHOLE_STRIP:
             return ""
         return (
@@ -159,7 +159,10 @@ class Calibration(FileTable):
 
     @cached_property
     def _triangle(self) -> np.ndarray:
-        """L, in the order of PARAMETERS. Rows and columns of uncalibrated parameters are 0."""
+        """Return the lower triangle L with L L' = covariance, in the order of PARAMETERS.
+
+        Rows and columns of parameters that are not calibrated are 0.
+        """
         rows = [PARAMETERS.index(name) for name in self.parameters]
         matrix = np.array(self.log_covariance)
         # A parameter that is known exactly has a row of zeros, for which there is no L.
@@ -172,12 +175,13 @@ class Calibration(FileTable):
         return found
 
     def errors(self, slopes: Mapping[Parameter, float], of_model: float = 0.0) -> tuple[float, ...]:
-        """Standard errors L' g, one for each of PARAMETERS, and last the model's own error.
+        """Return the independent standard errors L' g that the calibration gives a figure.
 
-        The errors of two figures subtract.
+        There is one for each of PARAMETERS, and last the model's own error. The errors of the
+        difference of two figures are the differences of their errors.
 
         Args:
-            slopes: g by name of the parameter; missing parameters have slope 0.
+            slopes: slope of the figure by each parameter's logarithm; a missing one is 0.
             of_model: standard error by effects that the model leaves out.
         """
         slope = np.array([slopes.get(name, 0.0) for name in PARAMETERS])
@@ -185,14 +189,14 @@ class Calibration(FileTable):
 
 
 def why_no_intensity(calibration: Calibration | None) -> str:
-    """Reason why a design with this calibration has no Almen intensity; "" if it has."""
+    """Return why a design with this calibration has no Almen intensity; "" if it has one."""
     if calibration is None:
         return NO_CALIBRATION
     return "" if calibration.has_strips else NO_STRIPS
 
 
 def _read(given: Any, info: ValidationInfo) -> Any:
-    """The table of a file, if a path is given."""
+    """Return the calibration in a file if a path is given, else the given value unchanged."""
     if not isinstance(given, str):
         return given
     if (info.context or {}).get("recorded"):  # a result holds the numbers, and names no file
@@ -224,9 +228,10 @@ CalibrationField = Annotated[
 
 
 def with_measured_values(design: Any) -> Any:
-    """A Design with the values of its calibration in place of its own.
+    """Return a copy of a Design with the values of its calibration in place of its own.
 
-    It serves only for a simulation: it has no calibration, and its values are not checked.
+    The copy is only for a simulation: it names no calibration, and its values are not checked.
+    A design without calibration is returned as it is.
     """
     one: Calibration | None = design.calibration
     if one is None:
@@ -256,7 +261,7 @@ def with_measured_values(design: Any) -> Any:
 
 
 def calibration_problems(design: Any) -> Iterator[Problem]:
-    """Problems of values beyond a Design's range, given by its calibration."""
+    """Yield a problem for each value of a Design that its calibration puts out of range."""
     one: Calibration | None = design.calibration
     if one is None:
         return
@@ -283,13 +288,16 @@ def calibration_problems(design: Any) -> Iterator[Problem]:
 
 
 def calibrated_strip(shot: ShotTable, calibration: Calibration | None) -> PartMaterial:
-    """The metal of an Almen strip under this shot, with known hardness."""
+    """Return hardness and restitution of an Almen strip under this shot.
+
+    A calibration corrects the restitution but not the hardness, which the standard sets.
+    """
     strip = strip_material(shot)
     return strip if calibration is None else _with_measured_restitution(strip, calibration)
 
 
 def _times(table: Any, factors: Mapping[str, float]) -> Any:
-    """A table with some of its numbers multiplied. Unset numbers stay unset."""
+    """Return a copy of a table with some numbers multiplied by factors. Unset ones stay unset."""
     values = {name: getattr(table, name) for name in factors}
     changed = {name: one * factors[name] for name, one in values.items() if one is not None}
     return table.model_copy(update=changed)
@@ -300,9 +308,14 @@ def _with_measured_restitution(law: Law, one: Calibration) -> Law:
 
 
 def scaled_restitution(law: Law, c0: float, v0: float) -> Law:
-    """A restitution law with factors on C0 and v0. No restitution is above 1.
+    """Return a restitution law with its C0 and v0 multiplied by factors.
 
-    Its v0 then differs from the catalogue's.
+    A restitution above 1 becomes 1. The copy no longer says that v0 is the catalogue's.
+
+    Args:
+        law: restitution over impact speed, from C0 and v0 or as a table of points.
+        c0: factor on the restitution.
+        v0: factor on the speed at which yielding starts, and on the speeds of a table.
     """
     law = law.model_copy(update={"v0_for": None})
     if law.e_at_m_s is not None:

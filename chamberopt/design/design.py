@@ -89,13 +89,16 @@ class Design(FileTable):
 
     @property
     def simulated(self) -> "Design":
-        """The design that is simulated: with its calibration's values in place of its own."""
+        """Return the design to simulate, with its calibration's values in place of its own."""
         found: Design = with_measured_values(self)
         return found
 
     @property
     def is_recorded(self) -> bool:
-        """True if the design comes from a result and has a user's own shape, which is not run."""
+        """True if the design comes from a result file and its chamber has a user's own shape.
+
+        The Python file of that shape is then not run.
+        """
         return isinstance(self.chamber, RecordedShape)
 
     @pydantic.model_validator(mode="before")
@@ -111,7 +114,7 @@ class Design(FileTable):
     @pydantic.model_validator(mode="before")
     @classmethod
     def _look_up_metals(cls, data: Any) -> Any:
-        """Replace the catalogue's names by numbers, so that results hold the numbers."""
+        """Replace names of metals by the catalogue's numbers, so that results hold the numbers."""
         if (materials := _table(data, "materials")) is None:
             return data
         shot = data.get("shot")
@@ -146,7 +149,7 @@ class Design(FileTable):
             yield Problem("shot.mass_g", text)
 
     def _size_problems(self) -> Iterator[Problem]:
-        """Problems of part, balls and sonotrode that do not fit into the chamber."""
+        """Yield a problem for each part, ball or sonotrode that does not fit into the chamber."""
         chamber, amplitude_um = self.chamber, self.sonotrode.zero_to_peak_um
         distance, widths = chamber.sonotrode_distance_mm, chamber.widths_mm()
         if distance is None:  # the drawn distance is known only once the set-up's file is read
@@ -172,7 +175,7 @@ class Design(FileTable):
             yield Problem(ball_field, f"given {ball:g}, not below {less}: {remedy}")
 
     def _setup_problems(self) -> Iterator[Problem]:
-        """Problems of keys that a set-up drawn as a whole already decides."""
+        """Yield a problem for each given key that a set-up drawn in one file already decides."""
         chamber, part = self.chamber, self.part
         if not isinstance(chamber, Imported):
             return
@@ -193,7 +196,7 @@ class Design(FileTable):
                 yield Problem(f"part.{key}", text)
 
     def numbers(self) -> tuple[str, ...]:
-        """Dotted names of every continuous number, which a study may vary."""
+        """Return the dotted names of all continuous numbers of the design that a study may vary."""
         fields = toml_errors.numeric_fields(self)
         return tuple(
             name
@@ -202,14 +205,14 @@ class Design(FileTable):
         )
 
     def whole_numbers(self) -> tuple[str, ...]:
-        """Dotted names of every whole number that belongs to the chamber, such as its sides."""
+        """Return the dotted names of all whole numbers of the chamber, such as its sides."""
         fields = toml_errors.numeric_fields(self)
         others = ("process.", "calibration.", "zones.", "tolerances.", "chamber.facets")
         whole = (name for name, field in fields if field.annotation is int)
         return tuple(name for name in whole if not name.startswith(others))
 
     def choices(self) -> dict[str, tuple[str, ...]]:
-        """Dotted names of the texts that a study may choose, and the allowed texts of each."""
+        """Return the allowed texts of each text key that a study may vary, by its dotted name."""
         tables = {"chamber": self.chamber, "sonotrode": self.sonotrode, "shot": self.shot}
         found = (one for name, table in tables.items() for one in text_choices(table, name))
         choices = {name: texts for name, texts in found if name != "chamber.unit"}
@@ -217,12 +220,15 @@ class Design(FileTable):
         return choices | ({SHAPE: generated} if self.chamber.shape in generated else {})
 
     def chamber_keys(self, shape: str) -> dict[str, bool]:
-        """Dotted names of the keys of a shape's chamber; True for a whole number."""
+        """Return True or False for each key of this shape's chamber, by its dotted name.
+
+        True means that the value of the key is a whole number.
+        """
         fields = SHAPES[shape].model_fields.items()
         return {f"chamber.{key}": field.annotation is int for key, field in fields}
 
     def why_fixed(self, name: str) -> str:
-        """Reason why a number cannot be changed by degrees; an empty text if it can."""
+        """Return why a study cannot vary the number at a dotted name; an empty text if it can."""
         if name == SHAPE:
             return "a shape of your own, or one that is drawn; it cannot vary"
         if name.startswith("calibration."):
@@ -244,7 +250,10 @@ class Design(FileTable):
         return "" if name in numbers else "a whole number cannot vary; leave it out"
 
     def value(self, name: str) -> float:
-        """The number at a dotted name, in the file's unit; InputError if no number is set there."""
+        """Return the number at a dotted name, in the unit of the design file.
+
+        Raises InputError if there is no such number, or it is not set in this design.
+        """
         known = [known for known, _ in toml_errors.numeric_fields(self)]
         if name not in known:
             hint = toml_errors.did_you_mean(name, known)
@@ -257,14 +266,17 @@ class Design(FileTable):
         return cast(float, value)
 
     def setting(self, name: str) -> float | str:
-        """The number, or the text of `choices`, at a dotted name; InputError as `value`."""
+        """Return the number at a dotted name, or the text if `choices` has the name.
+
+        Raises InputError if there is neither, or it is not set in this design.
+        """
         if name not in self.choices():
             return self.value(name)
         table, key = name.split(".")
         return str(getattr(getattr(self, table), key))
 
     def changed(self, values: Mapping[str, Any]) -> "Design":
-        """A copy with other values, checked again as a whole.
+        """Return a copy of the design with other values, checked again as a whole.
 
         The values are in the file's units, by dotted name, e.g. {"chamber.height_mm": 45}. An entry
         of a list is named by its position: part.offset_mm.0. With another chamber.shape the chamber
@@ -281,7 +293,13 @@ class Design(FileTable):
 
 
 def _unpickled(data: dict[str, Any], recorded: bool, sha256: str) -> Design:
-    """The design on a worker; InputError if the file of its shape differs there."""
+    """Return a design from its pickled values, in a worker process.
+
+    Raises InputError if the Python file of its own shape has other contents on this machine.
+
+    Args:
+        sha256: checksum of that file where the design was pickled.
+    """
     design = validate(Design, data, recorded=recorded)
     if design.chamber.sha256 != sha256:
         raise InputError(
@@ -292,7 +310,12 @@ def _unpickled(data: dict[str, Any], recorded: bool, sha256: str) -> Design:
 
 
 def _replaced(old: Any, name: str, steps: Sequence[str], value: Any) -> Any:
-    """A table or list with another value at the end of a path of keys and positions."""
+    """Return a copy of a table or list with another value at the end of a path.
+
+    Args:
+        name: dotted name of the value, for messages.
+        steps: the path: keys of tables and positions in lists.
+    """
     if not steps:
         return _of_the_same_kind(old, value)
     step, rest = steps[0], steps[1:]
@@ -306,7 +329,10 @@ def _replaced(old: Any, name: str, steps: Sequence[str], value: Any) -> Any:
 
 
 def _of_the_same_kind(old: Any, value: Any) -> Any:
-    """The value as a whole number if the old value is one. Numpy's numbers are accepted too."""
+    """Return a new number in the type of the old value, int or float; other values as they are.
+
+    A number that is not whole becomes a float. Numbers of numpy are accepted too.
+    """
     is_number = isinstance(value, Real) and not isinstance(value, bool)
     if not is_number:
         return value
@@ -337,7 +363,12 @@ class AnyShape(ChamberTable):
 
 
 def design_class(data: Mapping[str, Any], context: Mapping[str, Any] | None = None) -> type[Design]:
-    """The class of designs whose chamber has the shape named in a design's values."""
+    """Return the subclass of Design whose chamber table has the keys of the shape in `data`.
+
+    Args:
+        data: values of a design file.
+        context: folder of the file, and whether the values come from a result ("recorded").
+    """
     chamber = data.get("chamber")
     name = chamber.get("shape") if isinstance(chamber, Mapping) else getattr(chamber, "shape", None)
     if not is_custom(name):
@@ -371,9 +402,11 @@ def validate(
     source: str = "",
     recorded: bool = False,
 ) -> Model:
-    """The data as a frozen model.
+    """Check values against a model, such as Design, and return them as a frozen instance of it.
 
     Args:
+        model: class of the instance.
+        data: values as read from a file.
         path: path of the file that holds the data. Paths of meshes and shapes are relative to it.
         source: text of that file, for line numbers in messages.
         recorded: True for the design of a result. No file that it names is looked for or run.

@@ -58,7 +58,10 @@ class PartTurn(FileTable):
 
 
 class FrictionTable(FileTable):
-    """Walton's mu and beta0 of balls on surfaces and, unless given separately, of ball on ball."""
+    """Friction of balls on surfaces and, unless given separately, of ball on ball.
+
+    mu is the coefficient of friction and beta0 the tangential restitution of Walton's model.
+    """
 
     mu: float = quantity(0, 10, "", "coefficient of friction; 0 is smooth, metals: tenths")
     beta0: float = quantity(
@@ -72,22 +75,25 @@ class FrictionTable(FileTable):
 
     @property
     def surfaces(self) -> tuple[float, float]:
-        """mu and beta0 of a ball on a surface."""
+        """Friction coefficient mu and tangential restitution beta0 of a ball on a surface."""
         return self.mu, self.beta0
 
     @property
     def balls(self) -> tuple[float, float]:
-        """mu and beta0 of ball on ball."""
+        """Friction coefficient mu and tangential restitution beta0 of ball on ball."""
         mu, beta0 = self.mu_balls, self.beta0_balls
         return self.mu if mu is None else mu, self.beta0 if beta0 is None else beta0
 
 
 class SurfaceEffectTable(FileTable):
-    """A table of [effects] for a further effect of hits on surfaces in the simulator."""
+    """Base class of a table of [effects] that adds a further effect of hits on surfaces.
+
+    The simulator has the effect under the same name as the table.
+    """
 
     @property
     def parameters(self) -> dict[str, float]:
-        """The numbers that the simulator's effect of the same name takes, in SI units."""
+        """Return the numbers for the simulator's effect of the same name, in SI units."""
         raise NotImplementedError
 
 
@@ -121,7 +127,7 @@ class Effects(FileTable):
 
     @property
     def of_surfaces(self) -> dict[str, dict[str, float]]:
-        """Parameters of the further effects of hits on surfaces, by name of the effect."""
+        """Return the numbers of each SurfaceEffectTable, in SI units, by name of the effect."""
         tables = {name: getattr(self, name) for name in type(self).model_fields}
         return {k: v.parameters for k, v in tables.items() if isinstance(v, SurfaceEffectTable)}
 

@@ -1,4 +1,4 @@
-"""Loading and saving of design files. All problems of a file are reported in one error."""
+"""Load and save design files. All problems of a file are reported in one error."""
 
 import os
 from collections.abc import Mapping
@@ -15,7 +15,10 @@ __all__ = ["Design", "load_design", "read_toml", "save_design"]
 
 
 def load_design(path: str | Path) -> Design:
-    """Load the design in a file; InputError names every problem, with file and line."""
+    """Load and return the design in a file.
+
+    Raises InputError, which names every problem with file and line.
+    """
     path = Path(path)
     source, data = read_toml(path, "design")
     if is_study(data):
@@ -36,7 +39,7 @@ def save_design(design: Design, path: str | Path) -> None:
 
 
 def with_paths_from(folder: Path, value: Any) -> Any:
-    """The values of a design, with paths of meshes and of a custom shape relative to a folder."""
+    """Return a design's values with paths of meshes and of an own shape relative to a folder."""
     if isinstance(value, Mapping):
         return {
             name: _relative(inner, folder)
@@ -56,12 +59,12 @@ def _relative(path: str, folder: Path) -> str:
 
 
 def is_study(data: Mapping[str, Any]) -> bool:
-    """True if these are the values of a study file."""
+    """True if these values are those of a study file rather than of a design file."""
     return isinstance(data.get("design"), str) or not {"vary", "optimizer"}.isdisjoint(data)
 
 
 def _without_none(value: Any) -> Any:
-    """The values without keys that are not set or hold an empty list."""
+    """Return a copy of the values without keys that are None or hold an empty list."""
     if isinstance(value, Mapping):
         return {k: _without_none(v) for k, v in value.items() if v is not None and v != ()}
     return [_without_none(inner) for inner in value] if isinstance(value, tuple) else value

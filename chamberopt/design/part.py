@@ -103,7 +103,7 @@ class Target(Selection):
 
     @property
     def element(self) -> float | None:
-        """Wanted side of the target's triangles [m]."""
+        """Wanted side of the target's triangles [m]; None to keep the triangles of the file."""
         return None if self.element_mm is None else self.element_mm * 1e-3
 
 
@@ -120,13 +120,13 @@ class TessellationTable(FileTable):
 
     @property
     def limits(self) -> Tessellation:
-        """The fineness in m and rad."""
+        """Return the limits on the triangles of a STEP file, in metres and radians."""
         side = 0.0 if self.side_mm is None else 1e-3 * self.side_mm
         return Tessellation(1e-3 * self.chord_mm, math.radians(self.angle_deg), side)
 
 
 class SmoothingTable(FileTable):
-    """Fineness of the facets of rounds, and limit of the surface's move.
+    """How finely facets of curved surfaces are divided, and how far that may move the surface.
 
     A ball of radius r in a hollow touches facets that turn by an angle a at r tan(a / 2) from their
     edge, on both sides. Dents of a diameter d cover the strip between them if a < d / 2 r. Dents
@@ -147,7 +147,7 @@ class SmoothingTable(FileTable):
     )  # fmt: skip
 
     def rule(self, triangles: np.ndarray) -> Rule:
-        """The smoothing rule for some triangles (m,) bool, in SI units."""
+        """Return these limits in SI units, as a rule for smoothing the marked triangles (m,)."""
         tolerance = math.inf if self.tolerance_mm is None else 1e-3 * self.tolerance_mm
         turn = math.radians(self.limit_deg)
         return Rule(triangles, self.off, turn, 1e-3 * self.narrow_mm, tolerance)
@@ -186,7 +186,7 @@ class PartTable(FileTable):
 
     @property
     def limits(self) -> Tessellation | None:
-        """Fineness of the triangles of a STEP file; None for the usual limits."""
+        """Return the limits on the triangles of a STEP file; None if the design gives none."""
         return None if self.tessellation is None else self.tessellation.limits
 
     @property

@@ -66,7 +66,7 @@ class Process(FileTable):
 
     @property
     def recorded_time(self) -> float:
-        """Recorded time of each replica [s]."""
+        """Time of each replica [s] in which impacts are recorded, after the warm-up."""
         return self.accuracy.simulated_time
 
     treatment_time = SI("treatment_time_s", 1.0, "Peening time [s] of the predicted coverage")

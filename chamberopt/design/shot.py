@@ -1,4 +1,4 @@
-"""The charge of a design: balls of one size, or a mix of sizes by mass."""
+"""The charge of a design: all its balls, either of one size or a mix of sizes by mass."""
 
 import math
 from collections.abc import Iterator
@@ -20,7 +20,11 @@ class ShotSize(FileTable):
 
 
 class ShotTable(FileTable):
-    """The charge: exactly one of diameter_mm and mix, and one of material and density_kg_m3."""
+    """All balls of a design: their mass, size and material.
+
+    The size is given as exactly one of diameter_mm and mix, the material as exactly one of material
+    and density_kg_m3.
+    """
 
     mass_g: float = quantity(1e-4, 10000, "g", "of all balls together")
     diameter_mm: float | None = quantity(0.1, 20, "mm", "of one ball", None)
@@ -68,7 +72,7 @@ class ShotTable(FileTable):
 
     @property
     def sizes(self) -> tuple[tuple[float, int], ...]:
-        """Diameter [m] and number of the balls of each size.
+        """Return the diameter [m] and the number of balls of each size.
 
         The mass of a size is rounded to whole balls, at least one.
         """
@@ -86,7 +90,7 @@ class ShotTable(FileTable):
 
     @property
     def diameters(self) -> tuple[float, ...]:
-        """Diameter of each ball [m], size by size, in the order of the balls of a scene."""
+        """Return the diameter of each ball [m], size by size, in the simulator's order of balls."""
         return tuple(diameter for diameter, count in self.sizes for _ in range(count))
 
     @property

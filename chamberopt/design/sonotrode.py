@@ -13,7 +13,10 @@ from chamberopt.design.table_base import SI, FileTable
 
 
 class VibratingFace(FileTable):
-    """A vibrating face, by its zero-to-peak or peak-to-valley amplitude."""
+    """Frequency and amplitude of a sonotrode's vibrating face.
+
+    The amplitude is given either zero-to-peak or peak-to-valley.
+    """
 
     frequency_khz: float = quantity(0.01, 200, "kHz", "usually 20")
     amplitude_um: float | None = quantity(
@@ -35,17 +38,17 @@ class VibratingFace(FileTable):
 
     @property
     def amplitude_key(self) -> str:
-        """The key that gives the amplitude."""
+        """Return the key with which the file gives the amplitude."""
         return "amplitude_pv_um" if self.amplitude_um is None else "amplitude_um"
 
     @property
     def per_amplitude(self) -> float:
-        """Given amplitude over the zero-to-peak amplitude: 1 or 2."""
+        """Return 2 if the amplitude is given peak-to-valley, and 1 if it is given zero-to-peak."""
         return 2.0 if self.amplitude_um is None else 1.0
 
     @property
     def zero_to_peak_um(self) -> float:
-        """Zero-to-peak amplitude [µm], from either key."""
+        """Return the zero-to-peak amplitude [µm], whichever way the file gives the amplitude."""
         return float(getattr(self, self.amplitude_key)) / self.per_amplitude
 
     @property
@@ -55,12 +58,12 @@ class VibratingFace(FileTable):
 
     @property
     def peak_speed(self) -> float:
-        """Largest speed of the face, 2 pi f A [m/s]."""
+        """Return the largest speed of the face [m/s], 2 pi times frequency times amplitude."""
         return 2.0 * math.pi * self.frequency * self.amplitude
 
 
 class Sonotrode(VibratingFace):
-    """The vibrating floor."""
+    """The first sonotrode, which is the vibrating floor of the chamber."""
 
     motion: Literal["sinusoidal", "random_phase"] = Field(
         default="sinusoidal",
@@ -80,5 +83,5 @@ class FurtherSonotrode(PlacedBore, VibratingFace):
 
     @property
     def phase(self) -> float:
-        """Phase ahead of the first sonotrode [rad]."""
+        """Phase [rad] by which this sonotrode's vibration is ahead of the first sonotrode's."""
         return math.radians(self.phase_deg)

@@ -10,7 +10,7 @@ from chamberopt.common.toml_fields import metres
 
 
 class SI:
-    """A key's value in SI units: the value in the file times a factor."""
+    """Attribute of a table that gives the value of a key in SI units: its value times a factor."""
 
     def __init__(self, key: str, factor: float, meaning: str) -> None:
         self._key, self._factor, self.__doc__ = key, factor, meaning
@@ -20,7 +20,7 @@ class SI:
 
 
 class Metres:
-    """A position or three sides in metres, from a key in mm."""
+    """Attribute of a table that gives a position or three sides in metres, from a key in mm."""
 
     def __init__(self, key: str, meaning: str) -> None:
         self._key, self.__doc__ = key, meaning
@@ -37,14 +37,18 @@ MAX_NAMES = 500  # numbers or metrics in one table: no design has as many
 
 
 class FileTable(BaseModel):
-    """A frozen table without unknown keys, whose values are also checked against each other."""
+    """Base class of the tables of design and study files.
+
+    A table cannot be changed and refuses unknown keys. Its values are also checked against each
+    other.
+    """
 
     model_config = STRICT
     RENAMED: ClassVar[dict[str, str]] = {}  # new name of each renamed key, for errors
     REMOVED: ClassVar[dict[str, str]] = {}  # removed keys, and the reason for each removal
 
     def _problems(self) -> Iterable[Problem]:
-        """Problems of values that are each in range but contradict each other."""
+        """Return the problems of values that are each in range but contradict each other."""
         return ()
 
     @model_validator(mode="after")

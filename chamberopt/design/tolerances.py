@@ -28,7 +28,10 @@ FORM = 'a number, a share such as "2 %", or [low, high] of these, such as ["-10 
 
 
 def _deviation(side: Any) -> tuple[float, bool]:
-    """A deviation, and True if it is in per cent; raises ValueError if it is neither."""
+    """Return a deviation as a number, and True if it was given in per cent, such as "-10 %".
+
+    Raises ValueError if it is neither a number nor a percentage.
+    """
     if isinstance(side, str) and (found := re.fullmatch(r"\s*([-+]?[\d.]+)\s*%\s*", side)):
         return float(found[1]), True
     if isinstance(side, bool) or not isinstance(side, (int, float)) or not math.isfinite(side):
@@ -37,7 +40,10 @@ def _deviation(side: Any) -> tuple[float, bool]:
 
 
 def _checked(given: Any) -> Any:
-    """A tolerance in the form of its file, after a check that it is a tolerance."""
+    """Return a tolerance as its file gives it, after a check that it is one.
+
+    A tolerance is one deviation for both sides, or a pair of a lower and an upper deviation.
+    """
     several = isinstance(given, (list, tuple))
     shown = list(given) if several else given
     try:
@@ -62,7 +68,7 @@ Tolerance = Annotated[Any, PlainValidator(_checked)]  # a side, or a tuple of tw
 
 
 class ToleratedDesign(Protocol):
-    """The part of a design that this module uses."""
+    """The properties and methods of Design that this module uses."""
 
     @property
     def tolerances(self) -> dict[str, Tolerance] | None: ...
@@ -72,7 +78,7 @@ class ToleratedDesign(Protocol):
 
 
 def tolerance_box(design: ToleratedDesign) -> dict[str, tuple[float, float]]:
-    """Lowest and highest value of each number that has a tolerance, by its whole dotted name.
+    """Return the lowest and highest value of each number with a tolerance, by its dotted name.
 
     The values are in the units of the file, for the key that the design gives.
     """
@@ -97,7 +103,9 @@ def require_tolerances(design: ToleratedDesign) -> None:
 def tolerance_problems(
     design: ToleratedDesign, fields: Mapping[str, FieldInfo]
 ) -> Iterator[Problem]:
-    """Problems of tolerances: keys that are no numbers of the design, ranges beyond bounds.
+    """Yield a problem for each tolerance of no number of the design, or with a wrong range.
+
+    A range is wrong if it is empty or goes beyond the values allowed for the number.
 
     Args:
         fields: fields of every number of the design, by dotted name.
@@ -124,7 +132,12 @@ def tolerance_problems(
 
 
 def _number_of(design: ToleratedDesign, key: str) -> tuple[str, float]:
-    """The number of the design that a key means, and its size over the key's number."""
+    """Return the dotted name of the number that a key of [tolerances] means, and a factor.
+
+    A tolerance of the key times the factor is a tolerance of the number. The factor is 2 or 1/2 if
+    the key is the zero-to-peak amplitude and the design gives peak-to-valley, or the other way
+    round; otherwise it is 1.
+    """
     name = SHORT_NAMES.get(key, key)
     table, _, last = name.rpartition(".")
     if last in TWINS and design.why_fixed(name):

@@ -79,7 +79,10 @@ class Zone(FileTable):
 
 
 def zone_problems(zones: Sequence[Zone], calibration: Calibration | None) -> Iterator[Problem]:
-    """Problems between a design's zones, and between its zones and its calibration."""
+    """Yield a problem for each zone whose name is taken or whose intensity is not calibrated.
+
+    Limits on the Almen intensity of a zone take a calibration that has measured strips.
+    """
     names = [zone.name for zone in zones]
     for k, zone in enumerate(zones):
         if zone.name in names[:k]:

@@ -1,4 +1,4 @@
-"""Materials of balls and surfaces: tables of a design, and the catalogue of names in them."""
+"""Materials of balls and surfaces: tables of a design, and a catalogue of metals by name."""
 
 from chamberopt.design.materials.catalogue import (
     BRINELL_TO_PASCAL,

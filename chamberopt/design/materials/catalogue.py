@@ -1,4 +1,4 @@
-"""The catalogue: alloys and commercial balls, from alloys.toml and balls.toml beside it."""
+"""The catalogue of alloys and commercial balls, read from alloys.toml and balls.toml."""
 
 from __future__ import annotations
 
@@ -37,26 +37,26 @@ BRINELL_TO_PASCAL = 9.81e6  # HB is kgf/mm²
 
 @dataclass(frozen=True)
 class Elastic:
-    """Young's modulus [Pa] and Poisson's ratio."""
+    """Elasticity of a material: Young's modulus [Pa] and Poisson's ratio."""
 
     modulus: float
     poisson: float
 
     @property
     def compliance(self) -> float:
-        """(1 - nu²) / E [1/Pa]."""
+        """Return (1 - nu²) / E [1/Pa], for Poisson's ratio nu and Young's modulus E."""
         return (1.0 - self.poisson**2) / self.modulus
 
 
 def yield_speed(
     ball: Elastic, surface: Elastic, density: float, hardness: float, c0: float
 ) -> float:
-    """Yield speed v0 [m/s] of a ball on a surface, see above.
+    """Return the speed v0 [m/s] from which a ball dents a surface, by Johnson's formula above.
 
     Args:
         density: density of the ball [kg/m³].
         hardness: hardness of the softer of the two [Pa].
-        c0: restitution below v0.
+        c0: restitution of impacts slower than v0.
     """
     stress = hardness / 2.8
     ratio = stress * (ball.compliance + surface.compliance)
@@ -64,7 +64,7 @@ def yield_speed(
 
 
 class Named(FileTable):
-    """Common properties of every solid of the catalogue."""
+    """Properties that all alloys and ball materials of the catalogue have."""
 
     name: str
     also: Several[str] = Field(description="other names under which it is found")
@@ -96,7 +96,7 @@ class Ball(Named):
 
 
 class Grade(FileTable):
-    """Tolerances of a grade of ISO 3290-1."""
+    """Tolerances of balls of one grade of ISO 3290-1."""
 
     name: str
     ball_um: float = quantity(0.01, 1000, "µm", "differences of the diameters of one ball")
@@ -119,24 +119,27 @@ Solid = TypeVar("Solid", bound=Named)
 
 @cache
 def alloys() -> tuple[Alloy, ...]:
-    """All alloys. The alloys of one base metal are together."""
+    """Return all alloys of the catalogue. The alloys of one base metal are together."""
     return _read("alloys.toml", _Alloys).alloy
 
 
 @cache
 def balls() -> tuple[Ball, ...]:
-    """All materials of balls."""
+    """Return all materials of balls in the catalogue."""
     return _read("balls.toml", _Balls).ball
 
 
 @cache
 def grades() -> tuple[Grade, ...]:
-    """All grades, the finest first."""
+    """Return the tolerances of all grades of balls, the finest first."""
     return _read("balls.toml", _Balls).grade
 
 
 def find(name: object, among: Iterable[Solid]) -> Solid | None:
-    """The solid of this name; None if unknown. Case, spaces and hyphens do not matter."""
+    """Return the alloy or ball material of this name among the given ones; None if unknown.
+
+    Case, spaces and hyphens do not matter.
+    """
     if not isinstance(name, str):
         return None
     plain = _plain(name)
@@ -144,22 +147,28 @@ def find(name: object, among: Iterable[Solid]) -> Solid | None:
 
 
 def alloy(name: str) -> Alloy:
-    """The alloy of this name; InputError if there is none."""
+    """Return the alloy of this name. Raises InputError if there is none."""
     return _found(name, alloys(), "alloy")
 
 
 def ball(name: str) -> Ball:
-    """The material of balls of this name; InputError if there is none."""
+    """Return the material of balls of this name. Raises InputError if there is none."""
     return _found(name, balls(), "material of balls")
 
 
 def ball_sizes(material: str) -> tuple[float, ...]:
-    """Diameters [mm] in which balls of a material are sold, ascending; InputError if unknown."""
+    """Return the diameters [mm] in which balls of a material are sold, in ascending order.
+
+    Raises InputError if there is no such material.
+    """
     return ball(material).sizes_mm
 
 
 def unknown(name: object, among: Iterable[Named]) -> str:
-    """Message on a name that was not found, with the most similar name or all names."""
+    """Return a message that a name is unknown.
+
+    It has the most similar name of the given solids if one is similar, otherwise all names.
+    """
     known = [word for one in among for word in (one.name, *one.also)]
     close = did_you_mean(str(name), known)
     if close.startswith("did"):

@@ -1,4 +1,7 @@
-"""Names of metals in [materials]: numbers of the catalogue, and v0 by Johnson's formula."""
+"""Replace names of metals in [materials] by the catalogue's numbers.
+
+The speed v0 from which a ball dents a surface is computed by Johnson's formula.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +29,7 @@ NOT_NAMED = (
 
 
 def with_numbers(materials: Mapping[str, Any], material: object) -> dict[str, Any]:
-    """The tables of [materials] with numbers in place of names.
+    """Return the tables of [materials] with numbers in place of names of metals.
 
     Given numbers stay. A v0 that was computed for another ball, hardness or C0 is computed again. A
     name that is not in the catalogue stays, and the tables report it.
@@ -42,7 +45,7 @@ def with_numbers(materials: Mapping[str, Any], material: object) -> dict[str, An
 
 
 def name_problems(materials: object) -> Iterator[Problem]:
-    """Problems of names in [materials] that with_numbers did not find."""
+    """Yield a problem for each name of a metal in [materials] that is not in the catalogue."""
     for name, given in materials.items() if isinstance(materials, Mapping) else ():
         if isinstance(given, str) and name == "shot":
             known = find(given, balls()) is not None
@@ -57,7 +60,14 @@ def name_problems(materials: object) -> Iterator[Problem]:
 
 
 def _surface(name: str, given: Any, ball: Ball | None) -> Any:
-    """The table of a surface; the given value if it names no known alloy."""
+    """Return the table of a surface with the numbers of the alloy that it names.
+
+    Return the given value unchanged if it names no known alloy.
+
+    Args:
+        name: the surface: wall, sonotrode or part.
+        ball: material of the balls that hit it; None if it is not known.
+    """
     table = {"alloy": given} if isinstance(given, str) else given
     if name not in SURFACES or not isinstance(table, Mapping) or not table.get("alloy"):
         return given
@@ -72,7 +82,10 @@ def _surface(name: str, given: Any, ball: Ball | None) -> Any:
 
 
 def _pair(given: Any, ball: Ball | None) -> Any:
-    """The table of two balls; the given value if it is a law of its own."""
+    """Return the table of impacts of ball on ball, computed for this material of the balls.
+
+    Return the given value unchanged if it has a restitution law of its own.
+    """
     if given is None or (isinstance(given, str) and ball and find(given, balls()) is ball):
         given = {}
     if not isinstance(given, Mapping) or (given and not given.get("v0_for")):
@@ -84,9 +97,9 @@ def _pair(given: Any, ball: Ball | None) -> Any:
 def _with_v0(
     table: dict[str, Any], ball: Ball | None, other: Alloy | Ball | None, hardness: Any
 ) -> dict[str, Any]:
-    """A table with C0 and v0, and the solids and numbers for which v0 holds.
+    """Return a table with restitution C0, yield speed v0, and a note of what v0 was computed for.
 
-    A table with a law of its own stays as it is.
+    A table with a restitution law of its own stays as it is.
 
     Args:
         other: solid that the ball hits; None if it is not in the catalogue.
@@ -112,9 +125,10 @@ def _with_v0(
 def computed_v0(
     ball: Ball, other: Alloy | Ball, c0: float = DEFAULT_C0, hardness: float | None = None
 ) -> float:
-    """Yield speed v0 [m/s] of a ball, of known hardness, on a surface or on an equal ball.
+    """Return the speed v0 [m/s] from which a ball dents a surface, or an equal ball.
 
-    It has two digits, which is more than the accuracy of the formula.
+    The ball's hardness must be known. The result has two digits, which is more than the accuracy
+    of the formula.
 
     Args:
         hardness: hardness of the surface [HB]; None means the catalogue's hardness.

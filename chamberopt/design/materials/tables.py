@@ -73,12 +73,12 @@ class RestitutionTable(FileTable):
 
     @property
     def _why_not_named(self) -> str:
-        """Reason why the catalogue did not give the missing numbers."""
+        """Return why the catalogue did not give missing numbers; "" if no alloy is named."""
         return f" ({NOT_NAMED})" if getattr(self, "alloy", None) and self.exponent is None else ""
 
     @property
     def in_words(self) -> str:
-        """The numbers that impacts follow, as computed or given."""
+        """Return the material in words: alloy, hardness, and the numbers of its restitution law."""
         alloy, hardness = getattr(self, "alloy", None), getattr(self, "hardness_HB", None)
         words = [alloy] if alloy else []
         words += [f"{hardness:g} HB"] if hardness else []
@@ -88,7 +88,7 @@ class RestitutionTable(FileTable):
 
     @property
     def restitution(self) -> RestitutionLaw:
-        """The law in the form that the simulator takes."""
+        """Return the restitution law in the form that the simulator takes."""
         from sim_core import TabulatedRestitution
 
         if self.e_at_m_s is not None:
@@ -172,7 +172,10 @@ class PartMaterial(RestitutionTable):
 
     @property
     def hardness(self) -> float:
-        """Dynamic hardness B [Pa] of Kirk's dent law, B = 9.81e6 HB."""
+        """Return the part's hardness [Pa], 9.81e6 times HB, which sets the size of its dents.
+
+        It is the dynamic hardness B in Kirk's formula of the dent diameter.
+        """
         return self.hardness_HB * BRINELL_TO_PASCAL
 
 

@@ -1,4 +1,4 @@
-"""Shapes of chambers: a file each, and the name by which a design chooses it.
+"""Shapes of chambers: each has a file here and a name by which a design chooses it.
 
 A user's own shape may import the names below. registry.py lists the shapes.
 """

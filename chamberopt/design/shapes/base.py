@@ -62,30 +62,34 @@ class ChamberTable(FileTable):
 
     @abstractmethod
     def surface(self, vertices: np.ndarray, triangles: np.ndarray) -> ShapeSurface:
-        """The closed surface of the cavity, without the part; InputError if there is none.
+        """Return the closed surface of the cavity before the part is taken out of it.
 
-        Shapes that follow the part get its vertices (n, 3) [m] and triangles (m, 3) in the chamber.
+        Raises InputError if the values make no cavity. Vertices (n, 3) [m] and triangles (m, 3) of
+        the part in the chamber are for shapes that follow the part.
         """
 
     def setup(self) -> Setup | None:
-        """The set-up as drawn, if chamber and part come from one file; otherwise None."""
+        """Return the CAD set-up if chamber and part are drawn in one file; otherwise None."""
         return None
 
     def widths_mm(self) -> dict[str, float]:
-        """Inner widths [mm] by the key that sets them. Every ball must be narrower than each."""
+        """Return inner widths [mm] of the cavity by the key that sets each.
+
+        Every ball must be smaller than each width.
+        """
         return {}
 
     def room(self) -> float:
-        """An upper bound [m³] of the cavity's volume, from the table alone."""
+        """Return an upper bound [m³] of the cavity's volume, without building its surface."""
         return math.inf
 
     @property
     def is_round(self) -> bool:
-        """True if `facets` makes a difference."""
+        """True if the cavity has round walls, whose number of flat sides is the key `facets`."""
         return False
 
     def notes(self, ball: float) -> list[str]:
-        """Remarks on these values with shot whose largest balls have this diameter [m]."""
+        """Return remarks on the chamber's values for shot with this largest ball diameter [m]."""
         return []
 
 
@@ -118,7 +122,7 @@ class ParametricChamber(WalledChamber):
         return self.height * self.slope
 
     def lofted_over(self, floor: np.ndarray, ceiling: np.ndarray) -> ShapeSurface:
-        """The surface between outlines (n, 2) [m] at the floor and at the ceiling."""
+        """Return the cavity's surface between outlines (n, 2) [m] at the floor and the ceiling."""
         rings = ((floor, 0.0), (ceiling, self.height))
         return lofted([np.c_[ring, np.full(len(ring), z)] for ring, z in rings])
 
@@ -142,7 +146,10 @@ class PolygonChamber(ParametricChamber):
 
     @abstractmethod
     def floor(self) -> np.ndarray:
-        """The corners of the polygon at the sonotrode, (n, 2) [m], convex, counter-clockwise."""
+        """Return the corners (n, 2) [m] of the polygon at the sonotrode.
+
+        The polygon is convex and its corners are counter-clockwise.
+        """
 
     @property
     def radius(self) -> float:
@@ -151,7 +158,7 @@ class PolygonChamber(ParametricChamber):
 
     @property
     def is_round(self) -> bool:
-        """True if `facets` makes a difference."""
+        """True if the upright edges are rounded, so that the key `facets` has an effect."""
         return self.radius > 0.0
 
     @model_validator(mode="after")
@@ -164,7 +171,7 @@ class PolygonChamber(ParametricChamber):
         return self
 
     def surface(self, vertices: np.ndarray, triangles: np.ndarray) -> ShapeSurface:
-        """4 triangles for each corner of the rounded polygon."""
+        """Return the cavity's surface, with 4 triangles for each corner of the rounded polygon."""
         floor = self.floor()
         if self.radius:
             corner, direction = outlines.corner_arcs(floor, self.facets)
@@ -175,7 +182,10 @@ class PolygonChamber(ParametricChamber):
         return self.lofted_over(*rings)
 
     def room(self) -> float:
-        """Volume [m³] of the cavity with sharp edges, by Simpson's rule, which is exact here."""
+        """Return the volume [m³] of the cavity as if its edges were sharp.
+
+        Simpson's rule is exact here.
+        """
         moves = (share * self.lean for share in (0.0, 0.5, 1.0))
         low, middle, high = (outlines.area_inside(self.floor(), move) for move in moves)
         return self.height / 6.0 * (1.0 * low + 4.0 * middle + 1.0 * high)
@@ -194,15 +204,21 @@ class RoundChamber(WalledChamber):
 
     @abstractmethod
     def upright(self) -> np.ndarray:
-        """The profile before it leans: (n, 2) [m], from the sonotrode's edge to the axis."""
+        """Return the profile with an upright wall: points (radius, height) [m], shape (n, 2).
+
+        It goes from the sonotrode's edge to the axis.
+        """
 
     @property
     def is_round(self) -> bool:
-        """True if `facets` makes a difference."""
+        """True, because the flat sides of the round wall are as many as the key `facets` says."""
         return True
 
     def profile(self) -> np.ndarray:
-        """The leaning profile (n, 2) [m] with sharp corners."""
+        """Return the profile with the wall's lean: points (radius, height) [m], shape (n, 2).
+
+        Its corners are sharp.
+        """
         line = self.upright()
         off_axis = line[:, 0] > 0.0
         return np.asarray(
@@ -224,11 +240,11 @@ class RoundChamber(WalledChamber):
         return self
 
     def surface(self, vertices: np.ndarray, triangles: np.ndarray) -> ShapeSurface:
-        """2 * facets triangles for each point of the rounded profile."""
+        """Return the cavity's surface, with 2 * facets triangles for each point of its profile."""
         return outlines.revolve(self._rounded(), self.facets)
 
     def room(self) -> float:
-        """Volume [m³] of the round cavity."""
+        """Return the volume [m³] of the cavity as if its wall were truly round."""
         return outlines.revolved_volume(self._rounded())
 
     def _rounded(self) -> np.ndarray:

@@ -1,5 +1,6 @@
-"""Reader of a CAD set-up: the room over its sonotrode, with the sonotrode's face at z = 0.
+"""Read a CAD set-up, in which chamber, sonotrode and part are drawn together in one file.
 
+What is read is the room over the sonotrode, moved so that the sonotrode's face is at z = 0.
 The part is either a separate closed body, which is cut out of the room later, or the piece of the
 room's surface that it bounds. The room is the closed surface that the sonotrode's face belongs to.
 Its triangles may face either way.
@@ -34,7 +35,7 @@ FACING_TOLERANCE = 1e-3  # share of the area that triangles facing another way m
 
 @dataclass(frozen=True)
 class Setup:
-    """The set-up as drawn, with the face of its sonotrode at z = 0 and facing up."""
+    """Chamber and part as drawn in one file, with the sonotrode's face at z = 0 and facing up."""
 
     room: ShapeSurface  # without the part if the part is a separate body
     # The part in the file's frame, normals out of the part, with the notes on the whole set-up. It
@@ -46,7 +47,7 @@ class Setup:
 
 
 def read_setup(path: Path, unit: str, part: tuple[str, ...], sonotrode: tuple[str, ...]) -> Setup:
-    """Read the set-up in a file, again only if the file has changed.
+    """Return the set-up in a file. The file is read again only if it has changed.
 
     `part` and `sonotrode` (its face) are names of the file's groups. Raises InputError if a name is
     not in the file, the room is not closed, or the face is not flat.
@@ -97,7 +98,11 @@ def _read_once(
 
 
 def _select_some(read: TriangleSoup, names: tuple[str, ...], field: str) -> np.ndarray:
-    """The triangles with these names, (m,) bool; InputError if they are none or all."""
+    """Mark the triangles (m,) of the named groups. Raises InputError if none or all are marked.
+
+    Args:
+        field: the field of the design that gives the names, for messages.
+    """
     chosen = select_triangles(read.groups, names, len(read.corners), field)
     if not chosen.any() or chosen.all():
         what = "all" if chosen.any() else "none"
@@ -106,9 +111,12 @@ def _select_some(read: TriangleSoup, names: tuple[str, ...], field: str) -> np.n
 
 
 def _separate_part(read: TriangleSoup, in_part: np.ndarray) -> tuple[PartMesh | None, PartMesh]:
-    """The part as a closed body, and the closed surface of the rest.
+    """Return the part as a closed body, and the closed surface of all the rest.
 
-    The result is None and the whole surface if only a piece of the part's surface is drawn.
+    If only a piece of the part's surface is drawn, return None and the whole surface instead.
+
+    Args:
+        in_part: marks the triangles of the part, (m,).
     """
     try:
         body = close_surface(read, in_part)
@@ -127,7 +135,13 @@ def _separate_part(read: TriangleSoup, in_part: np.ndarray) -> tuple[PartMesh | 
 
 
 def _pick(mesh: PartMesh, triangles: np.ndarray, rows: np.ndarray) -> PartMesh:
-    """The rows (m,) bool of the triangles (m, 3), with their vertices, groups and numbers."""
+    """Return a mesh of the marked triangles only, with their vertices, groups and numbers.
+
+    Args:
+        mesh: mesh that has the vertices and groups.
+        triangles: the triangles of the mesh, or these with other directions, (m, 3).
+        rows: marks the triangles to keep, (m,) bool.
+    """
     used, numbers = np.unique(triangles[rows], return_inverse=True)
     return replace(
         mesh,
@@ -139,7 +153,10 @@ def _pick(mesh: PartMesh, triangles: np.ndarray, rows: np.ndarray) -> PartMesh:
 
 
 def _piece_of_part(mesh: PartMesh, in_part: np.ndarray) -> PartMesh:
-    """The part as the piece of the room's surface that it bounds, in the order of the room."""
+    """Return the piece of the room's surface that belongs to the part, with normals out of it.
+
+    Its triangles have the order of the room's.
+    """
     if not in_part.any():
         text = "none of it bounds the room over the sonotrode; check the groups of the file"
         raise InputError(f"chamber.part: {text}")
@@ -148,9 +165,10 @@ def _piece_of_part(mesh: PartMesh, in_part: np.ndarray) -> PartMesh:
 
 
 def _room_over_sonotrode(mesh: PartMesh, sonotrode: tuple[str, ...]) -> tuple[PartMesh, list[str]]:
-    """The closed surface of sonotrode and bodies in it, facing out of the room; and notes.
+    """Return the surface of the room over the sonotrode, and notes on what was left out.
 
-    Surfaces around it, such as the outside of a chamber with thick walls, are left out.
+    It is the closed surface that has the sonotrode's face, and those of bodies inside it, with
+    normals out of the room. Surfaces around it, such as the outside of thick walls, are left out.
     """
     face = select_triangles(mesh.groups, sonotrode, len(mesh.triangles), "chamber.sonotrode")
     facing = area_vectors(mesh.vertices, mesh.triangles[face])
@@ -183,7 +201,7 @@ def _room_over_sonotrode(mesh: PartMesh, sonotrode: tuple[str, ...]) -> tuple[Pa
 
 
 def _is_inside(body: Solid, room: Solid) -> bool:
-    """True if a body stands in the room; InputError if it crosses the room."""
+    """True if a body stands wholly in the room. Raises InputError if it crosses the room's wall."""
     common = overlap_volume(body, room)
     smaller = min(body.volume, room.volume)
     if VOLUME_TOLERANCE * body.volume < common < (1.0 - VOLUME_TOLERANCE) * smaller:
@@ -195,7 +213,14 @@ def _is_inside(body: Solid, room: Solid) -> bool:
 
 
 def _pose(mesh: PartMesh, face: np.ndarray) -> tuple[np.ndarray, np.ndarray, list[str]]:
-    """Rotation (3, 3) and shift (3,) [m] that put the face at z = 0, facing up; and notes."""
+    """Return the motion that puts the sonotrode's face at z = 0, facing up, and notes on it.
+
+    The motion is a rotation (3, 3), then a shift (3,) [m]. Raises InputError if the face is not
+    flat.
+
+    Args:
+        face: marks the triangles of the face, (m,).
+    """
     up = -area_vectors(mesh.vertices, mesh.triangles[face]).sum(axis=0)
     up /= np.linalg.norm(up)
     axis = np.round(up)
@@ -214,7 +239,10 @@ def _pose(mesh: PartMesh, face: np.ndarray) -> tuple[np.ndarray, np.ndarray, lis
 
 
 def _rotation_to_z(up: np.ndarray) -> np.ndarray:
-    """The smallest rotation (3, 3) of a unit vector to (0, 0, 1); about x from (0, 0, -1)."""
+    """Return the smallest rotation (3, 3) that turns a unit vector to (0, 0, 1).
+
+    For (0, 0, -1), where there are many, it is the half turn about x.
+    """
     x, y, z = up
     if z < -1.0 + AXIS_TOLERANCE:
         return np.diag([1.0, -1.0, -1.0])

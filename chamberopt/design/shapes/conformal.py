@@ -74,7 +74,10 @@ class Conformal(ParametricChamber):
         return self
 
     def surface(self, vertices: np.ndarray, triangles: np.ndarray) -> ShapeSurface:
-        """The wall round the part; InputError if it is above the ceiling or in pieces."""
+        """Return the cavity's surface with its wall round the part's shadow.
+
+        Raises InputError if no part is below the ceiling, or the shadow stays in several pieces.
+        """
         if not len(vertices) or vertices[:, 2].min() >= self.height:
             raise InputError(
                 f"chamber.height_mm: given {self.height_mm:g}: no part below that ceiling, whose "
@@ -105,11 +108,11 @@ class Conformal(ParametricChamber):
         return ShapeSurface(vertices, triangles, tags)
 
     def widths_mm(self) -> dict[str, float]:
-        """Height of the chamber, which is wider than the part in plan."""
+        """Return the chamber's height [mm] by its key. In plan it is wider than the part."""
         return {"height_mm": self.height_mm}
 
     def notes(self, ball: float) -> list[str]:
-        """A remark if balls do not fit beside the part."""
+        """Return a remark if balls of this diameter [m] do not fit beside the part."""
         if self.gap >= ball:
             return []
         return [

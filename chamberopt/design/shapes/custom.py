@@ -1,4 +1,4 @@
-"""A user's own shape: a Python file with one subclass of ChamberTable, named by the design."""
+"""Load and check a user's own shape: a Python file with one subclass of ChamberTable."""
 
 import inspect
 import sys
@@ -30,7 +30,10 @@ MAX_WIDTH = 10.0  # m: shipped shapes are smaller; a chamber with mm taken for m
 
 
 def find_fault(cavity: object) -> str | None:
-    """Fault of a surface, to follow the words "the surface"; None if it can be used."""
+    """Return what is wrong with the surface that a user's own shape made; None if nothing is.
+
+    The text continues a sentence, such as "is not closed".
+    """
     if not isinstance(cavity, ShapeSurface):
         given = type(cavity).__name__
         return f"gives {given}; it must give a chamberopt.design.shapes.ShapeSurface"
@@ -57,7 +60,7 @@ def find_fault(cavity: object) -> str | None:
 
 
 def with_array_types(cavity: ShapeSurface) -> ShapeSurface:
-    """The surface with the array types of a ShapeSurface and no part, if it has no fault."""
+    """Return a surface without fault with its arrays in the types of a ShapeSurface."""
     arrays = (cavity.vertices, np.float64), (cavity.triangles, np.int32), (cavity.tags, np.uint8)
     return ShapeSurface(*(np.asarray(array, dtype=kind) for array, kind in arrays))
 
@@ -97,12 +100,12 @@ def _crossing_fault(vertices: np.ndarray, triangles: np.ndarray) -> str | None:
 
 
 class RecordedShape(ChamberTable):
-    """Replaces a user's own shape in the design of a result: recorded values, no code."""
+    """Stands for a user's own shape in the design of a result: its values, without its code."""
 
     model_config = ConfigDict(**{**STRICT, "extra": "allow"})
 
     def surface(self, vertices: np.ndarray, triangles: np.ndarray) -> ShapeSurface:
-        """Raise InputError: a result holds its chamber, and never runs the file that made it."""
+        """Raise InputError, because loading a result never runs the Python file of its shape."""
         raise InputError(
             f"chamber.shape: {self.shape}: named by a result, whose code is never run; load the "
             "design file to build its chamber again"
@@ -129,7 +132,7 @@ OPTIONAL_METHODS: dict[str, tuple[str, Callable[[Any], bool]]] = {
 
 
 def load_custom_shape(path: Path) -> type[ChamberTable]:
-    """Load the shape in a file, as the same class while the file's content is the same.
+    """Return the class of the shape in a Python file: the same class while its content is the same.
 
     Raises InputError if the file cannot be read or run, or does not hold exactly one shape.
     """
@@ -164,7 +167,14 @@ def _run(path: Path, source: bytes) -> type[ChamberTable]:
 
 
 def _with_checks(path: Path, shape: type[ChamberTable], digest: str) -> type[ChamberTable]:
-    """The shape, with errors in its code and faults of its surface reported as InputError."""
+    """Return a subclass of a user's shape that reports faults of its code and surface.
+
+    All are reported as InputError.
+
+    Args:
+        path: the Python file of the shape.
+        digest: SHA-256 of the file.
+    """
 
     def check(name: str) -> Callable[..., Any]:
         def method(self: ChamberTable, *arguments: Any) -> Any:
@@ -182,7 +192,7 @@ def _with_checks(path: Path, shape: type[ChamberTable], digest: str) -> type[Cha
     unchecked_surface = check("surface")
 
     def surface(self: ChamberTable, vertices: np.ndarray, triangles: np.ndarray) -> ShapeSurface:
-        """The surface that the file makes, if it is closed and has a sonotrode."""
+        """Return the surface that the user's file makes. Raises InputError if it has a fault."""
         # views of the part, which the shape cannot change
         views = vertices.view(), triangles.view()
         for view in views:
@@ -209,7 +219,12 @@ def _with_checks(path: Path, shape: type[ChamberTable], digest: str) -> type[Cha
 
 @contextmanager
 def _errors_of_the_file(path: Path, what: str) -> Iterator[None]:
-    """Report an error in the user's code as InputError with the line of its origin."""
+    """Turn an error in the user's code into InputError with the line of its origin.
+
+    Args:
+        path: the file with the code.
+        what: what failed, for the message.
+    """
     try:
         yield
     except (InputError, ValidationError):

@@ -1,4 +1,4 @@
-"""Fixture holes and deflectors of a chamber of any shape."""
+"""Tables of a design file for holes in a chamber's wall, and for deflectors in the chamber."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -65,12 +65,12 @@ class Deflector(FileTable):
 
     @property
     def mesh_path(self) -> Path:
-        """Absolute path of a mesh's file."""
+        """Absolute path of the mesh file of a deflector of kind "mesh"."""
         return Path(self.mesh)  # type: ignore[arg-type]
 
 
 class PlacedBore(FileTable):
-    """A round bore in the chamber's frame: of a hole, or of a further sonotrode's well."""
+    """Base class of a round bore in the chamber's wall: a hole, or a further sonotrode's well."""
 
     at_mm: Position
     axis: Direction
@@ -80,7 +80,7 @@ class PlacedBore(FileTable):
 
     @property
     def direction(self) -> tuple[float, float, float]:
-        """Axis of the bore, a unit vector."""
+        """Direction of the bore's axis, a unit vector (3,) in the chamber's frame."""
         return toml_fields.unit_vector(self.axis)
 
     diameter = SI("diameter_mm", 1e-3, "Its diameter [m]")

@@ -40,7 +40,7 @@ SAME_DISTANCE = 1e-9  # m
 
 
 def move_sonotrode(setup: Setup, distance: float) -> ShapeSurface:
-    """The room with its sonotrode at another distance [m] from the lowest point of the part.
+    """Return the room's surface with its sonotrode at this distance [m] from the part's low end.
 
     Raises InputError if the sonotrode is to come nearer than the walls rise straight from it, or
     farther where another part of the room is in the way.
@@ -53,7 +53,14 @@ def move_sonotrode(setup: Setup, distance: float) -> ShapeSurface:
 
 
 def _extend_down(room: ShapeSurface, setup: Setup) -> ShapeSurface:
-    """The room with walls continued straight down from the sonotrode's outline to z = 0."""
+    """Return the room with walls continued straight down from the sonotrode's outline to z = 0.
+
+    Raises InputError if another part of the room is in the way.
+
+    Args:
+        room: surface of the room, with the sonotrode's face above z = 0.
+        setup: the set-up as drawn, for messages.
+    """
     on_face = room.tags == TAG_SONOTRODE
     face, count = room.triangles[on_face], len(room.vertices)
     used, numbers = np.unique(face, return_inverse=True)
@@ -80,7 +87,13 @@ def _extend_down(room: ShapeSurface, setup: Setup) -> ShapeSurface:
 
 
 def _cut_off(room: ShapeSurface, height: float, setup: Setup) -> ShapeSurface:
-    """The room without its lowest ``height`` [m], below z = 0, where the walls rise straight."""
+    """Return the room without its lowest ``height`` [m], which lies below z = 0.
+
+    Raises InputError if the walls do not rise straight from the sonotrode's outline so far.
+
+    Args:
+        setup: the set-up as drawn, for messages.
+    """
     whole = make_solid(room.vertices, room.triangles, "the set-up")
     face = whole.surface().select(room.tags[whole.surface().source] == TAG_SONOTRODE)
     shaft = sweep_face(face, np.array([0.0, 0.0, height]), "the room over the sonotrode as drawn")
@@ -137,9 +150,12 @@ class Imported(ChamberTable):
         return self.setup().distance if given is None else given * 1e-3
 
     def setup(self) -> Setup:
-        """The set-up as drawn, read once; InputError if it is no closed room with a sonotrode."""
+        """Return the set-up as drawn. Its file is read only once.
+
+        Raises InputError if it is no closed room with a flat sonotrode.
+        """
         return read_setup(Path(self.mesh), self.unit, self.part, self.sonotrode)
 
     def surface(self, vertices: np.ndarray, triangles: np.ndarray) -> ShapeSurface:
-        """The room as drawn, its floor moved to the wanted distance."""
+        """Return the surface of the drawn room, with the sonotrode at the wanted distance."""
         return move_sonotrode(self.setup(), self.sonotrode_distance)

@@ -1,4 +1,4 @@
-"""Profiles of round cavities: rounded at their corners and turned about the axis.
+"""Profiles of round cavities and outlines of cavities seen from above, and their rounding.
 
 A profile is a line of points (r, z) [m], shape (n, 2), from the sonotrode's edge to the axis.
 
@@ -19,14 +19,14 @@ from chamberopt.design.shapes.surface import MIN_LENGTH, ShapeSurface, lofted
 
 
 def corner_angles(outline: np.ndarray) -> np.ndarray:
-    """Angle [rad] by which the outline turns left at each corner, (n,)."""
+    """Return the angle [rad] by which a closed outline turns left at each corner, (n,)."""
     before, after = _directions(outline)
     cross = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
     return np.asarray(np.arctan2(cross, np.einsum("ij,ij->i", before, after)))
 
 
 def move_sides(outline: np.ndarray, distance: float) -> np.ndarray:
-    """Corners of the outline whose sides are moved outward by a distance [m]."""
+    """Return an outline's corners (n, 2) [m] after its sides moved outward by a distance [m]."""
     before, after = _directions(outline)
     outward = np.c_[before[:, 1] + after[:, 1], -before[:, 0] - after[:, 0]]
     return np.asarray(
@@ -35,14 +35,17 @@ def move_sides(outline: np.ndarray, distance: float) -> np.ndarray:
 
 
 def largest_inward_move(outline: np.ndarray) -> float:
-    """Largest distance [m] by which all sides can be moved inward, until a side has MIN_LENGTH."""
+    """Return the largest distance [m] by which all sides of an outline can be moved inward.
+
+    Then the first side is as short as MIN_LENGTH.
+    """
     tangent = np.tan(corner_angles(outline) / 2.0)
     length = np.hypot(*(np.roll(outline, -1, axis=0) - outline).T)
     return max(0.0, float(((length - MIN_LENGTH) / (tangent + np.roll(tangent, -1))).min()))
 
 
 def area_inside(outline: np.ndarray, distance: float = 0.0) -> float:
-    """Area [m²] of the outline whose sides are moved outward by a distance [m]."""
+    """Return the area [m²] inside an outline after its sides moved outward by a distance [m]."""
     (x, y), (xn, yn) = outline.T, np.roll(outline, -1, axis=0).T
     around = np.hypot(xn - x, yn - y).sum()
     corners = np.tan(corner_angles(outline) / 2.0).sum()
@@ -51,7 +54,7 @@ def area_inside(outline: np.ndarray, distance: float = 0.0) -> float:
 
 
 def corner_arcs(outline: np.ndarray, facets: int) -> tuple[np.ndarray, np.ndarray]:
-    """Points of a rounded outline: corner of each, (k,), and direction from the corner, (k, 2).
+    """Return the corner (k,) of each point of a rounded outline, and its direction (k, 2) from it.
 
     Corners plus radius times directions are the outline grown by the radius. Each corner has a fan
     from the normal of one side to the normal of the next, in steps of at most a full turn / facets.
@@ -71,14 +74,17 @@ def corner_arcs(outline: np.ndarray, facets: int) -> tuple[np.ndarray, np.ndarra
 
 
 def _directions(outline: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Unit vectors (n, 2) along the side before and the side after each corner."""
+    """Return unit vectors (n, 2) along the side before and along the side after each corner."""
     after = np.roll(outline, -1, axis=0) - outline
     after /= np.hypot(*after.T)[:, None]
     return np.roll(after, 1, axis=0), after
 
 
 def turn_angles(line: np.ndarray) -> np.ndarray:
-    """Angle [rad] by which the line turns left at each of its points, (n,); 0 at both ends."""
+    """Return the angle [rad] by which an open line turns left at each of its points, (n,).
+
+    It is 0 at both ends of the line.
+    """
     along = np.diff(line, axis=0)
     before, after = along[:-1], along[1:]
     cross = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
@@ -86,7 +92,7 @@ def turn_angles(line: np.ndarray) -> np.ndarray:
 
 
 def largest_corner_radius(line: np.ndarray) -> float:
-    """Largest radius [m] to which all corners can be rounded.
+    """Return the largest radius [m] to which all corners of a line can be rounded.
 
     The arc of radius r begins r tan(angle / 2) from its corner. Two arcs must not meet.
     """
@@ -97,9 +103,10 @@ def largest_corner_radius(line: np.ndarray) -> float:
 
 
 def round_corners(line: np.ndarray, radius: float, facets: int) -> np.ndarray:
-    """The line with arcs in place of its corners, in steps of at most a full turn / facets.
+    """Return a line with an arc of this radius [m] in place of each corner.
 
-    The ends of arcs lie on the line. A corner of less than half a step stays as it is.
+    An arc has steps of at most a full turn / facets. Its ends lie on the line. A corner that turns
+    by less than half a step stays as it is.
     """
     if radius <= MIN_LENGTH:
         return line
@@ -121,7 +128,10 @@ def round_corners(line: np.ndarray, radius: float, facets: int) -> np.ndarray:
 
 
 def find_contact(line: np.ndarray) -> np.ndarray | None:
-    """A point (2,) [m] where the line folds back or comes nearer to itself than MIN_LENGTH."""
+    """Return a point (2,) [m] where a line folds back or comes nearer to itself than MIN_LENGTH.
+
+    Return None if there is no such point.
+    """
     sharp = np.abs(turn_angles(line)) > np.pi - 1e-3
     if sharp.any():
         return np.asarray(line[np.argmax(sharp)])
@@ -134,20 +144,23 @@ def find_contact(line: np.ndarray) -> np.ndarray | None:
 
 
 def crosses_itself(line: np.ndarray) -> bool:
-    """True if two sides of the line that are not neighbours cross."""
+    """True if two straight pieces of a line that are not neighbours cross."""
     start, end = line[:-1], line[1:]
     i, j = np.triu_indices(len(start), 2)
     return bool(_cross(start[i], end[i], start[j], end[j]).any())
 
 
 def revolved_volume(line: np.ndarray) -> float:
-    """Volume [m³] inside the line turned about the axis: a sum of truncated cones."""
+    """Return the volume [m³] inside a profile turned about the axis, a sum of truncated cones."""
     (r0, r1), rise = (line[:-1, 0], line[1:, 0]), np.diff(line[:, 1])
     return float(np.pi / 3.0 * (rise * (r0 * r0 + r0 * r1 + r1 * r1)).sum())
 
 
 def revolve(line: np.ndarray, facets: int) -> ShapeSurface:
-    """The cavity under the line: `facets` flat sides for a full turn, their corners on the line."""
+    """Return the surface of the cavity that a profile makes when turned about the axis.
+
+    A full turn has `facets` flat sides, whose corners lie on the profile.
+    """
     angle = 2.0 * np.pi * np.arange(facets) / facets
     circle = np.c_[np.cos(angle), np.sin(angle)]
     rings = [np.c_[r * circle, np.full(facets, z)] for r, z in line[:-1]]
@@ -160,14 +173,18 @@ def _unit(vector: np.ndarray) -> np.ndarray:
 
 
 def _distance(point: np.ndarray, start: np.ndarray, end: np.ndarray) -> np.ndarray:
-    """Distance [m] of points (k, 2) from one straight piece each."""
+    """Return the distance [m] of each point (k, 2) from its own straight piece, (k,).
+
+    Args:
+        start, end: ends of the pieces [m], (k, 2) each.
+    """
     along = end - start
     share = np.einsum("ij,ij->i", point - start, along) / np.einsum("ij,ij->i", along, along)
     return np.asarray(np.hypot(*(point - start - np.clip(share, 0.0, 1.0)[:, None] * along).T))
 
 
 def _cross(a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray) -> np.ndarray:
-    """True where pieces ab and cd cross, (k,) bool."""
+    """Return True where the straight piece from a to b crosses that from c to d, (k,) bool."""
 
     def side(p: np.ndarray, q: np.ndarray, x: np.ndarray) -> np.ndarray:
         return np.asarray(np.sign((q - p)[:, 0] * (x - p)[:, 1] - (q - p)[:, 1] * (x - p)[:, 0]))

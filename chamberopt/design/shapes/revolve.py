@@ -39,23 +39,26 @@ class Revolve(RoundChamber):
         return points
 
     def upright(self) -> np.ndarray:
-        """The points, continued to the axis."""
+        """Return the profile's points (radius, height) [m], (n, 2), continued to the axis."""
         return _to_the_axis(self.profile_mm)
 
     def widths_mm(self) -> dict[str, float]:
-        """The largest diameter or the height, the smaller of the two."""
+        """Return the largest diameter or the height [mm], whichever is smaller, by its key."""
         r, z = np.array(self.profile_mm).T
         return {"profile_mm": float(min(2.0 * r.max(), z.max()))}
 
 
 def _to_the_axis(points: tuple[Pair, ...]) -> np.ndarray:
-    """Points (r, z) [m], with the middle of the ceiling if the ceiling is flat."""
+    """Return points (radius, height) given in mm as an array in metres that ends on the axis.
+
+    A flat ceiling gets one more point, its middle.
+    """
     line = 1e-3 * np.array(points)
     return line if line[-1, 0] == 0.0 else np.r_[line, [[0.0, line[-1, 1]]]]
 
 
 def _find_fault(points: tuple[Pair, ...]) -> str | None:
-    """Reason why the points cannot be a profile; None if they can."""
+    """Return why the points (radius, height) [mm] cannot be a profile; None if they can."""
     if points[0][1] != 0.0:
         return f"begins at z = {points[0][1]:g}; the rim is on the sonotrode, at z = 0"
     for number, (r, z) in enumerate(points):

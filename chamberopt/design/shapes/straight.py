@@ -19,12 +19,12 @@ class Box(PolygonChamber):
     width_mm: float = quantity(2, 2000, "mm", "inner size along y, at the sonotrode")
 
     def floor(self) -> np.ndarray:
-        """The corners, beginning at +x, -y."""
+        """Return the floor's corners (4, 2) [m], counter-clockwise from the one at +x, -y."""
         half_sides = 0.5e-3 * np.array([self.length_mm, self.width_mm])
         return np.asarray(half_sides * np.array([[1, -1], [1, 1], [-1, 1], [-1, -1]]))
 
     def widths_mm(self) -> dict[str, float]:
-        """Length, width and height."""
+        """Return length, width and height [mm] by their keys."""
         return {"length_mm": self.length_mm, "width_mm": self.width_mm, "height_mm": self.height_mm}
 
 
@@ -47,12 +47,12 @@ class Cylinder(RoundChamber, ParametricChamber):
     diameter = SI("diameter_mm", 1e-3, "Inner diameter at the sonotrode [m]")
 
     def upright(self) -> np.ndarray:
-        """The profile: up the side, then in along the ceiling."""
+        """Return the profile (radius, height) [m]: up the side, then in along the ceiling."""
         radius = self.diameter / 2.0
         return np.array([[radius, 0.0], [radius, self.height], [0.0, self.height]])
 
     def widths_mm(self) -> dict[str, float]:
-        """Diameter and height."""
+        """Return diameter and height [mm] by their keys."""
         return {"diameter_mm": self.diameter_mm, "height_mm": self.height_mm}
 
 
@@ -67,7 +67,7 @@ class Prism(PolygonChamber):
     turn_deg: float = quantity(-360, 360, "degrees", "about z; at 0 the first side faces +x", 0.0)
 
     def floor(self) -> np.ndarray:
-        """The corners, beginning at the corner after the first side."""
+        """Return the floor's corners (n, 2) [m], from the one after the first side on."""
         half_angle = np.pi / self.sides
         angle = np.radians(self.turn_deg) + half_angle * (2.0 * np.arange(self.sides) + 1.0)
         return np.asarray(
@@ -75,5 +75,5 @@ class Prism(PolygonChamber):
         )
 
     def widths_mm(self) -> dict[str, float]:
-        """Width across flats, and height."""
+        """Return the width across flats and the height [mm] by their keys."""
         return {"across_mm": self.across_mm, "height_mm": self.height_mm}

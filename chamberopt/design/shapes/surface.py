@@ -1,4 +1,4 @@
-"""The closed surface that a shape makes, with a tag on each triangle."""
+"""The closed surface of a chamber's shape. Tags mark its triangles as part, sonotrode or wall."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -17,7 +17,13 @@ MIN_LENGTH_MM = 1e3 * MIN_LENGTH
 
 
 def refuse_above(key: str, given: float, limit: float, why: str) -> None:
-    """Raise CrossCheckError if the value of a key [mm or degrees] exceeds a limit of its sign."""
+    """Raise CrossCheckError if the value of a key [mm or degrees] is larger than a limit.
+
+    The signs of both are ignored.
+
+    Args:
+        why: what is wrong with a larger value, for the message.
+    """
     if abs(given) > abs(limit):
         fits = math.trunc(limit * 1e3) / 1e3  # rounded towards 0, so that this value does fit
         text = f"given {given:g}, {why}; {fits:.7g} is the furthest that fits"
@@ -40,18 +46,18 @@ TAG_PART, TAG_SONOTRODE, TAG_WALL = 0, 1, 2
 
 
 def further_sonotrode_tag(k: int) -> int:
-    """Tag of sonotrodes.k of a design."""
+    """Return the tag of triangles on further sonotrode k, which is `sonotrodes.k` in a design."""
     return TAG_WALL + 1 + k
 
 
 def is_sonotrode(tags: np.ndarray) -> np.ndarray:
-    """True for tags (k,) of a sonotrode, the first or a further sonotrode."""
+    """Return True for each tag (k,) of a sonotrode, whether the first or a further one."""
     return np.asarray((tags == TAG_SONOTRODE) | (tags > TAG_WALL))
 
 
 @dataclass(frozen=True)
 class ShapeSurface:
-    """The cavity before the part is taken out of it."""
+    """The closed surface of the cavity before the part is taken out of it."""
 
     vertices: np.ndarray  # [m], shape (n, 3), float64
     triangles: np.ndarray  # shape (k, 3), int32; closed, with normals out of the cavity
@@ -62,7 +68,7 @@ class ShapeSurface:
 
 
 def lofted(rings: Sequence[np.ndarray], peak: np.ndarray | None = None) -> ShapeSurface:
-    """Closed surface through rings of points, lowest first; its floor is the sonotrode.
+    """Return a closed surface through rings of points, lowest first; its floor is the sonotrode.
 
             ____ ring 1      ceiling: a fan about its middle, or about a peak
            /____\\
