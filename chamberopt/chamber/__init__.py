@@ -1,1 +1,1 @@
-"""The closed cavity of a design, and the simulator's scene in the cavity."""
+"""Build the closed cavity of a design, and the scene in it that the simulator runs."""

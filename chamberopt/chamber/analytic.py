@@ -1,7 +1,7 @@
 """Analytical cavity of a chamber: exact planes and a true circle for a cylinder, box or prism.
 
-It is the first of the two systems of the paper: the same chamber without facets, in the same event
-loop. The part must be the lid, and nothing may reach into the chamber.
+It is the same chamber without a mesh of triangles, simulated by the same event loop. The part must
+be the chamber's lid, and nothing may reach into the chamber.
 """
 
 from __future__ import annotations
@@ -31,7 +31,9 @@ REMEDY = "simulate without the analytical cavity"
 
 
 def analytic_cavity(design: Design, chamber: Chamber) -> AnalyticCavity:
-    """The exact cavity of a chamber: a true circle for a "cylinder", a polygon for other shapes.
+    """Return the exact cavity of a chamber, with walls without facets.
+
+    In plan it is a true circle for the shape "cylinder" and a polygon for other shapes.
 
     Raises:
         InputError: the chamber is not a cylinder, box or prism with the part as its lid, or an
@@ -56,14 +58,18 @@ def analytic_cavity(design: Design, chamber: Chamber) -> AnalyticCavity:
 
 
 def cavity_note(cavity: AnalyticCavity) -> str:
-    """A note for the result that names the analytical cavity simulated in place of the mesh."""
+    """Return a note that names the analytical cavity that is simulated in place of the mesh."""
     what = "cylinder" if cavity.radius is not None else f"prism of {len(cavity.outline)} sides"
     volume = f"{1e6 * cavity.volume:.5g} cm³"
     return f"simulated in an analytical cavity, an exact {what} of {volume}, not the mesh"
 
 
 def impacts_on_chamber(impacts: ImpactLog, chamber: Chamber) -> ImpactLog:
-    """The impacts in an analytical cavity, with the chamber's triangles in place of its ceiling."""
+    """Return impacts on an analytical cavity's ceiling as impacts on the chamber's part triangles.
+
+    Args:
+        impacts: recorded impacts, all on the ceiling, which is the part.
+    """
     from sim_core import find_triangles
 
     ceiling = np.flatnonzero(chamber.tags == TAG_PART)
@@ -76,7 +82,11 @@ def _refused(why: str) -> InputError:
 
 
 def _require_flat_or_upright(chamber: Chamber, bottom: float, top: float) -> None:
-    """Raise InputError unless sonotrode and part are flat, and the wall between them upright."""
+    """Raise InputError unless sonotrode and part are flat, and the wall between them upright.
+
+    Args:
+        bottom, top: heights of the floor and of the ceiling [m].
+    """
     vectors = area_vectors(chamber.vertices, chamber.triangles)
     area = np.linalg.norm(vectors, axis=1)
     heights = chamber.vertices[chamber.triangles][:, :, 2]
@@ -95,7 +105,13 @@ def _require_flat_or_upright(chamber: Chamber, bottom: float, top: float) -> Non
 
 
 def _outline(chamber: Chamber, bottom: float, top: float) -> np.ndarray:
-    """The convex outline (n, 2) [m] of the floor. InputError if its prism is not the chamber."""
+    """Return the convex outline (n, 2) [m] of the floor.
+
+    Raises InputError if the chamber is not the straight prism over this outline.
+
+    Args:
+        bottom, top: heights of the floor and of the ceiling [m].
+    """
     from scipy.spatial import ConvexHull
 
     floor = np.unique(chamber.triangles[chamber.tags == TAG_SONOTRODE])

@@ -1,4 +1,4 @@
-"""Cavity of a shape with its holes, the wells of further sonotrodes, and its deflectors.
+"""Add holes, wells of further sonotrodes and deflectors to the cavity of a chamber's shape.
 
 A hole and a well are both round bores from a bottom to the room. The tag of the bottom tells them
 apart: wall for a hole, sonotrode for a well.
@@ -49,7 +49,7 @@ DEFLECTOR_SIDES = 64  # flat sides of a round rod, their corners on the circle
 
 
 class DeflectorMesh(NamedTuple):
-    """A deflector as it stands in the chamber."""
+    """The closed surface of a deflector as it stands in the chamber."""
 
     name: str  # in the design
     at_mm: tuple[float, float, float]  # its middle in the design, for messages
@@ -59,7 +59,10 @@ class DeflectorMesh(NamedTuple):
 
 
 def read_deflectors(design: Design) -> list[DeflectorMesh]:
-    """All deflectors of a design. InputError if the file of a deflector cannot be used."""
+    """Return all deflectors of a design as closed surfaces in the chamber.
+
+    Raises InputError if the mesh file of a deflector cannot be used.
+    """
     deflectors = []
     for k, one in enumerate(design.chamber.deflectors):
         name = f"chamber.deflectors.{k}"
@@ -72,7 +75,10 @@ def read_deflectors(design: Design) -> list[DeflectorMesh]:
 def _mesh_about_its_middle(
     deflector: Deflector, name: str
 ) -> tuple[np.ndarray, np.ndarray, list[str]]:
-    """Vertices [m] and triangles of a deflector before its rotation, and notes on its file."""
+    """Return vertices [m] and triangles of a deflector, and notes on its mesh file.
+
+    The deflector is not yet rotated, and its middle is at the origin.
+    """
     import trimesh
 
     if deflector.kind == "mesh":
@@ -114,7 +120,7 @@ TAG_END = 255  # tag of a bore's end, which must vanish
 
 
 class TriangleProperties(NamedTuple):
-    """Tag, direction, part triangle and fitting of each triangle of a surface."""
+    """Tag, direction, part triangle and fitting (hole or deflector) of a surface's triangles."""
 
     tags: np.ndarray  # (k,), uint8
     facing: np.ndarray  # area vector out of the cavity [m²], (k, 3)
@@ -125,7 +131,14 @@ class TriangleProperties(NamedTuple):
 def triangle_properties(
     facing: np.ndarray, tags: np.ndarray | int, source: np.ndarray | None = None, fitting: int = -1
 ) -> TriangleProperties:
-    """Properties of triangles of one fitting, whose tags are one number or an array (k,)."""
+    """Return the properties of triangles that belong to one fitting, or to none.
+
+    Args:
+        facing: area vectors out of the cavity [m²], (k, 3).
+        tags: one tag for all, or a tag of each triangle, (k,).
+        source: part triangle under each triangle, (k,); None if they are not on the part.
+        fitting: index of a hole or deflector in `fitting_names`, else -1.
+    """
     count = len(facing)
     return TriangleProperties(
         np.broadcast_to(np.asarray(tags, dtype=np.uint8), count),
@@ -136,7 +149,7 @@ def triangle_properties(
 
 
 def fitting_names(design: Design) -> list[str]:
-    """The names in the design of all holes, then of all deflectors."""
+    """Return the dotted names of all holes, then of all deflectors, such as chamber.holes.0."""
     counts = {"holes": len(design.chamber.holes), "deflectors": len(design.chamber.deflectors)}
     return [f"chamber.{kind}.{k}" for kind, count in counts.items() for k in range(count)]
 
@@ -149,7 +162,7 @@ class CavitySolid:
     pieces: Mapping[int, TriangleProperties]
 
     def trace(self, surface: SolidSurface) -> TriangleProperties:
-        """Properties of each triangle of a surface cut from these solids."""
+        """Return the properties of each triangle of a surface that was cut from these solids."""
         some = next(iter(self.pieces.values()))
         traced = TriangleProperties(
             *(np.zeros((len(surface.solid), *one.shape[1:]), one.dtype) for one in some)
@@ -161,7 +174,7 @@ class CavitySolid:
         return traced
 
     def without(self, body: Solid, pieces: Mapping[int, TriangleProperties]) -> CavitySolid:
-        """The cavity after a body is cut out.
+        """Return the cavity after a body was cut out of it.
 
         Args:
             body: the solid to cut out.
@@ -185,7 +198,10 @@ class Bore(NamedTuple):
 def cavity_solid(
     design: Design, shape: ShapeSurface, deflectors: Sequence[DeflectorMesh]
 ) -> CavitySolid:
-    """The shape with holes, wells and deflectors. InputError if any of them is out of place."""
+    """Return the solid cavity of a shape with its holes and wells, and without its deflectors.
+
+    Raises InputError if a hole, a well of a further sonotrode or a deflector is out of place.
+    """
     shell = make_solid(shape.vertices, shape.triangles, "the chamber")
     facing = area_vectors(shape.vertices, shape.triangles)
     own = triangle_properties(facing, shape.tags, shape.source)
@@ -200,7 +216,7 @@ def cavity_solid(
 
 
 def swept_faces(design: Design, cavity: CavitySolid) -> list[tuple[str, Solid]]:
-    """The room that each sonotrode's vibration sweeps, beside the name of the sonotrode."""
+    """Return the name of each sonotrode and the solid that its face sweeps as it vibrates."""
     surface = cavity.body.surface()
     tags, sweeps = cavity.trace(surface).tags, []
     for name, tag, axis, amplitude in (
@@ -216,7 +232,10 @@ def swept_faces(design: Design, cavity: CavitySolid) -> list[tuple[str, Solid]]:
 
 
 def _bore_of_hole(cavity: CavitySolid, hole: Hole, k: int) -> Bore:
-    """The bore of a hole. Its bottom lies beyond the wall by the depth of the hole."""
+    """Return the bore of hole `k`. Its bottom lies beyond the wall by the depth of the hole.
+
+    Raises InputError if the hole's axis does not lead out of the room.
+    """
     name, at, out = f"chamber.holes.{k}", np.array(hole.at), np.array(hole.direction)
     distance, entering = _first_crossings(cavity.body.surface(), at[None], out, -WALL_TOLERANCE)
     if entering[0] or not np.isfinite(distance[0]):
@@ -230,7 +249,11 @@ def _bore_of_hole(cavity: CavitySolid, hole: Hole, k: int) -> Bore:
 
 
 def _with_bore(cavity: CavitySolid, bore: Bore) -> CavitySolid:
-    """The cavity united with a bore. InputError if the bore is out of place."""
+    """Return the cavity united with a bore.
+
+    Raises InputError if the bore does not enter the room all round, comes out of it again, or cuts
+    into a sonotrode's face or the part.
+    """
     axis, bottom = bore.axis, bore.bottom
     aside = np.cross(axis, np.eye(3)[np.abs(axis).argmin()])
     aside /= np.linalg.norm(aside)
@@ -265,7 +288,13 @@ def _with_bore(cavity: CavitySolid, bore: Bore) -> CavitySolid:
 
 
 def _length_to_room(cavity: CavitySolid, bore: Bore, rim: np.ndarray) -> float:
-    """Length [m] at which a bore with this rim (p, 3) [m] is inside the room all round."""
+    """Return the length [m] at which a bore is inside the room all round.
+
+    Raises InputError if it does not lead into the room.
+
+    Args:
+        rim: points on the edge of the bore's bottom [m], (p, 3).
+    """
     starts = np.r_[rim, bore.bottom[None]]
     distance, entering = _first_crossings(cavity.body.surface(), starts, bore.axis, 0.0)
     if not (entering & np.isfinite(distance) & (distance > bore.amplitude)).all():
@@ -287,7 +316,11 @@ def _length_to_room(cavity: CavitySolid, bore: Bore, rim: np.ndarray) -> float:
 def _without_deflectors(
     cavity: CavitySolid, design: Design, deflectors: Sequence[DeflectorMesh]
 ) -> CavitySolid:
-    """The cavity without all deflectors. One cut for all keeps the surface from being refined."""
+    """Return the cavity after all deflectors were cut out of it.
+
+    Raises InputError if a deflector is outside the room, or a sonotrode would hit it. They are cut
+    out together, because each cut divides triangles of the surface.
+    """
     sweeps, solids, pieces = swept_faces(design, cavity), [], {}
     for k, deflector in enumerate(deflectors, start=len(design.chamber.holes)):
         own = split_bodies(deflector.vertices, deflector.triangles, deflector.name)[0]
@@ -311,7 +344,7 @@ def _without_deflectors(
 def _first_crossings(
     surface: SolidSurface, points: np.ndarray, direction: np.ndarray, beyond: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """First crossing of each line with the surface. A line along an edge counts as a crossing.
+    """Find where each line first crosses a surface. A line along an edge counts as a crossing.
 
     Args:
         points: starts of the lines [m], shape (p, 3).
@@ -340,7 +373,7 @@ def _first_crossings(
 
 
 def _area_by_tag(cavity: CavitySolid) -> np.ndarray:
-    """Surface area [m²] with each tag from 0 to TAG_END."""
+    """Return the cavity's surface area [m²] with each tag from 0 to TAG_END."""
     surface = cavity.body.surface()
     tags = cavity.trace(surface).tags
     return np.bincount(tags, areas(surface.vertices, surface.triangles), TAG_END + 1)

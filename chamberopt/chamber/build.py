@@ -58,7 +58,7 @@ TARGET = "the target"
 
 @dataclass(frozen=True)
 class Chamber:
-    """The cavity of one design."""
+    """The closed cavity of one design, its surface in triangles, and the part in it."""
 
     vertices: np.ndarray  # [m], shape (n, 3), float64
     triangles: np.ndarray  # (k, 3) int32; closed, normals pointing out of the cavity
@@ -80,26 +80,29 @@ class Chamber:
 
     @property
     def pieces_in_air(self) -> int:
-        """The number of pieces of the part that reach no wall, and so have no holder."""
+        """Number of pieces of the part that reach no wall, and so have no holder."""
         return _pieces_in_air(self.vertices, self.triangles, self.tags)
 
     @property
     def on_target(self) -> np.ndarray:
-        """Marks of the cavity's triangles on the target, (k,) bool."""
+        """Return True for each triangle of the cavity that is on the target, (k,) bool."""
         # A source of -1, off the part, reads the appended False.
         return np.asarray(np.append(self.part.target, False)[self.source])
 
     def on_zone(self, zone: str) -> Chamber:
-        """The same chamber with a zone of the part as its target."""
+        """Return the same chamber with the named zone of the part as its target."""
         return replace(self, part=replace(self.part, target=self.part.zones[zone]))
 
     def surfaces(self) -> dict[str, Chamber]:
-        """The chamber with its target, then with each zone as its target, by names for messages."""
+        """Return the chamber with its own target, then with each zone as its target.
+
+        The keys are names for messages: "the target", "zone NAME".
+        """
         return {TARGET: self, **{f"zone {name}": self.on_zone(name) for name in self.part.zones}}
 
 
 def build_chamber(design: Design, target: np.ndarray | None = None) -> Chamber:
-    """The chamber of a design.
+    """Build and return the chamber of a design.
 
     Args:
         target: part triangles to cover, (m,) bool, in place of the design's own choice. A study
@@ -169,13 +172,17 @@ def build_chamber(design: Design, target: np.ndarray | None = None) -> Chamber:
 
 
 def _misplaced(part: Part, shape: ShapeSurface, text: str) -> SurfaceError:
-    """An error that shows the part, and the edges of the chamber without the part."""
+    """Return an error with this text and a picture of the part and the chamber's edges."""
     edges = shape.vertices[sharp_edges(shape.vertices, shape.triangles)]
     return SurfaceError(text, part.vertices[part.triangles], edges)
 
 
 def _where_to_look(is_drawn: bool) -> str:
-    """The fields that place a part, as the remedy for a part in the wrong place."""
+    """Return a remedy for a part in the wrong place: the fields of the design that place it.
+
+    Args:
+        is_drawn: True if the part is drawn with its chamber in one file.
+    """
     if is_drawn:
         return "check the groups in [chamber]"
     return (
@@ -185,7 +192,10 @@ def _where_to_look(is_drawn: bool) -> str:
 
 
 def _refuse_misplaced_part(part: Part, shape: ShapeSurface, design: Design) -> None:
-    """Raise InputError for a part outside a shape, or too low."""
+    """Raise InputError if the part is outside the chamber, or so low that the sonotrode hits it.
+
+    Raise it too if the part is drawn with its chamber and no ball fits under it.
+    """
     distance, amplitude = design.chamber.sonotrode_distance, design.sonotrode.amplitude
     if distance <= amplitude:
         drawn = design.chamber.sonotrode_distance_mm is None
@@ -224,7 +234,12 @@ def _refuse_misplaced_part(part: Part, shape: ShapeSurface, design: Design) -> N
 
 
 def _refuse_free_edges(design: Design, room: SolidSurface, tags: np.ndarray) -> None:
-    """Raise InputError for a sonotrode outside the room, or a sonotrode edge without a wall."""
+    """Raise InputError if a sonotrode is cut off from the room or has an edge without a wall.
+
+    Args:
+        room: surface of the cavity.
+        tags: tags of its triangles, (k,).
+    """
     for k in range(len(design.sonotrodes)):
         if not (tags == further_sonotrode_tag(k)).any():
             raise InputError(
@@ -240,7 +255,12 @@ def _refuse_free_edges(design: Design, room: SolidSurface, tags: np.ndarray) -> 
 
 
 def _refuse_wide_swings(design: Design, room: SolidSurface, tags: np.ndarray) -> None:
-    """Raise InputError for a sonotrode that would vibrate out of a wall beside it."""
+    """Raise InputError if a sonotrode's amplitude is too large for the walls beside its face.
+
+    Args:
+        room: surface of the cavity.
+        tags: tags of its triangles, (k,).
+    """
     from sim_core import TriangleMesh, largest_amplitude
 
     mesh, ball = TriangleMesh(room.vertices, room.triangles, tags), min(design.shot.diameters)
@@ -259,7 +279,12 @@ def _refuse_wide_swings(design: Design, room: SolidSurface, tags: np.ndarray) ->
 
 
 def _room_over_sonotrode(whole: SolidSurface, tags: np.ndarray) -> tuple[SolidSurface, list[str]]:
-    """The room with the sonotrode as its floor, and a note on rooms that are cut off."""
+    """Return the surface of the room over the sonotrode, and a note on rooms that were left out.
+
+    Args:
+        whole: surface of all closed rooms of the chamber.
+        tags: tags of its triangles, (k,).
+    """
     rooms = find_cavities(whole)
     floor = tags == TAG_SONOTRODE
     with_floor = [room for room in rooms if (room & floor).any()]
@@ -285,7 +310,12 @@ def _room_over_sonotrode(whole: SolidSurface, tags: np.ndarray) -> tuple[SolidSu
 
 
 def _ceiling_notes(room: SolidSurface, ceiling: float, key: str) -> list[str]:
-    """A note that the part closes the chamber below its ceiling [m], the value of this key."""
+    """Return a note if the part closes the chamber below its ceiling, else an empty list.
+
+    Args:
+        ceiling: height of the ceiling [m].
+        key: key of [chamber] that sets this height.
+    """
     top = float(room.vertices[:, 2].max())
     if top >= ceiling - MIN_HEIGHT:
         return []
@@ -296,7 +326,14 @@ def _ceiling_notes(room: SolidSurface, ceiling: float, key: str) -> list[str]:
 def _only_reachable(
     part: Part, room: SolidSurface, traced: TriangleProperties, design: Design
 ) -> tuple[Part, str]:
-    """The part with the reachable share of its target, and a note. InputError if it is empty."""
+    """Return the part with only what a ball can touch as its target, and a note.
+
+    Raises InputError if balls touch nothing of the target.
+
+    Args:
+        room: surface of the cavity.
+        traced: properties of its triangles.
+    """
     from sim_core import TriangleMesh
 
     ball = min(design.shot.diameters)
@@ -320,12 +357,16 @@ def _only_reachable(
 
 
 def selection_of(surface: str) -> str:
-    """The place in a design that chooses a surface of `Chamber.surfaces`, for messages."""
+    """Return which field of a design chooses the target or a zone, for messages.
+
+    Args:
+        surface: "the target" or "zone NAME".
+    """
     return "[part.target]" if surface == TARGET else f"the target of {surface}"
 
 
 def hidden_share(chamber: Chamber) -> float:
-    """Share of the target's area outside the cavity."""
+    """Return the share of the target's area that is outside the cavity, where no shot gets."""
     part = chamber.part
     return float(1.0 - chamber.exposed_area[part.target].sum() / part.area[part.target].sum())
 
@@ -341,7 +382,7 @@ def _refuse_hidden_zones(part: Part, exposed: np.ndarray) -> None:
 
 
 def _hidden_notes(chamber: Chamber) -> list[str]:
-    """Notes on the target and the zones that are partly outside the cavity."""
+    """Return a note for the target and for each zone of which a part is outside the cavity."""
     shares = {name: hidden_share(one) for name, one in chamber.surfaces().items()}
     return [
         f"{hidden:.1%} of the area of {name} is outside the cavity and counts as not covered; "
@@ -352,14 +393,19 @@ def _hidden_notes(chamber: Chamber) -> list[str]:
 
 
 def _pieces_in_air(vertices: np.ndarray, triangles: np.ndarray, tags: np.ndarray) -> int:
-    """The number of pieces of the part that reach no wall."""
+    """Return the number of pieces of the part that reach no wall of the cavity."""
     shells, volumes = find_shells(vertices, triangles)
     on_part = tags == TAG_PART
     return sum(bool(on_part[shells == k].all()) for k in range(len(volumes)))
 
 
 def _notes_on_room(room: SolidSurface, traced: TriangleProperties, part_name: str) -> Iterator[str]:
-    """Notes on triangles turned by rounding, and on pieces of the part without a holder."""
+    """Yield a note on triangles turned by rounding, and one on pieces of the part without holder.
+
+    Args:
+        room: surface of the cavity.
+        traced: properties of its triangles.
+    """
     own = area_vectors(room.vertices, room.triangles)
     across = np.linalg.norm(np.cross(own, traced.facing), axis=1)
     turned = np.arctan2(across, np.einsum("ij,ij->i", own, traced.facing)) > MAX_ROTATION

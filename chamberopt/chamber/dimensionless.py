@@ -22,12 +22,15 @@ MAX_SPIN_SHARE = 2.0 / 7.0
 
 
 def gravity_speed_change(design: Design, chamber: Chamber) -> float:
-    """g H / V²: a ball's relative change of speed over H, half its change of kinetic energy."""
+    """Return how much gravity changes a ball's speed over the chamber's height, as a share.
+
+    It is g H / V² for gravity g, height H and peak speed V of the sonotrode.
+    """
     return STANDARD_GRAVITY * chamber.height / design.sonotrode.peak_speed**2
 
 
 def free_path(design: Design, chamber: Chamber) -> float:
-    """Mean free path between balls over the chamber's height. It is infinite for one ball.
+    """Return the mean path of a ball from ball to ball, in chamber heights; infinite for one ball.
 
     The path is 1 / (sqrt(2) pi d² n chi) for n balls a volume, with chi = (1 - p/2)/(1 - p)³ for
     the packing fraction p.
@@ -45,10 +48,10 @@ def free_path(design: Design, chamber: Chamber) -> float:
 
 
 def drag_loss(design: Design, chamber: Chamber) -> float:
-    """3/4 Cd (rho_air / rho) (H / d): share of a ball's speed that drag takes over H.
+    """Return the share of its speed that a ball loses by air drag over the chamber's height.
 
-    Cd is the drag coefficient at speed V. The densities rho_air and rho are the air's and the
-    ball's.
+    It is 3/4 Cd (rho_air / rho) (H / d) for height H and ball diameter d. Cd is the drag
+    coefficient at the sonotrode's peak speed. rho_air and rho are the densities of air and ball.
     """
     from sim_core import Drag, drag_coefficient
 

@@ -1,4 +1,4 @@
-"""The largest ball that touches the cavity's surface at a point and crosses it nowhere.
+"""Find the largest ball that touches the cavity's surface at a point and crosses it nowhere.
 
 A ball that touches at the point is shrunk past the closest obstacle until no obstacle is left.
 
@@ -23,7 +23,7 @@ SEQUENCE_STEP = np.array([0.7548776662466927, 0.5698402909980532])
 
 
 class TouchPoints(NamedTuple):
-    """Points of the surface, and the largest ball that touches at each point."""
+    """Points of a cavity's surface, and the largest ball that touches it at each point."""
 
     triangle: np.ndarray  # (p,), triangle under the point
     point: np.ndarray  # [m], (p, 3)
@@ -47,7 +47,9 @@ class TouchPoints(NamedTuple):
 def find_touch_points(
     mesh: TriangleMesh, normals: np.ndarray, spacing: np.ndarray, max_radius: float, overlap: float
 ) -> TouchPoints:
-    """Points on all triangles of a mesh, at least one point on each, and their largest balls.
+    """Return points on all triangles of a mesh, and the largest ball that touches at each point.
+
+    Each triangle has at least one point.
 
     Args:
         normals: unit vectors of the surface at the triangles' corners, into the cavity, (m, 3, 3).
@@ -64,7 +66,14 @@ def find_touch_points(
 def spread_points(
     vertices: np.ndarray, triangles: np.ndarray, spacing: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Points spread evenly over triangles: triangle (p,), place (p, 3) [m] and area (p,) [m²]."""
+    """Return points spread evenly over triangles.
+
+    Args:
+        spacing: distance between the points on each triangle [m], (m,).
+    Returns:
+        For each point its triangle (p,), its place [m] (p, 3), and the area [m²] that it stands
+        for (p,).
+    """
     size = areas(vertices, triangles)
     count = np.where(size > 0.0, np.maximum(np.ceil(size / spacing**2), 1.0), 0.0).astype(np.int64)
     triangle = np.repeat(np.arange(len(triangles)), count)
@@ -76,7 +85,7 @@ def spread_points(
 
 
 def on_triangles(corners: np.ndarray, u: np.ndarray, v: np.ndarray) -> np.ndarray:
-    """Points (..., n, c) on triangles (n, 3, c) from points u, v (..., n) of the unit square.
+    """Map points u, v (..., n) of the unit square to points (..., n, c) on triangles (n, 3, c).
 
     One half of the square is folded onto the other, so that an even spread stays even.
     """
@@ -89,7 +98,10 @@ def on_triangles(corners: np.ndarray, u: np.ndarray, v: np.ndarray) -> np.ndarra
 def largest_balls(
     mesh: TriangleMesh, point: np.ndarray, normal: np.ndarray, max_radius: float, overlap: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Radius, obstacle and cosine (p,) of the largest ball at each point, as in TouchPoints.
+    """Find the largest ball that touches a mesh at each point.
+
+    Returns its radius [m], the triangle that limits it (-1 if none does), and the cosine between
+    the normals of point and triangle, (p,) each.
 
     A ball of radius R touches at p with normal n. It is o > 0 deep in a surface at q where |q - p -
     R n| = R - o.

@@ -33,7 +33,7 @@ NEAR = 0.01  # share of the part's diagonal: a place further off the surface is 
 
 
 def chosen_triangles(mesh: PartMesh, wanted: Selection, field: str = "part.target") -> np.ndarray:
-    """The triangles (m,) bool that meet all conditions of a selection.
+    """Mark the triangles (m,) of a part that meet all conditions of a selection.
 
     Args:
         field: the field of the design, for messages.
@@ -69,7 +69,10 @@ def chosen_triangles(mesh: PartMesh, wanted: Selection, field: str = "part.targe
 
 
 def _on_faces(mesh: PartMesh, wanted: Sequence[FaceAt], field: str) -> np.ndarray:
-    """Mark the triangles (m,) on one of the faces. InputError if a place is off the surface."""
+    """Mark the triangles (m,) on any of the wanted faces.
+
+    Raises InputError if the place that selects a face is off the part's surface.
+    """
     by_crease: dict[float, Faces] = {}
     chosen = np.zeros(len(mesh.triangles), dtype=bool)
     for k, one in enumerate(wanted):
@@ -143,13 +146,15 @@ class Part:
 
     @property
     def corners_with_normals(self) -> np.ndarray:
-        """Corners [m] of the triangles, and unit normals of the surface there, (m, 3, 6)."""
+        """Return the triangles' corners [m] and unit normals of the surface there, (m, 3, 6)."""
         return np.concatenate([self.vertices[self.triangles], self.corner_normals], axis=2)
 
     def normals_in_cavity(
         self, vertices: np.ndarray, triangles: np.ndarray, source: np.ndarray
     ) -> np.ndarray:
-        """Unit normals into a cavity at the corners of the cavity's triangles, (k, 3, 3).
+        """Return unit normals into a cavity at the corners of the cavity's triangles, (k, 3, 3).
+
+        On the part they are normals of the surface behind its facets.
 
         Args:
             vertices: of the cavity [m], shape (n, 3).
@@ -164,7 +169,7 @@ class Part:
         return normals
 
     def normals_at(self, triangle: np.ndarray, place: np.ndarray) -> np.ndarray:
-        """Unit normals (p, 3) of the surface at places (p, 3) [m] on triangles (p,)."""
+        """Return unit normals (p, 3) out of the part at places (p, 3) [m] on its triangles (p,)."""
         corners = self.vertices[self.triangles[triangle]]
         if self.normals is None:
             return unit_normals(corners)
@@ -172,14 +177,17 @@ class Part:
 
     @property
     def elements(self) -> np.ndarray:
-        """Element number in the file of each triangle, (m,) int64, as in ElementNumbers."""
+        """Number that the part's file gives to the element of each triangle, (m,) int64.
+
+        Without a file the triangles are numbered from 1 on.
+        """
         if self.file is None:
             return np.arange(1, len(self.triangles) + 1)
         return self.file.simulated.elements
 
 
 def posed_part(design: Design) -> tuple[Part, list[str]]:
-    """The part in the chamber's frame, and notes on its file.
+    """Return the part as it stands in the chamber, and notes on its file.
 
     It is turned about the file's x, then y, then z. Its box is centred on the chamber's axis and
     moved sideways by the offset. It is raised or lowered until its lowest point is at the sonotrode
@@ -222,7 +230,10 @@ def posed_part(design: Design) -> tuple[Part, list[str]]:
 
 
 def _smoothing_notes(part: Part) -> list[str]:
-    """A note on how far the rounds were moved to the surface behind their facets."""
+    """Return a note on how far facets of curved surfaces were moved to the surface behind them.
+
+    Return an empty list if nothing worth a note was moved.
+    """
     facts = part.smoothing
     if facts is None or facts.moved_share < LEAST_MOVED:
         return []
@@ -236,7 +247,11 @@ def _smoothing_notes(part: Part) -> list[str]:
 
 
 def _sharp_edges(count: int) -> str:
-    """The end of a note on edges that are taken for sharp, although facets may turn as much."""
+    """Return the end of a note on edges that are taken for sharp, although they turn little.
+
+    Args:
+        count: number of such edges. The text is empty for 0.
+    """
     if not count:
         return ""
     return (
@@ -247,7 +262,7 @@ def _sharp_edges(count: int) -> str:
 
 @dataclass(frozen=True)
 class PartPreview:
-    """The part as its file has it, with the pose and the target of a design."""
+    """The part with the triangles of its file, and the pose, target and zones of a design."""
 
     mesh: PartMesh  # with the file's own triangles (m, 3), in the file's frame
     rotation: np.ndarray  # from the file's frame to the chamber's, (3, 3), applied before the shift
@@ -262,7 +277,9 @@ class PartPreview:
 
 
 def preview_part(design: Design) -> PartPreview:
-    """The part before the slow steps of `posed_part`: target.element_mm and rounding.
+    """Return the part with the triangles of its file, which takes less time than `posed_part`.
+
+    Curved surfaces are not divided, and target.element_mm has no effect.
 
     Raises:
         InputError: the file cannot be used, or target or zone are empty.
@@ -277,9 +294,9 @@ def preview_part(design: Design) -> PartPreview:
 
 
 def turning_axis(design: Design, part: Part) -> Axis | None:
-    """The axis of effects.part_turn in the chamber's frame: a point [m] and a direction, (3,) each.
+    """Return the axis about which the part turns: a point [m] and a direction, (3,) each.
 
-    It is None for a part that does not turn.
+    They are in the chamber's frame. Return None for a part that does not turn.
     """
     turn, file = design.effects.part_turn, part.file
     if turn is None or file is None:
@@ -289,7 +306,7 @@ def turning_axis(design: Design, part: Part) -> Axis | None:
 
 
 def _part_of_file(design: Design) -> PartMesh:
-    """The part as its file has it. A file is read once, even if many chambers are built from it."""
+    """Return the part as its file has it. A file is read once for all chambers built from it."""
     part, setup = design.part, design.chamber.setup()
     if setup is not None:
         return setup.part
@@ -308,7 +325,12 @@ def _chosen(mesh: PartMesh, wanted: Selection, field: str) -> np.ndarray:
 
 
 class _Simulated(NamedTuple):
-    """The mesh of the part as it is simulated. The other fields are the same as in SmoothPart."""
+    """The mesh of the part as it is simulated, in the file's frame.
+
+    For each of its triangles `origin` is the file's triangle it came from. `normals` are those of
+    the surface behind the triangles at their corners, and `hollow` is its largest hollow curvature
+    [1/m]. `facts` says what was smoothed. They are None where nothing was smoothed.
+    """
 
     mesh: PartMesh
     origin: np.ndarray
@@ -325,7 +347,12 @@ def _simulated(
     zones: tuple[Zone, ...],
     is_wall: bool,
 ) -> _Simulated:
-    """The part of a file with its rounds divided, in triangles of the wanted size."""
+    """Return the part with facets of curved surfaces divided and triangles of the wanted size.
+
+    Args:
+        mesh: the part as its file has it.
+        is_wall: True if the part is a piece of the room's surface, which is not divided.
+    """
     chosen = _chosen(mesh, target, "part.target")
     rules = [
         (zone.smoothing or smoothing).rule(_chosen(mesh, zone.target, f"zones.{k}.target"))
@@ -340,7 +367,13 @@ def _simulated(
 
 
 def _remeshed(found: _Simulated, target: np.ndarray, size: float) -> _Simulated:
-    """The part with its target (m,) in new triangles whose sides are about the size [m]."""
+    """Return the part with its target in new triangles whose sides are about `size` [m].
+
+    Raises InputError if they would be too many.
+
+    Args:
+        target: marks triangles of the part, (m,).
+    """
     mesh = found.mesh
     area = float(areas(mesh.vertices, mesh.triangles)[target].sum())
     count = area / (np.sqrt(3.0) / 4.0 * size * size)
@@ -382,7 +415,7 @@ def _remeshed(found: _Simulated, target: np.ndarray, size: float) -> _Simulated:
 
 
 def _find_origin(mesh: PartMesh, corners: np.ndarray, source: np.ndarray) -> np.ndarray:
-    """The triangle of the mesh under the middle of each new triangle, (k,).
+    """Return the triangle of a mesh under the middle of each new triangle, (k,).
 
     Args:
         corners: of the new triangles [m], shape (k, 3, 3).
@@ -400,7 +433,7 @@ def _find_origin(mesh: PartMesh, corners: np.ndarray, source: np.ndarray) -> np.
 
 
 def _pose(given: PartMesh, vertices: np.ndarray, design: Design) -> tuple[np.ndarray, np.ndarray]:
-    """Rotation (3, 3), then shift (3,) [m], from the part file's frame to the chamber's.
+    """Return the rotation (3, 3), then shift (3,) [m], from the part file's frame to the chamber's.
 
     Args:
         given: the part as its file has it. Its middle comes onto the axis.

@@ -1,4 +1,4 @@
-"""The places where a ball from the sonotrode can touch the cavity's surface."""
+"""Find the places where a ball from the sonotrode can touch the cavity's surface."""
 
 from __future__ import annotations
 
@@ -44,11 +44,11 @@ class Cells(NamedTuple):
     unsure: np.ndarray  # true if a ball's centre may lie in a part of the cell
 
     def middles(self, chosen: np.ndarray) -> np.ndarray:
-        """Middles (n, 3) [m] of the chosen cells, (nx, ny, nz) bool."""
+        """Return the middles (n, 3) [m] of the cells that `chosen` (nx, ny, nz) marks."""
         return np.asarray(self.low + self.edge * (np.argwhere(chosen) + 0.5))
 
     def at(self, places: np.ndarray) -> np.ndarray:
-        """The open space (n,) at each of the places (n, 3) [m]."""
+        """Return the number of the open space at each place (n, 3) [m], 0 where there is none."""
         index = np.clip(
             ((places - self.low) / self.edge).astype(np.int64), 0, np.array(self.space.shape) - 1
         )
@@ -56,13 +56,16 @@ class Cells(NamedTuple):
 
 
 def cell_edge(mesh: TriangleMesh, radius: float) -> float:
-    """Side [m] of the cells for a ball of this radius [m], large enough for at most MAX_CELLS."""
+    """Return the side [m] of the grid's cells for a ball of this radius [m].
+
+    It is at least so large that there are at most about MAX_CELLS.
+    """
     volume = float(np.prod(np.ptp(mesh.vertices, axis=0)))
     return float(max(EDGE * radius, (volume / MAX_CELLS) ** (1.0 / 3.0)))
 
 
 def open_cells(mesh: TriangleMesh, radius: float) -> Cells:
-    """Grid of the cells in which the centre of a ball of this radius [m] may lie anywhere.
+    """Return a grid that marks the cells in which a ball's centre may lie anywhere.
 
     Cells outside the cavity and inside the part count too. No ball touches the surface there.
     """
@@ -90,7 +93,7 @@ def open_cells(mesh: TriangleMesh, radius: float) -> Cells:
 def find_regions(
     mesh: TriangleMesh, touches: TouchPoints, radius: float, spacing: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The regions in which the centre of a ball of this radius [m] can move.
+    """Find the separate regions in which the centre of a ball of this radius [m] can move.
 
     Args:
         spacing: largest distance between neighbouring touch points [m].
@@ -122,7 +125,7 @@ def find_regions(
 
 
 def _midway_points(mesh: TriangleMesh, cells: Cells, radius: float) -> np.ndarray:
-    """Points (n, 3) [m] for a ball's centre in cells near no open space, or near several.
+    """Return points (n, 3) [m] for a ball's centre in cells near no open space, or near several.
 
     Each point starts at the cell's middle. It moves away from the closest wall, in ever smaller
     steps, until it is midway between the walls.
@@ -153,7 +156,15 @@ def _midway_points(mesh: TriangleMesh, cells: Cells, radius: float) -> np.ndarra
 def _links_to_spaces(
     mesh: TriangleMesh, cells: Cells, centre: np.ndarray, radius: float, spacing: float
 ) -> np.ndarray:
-    """Links (k, 2) from points in narrow places (n, 3) [m] to open spaces nearby, each once."""
+    """Return index pairs (point, open space), (k, 2), between which the ball can move straight.
+
+    Each point has each open space nearby at most once.
+
+    Args:
+        centre: points in narrow places [m], (n, 3).
+        radius: of the ball [m].
+        spacing: largest distance between neighbouring points [m].
+    """
     from scipy.ndimage import binary_erosion
     from scipy.spatial import KDTree
 
@@ -180,7 +191,16 @@ def _links_to_spaces(
 def _links_between(
     mesh: TriangleMesh, centre: np.ndarray, region: np.ndarray, radius: float, spacing: float
 ) -> np.ndarray:
-    """Links (k, 2) between nearby points in narrow places of different regions."""
+    """Return index pairs (k, 2) of nearby points between which the ball can move straight.
+
+    Only pairs of points in different regions are returned.
+
+    Args:
+        centre: points in narrow places [m], (n, 3).
+        region: region of each point, (n,).
+        radius: of the ball [m].
+        spacing: largest distance between neighbouring points [m].
+    """
     from scipy.spatial import KDTree
 
     if len(centre) < 2:
@@ -274,7 +294,9 @@ def find_reach(
 
 
 def reached_part_share(reach: Reach, source: np.ndarray, count: int) -> np.ndarray:
-    """Share (count,) of each part triangle that the ball can touch. It is 0 outside the cavity.
+    """Return the share of each part triangle that the ball can touch, (count,).
+
+    It is 0 for triangles outside the cavity.
 
     Args:
         source: part triangle under each triangle of the cavity, else -1; shape (k,).
@@ -286,14 +308,23 @@ def reached_part_share(reach: Reach, source: np.ndarray, count: int) -> np.ndarr
 
 
 def _share(triangle: np.ndarray, area: np.ndarray, touched: np.ndarray, count: int) -> np.ndarray:
-    """Touched share (count,) of each triangle, from the touched shares of its pieces (p,)."""
+    """Return the touched share of each triangle, (count,), from those of its pieces.
+
+    Args:
+        triangle: triangle that each piece is of, (p,).
+        area: of each piece [m²], (p,).
+        touched: share of each piece that is touched, (p,).
+    """
     whole = np.bincount(triangle, area, count)
     part = np.bincount(triangle, touched * area, count)
     return np.divide(part, whole, out=np.zeros(count), where=whole > 0.0)
 
 
 def _spacing(mesh: TriangleMesh, wanted: float) -> np.ndarray:
-    """Distance [m] between touch points on each triangle (k,)."""
+    """Return the distance [m] between touch points on each triangle of a cavity, (k,).
+
+    It is the wanted distance, unless the points would be too many or too few on a part triangle.
+    """
     size = areas(mesh.vertices, mesh.triangles)
     spacing = np.full(len(size), wanted)
     for chosen in (mesh.tags == TAG_PART, mesh.tags != TAG_PART):

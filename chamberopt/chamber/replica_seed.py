@@ -6,7 +6,7 @@ STREAMS = ("search", "confirm")
 
 
 def replica_seed(seed: int, replica: int, stream: str = "search") -> int:
-    """The random seed of one replica, 128 bits.
+    """Return the random seed, 128 bits, of one replica of a design with this seed.
 
     It is the same for every candidate of a study (common random numbers). It differs between
     replicas and between streams, so a candidate that is chosen on "search" is confirmed on other

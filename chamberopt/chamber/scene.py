@@ -21,12 +21,15 @@ if TYPE_CHECKING:
 
 
 def start_velocities(rng: np.random.Generator, count: int, rms_speed: float) -> np.ndarray:
-    """Isotropic Maxwell velocities [m/s], shape (count, 3), of this rms speed [m/s]."""
+    """Return random Maxwell velocities [m/s] in all directions, (count, 3), of this rms speed."""
     return rng.normal(0.0, rms_speed / np.sqrt(3.0), (count, 3))
 
 
 def chamber_mesh(chamber: Chamber) -> TriangleMesh:
-    """The chamber's surface for the simulator. It holds a search tree: make it once a chamber."""
+    """Return the chamber's surface in the simulator's form.
+
+    Make it once for each chamber, because building its search tree takes time.
+    """
     from sim_core import TriangleMesh
 
     return TriangleMesh(chamber.vertices, chamber.triangles, chamber.tags)
@@ -43,7 +46,12 @@ def require_ball_count(design: Design) -> None:
 
 
 def part_rotation(design: Design, axis: Axis | None, phase: float = 0.0) -> PartRotation | None:
-    """The rotation of a turning part with its phase [rad] at the start, or None."""
+    """Return the rotation of a turning part; None if the part does not turn.
+
+    Args:
+        axis: a point [m] on the axis and its direction, in the chamber's frame.
+        phase: at the start [rad].
+    """
     from sim_core import PartRotation
 
     turn = design.effects.part_turn
@@ -70,7 +78,7 @@ def require_turnable(design: Design, mesh: TriangleMesh, axis: Axis | None) -> N
 
 
 def balls_can_rest(design: Design, mesh: TriangleMesh | AnalyticCavity) -> bool:
-    """True if balls can lie still: by the design, or because a surface at rest faces up."""
+    """True if balls can lie still: as effects.rest says, or if a surface at rest faces up."""
     from sim_core import Gravity, can_rest
 
     if design.effects.rest is not None:
@@ -83,7 +91,7 @@ def balls_can_rest(design: Design, mesh: TriangleMesh | AnalyticCavity) -> bool:
 
 
 def vibrations(design: Design, phase: float) -> Vibration | tuple[Vibration, ...]:
-    """The vibration of the sonotrode, or of each sonotrode if there are several.
+    """Return the vibration of the only sonotrode, or a tuple with that of each of several.
 
     Args:
         phase: of the first sonotrode at the start [rad]. The phases of the others are added to it,
@@ -107,10 +115,12 @@ def scene_physics(
     phase_seed: int = 0,
     axis: Axis | None = None,
 ) -> Physics:
-    """The effects of a design in its chamber's mesh or analytical cavity.
+    """Return the simulator's effects for a design in its chamber's mesh or analytical cavity.
+
+    Raises InputError if the effects are still "auto".
 
     Args:
-        axis: of a turning part, as `turning_axis` gives it.
+        axis: of a turning part: a point [m] and a direction, in the chamber's frame.
         phase, turn_phase: of the sonotrode and of a turning part at the start [rad].
         phase_seed: for motion = "random_phase", the seed of each ball's phase.
     """
@@ -148,7 +158,7 @@ def scene_physics(
 def build_scene(
     design: Design, mesh: TriangleMesh | AnalyticCavity, seed: int, axis: Axis | None = None
 ) -> Scene:
-    """The scene that one replica simulates. Equal arguments give bit-identical scenes.
+    """Return the scene that one replica simulates. Equal arguments give bit-identical scenes.
 
     The shot starts packed low in the chamber, at the speed scale of the sonotrode, 2 pi f A. So the
     warm-up has to forget only the arrangement, and the shot's energy need not change by orders of
@@ -156,7 +166,7 @@ def build_scene(
     part may take longer than a replica.
 
     Args:
-        axis: of a turning part, as `turning_axis` gives it.
+        axis: of a turning part: a point [m] and a direction, in the chamber's frame.
     Raises:
         InputError: the shot does not fit or has too many balls, or the part cannot turn.
     """

@@ -15,7 +15,11 @@ AMPLITUDE_RANGE, DIAMETER_RANGE, DENSITY_RANGE = 1.3, 1.5, 1.05
 
 
 def calibration_warnings(design: Design) -> list[str]:
-    """Warnings about values outside the calibration, and about measurements it does not explain."""
+    """Return warnings about a design for which its calibration may not hold.
+
+    They are about values beyond those measured at, measurements that the calibrated model does not
+    explain, and strips that were not measured or not whole.
+    """
     one = design.calibration
     if one is None:
         return []
@@ -51,7 +55,7 @@ def calibration_warnings(design: Design) -> list[str]:
 
 
 def misfit_texts(calibration: Calibration) -> list[str]:
-    """Texts on the measurements that the model does not explain."""
+    """Return a text for each kind of measurement that the calibrated model does not explain."""
     return [
         f"calibration: the model explains your {misfit.kind} only with errors "
         f"{misfit.error_scale:.2g} times as large, as intervals have them: look at the picture of "

@@ -44,10 +44,10 @@ Facts = dict[str, object]
 
 
 def describe(design: Design, chamber: Chamber, reach: Reach | None = None) -> dict[str, Any]:
-    """Facts and warnings about a design and its chamber, as JSON values with named units.
+    """Return facts and warnings about a design and its chamber, as JSON values with named units.
 
     Args:
-        reach: the chamber's `shot_reach`, if it is already known.
+        reach: the places that the shot reaches, if they are already known.
     Raises:
         InputError: there are too many balls, or the part cannot turn.
         sim_core.SceneError: the cavity is not closed; names the place.
@@ -80,7 +80,7 @@ def describe(design: Design, chamber: Chamber, reach: Reach | None = None) -> di
 
 
 def first_facts(design: Design, chamber: Chamber) -> dict[str, Facts]:
-    """The facts that are known as soon as the chamber is built."""
+    """Return the facts that are known as soon as the chamber is built, by subject and name."""
     part, shot = chamber.part, design.shot
     exposed = chamber.exposed_area > 0.0
     box, low = np.ptp(part.vertices, axis=0), part.vertices.min(axis=0)
@@ -128,7 +128,11 @@ def first_facts(design: Design, chamber: Chamber) -> dict[str, Facts]:
 
 
 def _smoothing_facts(part: Part, ball: float) -> Facts:
-    """Facts on the smoothing of the target's rounds, if the target has rounds."""
+    """Return facts on how facets of the target's curved surfaces were smoothed; none without any.
+
+    Args:
+        ball: diameter of the smallest ball [m].
+    """
     facts = part.smoothing
     if facts is None or not facts.facet_turn:
         return {}
@@ -145,14 +149,18 @@ def _smoothing_facts(part: Part, ball: float) -> Facts:
 
 
 def with_clearance(facts: dict[str, Facts], mesh: TriangleMesh) -> dict[str, Facts]:
-    """The first facts with the sonotrode's clearance, from the closed mesh of the chamber."""
+    """Return the facts of `first_facts` with the distance between sonotrode and part added.
+
+    Args:
+        mesh: closed mesh of the chamber.
+    """
     clearance = _rounded(sonotrode_clearance(mesh) * 1e3)
     more = {"closed": "yes", "sonotrode_clearance_mm": clearance}
     return {**facts, "chamber": facts["chamber"] | more}
 
 
 def notes(design: Design, chamber: Chamber) -> list[str]:
-    """Notes on assumptions, and on effects that the design leaves out."""
+    """Return notes on what the chamber assumes, and on effects that the design leaves out."""
     return [
         *chamber.notes,
         *_place_notes(design),
@@ -162,7 +170,10 @@ def notes(design: Design, chamber: Chamber) -> list[str]:
 
 
 def shot_reach(design: Design, chamber: Chamber) -> Reach:
-    """The reach of the shot, with a turning part as drawn. It takes a second or two."""
+    """Return the places of a chamber that the shot reaches, with a turning part at rest as drawn.
+
+    It takes a second or two.
+    """
     return find_reach(
         chamber_mesh(chamber),
         min(design.shot.diameters),
@@ -172,7 +183,11 @@ def shot_reach(design: Design, chamber: Chamber) -> Reach:
 
 
 def warnings(design: Design, chamber: Chamber, reach: Reach | None = None) -> list[str]:
-    """Warnings about values that are allowed but probably not intended, each with a remedy."""
+    """Return warnings about values that are allowed but probably not intended, with remedies.
+
+    Args:
+        reach: the places that the shot reaches, if they are already known.
+    """
     reach = shot_reach(design, chamber) if reach is None else reach
     texts = first_warnings(design, chamber, reach.mesh)
     for name, surface in _to_be_peened(design, chamber).items():
@@ -185,7 +200,7 @@ def warnings(design: Design, chamber: Chamber, reach: Reach | None = None) -> li
 
 
 def first_warnings(design: Design, chamber: Chamber, mesh: TriangleMesh) -> list[str]:
-    """The warnings that do not depend on the reach of the shot.
+    """Return the warnings that do not depend on which places the shot reaches.
 
     Args:
         mesh: of the chamber.
@@ -230,20 +245,26 @@ def first_warnings(design: Design, chamber: Chamber, mesh: TriangleMesh) -> list
 
 
 def _to_be_peened(design: Design, chamber: Chamber) -> dict[str, Chamber]:
-    """The surfaces of the chamber, without zones that are to be spared."""
+    """Return the chamber with its target, then with each zone to be peened as its target, by name.
+
+    Zones that are to be spared are left out.
+    """
     spared = {f"zone {one.name}" for one in design.zones if one.is_spared}
     return {name: one for name, one in chamber.surfaces().items() if name not in spared}
 
 
 def _place_notes(design: Design) -> list[str]:
-    """A note on the place of a part that the design does not move."""
+    """Return a note on where the part is, if the design does not move it sideways."""
     if design.chamber.setup() is not None or any(design.part.offset):
         return []
     return ["the middle of the part's box is on the chamber's axis; part.offset_mm moves it"]
 
 
 def friction_notes(design: Design) -> list[str]:
-    """A note on the effect of leaving friction out of a design; see docs/physics.md."""
+    """Return a note on what leaving friction out changes, if the design leaves it out.
+
+    Source: docs/physics.md.
+    """
     if design.effects.friction is not None or design.effects.auto:
         return []
     remedy = (
@@ -259,7 +280,7 @@ def friction_notes(design: Design) -> list[str]:
 
 
 def _reach_facts(reach: Reach, chamber: Chamber) -> Facts:
-    """Area of the target and of the part in the chamber that the smallest balls can touch."""
+    """Return area and share of the target and of the part that the smallest balls can touch."""
     size = areas(chamber.vertices, chamber.triangles)
     facts: Facts = {"ball_mm": _rounded(reach.diameter * 1e3)}
     for name, rows in (("target", chamber.on_target), ("part", chamber.tags == TAG_PART)):
@@ -270,13 +291,16 @@ def _reach_facts(reach: Reach, chamber: Chamber) -> Facts:
 
 
 def _reached_share(reach: Reach, rows: np.ndarray) -> float:
-    """Share of the marked triangles of the cavity (k,) that the ball can touch."""
+    """Return the share of the area of the marked cavity triangles (k,) that the ball can touch."""
     size = areas(reach.mesh.vertices, reach.mesh.triangles)[rows]
     return float(reach.share[rows] @ size / size.sum())
 
 
 def _zone_facts(reach: Reach, chamber: Chamber) -> dict[str, Facts]:
-    """Size of each zone, and the share of its exposed area that the smallest balls can touch."""
+    """Return the size of each zone, and the share of it that the smallest balls can touch.
+
+    The share is of the zone's area inside the cavity.
+    """
     part = chamber.part
     share = reached_part_share(reach, chamber.source, len(part.triangles))
     facts: dict[str, Facts] = {}
@@ -292,7 +316,7 @@ def _zone_facts(reach: Reach, chamber: Chamber) -> dict[str, Facts]:
 
 
 def _turn_facts(design: Design, part: Part) -> dict[str, Facts]:
-    """The motion of a turning part, with its axis in the chamber's frame."""
+    """Return motion and axis of a turning part, in the chamber's frame; nothing if none turns."""
     turn, line = design.effects.part_turn, turning_axis(design, part)
     if turn is None or line is None:
         return {}
@@ -306,7 +330,10 @@ def _turn_facts(design: Design, part: Part) -> dict[str, Facts]:
 
 
 def _tolerance_facts(design: Design) -> dict[str, Facts]:
-    """The range of each number with a tolerance. InputError if a tolerance is out of bounds."""
+    """Return lowest, given and highest value of each number with a tolerance.
+
+    Raises InputError if the design is not valid at either end of a range.
+    """
     require_tolerances(design)
     box = tolerance_box(design)
     ranges: Facts = {
@@ -316,7 +343,7 @@ def _tolerance_facts(design: Design) -> dict[str, Facts]:
 
 
 def _side_wall_warnings(design: Design, chamber: Chamber) -> list[str]:
-    """A warning that the part is joined to the side wall.
+    """Return a warning if the part goes out through the side wall, else an empty list.
 
     There is no warning for a part that closes the chamber like a lid, turns (its joint is a round
     shaft), has a hole for its fixture, or is drawn with its chamber.
@@ -341,7 +368,11 @@ def _side_wall_warnings(design: Design, chamber: Chamber) -> list[str]:
 
 
 def _sonotrode_warnings(design: Design, mesh: TriangleMesh, line: Axis | None) -> list[str]:
-    """A warning about a sonotrode, or a ball on a sonotrode, that may hit the part."""
+    """Return a warning if the sonotrode may hit the part, or a ball may be jammed between them.
+
+    Args:
+        line: axis of a turning part: a point [m] and a direction.
+    """
     amplitude, ball = design.sonotrode.amplitude, design.shot.diameter
     remedy = "raise chamber.sonotrode_distance_mm"
     clear, turn = sonotrode_clearance(mesh), design.effects.part_turn
@@ -363,7 +394,10 @@ def _sonotrode_warnings(design: Design, mesh: TriangleMesh, line: Axis | None) -
 
 
 def sonotrode_clearance(mesh: TriangleMesh) -> float:
-    """Least distance [m] from a corner of the part to the sonotrode or back; inf without a part."""
+    """Return the least distance [m] between part and sonotrode; inf without a part.
+
+    It is the least from a corner of either to the surface of the other.
+    """
     from sim_core import closest_points
 
     if not ((mesh.tags == TAG_PART).any() and (mesh.tags == TAG_SONOTRODE).any()):
@@ -376,7 +410,7 @@ def sonotrode_clearance(mesh: TriangleMesh) -> float:
 
 
 def _lowest_height(line: Axis, points: np.ndarray, amplitude: float | None) -> float:
-    """The lowest height [m] that points (n, 3) [m] of the turning part reach.
+    """Return the lowest height [m] that points (n, 3) [m] of the turning part reach.
 
     At angle a of the part, the height of a point is c + r cos(a - a0) for some c, r and a0. It is
     least where a is furthest from a0.
@@ -396,5 +430,5 @@ def _lowest_height(line: Axis, points: np.ndarray, amplitude: float | None) -> f
 
 
 def _rounded(value: float) -> float:
-    """The value to six figures, for readers."""
+    """Return the value rounded to six figures, for readers."""
     return float(f"{value:.6g}")

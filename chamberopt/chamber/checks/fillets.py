@@ -28,12 +28,12 @@ LEAST_SHARE = 0.01  # share of the target's area that is worth a warning
 
 
 def facets_are_left(part: Part) -> bool:
-    """True if so much of the target has coarse facets that its coverage is theirs."""
+    """True if coarse facets take so much of the target that they decide its coverage."""
     return part.smoothing is not None and part.smoothing.coarse_share >= LEAST_SHARE
 
 
 def facet_warnings(part: Part, ball: float, reachable: float) -> list[str]:
-    """A warning that the target's figures are the figures of its facets.
+    """Return a warning if the target's coverage is that of coarse facets, not of its true surface.
 
     Args:
         ball: diameter of the smallest ball [m].
@@ -61,7 +61,11 @@ def facet_warnings(part: Part, ball: float, reachable: float) -> list[str]:
 
 
 def touched_by_curvature(part: Part, ball: float) -> float:
-    """Share of the target without a hollow rounder than a ball of this diameter [m]."""
+    """Return the share of the target's area with no hollow too sharp for a ball.
+
+    Args:
+        ball: diameter [m].
+    """
     if part.hollow is None:
         return 1.0
     fits = part.hollow * 0.5 * ball <= 1.0 + TOLERATED_OVERLAP
@@ -78,7 +82,11 @@ MAX_POINTS = 5000  # surface points at which slots are searched
 
 
 def fillet_warnings(reach: Reach, chamber: Chamber, largest: float) -> list[str]:
-    """Warnings about fillets and slots that are too small for the largest ball [m]."""
+    """Return warnings about fillets and slots of target and zones too small for the largest ball.
+
+    Args:
+        largest: diameter of that ball [m].
+    """
     part = chamber.part
     chosen = np.any([part.target, *part.zones.values()], axis=0) & (chamber.exposed_area > 0.0)
     return [*_fillets(chamber, chosen, largest), *_slots(reach, chamber, chosen, largest)]
@@ -90,7 +98,7 @@ def inner_edges(
     chosen: np.ndarray,
     hollow: np.ndarray | None = None,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Middle, length and fillet radius of each inner edge between chosen triangles.
+    """Find the inner edges between chosen triangles, which are the edges of fillets.
 
     Facets of a height L that turn by an angle a at each edge touch a circle of the radius L / (2
     tan(a / 2)). The radius is 0 at edges that turn by more than SHARP. Triangles of a shaft or a
@@ -139,7 +147,7 @@ def inner_edges(
 
 
 def _turn_across(ends: np.ndarray, way: np.ndarray, turns: np.ndarray) -> np.ndarray:
-    """Turn of the surface across each edge [m rad], summed over the edges at both its ends.
+    """Return how much the surface turns across each edge [m rad], summed over edges at its ends.
 
     Each edge counts by its turn, its length and its squared cosine to the given edge. Sharp edges,
     at which a fillet ends, do not count.
@@ -177,7 +185,12 @@ def _fillets(chamber: Chamber, chosen: np.ndarray, largest: float) -> list[str]:
 
 
 def _slots(reach: Reach, chamber: Chamber, chosen: np.ndarray, largest: float) -> list[str]:
-    """A warning about faces of the part that face each other less than four balls apart."""
+    """Return a warning if faces of the part face each other less than four balls apart.
+
+    Args:
+        chosen: marks part triangles on the target or a zone, (m,).
+        largest: diameter of the largest ball [m].
+    """
     mesh, touches = reach.mesh, reach.touches
     source = chamber.source[touches.triangle]
     own = np.flatnonzero((source >= 0) & chosen[np.maximum(source, 0)])
@@ -201,7 +214,7 @@ def _slots(reach: Reach, chamber: Chamber, chosen: np.ndarray, largest: float) -
 
 
 def _low_quantile(values: np.ndarray, weight: np.ndarray) -> float:
-    """The value below which the share SMALLEST of the weight lies."""
+    """Return the value below which only the share SMALLEST of the total weight lies."""
     order = np.argsort(values)
     upto = np.cumsum(weight[order])
     return float(values[order][np.searchsorted(upto, SMALLEST * upto[-1])])

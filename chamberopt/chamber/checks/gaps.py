@@ -43,7 +43,12 @@ GapKind = tuple[str, str, bool]
 
 
 def gap_warnings(reach: Reach, chamber: Chamber, largest: float, turns: bool = False) -> list[str]:
-    """Warnings about gaps narrower than the largest ball [m], the largest areas first."""
+    """Return warnings about gaps narrower than the largest ball, the largest areas first.
+
+    Args:
+        largest: diameter of that ball [m].
+        turns: True if the part turns, so that a ball may be jammed beside it.
+    """
     touches = reach.touches
     facing = (touches.obstacle >= 0) & (touches.cosine < MAX_COSINE)
     narrow = facing & (touches.radius < 0.5 * largest)
@@ -64,7 +69,7 @@ def gap_warnings(reach: Reach, chamber: Chamber, largest: float, turns: bool = F
 
 
 def pocket_warnings(reach: Reach, chamber: Chamber) -> list[str]:
-    """Warnings about pockets that could hold a ball but let no ball in, the largest areas first."""
+    """Return warnings about pockets that could hold a ball but let none in, largest areas first."""
     touches, closed = reach.touches, reach.fits & ~reach.reached
     target = chamber.on_target[touches.triangle]
     found: list[tuple[float, str]] = []
@@ -86,10 +91,11 @@ def pocket_warnings(reach: Reach, chamber: Chamber) -> list[str]:
 def surface_warnings(
     reach: Reach, chamber: Chamber, name: str = TARGET, only_reachable: bool = False
 ) -> list[str]:
-    """A warning about the share of the target that no ball can touch, for any peening time.
+    """Return a warning if no ball can touch some of the target, however long it is peened.
 
     Args:
-        chamber: the chamber with the named surface as its target, see `Chamber.surfaces`.
+        chamber: the chamber with the named surface as its target.
+        name: the surface, for the message: "the target" or "zone NAME".
         only_reachable: true if the design takes only the reachable surface for the target.
     """
     touches = reach.touches
@@ -116,7 +122,11 @@ def surface_warnings(
 
 
 def _clusters(centre: np.ndarray, near: float) -> list[np.ndarray]:
-    """Indices of the points (n, 3) [m] in each group linked by steps of at most ``near`` [m]."""
+    """Return the indices of the points in each group that steps of at most ``near`` [m] link.
+
+    Args:
+        centre: the points [m], (n, 3).
+    """
     from scipy.spatial import KDTree
 
     if not len(centre):
@@ -132,6 +142,7 @@ def _is_wedge(gap: TouchPoints, entrance: np.ndarray, largest: float, near: floa
 
     Args:
         entrance: centres (n, 3) [m] of reached balls in gaps slightly wider than the largest ball.
+        largest: diameter of the largest ball [m].
         near: distance from the gap to its entrance [m].
     """
     from scipy.spatial import KDTree
@@ -143,7 +154,13 @@ def _is_wedge(gap: TouchPoints, entrance: np.ndarray, largest: float, near: floa
 def _gap_warning(
     kind: GapKind, gaps: list[TouchPoints], smallest: float, largest: float, turns: bool
 ) -> str:
-    """A sentence on all gaps of a kind, for balls between two diameters [m]."""
+    """Return one warning about all gaps between the same two surfaces.
+
+    Args:
+        kind: names of both surfaces, and True if a ball can wedge in the gap.
+        smallest, largest: diameters of the balls [m].
+        turns: True if the part turns.
+    """
     one, two, wedge = kind
     biggest = max(gaps, key=lambda gap: gap.area.sum())
     radius = np.concatenate([gap.radius for gap in gaps])
@@ -202,7 +219,7 @@ class Ledge(NamedTuple):
 
 
 def find_ledges(design: Design, chamber: Chamber) -> list[Ledge]:
-    """The places on part and wall where balls can come to rest.
+    """Return the places on part and wall where balls can come to rest, each with a message.
 
     Such surfaces face up, and neither vibrate nor turn.
     """

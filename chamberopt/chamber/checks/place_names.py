@@ -1,4 +1,4 @@
-"""Names of places and surfaces of a chamber, for messages."""
+"""Put places and surfaces of a chamber into words, for messages."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ CEILING, SIDE_WALL, SONOTRODE = "the ceiling", "the wall", "the sonotrode"
 
 
 def surface_names(chamber: Chamber) -> np.ndarray:
-    """Name of the surface of each triangle, (k,) of str."""
+    """Return a name, such as "the ceiling", for the surface that each triangle is on, (k,)."""
     up = -unit_vectors(area_vectors(chamber.vertices, chamber.triangles))[:, 2]
     faces = [up > MIN_UPWARD, up < -MIN_UPWARD]
     sides = ["the part's upper side", "the part's underside"]
@@ -31,17 +31,20 @@ def surface_names(chamber: Chamber) -> np.ndarray:
 
 
 def around(points: np.ndarray, weights: np.ndarray | None = None) -> str:
-    """Mean of points (n, 3) [m] with weights (n,) as text, e.g. "(1.0, 2.0, 3.0) mm"."""
+    """Return the weighted mean of points (n, 3) [m] as text, such as "(1.0, 2.0, 3.0) mm"."""
     middle = np.average(1e3 * points, axis=0, weights=weights)
     return f"({', '.join(f'{x:.1f}' for x in np.round(middle, 1) + 0.0)}) mm"
 
 
 def mm2(area: float) -> str:
-    """An area [m²] as text in mm², to three figures."""
+    """Return an area given in m² as text in mm², to three figures."""
     return f"{float(f'{1e6 * area:.3g}'):g} mm²"
 
 
 def one_of(points: np.ndarray, weights: np.ndarray) -> str:
-    """The point of (n, 3) [m] closest to their mean, as text. A ring's mean lies off the ring."""
+    """Return as text the one of the points (n, 3) [m] that is closest to their weighted mean.
+
+    The mean itself may lie off the points, as that of a ring does.
+    """
     middle = np.average(points, axis=0, weights=weights)
     return around(points[[np.linalg.norm(points - middle, axis=1).argmin()]])

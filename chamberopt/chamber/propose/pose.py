@@ -25,7 +25,7 @@ LOW = 0.05  # advantage of a target at the part's lower end over a target at its
 def propose_pose(
     vertices: np.ndarray, triangles: np.ndarray, target: np.ndarray
 ) -> tuple[Turns, str]:
-    """Turns about x, then y, then z [degrees] of a part, and the reason for them.
+    """Return turns of a part about x, then y, then z [degrees], and the reason for them.
 
     Args:
         vertices: [m], shape (n, 3).
@@ -60,7 +60,10 @@ def propose_pose(
 
 
 def square_to_walls(vertices: np.ndarray, turns: Turns) -> Turns:
-    """The turns that also bring the long side of the part along x, as seen from above."""
+    """Return the turns [degrees] with one more about z that brings the part's long side along x.
+
+    The long side is that of the smallest rectangle round the part as seen from above.
+    """
     from shapely import MultiPoint
 
     plan = (vertices @ rotation_matrix(turns).T)[:, :2]
@@ -73,7 +76,14 @@ def square_to_walls(vertices: np.ndarray, turns: Turns) -> Turns:
 
 
 def _downs(normal: np.ndarray, weight: np.ndarray) -> Iterator[tuple[np.ndarray, float]]:
-    """Directions (3,) in the file's frame that may point down, and the advantage of each."""
+    """Yield directions (3,) of the part's file that may be turned down, and an advantage for each.
+
+    The advantage is added to what the exposure of the pose is worth.
+
+    Args:
+        normal: unit normals of the target's triangles, (m, 3).
+        weight: share of the target's area of each, (m,).
+    """
     for axis in (2, 0, 1):
         for sign in (-1.0, 1.0):
             yield sign * np.eye(3)[axis], AS_DRAWN if (axis, sign) == (2, -1.0) else ALONG_AXIS
@@ -86,7 +96,7 @@ def _downs(normal: np.ndarray, weight: np.ndarray) -> Iterator[tuple[np.ndarray,
 
 
 def turns_down(down: np.ndarray) -> Turns:
-    """Turns about x, then y [degrees, to a tenth], that turn a direction down.
+    """Return the turns about x, then y [degrees, to a tenth] that turn a direction down.
 
     >>> turns_down(np.array([1.0, 0.0, 0.0]))
     (0.0, 90.0, 0.0)

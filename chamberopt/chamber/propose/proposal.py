@@ -49,7 +49,7 @@ MISSED = 0.05  # share of the target's area that a larger ball may leave out
 def touched_shares(
     vertices: np.ndarray, triangles: np.ndarray, target: np.ndarray, diameters: Sequence[float]
 ) -> np.ndarray:
-    """Share of a part's target that balls of each diameter [m] can touch, from any side.
+    """Return the share of a part's target that balls of each diameter [m] can touch from any side.
 
     Args:
         vertices: of the part [m], shape (n, 3).
@@ -74,10 +74,14 @@ def touched_shares(
 def fit_fillets(
     vertices: np.ndarray, triangles: np.ndarray, target: np.ndarray, diameters: Sequence[float]
 ) -> np.ndarray:
-    """Mark the diameters [m] that are small enough for the fillets of a part's target.
+    """Return True for each ball diameter [m] that is small enough for the target's fillets.
 
-    Arguments as in `touched_shares`. Inner edges without a fillet are left out, because no ball
-    fits.
+    Inner edges without a fillet are left out, because no ball fits.
+
+    Args:
+        vertices: of the part [m], shape (n, 3).
+        triangles: normals out of the part, shape (m, 3).
+        target: marks triangles, shape (m,).
     """
     _, length, radius = inner_edges(vertices, triangles, target)
     small = [(radius > 0.0) & (OF_FILLET * radius < one) for one in diameters]
@@ -87,14 +91,14 @@ def fit_fillets(
 def propose_ball(
     shares: np.ndarray, fits: np.ndarray, diameters: Sequence[float]
 ) -> tuple[float, str]:
-    """The diameter [m] of the proposed ball, and the reason.
+    """Return the diameter [m] of the proposed ball, and the reason for it.
 
     It is the largest ball that touches nearly as much as the smallest, and that is small enough for
     the fillets if there is such a ball.
 
     Args:
-        shares: from `touched_shares`.
-        fits: from `fit_fillets`.
+        shares: share of the target that balls of each diameter can touch.
+        fits: True for each diameter that is small enough for the target's fillets.
         diameters: [m], in ascending order.
     """
     touching = shares >= shares[0] - MISSED
@@ -118,7 +122,7 @@ HEAVIEST_G = allowed_range(ShotTable.model_fields["mass_g"])[1]
 
 
 class Range(NamedTuple):
-    """The range of a number of the design, in its unit, and the step between its values."""
+    """The range in which a study varies a number, in its unit, and the step between values."""
 
     low: float
     high: float
@@ -126,7 +130,7 @@ class Range(NamedTuple):
 
 
 def propose_charge(floor: float, diameter: float, ball_mass: float) -> tuple[float, str]:
-    """Mass of the charge [g] to two digits, and the reason for it.
+    """Return the mass of all balls together [g], to two digits, and the reason for it.
 
     Args:
         floor: area of the sonotrode [m²].
@@ -142,7 +146,14 @@ def propose_charge(floor: float, diameter: float, ball_mass: float) -> tuple[flo
 def propose_ranges(
     sizes: Sizes, mass_g: float, ball_mm: float, ball_mass: float
 ) -> dict[str, Range]:
-    """The ranges of the numbers that the study varies, by dotted name."""
+    """Return the range of each number that the proposed study varies, by dotted name.
+
+    Args:
+        sizes: sizes of the chamber.
+        mass_g: of all balls together.
+        ball_mm: ball diameter.
+        ball_mass: of one ball [kg].
+    """
     distance, height = round(1e3 * sizes.distance), round(1e3 * sizes.height)
     far = round(1.25 * distance)
     near = max(round(0.4 * distance), math.ceil(2.0 * ball_mm))
@@ -160,17 +171,21 @@ def propose_ranges(
 
 
 def _lengths(low: float, high: float) -> Range:
-    """The range of lengths between two whole lengths [mm]."""
+    """Return the range between two lengths [mm], with fine steps unless it is long."""
     return Range(low, high, FINE_MM if high - low <= FEW_MM else COARSE_MM)
 
 
 def _second_digit(mass: float) -> float:
-    """The step of the second significant digit of a mass."""
+    """Return the step of a mass's second significant digit, such as 10 for 345."""
     return 10.0 ** (math.floor(math.log10(mass)) - 1)
 
 
 def _heaviest_g(ball_mass: float) -> float:
-    """The largest charge [g] of two digits that the program takes."""
+    """Return the largest mass of all balls [g], to two digits, that the program takes.
+
+    Args:
+        ball_mass: of one ball [kg].
+    """
     most = min(1e3 * MAX_BALLS * ball_mass, HEAVIEST_G)
     digit = _second_digit(most)
     return float(f"{digit * math.floor(most / digit + 1e-9):.6g}")
@@ -189,7 +204,7 @@ Tables = dict[str, dict[str, Any]]
 
 @dataclass(frozen=True)
 class Wanted:
-    """The wishes of the user. None and empty texts leave the choice to the proposal."""
+    """The user's wishes for a proposed design. None or an empty text leaves the choice open."""
 
     unit: str = "guess"
     shape: str | None = None
@@ -200,7 +215,7 @@ class Wanted:
 
 @dataclass(frozen=True)
 class Proposal:
-    """A design with the reason for each value, and the warnings of its check."""
+    """A proposed design, the reason for each value, and the warnings of its check."""
 
     design: Design
     tables: Tables  # the values of the design file
@@ -293,7 +308,10 @@ def propose(
 
 
 def _shot(name: str) -> str:
-    """The material of the named balls. InputError if their restitution is not known."""
+    """Return the catalogue's name of a material of balls.
+
+    Raises InputError if it is unknown, or its hardness and so its restitution is not known.
+    """
     found = ball(name)
     if found.hardness_HB is None:
         known = ", ".join(one.name for one in balls() if one.hardness_HB is not None)
@@ -303,7 +321,7 @@ def _shot(name: str) -> str:
 
 
 def _read(path: Path, unit: str) -> PartMesh:
-    """The part of a file. Messages and notes name the command's option, not the design's field."""
+    """Return the part in a file. Messages name the option --unit, not the design's part.unit."""
     try:
         mesh = read_part(path, unit)
     except InputError as error:
@@ -321,7 +339,7 @@ def _require_near_origin(path: Path, target: Target) -> None:
 
 
 def _ball_diameter(mesh: PartMesh, target: Target, wanted: Wanted) -> tuple[float, str]:
-    """Diameter [m] of the balls, and the reason for it."""
+    """Return the wanted or proposed diameter of the balls [m], and the reason for it."""
     if wanted.ball_mm is not None:
         return 1e-3 * wanted.ball_mm, "as asked"
     least = float(np.sort(mesh.size)[1]) / BALLS_ACROSS
@@ -358,7 +376,17 @@ def _size_reasons(sizes: Sizes) -> dict[str, str]:
 def _checked(
     tables: Tables, reasons: dict[str, str], sizes: Sizes, known: Sequence[Surface], mesh: PartMesh
 ) -> Proposal:
-    """The proposal of these values with its charge, built and checked."""
+    """Choose the mass of the balls for these values, and return the built and checked proposal.
+
+    Raises InputError if the chamber would be too large or cannot be built.
+
+    Args:
+        tables: tables of the design file. Their mass of the balls is replaced.
+        reasons: reason for each value, by dotted name.
+        sizes: sizes of the chamber, from which the ranges of the study follow.
+        known: surfaces to choose the target from.
+        mesh: the part.
+    """
     largest = max(size for key, size in tables["chamber"].items() if key.endswith("_mm"))
     if largest > LARGEST_MM:
         text = f"the part measures {format_box(mesh.size)}, too much for a chamber: it would need"
@@ -379,7 +407,7 @@ def _checked(
 
 
 def _nested(tables: Tables) -> dict[str, Any]:
-    """Nested tables from tables by dotted name."""
+    """Return tables with dotted names, such as "part.target", as tables inside each other."""
     nested: dict[str, Any] = {}
     for name, values in tables.items():
         table = nested

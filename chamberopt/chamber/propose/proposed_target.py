@@ -1,4 +1,7 @@
-"""Propose the surface of a part to peen: names of its file, or faces between its edges."""
+"""Propose the surface of a part to peen, and the sizes of a chamber round the part.
+
+The surface is chosen from names in the part's file and from faces between sharp edges.
+"""
 
 from __future__ import annotations
 
@@ -30,7 +33,7 @@ SIDES = 6  # of a prism
 
 @dataclass(frozen=True)
 class Sizes:
-    """Sizes of a chamber round a part."""
+    """Shape and sizes of a proposed chamber round a part."""
 
     shape: str
     plan: dict[str, float | str]  # keys of [chamber] for its form in plan, and their values
@@ -42,14 +45,17 @@ class Sizes:
 
 
 def shape_for(box: np.ndarray) -> str:
-    """The shape for a part with a box of these sides (3,) [m]."""
+    """Return the name of the chamber's shape for a part with a bounding box of these sides (3,).
+
+    It is "box" if the part is long seen from above, else "cylinder".
+    """
     return "box" if max(box[:2]) > LONG * min(box[:2]) else "cylinder"
 
 
 def propose_sizes(
     vertices: np.ndarray, target_top: float, ball: float, shape: str, wider: float = 1.0
 ) -> Sizes:
-    """Sizes of a chamber of a shape in SHAPES.
+    """Return the sizes of a chamber of the named shape, with room for balls round the part.
 
     Args:
         vertices: of the turned part, with its lowest point at z = 0 [m], shape (n, 3).
@@ -83,7 +89,7 @@ def propose_sizes(
 
 
 def _up_mm(length: float) -> float:
-    """A length [m] in whole millimetres, rounded up."""
+    """Return a length given in m in whole millimetres, rounded up."""
     return float(math.ceil(1e3 * length - 1e-6))
 
 
@@ -118,7 +124,7 @@ class Surface:
 
 @dataclass(frozen=True)
 class Target:
-    """The surface to peen."""
+    """The proposed surface to peen, and the reason for it."""
 
     keys: Keys
     triangles: np.ndarray  # (m,) bool
@@ -126,7 +132,10 @@ class Target:
 
 
 def surfaces(mesh: PartMesh) -> list[Surface]:
-    """All surfaces to choose from: the file's names, then faces, the largest first."""
+    """Return all surfaces that the target can be chosen from.
+
+    First are the surfaces that the file names, then faces, each the largest first.
+    """
     area = areas(mesh.vertices, mesh.triangles)
     named: dict[bytes, Surface] = {}
     for name, marked in sorted(
@@ -142,7 +151,7 @@ def surfaces(mesh: PartMesh) -> list[Surface]:
 
 
 def propose_target(mesh: PartMesh, known: Sequence[Surface], wanted: Iterable[str]) -> Target:
-    """The target with the wanted surface names, or the likeliest target without names.
+    """Return the target that has the wanted surfaces, or the likeliest one if none is wanted.
 
     Raises:
         InputError: there is no surface of that name.
@@ -185,7 +194,10 @@ def propose_target(mesh: PartMesh, known: Sequence[Surface], wanted: Iterable[st
 
 
 def _faces(mesh: PartMesh) -> list[Surface]:
-    """The kinds of faces, each with all its alike faces."""
+    """Return the faces between sharp edges, the largest first, as surfaces.
+
+    Faces that are alike are one surface.
+    """
     faces = Faces(mesh.vertices, mesh.triangles, CREASE_DEG)
     left, found = np.ones(faces.count, dtype=bool), []
     for face in np.argsort(-faces.area, kind="stable"):
@@ -215,14 +227,14 @@ def _named(mesh: PartMesh, name: str, marked: np.ndarray) -> Surface:
 
 
 def _is_vivid(name: str) -> bool:
-    """True if a name is a vivid colour. A grey usually marks the whole body."""
+    """True if a name is a vivid colour, such as #ff0000. A grey usually marks the whole body."""
     found = COLOUR.match(name)
     levels = [int(level, 16) for level in found.groups()] if found else [0]
     return max(levels) - min(levels) > VIVID
 
 
 def _from_red(colour: str) -> float:
-    """Distance of a colour's hue from red, the usual mark, from 0 to 1/2."""
+    """Return the distance of a colour's hue from red, the usual mark, from 0 to 1/2."""
     hue = colorsys.rgb_to_hsv(*bytes.fromhex(colour[1:]))[0]
     return min(hue, 1.0 - hue)
 
@@ -248,7 +260,10 @@ def _find(mesh: PartMesh, known: Sequence[Surface], name: str) -> Surface:
 
 
 def _joined(chosen: Sequence[Surface], reason: str) -> Target:
-    """One target of several surfaces. InputError if names are mixed with faces."""
+    """Return one target made of several surfaces.
+
+    Raises InputError if surfaces that the file names are mixed with faces.
+    """
     keys: Keys = {}
     for one in chosen:
         for key, values in one.keys.items():

@@ -1,4 +1,4 @@
-"""The text of a proposal's files, a design and a study, with a reason beside each value."""
+"""Write the texts of a proposed design file and study file, with a reason beside each value."""
 
 from __future__ import annotations
 
@@ -17,7 +17,11 @@ EVALUATIONS, SEARCH_HALF_WIDTH = 20, 0.04
 
 
 def design_text(proposal: Proposal, folder: Path) -> str:
-    """The text of a design file in a folder. It names the part relative to the folder."""
+    """Return the text of the proposed design file.
+
+    Args:
+        folder: folder that the file will be in. The path of the part is relative to it.
+    """
     tables = with_paths_from(folder.resolve(), proposal.tables)
     name = Path(tables["part"]["mesh"]).name
     rules = "proposed by `chamberopt new`: rules of thumb to vary."
@@ -32,7 +36,11 @@ def design_text(proposal: Proposal, folder: Path) -> str:
 
 
 def study_text(proposal: Proposal, design: str) -> str:
-    """The text of a study file beside the named design file."""
+    """Return the text of a study file that varies numbers of the proposed design.
+
+    Args:
+        design: name of the design file, in the same folder.
+    """
     bounds = {name: one._asdict() for name, one in proposal.bounds.items()}
     start = {name: f"now {proposal.design.value(name):g}" for name in proposal.bounds}
     return study_lines(design, bounds, start)
@@ -44,9 +52,10 @@ def study_lines(
     notes: Mapping[str, str],
     evaluations: int = EVALUATIONS,
 ) -> str:
-    """The text of a study that varies numbers of a design file beside it.
+    """Return the text of a study file that varies numbers of a design.
 
     Args:
+        design: name of the design file, in the same folder.
         bounds: keys in [vary] by dotted name, such as low and high.
         notes: a comment on each number.
     """
@@ -86,7 +95,7 @@ def _values(values: Mapping[str, object], table: str, reasons: Mapping[str, str]
 
 
 def _line(key: str, value: object) -> str:
-    """A key and its value on one line."""
+    """Return a key and its value as one line of TOML."""
     if isinstance(value, dict):
         return f"{key} = {{ {', '.join(_line(k, v) for k, v in value.items())} }}"
     if isinstance(value, list):
@@ -97,7 +106,7 @@ def _line(key: str, value: object) -> str:
 
 
 def _choices(known: Sequence[Surface]) -> list[str]:
-    """Comments with the keys of [part.target] for each surface to choose from."""
+    """Return comment lines with the keys of [part.target] that choose each known surface."""
     lines = ["# The part's surfaces, the largest first; lists of several are one target:"]
     for one in known[:MAX_LISTED]:
         keys = ", ".join(_line(key, value) for key, value in one.keys.items())
