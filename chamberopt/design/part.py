@@ -40,7 +40,7 @@ class FaceAt(FileTable):
 
 
 class Selection(FileTable):
-    """Triangles of the part that meet all given conditions."""
+    """Conditions that choose triangles of the part: those that meet all given conditions."""
 
     surface: Names = list_field(
         'a name in quotes, or a list of names, e.g. ["flank", "root"]',
@@ -108,7 +108,7 @@ class Target(Selection):
 
 
 class TessellationTable(FileTable):
-    """Fineness of the triangles of a STEP file."""
+    """How fine the triangles are into which the surface of a STEP file is divided."""
 
     chord_mm: float = quantity(
         1e-4, 10, "mm", "distance that triangles keep from the surface", 0.02

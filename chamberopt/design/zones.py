@@ -61,7 +61,7 @@ class Zone(FileTable):
 
     @property
     def is_spared(self) -> bool:
-        """True if the zone is to have little coverage, with none wanted."""
+        """True if the zone has a largest coverage but no least one: it is to be spared."""
         return self.coverage_max is not None and self.coverage_min is None
 
     def _problems(self) -> Iterator[Problem]:

@@ -37,7 +37,7 @@ POINTS = "pairs [v in m/s, e] with ascending v, e.g. [[0.1, 0.97], [1, 0.9], [5,
 
 
 class RestitutionTable(FileTable):
-    """The restitution law of one surface, or of two balls."""
+    """Restitution over impact speed of a ball on one surface, or of a ball on a ball."""
 
     WITHOUT_EFFECT: ClassVar[tuple[str, ...]] = ("C0", "v0_m_s", "exponent")  # keys beside a table
 
@@ -114,7 +114,7 @@ def _table_problems(points: tuple[tuple[float, float], ...]) -> Iterator[Problem
 
 
 class SurfaceMaterial(RestitutionTable):
-    """The restitution law of wall or sonotrode."""
+    """Restitution over impact speed of a ball on the wall or on a sonotrode."""
 
     alloy: str | None = Field(default=None, description=ALLOY)
     hardness_HB: float | None = quantity(  # noqa: N815
@@ -128,9 +128,9 @@ class SurfaceMaterial(RestitutionTable):
 
 
 class PartMaterial(RestitutionTable):
-    """The part's restitution law, and the size of its dents: hardness and yield speed.
+    """Restitution over impact speed of a ball on the part, and what sets the size of its dents.
 
-    With every law v0_m_s is the speed below which the contact is elastic and no dent is left.
+    Hardness and v0_m_s set it. Below the speed v0_m_s the contact is elastic and leaves no dent.
     """
 
     alloy: str | None = Field(default=None, description=ALLOY)
@@ -165,7 +165,10 @@ class PartMaterial(RestitutionTable):
 
     @property
     def hardens_strongly(self) -> bool:
-        """True if tensile and yield strength show that the depth of compression is not known."""
+        """True if the metal hardens so much that its depth of compression cannot be estimated.
+
+        Then its tensile strength is far above its yield strength.
+        """
         if self.yield_MPa is None or self.tensile_MPa is None:
             return False
         return self.tensile_MPa > STRONG_HARDENING * self.yield_MPa
@@ -184,7 +187,7 @@ def _law(what: str, else_: str = 'the name of an alloy, e.g. "Ti-6Al-4V"') -> An
 
 
 class Materials(FileTable):
-    """One restitution law for each object that a ball can hit."""
+    """Material of each object that a ball can hit: another ball, wall, sonotrode and part."""
 
     shot: RestitutionTable = _law("ball against ball", "a shot.material of known hardness")
     wall: SurfaceMaterial = _law("ball against chamber wall and lid")

@@ -108,7 +108,7 @@ class WalledChamber(ChamberTable):
 
 
 class ParametricChamber(WalledChamber):
-    """A cavity made from its parameters: floor, sides that may lean, flat ceiling."""
+    """A cavity with a floor, sides that may lean, and a flat ceiling at a given height."""
 
     ceiling_key: ClassVar[str] = "height_mm"
 
@@ -128,7 +128,7 @@ class ParametricChamber(WalledChamber):
 
 
 class PolygonChamber(ParametricChamber):
-    """Flat sides over a convex polygon, which may lean; upright edges sharp or rounded.
+    """A chamber with flat sides over a convex polygon, which may lean; edges sharp or rounded.
 
       ____________            in plan: the sides at the sonotrode; higher up they are moved out by
      /            \\           the lean, and with them the arcs of the edges, of constant radius
@@ -192,7 +192,7 @@ class PolygonChamber(ParametricChamber):
 
 
 class RoundChamber(WalledChamber):
-    """A profile that may lean, its corners rounded, turned about the axis.
+    """A round chamber: a profile, which may lean and have rounded corners, turned about the axis.
 
     Corners of the wall's flat sides lie on the round wall. The sides therefore lie inside it, by at
     most radius * (1 - cos(pi/facets)): 0.04 mm for 70 mm across and 64 facets.
@@ -244,7 +244,7 @@ class RoundChamber(WalledChamber):
         return outlines.revolve(self._rounded(), self.facets)
 
     def room(self) -> float:
-        """Return the volume [m³] of the cavity as if its wall were truly round."""
+        """Return the volume [m³] of the cavity, with a wall that is truly round."""
         return outlines.revolved_volume(self._rounded())
 
     def _rounded(self) -> np.ndarray:

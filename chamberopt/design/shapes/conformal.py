@@ -34,7 +34,10 @@ SIMPLIFIED = 5e-6
 
 
 class Conformal(ParametricChamber):
-    """A wall round the shadow of the part below the ceiling. Holes in the shadow are filled."""
+    """A chamber whose wall follows the shadow of the part on the floor.
+
+    Only the part below the ceiling counts. Holes in the shadow are filled.
+    """
 
     shape: Literal["conformal"]
     outline: Literal["hull", "silhouette"] = Field(

@@ -204,7 +204,7 @@ def _with_checks(path: Path, shape: type[ChamberTable], digest: str) -> type[Cha
         return with_array_types(cavity)
 
     def run_validators(cls: type[ChamberTable], values: Any, validate: Callable[[Any], Any]) -> Any:
-        """Run the shape's own validators."""
+        """Run the checks of values in the user's shape. If their code fails, raise InputError."""
         with _errors_of_the_file(path, "its checks failed"):
             return validate(values)
 

@@ -33,7 +33,10 @@ def refuse_above(key: str, given: float, limit: float, why: str) -> None:
 def refuse_meeting_walls(slope: float, limits: Iterable[float], inclination_deg: float) -> None:
     """Raise CrossCheckError if walls lean in so far that they meet below the ceiling.
 
-    ``slope``: tangent of the outward inclination. ``limits``: least slope that each wall allows.
+    Args:
+        slope: tangent of the walls' outward inclination.
+        limits: least slope with which each wall does not meet another.
+        inclination_deg: the given inclination, for the message.
     """
     least = max(limits, default=-math.inf)
     if slope < least:
