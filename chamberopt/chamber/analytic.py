@@ -31,7 +31,7 @@ REMEDY = "simulate without the analytical cavity"
 
 
 def analytic_cavity(design: Design, chamber: Chamber) -> AnalyticCavity:
-    """Return the exact cavity of a chamber, with walls without facets.
+    """Return the exact cavity of a chamber, whose walls are not made of triangles.
 
     In plan it is a true circle for the shape "cylinder" and a polygon for other shapes.
 

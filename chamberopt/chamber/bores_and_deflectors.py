@@ -156,7 +156,10 @@ def fitting_names(design: Design) -> list[str]:
 
 @dataclass(frozen=True)
 class CavitySolid:
-    """The room, and the triangle properties of each solid that bounds it, by the solid's label."""
+    """The cavity as a solid, and properties of the triangles of each solid it was made from.
+
+    `pieces` has the properties by the solid's label.
+    """
 
     body: Solid
     pieces: Mapping[int, TriangleProperties]

@@ -104,7 +104,7 @@ MAX_ELEMENTS = 3e5  # makes a few minutes of meshing, and slow steps after it
 
 @dataclass(frozen=True)
 class PartOfFile:
-    """The part's file as a result needs it, without groups and notes."""
+    """What a result keeps of the part's file: its triangles, and how it stands in the chamber."""
 
     simulated: PartMesh  # in the file's frame
     original: PartMesh | None  # the file's own triangles, if other triangles are simulated
@@ -114,11 +114,11 @@ class PartOfFile:
 
 @dataclass(frozen=True)
 class Part:
-    """The part in the chamber's frame.
+    """The part as it stands in the chamber, with its target and zones.
 
-    Its triangles are the file's, in the file's order. Divided rounds and target.element_mm make
-    other triangles. It is closed, unless its file draws it as the piece that bounds the room of a
-    whole set-up.
+    Its triangles are the file's, in the file's order, unless curved surfaces are divided or
+    target.element_mm asks for other triangles. Its surface is closed, unless its file draws it as
+    a piece of the chamber's surface.
     """
 
     vertices: np.ndarray  # [m], (n, 3)

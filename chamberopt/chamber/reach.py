@@ -34,7 +34,7 @@ STEP = 0.25  # of the radius, between two checks of a straight way
 
 
 class Cells(NamedTuple):
-    """A grid of cubic cells over the cavity, shape (nx, ny, nz)."""
+    """A grid (nx, ny, nz) of cubic cells over the cavity: where the centre of a ball may lie."""
 
     low: np.ndarray  # lowest corner [m], (3,)
     edge: float  # of a cell [m]
@@ -244,7 +244,7 @@ MEASURED_WIDTH = 1.25  # widest gap that is measured, over the largest ball's di
 
 @dataclass(frozen=True)
 class Reach:
-    """The places in a cavity that a ball reaches."""
+    """The places on a cavity's surface that a ball from the sonotrode reaches."""
 
     mesh: TriangleMesh  # with k triangles
     diameter: float  # of the ball [m]

@@ -1,4 +1,4 @@
-"""The random seed of a replica."""
+"""The random seed of a replica, which is one of several simulations of the same design."""
 
 import hashlib
 

@@ -1,4 +1,4 @@
-"""Facts and warnings about a design before it is simulated: volumes, shot, target, errors."""
+"""Collect facts and warnings about a design before it is simulated, such as volumes and shot."""
 
 from __future__ import annotations
 

@@ -143,7 +143,7 @@ def _is_wedge(gap: TouchPoints, entrance: np.ndarray, largest: float, near: floa
     Args:
         entrance: centres (n, 3) [m] of reached balls in gaps slightly wider than the largest ball.
         largest: diameter of the largest ball [m].
-        near: distance from the gap to its entrance [m].
+        near: largest distance from the gap to its entrance [m].
     """
     from scipy.spatial import KDTree
 

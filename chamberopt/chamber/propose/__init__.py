@@ -1,1 +1,1 @@
-"""A first design for a part: its target, pose, balls, chamber and charge, each with its reason."""
+"""Propose a first design for a part: target, pose, balls and chamber, each with its reason."""
