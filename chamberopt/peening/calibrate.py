@@ -73,9 +73,10 @@ Simulator = Callable[[Setup, Mapping[Parameter, float], Executor, int], Impacts]
 
 @dataclass(frozen=True)
 class Calibrated:
-    """A calibration and how it came about.
+    """A calibration of a machine, and the simulations and measurements that led to it.
 
-    figures: models of the design's figures, by name.
+    figures: functions that predict the design's figures (Almen intensity, coverage rate, ...) from
+        the parameters of the machine, by name of the figure.
     moved: distance of the last round's centre from the result, in standard deviations.
     """
 
@@ -90,12 +91,13 @@ class Calibrated:
 
 
 class Prepared(NamedTuple):
-    """The set-ups to simulate, and their purposes.
+    """What a calibration has to simulate, and what it compares with the measurements.
 
     Attributes:
-        setups: the design itself first.
-        data: measurements with their models.
-        figures: models of the design's figures, by name.
+        setups: the chambers in which something was measured; the design itself comes first.
+        data: the measurements, each with the function that predicts it from the parameters.
+        figures: functions that predict the design's figures from the parameters, by name of the
+            figure.
     """
 
     setups: list[Setup]
@@ -104,11 +106,11 @@ class Prepared(NamedTuple):
 
 
 def prepare(measured: Measured, designs: Mapping[str, Design], folder: Path) -> Prepared:
-    """The set-ups to simulate, the data with their models, and the figures of the design.
+    """Return what a calibration has to simulate to explain the measurements.
 
     Args:
-        designs: designs by path.
-        folder: place for the meshes of strips in lids.
+        designs: designs that the measurements name, by path.
+        folder: folder into which the meshes of strips in the lid of a chamber are written.
 
     Raises:
         InputError: a chamber cannot be built, or a strip does not fit.
@@ -167,7 +169,10 @@ def _single(kind: str, label: str, at: float, value: float, sd: float, model: Mo
 
 
 def _arcs(strip: MeasuredStrip, setup: Setup) -> Data:
-    """Arc heights with their model, and a model of further times for a picture."""
+    """Return the measured arc heights of a strip, with the function that predicts them.
+
+    With them comes a function that predicts the arc heights at further times, for a picture.
+    """
     times = np.array(strip.time_s)
     drawn = np.geomspace(0.5 * times[0], 1.5 * times[-1], DRAWN_TIMES)
     model = setup.model(ArcProbe(strip_cells(strip.size), (*strip.time_s, *drawn.tolist())))
@@ -208,7 +213,11 @@ def _coupon_data(coupon: MeasuredCoupon, setup: Setup) -> list[Data]:
 
 
 def prior_of(measured: Measured, simulated: tuple[Parameter, ...]) -> Prior:
-    """The knowledge before measuring, of the parameters that the measurements can concern."""
+    """Return what is known before measuring about each parameter that the measurements concern.
+
+    Args:
+        simulated: parameters that take a simulation.
+    """
     names = [
         name
         for name in PARAMETERS
@@ -238,7 +247,8 @@ def calibrate(
         designs: designs by path, as `load_measured` gives them.
         prepared: result of `prepare`.
         progress: called as progress(simulations done, simulations in all, None).
-        simulator: gives the impacts of a set-up at some logarithms of parameters.
+        simulator: function that simulates a set-up at given logarithms of the parameters, and
+            returns its impacts.
 
     Raises:
         InputError: hardly anything that was measured is hit in the simulation.
@@ -279,13 +289,22 @@ def calibrate(
 
 
 def _places(centre: np.ndarray, steps: np.ndarray) -> list[np.ndarray]:
-    """The centre, and one step from it to each side along each parameter."""
+    """Return the points (k,) to simulate: the centre, and one step to each side by each parameter.
+
+    Args:
+        centre: logarithms of the parameters that take a simulation, (k,).
+        steps: step of each of these, (k,).
+    """
     sides = [sign * row for row in np.diag(steps) for sign in (-1.0, 1.0)]
     return [centre, *(centre + side for side in sides)]
 
 
 def _centre_at(setups: list[Setup], middle: np.ndarray) -> None:
-    """Fit the surfaces of all figures round a place (k,)."""
+    """Fit the polynomials of all simulated figures round a point.
+
+    Args:
+        middle: logarithms of the parameters that take a simulation, (k,).
+    """
     for setup in setups:
         for _, model in setup.models:
             model.centre_at(middle)
@@ -294,14 +313,27 @@ def _centre_at(setups: list[Setup], middle: np.ndarray) -> None:
 def _bounds(
     known: Posterior, at: list[int], middle: np.ndarray, reach: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Ends between which theta may lie, at a distance `reach` (k,) from the middle."""
+    """Return the least and the largest values (p,) that the logarithms of all parameters may have.
+
+    Args:
+        at: positions of the parameters that take a simulation; the others have no bounds.
+        middle: middle of the bounds of the parameters at these positions, (k,).
+        reach: distance of these bounds from the middle, (k,).
+    """
     low, high = np.full((2, len(known.mean)), np.inf) * [[-1.0], [1.0]]
     low[at], high[at] = middle - reach, middle + reach
     return low, high
 
 
 def _moved(known: Posterior, at: list[int], centre: np.ndarray) -> float:
-    """Distance of a round's centre (k,) from the result, in standard deviations."""
+    """Return by how many standard deviations the result differs from the centre of a round.
+
+    The parameter that differs most counts.
+
+    Args:
+        at: positions of the parameters that take a simulation.
+        centre: logarithms of these parameters at the centre of the round, (k,).
+    """
     sds = np.sqrt(np.diag(known.covariance))[at]
     return float((np.abs(known.mean[at] - centre) / sds).max())
 
@@ -309,7 +341,10 @@ def _moved(known: Posterior, at: list[int], centre: np.ndarray) -> float:
 def _table(
     found: Posterior, setups: list[Setup], design: Design, measured: Measured
 ) -> Calibration:
-    """The record for designs, with the ranges of the measurements."""
+    """Return the table [calibration] that designs of this machine name.
+
+    It holds the parameters, and the ranges of amplitude and ball diameter that were measured.
+    """
     tried = setups if len(setups[0].models) > OF_DESIGN else setups[1:] or setups
     amplitudes = [round(1e6 * one.design.sonotrode.amplitude, 6) for one in tried]
     balls = [1e3 * ball for one in tried for ball, _ in one.design.shot.sizes]

@@ -65,14 +65,21 @@ def evaluate_calibrated(
     cavity: AnalyticCavity | None = None,
     known: ReplicaSet | None = None,
 ) -> Evaluation:
-    """Evaluate as `evaluate`, with its arguments, and with the errors of the calibration."""
+    """Simulate a design, and widen the intervals of its figures by the errors of its calibration.
+
+    The arguments are those of `evaluate` in simulation/evaluate.py.
+    """
     of_all = RunsProgress(progress, 1 + len(moved_designs(design)))
     known = known or ReplicaSet()
     return with_open_errors(Variations(design, chamber, executor, of_all, plan, cavity, known))
 
 
 def with_open_errors(runs: Variations) -> Evaluation:
-    """The evaluation of the design itself, with the errors of its calibration."""
+    """Return the evaluation of the design itself, with intervals that hold calibration errors.
+
+    Args:
+        runs: simulates the design, and changed copies of it on the same seeds.
+    """
     found, calibration = runs.nominal, runs.design.calibration
     if calibration is None:
         return found
@@ -103,7 +110,13 @@ def with_open_errors(runs: Variations) -> Evaluation:
 
 
 def moved_designs(design: Design, names: Sequence[Parameter] = SIMULATED) -> list[Moved]:
-    """Designs with one calibrated parameter moved each; without parameters known exactly."""
+    """Return a copy of the design for each calibrated parameter, with this one moved by a step.
+
+    Parameters that are known exactly are left out, and friction where the design has none.
+
+    Args:
+        names: parameters to move.
+    """
     calibration = design.calibration
     if calibration is None:
         return []
@@ -121,23 +134,35 @@ def moved_designs(design: Design, names: Sequence[Parameter] = SIMULATED) -> lis
 
 
 def slope(one: Estimate, two: Estimate, step: float) -> float:
-    """Slope of a figure from a run to a run with a step; 0 where a run gives no number."""
+    """Return the slope of a figure by a parameter's logarithm; 0 where a run gives no number.
+
+    Args:
+        one: the figure.
+        two: the figure in a run in which the parameter is moved.
+        step: step of the parameter's logarithm between both runs.
+    """
     known = all(math.isfinite(e.value) and e.has_number for e in (one, two))
     return (two.value - one.value) / step if known else 0.0
 
 
 def _figures(found: Evaluation) -> dict[str, Estimate]:
-    """The metrics of an evaluation, and its metrics of wide windows with the prefix WIDE."""
+    """Return all metrics of an evaluation by name.
+
+    The metrics of its wide coverage windows have the prefix WIDE before their name.
+    """
     return found.metrics | {WIDE + name: one for name, one in found.metrics_of_wide.items()}
 
 
 def _with_other_dents(replicas: list[Replica], factor: float) -> list[Replica]:
-    """The replicas with dents on the part that are wider by a factor."""
+    """Return copies of the replicas in which the part's dents are wider by a factor."""
     return [replace(one, hits=replace(one.hits, dent=one.hits.dent * factor)) for one in replicas]
 
 
 def _factors(name: str, one: Estimate) -> dict[Parameter, float]:
-    """Slopes of a figure by the logarithms of K and beta, which are factors on figures."""
+    """Return the slopes of a figure by the logarithms of K and beta.
+
+    K is a factor on Almen intensities, and 1 / beta on saturation times; all else has no slope.
+    """
     figure = name.rpartition(".")[2]
     if figure.startswith("almen_intensity"):
         return {"K": one.value}
@@ -145,5 +170,8 @@ def _factors(name: str, one: Estimate) -> dict[Parameter, float]:
 
 
 def _of_model(name: str, one: Estimate) -> float:
-    """Standard error of a figure by the simplifications of the model."""
+    """Return the standard error that the simplifications of the model cause in a figure.
+
+    Only saturation times have one; it is 0 for all other figures.
+    """
     return TIME_ERROR * one.value if name.rpartition(".")[2] == "saturation_time_s" else 0.0

@@ -28,19 +28,22 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class KirkFit:
-    """A fitted curve; a curve of two parameters has c = 1."""
+    """A saturation curve fitted to arc heights, a (1 - exp(-b t^c)).
+
+    The curve with two parameters has c = 1.
+    """
 
     a: float
     b: float  # [1/s^c]
     c: float = 1.0
 
     def at(self, times: np.ndarray | float) -> np.ndarray:
-        """h after these times [s]."""
+        """Return the arc height after each of these peening times [s]."""
         return np.asarray(-self.a * np.expm1(-self.b * np.asarray(times) ** self.c))
 
     @property
     def saturation_time(self) -> float:
-        """T [s]."""
+        """Saturation time T of the curve [s]: twice this time gives a tenth more arc height."""
         from scipy.optimize import brentq
 
         # x = b T^c is the only root above 0 of h(2 T) - 1.1 h(T).
@@ -50,7 +53,7 @@ class KirkFit:
 
     @property
     def intensity(self) -> float:
-        """h(T), in the unit of the heights."""
+        """Arc height at the saturation time, in the unit of the fitted heights."""
         return float(self.at(self.saturation_time))
 
 
@@ -58,11 +61,11 @@ MIN_C, MAX_C = 0.2, 5.0  # h(2 T) = 1.1 h(T) has no root below c = 0.14
 
 
 def kirk_fits(times: np.ndarray, heights: np.ndarray) -> tuple[KirkFit, KirkFit]:
-    """The fits of two and of three parameters.
+    """Fit curves with two and with three parameters to arc heights, and return both.
 
     Args:
-        times: [s], (n,) with n >= 4, ascending.
-        heights: in any unit, above 0, (n,).
+        times: peening times [s], (n,) with n >= 4, ascending.
+        heights: arc heights after these times, in any unit, above 0, (n,).
     """
     from scipy.optimize import curve_fit
 
@@ -94,14 +97,17 @@ MULTIPLES = 0.25, 0.5, 1.0, 2.0, 4.0  # times at which a shop measures, in units
 
 
 class StripSaturation(NamedTuple):
-    """S [m] and T [s] of a virtual strip."""
+    """Arc strength [m] of a virtual strip at its saturation time, and this time [s]."""
 
     strength: Estimate
     time: Estimate
 
 
 def strip_saturation(dents: StripDents) -> StripSaturation:
-    """S and T of the saturation curve; T is the largest root of h(2 T) = 1.1 h(T)."""
+    """Return the saturation time T of a strip, and its arc strength then, with intervals.
+
+    T is the longest time after which twice the time gives exactly a tenth more arc strength.
+    """
 
     def saturated(curve: StripCurve) -> np.ndarray:
         time = curve.saturation_time()
@@ -111,16 +117,16 @@ def strip_saturation(dents: StripDents) -> StripSaturation:
 
 
 def heights(dents: StripDents, times: Iterable[float]) -> list[Estimate]:
-    """h [m] after each of these times [s]."""
+    """Return the arc strength [m] of a strip after each of these times [s], with intervals."""
     when = np.array(list(times))
     return corrected(dents, lambda curve: curve.at(when))
 
 
 def corrected(dents: StripDents, figures: Callable[[StripCurve], np.ndarray]) -> list[Estimate]:
-    """Estimates of some figures.
+    """Return figures of a strip with intervals, corrected for cells that have few dents.
 
     Args:
-        figures: function that gives the figures of a curve, (n,).
+        figures: function that works out the figures (n,) from a saturation curve.
     """
     count = len(dents.parts)
     whole = figures(strip_curve(dents))

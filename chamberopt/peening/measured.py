@@ -49,7 +49,7 @@ class Peened(FileTable):
 
     @property
     def zero_to_peak_um(self) -> float | None:
-        """Amplitude as set [µm]; None for the amplitude of the design."""
+        """Zero-to-peak amplitude as set [µm]; None if no amplitude is given but the design's."""
         return 0.5 * self.amplitude_pv_um if self.amplitude_pv_um else self.amplitude_um
 
 
@@ -96,7 +96,7 @@ class MeasuredStrip(Peened):
 
     @property
     def size(self) -> StripSize:
-        """The size of the strip, standard unless given."""
+        """The size of the strip: that of a standard strip unless the file gives one."""
         if self.disc_mm is not None:
             return StripSize(1e-3 * self.disc_mm, 1e-3 * self.disc_mm, is_disc=True)
         if self.size_mm is None:
@@ -223,9 +223,9 @@ Entry = MeasuredStrip | MeasuredCoupon | MeasuredDrop | MeasuredImpacts
 
 
 def load_measured(path: Path) -> tuple[Measured, dict[str, Design]]:
-    """The measurements in a file, and the designs that it names, by path.
+    """Read a file of measurements, and return it with the designs that it names, by path.
 
-    InputError names every problem of the file, or of the first design that cannot be used.
+    Raises InputError with every problem of the file, or of the first design that cannot be used.
     """
     source, values = read_toml(path, "measurements", "see docs/peening.md for an example")
     if {"part", "chamber"} <= values.keys():
@@ -262,7 +262,7 @@ def load_measured(path: Path) -> tuple[Measured, dict[str, Design]]:
 
 
 def _designs(found: Measured) -> Iterator[tuple[str, str]]:
-    """Field and path of each design."""
+    """Return the name of each field of the file that names a design, and the design's path."""
     yield "design", found.design
     for kind in ("strip", "coupon", "drop", "impacts"):
         for number, entry in enumerate(getattr(found, kind)):
@@ -271,7 +271,10 @@ def _designs(found: Measured) -> Iterator[tuple[str, str]]:
 
 
 def _usable(design: Design) -> Design:
-    """The design without its calibration; InputError if it cannot be used."""
+    """Return the design without its calibration.
+
+    Raises InputError if its effects are "auto", because a calibration needs effects that stay.
+    """
     if design.effects.auto:
         text = 'effects: given "auto"; a calibration needs effects that stay: name them, as '
         raise InputError(f"{text}`chamberopt check --pilot` advises")
@@ -279,10 +282,14 @@ def _usable(design: Design) -> Design:
 
 
 def falls(arcs: np.ndarray, sd: float) -> list[tuple[int, float]]:
-    """Arcs (n,) that are below an earlier arc, and by how many standard deviations of the pair.
+    """Return which arc heights are below an earlier one, and by how many standard deviations.
 
     Args:
-        sd: standard deviation of each arc, as a share of it.
+        arcs: arc heights in the order of their peening times, (n,).
+        sd: standard deviation of each arc height, as a share of it.
+    Returns:
+        Position of each arc height that is too low, with the number of standard deviations of the
+        difference by which it is below the largest arc height before it.
     """
     with np.errstate(divide="ignore", invalid="ignore"):  # arcs of 0 and less are refused
         fall = -np.log(arcs / np.maximum.accumulate(arcs)) / (math.sqrt(2.0) * sd)
@@ -299,7 +306,10 @@ def _time_problems(name: str, times: tuple[float, ...]) -> Iterator[Problem]:
 
 
 def with_amplitude(design: Design, amplitude_um: float | None) -> Design:
-    """The design at a zero-to-peak amplitude of its first sonotrode; None: its own amplitude."""
+    """Return the design with its first sonotrode at this zero-to-peak amplitude [µm].
+
+    With an amplitude of None the design stays as it is.
+    """
     if amplitude_um is None:
         return design
     face = design.sonotrode
@@ -307,13 +317,19 @@ def with_amplitude(design: Design, amplitude_um: float | None) -> Design:
 
 
 def with_material(design: Design, material: CouponMaterial | None) -> Design:
-    """The design with the metal of a coupon."""
+    """Return the design with its part made of a coupon's metal.
+
+    The design stays as it is where `material` is None.
+    """
     given: Mapping[str, Any] = material.model_dump(exclude_none=True) if material else {}
     return design.changed({f"materials.part.{name}": one for name, one in given.items()})
 
 
 def dent_errors(dents: MeasuredDents) -> np.ndarray:
-    """Covariance of the logarithms of mean and 90th percentile; (1, 1) without a percentile."""
+    """Return the covariance (2, 2) of the logarithms of a coupon's mean dent and 90th percentile.
+
+    Where no percentile was measured, it has the shape (1, 1), for the mean alone.
+    """
     reading = (1e-2 * dents.sd_percent) ** 2 * np.eye(2)
     size = 1 if dents.p90 is None else 2
     return np.asarray((SPREAD**2 / dents.count * SAMPLED + reading)[:size, :size])

@@ -29,9 +29,13 @@ GAIN = 0.9  # share of a standard deviation that a measurement must get below to
 
 
 class Candidate(NamedTuple):
-    """A measurement that could be made next, with its slopes J+ and errors R+.
+    """A measurement that could be made next.
 
-    Errors are larger by the error scale of the measurements of its kind.
+    Attributes:
+        name: the measurement in words.
+        slopes: slopes of the logarithms of its figures by those of the parameters, (n, p).
+        errors: covariance of the logarithms of its figures, (n, n), enlarged as that of the
+            measurements of its kind whose scatter the model does not explain.
     """
 
     name: str
@@ -41,9 +45,11 @@ class Candidate(NamedTuple):
 
 @dataclass(frozen=True)
 class Prediction:
-    """A figure of the design.
+    """A predicted figure of the design, and how much better a further measurement would make it.
 
     Attributes:
+        name, words: key of the figure, and its name in words.
+        value: predicted value.
         sd_before, sd: standard deviations of its logarithm, before measuring and now.
         noise: standard deviation of its logarithm by the noise of simulations.
         next_name, next_sd: the measurement that would leave the least standard deviation, and this
@@ -61,7 +67,11 @@ class Prediction:
 
 
 def predict(found: Calibrated) -> list[Prediction]:
-    """The figures of the design that the calibration is for."""
+    """Predict the figures of the design that was calibrated, each with its best next measurement.
+
+    The figures are Almen intensity, saturation time and coverage rate; only the last one where no
+    strip was measured.
+    """
     posterior, candidates = found.posterior, _candidates(found)
     before = np.diag(posterior.prior.sd**2)
     predictions = []

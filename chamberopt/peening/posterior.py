@@ -52,11 +52,11 @@ CUBIC = 0.1  # standard deviation of the coefficient of a cubic term
 
 
 class Surface(NamedTuple):
-    """Weights of the runs at any place near the centre.
+    """A quadratic polynomial through the figures of runs, as weights of these runs at a point.
 
     Attributes:
-        centre: logarithms of the parameters, (k,).
-        matrix: M, (q, r).
+        centre: logarithms of the parameters at its centre, (k,).
+        matrix: coefficients of the polynomial for a figure of 1 in each run, (q, r).
         spread: covariance of the coefficients over the variance of a run's figure, (q, q).
     """
 
@@ -65,21 +65,30 @@ class Surface(NamedTuple):
     spread: np.ndarray
 
     def weights(self, place: np.ndarray) -> np.ndarray:
-        """The weight of each run at a place (k,), (r,)."""
+        """Return the weight (r,) of each run in the figures at a point.
+
+        Args:
+            place: logarithms of the parameters at the point, (k,).
+        """
         return np.asarray(_terms(place - self.centre)[0] @ self.matrix)
 
     def noise(self, place: np.ndarray) -> float:
-        """c(x) at a place (k,)."""
+        """Return the variance of a figure at a point, as a multiple of that of a single run.
+
+        Args:
+            place: logarithms of the parameters at the point, (k,).
+        """
         terms = _terms(place - self.centre)[0]
         return float(terms @ self.spread @ terms)
 
 
 def fit_surface(places: np.ndarray, centre: np.ndarray, noise: float) -> Surface:
-    """Fit the surface to some runs.
+    """Fit a quadratic polynomial to runs, and return it.
 
     Args:
         places: logarithms of the parameters of each run, (r, k).
-        noise: s.
+        centre: logarithms of the parameters at the centre of the polynomial, (k,).
+        noise: standard deviation of a figure by the noise of one run.
     """
     x = places - centre
     terms = _terms(x)
@@ -92,7 +101,7 @@ def fit_surface(places: np.ndarray, centre: np.ndarray, noise: float) -> Surface
 
 
 def _terms(x: np.ndarray) -> np.ndarray:
-    """The terms p of each row, (r, q)."""
+    """Return the terms of a quadratic polynomial (1, x_i, x_i x_j) for each row of x, (r, q)."""
     x = np.atleast_2d(x)
     pairs = combinations_with_replacement(range(x.shape[1]), 2)
     return np.column_stack([np.ones(len(x)), x, *(x[:, i] * x[:, j] for i, j in pairs)])
@@ -105,7 +114,7 @@ BY_CHANCE = 0.05  # probability of a larger chi² below which errors are multipl
 
 
 class Figures(NamedTuple):
-    """The values f of a model, and their covariance N."""
+    """Logarithms of predicted figures (n,), and their covariance by simulation noise (n, n)."""
 
     values: np.ndarray
     noise: np.ndarray
@@ -116,8 +125,8 @@ class Prior(NamedTuple):
 
     Attributes:
         names: names of the parameters, (p,).
-        mean: m, (p,).
-        sd: square roots of P's diagonal, (p,).
+        mean: means of their logarithms, (p,).
+        sd: standard deviations of their logarithms, (p,).
     """
 
     names: tuple[Parameter, ...]
@@ -125,7 +134,7 @@ class Prior(NamedTuple):
     sd: np.ndarray
 
     def values(self, theta: np.ndarray) -> dict[Parameter, float]:
-        """The logarithms by name."""
+        """Return the logarithms of the parameters, theta (p,), by name of the parameter."""
         return dict(zip(self.names, map(float, theta), strict=True))
 
 
@@ -134,10 +143,14 @@ Model = Callable[[Mapping[Parameter, float]], Figures]
 
 
 class SimulatedModel:
-    """The figures of a probe from all runs of one set-up.
+    """A function that predicts the figures of one measurement from the runs of one set-up.
 
-    `simulated` names the parameters that take a simulation. `add` takes their logarithms in a run,
-    (k,), and the reading of the probe there.
+    Called with the logarithms of all parameters by name, it returns the logarithms of the figures
+    and their noise.
+
+    Args:
+        probe: reads the figures off the impacts of a run.
+        simulated: names of the parameters that take a simulation.
     """
 
     def __init__(self, probe: Probe, simulated: Sequence[Parameter]) -> None:
@@ -149,12 +162,21 @@ class SimulatedModel:
         self._noise = np.zeros((0, 0))
 
     def add(self, place: np.ndarray, reading: Reading) -> None:
-        """Add the reading of a run."""
+        """Add a run to those from which the figures are predicted.
+
+        Args:
+            place: logarithms in the run of the parameters that take a simulation, (k,).
+            reading: figures of the run.
+        """
         self._places.append(place)
         self._readings.append(reading)
 
     def centre_at(self, centre: np.ndarray) -> None:
-        """Fit the surface round a place (k,)."""
+        """Fit the quadratic polynomial of the figures round a point.
+
+        Args:
+            centre: logarithms there of the parameters that take a simulation, (k,).
+        """
         self._noise = np.mean([one.noise for one in self._readings], axis=0)
         sd = float(np.sqrt(np.diag(self._noise).mean()))
         self._surface = fit_surface(np.array(self._places), centre, max(sd, 1e-6))
@@ -181,9 +203,9 @@ class Data:
         label: name among several data of this kind.
         at: times [s] or other positions of the figures in a picture, (n,).
         y: logarithms of the measured figures, (n,).
-        covariance: R, (n, n).
-        model: gives f of the figures.
-        drawn: further times and a model of the figures then, for a picture.
+        covariance: covariance of the errors of y, (n, n).
+        model: function that predicts y from the parameters.
+        drawn: further times, and a function that predicts the figures at these, for a picture.
     """
 
     kind: str
@@ -206,27 +228,44 @@ class Posterior:
 
     @property
     def values(self) -> dict[Parameter, float]:
-        """The logarithms by name."""
+        """Logarithms of the most probable parameters by name."""
         return self.prior.values(self.mean)
 
     def slopes(self, model: Model) -> np.ndarray:
-        """J of a model's figures at the mean, (n, p)."""
+        """Return the slopes (n, p) of predicted figures by the logarithms of the parameters.
+
+        They hold at the most probable parameters.
+        """
         return slopes(model, self.prior, self.mean)
 
     def sd(self, model: Model, covariance: np.ndarray | None = None) -> np.ndarray:
-        """Standard deviations of a model's figures, (n,), by C or another covariance of theta."""
+        """Return the standard deviations (n,) of the logarithms of predicted figures.
+
+        Args:
+            covariance: covariance of the logarithms of the parameters, (p, p); by default the one
+                after measuring.
+        """
         rows = self.slopes(model)
         spread = self.covariance if covariance is None else covariance
         return np.asarray(np.sqrt(np.einsum("ij,jk,ik->i", rows, spread, rows)))
 
     def after(self, rows: np.ndarray, errors: np.ndarray) -> np.ndarray:
-        """C after a further measurement with J+ (n, p) and R+ (n, n)."""
+        """Return the covariance (p, p) of the parameters' logarithms after a further measurement.
+
+        Args:
+            rows: slopes of the measured figures by the logarithms of the parameters, (n, p).
+            errors: covariance of the errors of the measured figures, (n, n).
+        """
         gain = self.covariance @ rows.T @ np.linalg.inv(rows @ self.covariance @ rows.T + errors)
         return np.asarray(self.covariance - gain @ rows @ self.covariance)
 
 
 def slopes(model: Model, prior: Prior, theta: np.ndarray) -> np.ndarray:
-    """J of a model's figures, (n, p)."""
+    """Return the slopes (n, p) of predicted figures by the logarithms of the parameters.
+
+    Args:
+        theta: logarithms of the parameters where the slopes hold, (p,).
+    """
     columns = []
     for k in range(len(theta)):
         step = np.zeros(len(theta))
@@ -243,10 +282,11 @@ def find_posterior(
     bounds: tuple[np.ndarray, np.ndarray],
     scales: Mapping[str, float] | None = None,
 ) -> Posterior:
-    """The most probable theta within bounds, C there, and the misfit of each kind of data.
+    """Find the most probable parameters, their covariance, and how well each kind of data fits.
 
     Args:
-        start: theta where the search begins, (p,).
+        start: logarithms of the parameters where the search begins, (p,).
+        bounds: least and largest logarithms that the parameters may have, (p,) each.
         scales: factor on the errors of each kind of data; None: 1 for all.
     """
     from scipy.linalg import block_diag, solve_triangular
@@ -279,7 +319,11 @@ def find_posterior(
 def explaining_posterior(
     data: Sequence[Data], prior: Prior, start: np.ndarray, bounds: tuple[np.ndarray, np.ndarray]
 ) -> Posterior:
-    """Find as `find_posterior`, with errors so large that the model explains data and priors."""
+    """Find the most probable parameters, with errors so large that the model explains all data.
+
+    The errors of each kind of data, and then the covariance of the parameters, are enlarged until
+    chance allows the misfit. The arguments are those of `find_posterior`.
+    """
     from scipy.special import chdtrc
 
     found = find_posterior(data, prior, start, bounds)
@@ -300,7 +344,11 @@ def explaining_posterior(
 def _misfits(
     data: Sequence[Data], found: Posterior, scales: Mapping[str, float]
 ) -> tuple[Misfit, ...]:
-    """chi² of each kind of data, and the factor on its errors with which the model explains it."""
+    """Return how far each kind of data is from the model, and by which factor its errors must grow.
+
+    Args:
+        scales: factor by which the errors of each kind are multiplied already.
+    """
     from scipy.special import chdtrc
 
     misfits = []

@@ -53,22 +53,22 @@ class Impacts(NamedTuple):
     strip: PartMaterial
 
     def strip_dents(self, cells: Cells) -> StripDents:
-        """Dents in cells of a strip."""
+        """Return the dents that these impacts would leave in the cells of an Almen strip."""
         return count_dents(self.replicas, self.seconds, cells, self.density, self.strip)
 
 
 def impacts_of(design: Design, replicas: Sequence[Replica]) -> Impacts:
-    """The impacts of a design's replicas."""
+    """Collect the impacts on the part in all replicas of a design."""
     strip = calibrated_strip(design.shot, design.calibration)
     hits, seconds = [one.hits for one in replicas], design.process.recorded_time
     return Impacts(hits, seconds, design.shot.density, strip)
 
 
 class Reading(NamedTuple):
-    """The figures of a probe in one run.
+    """Logarithms of the figures that one run gives for a measurement.
 
     Attributes:
-        at: function of ln beta that gives the figures, (n,).
+        at: function of the logarithm of beta that returns them, (n,).
         noise: covariance of their errors by the number of impacts, (n, n).
     """
 
@@ -78,7 +78,7 @@ class Reading(NamedTuple):
 
 @dataclass(frozen=True)
 class ArcProbe:
-    """Arc heights after some times [s]."""
+    """Reads the arc heights of a strip after some peening times [s] off simulated impacts."""
 
     cells: Cells
     times: tuple[float, ...]
@@ -89,7 +89,7 @@ class ArcProbe:
         return (of_one,) * len(self.times)
 
     def read(self, impacts: Impacts) -> Reading:
-        """ln of arc height [mm] at K = 1."""
+        """Return the logarithms of the arc heights [mm] with a calibration constant K of 1."""
         times = np.array(self.times)
         dents = impacts.strip_dents(self.cells)
         curve, found = strip_curve(dents), heights(dents, times)
@@ -103,14 +103,17 @@ class ArcProbe:
 
 @dataclass(frozen=True)
 class SaturationProbe:
-    """Strength S and saturation time T of a strip; K S is the intensity [mmA]."""
+    """Reads a strip's saturation time, and its arc strength then, off simulated impacts.
+
+    This arc strength times the calibration constant K is the Almen intensity [mmA].
+    """
 
     cells: Cells
 
     slopes: tuple[Mapping[Parameter, float], ...] = ({"K": 1.0}, {"beta": -1.0})
 
     def read(self, impacts: Impacts) -> Reading:
-        """ln of S [mm] and T [s]."""
+        """Return the logarithms of arc strength [mm] and saturation time [s]."""
         strength, time = strip_saturation(impacts.strip_dents(self.cells))
         found = strength.times(1e3), time
         values = _logs(found)
@@ -119,10 +122,11 @@ class SaturationProbe:
 
 @dataclass(frozen=True)
 class PartProbe:
-    """Figures of dents and impacts on the part, in the order of `names`.
+    """Reads figures of dents and impacts on the part off simulated impacts.
 
     Args:
-        names: names of figures, as in SLOPES.
+        names: figures to read: "rate" of dented area, "mean" and "p90" of dent diameters, or rate
+            of "impacts".
         target: whether dents on each triangle of the part count, (m,) bool.
         area: area of the triangles that count [m²].
     """
@@ -138,7 +142,11 @@ class PartProbe:
         return tuple({"hardness": self.SLOPES[name]} for name in self.names)
 
     def read(self, impacts: Impacts) -> Reading:
-        """ln of x [1/s], mean d [mm], 90th percentile of d [mm] and impacts on the part [1/s]."""
+        """Return the logarithms of those figures that `names` asks for.
+
+        These are dented area over area per second [1/s], mean and 90th percentile of the dent
+        diameters [mm], and impacts on the part per second [1/s].
+        """
         dents = [hits.on(self.target).dent.astype(float) for hits in impacts.replicas]
         dents = [one[one > 0.0] for one in dents]
         counts = np.array([len(hits) for hits in impacts.replicas])
@@ -172,7 +180,12 @@ Probe = ArcProbe | SaturationProbe | PartProbe
 
 
 def whole_target(target: np.ndarray, area: float) -> Cells:
-    """A strip as large as the target of a part."""
+    """Return the target of a part as the single cell of a strip that covers all of it.
+
+    Args:
+        target: triangles of the part that are its target, (m,) bool.
+        area: area of the target [m²].
+    """
     return Cells(np.array([area]), np.ones(1), lambda hits: np.where(target[hits.triangle], 0, -1))
 
 
@@ -184,7 +197,7 @@ def _logs(found: Sequence[Estimate]) -> np.ndarray:
 
 
 def _noise(found: Sequence[Estimate]) -> np.ndarray:
-    """Covariance (n, n) of the logarithms, from the pseudo-values of the replicas."""
+    """Return the covariance (n, n) of the logarithms of figures, from the scatter of replicas."""
     relative = np.array([np.array(one.pseudovalues) / one.value for one in found])
     scatter = np.atleast_2d(np.cov(relative)) / relative.shape[1]
     # The possible error of the correction for few dents is added.

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 class FigureScale(NamedTuple):
-    """A scale L(m) with its inverse and its slope dL/dm."""
+    """A scale on which a figure is nearly straight: a function, its inverse and its slope."""
 
     forward: Callable[[float], float]
     inverse: Callable[[float], float]
@@ -44,7 +44,11 @@ SHARE = FigureScale(
 
 
 def scale_of(name: str) -> FigureScale:
-    """The scale of a metric."""
+    """Return the scale on which a metric responds nearly in a straight line.
+
+    That is ln(-ln(1 - m)) for a share, the logarithm for another figure that is never negative,
+    and the figure itself for all others.
+    """
     metric = find_metric(name)
     if metric is None or metric.lowest < 0.0:
         return IDENTITY
@@ -52,12 +56,12 @@ def scale_of(name: str) -> FigureScale:
 
 
 def on_scale(figure: Estimate, scale: FigureScale) -> Estimate:
-    """The estimate of L from the estimate of m; without an interval where m has none.
+    """Return the estimate of a figure on its scale; it has no interval where the figure has none.
 
-    The half-width of L is so chosen that `back_from_scale` gives the half-width of m, because near
-    full coverage the slope would make it far wider. Pseudo-values and shared errors are multiplied
-    by the slope, as far as the half-width has room for them. A logarithm has no interval where the
-    interval of m reaches 0.
+    Its half-width is so chosen that `back_from_scale` returns that of the figure, because near full
+    coverage the slope would make it far wider. Pseudo-values and shared errors are multiplied by
+    the slope, as far as the half-width has room for them. A logarithm has no interval where the
+    interval of the figure reaches 0.
     """
     if not math.isfinite(figure.half_width):
         return figure.not_known(figure.in_words or NOT_RESOLVED)
@@ -83,9 +87,10 @@ def on_scale(figure: Estimate, scale: FigureScale) -> Estimate:
 
 
 def with_errors_of(nominal: Estimate, changed: Estimate) -> Estimate:
-    """A changed design's L with the errors of calibration of the nominal L: both move together.
+    """Give a changed design's figure the calibration errors of the nominal design's figure.
 
-    A figure that the change leaves as it is has these errors already.
+    Both figures are on their scale, where these errors move them together. A figure that has such
+    errors already stays as it is.
     """
     errors = nominal.shared[FIRST_OF_CALIBRATION:]
     if not errors or changed.shared[FIRST_OF_CALIBRATION:]:
@@ -94,7 +99,10 @@ def with_errors_of(nominal: Estimate, changed: Estimate) -> Estimate:
 
 
 def back_from_scale(value: Estimate, scale: FigureScale) -> Estimate:
-    """The estimate of m from the estimate of L; the half-width is the interval's wider side."""
+    """Return the estimate of a figure from its estimate on the scale.
+
+    Its half-width is the wider side of the interval.
+    """
     middle = scale.inverse(value.value)
     if value.in_words or not math.isfinite(value.half_width):
         return Estimate(middle, math.inf, in_words=value.in_words or NOT_RESOLVED)
@@ -103,7 +111,10 @@ def back_from_scale(value: Estimate, scale: FigureScale) -> Estimate:
 
 
 def combine(figures: Mapping[str, Estimate], weights: Mapping[str, float]) -> Estimate:
-    """Weighted sum of paired estimates; an estimate without a weight does not count."""
+    """Return the weighted sum of estimates that come from the same replicas.
+
+    An estimate without a weight is left out.
+    """
     used = {name: weight for name, weight in weights.items() if weight}
     if not used:
         return Estimate(0.0, 0.0)

@@ -25,7 +25,13 @@ if TYPE_CHECKING:
 
 @dataclass
 class Setup:
-    """A design as it was set, without a calibration, and the readings of its impacts."""
+    """A design in which something was measured, and functions that predict the measurements.
+
+    Attributes:
+        design: the design as it was set on the machine, without a calibration.
+        simulated: parameters of the machine that take a simulation.
+        models: each kind of measurement, with the function that predicts its figures.
+    """
 
     design: Design
     chamber: Chamber
@@ -39,13 +45,21 @@ class Setup:
         self.mesh = chamber_mesh(self.chamber)
 
     def model(self, probe: Probe) -> SimulatedModel:
-        """The model of the figures of a further probe, in all runs that follow."""
+        """Return a function that predicts a measurement's figures from all runs that follow.
+
+        Args:
+            probe: reads these figures off the impacts of a run.
+        """
         made = SimulatedModel(probe, self.simulated)
         self.models.append((probe, made))
         return made
 
     def add_run(self, place: np.ndarray, impacts: Impacts) -> None:
-        """Read all probes in a run with the logarithms of parameters `place` (k,)."""
+        """Read the figures of all measurements off the impacts of a run, and keep them.
+
+        Args:
+            place: logarithms in the run of the parameters that take a simulation, (k,).
+        """
         for probe, model in self.models:
             model.add(place, probe.read(impacts))
 
@@ -53,9 +67,10 @@ class Setup:
 def simulate_setup(
     setup: Setup, values: Mapping[Parameter, float], executor: Executor, seed: int
 ) -> Impacts:
-    """Impacts at some logarithms of parameters, in as many replicas as the design asks for.
+    """Simulate a set-up in as many replicas as its design asks for, and return its impacts.
 
     Args:
+        values: logarithms of the parameters by name.
         seed: seed of the run; runs with the same seed start alike.
     """
     design = setup.design
@@ -67,7 +82,11 @@ def simulate_setup(
 
 
 def exact_calibration(design: Design, values: Mapping[Parameter, float]) -> Calibration:
-    """A calibration to some logarithms of parameters that are known exactly."""
+    """Return a calibration whose parameters are known exactly.
+
+    Args:
+        values: logarithms of the parameters by name.
+    """
     names = tuple(name for name in PARAMETERS if name in values)
     count, balls = len(names), sorted(design.shot.diameters)
     return Calibration(
@@ -83,7 +102,14 @@ def exact_calibration(design: Design, values: Mapping[Parameter, float]) -> Cali
 
 @dataclass(frozen=True)
 class DropModel:
-    """ln of the restitution of one ball on a surface, e = C0 (v / v0)^(-1/4) as a rule."""
+    """A function that predicts how much of its speed a ball keeps when it bounces off a surface.
+
+    It returns the logarithm of the restitution, which is e = C0 (v / v0)^(-1/4) as a rule.
+
+    Attributes:
+        law: restitution of the surface against speed.
+        speed: speed of the ball [m/s].
+    """
 
     law: RestitutionTable
     speed: float  # [m/s]
@@ -98,12 +124,16 @@ class DropModel:
 
 
 def amplitude_model(theta: Mapping[Parameter, float]) -> Figures:
-    """ln of the real amplitude over the set amplitude."""
+    """Return the logarithm of the sonotrode's real amplitude over the set amplitude."""
     return Figures(np.array([theta["amplitude"]]), np.zeros((1, 1)))
 
 
 def rows_of(model: Model, rows: Sequence[int]) -> Model:
-    """A model of some rows of another model's figures; a row may come twice."""
+    """Return a function that predicts only some of the figures that `model` predicts.
+
+    Args:
+        rows: positions of the figures to keep; one may come twice.
+    """
     at = list(rows)
 
     def some(theta: Mapping[Parameter, float]) -> Figures:

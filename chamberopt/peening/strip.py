@@ -60,7 +60,7 @@ class StripSize:
 
     @property
     def calibrated_as(self) -> str:
-        """The name of such strips in a calibration."""
+        """Name by which a calibration records strips of this size."""
         if self.is_whole:
             return WHOLE_STRIP
         return f"{self}" if self.is_disc else f"{self} strip"
@@ -76,7 +76,7 @@ class Cells(NamedTuple):
 
     Attributes:
         area: area of each cell [m²], (c,).
-        weight: w of each cell, (c,); their sum is 1.
+        weight: share of each cell in the arc height, (c,); their sum is 1.
         of: function of impacts that gives the cell of each impact, (k,); -1 outside.
     """
 
@@ -86,13 +86,13 @@ class Cells(NamedTuple):
 
 
 class StripDents(NamedTuple):
-    """Dents in cells of a strip by level of strength.
+    """Dents in the cells of a strip, by level of strength: dent diameter² / ball diameter.
 
     Attributes:
         parts: dented area over area, of each replica in each cell, (g, c, LEVELS).
-        strength: mean s of the dents of each level [m], ascending, (LEVELS,).
-        weight: w of each cell, (c,).
-        number: of dents in each cell in all replicas, (c,).
+        strength: mean strength of the dents of each level [m], ascending, (LEVELS,).
+        weight: share of each cell in the arc height, (c,).
+        number: number of dents in each cell in all replicas, (c,).
         seconds: simulated time of each replica [s].
     """
 
@@ -104,28 +104,31 @@ class StripDents(NamedTuple):
 
 
 class StripCurve(NamedTuple):
-    """h(t) = sum of height (1 - exp(-rate t)).
+    """Saturation curve: arc strength after time t is the sum of height (1 - exp(-rate t)).
 
     Attributes:
-        height: [m], (n,).
-        rate: [1/s], (n,).
+        height: arc strength that each term reaches in the end [m], (n,).
+        rate: rate at which each term approaches it [1/s], (n,).
     """
 
     height: np.ndarray
     rate: np.ndarray
 
     def at(self, times: np.ndarray | float) -> np.ndarray:
-        """h [m] after some times [s], of the same shape."""
+        """Return the arc strength [m] after some times [s], in an array of the same shape."""
         gone = -np.expm1(-np.multiply.outer(np.asarray(times, dtype=float), self.rate))
         return np.asarray(gone @ self.height)
 
     def growth(self, times: np.ndarray | float) -> np.ndarray:
-        """Slope of h by the logarithm of the time [m], of the shape of the times."""
+        """Return the slope [m] of arc strength by the logarithm of time, in the shape of times."""
         exposure = np.multiply.outer(np.asarray(times, dtype=float), self.rate)
         return np.asarray((exposure * np.exp(-exposure)) @ self.height)
 
     def saturation_time(self) -> float:
-        """T [s], the largest root of h(2 T) = 1.1 h(T); 0 without dents."""
+        """Return the longest time [s] after which twice the time gives a tenth more arc strength.
+
+        This is the saturation time. It is 0 if there are no dents.
+        """
         from scipy.optimize import brentq
 
         rates = self.rate[self.rate > 0.0]
@@ -142,7 +145,7 @@ class StripCurve(NamedTuple):
 
 
 def strip_cells(size: StripSize) -> Cells:
-    """Cells of a strip whose middle is at x = y = 0."""
+    """Divide a strip, whose middle is at x = y = 0, into cells in which dents are counted."""
     if size.is_disc:
         return _disc_cells(0.5 * size.length)
     a, b = GAUGE
@@ -168,13 +171,16 @@ def strip_cells(size: StripSize) -> Cells:
 
 
 def _leverage(edges: np.ndarray, half: float) -> np.ndarray:
-    """Share of each interval in the integral of half - |x| from -half to half."""
+    """Return the share of each interval between edges in the integral of half - |x|.
+
+    The integral runs from -half to half.
+    """
     x = np.clip(edges, -half, half)
     return np.asarray(np.diff(x * (2.0 * half - np.abs(x))) / (2.0 * half**2))
 
 
 def _disc_cells(radius: float) -> Cells:
-    """Sectors of rings, all of one area."""
+    """Divide a round strip into cells of equal area: four sectors of each of its rings."""
     rings, sectors = CELLS[0], 4
     count = rings * sectors
 
@@ -189,7 +195,9 @@ def _disc_cells(radius: float) -> Cells:
 
 
 def surface_cells(vertices: np.ndarray, triangles: np.ndarray, area: np.ndarray) -> Cells:
-    """Cells of a surface that counts evenly: neighbouring triangles, about a sixteenth of it each.
+    """Divide a surface into about 16 cells of neighbouring triangles, in which dents are counted.
+
+    All places of the surface count evenly.
 
     Args:
         vertices: vertices of the part [m], (n, 3).
@@ -209,7 +217,7 @@ def surface_cells(vertices: np.ndarray, triangles: np.ndarray, area: np.ndarray)
 def count_dents(
     replicas: Sequence[Hits], seconds: float, cells: Cells, density: float, strip: PartMaterial
 ) -> StripDents:
-    """Dents of replicas in cells of a strip.
+    """Count the dents that the impacts of replicas leave in the cells of a strip.
 
     Args:
         replicas: impacts of each replica, on the strip and perhaps beside it.
@@ -238,7 +246,7 @@ def count_dents(
 
 
 def _put_together(dents: StripDents) -> StripDents:
-    """The dents in fewer cells, 4 or 1, where there are too few dents for all cells."""
+    """Return the dents in 4 cells, or in 1, where they are too few for all cells."""
     cells, total = len(dents.weight), dents.number.sum()
     groups = next((k for k in (cells, 4) if total >= ENOUGH_DENTS * k), 1)
     if groups >= cells:
@@ -251,9 +259,13 @@ def _put_together(dents: StripDents) -> StripDents:
 
 
 def strip_curve(dents: StripDents, some: np.ndarray | slice = slice(None)) -> StripCurve:
-    """Arc strength against time from some replicas, all by default.
+    """Return the curve of arc strength against time.
 
-    Almen's arc height is K times the arc strength at beta times the time.
+    The arc height of a real strip is K times the arc strength at beta times the time, with K and
+    beta from a calibration.
+
+    Args:
+        some: replicas that count; by default all.
     """
     parts = dents.parts[some]
     density = parts.sum(axis=0) / (dents.seconds * len(parts))

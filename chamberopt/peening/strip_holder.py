@@ -40,7 +40,9 @@ FIT_MM = 1e-6
 def strip_design(
     design: Design, size: StripSize, folder: Path, distance_mm: float | None = None
 ) -> Design:
-    """The design with a strip in a flush lid in place of its part; the lid is written as a mesh.
+    """Return the design with its part replaced by a strip that is flush in a lid on the chamber.
+
+    The lid is written as a mesh.
 
     Args:
         folder: folder for the mesh.
@@ -78,7 +80,7 @@ def strip_design(
 
 
 def _outline_mm(chamber: ParametricChamber, height: float) -> np.ndarray:
-    """The convex outline (n, 2) [mm] of a chamber at a height [mm], counter-clockwise."""
+    """Return the convex outline (n, 2) [mm] of a chamber at a height [mm], counter-clockwise."""
     import trimesh
     from scipy.spatial import ConvexHull
 
@@ -96,7 +98,7 @@ def _require_room(size: StripSize, outline: np.ndarray) -> None:
     reach = (normal * outline).sum(axis=1)  # distance of each side from the middle
 
     def share(edge: np.ndarray) -> float:
-        """The factor by which the strip could be larger."""
+        """Return the factor by which an edge (n, 2) could be enlarged and still fit."""
         return float((reach / (edge @ normal.T).max(axis=0)).min())
 
     if share(_edge_mm(size)) >= 1.0 - FIT_MM:
@@ -117,7 +119,7 @@ def _require_room(size: StripSize, outline: np.ndarray) -> None:
 
 
 def _edge_mm(size: StripSize) -> np.ndarray:
-    """Corners of the strip [mm], (n, 2), counter-clockwise."""
+    """Return the corners of a strip [mm], (n, 2), counter-clockwise."""
     if size.is_disc:
         angle = 2.0 * np.pi * (np.arange(SIDES) + 0.5) / SIDES
         return np.asarray(500.0 * size.length * np.c_[np.cos(angle), np.sin(angle)])
@@ -126,11 +128,12 @@ def _edge_mm(size: StripSize) -> np.ndarray:
 
 
 def _holder_obj(edge: np.ndarray, half_sides: np.ndarray, thickness: float) -> str:
-    """A plate [mm] whose lower face, at z = 0, has the strip as a group of its own.
+    """Return the OBJ text of a plate [mm] whose lower face, at z = 0, has the strip as a group.
 
     Args:
-        edge: corners of the strip, (n, 2).
-        half_sides: half sides of the plate along x and y, (2,).
+        edge: corners of the strip [mm], (n, 2).
+        half_sides: half sides of the plate along x and y [mm], (2,).
+        thickness: thickness of the plate [mm].
     """
     from scipy.spatial import Delaunay
 

@@ -63,7 +63,10 @@ SAMPLE_EXPONENT = 12  # the box has 2^12 points
 
 @dataclass(frozen=True)
 class ToleratedNumber:
-    """A number of a design with its range, in the unit of the file, and the design of its run."""
+    """A number of a design that has a tolerance, with its range and the changed design to simulate.
+
+    low, nominal, high: least, designed and largest value in the unit of the design file.
+    """
 
     name: str
     low: float
@@ -73,14 +76,18 @@ class ToleratedNumber:
     step: float  # u of this change; for the shot's mass, of its whole balls
 
     def moved(self, value: float) -> float:
-        """u of a value."""
+        """Return by how much a value of this number differs from the nominal one.
+
+        That is the logarithm of their ratio where the range is positive, else their difference.
+        """
         return _moved(self.nominal, self.low, value)
 
 
 def plan_tolerances(design: Design) -> tuple[ToleratedNumber, ...]:
-    """The numbers of a design that have tolerances, each with the change to simulate.
+    """Return the numbers of a design that have tolerances, each with the change to simulate.
 
-    InputError if no number has a tolerance, or the design cannot have an end of a range.
+    Raises InputError if no number has a tolerance, or if the design cannot have the least or the
+    largest value that a tolerance allows.
     """
     box = tolerance_box(design)
     if not box:
@@ -91,14 +98,22 @@ def plan_tolerances(design: Design) -> tuple[ToleratedNumber, ...]:
 
 
 def effective_move(design: Design, number: ToleratedNumber) -> float:
-    """u of a number in a design; for the shot's mass, u of the mass of its whole balls."""
+    """Return by how much a number in a design differs from its nominal value.
+
+    For the shot's mass, the mass of the whole balls counts. The difference is measured as by
+    `ToleratedNumber.moved`: the logarithm of the ratio where the range is positive.
+    """
     if number.name != MASS:
         return number.moved(design.value(number.name))
     return number.moved(1e3 * design.shot.count * design.shot.ball_mass)
 
 
 def box_points(numbers: tuple[ToleratedNumber, ...]) -> np.ndarray:
-    """u at points spread evenly over the box, (n, k)."""
+    """Return changes (n, k) of all numbers at points spread evenly over their tolerances.
+
+    A change is the logarithm of a number's ratio to its nominal value where its range is positive,
+    else the difference of both.
+    """
     from scipy.stats.qmc import Sobol
 
     sample = Sobol(len(numbers), seed=0).random_base2(SAMPLE_EXPONENT)
@@ -111,7 +126,10 @@ def box_points(numbers: tuple[ToleratedNumber, ...]) -> np.ndarray:
 
 
 def ball_notes(design: Design, numbers: tuple[ToleratedNumber, ...]) -> list[str]:
-    """A note on the number of whole balls at both ends of the shot's mass."""
+    """Return a note with the number of whole balls at the least and largest tolerated shot mass.
+
+    The list is empty where the shot's mass has no tolerance.
+    """
     for one in numbers:
         if one.name == MASS:
             ends = ({MASS: end, "tolerances": None} for end in (one.low, one.high))
@@ -153,7 +171,7 @@ def _moved(nominal: float, low: float, value: float) -> float:
 
 
 def _is_logarithmic(nominal: float, low: float) -> bool:
-    """Whether u is a logarithm."""
+    """Return whether changes of a number are measured as logarithms of its ratio to nominal."""
     return nominal > 0.0 and low > 0.0
 
 
@@ -168,8 +186,10 @@ DECIDING = ("p05_coverage", "mean_coverage", "impacts_per_mm2_s")
 
 @dataclass(frozen=True)
 class ToleratedFigure:
-    """A figure over the box.
+    """A figure of a design over all values that the tolerances allow (their box).
 
+    nominal: value of the design as it is.
+    q05, q95: values below which the figure is in 5 % and in 95 % of the box.
     lowest and highest: values in the corners of the box that are extreme to first order.
     effects: changes of the figure at the low and at the high end of each number alone.
     predicted, simulated: values in the worst corner; None where it could not be simulated.
@@ -189,7 +209,7 @@ class ToleratedFigure:
 
 @dataclass(frozen=True)
 class ToleranceResult:
-    """Figures over the box of tolerances.
+    """All figures of a design over the values that its tolerances allow.
 
     worst_for: the figure that is lowest in `corner`; empty where no such figure is resolved.
     corner: value of each number in the worst corner.
@@ -209,10 +229,12 @@ def simulate_tolerances(
     progress: Progress | None = None,
     analytic: bool = False,
 ) -> tuple[Evaluation, ToleranceResult]:
-    """Simulate a design and its tolerances.
+    """Simulate a design, and what its tolerances do to its figures; return both.
 
+    Args:
+        analytic: whether the chamber has its exact shape in the simulation, instead of a mesh.
     Raises:
-        InputError: as `plan_tolerances`, or a changed chamber cannot be built.
+        InputError: the design has no tolerances, or cannot have a value that they allow.
         sim_core.SimulationError: a run must stop.
     """
     numbers = plan_tolerances(design)
@@ -238,7 +260,7 @@ def simulate_tolerances(
 
 @contextmanager
 def _run_named(number: ToleratedNumber) -> Iterator[None]:
-    """Add the run to the message of an error."""
+    """Add to the message of an error in which run it happened: the changed number and its value."""
     try:
         yield
     except Exception as error:
@@ -252,9 +274,13 @@ def find_tolerances(
     nominal: Evaluation,
     evaluate: Callable[[Design], Evaluation],
 ) -> ToleranceResult:
-    """Run each change, then the worst corner, and work out the figures over the box.
+    """Simulate each change of a number, then the worst corner, and return all figures over the box.
+
+    The box holds all values that the tolerances allow. The worst corner is that in which coverage,
+    or the rate of impacts where no coverage is resolved, is lowest to first order.
 
     Args:
+        nominal: evaluation of the design as it is.
         evaluate: evaluates a changed design in the replicas and on the seeds of `nominal`.
     """
     changed = {}
@@ -313,12 +339,16 @@ def find_tolerances(
 
 
 class _Figure:
-    """One figure on its scale, of all runs."""
+    """One figure in all runs, on the scale on which it responds nearly in a straight line."""
 
     def __init__(
         self, name: str, numbers: tuple[ToleratedNumber, ...], runs: dict[str, Estimate]
     ) -> None:
-        """`runs` has the figure of the nominal design, and of the run of each number."""
+        """Bring the figure of each run to its scale, and find its slope by each number.
+
+        Args:
+            runs: the figure of the nominal design, and of the run in which each number is changed.
+        """
         metric, self._scale = find_metric(name), scale_of(name)
         if name.rpartition(".")[2] == "time_to_98_s" and TREATMENT_TIME in runs:
             # It does not depend on the treatment time, but its estimate does, by chance.
@@ -333,7 +363,10 @@ class _Figure:
         self.slopes = np.array([(self._on[x.name].value - at_nominal) / x.step for x in numbers])
 
     def over_the_box(self) -> ToleratedFigure:
-        """The figure over the box, without its worst corner."""
+        """Return quantiles, extremes and effects of the figure over the box of tolerances.
+
+        The values in the worst corner are left out.
+        """
         ends = np.array([[x.moved(x.low), x.moved(x.high)] for x in self._numbers])
         points = box_points(self._numbers)
         order = np.argsort(points @ self.slopes, kind="stable")
@@ -361,7 +394,14 @@ class _Figure:
     def with_corner(
         self, found: ToleratedFigure, u: np.ndarray, simulated: Estimate, confidence: float
     ) -> ToleratedFigure:
-        """The figure with its values at u (k,) by first order and by a run."""
+        """Add to a figure its values in the worst corner: by first order, and as simulated.
+
+        Args:
+            found: the figure over the box of tolerances.
+            u: changes of the numbers in the corner, (k,).
+            simulated: the figure as simulated in the corner.
+            confidence: confidence with which both values must differ to disagree.
+        """
         predicted = self._at(u)
         there, shown = on_scale(simulated, self._scale), self._back(predicted)
         found = replace(found, predicted=shown, simulated=_without_replicas(simulated))
@@ -375,16 +415,20 @@ class _Figure:
         return replace(found, agrees=abs(gap.value) <= max(gap.half_width, BENT * change))
 
     def _at(self, u: np.ndarray) -> Estimate:
-        """L at u (k,), to first order."""
+        """Return the figure on its scale after changes u (k,) of the numbers, to first order."""
         shares = [float(one) / x.step for one, x in zip(u, self._numbers, strict=True)]
         weights = {x.name: share for x, share in zip(self._numbers, shares, strict=True)}
         return combine(self._on, {NOMINAL: 1.0 - sum(shares), **weights})
 
     def _change(self, number: int, u: float) -> Estimate:
-        """Change of the figure when a number alone moves by u.
+        """Return the change of the figure when only one number changes.
 
-        Its error comes from the change on the scale, and from the place on the scale where the
+        Its error comes from the change on the scale, and from the value on the scale where the
         change starts.
+
+        Args:
+            number: position of the number.
+            u: change of the number.
         """
         x, nominal = self._numbers[number], self._on[NOMINAL]
         share, changed = u / x.step, self._on[x.name]
@@ -409,7 +453,7 @@ class _Figure:
         )
 
     def _possible(self, value: Estimate) -> Estimate:
-        """The figure from its value on the scale, within its range."""
+        """Return the figure from its value on the scale, limited to values that it can have."""
         found = self._back(value)
         return replace(found, value=min(max(found.value, self._range[0]), self._range[1]))
 
@@ -420,7 +464,10 @@ class _Figure:
 def _resolved(
     name: str, nominal: Evaluation, changed: Mapping[str, Evaluation]
 ) -> dict[str, Estimate]:
-    """A figure of all runs; empty where a run does not resolve it, or nothing in it is random."""
+    """Return the estimate of a figure in each run.
+
+    Return nothing where a run does not resolve the figure, or where the figure has no scatter.
+    """
     runs = {NOMINAL: nominal, **changed}
     figures = {run: one.metrics[name] for run, one in runs.items() if name in one.metrics}
     known = all(_is_resolved(on_scale(one, scale_of(name))) for one in figures.values())

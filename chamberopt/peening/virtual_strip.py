@@ -72,14 +72,14 @@ OF_A_ZONE = (
 
 
 class StripSetting(NamedTuple):
-    """A strip in its place.
+    """Where and how a virtual strip is peened.
 
     Attributes:
         design: design in which the strip is peened.
         type: type of the strip, as N, A or C.
         place: place of the strip, in words.
         cells: cells of the strip.
-        notes: sentences on how the gauge weighs places.
+        notes: sentences on how much each place of the strip counts in the arc height.
     """
 
     design: Design
@@ -91,7 +91,7 @@ class StripSetting(NamedTuple):
 
 @dataclass(frozen=True)
 class VirtualStrip:
-    """A peened strip; arc heights and the intensity are in `unit`."""
+    """The figures of a peened strip; arc heights and the intensity are in `unit`."""
 
     setting: StripSetting
     unit: str
@@ -106,7 +106,7 @@ class VirtualStrip:
 
     @property
     def is_calibrated(self) -> bool:
-        """Whether arc heights are in mm of a real strip."""
+        """Whether the machine is calibrated, so that arc heights are those of a real strip."""
         return bool(self.of)
 
     @property
@@ -123,7 +123,15 @@ def strip_in_lid(
     folder: Path,
     distance_mm: float | None = None,
 ) -> StripSetting:
-    """A strip in a flush lid; arguments and errors as of `strip_design`."""
+    """Return the setting of a strip that is flush in a lid on the design's chamber.
+
+    Args:
+        folder: folder for the mesh of the lid.
+        distance_mm: distance from the sonotrode to the strip; None for the distance of the part.
+
+    Raises:
+        InputError: the chamber has a shape without a lid, or the strip does not fit into it.
+    """
     changed = strip_design(design, size, folder, distance_mm)
     distance = changed.chamber.sonotrode_distance_mm
     place = f"{size}, flush in a lid {distance:g} mm over the sonotrode"
@@ -134,7 +142,7 @@ def strip_in_lid(
 def strip_in_zone(
     design: Design, strip_type: StripType, zone: str, chamber: Chamber
 ) -> StripSetting:
-    """A strip in the place of a zone of the part, which stays as it is.
+    """Return the setting of a strip in the place of a zone of the part, which stays as it is.
 
     Args:
         chamber: chamber of the design.
@@ -149,7 +157,7 @@ def strip_in_zone(
 def peen_strip(
     setting: StripSetting, chamber: Chamber, executor: Executor, progress: Progress | None = None
 ) -> VirtualStrip:
-    """Simulate the replicas of the design, and give arc heights with their intervals.
+    """Simulate the peening of a strip, and return its arc heights and intensity with intervals.
 
     Args:
         chamber: chamber of the setting's design.
@@ -223,12 +231,12 @@ def _as_measured(
     slopes: list[dict[Parameter, float]],
     times: list[float],
 ) -> list[Estimate]:
-    """Figures of a real strip from simulated figures, with the errors of the calibration.
+    """Return the figures of a real strip from simulated ones, with the errors of the calibration.
 
     Args:
-        found: S, T, and h after some times.
+        found: arc strength at the saturation time, this time, and arc strengths at `times`.
         slopes: slopes of each figure by the parameters that took a run.
-        times: times of h [s].
+        times: times of the arc strengths [s].
     """
     calibration = setting.design.calibration
     scale, slower = MICROMETRES, 1.0
@@ -254,7 +262,11 @@ def _as_measured(
 
 
 def _unit(setting: StripSetting) -> str:
-    """The unit of arc heights; only whole strips have mmA."""
+    """Return the unit of the arc heights.
+
+    That is µm without a calibration, mmA (or N, C) if standard strips were calibrated, and mm if
+    strips of another size were.
+    """
     calibration = setting.design.calibration
     if calibration is None or not calibration.has_strips:
         return "µm"
@@ -262,10 +274,10 @@ def _unit(setting: StripSetting) -> str:
 
 
 def _calibrated_notes(setting: StripSetting, height: float) -> tuple[str, ...]:
-    """Notes on the strip of the arc heights, and on the type that shops use at this intensity.
+    """Return notes on what strip the arc heights hold for, and which type of strip would suit.
 
     Args:
-        height: the intensity [mm of the type].
+        height: Almen intensity, in mm of the strip's type (N, A or C).
     """
     calibration, strip_type = setting.design.calibration, setting.type
     assert calibration is not None
