@@ -59,7 +59,7 @@ Place = tuple[int | None, np.ndarray]
 
 @dataclass
 class _Asked:
-    """A candidate that was asked for and is not on the list of trials yet."""
+    """A candidate that the search has asked for, and that is not on the list of trials yet."""
 
     candidate: Candidate
     began: float  # by the clock [s]
@@ -78,8 +78,9 @@ class Search:
     Args:
         folder: where trials are recorded; those on record are not asked for again. By default
             nothing is recorded.
-        progress: called after each trial.
-        points: the candidates of a sweep, shape (n, d), instead of a search.
+        progress: called after each trial as progress(trials done, trials in all, best score).
+        points: the candidates of a sweep as points of the unit cube, shape (n, d); by default the
+            search finds its candidates itself.
         has_promise: whether a candidate that was never evaluated is worth a confirmation.
     """
 
@@ -121,9 +122,10 @@ class Search:
         )
 
     def ask(self) -> Candidate | None:
-        """The next candidate; None if those that are out must be told first, or at the end.
+        """Return the next candidate to evaluate.
 
-        InputError if an algorithm cannot take the study's parameters.
+        Return None if figures of earlier candidates must be told first, and when the search has
+        ended. Raises InputError if an algorithm cannot take the study's parameters.
         """
         while True:
             candidate = next(self._steps, None)
@@ -138,13 +140,14 @@ class Search:
                 return None
 
     def tell(self, candidate: Candidate, answer: Answer) -> Trial:
-        """Take the figures of the candidate that was asked for first; returns its trial.
+        """Take the figures of a candidate, and return its trial. The oldest candidate comes first.
 
         Args:
-            answer: measured figures have those of `figures` at least; plain numbers are exact.
+            answer: an evaluation, measured figures by name, or the reason why there are none.
+                Measured figures are at least those named by `figures`; plain numbers are exact.
         Raises:
-            InputError: it is not this candidate's turn, a figure is missing or not finite, or the
-                start has none.
+            InputError: an older candidate has no figures yet, a figure is missing or not finite, or
+                the start has no figures.
         """
         self._require_turn(candidate)
         given = self._read(answer)
@@ -157,7 +160,7 @@ class Search:
 
     @property
     def figures(self) -> tuple[str, ...]:
-        """The names of the figures to tell: objectives, and metrics with limits."""
+        """Names of the figures that `tell` needs: the objectives, and the metrics with limits."""
         return self._judge.names
 
     @property
@@ -167,9 +170,10 @@ class Search:
 
     @property
     def best(self) -> ConfirmedCandidate:
-        """The best confirmed candidate that meets the constraints, or may; of the first objective.
+        """The confirmed candidate with the best first objective that meets the constraints.
 
-        InputError if the search has not ended, the start was not confirmed, or there is none.
+        If none surely meets them, one that may meet them counts. Raises InputError if the search
+        has not ended, if the start could not be confirmed, or if no candidate meets them.
         """
         start = self.confirmed[0] if self.confirmed else None
         if start is None or start.searched != 0:
@@ -188,9 +192,10 @@ class Search:
         return max(winners, key=lambda one: one.goals[0].value - one.lost_to_tolerances)
 
     def observations(self, weight: np.ndarray | None = None) -> Observations:
-        """What the trials of the search tell a model.
+        """Return what the model of the search learns from the trials so far.
 
-        The weights of two objectives are by default random ones for this step.
+        Args:
+            weight: weights of two objectives, (2,); by default random ones for this step.
         """
         if weight is None:
             weight = draw_weights(self._study.optimizer.seed, len(self._search.points))
@@ -199,14 +204,23 @@ class Search:
 
     @cached_property
     def objective_model(self) -> SearchModel | None:
-        """A model of the first objective when the search has ended, with all that bounds it.
+        """Model of the first objective by all trials of a search that has ended.
 
-        None with too few points.
+        It also knows the largest objective of candidates that were not simulated, as the reach of
+        the balls gives it. It is None if there are too few points for a model.
         """
         return self._model(FIRST_OBJECTIVE, learns_bounds=True)
 
     def _model(self, weight: np.ndarray, learns_bounds: bool = False) -> SearchModel | None:
-        """A model of the whole search; None if there are too few points."""
+        """Return a model of the score by all trials of the search.
+
+        Return None if the points are too few, or if all their scores are equal.
+
+        Args:
+            weight: weights of two objectives in the score, (2,).
+            learns_bounds: whether it also learns the largest score of candidates that were not
+                simulated.
+        """
         seen = self.observations(weight)
         scores = seen.scores[seen.simulated]
         if len(scores) < POINTS_PER_PARAMETER * len(self.space.names) or np.ptp(scores) == 0.0:
@@ -233,7 +247,7 @@ class Search:
 
     @property
     def _best_low(self) -> float:
-        """The highest lower end of the objective's intervals so far."""
+        """The value that the best objective so far has at least: the highest lower interval end."""
         lows = (t.objective.low for t in self.trials if t.feasible and t.objective)
         return max(lows, default=-np.inf)
 
@@ -270,7 +284,11 @@ class Search:
         self.confirmed = tuple(confirmed.values())
 
     def _confirmed(self, searched: int | None, candidate: Candidate) -> ConfirmedCandidate | None:
-        """The candidate as it was confirmed; None if its evaluation failed."""
+        """Return a candidate with its confirmed figures; None if its evaluation failed.
+
+        Args:
+            searched: number of its trial in the search; None if it was not evaluated there.
+        """
         figures = self._answers.pop(candidate.number, None)
         if figures is None:
             return None
@@ -287,7 +305,7 @@ class Search:
         return max(0.0, lost)  # where the model rises beyond a bound, nobody has looked
 
     def _promising(self, count: int) -> list[Place]:
-        """The start and up to `count` distinct others, each with its trial number.
+        """Return the start and up to `count` other points to confirm, each with its trial number.
 
         For one objective: the best feasible candidates and the two that the model recommends, of
         which one was evaluated. For two: what the model recommends for `count` weights, from one
@@ -311,7 +329,10 @@ class Search:
         return chosen
 
     def _wanted(self, count: int) -> list[np.ndarray]:
-        """The points (d,) to confirm, if they differ, the most promising first."""
+        """Return points (d,) that are worth a confirmation, the most promising first.
+
+        Some of them may be equal, or nearly so.
+        """
         has_two_objectives = len(self._study.objective.goals) > 1
         first = (np.arange(count) + 0.5) / count
         weights = np.stack([first, 1.0 - first], axis=1) if has_two_objectives else FIRST_OBJECTIVE
@@ -329,7 +350,10 @@ class Search:
     # Answers.
 
     def _with_answer(self, candidate: Candidate) -> _Asked:
-        """A candidate with its answer, if that is on record or its design is impossible."""
+        """Return a candidate with its answer, if this is known without an evaluation.
+
+        It is known if it is on record, or if the design cannot have the candidate's parameters.
+        """
         asked = _Asked(candidate, time.perf_counter())
         if self._folder:
             place = candidate.number, candidate.stage, candidate.point.tolist()
@@ -343,7 +367,7 @@ class Search:
         return asked
 
     def _require_turn(self, candidate: Candidate) -> None:
-        """Raise InputError unless the candidate is the first of those that are out."""
+        """Raise InputError unless the candidate is the oldest one whose figures are awaited."""
         first = next((one.candidate for one in self._asked if one.answer is None), None)
         if first is not None and candidate is first:
             return
@@ -365,7 +389,7 @@ class Search:
         return InputError(answer) if isinstance(answer, str) else answer
 
     def _take(self, answer: Figures | InputError) -> Trial:
-        """Put the first candidate that was asked for on the list of trials, with its answer."""
+        """Put the oldest candidate without a trial on the list of trials, and return its trial."""
         asked = self._asked[0]
         trial = asked.recorded or self._record(asked, answer)
         self._asked.popleft()
@@ -399,7 +423,10 @@ class Search:
             self._best[trial.stage] = max(trial.score, self._best.get(trial.stage, -math.inf))
 
     def _expected(self) -> int:
-        """How many trials there will be, at most: some will cost a part of an evaluation."""
+        """Return how many trials there will be in all, as far as can be told now.
+
+        Candidates that cost only a part of an evaluation leave room for more.
+        """
         if self._sweep is not None:
             return len(self._sweep)
         settings, searched = self._study.optimizer, len(self._search.scores)
@@ -410,7 +437,7 @@ class Search:
 
 
 def _why_impossible(candidate: Candidate) -> InputError | None:
-    """Why the study's design cannot have a candidate's parameters; None if it can."""
+    """Return the error why the design cannot have a candidate's parameters; None if it can."""
     try:
         _ = candidate.design
     except UnreadableError:

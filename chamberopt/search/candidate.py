@@ -53,7 +53,7 @@ class Candidate:
 
     @cached_property
     def design(self) -> Design:
-        """The design to evaluate; InputError if the study's design cannot have the parameters."""
+        """The study's design with these parameters; InputError if it cannot have them."""
         return self.space.design_at(self.point)
 
     @property
@@ -74,7 +74,7 @@ class Figures:
 
 
 def simulated_figures(study: Study, evaluation: Evaluation) -> Figures:
-    """The figures of a simulated candidate."""
+    """Return the objectives and metrics of a simulated candidate from its evaluation."""
     metrics, (_, *others) = evaluation.metrics, study.objective.goals
     more = (weighted_sum(parse_objective(name), metrics) for name in others)
     return Figures((evaluation.objective, *more), metrics, evaluation.replicas, evaluation)
@@ -121,7 +121,10 @@ class ConfirmedCandidate:
 
 
 def close_to_best(confirmed: Sequence[ConfirmedCandidate]) -> list[ConfirmedCandidate]:
-    """The best candidate and those within the noise of it; empty if it stands alone."""
+    """Return the best candidate and those that noise cannot tell from it.
+
+    Return nothing if the best one is clearly better than all others.
+    """
     feasible = [one for one in confirmed if one.feasibility != INFEASIBLE]
     if not feasible:
         return []
@@ -132,7 +135,7 @@ def close_to_best(confirmed: Sequence[ConfirmedCandidate]) -> list[ConfirmedCand
 
 
 class NoPromiseError(InputError):
-    """A candidate is not worth a simulation: its objective is at most `highest`."""
+    """Raised for a candidate that is not worth a simulation: its objective is at most `highest`."""
 
     def __init__(self, text: str, highest: float) -> None:
         super().__init__(text)
@@ -147,7 +150,7 @@ class CandidateEvaluator:
         self._first_look = study.first_look
 
     def evaluate(self, candidate: Candidate) -> Evaluation | InputError:
-        """Simulate a candidate; the error with the reason if that is impossible.
+        """Simulate a candidate and return its evaluation, or the error why that is impossible.
 
         All but confirmations are evaluated at the accuracy and with the seeds of a search. Several
         threads may call this at a time.
@@ -175,7 +178,10 @@ class CandidateEvaluator:
         return evaluation
 
     def has_promise(self, candidate: Candidate) -> bool:
-        """Whether a candidate can be built and may be above its bar, as far as reach tells."""
+        """Return whether a candidate can be built and may be as good as the best one so far.
+
+        Its objective is bounded by the share of the target that the balls can reach.
+        """
         try:
             self._require_promise(self._study.at_search_accuracy(candidate.design), candidate.bar)
         except UnreadableError:
@@ -196,7 +202,13 @@ class CandidateEvaluator:
         return self._simulate(design, "search", candidate.replicas)
 
     def _require_promise(self, design: Design, bar: float | None) -> None:
-        """Raise NoPromiseError if reach alone shows that a candidate is below the bar."""
+        """Raise NoPromiseError if a candidate is clearly worse than the best one so far.
+
+        That is shown without a simulation, by the share of the target that the balls can reach.
+
+        Args:
+            bar: least value of the best objective so far; None if there is none.
+        """
         find_reachable = getattr(self._simulator, "reachable", None)
         goals = self._study.objective.goals
         if bar is None or find_reachable is None or len(goals) > 1:
@@ -221,5 +233,5 @@ class CandidateEvaluator:
 
 
 def evaluation_cost(replicas: int, all_replicas: int) -> float:
-    """The cost of so many replicas of a candidate, where that of all of them is 1."""
+    """Return the cost of simulating some replicas of a candidate, as a share of that of all."""
     return SET_UP + (1.0 - SET_UP) * replicas / all_replicas

@@ -23,10 +23,10 @@ FAILURE_PENALTY = 2.0
 
 
 class Judge:
-    """The objectives, limits and costs of a study.
+    """Judges candidates by the objectives and limits of a study: score, penalty, feasibility, cost.
 
     Scores are measured by the start: a search sets `reference` to its score, and `unit` to the size
-    of its objective, see `unit_of`.
+    of the largest term of its objective.
     """
 
     def __init__(self, study: Study) -> None:
@@ -36,19 +36,28 @@ class Judge:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The figures that a candidate must have: objectives, and metrics with limits."""
+        """Names of the figures that a candidate must have: objectives, and metrics with limits."""
         limited = (name for name in self._study.all_constraints if find_metric(name))
         return tuple(dict.fromkeys((*self._study.objective.goals, *limited)))
 
     def measured(self, told: Mapping[str, Estimate | float]) -> Figures:
-        """The figures of a measured candidate; InputError unless `names` are there and finite."""
+        """Return the figures of a measured candidate.
+
+        Raises InputError if one of `names` is missing, or if a figure is not finite.
+
+        Args:
+            told: measured figures by name; a plain number is exact.
+        """
         if missing := [name for name in self.names if name not in told]:
             raise InputError(f"tell: {missing[0]} is missing; give {', '.join(self.names)}")
         figures = {name: _finite(name, one) for name, one in told.items()}
         return Figures(tuple(figures[name] for name in self._study.objective.goals), figures)
 
     def limited(self, candidate: Candidate, figures: Figures) -> dict[str, Estimate]:
-        """The figures with limits: metrics, and numbers of the design, which are exact."""
+        """Return a candidate's figures that have limits, by name.
+
+        These are metrics, and numbers of the design, which are exact.
+        """
         known = exact(candidate.parameters) | dict(figures.metrics)
         return {
             name: known[name] if name in known else Estimate(self._study.design.value(name), 0.0)
@@ -56,9 +65,10 @@ class Judge:
         }
 
     def cost(self, trial: Trial) -> float:
-        """Cost of a trial of the search, where that of all replicas is 1; 0 if not simulated.
+        """Return what a trial of the search has cost, as a share of one with all its replicas.
 
-        It follows from the number of replicas, not from a clock, so that it is the same everywhere.
+        It is 0 if the candidate was not simulated. It follows from the number of replicas, not from
+        a clock, so that it is the same everywhere.
         """
         if not trial.goals:
             return 0.0
@@ -66,7 +76,11 @@ class Judge:
         return 1.0 if few is None or trial.replicas != few else evaluation_cost(few, self._replicas)
 
     def trial(self, candidate: Candidate, answer: Figures | InputError) -> Trial:
-        """The row of a candidate, or of the reason why it has no figures."""
+        """Return the row of the trial log for a candidate.
+
+        Args:
+            answer: its figures, or the reason why it has none.
+        """
         worst = self.reference - FAILURE_PENALTY * self.unit
         at = candidate.number, candidate.stage, tuple(candidate.point.tolist())
         failed = Trial(*at, candidate.parameters, (), {}, 0.0, worst, False, "")
@@ -98,7 +112,7 @@ class Judge:
         )
 
     def unit_of(self, figures: Figures) -> float:
-        """Size of one unit of the first objective: that of its largest term.
+        """Return the size of the largest term of the first objective, by which scores are measured.
 
         For a metric between 0 and 1 this is its weight, for another also the size of the metric, or
         of the objective where the metric was not measured.
@@ -112,7 +126,10 @@ class Judge:
 
 
 def _finite(name: str, given: Estimate | float) -> Estimate:
-    """The estimate of a figure that was told; plain numbers are exact."""
+    """Return a measured figure as an estimate; a plain number is exact.
+
+    Raises InputError if it is not finite.
+    """
     if isinstance(given, Estimate):
         if math.isfinite(given.value) and given.half_width >= 0.0:
             return given

@@ -27,7 +27,7 @@ FIRST_OBJECTIVE = np.array([1.0, 0.0])  # weights of two objectives
 def observe(
     trials: Sequence[Trial], constraints: Mapping[str, Limits], weight: np.ndarray
 ) -> Observations:
-    """What the trials of a search have shown.
+    """Return what the models of a search learn from its trials: scores, and figures with limits.
 
     Args:
         weight: of two objectives, (2,); not looked at where there is one.
@@ -50,11 +50,11 @@ def observe(
 
 
 def _limited_figure(name: str, limits: Limits, trials: Sequence[Trial]) -> LimitedFigure:
-    """A figure of the trials with limits, as a model learns it.
+    """Return the values of a figure with limits in all trials, as a model learns them.
 
-    One that is not resolved tells next to nothing. One far outside, such as a time that stands for
-    never, is brought nearer to its limit: how far outside it is decides nothing, and would bend the
-    model.
+    A value that is not resolved gets so large an error that it tells next to nothing. One far
+    outside the limits, such as a time that stands for never, is brought nearer to its limit: how
+    far outside it is decides nothing, and would bend the model.
     """
     figures = [(trial.metrics | exact(trial.parameters)).get(name) for trial in trials]
     known = np.array([one.value if one else np.nan for one in figures])
@@ -73,7 +73,7 @@ def _limited_figure(name: str, limits: Limits, trials: Sequence[Trial]) -> Limit
 
 
 def _error(figure: Estimate | None, trial: Trial) -> float:
-    """Standard error of a figure, whose pseudo-values the log does not keep."""
+    """Return the standard error of a figure of a trial, from its half-width; NaN if it has none."""
     if figure is None or not math.isfinite(figure.half_width):
         return math.nan
     if trial.replicas is None:  # measured, or not varied by chance
@@ -82,9 +82,10 @@ def _error(figure: Estimate | None, trial: Trial) -> float:
 
 
 def _variances(goals: list[Estimate]) -> np.ndarray:
-    """Squared standard errors (n,) of one objective.
+    """Return the squared standard errors (n,) of one objective of n candidates.
 
-    Those of replicas are drawn towards those of all candidates; without, intervals tell.
+    They come from the scatter of replicas, and are drawn towards those of all candidates. Where an
+    objective was measured, they come from the half-width of its interval.
     """
     samples = [goal.pseudovalues for goal in goals]
     spreads = [float(np.var(one, ddof=1)) if len(one) > 1 else np.nan for one in samples]

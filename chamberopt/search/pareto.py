@@ -28,11 +28,14 @@ class ParetoPoint:
 
 
 def on_front(values: np.ndarray, among: np.ndarray | None = None) -> np.ndarray:
-    """Whether each candidate is on the Pareto front, shape (n,) bool.
+    """Return which candidates are on the Pareto front, shape (n,) bool.
+
+    These are the candidates that no other one beats in one objective and equals in the rest.
 
     Args:
         values: objectives, shape (n, k), to be maximised.
-        among: candidates that count, shape (n,) bool, default all; the others are not on the front.
+        among: candidates that count, shape (n,) bool; by default all. The others are never on the
+            front.
     """
     counts = np.ones(len(values), dtype=bool) if among is None else among
     as_good = (values[:, None] >= values[None]).all(axis=2)
@@ -42,7 +45,10 @@ def on_front(values: np.ndarray, among: np.ndarray | None = None) -> np.ndarray:
 
 
 def pareto_points(result: StudyResult) -> list[ParetoPoint]:
-    """The confirmed candidates, then those of the search; the start is the first of each."""
+    """Return the confirmed candidates of a study, then those of its search, with their objectives.
+
+    The start is the first of each.
+    """
     stages = {
         "confirm": [(one.parameters, one.goals, one.feasibility) for one in result.confirmed],
         "search": [
@@ -62,7 +68,10 @@ def pareto_points(result: StudyResult) -> list[ParetoPoint]:
 
 
 def as_csv(result: StudyResult) -> str:
-    """The points as a table; NAME_pm is the half-width of the objective NAME."""
+    """Return the confirmed and searched candidates of a study as CSV text.
+
+    The column NAME_pm has the half-width of the objective NAME.
+    """
     lines = []
     for one in pareto_points(result):
         line = {"stage": one.stage, "on_front": one.on_front, "standing": one.feasibility}

@@ -71,7 +71,7 @@ class StudyResult:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What tolerances did to the search, and each parameter whose best value is on a bound."""
+        """Sentences on what tolerances did to the search, and on best values on their bounds."""
         lost = self.best.lost_to_tolerances
         which = "mean" if self.study.objective.over_tolerances == "mean" else "worst value"
         sentences = tolerance_notes(lost, which) if self.study.design.tolerances else []
@@ -103,7 +103,7 @@ class StudyResult:
 
     @property
     def improved(self) -> bool:
-        """Whether the best beats the start by more than the interval of the gain."""
+        """Whether the whole interval of the gain of the best design over the start is above 0."""
         return self.gain.low > 0.0
 
 
@@ -174,11 +174,12 @@ def run_study(
 def run_search(
     search: Search, submit: Callable[[Candidate], Future[Outcome]], stop: Stop | None = None
 ) -> None:
-    """Ask, evaluate and tell until a search ends.
+    """Have all candidates of a search evaluated, and tell it their figures, until it ends.
 
     Args:
-        submit: begins an evaluation.
-        stop: as of run_study; the evaluations that run are finished and told first.
+        submit: function that begins an evaluation of a candidate.
+        stop: called before each evaluation; if it returns True, the evaluations that run are
+            finished and told, and KeyboardInterrupt is raised.
     """
     running: deque[tuple[Candidate, Future[Outcome]]] = deque()
     try:
@@ -210,17 +211,23 @@ def _outcome(candidate: Candidate, evaluation: Future[Outcome]) -> Outcome:
 
 
 def tolerance_notes(lost: float, which: str = "mean") -> list[str]:
-    """What a search with tolerances has maximised; a loss of 0 is that without a model."""
+    """Return sentences on what a search maximised over the design's tolerances.
+
+    Args:
+        lost: score that tolerances cost at the best design; 0 if no model tells it.
+        which: "mean" or "worst value" of the objective over the tolerances.
+    """
     side = "below" if lost > 0.0 else "above"
     maximised = [MAXIMISED.format(which=which, lost=abs(lost), side=side)] if lost else []
     return [*maximised, TOLERANCES]
 
 
 def fixed_target(study: Study) -> np.ndarray | None:
-    """The target of all candidates, shape (m,) bool, if it is what the shot reaches; else None.
+    """Return which triangles of the part are the target in all candidates, shape (m,) bool.
 
-    It is found once, in the chamber of the start. Otherwise a search could shrink the area that it
-    has to cover.
+    This holds where the target is what the shot reaches: it is found once, in the chamber of the
+    start, because a search could otherwise shrink the area that it has to cover. Return None where
+    the design itself says what the target is.
     """
     from chamberopt.chamber.build import build_chamber
 
@@ -230,7 +237,10 @@ def fixed_target(study: Study) -> np.ndarray | None:
 
 
 def save_inputs(study: Study, folder: Path) -> None:
-    """Write design.toml and study.toml, to be read and run again."""
+    """Write the study's design.toml and study.toml to the folder, from which it can be run again.
+
+    Nothing is written if study.toml is there already.
+    """
     import tomlkit
 
     if (folder / STUDY).is_file():
@@ -242,14 +252,14 @@ def save_inputs(study: Study, folder: Path) -> None:
 
 @dataclass
 class _Simulated:
-    """What is kept of a candidate."""
+    """The chamber and the replicas of a candidate, kept in case it is simulated further."""
 
     chamber: Chamber
     known: ReplicaSet = field(default_factory=ReplicaSet)
 
 
 class ChamberSimulator:
-    """The simulator of a study: chamber, replicas, coverage.
+    """Simulates the candidates of a study: builds the chamber, runs replicas, evaluates coverage.
 
     Asked for more replicas of a candidate, it adds them to those it has. Several threads may call
     it at a time.
@@ -270,7 +280,7 @@ class ChamberSimulator:
         return replace(evaluation, timings={"chamber": seconds, **evaluation.timings})
 
     def reachable(self, design: Design) -> float:
-        """The largest share of the target that the balls may touch, without any simulation."""
+        """Return the largest share of the target that the balls may touch, from geometry alone."""
         one = self._candidate(design, "search")
         one.known.target = prepare_target(design, one.chamber, chamber_mesh(one.chamber))
         return one.known.target.reach.largest

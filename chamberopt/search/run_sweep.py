@@ -49,13 +49,13 @@ class SweepPlan:
     seed: int | None  # of the points; None for a grid
 
     def as_json(self) -> dict[str, Any]:
-        """Plain JSON values; the points follow from them."""
+        """Return the plan without its points, which follow from it, as plain JSON values."""
         return {"method": self.method, "count": self.count, "seed": self.seed}
 
 
 @dataclass(frozen=True)
 class SweepResult:
-    """The trials in the order of the plan, and their wall-clock time [s]."""
+    """The result of a sweep: its trials in the order of the plan, and their wall-clock time [s]."""
 
     study: Study
     plan: SweepPlan
@@ -65,9 +65,10 @@ class SweepResult:
 
     @property
     def best(self) -> Trial | None:
-        """The feasible candidate with the largest objective; partly the luckiest one.
+        """The feasible candidate with the largest objective; None if no candidate is feasible.
 
-        One whose objective is not resolved counts only where there is no other.
+        It is partly the luckiest one. A candidate whose objective is not resolved counts only where
+        there is no other.
         """
         feasible = [trial for trial in self.trials if trial.feasible]
         resolved = [one for one in feasible if one.objective and one.objective.has_number]
@@ -79,8 +80,8 @@ def plan_sweep(
 ) -> SweepPlan:
     """Plan a sweep of `grid` values of each parameter, bounds included, or `sobol` points in all.
 
-    `seed` is that of the Sobol points, by default the study's optimizer's. InputError if not one of
-    grid and sobol is given, or a number is out of range.
+    `seed` is that of the Sobol points, by default the study's optimizer.seed. Raises InputError
+    unless exactly one of grid and sobol is given, or if a number is out of range.
 
     Source: the Sobol points are scrambled as in A. B. Owen, "Scrambling Sobol' and
     Niederreiter-Xing points", J. Complexity 14, 1998 (scipy.stats.qmc.Sobol).
@@ -174,7 +175,17 @@ def evaluate_point(
     target: np.ndarray | None = None,
     simulator: Simulator | None = None,
 ) -> Outcome:
-    """Evaluate one candidate on one worker; its impacts, or an error's own class, stay there."""
+    """Evaluate one candidate of a sweep on one worker.
+
+    Return its evaluation without the impacts, which are large, or an InputError with the reason why
+    there is none.
+
+    Args:
+        number: number of the candidate.
+        point: its point in the unit cube, (d,).
+        target: which triangles of the part are the target, (m,) bool; None if the design says it.
+        simulator: replaces the simulation.
+    """
     evaluator = CandidateEvaluator(
         study, simulator or ChamberSimulator(study, SerialExecutor(), target)
     )

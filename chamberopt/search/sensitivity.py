@@ -46,7 +46,7 @@ class Slice:
 
 @dataclass(frozen=True)
 class Sensitivity:
-    """One slice for each parameter."""
+    """How the score depends on each parameter near the best design, with one slice for each."""
 
     slices: tuple[Slice, ...]
     noise: float  # loss that counts as none
@@ -54,7 +54,7 @@ class Sensitivity:
     together: float  # share of the designs within all flat ranges that lose no more than the noise
 
     def sentences(self) -> list[str]:
-        """What a designer may change: one sentence for each parameter, and one for all."""
+        """Return sentences on how far parameters may change without loss: one each, one for all."""
         loss = f"without losing more than the noise, {self.noise:.2g}"
         ranges = []
         for one in self.slices:
@@ -68,10 +68,14 @@ class Sensitivity:
 def analyse_sensitivity(
     search: SearchModel, space: ParameterSpace, best: Mapping[str, float | str], noise: float
 ) -> Sensitivity:
-    """Sensitivity of the model's score near the best design.
+    """Work out how the score depends on each parameter near the best design, by the model.
 
-    The best values are in the units of the file. A loss below `noise`, or below what the model
-    can tell there, is none. Ranges end where the limits are probably not met.
+    The ranges without loss end where the limits are probably not met.
+
+    Args:
+        search: model of the score by the trials of the search.
+        best: values of the best design by parameter, in the units of the file.
+        noise: loss of score that counts as none; raised to what the model can tell.
     """
     from scipy.stats.qmc import Sobol
 
@@ -121,10 +125,15 @@ def analyse_sensitivity(
 def _with_best_of_its_own(
     search: SearchModel, line: np.ndarray, at: np.ndarray, sample: np.ndarray
 ) -> np.ndarray:
-    """Points (k, d) of a shape each; what `at` (d,) does not have is the best by the model.
+    """Return points (k, d), one for each chamber shape, with the best values for this shape.
+
+    A parameter that the best design has keeps its value there. The others, which only this shape
+    has, get the values with the best score by the model.
 
     Args:
-        sample: places of which the best is taken, (n, d).
+        line: points that differ in their shape alone, (k, d).
+        at: point of the best design, (d,).
+        sample: points among which the best values are looked for, (n, d).
     """
     domain, found = search.domain, []
     own = domain.has(domain.snap(at[None]))[0]
@@ -137,7 +146,13 @@ def _with_best_of_its_own(
 def _main_effect(
     model: GaussianProcess, sample: np.ndarray, i: int, steps: np.ndarray
 ) -> np.ndarray:
-    """Mean score over the other parameters at each step of parameter i."""
+    """Return the mean score at each value of parameter i, over all values of the others.
+
+    Args:
+        sample: points with evenly spread values of the other parameters, (n, d).
+        i: position of the parameter.
+        steps: values of the parameter, as shares of its bounds.
+    """
     moved, means = sample.copy(), []
     for step in steps:
         moved[:, i] = step
@@ -148,8 +163,14 @@ def _main_effect(
 def _flat_range(
     search: SearchModel, at: np.ndarray, i: int, threshold: float
 ) -> tuple[float, float]:
-    """How far parameter i may go down and up, in shares of the bounds, above the threshold and
-    within the limits.
+    """Return how far down and up parameter i may go without loss, as shares of its bounds.
+
+    The score stays at or above the threshold, and the limits are probably met.
+
+    Args:
+        at: point of the best design, (d,).
+        i: position of the parameter.
+        threshold: least score.
     """
     ends = []
     for bound in (0.0, 1.0):

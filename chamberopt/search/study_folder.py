@@ -47,9 +47,10 @@ if TYPE_CHECKING:
 
 
 class RecordedTrials:
-    """The trials of a log, read once; a last line cut off by a crash is removed.
+    """The trials that a study's log held when the study was opened.
 
-    InputError for a row that is none of this study.
+    A last line of the log that a crash cut off is removed. Raises InputError if a row is damaged or
+    does not belong to this study.
     """
 
     def __init__(self, log: JsonLines, study: Study) -> None:
@@ -60,9 +61,10 @@ class RecordedTrials:
         self.trials = [self._trial(number, row) for number, row in enumerate(log.rows())]
 
     def find(self, number: int, stage: str, point: Sequence[float]) -> Trial | None:
-        """The recorded trial of a candidate, or None if the record has ended.
+        """Return the recorded trial of a candidate, or None if the record has no more trials.
 
-        InputError if the record has another candidate at this number, by as little as a bit.
+        Raises InputError if the record has another candidate at this number, even if its point
+        differs by no more than a bit.
         """
         if number >= len(self.trials):
             return None
@@ -90,7 +92,11 @@ class RecordedTrials:
         return trial
 
     def _is_possible(self, trial: Trial) -> bool:
-        """Whether a trial has the figures of this study, or failed, which its start never does."""
+        """Return whether a trial can belong to this study.
+
+        It must have all figures of the study, or have failed and not be the start, which never
+        fails.
+        """
         if not trial.goals:
             return trial.number > 0 or trial.stage != "search"
         return (
@@ -111,7 +117,7 @@ class RecordedTrials:
 
 
 def _exact(point: Sequence[float]) -> str:
-    """The numbers of a point, so exactly that different numbers have different texts."""
+    """Return the numbers of a point as a text that is different for different numbers."""
     return "[" + ", ".join(repr(float(share)) for share in point) + "]"
 
 
@@ -122,10 +128,13 @@ MAX_DIFFERENCES = 12  # in one message
 
 
 def study_inputs(study: Study, plan: Mapping[str, Any] | None = None) -> dict[str, Any]:
-    """Everything that the trials depend on, as plain JSON: values, not the text of the files.
+    """Return everything that the trials of a study depend on, as plain JSON values.
 
     A file that the design names, such as the part's mesh, is stored as its name and the sha256 of
-    its content, so that it may be moved. The plan is that of a sweep.
+    its content, so that it may be moved.
+
+    Args:
+        plan: the plan of a sweep; None for a search.
     """
     values = study.model_dump(mode="json", exclude={"design"})
     values["design"] = _with_digests(study.design.model_dump(mode="json"))
@@ -153,7 +162,14 @@ def require_same_files(design: Design, before: Mapping[str, Any], folder: Path) 
 def _require_same(
     before: Mapping[str, Any], now: Mapping[str, Any], title: str, remedy: str
 ) -> None:
-    """Raise InputError that lists differences: `study.design.shot.mass_g: was 5.0, is 6.0`."""
+    """Raise InputError if two tables differ, with a list of the differences.
+
+    It reads such as `study.design.shot.mass_g: was 5.0, is 6.0`.
+
+    Args:
+        title: first line of the message.
+        remedy: last line of the message.
+    """
     old, new = _flatten(before), _flatten(now)
     changed = [
         f"{name}: was {_format(old, name)}, is {_format(new, name)}"
@@ -168,7 +184,7 @@ def _require_same(
 
 
 def _with_digests(value: Any) -> Any:
-    """The value with each path of a file replaced by the file's name and sha256."""
+    """Return a JSON value with each path of a file replaced by the file's name and sha256."""
     if isinstance(value, dict):
         return {name: _with_digests(item) for name, item in value.items()}
     if isinstance(value, list):
@@ -181,7 +197,11 @@ def _with_digests(value: Any) -> Any:
 
 
 def _flatten(value: Any, prefix: str = "") -> dict[str, Any]:
-    """The values of nested tables by dotted name."""
+    """Return the values of nested tables by dotted name, such as "shot.mass_g".
+
+    Args:
+        prefix: dotted name of the value itself; "" for the outermost table.
+    """
     if not isinstance(value, Mapping) or not value:
         return {prefix: value}
     flat: dict[str, Any] = {}
@@ -205,7 +225,7 @@ CONFIRMED = "confirm"
 def open_study_folder(
     study: Study, folder: str | Path, plan: Mapping[str, Any] | None = None
 ) -> Iterator[StudyFolder]:
-    """Open the folder of a study, and hold it against other processes.
+    """Open the folder of a study, and keep other processes from writing to it meanwhile.
 
     Args:
         folder: new, empty, or where this very study was begun.
@@ -223,17 +243,20 @@ def open_study_folder(
 
 
 def is_study_folder(folder: Path) -> bool:
-    """Whether a study was begun in the folder; it may be finished or not."""
+    """Return whether a study was begun in the folder; it may be finished or not."""
     return (folder / INPUTS).is_file()
 
 
 def is_finished(folder: Path) -> bool:
-    """Whether the study of the folder has its result, which is written last."""
+    """Return whether the study of the folder is finished: its result, written last, is there."""
     return (folder / RESULT).is_file()
 
 
 class StudyFolder:
-    """An open study folder, see open_study_folder; `recorded` are the trials that it held then."""
+    """The folder of a study that runs: its inputs, its trials and its confirmed evaluations.
+
+    `recorded` are the trials that it held when it was opened by `open_study_folder`.
+    """
 
     def __init__(self, study: Study, path: Path, plan: Mapping[str, Any] | None = None) -> None:
         self.path, self.study, self._inputs = path, study, study_inputs(study, plan)
@@ -262,7 +285,10 @@ class StudyFolder:
         return sum(read_seconds(self.path).values())
 
     def begin(self) -> None:
-        """Write the inputs before the first trial; inputs of a run without trials are replaced."""
+        """Write what the study's trials depend on to the folder, before the first trial.
+
+        Inputs of an earlier run that has no trials yet are replaced.
+        """
         remove_leftovers(self.path)
         path = self.path / INPUTS
         if path.is_file() and (self.begun or _read_json(path) == self._inputs):
@@ -274,9 +300,13 @@ class StudyFolder:
     def with_effects_resolved(
         self, resolve: Callable[[Design], tuple[Design, list[Advice]]]
     ) -> tuple[Study, list[Advice]]:
-        """The study with effects instead of "auto", and the advice of the pilot runs.
+        """Return the study with physical effects chosen in place of "auto", and why they were.
 
-        `resolve` is called once and its answer is stored, because a pilot run takes minutes.
+        The study stays as it is, without advice, if its design does not ask for "auto".
+
+        Args:
+            resolve: function that chooses the effects of a design by pilot runs. It is called once
+                and its answer is stored in the folder, because a pilot run takes minutes.
         """
         design = self.study.design
         if not design.effects.auto:
@@ -301,7 +331,10 @@ class StudyFolder:
         return self.study.model_copy(update={"design": resolved}), advice
 
     def evaluation(self, trial: Trial) -> Evaluation:
-        """The evaluation of a recorded confirmation; InputError unless its file has its figures."""
+        """Return the evaluation of a recorded trial of the confirmation, from its file.
+
+        Raises InputError if the figures in the file are not those of the trial.
+        """
         path = self._evaluation_path(trial.number)
         found = load_evaluation(path)
         metrics = {name: one.interval_json() for name, one in found.metrics.items()}
@@ -319,9 +352,10 @@ class StudyFolder:
     def append(
         self, trial: Trial, evaluation: Evaluation | Exception | None, seconds: float
     ) -> None:
-        """Store a trial, and the whole evaluation of a confirmation; both are then on the disk.
+        """Write a trial to the log, and the whole evaluation of a confirmation to a file.
 
-        OSError if they cannot be written, InputError if a file that the design names has changed.
+        Both are on the disk when this returns. Raises OSError if they cannot be written, and
+        InputError if a file that the design names has changed since the study began.
         """
         require_same_files(self.study.design, self._inputs, self.path)
         if trial.stage == "confirm" and isinstance(evaluation, Evaluation):

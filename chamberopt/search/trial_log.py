@@ -23,7 +23,7 @@ DAMAGED = KeyError, TypeError, ValueError, AttributeError, OverflowError  # of a
 
 @dataclass(frozen=True)
 class Trial:
-    """One evaluated candidate."""
+    """One evaluated candidate, as a row of the trial log."""
 
     number: int
     stage: str  # "search", "confirm" or "sweep"
@@ -44,7 +44,7 @@ class Trial:
         return self.goals[0] if self.goals else None
 
     def row(self) -> dict[str, Any]:
-        """The trial as plain JSON values, which read back to the same bits."""
+        """Return the trial as a row of plain JSON values, which reads back to the same bits."""
         objective = self.objective
         interval = (objective or Estimate(math.nan, math.nan)).interval_json()
         return {
@@ -67,7 +67,10 @@ class Trial:
 
     @classmethod
     def from_row(cls, row: Mapping[str, Any]) -> Self:
-        """The trial of a row as `row` made it, or an error of DAMAGED."""
+        """Return the trial of a row of the log.
+
+        Raises one of the errors in DAMAGED if the row is not exactly as it was written.
+        """
         trial = cls(
             number=int(row["number"]),
             stage=str(row["stage"]),
@@ -107,7 +110,10 @@ class JsonLines:
         append_bytes(self.path, line, self._survives_power_cut)
 
     def rows(self) -> list[dict[str, Any]]:
-        """All rows in order, without a last line that a crash cut off; InputError if damaged."""
+        """Return all rows in order, without a last line that a crash cut off.
+
+        Raises InputError if a row is damaged.
+        """
         return self._read()[0]
 
     def repair(self) -> None:
@@ -120,12 +126,12 @@ class JsonLines:
             write_bytes(self.path, whole)
 
     def damaged(self, line: int) -> InputError:
-        """The error for a damaged line; lines are counted from 1."""
+        """Return the error that says that a line is damaged; lines are counted from 1."""
         text = "damaged row; restore the file or run the study in a new folder"
         return InputError(f"{self.path}:{line}: {text}")
 
     def _read(self) -> tuple[list[dict[str, Any]], bytes, bytes]:
-        """The rows, their bytes, and those of a line that was cut off."""
+        """Return the rows, the bytes of their lines, and those of a last line that was cut off."""
         try:
             content = read_file(self.path)
         except FileNotFoundError:
@@ -147,7 +153,10 @@ class JsonLines:
 
 
 def read_trials(folder: Path) -> list[dict[str, Any]]:
-    """All rows of a study's trial log in order, each with its seconds, or None where unknown."""
+    """Return all rows of a study's trial log in order, each with the seconds of its evaluation.
+
+    The seconds are None where they are unknown.
+    """
     path = folder / HISTORY
     if not path.is_file():
         raise InputError(f"{path}: is not there; give a study's results folder")
@@ -162,7 +171,7 @@ def read_trials(folder: Path) -> list[dict[str, Any]]:
 
 
 def read_seconds(folder: Path) -> dict[int, float]:
-    """Wall-clock time of each evaluation [s], by its number."""
+    """Return the wall-clock time [s] of each evaluation in a study's folder, by its number."""
     log, seconds = JsonLines(folder / TIMINGS), {}
     for line, row in enumerate(log.rows(), start=1):
         number, time = row.get("number"), row.get("seconds")
@@ -173,7 +182,7 @@ def read_seconds(folder: Path) -> dict[int, float]:
 
 
 def trials_as_csv(rows: list[dict[str, Any]]) -> str:
-    """The trial log as a table with a column for each parameter and metric.
+    """Return the rows of a trial log as CSV text, with a column for each parameter and metric.
 
     NAME_pm is the half-width of NAME, empty where words such as "never" stand in the place of the
     number. A failed evaluation has no metrics.
@@ -193,7 +202,10 @@ def trials_as_csv(rows: list[dict[str, Any]]) -> str:
 
 
 def _cells(interval: Mapping[str, Any]) -> tuple[Any, Any]:
-    """Cells of an `Estimate.interval_json`: value and half-width, or words and nothing."""
+    """Return the two cells of a figure in a table: its value and half-width.
+
+    If words such as "never" stand for the figure, return these words and None.
+    """
     if "in_words" in interval:
         return interval["in_words"], None
     return interval["value"], interval["half_width"]

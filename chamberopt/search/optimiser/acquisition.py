@@ -48,7 +48,10 @@ Function = Callable[[np.ndarray], np.ndarray]
 
 
 def propose_point(model: SearchModel, rng: np.random.Generator) -> np.ndarray:
-    """The new point (d,) of the unit cube whose evaluation has the largest knowledge gradient."""
+    """Return the new point (d,) of the unit cube that is most worth an evaluation.
+
+    Its evaluation raises the best mean of the model most, on average (its knowledge gradient).
+    """
     with one_thread():
         choices = _choices(model, rng)
         (at, deviation), feasible = model.expected(choices), model.feasible(choices)
@@ -65,9 +68,10 @@ def propose_point(model: SearchModel, rng: np.random.Generator) -> np.ndarray:
 
 
 def recommend_points(model: SearchModel, seed: int) -> list[np.ndarray]:
-    """The points (d,) with the largest mean less CAUTION standard deviations, within the limits.
+    """Return two points (d,) that are best by a cautious reading of the model.
 
-    The best of those that were evaluated, and the best of all if that is another one.
+    The first is the best of those that were evaluated, the second the best of all; they may be the
+    same. The model's mean counts less CAUTION standard deviations, and limits must be met.
     """
 
     def cautious_value(at: np.ndarray) -> np.ndarray:
@@ -84,15 +88,23 @@ def recommend_points(model: SearchModel, seed: int) -> list[np.ndarray]:
 
 
 def _best(model: SearchModel) -> float:
-    """The best mean among the points that began, each as far above the lowest as it is feasible."""
+    """Return the best mean score by the model among points whose evaluation has begun.
+
+    The height of each mean above the lowest score is multiplied by the probability that the point
+    meets all limits.
+    """
     mean, _ = model.expected(model.points)
     return model.lowest + float(((mean - model.lowest) * model.feasible(model.points)).max())
 
 
 def _knowledge_gradient(model: SearchModel, leaders: np.ndarray) -> Function:
-    """Logarithm of the knowledge gradient as a function of points (k, d).
+    """Return a function of points (k, d) that computes how much their evaluation is worth, (k,).
 
-    The logarithm, because NLopt works on the shape of a function better than on tiny values.
+    It computes the logarithm of the knowledge gradient, because NLopt works better on the shape of
+    a function than on tiny values.
+
+    Args:
+        leaders: points (m, d) where the model's best mean may be.
     """
     from scipy.special import ndtri
 
@@ -113,7 +125,11 @@ def _knowledge_gradient(model: SearchModel, leaders: np.ndarray) -> Function:
 
 
 def _expected_improvement(mean: np.ndarray, deviation: np.ndarray, best: float) -> np.ndarray:
-    """Expected improvement over the model's best mean."""
+    """Return the expected improvement of points over the model's best mean score, (k,).
+
+    Args:
+        mean, deviation: mean and standard deviation of the score at the points, (k,).
+    """
     from scipy.special import ndtr
 
     z = (mean - best) / deviation
@@ -123,7 +139,7 @@ def _expected_improvement(mean: np.ndarray, deviation: np.ndarray, best: float) 
 
 
 def _choices(model: SearchModel, rng: np.random.Generator) -> np.ndarray:
-    """Points (k, d) to choose from: around the model's five best, and over the whole cube."""
+    """Draw points (k, d) to choose the next from: near the model's five best, and over the cube."""
     from scipy.stats.qmc import Sobol
 
     points, domain = model.points, model.domain
@@ -141,7 +157,11 @@ def _choices(model: SearchModel, rng: np.random.Generator) -> np.ndarray:
 
 
 def _climb(function: Function, starts: np.ndarray, domain: Domain) -> np.ndarray:
-    """The best point (d,) that NLopt finds from the starts (k, d), on the levels of each."""
+    """Return the point (d,) with the largest value of a function that NLopt finds.
+
+    Args:
+        starts: points from which it climbs, (k, d). Parameters with levels stay as they are there.
+    """
     tried: list[tuple[float, np.ndarray]] = []
     free, count = domain.free, int(domain.free.sum())
     for start in starts:

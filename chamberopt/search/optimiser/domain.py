@@ -20,7 +20,7 @@ MISSES = 16  # places in the box of tolerances
 
 
 class Axis(NamedTuple):
-    """One parameter.
+    """Which values one parameter can have, and in which points.
 
     levels: how many values it can have; 0 for any number between its bounds.
     ordered: whether near levels are alike. If not, they are choices, and all differ alike.
@@ -34,14 +34,17 @@ class Axis(NamedTuple):
 
 
 class Domain:
-    """The points (d,) of a search; `free` (d,) bool are the parameters without levels.
+    """The points (d,) of the unit cube that a search may try.
+
+    `free` (d,) bool are the parameters without levels, which can be any number between bounds.
 
     Args:
-        axes: the parameters.
-        misses: by how much a shop may miss each, lowest and highest, where the coordinate is 0 and
-            where it is 1, shape (2, 2, d); between them in proportion; default 0.
-        counts_worst: whether the worst of MISSES places counts that a shop may end at, instead of
-            their mean.
+        axes: which values each parameter can have.
+        misses: by how much a shop that aims at a value may miss it, as a share of the bounds, shape
+            (2, 2, d): where the coordinate is 0 and 1, the lowest and highest miss of each
+            parameter. Between 0 and 1 it is in proportion; by default it is 0.
+        counts_worst: whether the worst of the values counts that a shop may get, instead of their
+            mean.
     """
 
     def __init__(
@@ -57,7 +60,7 @@ class Domain:
         return len(self.axes)
 
     def snap(self, points: np.ndarray) -> np.ndarray:
-        """The points (k, d) of the cube with each coordinate on its nearest level.
+        """Return points (k, d) with each coordinate moved to the nearest value that it can have.
 
         Choices have equal parts of the cube, so that evenly spread points try each as often. A
         parameter that a point does not have is 0.
@@ -68,7 +71,11 @@ class Domain:
         return np.where(self.has(snapped), snapped, 0.0)
 
     def has(self, snapped: np.ndarray) -> np.ndarray:
-        """Which parameters points (k, d) on their levels have, (k, d) bool."""
+        """Return which parameters each point has, (k, d) bool.
+
+        Args:
+            snapped: points as `snap` returns them, (k, d).
+        """
         there = np.ones(snapped.shape, dtype=bool)
         for k, axis in enumerate(self.axes):
             if axis.where is not None:
@@ -79,7 +86,7 @@ class Domain:
 
     @property
     def size(self) -> float:
-        """How many points there are; infinite if a parameter can be any number."""
+        """Number of points that a search can try; infinite if a parameter can be any number."""
         by = next((axis.where[0] for axis in self.axes if axis.where), None)
         if by is None:
             return math.prod(axis.levels or math.inf for axis in self.axes)
@@ -94,7 +101,10 @@ class Domain:
         return self._misses is not None
 
     def around(self, points: np.ndarray) -> np.ndarray:
-        """Where a shop may end that aims at points (k, d), evenly spread, shape (s, k, d)."""
+        """Return points that a shop may get when it aims at points (k, d), shape (s, k, d).
+
+        They are evenly spread over what the tolerances allow; without tolerances s is 1.
+        """
         if self._misses is None:
             return points[None]
         at_0, at_1 = np.where(self.free, self._misses, 0.0)[:, :, None, :]
@@ -103,7 +113,7 @@ class Domain:
 
     @cached_property
     def _shares(self) -> np.ndarray:
-        """Places in the box of misses, as shares of its sides, shape (s, d)."""
+        """Points spread evenly over what a shop may miss, as shares of the widths, shape (s, d)."""
         from scipy.stats.qmc import Sobol
 
         # The middles of equal boxes: unscrambled, the first point of the sequence is a corner.
@@ -111,7 +121,10 @@ class Domain:
         return shares
 
     def features(self, points: np.ndarray) -> np.ndarray:
-        """What a model sees of points (k, d), shape (k, f): a column for each level of a choice."""
+        """Return points (k, d) in the form that a model learns from, shape (k, f).
+
+        A number is one column; a choice is a column of 0 and 1 for each of its values.
+        """
         if self.free.all():
             return points
         snapped, columns = self.snap(points), []

@@ -63,9 +63,9 @@ class GaussianProcess:
     Its attribute `noise` is the variance of one evaluation's score.
 
     Args:
-        points: points with scores (n,), shape (n, d); only the best MAX_POINTS are used.
-        variances: squared standard errors of the scores, (n,), see moderate_variances; 0 where
-            unknown.
+        points: points with scores, shape (n, d); only the best MAX_POINTS are used.
+        scores: score of each point, (n,).
+        variances: squared standard errors of the scores, (n,); 0 where unknown.
         domain: which values each parameter can have; by default any.
         length_factor: multiplies the fitted length scales. Below 1 the model is less certain away
             from its points.
@@ -106,7 +106,7 @@ class GaussianProcess:
         self.noise = float(known.mean() + process.kernel_.k2.noise_level * self._spread**2)
 
     def __call__(self, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Mean and standard deviation of the true score at points (k, d): two arrays (k,)."""
+        """Return mean (k,) and standard deviation (k,) of the true score at points (k, d)."""
         kernel = self._kernel(self._domain.features(at), self._features)
         explained = ((kernel @ self._inverse.T) ** 2).sum(axis=1)
         variance = np.maximum(TREND + self._signal - explained, 1e-12)
@@ -114,7 +114,7 @@ class GaussianProcess:
         return mean, self._spread * np.sqrt(variance)
 
     def covariance(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
-        """Covariance of the true scores at points a (k, d) and b (m, d), shape (k, m)."""
+        """Return the covariance (k, m) of the true scores at points a (k, d) and b (m, d)."""
         a, b = self._domain.features(a), self._domain.features(b)
         from_a, from_b = (self._kernel(x, self._features) @ self._inverse.T for x in (a, b))
         explained = from_a @ from_b.T
@@ -130,8 +130,9 @@ class GaussianProcess:
 
 
 def moderate_variances(spreads: np.ndarray, replicas: np.ndarray) -> np.ndarray:
-    """Squared standard errors of means over replicas, each drawn towards those of all candidates.
+    """Return the squared standard error of each candidate's mean over its replicas, shape (n,).
 
+    Each is drawn towards those of all candidates.
     A few replicas estimate a candidate's own variance badly. How far the true ones differ shows in
     how much more the estimates scatter than chance lets them; the less, the more they are pooled.
 
@@ -162,7 +163,14 @@ def moderate_variances(spreads: np.ndarray, replicas: np.ndarray) -> np.ndarray:
 
 
 def _fit(points: np.ndarray, values: np.ndarray, noise: np.ndarray, length_factor: float) -> Any:
-    """Fit scikit-learn's process to values of mean 0 and size 1, with noise variances (n,)."""
+    """Fit scikit-learn's Gaussian process to scores, and return it.
+
+    Args:
+        points: points in the form that the model learns from, (n, f).
+        values: scores, moved and scaled to mean 0 and standard deviation 1, (n,).
+        noise: variance of each of these, (n,).
+        length_factor: multiplies the fitted length scales.
+    """
     from sklearn.exceptions import ConvergenceWarning
     from sklearn.gaussian_process import GaussianProcessRegressor
     from sklearn.gaussian_process.kernels import ConstantKernel, Matern, WhiteKernel
@@ -201,7 +209,11 @@ def _fit(points: np.ndarray, values: np.ndarray, noise: np.ndarray, length_facto
 
 
 def _fit_with(kernel: Any, points: np.ndarray, values: np.ndarray, noise: np.ndarray) -> Any:
-    """scikit-learn's process with hyperparameters that are known."""
+    """Return scikit-learn's Gaussian process for scores, with hyperparameters that are known.
+
+    Args:
+        kernel: the covariance function with these hyperparameters.
+    """
     from sklearn.gaussian_process import GaussianProcessRegressor
 
     alpha = np.maximum(noise, MIN_NOISE)
@@ -209,7 +221,7 @@ def _fit_with(kernel: Any, points: np.ndarray, values: np.ndarray, noise: np.nda
 
 
 def one_thread() -> Any:
-    """Context in which linear algebra runs on one thread.
+    """Return a context manager within which linear algebra runs on one thread.
 
     The results are then the same on any number of cores, and for such small arrays it is faster.
     """

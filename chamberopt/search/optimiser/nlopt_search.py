@@ -30,10 +30,12 @@ class NloptThread:
         self._told.put(None)
 
     def points(self, *run: Any) -> Generator[np.ndarray, float, None]:
-        """The points that a run of NLopt asks for; each is sent its score.
+        """Start a run of NLopt, and yield the points (d,) that it asks for.
+
+        The caller sends the score of each point back. An error that ends the run is raised.
 
         Args:
-            run: the arguments of run_nlopt after the function, whose errors are raised.
+            run: the arguments of `run_nlopt` after its function.
         """
         self._told.put(run)
         try:
@@ -79,7 +81,8 @@ def run_nlopt(
 
     Args:
         step: first step of local algorithms, as a share of the bounds.
-        tolerance: step below which they stop.
+        tolerance: step below which local algorithms stop, as a share of the bounds.
+        max_calls: number of calls of the function after which the run ends.
     Raises:
         InputError: the algorithm cannot search this number of parameters. Errors of the function
             pass unchanged.

@@ -69,7 +69,9 @@ class PointSearch:
 
     Args:
         start: first point, shape (d,).
-        observe: what the model learns; by default the scores, with unknown noise.
+        settings: the table [optimizer] of the study: algorithm, budget and so on.
+        observe: function that returns what the model learns; by default these are the scores, with
+            unknown noise.
         domain: which values each parameter can have; by default any.
         begin_with: points (d,) that are evaluated after the start.
     """
@@ -94,24 +96,26 @@ class PointSearch:
         self._steps = self._search([start, *begin_with])
 
     def ask(self) -> np.ndarray | None:
-        """The next point (d,) to evaluate; None if scores are missing, or at the end.
+        """Return the next point (d,) to evaluate.
 
-        InputError if an algorithm cannot take these parameters.
+        Return None if scores of earlier points must be told first, and when the search has ended.
+        Raises InputError if an algorithm cannot take these parameters.
         """
         return next(self._steps, None)
 
     def tell(self, score: float, cost: float = 1.0) -> None:
-        """Take the score of the first point that has none, a finite number to be maximised.
+        """Take the score of the oldest point that has none.
 
         Args:
-            cost: 1 for a whole evaluation, or less.
+            score: a finite number, to be maximised.
+            cost: cost of its evaluation: 1 for one with all replicas, less for one with fewer.
         """
         self.scores.append(score)
         self._costs.append(cost)
 
     @property
     def spent(self) -> float:
-        """Cost of all points with scores."""
+        """Cost of all points with scores, where an evaluation with all its replicas costs 1."""
         return sum(self._costs)
 
     def _search(self, first: Sequence[np.ndarray]) -> Wait:
@@ -134,7 +138,7 @@ class PointSearch:
                 yield from self._climb(LOCAL, self._budget, step, nlopt)
 
     def _plan(self) -> list[tuple[str, float]]:
-        """The phases, and the share of the budget at which each ends."""
+        """Return the algorithm of each phase, and the share of the budget at which it ends."""
         phases, budget = self._settings.phases, self._budget
         if phases:
             ends = np.cumsum([phase.share for phase in phases]).tolist()
@@ -147,7 +151,7 @@ class PointSearch:
         return [(phase, min(1.0, n / budget)) for phase, n in zip(AUTO, counts, strict=True)]
 
     def _run(self, phase: str, limit: int, nlopt: NloptThread) -> Wait:
-        """Run one phase until it converges or the points cost `limit`."""
+        """Run one phase until it converges, or until all points so far cost `limit` evaluations."""
         limit = min(limit, self._budget)
         left = yield from self._left(limit)
         if not left:
@@ -202,9 +206,10 @@ class PointSearch:
                 raise
 
     def _evaluate(self, point: np.ndarray, limit: int) -> Generator[np.ndarray | None, None, int]:
-        """Ask for a point, unless that was done; returns its place in `points`.
+        """Ask for a point unless it was asked for already, and return its position in `points`.
 
-        BudgetSpentError if it is new, and the limit or the budget has no place for it.
+        Raises BudgetSpentError if the point is new and `limit` evaluations, or the whole budget,
+        are spent.
         """
         key = point.tobytes()
         if key not in self._numbers:
@@ -217,9 +222,9 @@ class PointSearch:
         return self._numbers[key]
 
     def _left(self, limit: int) -> Generator[np.ndarray | None, None, int]:
-        """How many more whole evaluations may begin, until they and those before cost `limit`.
+        """Return how many more whole evaluations may begin before all so far cost `limit`.
 
-        Where none is left, those that run are waited for: they may turn out to cost less.
+        Where none is left, wait for those that run, because they may turn out to cost less.
         """
         if len(self.points) >= self._domain.size:
             return 0
@@ -233,7 +238,7 @@ class PointSearch:
         return 0
 
     def _wait(self, running: int = 0) -> Wait:
-        """Wait for the scores of all points but the last so many."""
+        """Wait until no more than the last `running` points are without scores."""
         while len(self.points) - len(self.scores) > running:
             yield None
 

@@ -13,7 +13,7 @@ SUM_WEIGHT = 0.05
 
 
 def draw_weights(seed: int, step: int) -> np.ndarray:
-    """Random weights (2,) of two objectives for one step of a search; they add up to 1."""
+    """Draw random weights (2,) of two objectives for one step of a search; they add up to 1."""
     first = float(np.random.default_rng([seed, step]).random())
     return np.array([first, 1.0 - first])
 
@@ -21,8 +21,9 @@ def draw_weights(seed: int, step: int) -> np.ndarray:
 def scalarise(
     values: np.ndarray, variances: np.ndarray, weight: np.ndarray, among: np.ndarray | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Augmented Tchebycheff distance from the best value of each objective, to be maximised.
+    """Join several objectives of each candidate to one score, to be maximised.
 
+    It is minus the augmented Tchebycheff distance from the best value of each objective.
     Each point of the Pareto front is the best one for some weights.
 
     Args:

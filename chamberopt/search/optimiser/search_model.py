@@ -24,8 +24,8 @@ LEAST_SIMULATED = 0.5
 class LimitedFigure:
     """A figure of each candidate that must stay within limits.
 
-    values: (n,).
-    variances: their squared standard errors, (n,).
+    values: the figure of each candidate, (n,).
+    variances: squared standard errors of the values, (n,).
     low: least value allowed, or -inf.
     high: largest value allowed, or inf.
     """
@@ -40,11 +40,11 @@ class LimitedFigure:
 class Observations:
     """What the candidates of a search have shown, in the order in which they began.
 
-    scores: to be maximised, (n,).
-    variances: their squared standard errors, (n,).
+    scores: score of each candidate, to be maximised, (n,).
+    variances: squared standard errors of the scores, (n,).
     simulated: which candidates were simulated, (n,) bool; the figures of the others are not looked
         at.
-    figures: those with limits.
+    figures: the figures of the candidates that have limits.
     spared: which candidates were not simulated because geometry shows them to be no better, (n,)
         bool; their scores are the largest that they can have. Of the others that were not
         simulated nothing is known but that.
@@ -58,11 +58,14 @@ class Observations:
 
 
 class SearchModel:
-    """The models of one search.
+    """Models of the score, of each figure with limits, and of what can be simulated, in one search.
 
     Args:
-        points: all that began, shape (m, d); the first n are those of `seen`, the others run.
-        length_factor: as of GaussianProcess.
+        points: all points whose evaluation began, shape (m, d). The first n are those of `seen`,
+            the evaluation of the others still runs.
+        seen: what is known of the points that were evaluated.
+        length_factor: multiplies the fitted length scales; below 1 the models are less certain away
+            from their points.
         learns_bounds: whether the model of the score learns the bounds of what was spared, for
             pictures. A search does better where it does not: a cliff bends a smooth model, also on
             the side that is good. It learns where candidates are spared, as where they fail.
@@ -102,10 +105,10 @@ class SearchModel:
             self._limits.append((everywhere, LEAST_SIMULATED, np.inf))
 
     def expected(self, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Mean and standard deviation of the score of a shop that aims at points (k, d): (k,).
+        """Return mean and standard deviation of the score that a shop gets at points (k, d), (k,).
 
-        It is the mean over where the shop may end, and the standard deviation the mean one there;
-        or both are of the worst of these places, by the model.
+        The shop aims at each point, and gets one that the tolerances allow. Both are means over
+        these; where the study counts the worst value over tolerances, they are those of the worst.
         """
         if self.domain.counts_worst:
             return self.score(self._worst(at))
@@ -113,14 +116,19 @@ class SearchModel:
         return mean, deviation
 
     def _worst(self, aims: np.ndarray) -> np.ndarray:
-        """Where a shop that aims at points (k, d) may end worst, (k, d)."""
+        """Return the worst points (k, d) that a shop may get when it aims at points (k, d)."""
         around = self.domain.around(aims)
         worst = np.argmin([self.score(one)[0] for one in around], axis=0)
         places: np.ndarray = around[worst, np.arange(len(aims))]
         return places
 
     def covariance(self, at: np.ndarray, aims: np.ndarray) -> np.ndarray:
-        """Covariance of the scores at points (k, d) and of a shop that aims at (m, d): (k, m)."""
+        """Return the covariance (k, m) of the scores at points and of what a shop gets at others.
+
+        Args:
+            at: points, (k, d).
+            aims: points at which a shop aims and gets one that the tolerances allow, (m, d).
+        """
         if self.domain.counts_worst:
             return self.score.covariance(at, self._worst(aims))
         around = self.domain.around(aims)
@@ -128,7 +136,9 @@ class SearchModel:
         return whole
 
     def feasible(self, at: np.ndarray, margin: float = 0.0) -> np.ndarray:
-        """Probability that a shop that aims at points (k, d) is within all limits, shape (k,).
+        """Return the probability (k,) that a shop that aims at points (k, d) meets all limits.
+
+        That of the worst point counts that the tolerances allow.
 
         Args:
             margin: standard errors of an evaluation by which a figure must be inside.

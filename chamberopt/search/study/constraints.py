@@ -29,7 +29,7 @@ class Violation(NamedTuple):
 
 
 class Limits(FileTable):
-    """Range that a metric, or a number of the design, must stay within."""
+    """Least and largest value that a metric, or a number of the design, may have."""
 
     min: float | None = Field(default=None, description="least value allowed")
     max: float | None = Field(default=None, description="largest value allowed")
@@ -41,18 +41,18 @@ class Limits(FileTable):
             yield Problem("min", f"given {self.min:g}, above max = {self.max:g}")
 
     def hold(self, value: float) -> bool:
-        """Whether an exact number is within them."""
+        """Return whether an exact number is within the limits."""
         low, high = self.min, self.max
         return (low is None or low <= value) and (high is None or value <= high)
 
 
 def zone_constraints(design: Design) -> dict[str, Limits]:
-    """The limits of a design's zones, as constraints on their metrics."""
+    """Return the limits that a design sets for its zones, by the name of the limited metric."""
     return {metric: limits for zone in design.zones for _, metric, limits in zone_limits(zone)}
 
 
 def zone_limits(zone: Zone) -> Iterator[tuple[str, str, Limits]]:
-    """The keys that limit a zone, with the metrics that they limit."""
+    """Return each key of the design file that limits a zone, the limited metric, and the limit."""
     for key, limited in LIMITED.items():
         given = getattr(zone, key)
         if given is not None:
@@ -62,8 +62,10 @@ def zone_limits(zone: Zone) -> Iterator[tuple[str, str, Limits]]:
 
 
 def judge_zones(design: Design, metrics: Mapping[str, Estimate]) -> dict[str, list[dict[str, Any]]]:
-    """The limits of each zone, by its name, and whether the whole intervals of its figures meet
-    them: a row of plain JSON values with key, limit, metric and standing for each limit.
+    """Return which limits of each zone are met, by name of the zone, as plain JSON values.
+
+    Each limit has a row with its key in the design file, the limit, the metric that it limits, and
+    its standing: whether the whole interval of the metric is "met", "not met" or "not known" to be.
     """
     judged: dict[str, list[dict[str, Any]]] = {}
     for zone in design.zones:
@@ -78,7 +80,12 @@ def judge_zones(design: Design, metrics: Mapping[str, Estimate]) -> dict[str, li
 def limit_problems(
     design: Design, vary: Mapping[str, tuple[float, float]], name: str, limits: Limits
 ) -> list[Problem]:
-    """Reasons why a constraint makes no sense: an unknown name, or limits no candidate can meet."""
+    """Return the reasons why a constraint makes no sense: an unknown name, or impossible limits.
+
+    Args:
+        vary: bounds of each number that the study varies.
+        name: metric, or number of the design, that has the limits.
+    """
     field, numbers = f"constraints.{name}", design.numbers()
     if metric := find_metric(name):
         if lacking := metric_problem(design, name):
@@ -109,13 +116,13 @@ def limit_problems(
 
 
 def exact(values: Mapping[str, float | str]) -> dict[str, Estimate]:
-    """The numbers among values of a design as figures, without error."""
+    """Return the numbers among values of a design as exact estimates; texts are left out."""
     numbers = ((k, value) for k, value in values.items() if not isinstance(value, str))
     return {name: Estimate(value, 0.0) for name, value in numbers}
 
 
 def expected_violation(figure: Estimate, limits: Limits) -> float:
-    """Expected excess of the true value over its limits, relative to the limits.
+    """Return the expected excess of a figure's true value over its limits, relative to the limits.
 
     The mean of max(0, x - limit) for x normally distributed about the estimate. Even an estimate
     within its limit has a small penalty if it is uncertain, which keeps the search away from the
@@ -135,7 +142,10 @@ def expected_violation(figure: Estimate, limits: Limits) -> float:
 
 
 def describe_violations(name: str, figure: Estimate, limits: Limits) -> list[str]:
-    """The limits that the estimate itself violates, a text for each; none if it is not resolved."""
+    """Return a text for each limit that the value of a figure violates, whatever its interval.
+
+    Return nothing if the figure is not resolved.
+    """
     if figure.in_words == NOT_RESOLVED:
         return []
     violated = (text for _, excess, text in _excesses(figure, limits) if excess > 0.0)
@@ -145,7 +155,10 @@ def describe_violations(name: str, figure: Estimate, limits: Limits) -> list[str
 def assess_feasibility(
     constraints: Mapping[str, Limits], figures: Mapping[str, Estimate]
 ) -> tuple[str, tuple[Violation, ...]]:
-    """Whether the estimates meet all limits, judged by their whole 95 % intervals."""
+    """Judge whether figures meet all limits with their whole 95 % intervals.
+
+    Return FEASIBLE, NOT_KNOWN or INFEASIBLE, and the limits that are or may be violated.
+    """
     feasibility, violations = FEASIBLE, []
     for name, limits in constraints.items():
         figure = figures[name]
@@ -161,14 +174,20 @@ def assess_feasibility(
 
 
 def standard_error(figure: Estimate) -> float:
-    """Standard error behind the interval of an estimate; 0 if it is exact or has no interval."""
+    """Return the standard error of an estimate, from its half-width and its number of replicas.
+
+    It is 0 if the estimate is exact or has no interval.
+    """
     if not 0.0 < figure.half_width < math.inf:
         return 0.0
     return figure.half_width / student_quantile(max(1, len(figure.pseudovalues) - 1))
 
 
 def _excesses(figure: Estimate, limits: Limits) -> list[tuple[float, float, str]]:
-    """Each limit, how far the estimate lies beyond it (negative: within), and the violation."""
+    """Return each limit of a figure, how far its value is beyond it, and the violation in words.
+
+    How far is negative where the value is within the limit.
+    """
     excesses = []
     if limits.min is not None:
         excesses.append((limits.min, limits.min - figure.value, f"< min {limits.min:g}"))

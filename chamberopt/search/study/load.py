@@ -17,7 +17,10 @@ from chamberopt.search.study.schema import Study
 
 
 def load_study(path: str | Path) -> Study:
-    """Load a study file and its design; InputError names every problem with file and line."""
+    """Load a study file and the design that it names.
+
+    Raises InputError with every problem of both, each with its file and line.
+    """
     path = Path(path)
     source, data = read_toml(path, "study")
     if not is_study(data):
@@ -27,7 +30,10 @@ def load_study(path: str | Path) -> Study:
 
 
 def load(path: str | Path) -> Design | Study:
-    """Load a design or study file; a study names a design or has [vary]."""
+    """Load a file that is either a design or a study.
+
+    It is a study if it names a design, or has [vary] or [optimizer].
+    """
     path = Path(path)
     source, data = read_toml(path, "design or study")
     return _study(path, source, data) if is_study(data) else validate(Design, data, path, source)
@@ -54,7 +60,11 @@ def _study(path: Path, source: str, data: dict[str, Any]) -> Study:
 
 
 def _with_dotted_names(data: dict[str, Any]) -> dict[str, Any]:
-    """The tables whose keys are numbers of the design or metrics, with their whole names."""
+    """Return the study's data with [vary], [constraints] and objective.sum by whole dotted names.
+
+    A file may write such names as nested tables: [vary.chamber] with height_mm becomes
+    "chamber.height_mm".
+    """
     if isinstance(data.get("vary"), Mapping):
         data = {**data, "vary": _flatten(data["vary"], is_table=_varies)}
     if isinstance(data.get("constraints"), Mapping):
@@ -66,7 +76,7 @@ def _with_dotted_names(data: dict[str, Any]) -> dict[str, Any]:
 
 
 def _other_problems(data: Mapping[str, Any], path: Path, source: str) -> list[str]:
-    """Problems of a study file whose design cannot be loaded."""
+    """Return the problems of a study file beside its design, which cannot be loaded, as texts."""
     try:
         Study.model_validate({**data, "design": None}, context={"folder": path.parent})
     except ValidationError as error:
@@ -81,9 +91,10 @@ def _flatten(
     prefix: str = "",
     is_table: Callable[[Mapping[str, Any]], bool] = lambda _: False,
 ) -> dict[str, Any]:
-    """Dotted names, however they are written: as quoted keys, dotted keys or nested tables.
+    """Return a table's values by dotted name, whether a file has quoted or dotted keys or tables.
 
     Args:
+        prefix: what comes before each name.
         is_table: whether a mapping is what is named, such as { min = 0.9 }, not a part of a name.
     """
     flat: dict[str, Any] = {}

@@ -63,13 +63,17 @@ class Varied(FileTable):
             yield Problem("step", f"{text} between {self.low:g} and {self.high:g}")
 
     def _fits(self, width: float) -> bool:
-        """Whether there are at least two values on the width of the bounds, and not too many."""
+        """Return whether steps of this size give at least two values between bounds, not too many.
+
+        Args:
+            width: distance of the bounds.
+        """
         step = self.step or 0.0
         return 0.0 < step <= width * (1.0 + NEAR) and width < MAX_LEVELS * step
 
     @model_serializer
     def _as_written(self) -> Any:
-        """As short as a file can have it."""
+        """Return the shortest form in which a study file can state these values."""
         if self.choose:
             return {"choose": list(self.choose)}
         if self.step is None:
@@ -78,23 +82,27 @@ class Varied(FileTable):
 
     @property
     def texts(self) -> tuple[str, ...]:
-        """What it may be, if that are texts; the place of a text is its position here."""
+        """The texts that the parameter may be; empty if it is a number."""
         return tuple(dict.fromkeys(one for one in self.choose if isinstance(one, str)))
 
     @property
     def ends(self) -> tuple[float | str, ...]:
-        """All texts that it may be; of a number the bounds."""
+        """All texts that the parameter may be, or the two bounds of a number."""
         return self.texts or self.bounds
 
     def place(self, value: float | str) -> float:
-        """A number itself, or the position of a text; the first one for NONE."""
+        """Return the number that stands for a value of the parameter.
+
+        That is a number itself, or the position of a text among `texts`. A value that a candidate
+        does not have (NONE) has the least number.
+        """
         if value == NONE and NONE not in self.texts:
             return self.bounds[0]
         return float(self.texts.index(value) if isinstance(value, str) else value)
 
     @property
     def bounds(self) -> tuple[float, float]:
-        """The least and the largest place: numbers are in the unit of the file."""
+        """Least and largest value in the unit of the file; for texts, first and last position."""
         if self.choose:
             places = self.values(False)
             return places[0], places[-1]
@@ -106,10 +114,12 @@ class Varied(FileTable):
         return self.low, self.high
 
     def values(self, is_whole: bool) -> tuple[float, ...]:
-        """All places that it may have, in order; empty if any number between the bounds.
+        """Return all values of the parameter in order; for texts, their positions in `texts`.
+
+        Return nothing if it may be any number between the bounds.
 
         Args:
-            is_whole: whether only whole numbers make sense.
+            is_whole: whether the parameter can only be a whole number.
         """
         if self.choose:
             return tuple(sorted({self.place(one) for one in self.choose}))
@@ -123,7 +133,7 @@ class Varied(FileTable):
 
 
 def _from_list(given: Any) -> Any:
-    """[low, high] as a table."""
+    """Return a list [low, high] of a study file as a table; all else stays as it is."""
     if isinstance(given, (list, tuple)) and len(given) == 2:
         return {"low": given[0], "high": given[1]}
     return given
@@ -133,7 +143,9 @@ Vary = Annotated[Varied, BeforeValidator(_from_list)]
 
 
 def from_catalogue(vary: Mapping[str, Any], material: str | None) -> dict[str, Any]:
-    """[vary] with the first names of balls, and in the place of "catalogue" the diameters sold.
+    """Return [vary] with the diameters in which balls are sold in the place of "catalogue".
+
+    Materials of balls that have several names get their first name.
 
     Args:
         material: shot.material of the design. If it varies, balls of all its materials must be
@@ -172,21 +184,29 @@ def from_catalogue(vary: Mapping[str, Any], material: str | None) -> dict[str, A
 
 
 def has_key(design: Design, name: str) -> bool:
-    """Whether the design's chamber, in its shape, has a key; of other tables they all have all."""
+    """Return whether a design has a key: not every shape has all keys of the chamber.
+
+    Args:
+        name: dotted name of the key; True for a key outside the chamber.
+    """
     key = name.removeprefix("chamber.").split(".")[0]
     return not name.startswith("chamber.") or key in type(design.chamber).model_fields
 
 
 def setting(design: Design, name: str) -> float | str:
-    """The value that a design has of what varies, or NONE; InputError as `Design.value`."""
+    """Return the design's value of a parameter that varies.
+
+    Return NONE if the design's chamber shape does not have it. Raises InputError if the design has
+    no value for it.
+    """
     return design.setting(name) if has_key(design, name) else NONE
 
 
 def designs_by_shape(design: Design, vary: Mapping[str, Varied]) -> dict[str, Design]:
-    """The design in each shape that it may have, its own one first.
+    """Return the design in each chamber shape that it may have, by shape, its own one first.
 
-    In another shape, what varies and its own shape does not have is at its first value. InputError
-    if the design cannot have a shape.
+    Parameters that only another shape has are at their first value there. Raises InputError if the
+    design cannot have a shape.
     """
     own = design.chamber.shape
     found = {own: design}
@@ -209,7 +229,12 @@ def designs_by_shape(design: Design, vary: Mapping[str, Varied]) -> dict[str, De
 
 
 def vary_problems(design: Design, name: str, varied: Varied) -> list[Problem]:
-    """Reasons why a parameter of the design cannot vary like this."""
+    """Return the reasons why a parameter of the design cannot vary as [vary] says.
+
+    Args:
+        name: dotted name of the parameter.
+        varied: bounds, steps or values that [vary] gives it.
+    """
     field = f"vary.{name}"
     if name in design.choices():
         return [Problem(field, text) for text in _choice_problems(design, name, varied)]
@@ -244,7 +269,7 @@ def vary_problems(design: Design, name: str, varied: Varied) -> list[Problem]:
 
 
 def _choice_problems(design: Design, name: str, varied: Varied) -> Iterator[str]:
-    """Reasons why a text of the design cannot vary like this."""
+    """Return the reasons why a parameter that is a text cannot vary as [vary] says."""
     allowed, start = design.choices()[name], design.setting(name)
     unknown = [one for one in varied.texts if one not in allowed]
     if not varied.texts:
@@ -267,10 +292,14 @@ def _choice_problems(design: Design, name: str, varied: Varied) -> Iterator[str]
 
 
 def _misses(designs: Mapping[str, Design], vary: Mapping[str, Varied], side: int) -> np.ndarray:
-    """By how much a shop may miss each parameter at its lower or upper bound, shape (2, d).
+    """Return by how much a shop may miss each parameter at its lower or upper bound, shape (2, d).
+
+    The two rows are the largest misses downward and upward by the design's tolerances, in the units
+    of the file.
 
     Args:
-        designs: one that has it, for each parameter.
+        designs: a design that has the parameter, for each parameter.
+        side: 0 for the lower bound, 1 for the upper one.
     """
     ends = []
     for name, varied in vary.items():
@@ -282,14 +311,17 @@ def _misses(designs: Mapping[str, Design], vary: Mapping[str, Varied], side: int
 
 
 def with_key(by_shape: Mapping[str, Design], name: str) -> Design | None:
-    """The first of the designs that has a key."""
+    """Return the first of the designs by shape that has a key; None if none has it."""
     return next((one for one in by_shape.values() if has_key(one, name)), None)
 
 
 def _where(
     by_shape: Mapping[str, Design], vary: Mapping[str, Varied], name: str
 ) -> tuple[int, frozenset[int]] | None:
-    """`Axis.where` of a parameter."""
+    """Return with which chamber shapes candidates have a parameter; None if all have it.
+
+    Return the position of the shape among the parameters, and the positions of these shapes.
+    """
     if SHAPE not in vary or all(has_key(one, name) for one in by_shape.values()):
         return None
     shapes = vary[SHAPE].texts
@@ -301,8 +333,11 @@ class ParameterSpace:
     """The varied parameters of a design, mapped to the unit cube.
 
     `start` is the design of the study as a point (d,), `domain` says which values each coordinate
-    can have, and `bounds` are low and high (d, 2) in the units of the file. `counts_worst` as of
-    Domain.
+    can have, and `bounds` are low and high (d, 2) in the units of the file.
+
+    Args:
+        counts_worst: whether the worst value over the design's tolerances counts in the search,
+            instead of the mean.
     """
 
     def __init__(
@@ -325,14 +360,20 @@ class ParameterSpace:
         self.start = self.domain.snap(start[None])[0]
 
     def point_of(self, values: Mapping[str, float | str]) -> np.ndarray:
-        """The point (d,) of values in the units of the file."""
+        """Return the point (d,) of the unit cube for values in the units of the file."""
         places = [
             one.place(values[name]) for name, one in zip(self.names, self.varied, strict=True)
         ]
         return np.array([self._share(k, place) for k, place in enumerate(places)])
 
     def values_on(self, k: int, shares: np.ndarray) -> np.ndarray:
-        """Places of parameter k at shares (n,) of its bounds; between two levels in proportion."""
+        """Return values of parameter k in the unit of the file; for texts, their positions.
+
+        A share between those of two allowed values gives a number between these.
+
+        Args:
+            shares: coordinates of the unit cube, (n,).
+        """
         levels, (low, high) = self._levels[k], self.bounds[k]
         if len(levels):
             return np.asarray(np.interp(shares, np.linspace(0.0, 1.0, len(levels)), levels))
@@ -341,7 +382,7 @@ class ParameterSpace:
         return values
 
     def values_at(self, point: np.ndarray) -> dict[str, float | str]:
-        """Values of the parameters at a point (d,), in the units of the file."""
+        """Return the values of the parameters at a point (d,) by name, in the units of the file."""
         # The start has the numbers of its file: the way through the unit cube could round them.
         if np.array_equal(point, self.start):
             return {name: setting(self._design, name) for name in self.names}
@@ -379,7 +420,11 @@ class ParameterSpace:
 
 
 def is_on_bound(value: float | str, ends: Sequence[float | str]) -> bool:
-    """True if a number lies on one of its two bounds, to a thousandth of their distance."""
+    """Return whether a number lies on one of its two bounds, to a thousandth of their distance.
+
+    Args:
+        ends: both bounds of a number, or all texts of a parameter that is a text.
+    """
     if isinstance(value, str):
         return False
     low, high = (float(end) for end in ends)

@@ -105,7 +105,7 @@ class Objective(FileTable):
 
     @property
     def goals(self) -> tuple[str, ...]:
-        """The objectives, as parse_objective takes them; a Pareto front has two."""
+        """The study's objectives as texts: a name or a weighted sum, or two for a Pareto front."""
         if self.sum:
             return (" + ".join(f"{weight:.10g} {name}" for name, weight in self.sum.items()),)
         return self.pareto or (self.name,)
@@ -179,7 +179,7 @@ class Optimizer(FileTable):
 class Study(FileTable):
     """A design, what may vary in it, what is maximised, what must hold, and the budget.
 
-    `vary` maps a dotted parameter of the design to what it may be, in the units of the file.
+    `vary` maps the dotted name of a parameter to the values it may have, in the units of the file.
     """
 
     RENAMED: ClassVar[dict[str, str]] = {"draft": "search_accuracy"}  # former names of keys
@@ -213,7 +213,10 @@ class Study(FileTable):
     @model_validator(mode="before")
     @classmethod
     def _look_up_sizes(cls, data: Any) -> Any:
-        """The sizes of the catalogue, so that a study does not depend on it."""
+        """Replace "catalogue" in [vary] by the ball sizes that are sold.
+
+        So the study stays the same when the catalogue changes.
+        """
         if not isinstance(data, Mapping) or not isinstance(data.get("vary"), Mapping):
             return data
         design = data.get("design")  # None where it has problems of its own
@@ -223,7 +226,10 @@ class Study(FileTable):
     @model_validator(mode="before")
     @classmethod
     def _read_begin_with(cls, data: Any, info: ValidationInfo) -> Any:
-        """The values of the designs to begin with, so that a study is whole without their files."""
+        """Replace the design files in `begin_with` by their values of what varies.
+
+        So the study is complete without these files.
+        """
         given = data.get("begin_with") if isinstance(data, Mapping) else None
         if not isinstance(given, (list, tuple)) or not isinstance(data.get("vary"), Mapping):
             return data
@@ -240,14 +246,15 @@ class Study(FileTable):
 
     @property
     def all_constraints(self) -> dict[str, Limits]:
-        """The constraints of the study, and the limits of its design's zones."""
+        """Limits by name of the metric or number: those of the study and of its design's zones."""
         return {**self.constraints, **zone_constraints(self.design)}
 
     @property
     def first_look(self) -> int | None:
-        """Replicas after which a candidate of the search may be given up; None if it never is.
+        """Number of replicas after which a candidate of the search may be given up.
 
-        Each candidate gets all replicas with two objectives, and where an accuracy is asked for.
+        It is None where each candidate gets all replicas: with two objectives, or where the design
+        asks for an accuracy of the objective.
         """
         accuracy = self.at_search_accuracy(self.design).process.accuracy
         few = self.optimizer.first_replicas
@@ -255,7 +262,7 @@ class Study(FileTable):
         return few if refines and 0 < few < accuracy.replicas else None
 
     def at_search_accuracy(self, design: Design) -> Design:
-        """A candidate at the accuracy of the search, which is usually coarser than its own.
+        """Return a candidate's design with the accuracy of the search, usually a coarser one.
 
         Raises InputError if [search_accuracy] does not fit the design.
         """
@@ -264,7 +271,7 @@ class Study(FileTable):
         return design.changed({f"{tables.get(k, 'process.accuracy')}.{k}": v for k, v in values})
 
     def _shape_problems(self) -> list[Problem]:
-        """Why the design cannot have the shapes of [vary]."""
+        """Return the reasons why the design cannot have the chamber shapes of [vary]."""
         if SHAPE not in self.vary:
             return []
         if problems := vary_problems(self.design, SHAPE, self.vary[SHAPE]):
