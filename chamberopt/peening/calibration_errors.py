@@ -49,7 +49,7 @@ WIDE = ".wide."  # prefix of the figures of wide windows, which is the name of n
 
 
 class Moved(NamedTuple):
-    """A design with one calibrated parameter moved by a step of its logarithm."""
+    """A copy of a design in which one calibrated parameter is moved by a step of its logarithm."""
 
     name: Parameter
     step: float

@@ -121,7 +121,7 @@ class Figures(NamedTuple):
 
 
 class Prior(NamedTuple):
-    """The knowledge of the parameters before measuring.
+    """What is known of a machine's parameters before measuring: independent, log-normal values.
 
     Attributes:
         names: names of the parameters, (p,).
@@ -196,7 +196,7 @@ class SimulatedModel:
 
 @dataclass(frozen=True)
 class Data:
-    """Measured figures of one kind.
+    """Measured figures of one kind, with their errors and the function that predicts them.
 
     Args:
         kind: such as "arc heights", in words that a message can use.
@@ -219,7 +219,7 @@ class Data:
 
 @dataclass(frozen=True)
 class Posterior:
-    """The knowledge of the parameters after measuring."""
+    """What is known of a machine's parameters after measuring: most probable values, covariance."""
 
     prior: Prior
     mean: np.ndarray  # most probable theta, (p,)

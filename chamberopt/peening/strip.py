@@ -47,7 +47,7 @@ SCANNED = 200  # number of times at which the largest root is looked for
 
 @dataclass(frozen=True)
 class StripSize:
-    """Length and width [m] of a strip; of a disc both are its diameter."""
+    """Length and width [m] of an Almen strip; both are the diameter if the strip is round."""
 
     length: float = LENGTH
     width: float = WIDTH
@@ -55,7 +55,7 @@ class StripSize:
 
     @property
     def is_whole(self) -> bool:
-        """Whether the strip is a standard strip, whose gauge is known."""
+        """Whether this is the size of a standard Almen strip, whose gauge is known."""
         return not self.is_disc and (self.length, self.width) == (LENGTH, WIDTH)
 
     @property

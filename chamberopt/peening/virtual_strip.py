@@ -111,7 +111,7 @@ class VirtualStrip:
 
     @property
     def of(self) -> str:
-        """The real strip whose arc heights these are; "" if the design is not calibrated."""
+        """Name of the real strip that would get these arc heights; "" without a calibration."""
         calibration = self.setting.design.calibration
         return calibration.strips if calibration and calibration.has_strips else ""
 
