@@ -69,7 +69,7 @@ class _Asked:
 
 
 class Search:
-    """A study that asks for candidates and is told their figures.
+    """Runs the search of a study: asks for candidates, and is told their figures.
 
     Up to `optimizer.batch` candidates may be out at a time. They are told in the order in which
     they were asked for, and what is asked next follows from what was told, so that nothing depends

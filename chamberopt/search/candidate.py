@@ -35,7 +35,7 @@ InputError or an error of sim_core for a candidate that cannot be simulated."""
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """A point of a study with its design, to be evaluated once."""
+    """A set of values for what a study varies, with its design, to be evaluated once."""
 
     number: int  # of its trial
     stage: str  # "search", "sweep", or "confirm" for one with new seeds, or to be measured anew
@@ -48,7 +48,7 @@ class Candidate:
 
     @cached_property
     def parameters(self) -> dict[str, float | str]:
-        """Values of what varies, in the units of the file, by dotted name."""
+        """Values of what the study varies, by dotted name, in the units of the design file."""
         return self.space.values_at(self.point)
 
     @cached_property
@@ -58,13 +58,13 @@ class Candidate:
 
     @property
     def is_start(self) -> bool:
-        """Whether this is the first candidate of a search, the design as it is."""
+        """Whether this is the first candidate of a search: the study's own design, unchanged."""
         return self.number == 0 and self.stage == "search"
 
 
 @dataclass(frozen=True)
 class Figures:
-    """The figures of an evaluated candidate."""
+    """The objectives and metrics of an evaluated candidate."""
 
     goals: tuple[Estimate, ...]  # of each objective of the study
     metrics: Mapping[str, Estimate]
@@ -82,7 +82,7 @@ def simulated_figures(study: Study, evaluation: Evaluation) -> Figures:
 
 @dataclass(frozen=True)
 class ConfirmedCandidate:
-    """A candidate evaluated again, with new seeds."""
+    """A candidate that was evaluated again with new seeds, to confirm its figures."""
 
     searched: int | None  # number of its trial in the search; None if the model recommended it
     candidate: Candidate

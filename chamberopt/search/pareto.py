@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class ParetoPoint:
-    """One candidate in the plane of the two objectives."""
+    """A candidate of a study with two objectives, and whether it is on the Pareto front."""
 
     stage: str  # "search" or "confirm"
     parameters: dict[str, float | str]

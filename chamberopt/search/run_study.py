@@ -89,14 +89,14 @@ class StudyResult:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """A sentence if it is not known whether the best design meets the constraints."""
+        """A sentence on constraints that the best design may not meet; empty if it meets all."""
         if self.best.feasibility != NOT_KNOWN:
             return ()
         return (f"constraints: {self.best.reason}",)
 
     @property
     def given_up(self) -> int:
-        """Number of candidates of the search that got no more replicas than a first look."""
+        """Number of candidates that the search gave up after a few replicas, as clearly worse."""
         few = self.study.first_look
         search = (one for one in self.trials if one.stage == "search")
         return sum(one.replicas == few for one in search) if few else 0

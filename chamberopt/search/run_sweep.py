@@ -41,7 +41,7 @@ MAX_CANDIDATES = 100_000
 
 @dataclass(frozen=True)
 class SweepPlan:
-    """The candidates of a sweep."""
+    """The candidates that a sweep evaluates: a grid, or evenly spread points."""
 
     method: str  # "grid" or "sobol"
     count: int  # values of each parameter, or number of points

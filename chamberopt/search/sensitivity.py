@@ -26,9 +26,9 @@ RANGE_POINTS = 201
 
 @dataclass(frozen=True)
 class Slice:
-    """The score over one parameter, by the model; arrays have the shape (k,).
+    """How the model's score depends on one parameter; arrays have the shape (k,).
 
-    A parameter that is chosen among texts has one entry in the arrays for each.
+    A parameter that is chosen among texts has one entry in the arrays for each text.
     """
 
     name: str

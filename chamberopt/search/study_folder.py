@@ -276,12 +276,12 @@ class StudyFolder:
 
     @property
     def begun(self) -> bool:
-        """Whether there are trials to resume from."""
+        """Whether the folder has a trial log, from which the study is resumed."""
         return self._history.path.exists()
 
     @property
     def seconds(self) -> float:
-        """Wall-clock time of all evaluations, earlier runs included [s]."""
+        """Wall-clock time of all evaluations of the study [s], those before interruptions too."""
         return sum(read_seconds(self.path).values())
 
     def begin(self) -> None:

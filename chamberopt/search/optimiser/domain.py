@@ -20,7 +20,7 @@ MISSES = 16  # places in the box of tolerances
 
 
 class Axis(NamedTuple):
-    """Which values one parameter can have, and in which points.
+    """The values that one parameter of a search can have, and which points have this parameter.
 
     levels: how many values it can have; 0 for any number between its bounds.
     ordered: whether near levels are alike. If not, they are choices, and all differ alike.

@@ -58,7 +58,7 @@ Misfit = Callable[[np.ndarray], tuple[float, np.ndarray]]  # and its gradient
 
 
 class GaussianProcess:
-    """Scores as a smooth function of points of the unit cube, fitted when it is made.
+    """A smooth model of scores over points of the unit cube, fitted when it is made.
 
     Its attribute `noise` is the variance of one evaluation's score.
 

@@ -15,7 +15,7 @@ LOCAL = "LN_BOBYQA"
 
 
 class NloptThread:
-    """NLopt in a thread of its own, so that a run can wait for a score while others go on.
+    """Runs NLopt in a thread of its own, where it can wait for a score while the search goes on.
 
     NLopt's random numbers are those of the thread: the seed is for all of its runs.
     """

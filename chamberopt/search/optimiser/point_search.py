@@ -59,7 +59,7 @@ class BudgetSpentError(Exception):
 
 
 class PointSearch:
-    """The search for the largest score over the unit cube; the first question is the start.
+    """Searches the unit cube for the point with the largest score, beginning at the start.
 
     Each point is asked for once. Evenly spread points and those of the model may be evaluated
     `settings.batch` at a time: the next is proposed when all but the last `batch - 1` have scores.

@@ -22,7 +22,7 @@ MET = {FEASIBLE: "met", NOT_KNOWN: "not known", INFEASIBLE: "not met"}  # a limi
 
 
 class Violation(NamedTuple):
-    """A limit that is, or may be, violated."""
+    """A limit that a candidate violates, or may violate, with its figure and a text."""
 
     figure: str  # name of the metric, or of the number of the design
     text: str  # the figure, and how it compares with the limit

@@ -330,7 +330,7 @@ def _where(
 
 
 class ParameterSpace:
-    """The varied parameters of a design, mapped to the unit cube.
+    """Maps the varied parameters of a design to points of the unit cube, and back.
 
     `start` is the design of the study as a point (d,), `domain` says which values each coordinate
     can have, and `bounds` are low and high (d, 2) in the units of the file.
