@@ -1,1 +1,1 @@
-"""The way from impacts to dents, coverage, and metrics with intervals."""
+"""Compute dents, coverage, and metrics with confidence intervals from the balls' impacts."""

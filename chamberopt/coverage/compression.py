@@ -2,7 +2,7 @@
 
 Notation
     d       diameter of a dent on the part [m]
-    L(d)    rate of dents wider than d in a window [1/s], as in strength.py with s = d
+    L(d)    rate of dents wider than d in a window [1/s]: sum of their areas over window and time
     z(t)    depth of compression after a time t [m]
 
     z(t) = 1.1 integral over d of 1 - exp(-L(d) t)
@@ -49,12 +49,12 @@ PEAK_STRESS = 0.5, 0.7  # peak compressive stress over tensile strength, at almo
 
 
 def compression_depth(histogram: np.ndarray, time_ratio: float, highest: float) -> np.ndarray:
-    """Depth z [m] in each window, (p,).
+    """Return the depth [m] of the layer under compression below each measuring window, (p,).
 
     Args:
-        histogram: dented area over area of each window, by level of d, (p, LEVELS).
+        histogram: dented area over area of each window, by level of dent diameter, (p, LEVELS).
         time_ratio: peening time over the time in which the dents fell.
-        highest: d at the upper end of the levels [m].
+        highest: dent diameter at the upper end of the levels [m].
     """
     times = np.full(len(histogram), time_ratio)
     return np.asarray(OF_DENT * strength_at(dent_rates(histogram), times, highest))
@@ -63,12 +63,13 @@ def compression_depth(histogram: np.ndarray, time_ratio: float, highest: float) 
 def compression_estimate(
     field: TargetField, batches: Sequence[Sequence[Hits]], seconds: float, peening_time: float
 ) -> Estimate:
-    """Mean depth of compression [µm] over the target's reachable surface.
+    """Return the mean depth [µm] of the layer under compression, over the target's reachable
+    surface.
 
-    Its interval includes the estimate's own error, which is most of the width.
+    Its interval includes the error of the formula for the depth, which is most of the width.
 
     Args:
-        batches: impacts of the replicas of each batch, in the sector of the windows.
+        batches: impacts of each replica, in batches of replicas, turned into the windows' sector.
         seconds: simulated time of each replica.
         peening_time: [s].
     """
@@ -98,7 +99,9 @@ def compression_estimate(
 
 
 def stress_notes(metal: PartMaterial) -> tuple[str, ...]:
-    """Notes for a result on the stress under the surface."""
+    """Return notes on the stress under the surface: its likely peak, and a warning if the depth of
+    compression cannot be estimated for this metal.
+    """
     notes = []
     if metal.tensile_MPa is not None:
         low, high = (share * metal.tensile_MPa for share in PEAK_STRESS)

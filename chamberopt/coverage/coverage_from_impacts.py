@@ -39,7 +39,8 @@ MAX_BATCHES = 40  # batches of replicas; more batches would not improve the inte
 
 
 class Prints(Protocol):
-    """Footprints of the dents of one or more replicas.
+    """Interface to the footprints of one or more replicas: the share of each window that each dent
+    takes.
 
     Attributes:
         area: sum of the areas of all dents on the target [m²].
@@ -55,7 +56,9 @@ class Prints(Protocol):
     def squares(self) -> float: ...
 
     def pairs(self) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        """Yield points, and the shares of their windows that dents take, (k,) each, in order."""
+        """Yield the indices of windows, and the shares of these windows that single dents take,
+        (k,) each, always in the same order.
+        """
         ...
 
 
@@ -63,8 +66,11 @@ class Footprints(NamedTuple):
     """Pairs of a point and the share of its window that a dent takes.
 
     Attributes:
-        point, weight: of each pair, shape (k,).
-        area, area_on_creases, squares: as in Prints.
+        point: index of the window's point in each pair, shape (k,).
+        weight: share of the window that the dent takes, shape (k,).
+        area: sum of the areas of all dents on the target [m²].
+        area_on_creases: sum of the areas of dents on creases [m²].
+        squares: sum of the squared areas of all dents [m⁴].
     """
 
     point: np.ndarray
@@ -78,7 +84,7 @@ class Footprints(NamedTuple):
 
 
 class JoinedFootprints(NamedTuple):
-    """The footprints of several replicas, without a copy of them."""
+    """The footprints of several replicas, read from the replicas' own footprints without a copy."""
 
     replicas: tuple[Prints, ...]
     area: float
@@ -93,7 +99,8 @@ class JoinedFootprints(NamedTuple):
 class FoundAgain(NamedTuple):
     """Footprints of one replica that are computed again at each use.
 
-    They save memory: a dent takes 80 bytes, and each of its 60 to 340 pairs 12 bytes.
+    This saves memory: a dent takes 80 bytes, and each of its 60 to 340 pairs with a window 12
+    bytes.
     """
 
     find: Callable[[], Footprints]
@@ -106,14 +113,16 @@ class FoundAgain(NamedTuple):
 
 
 class Batch(NamedTuple):
-    """Footprints of one or more replicas."""
+    """The number of replicas in a batch, and the footprints of all their dents."""
 
     replicas: int
     footprints: Prints
 
 
 def coverage_from_dent_density(dent_density: np.ndarray) -> np.ndarray:
-    """Coverage 1 - exp(-x) of areas with dent density x, by Avrami's equation.
+    """Return the coverage 1 - exp(-x) of areas with dent density x, by Avrami's equation.
+
+    The dent density is the sum of the shares of an area that its dents take.
 
     >>> coverage_from_dent_density(np.array([np.log(50.0)]))
     array([0.98])
@@ -148,9 +157,9 @@ def batches_of(replicas: Sequence[Prints]) -> list[Batch]:
 
 
 def kept_footprints(field: TargetField, gauge: Gauge, dents: LocatedDents) -> Prints:
-    """The footprints of one replica, kept as long as there is memory for them.
+    """Return the footprints of one replica, kept in memory as long as there is room for them.
 
-    Without memory they are computed again at each use, with the same values.
+    Without room they are computed again at each use, with the same values.
     """
     found = find_footprints(field, gauge, dents)
     if MEMORY.keeps(found.point, found.weight):
@@ -159,11 +168,13 @@ def kept_footprints(field: TargetField, gauge: Gauge, dents: LocatedDents) -> Pr
 
 
 class LocatedDents(NamedTuple):
-    """Dents of one replica that may be in windows of the target, or of the whole part.
+    """Dents of one replica with the smooth face or the crease under each.
+
+    They may be in windows of the target, or of the whole part.
 
     Attributes:
         contacts: places of the dents.
-        triangle: of the part, shape (k,).
+        triangle: part triangle under each dent, shape (k,).
         radius: [m], shape (k,).
         edge: crease under each dent, -1 on a smooth face, shape (k,).
     """
@@ -179,7 +190,10 @@ class LocatedDents(NamedTuple):
 
 
 def locate_dents(field: TargetField, in_sector: Hits) -> LocatedDents:
-    """Find the face or the crease under each dent, from impacts in the sector of the windows."""
+    """Return the dents that impacts leave, with the smooth face or the crease under each.
+
+    The impacts must have been turned into the symmetry sector of the windows.
+    """
     dents = in_sector.select((in_sector.dent > 0.0) & field.has_windows[in_sector.triangle])
     contacts = field.places_of(dents, np.arange(len(dents)))
     edge = crease_of_contacts(field, contacts.place, dents.triangle)
@@ -187,7 +201,9 @@ def locate_dents(field: TargetField, in_sector: Hits) -> LocatedDents:
 
 
 def find_footprints(field: TargetField, gauge: Gauge, hits: Hits | LocatedDents) -> Footprints:
-    """The footprints of one replica in windows of one size. Dents off the target do not count."""
+    """Return the share of each window that each dent of one replica takes, for windows of one size.
+    Dents off the target do not count.
+    """
     dents = hits if isinstance(hits, LocatedDents) else locate_dents(field, field.in_sector(hits))
     contacts, radius, edge = dents.contacts, dents.radius, dents.edge
     on_face, size = edge < 0, np.pi * radius**2
@@ -213,7 +229,7 @@ Pairs = Iterator[tuple[np.ndarray, np.ndarray]]
 
 
 def _on_creases(field: TargetField, gauge: Gauge, dents: LocatedDents) -> Pairs:
-    """Shares of dents on edges that are creases to a window, in the bands beside the edges."""
+    """Yield the windows beside creases, and the share of each that a dent on its crease takes."""
     band, own = gauge.band, np.flatnonzero(dents.edge >= 0)
     if band is None:
         return
@@ -226,7 +242,9 @@ def _on_creases(field: TargetField, gauge: Gauge, dents: LocatedDents) -> Pairs:
 
 
 def _on_soft_edges(field: TargetField, gauge: Gauge, dents: LocatedDents) -> Pairs:
-    """Shares of dents on edges that are creases to some windows, in windows that see no crease."""
+    """Yield the windows that see no crease under a dent where other windows see one, and the share
+    of each that the dent takes.
+    """
     line, windows = field.creases.line, gauge.windows
     own = np.flatnonzero((dents.edge >= 0) & (line[-1, dents.edge] < 0))
     for point, contact in windows.pairs(dents.contacts.select(own)):
@@ -238,7 +256,7 @@ def _on_soft_edges(field: TargetField, gauge: Gauge, dents: LocatedDents) -> Pai
 def in_halves(
     field: TargetField, contacts: Places, triangle: np.ndarray
 ) -> tuple[Places, np.ndarray, np.ndarray]:
-    """Divide each contact on a crease into two halves, on the faces of its two sides.
+    """Divide each contact on a crease into two halves, one on the smooth face on each side.
 
     The division does not depend on the face that was hit.
 
@@ -256,7 +274,7 @@ def in_halves(
 
 
 def crease_of_contacts(field: TargetField, place: np.ndarray, triangle: np.ndarray) -> np.ndarray:
-    """The crease under each contact, (k,), or -1 on a smooth face."""
+    """Return the index of the crease under each contact point, (k,), or -1 on a smooth face."""
     creases = field.creases
     found = np.full(len(place), -1)
     borders = np.asarray((creases.at_corner >= 0).any(axis=1))

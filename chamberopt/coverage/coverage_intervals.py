@@ -49,7 +49,9 @@ from chamberopt.coverage.percentile import (
 
 
 class Products(NamedTuple):
-    """Products over the dents in each window of 1 - k w, for K time ratios.
+    """Product of 1 - k w over the dents in each window, for K time ratios k.
+
+    Here w is the share of the window that a dent takes. The mean product is the share left bare.
 
     Attributes:
         of_all: over all batches, shape (p, K).
@@ -61,11 +63,14 @@ class Products(NamedTuple):
 
 
 def multiply_dents(batches: Sequence[Batch], points: int, ratios: Sequence[float]) -> Products:
-    """Multiply over the dents of all batches, and without the dents of each batch in turn.
+    """Multiply 1 - k w over the dents in each window, for each time ratio k.
+
+    Here w is the share of the window that a dent takes. The products are over the dents of all
+    batches, and of all batches without each one in turn.
 
     Args:
         points: number of windows.
-        ratios: times over the simulated time of one replica, shape (K,).
+        ratios: treatment times over the simulated time of one replica, shape (K,).
     """
     from chamberopt.coverage.field.windows import multiply_products
 
@@ -93,6 +98,7 @@ def coverage_estimates(
 
     Args:
         sums: of the dents of the batches in each window.
+        reach: share of the target that a ball can touch.
         time_ratio: treatment time over the simulated time of one replica.
     """
     products = multiply_dents(batches, len(sums.number), [time_ratio, 2.0 * time_ratio])
@@ -113,10 +119,10 @@ def coverage_estimates(
 
 
 def mean_and_variance_estimates(products: Products, reach: Reach) -> tuple[Estimate, Estimate]:
-    """Mean and variance of coverage over the target.
+    """Return estimates of the mean and of the variance of coverage over the target.
 
     Args:
-        products: for the time ratio, and for twice the time ratio.
+        products: of the dents, for the time ratio and for twice the time ratio.
     """
     of_all, of_rest = products
     values = mean_and_variance(np.vstack([of_all.mean(axis=0), of_rest]), reach.share)
@@ -137,7 +143,9 @@ def mean_and_variance_estimates(products: Products, reach: Reach) -> tuple[Estim
 
 
 def products_without_each(products: np.ndarray) -> np.ndarray:
-    """Products (g, p, k) without each batch in turn, from the products (g, p, k) of each batch."""
+    """Return the products (g, p, k) over all batches but one, for each of the g batches left out,
+    from the products (g, p, k) of single batches.
+    """
     before, after = np.ones_like(products), np.ones_like(products)
     np.cumprod(products[:-1], axis=0, out=before[1:])
     after[:-1] = np.cumprod(products[:0:-1], axis=0)[::-1]
@@ -145,14 +153,18 @@ def products_without_each(products: np.ndarray) -> np.ndarray:
 
 
 def mean_and_variance(uncovered: np.ndarray, reachable: float) -> tuple[np.ndarray, np.ndarray]:
-    """Mean and variance of coverage over the target, from rows (..., 2) of m1 and m2."""
+    """Return mean and variance of coverage over the target.
+
+    The last axis of `uncovered` (..., 2) holds the means over the windows of exp(-x) and exp(-2 x),
+    with x the dent density of a window.
+    """
     m1, m2 = np.moveaxis(uncovered, -1, 0)
     mean = reachable * (1.0 - m1)
     return mean, reachable * (1.0 - 2.0 * m1 + m2) - mean**2
 
 
 def root_of_variance(variance: Estimate) -> Estimate:
-    """Standard deviation from a variance.
+    """Return the estimate of a standard deviation, from the estimate of its variance.
 
     The square root is steep at 0. So the ends of the interval come from the ends of the variance's
     interval, and the longer side serves for both.
@@ -177,7 +189,9 @@ NOT_RESOLVED = "not resolved"
 
 @dataclass(frozen=True)
 class Resolution:
-    """The number of dents in the windows of a simulation, and the number that its figures take."""
+    """The number of dents in the median window of a simulation, and the numbers that its figures
+    need.
+    """
 
     dents: float  # in the median window
     needed_for_mean: float  # dents in the median window for mean and standard deviation
@@ -193,7 +207,7 @@ class Resolution:
         return self.dents >= self.needed_for_places
 
     def time_for(self, needed: float) -> float:
-        """Simulated time [s] in which the median window gets the needed dents.
+        """Return the simulated time [s] in which the median window gets `needed` dents.
 
         It has a margin if the window has fewer dents now.
         """
@@ -206,7 +220,7 @@ class Resolution:
 def find_resolution(
     batches: Sequence[Batch], sums: DentSums, gauge: Gauge, time_ratio: float, time: float
 ) -> Resolution:
-    """Compare the dents in the windows with the number that the figures take.
+    """Return the number of dents in the median window, and the numbers that the figures need.
 
     Args:
         sums: of the dents of the batches in each window.

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Dents:
-    """Dents in order of time, in the part's own frame."""
+    """Dents on the part in order of time. Places are in the part's own frame."""
 
     place: np.ndarray  # contact points [m], (k, 3)
     normal: np.ndarray  # unit normals of the triangles that were hit, (k, 3)
@@ -40,7 +40,7 @@ class Dents:
 
 
 def dents_on_part(impacts: ImpactLog, chamber: Chamber, design: Design) -> Dents:
-    """The dents that impacts leave on the part. An impact below the yield speed leaves no dent."""
+    """Return the dents that impacts leave on the part; none for impacts below the yield speed."""
     diameter = dent_diameters(impacts, design)
     dents = np.flatnonzero((diameter > 0.0) & (chamber.source[impacts.triangle] >= 0))
     corners = chamber.vertices[chamber.triangles[impacts.triangle[dents]]]
@@ -59,7 +59,7 @@ def dent_diameter(
         normal_speed: v [m/s], (n,).
         diameter: D [m], (n,) or one for all.
         density: rho [kg/m³].
-        material: of the part, which has e(v), v0 and B.
+        material: of the part, with its restitution e(v), yield speed v0 and hardness B.
     Returns:
         Diameter [m], (n,); 0 where the normal speed is not above the yield speed v0.
 

@@ -32,7 +32,7 @@ P95 = 0.95  # share of the target's area that may be covered less than p95_cover
 
 @dataclass(frozen=True)
 class Metric:
-    """A named number of a candidate.
+    """A named figure of a simulated design, such as its mean coverage.
 
     Metrics of coverage and intensity have their own estimators, see simulation/estimates.py.
     """
@@ -212,7 +212,7 @@ METRICS = {
 
 
 def find_metric(name: str) -> Metric | None:
-    """The metric with a name such as "mean_coverage" or "ZONE.mean_coverage", or None."""
+    """Return the metric with a name such as "mean_coverage" or "ZONE.mean_coverage", or None."""
     zone, _, of_target = name.rpartition(".")
     metric = METRICS.get(of_target)
     if metric is None or not zone:
@@ -225,7 +225,7 @@ def find_metric(name: str) -> Metric | None:
 
 
 def metric_problem(design: Design, name: str) -> str:
-    """The reason why a design lacks the named metric, or ""."""
+    """Return the reason why a design lacks the named metric, or "" if the design has it."""
     metric = find_metric(name)
     if metric is None:
         return f"not a metric; {toml_errors.did_you_mean(name, METRICS)}"
@@ -237,7 +237,7 @@ def metric_problem(design: Design, name: str) -> str:
 
 
 def metric_names(design: Design) -> tuple[str, ...]:
-    """The names of all metrics of a design. The metrics of its zones come last."""
+    """Return the names of all metrics that a design has. The metrics of its zones come last."""
     of_target = tuple(name for name in METRICS if not metric_problem(design, name))
     of_zones = (f"{zone.name}.{name}" for zone in design.zones for name in of_target)
     return (*of_target, *(name for name in of_zones if find_metric(name)))
@@ -270,12 +270,13 @@ RENAMED_OBJECTIVES = {"coverage_p05": "p05_coverage", "time_to_98": "minus_time_
 
 
 def renamed_objective(old: str) -> str:
-    """A message for an objective's name of version 0.1.0."""
+    """Return a message with the new name of an objective that had another name in version 0.1.0."""
     return f"{old!r} is now called {RENAMED_OBJECTIVES[old]!r}; change the name"
 
 
 def parse_objective(name: str) -> ObjectiveFunction:
-    """The named objective, or a sum of objectives and metrics.
+    """Return the objective of this name, or the objective that a text of weighted objectives and
+    metrics describes.
 
     >>> parse_objective("1 uniform_coverage + -0.001 time_to_98_s").terms
     {'mean_coverage': 1.0, 'std_coverage': -1.0, 'time_to_98_s': -0.001}
@@ -303,7 +304,8 @@ def parse_objective(name: str) -> ObjectiveFunction:
 
 
 def highest_uniform_coverage(reachable: float) -> float:
-    """The largest uniform_coverage if balls reach only a share r of the target.
+    """Return the largest uniform_coverage (mean minus standard deviation of coverage) that is
+    possible if balls reach only a share r of the target.
 
     The rest has no coverage. If all reachable places are covered alike, to c, the mean is r c and
     the standard deviation is c sqrt(r (1 - r)).
@@ -312,7 +314,7 @@ def highest_uniform_coverage(reachable: float) -> float:
 
 
 def highest_objective(name: str, reachable: float) -> float:
-    """The largest value of an objective if balls reach only a share of the target, or infinity.
+    """Return the largest possible value of an objective if balls reach only a share of the target.
 
     It is infinite if no bound is known.
     """

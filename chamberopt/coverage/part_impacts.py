@@ -43,7 +43,7 @@ class Hits:
         return len(self.triangle)
 
     def on(self, triangles: np.ndarray) -> Hits:
-        """The impacts on the marked part triangles, (m,) bool."""
+        """Return the impacts on those part triangles that `triangles` marks, (m,) bool."""
         return self.select(triangles[self.triangle])
 
     def select(self, rows: slice | np.ndarray) -> Hits:
@@ -63,28 +63,28 @@ class TargetImpacts:
         return sum(len(one) for one in self.hits)
 
     def total(self, column: str) -> float:
-        """Sum of a column of Hits."""
+        """Return the sum of a column of Hits, such as "speed", over all impacts."""
         return float(sum(getattr(one, column).sum(dtype=float) for one in self.hits))
 
 
 @dataclass(frozen=True)
 class HitsByTriangle:
-    """Impacts in the order of their triangles."""
+    """Impacts in the order of the part triangles that they hit."""
 
     first: np.ndarray  # rows first[t] to first[t + 1] belong to triangle t, (m + 1,) int64
     hits: Hits
 
     def of(self, triangle: int) -> Hits:
-        """The impacts on one part triangle."""
+        """Return the impacts on one part triangle."""
         return self.hits.select(slice(self.first[triangle], self.first[triangle + 1]))
 
     def on(self, triangles: np.ndarray) -> Hits:
-        """The impacts on the marked part triangles, (m,) bool."""
+        """Return the impacts on those part triangles that `triangles` marks, (m,) bool."""
         return self.hits.select(np.repeat(triangles, np.diff(self.first)))
 
 
 def hits_on_part(impacts: ImpactLog, chamber: Chamber, design: Design) -> Hits:
-    """The impacts of a simulator log that are on the part."""
+    """Return those impacts of a simulator log that hit the part."""
     source = chamber.source[impacts.triangle]
     on_part = source >= 0
     speed = np.asarray(impacts.normal_speed)
@@ -105,7 +105,8 @@ def hits_on_part(impacts: ImpactLog, chamber: Chamber, design: Design) -> Hits:
 
 
 def sort_hits_by_triangle(hits: Sequence[Hits], triangles: int) -> HitsByTriangle:
-    """Put the impacts of several replicas together.
+    """Return the impacts of several replicas together, in the order of the part triangles that they
+    hit.
 
     Args:
         triangles: number of triangles of the part.
@@ -164,7 +165,8 @@ def require_impacts(columns: dict[str, np.ndarray], count: int) -> None:
 
 
 def load_matching_hits(path: Path, impacts: np.ndarray) -> HitsByTriangle:
-    """The single impacts of a results folder. They are checked to belong to its part.vtp.
+    """Return the single impacts of a results folder, after a check that they belong to its
+    part.vtp.
 
     Args:
         path: of the hits.npz.

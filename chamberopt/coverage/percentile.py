@@ -1,6 +1,6 @@
-"""Percentiles of coverage and exposure over the target, and the time until it is full.
+"""Estimate percentiles of coverage and exposure over the target, and the time to full coverage.
 
-A 5th percentile of k times the sum of w_j is too low, because counts scatter. The scatter of
+The 5th percentile of simulated dent densities is too low, because counts scatter. The scatter of
 sqrt(x) is alike everywhere (M. S. Bartlett, J. Roy. Stat. Soc. Suppl. 3 (1936) 68). So the roots
 are drawn to their mean until they vary over the target as the true roots do. This takes away the
 variance of counting, which shows from replica to replica. The result of half of the replicas shows
@@ -33,7 +33,9 @@ SHORTEST = 1e-6  # shortest treatment, over the whole treatment
 
 
 class Quantile(NamedTuple):
-    """A figure of single places, and the share of the target's area with a lower figure."""
+    """A percentile over the target: the figure of each place, such as coverage, and the share of
+    the target's area with a lower figure.
+    """
 
     level: float
     of_density: Callable[[np.ndarray | float], np.ndarray | float]  # gives the figure from x
@@ -45,7 +47,7 @@ def _coverage(density: np.ndarray | float) -> np.ndarray | float:
 
 
 def exposure_from_density(density: np.ndarray | float) -> np.ndarray | float:
-    """The exposure M from the dent density x."""
+    """Return the exposure (peening time over time to 98 % coverage) from the dent density."""
     return density / -math.log(1.0 - FULL_COVERAGE)
 
 
@@ -55,11 +57,12 @@ P95_EXPOSURE = Quantile(P95, exposure_from_density, math.inf)
 
 
 class DentSums(NamedTuple):
-    """Sums over the dents of all batches in windows of one size.
+    """Numbers of the dents in windows of one size, and sums of the shares of a window that they
+    take.
 
     Attributes:
-        replicas: number in each batch, shape (g,).
-        share: sums of w over the dents in each window, shape (g, p).
+        replicas: number of replicas in each batch, shape (g,).
+        share: sums of the dents' shares of each window, by batch, shape (g, p).
         number: dents of all batches in each window, shape (p,).
     """
 
@@ -75,7 +78,9 @@ class DentSums(NamedTuple):
 
 
 def sum_dents(batches: Sequence[Batch], points: int) -> DentSums:
-    """Add up the dents of each batch in each window, for `points` windows."""
+    """Return the number of dents in each of `points` windows, and the sum of the shares of the
+    window that the dents of each batch take.
+    """
     from chamberopt.coverage.field.windows import add_powers
 
     sums = np.zeros((len(batches), points, 3))
@@ -89,7 +94,8 @@ def sum_dents(batches: Sequence[Batch], points: int) -> DentSums:
 def quantile_estimate(
     quantile: Quantile, sums: DentSums, reach: Reach, time_ratio: float
 ) -> Estimate:
-    """A percentile over the target. Places out of reach are bare.
+    """Estimate a percentile of a figure such as coverage over the target. Places out of reach are
+    bare.
 
     The percentile is 0 where the share out of reach is more than its level. If the reach is not
     known well enough to tell, the value is the mean of both cases, so that the choice of points
@@ -128,7 +134,9 @@ def quantile_estimate(
 def _quantile_of_reached(
     quantile: Quantile, sums: DentSums, reach: Reach, time_ratio: float
 ) -> Estimate:
-    """A percentile over the target if the share out of reach is surely less than its level."""
+    """Estimate a percentile over the target if the share of the target out of reach is surely less
+    than the percentile's level.
+    """
     batches = len(sums.replicas)
     share, further = (
         max(0.0, (quantile.level - (1.0 - one)) / one)
@@ -186,10 +194,14 @@ def _quantile_of_reached(
 
 
 def mean_exposure(sums: DentSums, reach: Reach, time_ratio: float) -> Estimate:
-    """The mean exposure M over the target. It has no bias, because it is linear in the dents.
+    """Estimate the mean exposure M over the target: peening time over the time to 98 % coverage.
+
+    The estimate has no bias, because it is linear in the dents.
 
     Args:
-        sums, reach, time_ratio: as for `quantile_estimate`.
+        sums: of the dents of each batch of replicas.
+        reach: share of the target that a ball can touch.
+        time_ratio: treatment time over the simulated time of one replica.
     """
     total, replicas = sums.share.sum(axis=0), sums.replicas
     of_one_dent = float(exposure_from_density(reach.share * time_ratio))  # a dent as its window
@@ -203,7 +215,7 @@ def mean_exposure(sums: DentSums, reach: Reach, time_ratio: float) -> Estimate:
 
 
 def in_order(low: Estimate, high: Estimate, name: str) -> dict[str, Estimate]:
-    """The 5th and 95th percentile of a figure, by name, in ascending order.
+    """Return the 5th and 95th percentile of a figure, by name, with the 5th not above the 95th.
 
     The corrections may exchange the percentiles of an even surface. Then both are their middle.
 
@@ -220,12 +232,12 @@ def in_order(low: Estimate, high: Estimate, name: str) -> dict[str, Estimate]:
 
 
 class DensityRoots(NamedTuple):
-    """Roots of the dent density in windows, per replica.
+    """Figures of the square roots of dent densities in windows, per replica.
 
     Attributes:
         at_share: root that a share of the windows do not exceed.
-        middle: mean.
-        over_target: variance over the windows.
+        middle: mean root.
+        over_target: variance of the roots over the windows.
         counting: part of the variance that comes from counting.
     """
 
@@ -235,7 +247,8 @@ class DensityRoots(NamedTuple):
     counting: float
 
     def density(self, more: float = 0.0) -> float:
-        """The density that the share of the windows do not exceed, with counting taken away.
+        """Return the dent density that a share of the windows do not exceed, without the scatter of
+        counting.
 
         Args:
             more: variance to add to the remaining variance.
@@ -248,11 +261,13 @@ class DensityRoots(NamedTuple):
 
 
 def _density_roots(shares: np.ndarray, replicas: np.ndarray, share: float) -> DensityRoots:
-    """Roots of the dent density and their variances.
+    """Return a quantile, the mean and the variances of the square roots of dent densities in
+    windows.
 
     Args:
-        shares: sums of w of each batch in each window, (g, p).
-        replicas: in each batch, (g,).
+        shares: sums of the dents' shares of each window, by batch, (g, p).
+        replicas: number of replicas in each batch, (g,).
+        share: share of the windows that do not exceed the quantile.
     """
     batches, total = len(shares), shares.sum(axis=0)
     root = np.sqrt(total / replicas.sum())
@@ -268,15 +283,17 @@ def _density_roots(shares: np.ndarray, replicas: np.ndarray, share: float) -> De
 def time_to_98(
     p05: Estimate, sums: DentSums, reach: Reach, time_ratio: float, seconds: float
 ) -> Estimate:
-    """Time [s] until the 5th percentile of coverage is FULL_COVERAGE.
+    """Estimate the time [s] until 95 % of the target's area is 98 % covered.
 
     A coverage near 1 hardly changes with twice as many dents. So the time comes from the coverage
     after a shorter part of the treatment, which leaves more bare.
 
     Args:
         p05: 5th percentile of the coverage after the treatment.
-        sums, reach, time_ratio: as for `quantile_estimate`.
-        seconds: of the treatment.
+        sums: of the dents of each batch of replicas.
+        reach: share of the target that a ball can touch.
+        time_ratio: treatment time over the simulated time of one replica.
+        seconds: treatment time [s].
     """
     part, may_be_bare = 1.0, abs(reach.beyond(1.0 - P05)) < CERTAIN
     while (p05.high if may_be_bare else p05.value) > NEARLY_FULL and part > SHORTEST:
@@ -286,7 +303,7 @@ def time_to_98(
 
 
 def time_to_98_estimate(p05: Estimate, seconds: float) -> Estimate:
-    """Time [s] until the 5th percentile of coverage is FULL_COVERAGE, by Avrami's equation.
+    """Estimate the time [s] until 95 % of the target's area is 98 % covered, by Avrami's equation.
 
     The time is steep where little is covered, so the longer side of its interval serves for both.
 

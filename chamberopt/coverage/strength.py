@@ -39,7 +39,8 @@ HALVINGS = 12
 
 
 def ball_diameter(hits: Hits, density: float) -> np.ndarray:
-    """Diameter [m] of the ball of each impact, (k,), from its energy, or 0 for a ball at rest.
+    """Return the diameter [m] of the ball of each impact, (k,), from its energy, or 0 for a ball at
+    rest.
 
     Args:
         density: of the balls [kg/m³].
@@ -50,7 +51,8 @@ def ball_diameter(hits: Hits, density: float) -> np.ndarray:
 
 
 def strip_dents(hits: Hits, density: float, strip: PartMaterial) -> tuple[np.ndarray, np.ndarray]:
-    """Diameter [m] of the dent of each impact on a strip, (k,), and its strength s [m], (k,).
+    """Return the diameter [m] of the dent that each impact would leave on an Almen strip, (k,), and
+    the strength of the impact, dent diameter² over ball diameter [m], (k,).
 
     Both are 0 if the impact leaves no dent.
 
@@ -63,12 +65,13 @@ def strip_dents(hits: Hits, density: float, strip: PartMaterial) -> tuple[np.nda
 
 
 def area_of_dent(diameter: np.ndarray) -> np.ndarray:
-    """Area [m²] of dents of these diameters [m]."""
+    """Return the area [m²] of dents of these diameters [m]."""
     return np.asarray(np.pi / 4.0 * diameter**2)
 
 
 def levels(values: np.ndarray, highest: float) -> np.ndarray:
-    """The level of each value, from 0 to LEVELS - 1.
+    """Return for each value which of LEVELS equal steps from 0 to `highest` it is in, from 0 to
+    LEVELS - 1.
 
     >>> levels(np.array([0.0, 0.5, 1.0]), highest=1.0)
     array([ 0, 16, 31])
@@ -79,7 +82,7 @@ def levels(values: np.ndarray, highest: float) -> np.ndarray:
 def strength_histogram(
     windows: Windows, area: np.ndarray, contacts: Places, dent: np.ndarray, level: np.ndarray
 ) -> np.ndarray:
-    """Dented area over area of each window, by level of strength, (p, LEVELS).
+    """Return the dented area over the area of each window, by level of strength, (p, LEVELS).
 
     Args:
         area: of the windows [m²], (p,).
@@ -96,7 +99,9 @@ def strength_histogram(
 
 
 def saturated_strength(histogram: np.ndarray, highest: float) -> tuple[np.ndarray, np.ndarray]:
-    """S [m] and T [time of the dents] of each window, (p,), or 0 in a window without dents.
+    """Return the peening strength [m] and the saturation time of each window, (p,) each.
+
+    Both are 0 in a window without dents. The unit of time is the time in which the dents fell.
 
     Args:
         histogram: dented area over area of each window by level, (p, LEVELS).
@@ -108,7 +113,12 @@ def saturated_strength(histogram: np.ndarray, highest: float) -> tuple[np.ndarra
 
 
 def saturation_time(rate: np.ndarray) -> np.ndarray:
-    """Saturation time T (p,), from the rates of stronger dents (p, n), in units of their time."""
+    """Return the saturation time of each window, (p,): the last time after which as much time again
+    adds 10 % of strength.
+
+    `rate` (p, n) holds the rates of dents stronger than each level. The unit of time is the time in
+    which the dents fell.
+    """
     # T lies between these times. For equal dents it is ln 10 over their rate.
     top = rate.max(axis=1)
     some = top > 0.0
@@ -123,7 +133,10 @@ def saturation_time(rate: np.ndarray) -> np.ndarray:
 
 
 def time_near(rate: np.ndarray, time: np.ndarray) -> np.ndarray:
-    """Saturation time T (p,) if it is known to be near `time` (p,)."""
+    """Return the saturation time of each window, (p,), if it is known to be near `time` (p,).
+
+    `rate` holds the rates of dents stronger than each level.
+    """
     for _ in range(NEWTON_STEPS):
         gain, slope = _gain(rate, time)
         step = np.divide(gain, slope, out=np.zeros_like(gain), where=slope < 0.0)
@@ -132,13 +145,19 @@ def time_near(rate: np.ndarray, time: np.ndarray) -> np.ndarray:
 
 
 def dent_rates(histogram: np.ndarray) -> np.ndarray:
-    """Rate of dents stronger than the middle of each level, (p, LEVELS)."""
+    """Return the rate of dents stronger than the middle of each level, in each window, (p, LEVELS).
+
+    It comes from the dented area over the window's area by level. The unit of time is the time in
+    which the dents fell.
+    """
     down = np.cumsum(histogram[:, ::-1], axis=1)[:, ::-1]
     return np.asarray(down - 0.5 * histogram)
 
 
 def _gain(rate: np.ndarray, time: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """h(2 T) - 1.1 h(T), in levels, and its slope over T."""
+    """Return h(2 T) - 1.1 h(T) for the strength h after a time T, in levels, and its slope over T.
+    It is 0 at the saturation time.
+    """
     left = np.exp(-rate * time[:, None])
     gain = (1.0 - left**2).sum(axis=1) - SATURATED * (1.0 - left).sum(axis=1)
     slope = (rate * (2.0 * left**2 - SATURATED * left)).sum(axis=1)
@@ -146,5 +165,7 @@ def _gain(rate: np.ndarray, time: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def strength_at(rate: np.ndarray, time: np.ndarray, highest: float) -> np.ndarray:
-    """Strength h [m] of each window (p,) after a time (p,) in units of the time of the dents."""
+    """Return the strength [m] of each window, (p,), after a peening time (p,). The unit of time is
+    the time in which the dents fell.
+    """
     return np.asarray(-np.expm1(-rate * time[:, None]).sum(axis=1) * highest / LEVELS)

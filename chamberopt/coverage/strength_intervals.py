@@ -58,7 +58,7 @@ MICROMETRES = 1e6
 
 
 class StrengthHistograms(NamedTuple):
-    """Dents in windows by level of strength.
+    """Dented areas in windows, by batch of replicas and level of strength.
 
     Attributes:
         parts: dented area over area, by batch, window and level, (g, p, LEVELS).
@@ -72,12 +72,12 @@ class StrengthHistograms(NamedTuple):
 
 
 class Saturated(NamedTuple):
-    """Strength and saturation time from some batches.
+    """Peening strength and saturation time of windows, from the dents of some batches of replicas.
 
     Attributes:
-        strength: S of each window [m], (p,).
-        time: T of each window, in units of the time of these batches, (p,).
-        curve_time: T of the mean of h over all windows [s].
+        strength: peening strength S of each window [m], (p,).
+        time: saturation time T of each window, in units of the time of these batches, (p,).
+        curve_time: saturation time of the mean strength of all windows [s].
     """
 
     strength: np.ndarray
@@ -92,7 +92,7 @@ def strength_estimates(
     density: float,
     strip: PartMaterial,
 ) -> dict[str, Estimate]:
-    """Estimates of the strength metrics by name, over the target's reachable surface.
+    """Estimate the metrics of peening strength, by name, over the target's reachable surface.
 
     Args:
         batches: impacts of the replicas of each batch, in the sector of the windows.
@@ -100,11 +100,11 @@ def strength_estimates(
         density: of the balls [kg/m³].
         strip: the metal of a strip.
     Returns:
-        strength_um: mean of S.
+        strength_um: mean of the peening strength S.
         strength_p05_um, strength_p95_um: S that 95 % and 5 % of the area exceed.
         intensity_uniformity: 1 - (standard deviation of S) / (mean of S) over the whole target,
             where places out of reach have S = 0.
-        saturation_time_s: T of the mean of h.
+        saturation_time_s: saturation time of the mean strength of all windows.
     """
     found = level_histograms(
         field, batches, seconds, lambda hits: strip_dents(hits, density, strip)
@@ -130,10 +130,11 @@ def level_histograms(
     seconds: float,
     dents_of: Callable[[Hits], tuple[np.ndarray, np.ndarray]],
 ) -> StrengthHistograms:
-    """Histograms of the dents in WINDOWS windows of the target.
+    """Return the dented areas by level of strength, in at most WINDOWS windows of the target.
 
     Args:
-        batches, seconds: as for `strength_estimates`.
+        batches: impacts of the replicas of each batch, in the sector of the windows.
+        seconds: simulated time of each replica.
         dents_of: function of impacts that gives diameter and strength [m] of each dent, (k,) each.
             Both are 0 for an impact without a dent.
     """
@@ -157,7 +158,7 @@ def level_histograms(
 
 
 def estimates_of(found: StrengthHistograms, reach: Reach) -> dict[str, Estimate]:
-    """The estimates of the strength metrics from histograms."""
+    """Return estimates of the metrics of peening strength, by name, from dented areas by level."""
     reachable = reach.share
     batches, total = len(found.parts), found.parts.sum(axis=0)
     whole = _saturated(found, np.arange(batches))
@@ -220,7 +221,7 @@ def estimates_of(found: StrengthHistograms, reach: Reach) -> dict[str, Estimate]
 
 
 def _saturated(found: StrengthHistograms, some: np.ndarray) -> Saturated:
-    """S and T from some batches."""
+    """Return strength and saturation time of the windows, from the batches with indices `some`."""
     rate = dent_rates(found.parts[some].sum(axis=0))
     time = saturation_time(rate)
     of_curve = float(saturation_time(rate.reshape(1, -1))[0])
@@ -231,7 +232,9 @@ def _saturated(found: StrengthHistograms, some: np.ndarray) -> Saturated:
 def _without(
     found: StrengthHistograms, total: np.ndarray, whole: Saturated, batch: int
 ) -> Saturated:
-    """S and T without one batch, searched near the values of all batches.
+    """Return strength and saturation time of the windows without the dents of one batch.
+
+    They are searched near the values of all batches.
 
     Args:
         total: sum of the histograms of all batches, (p, LEVELS).
@@ -246,7 +249,9 @@ def _without(
 def _pairs(
     found: StrengthHistograms, size: int, rng: np.random.Generator
 ) -> list[tuple[Saturated, Saturated]]:
-    """SPLITS pairs of disjoint sets of `size` batches."""
+    """Return SPLITS pairs of strength and saturation time, from two random sets of `size` batches
+    each that share no batch.
+    """
     pairs = []
     for _ in range(SPLITS):
         order = rng.permutation(len(found.parts))
@@ -255,7 +260,7 @@ def _pairs(
 
 
 def _figures(found: Saturated, spread: float) -> dict[str, float]:
-    """All figures from some batches, except the evenness.
+    """Return the metrics of peening strength from some batches, by name, except the evenness.
 
     Args:
         spread: true mean square of S over its squared mean, on the reachable surface.
@@ -282,7 +287,7 @@ def _uniformity_estimate(
     whole: Saturated,
     reach: Reach,
 ) -> Estimate:
-    """The evenness over the whole target.
+    """Estimate the evenness of strength over the whole target, 1 - standard deviation / mean.
 
     Args:
         spreads: mean square of S over its squared mean, corrected for few dents, (SPLITS,).
@@ -314,22 +319,28 @@ def _uniformity_estimate(
 
 
 def _spread(one: np.ndarray, two: np.ndarray) -> float:
-    """Mean product of two estimates of S, (p,) each, over the product of their means."""
+    """Return the mean over the windows of the product of two estimates of strength, (p,) each, over
+    the product of their means.
+    """
     means = float(one.mean() * two.mean())
     return float((one * two).mean()) / means if means > 0.0 else 2.0
 
 
 def _uniformity(spread: float, reachable: float) -> float:
-    """The uniformity over the whole target. Places out of reach have S = 0."""
+    """Return the evenness of strength over the whole target, 1 - standard deviation / mean.
+
+    `spread` is the mean square of strength over its squared mean, on the reachable surface. Places
+    out of reach have no strength.
+    """
     return 1.0 - math.sqrt(max(0.0, spread / reachable - 1.0))
 
 
 def _relative_variance(squares: np.ndarray, means: np.ndarray, reachable: float) -> float:
-    """Variance of S over the target, divided by its squared mean.
+    """Return the variance of strength over the target, divided by its squared mean.
 
     Args:
-        squares: means over the windows of products of two batches, (g, g).
-        means: mean over the windows of each batch, (g,).
+        squares: means over the windows of products of two batches' pseudo-values, (g, g).
+        means: mean over the windows of each batch's pseudo-values, (g,).
     """
     batches, mean = len(means), float(means.mean())
     if mean <= 0.0:

@@ -1,1 +1,1 @@
-"""Coverage as a field over the target: the covered share of windows of a stated area, the gauge."""
+"""Measure coverage over the target: the covered share of windows of a stated area, the gauge."""

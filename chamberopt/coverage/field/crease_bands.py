@@ -1,4 +1,4 @@
-"""Windows along creases: the points that dents on a crease reach, and the length of each window."""
+"""Measuring windows along creases (sharp convex edges), where dents cover only a narrow band."""
 
 from __future__ import annotations
 
@@ -21,7 +21,9 @@ PIECES_PER_WINDOW = 32  # pieces that measure the length of a crease in a window
 
 
 class CreasePieces(NamedTuple):
-    """Short pieces of creases that a ball can touch: places, edges and lengths."""
+    """Short pieces of creases that a ball can touch: middles [m], indices of edges, and lengths
+    [m].
+    """
 
     place: np.ndarray
     edge: np.ndarray
@@ -52,7 +54,13 @@ def crease_pieces(
 
 
 def on_lines(creases: Creases, place: np.ndarray, edge: np.ndarray) -> tuple[Places, np.ndarray]:
-    """Places (k, 3) [m] on edges (k,) as places on the lines of all divisions, and their rows."""
+    """Return contact points on crease edges as places on the crease lines to which the edges
+    belong.
+
+    An edge may be on another line in each division of the part into faces, so a point comes once
+    for each. `place` (k, 3) [m] and `edge` (k,) give the points. The second result is the row of
+    each place in them.
+    """
     from chamberopt.coverage.field.windows import Places
 
     division, row = np.nonzero(creases.line[:, edge] >= 0)
@@ -61,13 +69,13 @@ def on_lines(creases: Creases, place: np.ndarray, edge: np.ndarray) -> tuple[Pla
 
 
 class CreaseBand(NamedTuple):
-    """Points near creases, with a row for each point and each line near it.
+    """Middles of windows near creases, with a row for each middle and each crease line near it.
 
     Attributes:
         point: index of the point, shape (b,).
         height: distance from the crease [m], shape (b,).
         length: of the crease in the window round the point's foot on it [m], shape (b,).
-        windows: along the lines, round the feet.
+        windows: along the lines, round the feet, the nearest places on the lines.
     """
 
     point: np.ndarray
@@ -79,7 +87,10 @@ class CreaseBand(NamedTuple):
 def find_band(
     windows: Windows, creases: Creases, pieces: CreasePieces, dent_radius: float
 ) -> CreaseBand | None:
-    """The points that dents on creases reach, for dents of radii up to dent_radius [m]."""
+    """Return the middles of windows that dents on creases reach, or None if there are none.
+
+    The dents have radii up to dent_radius [m].
+    """
     from scipy.spatial import cKDTree
 
     from chamberopt.coverage.field.windows import Places, Windows

@@ -1,6 +1,6 @@
-r"""A mesh to draw the field on: fine where the field changes, coarse where it does not.
+r"""Build a mesh to draw coverage on: fine where coverage changes, coarse where it does not.
 
-The part's triangles are divided round by round. An edge is split at its middle where the field
+The part's triangles are divided round by round. An edge is split at its middle where coverage
 changes along it, and always where it is longer than MAX_EDGE. A triangle is divided by the number
 of its split edges, so that neighbours always meet at whole edges:
 
@@ -54,7 +54,7 @@ class DisplayMesh(NamedTuple):
 
     @property
     def places(self) -> Places:
-        """The places at which fields are read for the vertices.
+        """The vertices with normals and smooth faces, as places at which coverage is computed.
 
         Dents on creases make a band as narrow as a dent. Fields at vertices should leave the band
         out, because the drawing would smear it over whole triangles.
@@ -64,7 +64,7 @@ class DisplayMesh(NamedTuple):
 
 @dataclass(frozen=True)
 class DisplayField:
-    """Fields at the vertices of a display mesh."""
+    """A mesh to draw, and fields such as coverage at its vertices."""
 
     mesh: DisplayMesh
     fields: dict[str, np.ndarray]  # by name, (v,) each
@@ -79,7 +79,7 @@ def display_mesh(
     gauge: float,
     coverage: Values,
 ) -> DisplayMesh:
-    """Divide a part's triangles until the field can be drawn by interpolation between vertices.
+    """Divide a part's triangles until coverage can be drawn by interpolation between vertices.
 
     Args:
         vertices: [m], shape (n, 3).
@@ -133,7 +133,9 @@ def display_mesh(
 def _with_vertices_of_faces(
     vertices: np.ndarray, triangles: np.ndarray, normals: np.ndarray, face: np.ndarray
 ) -> tuple[DisplayMesh, np.ndarray]:
-    """The part with separate vertices for each face, and the part's vertex behind each vertex."""
+    """Return the part as a mesh with separate vertices for each smooth face, and the index of the
+    part's vertex behind each vertex.
+    """
     faces = int(face.max()) + 1
     own, corner = np.unique(triangles * np.int64(faces) + face[:, None], return_inverse=True)
     corner = corner.reshape(-1, 3)
@@ -149,14 +151,18 @@ def _with_vertices_of_faces(
 
 
 def _edges_of(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Edges (e, 2), the lower vertex first, and the edge on each side of each triangle, (c, 3)."""
+    """Return the edges of triangles (e, 2), the lower vertex first, and the index of the edge on
+    each side of each triangle, (c, 3).
+    """
     sides = np.sort(sides_of(triangles), axis=1).astype(np.int64)
     key, of_side = np.unique((sides[:, 0] << 32) + sides[:, 1], return_inverse=True)
     return np.column_stack([key >> 32, key & 0xFFFFFFFF]), of_side.reshape(-1, 3)
 
 
 def _same_edge(ends: np.ndarray) -> np.ndarray:
-    """A number for each edge between points (e, 2), equal for equal pairs of points, shape (e,)."""
+    """Return a number for each edge, (e,). Edges between the same two points `ends` (e, 2) have
+    equal numbers.
+    """
     low, high = np.sort(ends, axis=1).astype(np.int64).T
     return np.unique((low << 32) + high, return_inverse=True)[1].reshape(-1)
 
@@ -164,7 +170,10 @@ def _same_edge(ends: np.ndarray) -> np.ndarray:
 def _spread_split(
     split: np.ndarray, ends: np.ndarray, of_side: np.ndarray, length: np.ndarray
 ) -> np.ndarray:
-    """Also split the same edges of neighbouring faces, and long edges of divided triangles.
+    """Return the marks of edges to split, with more edges marked.
+
+    These are the same edges of neighbouring faces, and the longest edge of each triangle that has a
+    split edge.
 
     Args:
         split: marks the edges to split, shape (e,).
@@ -183,7 +192,7 @@ def _spread_split(
 
 
 def _middles(mesh: DisplayMesh, edges: np.ndarray) -> DisplayMesh:
-    """New vertices in the middles of edges (e, 2), as a mesh without triangles."""
+    """Return new vertices in the middles of edges (e, 2), as a mesh without triangles."""
     a, b = edges.T
     return DisplayMesh(
         vertices=0.5 * (mesh.vertices[a] + mesh.vertices[b]),
@@ -201,7 +210,7 @@ def _joined(one: Places, other: Places) -> Places:
 def _divide(
     mesh: DisplayMesh, edges: np.ndarray, of_side: np.ndarray, split: np.ndarray
 ) -> DisplayMesh:
-    """Divide the triangles with split edges, by the number of their split edges."""
+    """Return the mesh with each triangle divided at its split edges, into two to four triangles."""
     added = _middles(mesh, edges[split])
     middle = np.full(len(edges), -1)
     middle[split] = len(mesh.vertices) + np.arange(len(added.vertices))

@@ -1,7 +1,7 @@
-"""Memory of an evaluation, estimated from its design before it begins.
+"""Estimate the memory that the evaluation of a design takes, before it begins.
 
 Pairs of dents and windows are not included, because they are kept only while there is room for them
-(common/parallel/memory.py). The bytes were measured, see docs/trust.md. The impacts are the impacts
+(common/memory.py). The bytes were measured, see docs/trust.md. The impacts are the impacts
 of a gas of balls as fast as the sonotrode at its peak: n V A / 4 on an area A for n balls a volume.
 This is 0.7 to 2.1 times the simulated number.
 """
@@ -30,7 +30,7 @@ OF_IMPACT, OF_LOGGED = 150.0, 100.0  # bytes an impact: kept on the part; logged
 
 
 def evaluation_bytes(design: Design, chamber: Chamber, replicas: int) -> float:
-    """Bytes of one evaluation, beside the bytes of its process."""
+    """Return the estimated memory [bytes] of one evaluation, beside the memory of its process."""
     accuracy, target = design.process.accuracy, chamber.part.target
     fields = 1 + len(design.zones)
     of_points = OF_POINT * (fields - 1) + OF_POINT_AT_WORK
@@ -49,7 +49,8 @@ def evaluation_bytes(design: Design, chamber: Chamber, replicas: int) -> float:
 
 
 def how_many_fit(most: int, each: float, common: float = 0.0) -> int:
-    """The largest number of things, from 1 to `most`, that fit into the allowed memory.
+    """Return the largest number of equal things, from 1 to `most`, that fit into the allowed
+    memory.
 
     Args:
         most: largest number.

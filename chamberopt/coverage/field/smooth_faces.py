@@ -34,7 +34,9 @@ GOLDEN = 0.5 * (5.0**0.5 - 1.0)  # steps of this share of a range spread evenly 
 
 
 class Faces(NamedTuple):
-    """Smooth faces of a part by all divisions that differ, the finest division first.
+    """Smooth faces of a part, by each of several divisions of the part into faces.
+
+    Divisions differ in the angle from which on an edge is sharp. The finest division comes first.
 
     Attributes:
         of_triangle: the face of each triangle by the finest division, shape (m,).
@@ -48,18 +50,20 @@ class Faces(NamedTuple):
     of_angle: np.ndarray
 
     def divisions(self, count: int) -> np.ndarray:
-        """The division seen by each of `count` windows, (count,). All angles serve equally many."""
+        """Return the index of the division that each of `count` windows uses, (count,). All angles
+        serve equally many windows.
+        """
         angle = (DIVISIONS * ((np.arange(count) + 0.5) * GOLDEN % 1.0)).astype(int)
         return np.asarray(self.of_angle[angle])
 
     @property
     def middle(self) -> int:
-        """The division by the angles in the middle of their ranges."""
+        """Index of the division whose sharp angles are in the middle of their ranges."""
         return int(self.of_angle[DIVISIONS // 2])
 
     @property
     def shares(self) -> np.ndarray:
-        """Share of the windows that see each division, shape (d,)."""
+        """Share of the windows that use each division, shape (d,)."""
         return np.bincount(self.of_angle, minlength=len(self.joined)) / DIVISIONS
 
 
@@ -155,7 +159,7 @@ def find_faces(
 
 
 def _joined_faces(pairs: np.ndarray, count: int) -> np.ndarray:
-    """The first of all faces joined to each face by pairs (k, 2), shape (count,)."""
+    """Return for each face the first of all faces that pairs (k, 2) join to it, shape (count,)."""
     piece = connected_pieces(pairs[:, 0], pairs[:, 1], count)[1]
     _, first = np.unique(piece, return_index=True)
     return np.asarray(first[piece])
@@ -164,7 +168,9 @@ def _joined_faces(pairs: np.ndarray, count: int) -> np.ndarray:
 def _links(
     vertices: np.ndarray, start: np.ndarray, end: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Pairs of edges that meet (k, 2), and the turn of the way over both edges [degrees], (k,)."""
+    """Return the pairs of edges that meet at a vertex, (k, 2), and the angle by which the way over
+    both edges turns [degrees], (k,).
+    """
     edges = len(start)
     edge, vertex = np.tile(np.arange(edges), 2), np.concatenate([start, end])
     along = unit_vectors(vertices[end] - vertices[start])

@@ -77,23 +77,26 @@ def spread_within(
 def _within(
     vertices: np.ndarray, triangles: np.ndarray, triangle: np.ndarray, number: np.ndarray
 ) -> SurfacePoints:
-    """Points on triangles (p,), by their numbers (p,) in the sequence of the plastic number."""
+    """Return points on triangles (p,), each at the place that its number (p,) has in an evenly
+    spread sequence, the additive recurrence of the plastic number.
+    """
     corners = vertices[triangles[triangle]]
     place = on_triangles(corners, *_in_square(number))
     return SurfacePoints(place, unit_normals(corners), triangle)
 
 
 def within_each(corners: np.ndarray, count: int) -> np.ndarray:
-    """Places of `count` points [m] on each triangle (n, 3, c), shape (count, n, c).
+    """Return the places [m] of `count` points on each triangle (n, 3, c), shape (count, n, c).
 
-    Each triangle takes the next numbers of the sequence. So a spot that the points miss on one of
-    many alike triangles is not missed on all of them.
+    Each triangle takes the next numbers of an evenly spread sequence. So a spot that the points
+    miss on one of many alike triangles is not missed on all of them.
     """
     return on_triangles(corners, *_in_square(np.arange(count * len(corners)).reshape(-1, count).T))
 
 
 def _in_square(number: np.ndarray) -> Iterator[np.ndarray]:
-    """Coordinates u and v of points by their numbers in the sequence of the plastic number.
+    """Return the coordinates u and v, from 0 to 1, of points with these numbers in an evenly spread
+    sequence, the additive recurrence of the plastic number.
 
     The first point comes to the middle of a triangle.
     """
@@ -101,7 +104,9 @@ def _in_square(number: np.ndarray) -> Iterator[np.ndarray]:
 
 
 def morton(places: np.ndarray) -> np.ndarray:
-    """Position of places (n, 3) along a Morton curve, which interleaves the bits of coordinates."""
+    """Return the position of each place (n, 3) along a Morton curve, on which near places mostly
+    follow one another. It interleaves the bits of the coordinates.
+    """
     low = places.min(axis=0)
     cells = ((places - low) / max(float(np.ptp(places, axis=0).max()), 1e-12) * 1023).astype(int)
     code = np.zeros(len(places), dtype=np.int64)
@@ -134,15 +139,18 @@ def ball_fits(
 
 
 def sparse_points(values: np.ndarray) -> list[np.ndarray]:
-    """Ten subsets, each with every tenth of the points (p, ...) and as even over the target."""
+    """Return ten subsets of the values at points (p, ...): each has every tenth point, spread as
+    evenly over the target as all points.
+    """
     return [values[start::SPARSE] for start in range(SPARSE)]
 
 
 def sampling_errors(of_some: np.ndarray) -> list[float]:
-    """Signed standard errors by the choice of points, from figures of `sparse_points`.
+    """Return the standard errors, with signs, that a figure has by the choice of its points.
 
-    Figures of the same points move together, so their common error drops out of their difference.
-    The standard error is the root of the sum of the squares.
+    `of_some` holds the figure from each subset of `sparse_points`. Figures of the same points move
+    together, so their common error drops out of their difference. The standard error is the root of
+    the sum of the squares.
     """
     count = len(of_some)
     errors: list[float] = ((of_some - of_some.mean()) / math.sqrt(count * (count - 1))).tolist()
@@ -154,7 +162,7 @@ CERTAIN = 3.0  # standard errors from which the reach surely is more or less tha
 
 
 class Reach(NamedTuple):
-    """The part of the target that a ball can touch.
+    """The share of the target that a ball can touch, and its error.
 
     Attributes:
         share: of the target's area.
@@ -166,17 +174,20 @@ class Reach(NamedTuple):
 
     @property
     def largest(self) -> float:
-        """The largest share that the reach may be."""
+        """The largest share of the target that a ball may be able to touch, within the error."""
         return min(1.0, self.share + CERTAIN * self.error)
 
     def beyond(self, share: float) -> float:
-        """Standard errors from a share up to the reach. It is negative if the reach is smaller."""
+        """Return by how many standard errors the touchable share is above a given share of the
+        target. It is negative if the touchable share is smaller.
+        """
         more = self.share - share
         return more / self.error if self.error else math.copysign(math.inf, more or -1.0)
 
 
 def reach_from(fits: np.ndarray) -> Reach:
-    """The reach, from marks (p,) of points where a ball fits.
+    """Return the share of the target that a ball can touch, from marks (p,) of points where a ball
+    fits.
 
     With a probability of 5 %, a ball fits at all points although a share of 3 / p is out of reach:
     the rule of three (J. A. Hanley and A. Lippman-Hand, J. Am. Med. Assoc. 249 (1983) 1743).

@@ -1,4 +1,4 @@
-"""Turns about the chamber's axis that change nothing, and the joint evaluation of alike places.
+"""Find the turns about the chamber's axis that change nothing, and count alike places together.
 
 Notation
     n   number of turns by 2 pi / n that leave cavity, target and sonotrode as they are  (copies)
@@ -34,7 +34,7 @@ FEW = 40  # triangles that are tried before all triangles
 
 @dataclass(frozen=True)
 class Symmetry:
-    """A cavity that looks the same from several sides."""
+    """A cavity that looks the same after a turn about its axis by 1 / `copies` of a full turn."""
 
     copies: int
     mesh: TriangleMesh  # of the chamber
@@ -46,7 +46,8 @@ class Symmetry:
         return 2.0 * np.pi / self.copies
 
     def into_sector(self, place: np.ndarray, margin: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
-        """Turns that bring places (k, 3) [m] into the sector round the x axis.
+        """Return the turns that bring places (k, 3) [m] into the sector of the cavity round the x
+        axis.
 
         Args:
             margin: distance from the sector [m] up to which a place counts as there too.
@@ -68,7 +69,8 @@ class Symmetry:
         return np.concatenate(rows), (np.concatenate(turns) % self.copies).astype(int)
 
     def on_each(self, face: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """A place in the cavity on each smooth face, on the face's largest triangle there.
+        """Return a place on each smooth face, in the middle of its largest triangle that bounds the
+        cavity.
 
         Args:
             face: of each triangle of the part, (m,).
@@ -84,11 +86,14 @@ class Symmetry:
         return self.mesh.corners[chosen].mean(axis=1), self.source[chosen]
 
     def turned(self, place: np.ndarray, turn: np.ndarray) -> np.ndarray:
-        """Places or directions (k, 3) after turns by `turn` steps, (k,)."""
+        """Return places or directions (k, 3) turned about the axis by `turn` (k,) times the
+        smallest turn.
+        """
         return turn_about_axis(place, turn * self.step)
 
     def triangles_at(self, place: np.ndarray, reach: float = 10.0 * TOLERANCE) -> np.ndarray:
-        """Part triangle at each place (k, 3), (k,), or -1 off the part's exposed surface.
+        """Return the index of the part triangle at each place (k, 3), (k,), or -1 off the part's
+        exposed surface.
 
         Args:
             reach: largest distance of the triangle from the place [m].
@@ -100,12 +105,16 @@ class Symmetry:
 
 
 def _off(angle: np.ndarray, radius: np.ndarray) -> np.ndarray:
-    """Distance [m] from a half plane through the axis, at an angle to it and a radius, (k,)."""
+    """Return the distance [m] of points from a half plane through the axis, (k,).
+
+    The points are at this angle to the half plane [rad] and at this radius from the axis [m].
+    """
     return np.asarray(radius * np.sin(np.clip(angle, 0.0, 0.5 * np.pi)))
 
 
 def find_symmetry(chamber: Chamber, mesh: TriangleMesh) -> Symmetry | None:
-    """The largest number of turns that leave a chamber as it is, or None without such turns.
+    """Return the symmetry by the smallest turn about the axis that leaves a chamber as it is, or
+    None if there is no such turn.
 
     Turned corners must lie on the surface again. Turned places just inside the corners of a
     triangle must lie on a triangle with the same tag, and in the target or outside it as before.
@@ -134,7 +143,9 @@ def find_symmetry(chamber: Chamber, mesh: TriangleMesh) -> Symmetry | None:
 
 
 def turn_about_axis(place: np.ndarray, angle: float | np.ndarray) -> np.ndarray:
-    """Places (k, 3) turned about the z axis by angles [rad], (k,) or a number."""
+    """Return places (k, 3) turned about the z axis by angles [rad], one for each place (k,) or one
+    for all.
+    """
     cosine, sine = np.cos(angle), np.sin(angle)
     x, y, z = place.T.astype(float)
     return np.stack([cosine * x - sine * y, sine * x + cosine * y, z], axis=1)

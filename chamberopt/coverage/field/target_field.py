@@ -1,4 +1,4 @@
-"""The target seen through windows, and the area of each window that the shot can touch.
+"""Place measuring windows on the target, and find the area of each that the shot can touch.
 
 Notation
     p     middle of a window                                           (points, (p,))
@@ -69,7 +69,9 @@ class WindowSetting(NamedTuple):
 
 @dataclass(frozen=True)
 class Gauge:
-    """The windows of one size round points, each together with its alike windows by symmetry."""
+    """Measuring windows of one size round points. Each also stands for all windows that symmetry
+    makes alike.
+    """
 
     windows: Windows
     area: np.ndarray  # touchable area of each window and its alike windows [m²], (p,)
@@ -78,7 +80,7 @@ class Gauge:
 
 @dataclass(frozen=True)
 class TargetField:
-    """A part in its chamber, ready for a view through windows."""
+    """A part in its chamber, with all that is needed to measure coverage in windows on it."""
 
     setting: WindowSetting
     faces: Faces
@@ -95,12 +97,12 @@ class TargetField:
 
     @property
     def face(self) -> np.ndarray:
-        """Smooth face of each part triangle by the finest division, (m,)."""
+        """Index of the smooth face of each part triangle, (m,), by the division into most faces."""
         return self.faces.of_triangle
 
     @property
     def drawn_face(self) -> np.ndarray:
-        """Smooth face of each part triangle by the division of pictures, (m,)."""
+        """Index of the smooth face of each part triangle, (m,), by the division for pictures."""
         return np.asarray(self.faces.joined[self.faces.middle][self.face])
 
     @property
@@ -110,7 +112,7 @@ class TargetField:
 
     @property
     def alike(self) -> int:
-        """Number of alike places of the target, 1 without symmetry."""
+        """Number of places of the target that symmetry makes alike; 1 without symmetry."""
         return self.symmetry.copies if self.symmetry else 1
 
     @property
@@ -132,16 +134,19 @@ class TargetField:
 
     @cached_property
     def gauge(self) -> Gauge:
-        """Windows of the gauge round points of the target."""
+        """Windows of the size that the design sets (gauge_mm2), round points of the target."""
         return self._gauge_of(self.setting.points, self.radius)
 
     @cached_property
     def wide(self) -> Gauge:
-        """Windows of twice the radius round points of the target."""
+        """Windows of twice the radius that the design sets, round points of the target."""
         return self._gauge_of(int(OF_WIDE * self.setting.points), 2.0 * self.radius)
 
     def _gauge_of(self, count: int, radius: float) -> Gauge:
-        """Windows of a radius [m] round at most `count` points, each with a division."""
+        """Return windows of a radius [m] round at most `count` points of the target.
+
+        All divisions of the part into smooth faces take turns among the windows.
+        """
         gauge = math.pi * radius**2
         most = max(MOST_AREA, MOST_OVERLAP * self.target_area) / gauge
         points = self.some_points(min(count, max(int(most), FEWEST_WINDOWS)))
@@ -150,7 +155,7 @@ class TargetField:
     def gauge_round(
         self, points: Places, radius: float, division: np.ndarray | None = None
     ) -> Gauge:
-        """Windows of a radius [m] round points of the part.
+        """Return windows of a radius [m] round given points of the part.
 
         Args:
             division: of the part into faces, for each window; None for the division of pictures.
@@ -169,13 +174,14 @@ class TargetField:
         return Gauge(windows, area, band)
 
     def some_points(self, count: int) -> Places:
-        """At most `count` points that a ball can touch, spread evenly over the target."""
+        """Return at most `count` points that a ball can touch, spread evenly over the target."""
         there = len(self.touched.place)
         rows = np.linspace(0, there - 1, min(count, there)).round().astype(int)
         return self.touched.select(rows)
 
     def in_sector(self, hits: Hits) -> Hits:
-        """The impacts in the sector of the windows; all impacts without symmetry.
+        """Return the impacts turned into the symmetry sector of the windows. Without symmetry,
+        return all impacts as they are.
 
         Impacts outside the cavity, which no simulation makes, stay in their place.
         """
@@ -203,7 +209,9 @@ class TargetField:
         return Places(place, normal, self._faces_after(self.symmetry)[turn, points.face])
 
     def _faces_after(self, symmetry: Symmetry) -> np.ndarray:
-        """The smooth face that each face becomes by each number of turns, (n, faces)."""
+        """Return the smooth face that each smooth face becomes by each number of turns of the
+        symmetry, (n, faces).
+        """
         after = np.tile(np.arange(int(self.face.max()) + 1), (symmetry.copies, 1))
         middles, triangles = symmetry.on_each(self.face)
         faces = self.face[triangles]
@@ -214,11 +222,11 @@ class TargetField:
         return after
 
     def sharpness(self, edge: np.ndarray) -> np.ndarray:
-        """Share of the windows that see each edge as a crease, (k,)."""
+        """Return for each edge the share of the windows that treat it as a crease, (k,)."""
         return np.asarray((self.faces.shares @ (self.creases.line >= 0))[edge])
 
     def places_of(self, hits: Hits, rows: np.ndarray) -> Places:
-        """The places of the impacts in the given rows."""
+        """Return positions, normals and smooth faces of the impacts in the given rows."""
         from chamberopt.coverage.field.windows import Places
 
         triangle = hits.triangle[rows]
@@ -266,7 +274,7 @@ def require_touchable_zones(chamber: Chamber, mesh: TriangleMesh, ball: float) -
 
 
 def find_target_field(chamber: Chamber, mesh: TriangleMesh, setting: WindowSetting) -> TargetField:
-    """Prepare the field of a chamber's target.
+    """Return a chamber's target with all that is needed to measure coverage in windows on it.
 
     Args:
         mesh: of the chamber.
@@ -302,7 +310,7 @@ def find_target_field(chamber: Chamber, mesh: TriangleMesh, setting: WindowSetti
 
 
 def with_whole_part(field: TargetField, chamber: Chamber, mesh: TriangleMesh) -> TargetField:
-    """The same field extended to the rest of the exposed part, for pictures."""
+    """Return the field extended from the target to the rest of the exposed part, for pictures."""
     from chamberopt.coverage.field.window_areas import joined_pieces, surface_pieces
 
     rest = ~chamber.part.target & (chamber.exposed_area > 0.0)
@@ -321,7 +329,11 @@ def with_whole_part(field: TargetField, chamber: Chamber, mesh: TriangleMesh) ->
 
 
 def _longest_side(setting: WindowSetting, area: float, most: float) -> float:
-    """Side [m] of a surface piece: a window or a ball wide, or longer to limit their number."""
+    """Return the longest side [m] that a piece of the surface may have.
+
+    It is the diameter of a window or of a ball, whichever is less, or longer so that there are at
+    most `most` pieces on the area [m²].
+    """
     size = min(math.sqrt(setting.gauge / math.pi), 0.5 * setting.ball)
     return 2.0 * max(size, math.sqrt(PIECES_PER_WINDOW / math.pi * area / most))
 
@@ -329,7 +341,9 @@ def _longest_side(setting: WindowSetting, area: float, most: float) -> float:
 def _touched(
     chamber: Chamber, mesh: TriangleMesh, area: np.ndarray, face: np.ndarray, setting: WindowSetting
 ) -> tuple[Places, np.ndarray]:
-    """Touchable points of the part, spread by area (m,), and their marks among all points."""
+    """Return the points that a ball can touch, and marks of them among all points that were tried.
+    The points are spread over the part's triangles by their `area` (m,).
+    """
     from chamberopt.coverage.field.windows import Places
 
     part = chamber.part

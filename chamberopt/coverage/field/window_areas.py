@@ -65,7 +65,7 @@ def surface_pieces(
         face: smooth face of each triangle, shape (m,).
         mesh: of the chamber.
         ball_radius: [m].
-        longest: side of a piece [m].
+        longest: longest side that a piece may have [m].
     """
     corners, owner = _halved_until(corners, np.arange(len(corners)), longest)
     middle = corners.mean(axis=1)
@@ -88,7 +88,7 @@ def joined_pieces(one: SurfacePieces, two: SurfacePieces) -> SurfacePieces:
 
 
 def window_areas(windows: Windows, pieces: SurfacePieces) -> np.ndarray:
-    """The touchable area [m²] of each window, (p,)."""
+    """Return the area [m²] of each window that a ball can touch, (p,)."""
     middle = pieces.corners.mean(axis=1)
     size = float(np.linalg.norm(pieces.corners - middle[:, None], axis=2).max(initial=0.0))
     kept = pieces.touched > 0.0
@@ -106,7 +106,11 @@ def window_areas(windows: Windows, pieces: SurfacePieces) -> np.ndarray:
 def _halved_until(
     corners: np.ndarray, owner: np.ndarray, longest: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Halve triangles (m, 3, 6) across their longest sides down to sides of `longest` [m]."""
+    """Halve triangles (m, 3, 6) across their longest sides until no side is longer than `longest`
+    [m].
+
+    Return the smaller triangles, and for each the `owner` of the triangle that it is a piece of.
+    """
     done, owners = [], []
     while len(corners):
         place = corners[..., :3]
@@ -127,7 +131,10 @@ def _halved_until(
 
 
 def _touched_share(places: np.ndarray, mesh: TriangleMesh, ball_radius: float) -> np.ndarray:
-    """Share of the places with normals, (k, n, 6), on each of n triangles where a ball fits."""
+    """Return for each of n triangles the share of its k places where a ball fits, (n,).
+
+    `places` (k, n, 6) holds the positions [m] and the normals of the surface there.
+    """
     place, normal = np.split(places.reshape(-1, 6), 2, axis=1)
     fits = ball_fits(mesh, place, unit_vectors(normal), ball_radius)
     return np.asarray(fits.reshape(places.shape[:2]).mean(axis=0))
@@ -135,7 +142,9 @@ def _touched_share(places: np.ndarray, mesh: TriangleMesh, ball_radius: float) -
 
 @jit
 def _add_common_areas(area, point, piece, points, pieces, radius):  # type: ignore[no-untyped-def]
-    """Add the common area of each pair of window and piece to area (p,)."""
+    """Add to `area` (p,), for each pair of a window and a piece of the surface, the touchable area
+    [m²] that they have in common.
+    """
     for pair in range(len(point)):
         i, t = point[pair], piece[pair]
         p, n_p, n_t = points.place[i], points.normal[i], pieces.normal[t]
@@ -178,7 +187,9 @@ def _add_common_areas(area, point, piece, points, pieces, radius):  # type: igno
 
 @jit
 def _sector(ax, ay, bx, by, radius):  # type: ignore[no-untyped-def]
-    """Signed common area of a circle round 0 and the triangle (0, a, b)."""
+    """Return the signed common area of a circle of this radius round the origin, and of the
+    triangle with the corners (0, 0), (ax, ay) and (bx, by).
+    """
     dx, dy = bx - ax, by - ay
     square = dx * dx + dy * dy
     if square == 0.0:

@@ -32,7 +32,7 @@ PAIRS_AT_ONCE = 500_000  # bounds memory, and fits in the processor's cache
 
 
 class Places(NamedTuple):
-    """Places on a surface.
+    """Points on a surface, with the normal and the smooth face there.
 
     Attributes:
         place: [m], shape (p, 3).
@@ -49,13 +49,14 @@ class Places(NamedTuple):
 
 
 class Windows:
-    """Windows of one radius round points on a surface.
+    """Measuring windows of one radius round points on a surface.
 
     Args:
         points: the middles of the windows.
         radius: [m].
-        faces: joins of faces by each division, `Faces.joined`; None without joins.
-        division: number of the division for each window, shape (p,); None for the first.
+        faces: for each division of the part and each face, the face that stands for all faces
+            joined to it; None without joins.
+        division: index of the division that each window uses, shape (p,); None for the first.
     """
 
     def __init__(
@@ -81,21 +82,25 @@ class Windows:
         self._normal = np.ascontiguousarray(points.normal[self._order].T)
 
     def with_radius(self, radius: float) -> Windows:
-        """Windows of another radius [m] round the same points."""
+        """Return windows of another radius [m] round the same points."""
         return Windows(self.points, radius, self.faces, self.division)
 
     def select(self, rows: np.ndarray) -> Windows:
         return Windows(self.points.select(rows), self.radius, self.faces, self.division[rows])
 
     def pairs(self, contacts: Places) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        """Yield indices of points and of the contacts in their windows, PAIRS_AT_ONCE at most."""
+        """Yield pairs of a point and a contact in its window, as two arrays of their indices.
+
+        The pairs come in several portions, to bound memory.
+        """
         for point, contact, rows in self._found(contacts):
             yield self._order[point], rows[contact]
 
     def shares(
         self, contacts: Places, size: np.ndarray, area: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Points, and the shares of their windows that sizes (k,) of contacts take, (n,) each.
+        """Return pairs of a window and a contact in it, as two arrays (n,): the index of the
+        window's point, and the share of the window's area that the contact's `size` (k,) takes.
 
         Args:
             area: of the windows, (p,).
@@ -111,14 +116,18 @@ class Windows:
         return np.concatenate([none, *points]), np.concatenate([none, *shares])
 
     def sums(self, contacts: Places, values: np.ndarray) -> np.ndarray:
-        """Sums over each window of values (k,) of the contacts, shape (p,)."""
+        """Return the sum of the `values` (k,) of the contacts in each window, shape (p,)."""
         total = np.zeros(len(self.points.place))
         for point, contact in self.pairs(contacts):
             total += np.bincount(point, values[contact], len(total))
         return total
 
     def _found(self, contacts: Places) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-        """Yield places of points in `_order`, places of contacts among rows, and the rows."""
+        """Yield pairs of a point and a contact in its window, in portions.
+
+        Each portion is the positions of the points in `_order`, the positions of the contacts in
+        `rows`, and `rows`, the indices of all contacts on faces with points.
+        """
         point, contact = np.empty((2, max(PAIRS_AT_ONCE, len(self._order))), dtype=np.int32)
         done, grid = 0, self._grid
         own = contacts.face if self.faces is None else self.faces[-1][contacts.face]
@@ -155,7 +164,9 @@ class _Grid(NamedTuple):
 
 
 def _grid_of_faces(place: np.ndarray, face: np.ndarray, radius: float) -> _Grid:
-    """Cells for points (p, 3) [m] on faces (p,)."""
+    """Return the cells in which to find points (p, 3) [m] on faces (p,), for windows of this radius
+    [m].
+    """
     faces = int(face.max(initial=0)) + 1
     low, high = np.full((faces, 3), np.inf), np.full((faces, 3), -np.inf)
     np.minimum.at(low, face, place)
@@ -175,7 +186,8 @@ def _grid_of_faces(place: np.ndarray, face: np.ndarray, radius: float) -> _Grid:
 
 @jit
 def _find_pairs(grid, first, x, n_x, contacts, radius, begin, point, contact):  # type: ignore[no-untyped-def]
-    """Write down all pairs until the arrays are full.
+    """Write pairs of a point and a contact in its window into the arrays `point` and `contact`,
+    until all are written or the arrays are full.
 
     The loop does not branch on the distance of a point, because the processor could not predict it.
 
@@ -183,7 +195,7 @@ def _find_pairs(grid, first, x, n_x, contacts, radius, begin, point, contact):  
         first: points first[c] to first[c + 1] are in cell c.
         x, n_x: places and normals of the points, shape (3, p).
         begin: first contact to look at.
-        point, contact: written.
+        point, contact: arrays to write into.
     Returns:
         The first contact that is not done, and the number of pairs.
     """
@@ -230,7 +242,10 @@ def _find_pairs(grid, first, x, n_x, contacts, radius, begin, point, contact):  
 
 @jit
 def _keep_joined(faces, division, face, order, face_of_contact, rows, point, contact):  # type: ignore[no-untyped-def]
-    """Keep the pairs whose faces the window's division joins, and return their number."""
+    """Remove pairs whose two faces are not joined in the window's division of the part into faces.
+
+    The other pairs move to the front of `point` and `contact`. Return their number.
+    """
     kept = 0
     for pair in range(len(point)):
         i, j = order[point[pair]], rows[contact[pair]]
@@ -243,7 +258,10 @@ def _keep_joined(faces, division, face, order, face_of_contact, rows, point, con
 def _divide(
     order: np.ndarray, area: np.ndarray, size: np.ndarray, place: np.ndarray, contact: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Points, and sizes over areas, for the pairs of `_found`."""
+    """Return the index of the point of each pair, and the contact's size over the window's area.
+
+    The pairs are those that `Windows._found` yields.
+    """
     point, share = np.empty(len(place), dtype=np.int32), np.empty(len(place))
     _write_shares(order, area, size, place, contact, point, share)
     return point, share
@@ -258,7 +276,9 @@ def _write_shares(order, area, size, place, contact, point, share):  # type: ign
 
 @jit
 def add_powers(point, share, sums):  # type: ignore[no-untyped-def]
-    """Add 1, share and share² of each pair to the sums (p, 3) of its point."""
+    """For each pair of a window `point` and a dent's `share` of it, add 1, share and share² to the
+    window's row of `sums` (p, 3).
+    """
     for pair in range(len(point)):
         one, w = point[pair], share[pair]
         sums[one, 0] += 1.0
@@ -268,7 +288,9 @@ def add_powers(point, share, sums):  # type: ignore[no-untyped-def]
 
 @jit
 def add_columns(point, contact, columns, sums):  # type: ignore[no-untyped-def]
-    """Add the columns (k, c) of each pair's contact to the sums (p, c) of its point."""
+    """For each pair of a window `point` and a `contact` in it, add the contact's row of `columns`
+    (k, c) to the window's row of `sums` (p, c).
+    """
     for pair in range(len(point)):
         for column in range(columns.shape[1]):
             sums[point[pair], column] += columns[contact[pair], column]
@@ -276,7 +298,9 @@ def add_columns(point, contact, columns, sums):  # type: ignore[no-untyped-def]
 
 @jit
 def add_to_levels(point, contact, size, level, histogram):  # type: ignore[no-untyped-def]
-    """Add the size (k,) of each pair's contact to its level in a histogram (p, levels)."""
+    """For each pair of a window `point` and a `contact` in it, add the contact's `size` (k,) to the
+    window's row of `histogram` (p, levels), at the contact's `level` (k,).
+    """
     for pair in range(len(point)):
         histogram[point[pair], level[contact[pair]]] += size[contact[pair]]
 
