@@ -1,1 +1,1 @@
-"""A design simulated in independent replicas, and the figures that follow from them."""
+"""Simulate a design in independent replicas, and compute its figures with intervals from them."""

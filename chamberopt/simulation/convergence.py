@@ -52,7 +52,10 @@ REFERENCE, DESIGNED = "reference", "as designed"
 
 
 def numerical_parameters(design: Design) -> dict[str, tuple[Any, ...]]:
-    """Settings of each numerical parameter by dotted name; the last setting is the reference's."""
+    """Return the settings to try of each numerical parameter, by its dotted name.
+
+    The last setting is the reference's.
+    """
     accuracy = design.process.accuracy
     settings: dict[str, Iterable[Any]] = {}
     if design.chamber.is_round:
@@ -74,12 +77,16 @@ def numerical_parameters(design: Design) -> dict[str, tuple[Any, ...]]:
 
 
 def _falling(value: float, factor: float) -> list[float]:
-    """A larger value, the value and a smaller value, within the range of its field, 0.1 to 1000."""
+    """Return `factor` times a value, the value, and the value over `factor`, the largest first.
+
+    All are within the range of the value's field, 0.1 to 1000.
+    """
     return sorted({min(1e3, factor * value), value, max(0.1, value / factor)}, reverse=True)
 
 
 def study_designs(design: Design) -> tuple[dict[str, Any], dict[tuple[str, str], Design]]:
-    """The reference's settings by parameter, and the designs by parameter and setting.
+    """Return the reference's settings by parameter, and the designs to simulate by parameter and
+    setting.
 
     The designs are the reference, a design for each other setting, and the design as it is.
     """
@@ -93,12 +100,12 @@ def study_designs(design: Design) -> tuple[dict[str, Any], dict[tuple[str, str],
 
 
 def setting_text(value: Any) -> str:
-    """A setting as a design file holds it, without quotes."""
+    """Return the text of a setting as in a design file, without quotes."""
     return f"{value:g}" if isinstance(value, int | float) else str(value)
 
 
 def short_name(parameter: str) -> str:
-    """The key of a parameter without table and unit."""
+    """Return the key of a parameter in words, without table and unit, such as "simulated time"."""
     return re.sub("_(mm_s|mm2|ms|s)$", "", parameter.rsplit(".", 1)[-1]).replace("_", " ")
 
 
@@ -112,7 +119,7 @@ ZERO = Estimate(0.0, 0.0)
 
 @dataclass(frozen=True)
 class Run:
-    """The result of one setting."""
+    """The result of one setting of one numerical parameter."""
 
     parameter: str  # dotted name of the numerical parameter that differs from the reference
     setting: str  # its value as text
@@ -149,7 +156,7 @@ class ConvergenceStudy:
 
 
 class TimedReplica(NamedTuple):
-    """The dents of one replica in windows, and its CPU seconds."""
+    """The footprints of one replica's dents in windows, and the CPU seconds that it took."""
 
     footprints: Prints
     cpu_s: float
@@ -157,7 +164,7 @@ class TimedReplica(NamedTuple):
 
 @dataclass
 class Replicas:
-    """The replicas of one design."""
+    """The replicas of one design that have been simulated so far, and their figures."""
 
     setting: ReplicaSetting
     target: TargetField
@@ -167,11 +174,13 @@ class Replicas:
 
     @property
     def cpu(self) -> Estimate:
-        """CPU seconds of a replica."""
+        """Estimate of the CPU seconds that a replica takes."""
         return estimate([one.cpu_s for one in self.done[self.skipped :]], 0.0)
 
     def estimates(self, part: slice = slice(None)) -> tuple[Estimate, Estimate, bool]:
-        """Objective, mean coverage, and whether there are enough dents for them."""
+        """Return the objective and the mean coverage from some replicas, and whether these have
+        enough dents for both.
+        """
         prints = [one.footprints for one in self.done[part]]
         metrics, found = window_estimates(
             self.target, self.target.gauge, prints, self.setting.design
@@ -180,7 +189,10 @@ class Replicas:
         return objective, metrics["mean_coverage"], found.has_mean
 
     def run(self, parameter: str, setting: str, reference: Run | None = None) -> Run:
-        """The result of the replicas, compared with a reference; None: they are its own."""
+        """Return the result of the replicas, with its difference from a reference.
+
+        Without a reference, the replicas are the reference itself and differ by nothing.
+        """
         objective, mean, _ = self.estimates()
         run = Run(parameter, setting, len(self.done), self.cpu, objective, mean)
         if reference is None:
@@ -197,7 +209,7 @@ def require_budget(budget_s: float) -> None:
 
 
 def describe_cost(design: Design, budget_s: float) -> str:
-    """A sentence on the cost of a study, for the user, before it begins."""
+    """Return a sentence for the user on the cost of a study, to show before it begins."""
     settings = len(study_designs(design)[1])
     return (
         f"{settings} settings, each in {MIN_ROUNDS} replicas or more: about {budget_s:g} CPU s "
@@ -214,8 +226,8 @@ def run_convergence_study(
     """Simulate all runs for about the budgeted CPU seconds, at least three replicas of each.
 
     Each round adds a replica to every run, and as many replicas to the reference as there are runs.
-    `prepare` is called for each design before the first simulation, to compile. InputError if the
-    budget is not positive, or evaluate() raises it.
+    `prepare` is called for each design before the first simulation, to compile. Raises InputError
+    if the budget is not positive, the memory is too small, or a design cannot be evaluated.
     """
     from chamberopt.chamber.build import build_chamber
 
@@ -264,7 +276,9 @@ def run_convergence_study(
 
 
 def require_memory(designs: Collection[Design], chamber: Chamber) -> None:
-    """Raise InputError if the fields of all designs, and the reference's replicas, do not fit."""
+    """Raise InputError if the windows of all designs and the dents of the reference's replicas do
+    not fit into memory.
+    """
     reference = next(iter(designs))
     points = sum(one.process.accuracy.points for one in designs)
     each = evaluation_bytes(reference, chamber, LIKELY_REPLICAS)
@@ -272,7 +286,9 @@ def require_memory(designs: Collection[Design], chamber: Chamber) -> None:
 
 
 def _add_replicas(designs: Sequence[Replicas], executor: Executor) -> float:
-    """Simulate another replica of each design as often as it is listed; their CPU seconds."""
+    """Simulate another replica of each design, as often as the design is listed. Return the CPU
+    seconds of all these replicas.
+    """
     futures = []
     for one in designs:
         futures.append(executor.submit(simulate_timed, one.setting, one.target, one.started))
@@ -287,7 +303,10 @@ def _add_replicas(designs: Sequence[Replicas], executor: Executor) -> float:
 
 
 def simulate_timed(setting: ReplicaSetting, target: TargetField, number: int) -> TimedReplica:
-    """Simulate one replica, and keep only its footprints, so that hundreds fit into memory."""
+    """Simulate the replica with this number, and return its footprints and CPU seconds.
+
+    All else is dropped, so that hundreds of replicas fit into memory.
+    """
     begin = time.thread_time()
     replica = simulate_replica(setting, replica_seed(setting.design.process.seed, number))
     dents = locate_dents(target, target.in_sector(replica.hits))
@@ -296,7 +315,7 @@ def simulate_timed(setting: ReplicaSetting, target: TargetField, number: int) ->
 
 
 def _require_error(size: float) -> None:
-    """Raise InputError where a coverage, or the error of a batch, is 0."""
+    """Raise InputError if a coverage, or the error of a batch of replicas, is 0."""
     if size < ZERO_ERROR:
         why = "no dent on the target was simulated, so there is no error to measure"
         remedy = "raise it, or see chamberopt check"
@@ -304,7 +323,9 @@ def _require_error(size: float) -> None:
 
 
 def _batch_sizes(reference: Replicas, whole: Run) -> tuple[BatchSize, ...]:
-    """Errors of batches of 4, 8, 16 ... replicas."""
+    """Return the errors of the objective from batches of 4, 8, 16 ... of the reference's replicas,
+    compared with the objective from all of them.
+    """
     sizes, count = [], 4
     while (batches := whole.replicas // count) >= MIN_BATCHES:
         begin = time.thread_time()

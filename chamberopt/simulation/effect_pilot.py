@@ -1,4 +1,4 @@
-"""Advice on the effects of a design, from dimensionless groups and short pilot runs.
+"""Advise which physical effects a design needs, by dimensionless groups and short pilot runs.
 
 The pilot simulates the design, and the design with each effect switched, from the same starts. It
 compares figures that a short run measures without bias: the mean normal speed of the impacts on the
@@ -64,7 +64,7 @@ SWITCHED = {
 
 @dataclass(frozen=True)
 class Advice:
-    """The changes by one effect, and the advice that follows from them."""
+    """The changes by one physical effect, such as gravity, and the advice that follows."""
 
     effect: str
     on: bool  # whether the design has it on
@@ -83,7 +83,7 @@ class Advice:
         return max(abs(change.value) for change in self.changes.values())
 
     def __str__(self) -> str:
-        """The advice as a sentence for the user."""
+        """Return the advice as a sentence for the user."""
         name, largest = max(self.changes.items(), key=lambda item: abs(item[1].value))
         change = f"{100 * largest.value:+.2g} ± {100 * largest.half_width:.1g} %"
         at = f"at {100 * self.accuracy:g} %"
@@ -103,7 +103,9 @@ class Advice:
 
 
 def _verdict(changes: Mapping[str, Estimate], accuracy: float) -> str:
-    """Whether changes matter: "matters", "makes no difference" or "undecided"."""
+    """Return whether changes matter at an accuracy: "matters", "makes no difference" or
+    "undecided".
+    """
     if all(abs(one.value) + one.half_width <= accuracy for one in changes.values()):
         return "makes no difference"
     if any(abs(one.value) - one.half_width > accuracy for one in changes.values()):
@@ -118,14 +120,16 @@ def advise(
     progress: Progress | None = None,
     prepare: Prepare | None = None,
 ) -> list[Advice]:
-    """Advice on every effect that can be switched in this design, the most important first.
+    """Return advice on every effect that can be switched in this design, the most important first.
 
     Args:
         prepare: called with each variant of the design before it runs, for example to compile the
             simulator for its effects.
 
     Raises:
-        InputError, sim_core.SimulationError: as `evaluate` does.
+        InputError: no triangle of the target bounds the cavity, the windows are too small or too
+            wide for it, or no ball touches a zone.
+        sim_core.SimulationError: a replica cannot be simulated.
     """
     return _Pilot(design, chamber, executor, progress, prepare).advise()
 
@@ -146,7 +150,8 @@ def with_effects_resolved(
         prepare: called with each variant of the design before it runs.
 
     Returns:
-        The design with its effects chosen, and the advice behind it, empty if there was no choice.
+        The design with its effects chosen, and the advice behind the choice. The advice is empty
+        if the design does not have effects = "auto".
     """
     if not design.effects.auto:
         return design, []
@@ -185,7 +190,7 @@ class _Pilot:
         self.unchanged = self.measure({})
 
     def advise(self) -> list[Advice]:
-        """Advice on each effect, the most important first."""
+        """Return advice on each effect that can be switched, the most important first."""
         advice = []
         for effect in self.effects:
             is_on = _is_on(effect, self.design, self.chamber)
@@ -196,13 +201,20 @@ class _Pilot:
         return sorted(advice, key=lambda one: -one.largest_change)
 
     def measure(self, effects: Mapping[str, bool]) -> dict[str, np.ndarray]:
-        """The figures in MEASURED of every replica, (REPLICAS,), with some effects switched."""
+        """Simulate the design with some effects switched, and return three figures of every
+        replica, by name, (REPLICAS,) each.
+
+        These are the mean speed of impacts, and the coverage of the target's nearer and farther
+        half.
+        """
         self.runs.ended += 1
         variant, replicas = self._simulate(effects)
         return _measure(variant, self.chamber, replicas)
 
     def _simulate(self, effects: Mapping[str, bool]) -> tuple[Design, list[Hits]]:
-        """The design with some effects switched, and the impacts of its replicas."""
+        """Simulate the design with some effects switched. Return this design, and the impacts of
+        its replicas.
+        """
         accuracy = {
             "replicas": REPLICAS,
             "simulated_time_s": self.time,
@@ -224,7 +236,8 @@ def _is_on(effect: str, design: Design, chamber: Chamber) -> bool:
 
 
 def groups(design: Design, chamber: Chamber) -> list[dict[str, Any]]:
-    """The name of each effect that can be switched, whether it is on, and a sentence on it.
+    """Return a table of the effects that can be switched: the name of each, whether it is on, and a
+    sentence on its importance.
 
     The sentences come from dimensionless groups, without a simulation.
     """
@@ -238,7 +251,7 @@ def groups(design: Design, chamber: Chamber) -> list[dict[str, Any]]:
 
 
 def _reason(effect: str, design: Design, chamber: Chamber) -> str:
-    """The importance of an effect by a dimensionless group, in words."""
+    """Return the importance of an effect in words, by a dimensionless group."""
     return {
         "gravity": f"g H / V² = {dimensionless.gravity_speed_change(design, chamber):.2g}",
         "ball_collisions": (
@@ -256,7 +269,7 @@ def _reason(effect: str, design: Design, chamber: Chamber) -> str:
 
 
 def _switchable(design: Design, chamber: Chamber) -> list[str]:
-    """Names of the effects that can be switched in this design."""
+    """Return the names of the effects that can be switched in this design."""
 
     def can_be_switched(effect: str) -> bool:
         if effect == "rest":
@@ -281,7 +294,10 @@ def _switched(design: Design, effects: Mapping[str, bool]) -> Design:
 
 
 def _measure(design: Design, chamber: Chamber, replicas: Sequence[Hits]) -> dict[str, np.ndarray]:
-    """The figures in MEASURED of every replica of a design."""
+    """Return three figures of every replica of a design, by name, (replicas,) each.
+
+    These are the mean speed of impacts, and the coverage of the target's nearer and farther half.
+    """
     target = exposed_target(chamber)
     centres = chamber.part.vertices[chamber.part.triangles].mean(axis=1)
     distance = np.linalg.norm(centres, axis=1)  # from the middle of the sonotrode
@@ -304,7 +320,7 @@ def _measure(design: Design, chamber: Chamber, replicas: Sequence[Hits]) -> dict
 
 
 def _median(distances: np.ndarray, areas: np.ndarray) -> float:
-    """The distance within which half of the area lies."""
+    """Return the distance within which half of the area lies."""
     order = np.argsort(distances, kind="stable")
     return float(distances[order][np.searchsorted(np.cumsum(areas[order]), 0.5 * areas.sum())])
 
@@ -312,7 +328,11 @@ def _median(distances: np.ndarray, areas: np.ndarray) -> float:
 def _changes(
     with_it: Mapping[str, np.ndarray], without: Mapping[str, np.ndarray]
 ) -> dict[str, Estimate]:
-    """Mean changes from replicas on the same seeds; without an interval if nothing was hit."""
+    """Return the mean change of each figure by an effect, from replicas with and without it.
+
+    Both have the same seeds. The change of the speed has no interval if nothing was hit without the
+    effect.
+    """
     changes = {}
     for name in MEASURED:
         scale = float(without[name].mean()) if name == SPEED else 1.0

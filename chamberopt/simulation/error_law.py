@@ -46,7 +46,7 @@ class BatchSize:
 
 @dataclass(frozen=True)
 class ErrorLaw:
-    """error = scale · cost^(-power)."""
+    """The error of the objective against the cost in CPU seconds: error = scale · cost^(-power)."""
 
     scale: float
     power: float
@@ -61,7 +61,7 @@ class ErrorLaw:
 
 
 def rms_error(values: np.ndarray, whole: float, share: float) -> float:
-    """Root mean square error of batches against infinitely many replicas.
+    """Return the root mean square error of batches of replicas against infinitely many replicas.
 
     A batch is a part of the pool that it is compared with. Independent replicas of variance s² have
     the mean square difference s²/k - s²/R = s²/k (1 - k/R).
@@ -69,13 +69,16 @@ def rms_error(values: np.ndarray, whole: float, share: float) -> float:
     Args:
         values: estimates of the batches, (m,).
         whole: estimate of all replicas.
-        share: k/R.
+        share: number of replicas of a batch over the number of all replicas, k/R.
     """
     return math.sqrt(float(np.mean((np.asarray(values) - whole) ** 2)) / (1.0 - share))
 
 
 def rms_interval(rms: float, batches: int) -> tuple[float, float]:
-    """95 % interval of an RMS error of m batches, from chi-square with m - 1 degrees of freedom."""
+    """Return the 95 % interval of a root mean square error that was measured on m batches.
+
+    It comes from chi-square with m - 1 degrees of freedom.
+    """
     from scipy.special import chdtri  # inverse of the upper tail of chi-square
 
     freedom, tail = batches - 1, 0.5 - CONFIDENCE / 2.0
@@ -84,9 +87,10 @@ def rms_interval(rms: float, batches: int) -> tuple[float, float]:
 
 
 def fit_error_law(sizes: Sequence[BatchSize]) -> ErrorLaw:
-    """Fit the law by weighted least squares in logarithms, to resolved sizes if there are two.
+    """Fit the law of the error against the cost, by weighted least squares in logarithms.
 
-    The logarithm of an RMS error of m batches has the standard deviation 1 / sqrt(2 (m - 1)).
+    Sizes of batches with too few dents are left out if two other sizes remain. The logarithm of an
+    RMS error of m batches has the standard deviation 1 / sqrt(2 (m - 1)).
     """
     resolved = [size for size in sizes if size.is_resolved]
     sizes = resolved if len(resolved) > 1 else sizes

@@ -65,9 +65,10 @@ SHARES = frozenset({"mean_coverage", "std_coverage", "p05_coverage", "p95_covera
 
 @dataclass
 class SeenDents:
-    """The dents of the replicas so far in windows of both sizes, and their impacts in the sector.
+    """The dents of the replicas so far in windows of both sizes, and the impacts in one sector.
 
-    A symmetric target has its windows in one sector, into which all impacts are turned.
+    A symmetric target has its windows in one sector, into which all impacts are turned. The sizes
+    are the gauge, which the design sets, and twice its radius.
     """
 
     field: TargetField
@@ -77,11 +78,11 @@ class SeenDents:
 
     @classmethod
     def none(cls, field: TargetField) -> SeenDents:
-        """A surface before the first replica."""
+        """Return a surface before the first replica, without dents."""
         return cls(field, [], [], [])
 
     def add(self, hits: Sequence[Hits]) -> None:
-        """Locate the dents of those replicas in `hits` that are new."""
+        """Locate the dents of those replicas in `hits` that were not added before."""
         for one in hits[len(self.gauge) :]:
             in_sector = self.field.in_sector(one)
             dents = locate_dents(self.field, in_sector)
@@ -97,7 +98,9 @@ class SeenDents:
 
 
 class Estimates(NamedTuple):
-    """The metrics of some replicas, and how well they are resolved."""
+    """The metrics of some replicas in windows of both sizes, and whether there are enough dents for
+    them.
+    """
 
     metrics: dict[str, Estimate]
     metrics_of_wide: dict[str, Estimate]
@@ -107,7 +110,9 @@ class Estimates(NamedTuple):
 def estimate_metrics(
     seen: SeenDents, hits: Sequence[Hits], chamber: Chamber, design: Design
 ) -> Estimates:
-    """Estimate all metrics from replicas; with a single one the half-widths are infinite."""
+    """Estimate all metrics from the impacts of replicas. From a single replica the half-widths of
+    the intervals are infinite.
+    """
     found, resolution = raw_estimates(seen, design)
     found |= _ratios(in_batches(hits), chamber, design)
     of_wide, resolution_of_wide = window_estimates(seen.field, seen.field.wide, seen.wide, design)
@@ -121,7 +126,7 @@ def estimate_metrics(
 def estimate_zones(
     zones: Mapping[str, SeenDents], hits: Sequence[Hits], chamber: Chamber, design: Design
 ) -> tuple[dict[str, Estimate], tuple[str, ...]]:
-    """The metrics of zones by names such as root.mean_coverage, and notes on them.
+    """Return the metrics of zones, by names such as root.mean_coverage, and notes for the user.
 
     Args:
         zones: the dents on each zone, by its name.
@@ -145,7 +150,11 @@ def estimate_zones(
 
 
 def raw_estimates(seen: SeenDents, design: Design) -> tuple[dict[str, Estimate], Resolution]:
-    """Metrics of coverage and intensity at the gauge, with intervals even where not resolved."""
+    """Return the metrics of coverage and intensity in windows of the gauge, and the dents that they
+    have and need.
+
+    The metrics have intervals even where there are too few dents.
+    """
     found, resolution = window_estimates(seen.field, seen.field.gauge, seen.gauge, design)
     process, batches = design.process, in_batches(seen.in_sector)
     shot = design.shot.density, calibrated_strip(design.shot, design.calibration)
@@ -160,7 +169,10 @@ def raw_estimates(seen: SeenDents, design: Design) -> tuple[dict[str, Estimate],
 def _calibrated(
     found: Mapping[str, Estimate], calibration: Calibration | None
 ) -> dict[str, Estimate]:
-    """Almen intensities, and the saturation time of a real strip."""
+    """Return the Almen intensities and the saturation time of a real strip, by name.
+
+    There are none without a calibration to strips.
+    """
     if calibration is None or not calibration.has_strips:
         return {}
     figures = {
@@ -176,7 +188,9 @@ def _calibrated(
 def window_estimates(
     field: TargetField, gauge: Gauge, prints: Sequence[Prints], design: Design
 ) -> tuple[dict[str, Estimate], Resolution]:
-    """Metrics of coverage in the windows of a gauge, and how well they are resolved."""
+    """Return the metrics of coverage in windows of one size, and how many dents these windows have
+    and need.
+    """
     process = design.process
     time_ratio = process.treatment_time / process.recorded_time
     batches = batches_of(prints)
@@ -193,7 +207,7 @@ def window_estimates(
 
 
 def least_half_width(reach: Reach, prints: Sequence[Prints]) -> float:
-    """The least half-width of any share of the target.
+    """Return the least half-width that the interval of a share of the target may have.
 
     It is the error of the share in reach, by the choice of points, or the share that no dent may
     have hit by chance, by the rule of three, if that is larger.
@@ -204,7 +218,7 @@ def least_half_width(reach: Reach, prints: Sequence[Prints]) -> float:
 
 
 def _all_resolved(found: Mapping[str, Estimate], resolution: Resolution) -> dict[str, Estimate]:
-    """All estimates as far as they are resolved.
+    """Return all estimates, without an interval where there are too few dents for one.
 
     A mean takes many dents where nearly all is covered. If it is not resolved, the 5th percentile
     gives a bound below it.
@@ -221,7 +235,7 @@ def _all_resolved(found: Mapping[str, Estimate], resolution: Resolution) -> dict
 
 
 def as_resolved(name: str, value: Estimate, resolution: Resolution) -> Estimate:
-    """The estimate of a metric, without an interval if there are too few dents for one."""
+    """Return the estimate of a metric, without an interval if there are too few dents for one."""
     metric = METRICS[name]
     enough = resolution.has_places if metric.of_places else resolution.has_mean
     # A percentile of exactly 0 follows from places out of reach, not from dents.
@@ -237,7 +251,7 @@ def as_resolved(name: str, value: Estimate, resolution: Resolution) -> Estimate:
 def _ratios(
     batches: Sequence[Sequence[Hits]], chamber: Chamber, design: Design
 ) -> dict[str, Estimate]:
-    """Estimates of the metrics that are ratios of sums over impacts."""
+    """Return estimates of the metrics that are ratios of sums over impacts, by name."""
     exposed, count = exposed_target(chamber), len(batches)
     area, time = float(chamber.exposed_area[exposed].sum()), design.process.recorded_time
     on_target = [tuple(hits.on(exposed) for hits in batch) for batch in batches]
@@ -260,7 +274,9 @@ def _ratios(
 
 
 def reach_notes(reach: Reach, surface: str = TARGET) -> tuple[str, ...]:
-    """A note on the highest coverage of a surface of which some is out of reach."""
+    """Return a note on the highest coverage that a surface can have if some of it is out of reach
+    of the balls. There is no note if all is in reach.
+    """
     reachable, beyond = reach.share, reach.beyond(1.0 - P05)
     if reachable > 1.0 - MIN_MISSED_SHARE:
         return ()
@@ -279,7 +295,10 @@ def reach_notes(reach: Reach, surface: str = TARGET) -> tuple[str, ...]:
 
 
 def resolution_notes(found: Resolution, surface: str = TARGET) -> tuple[str, ...]:
-    """A note on the figures of a surface that are not resolved, and on the time they take."""
+    """Return a note on the figures of a surface that have too few dents, and on the time they need.
+
+    There is no note if all figures have enough dents.
+    """
     if found.has_mean and found.has_places:
         return ()
     if not found.dents:
@@ -305,7 +324,9 @@ def resolution_notes(found: Resolution, surface: str = TARGET) -> tuple[str, ...
 def strength_notes(
     metrics: Mapping[str, Estimate], resolution: Resolution, surface: str = TARGET
 ) -> tuple[str, ...]:
-    """A note where strength and saturation are not resolved, but other figures of places are."""
+    """Return a note if strength and saturation time have too few dents, but other figures of places
+    have enough.
+    """
     saturation = metrics["saturation_time_s"]
     if saturation.in_words != NOT_RESOLVED or not resolution.has_places or not saturation.value:
         return ()
@@ -318,7 +339,10 @@ def strength_notes(
 
 
 def weighted_sum(objective: ObjectiveFunction, metrics: dict[str, Estimate]) -> Estimate:
-    """The objective from the metrics, with an interval from what they have in common."""
+    """Return the estimate of an objective, the weighted sum of metrics.
+
+    Its interval accounts for errors that the metrics share.
+    """
     terms = [(weight, metrics[name]) for name, weight in objective.terms.items()]
     value = sum(weight * metric.value for weight, metric in terms)
     columns = [weight * np.array(metric.pseudovalues) for weight, metric in terms]

@@ -140,7 +140,10 @@ class _Run:
         beside.shutdown(wait=False)
 
     def look(self) -> tuple[list[Hits], SeenDents, dict[str, SeenDents]]:
-        """Locate new dents; all replicas' impacts, and their dents on the target and each zone."""
+        """Locate the dents of new replicas.
+
+        Return the impacts of all replicas, and their dents on the target and on each zone.
+        """
         hits = [replica.hits for replica in self.known.replicas]
         target, zones = self.seen.result()
         for one in (target, *zones.values()):
@@ -148,7 +151,7 @@ class _Run:
         return hits, target, zones
 
     def add_up_to(self, count: int, progress: Progress | None, wanted: float | None) -> Evaluation:
-        """Add replicas until there are `count`, and evaluate all replicas.
+        """Add replicas until there are `count`, and return the evaluation of all replicas.
 
         Args:
             wanted: half-width of the objective to reach; None where the number was given.
@@ -211,19 +214,29 @@ class _Run:
 
 
 def require_figures(design: Design, chamber: Chamber, mesh: TriangleMesh) -> None:
-    """Raise InputError as `window_setting`, if windows are too wide, or no ball touches a zone."""
+    """Raise InputError if a chamber can give no figures of the target and its zones.
+
+    This is if no triangle of the target bounds the cavity, if the windows are too small or too wide
+    for the target, or if no ball touches a zone.
+    """
     window = window_setting(design, chamber)
     require_narrow_gauge(chamber, window)
     require_touchable_zones(chamber, mesh, 0.5 * window.ball)
 
 
 def prepare_target(design: Design, chamber: Chamber, mesh: TriangleMesh) -> TargetField:
-    """The target of a chamber with its windows; InputError as `window_setting`."""
+    """Return the target of a chamber with all that is needed to measure coverage in windows on it.
+
+    Raises InputError if no triangle of the target bounds the cavity, or the windows are too small.
+    """
     return find_target_field(chamber, mesh, window_setting(design, chamber))
 
 
 def see_zones(design: Design, chamber: Chamber, mesh: TriangleMesh) -> dict[str, SeenDents]:
-    """The zones of a chamber's part by name, without dents; InputError as `window_setting`."""
+    """Return the zones of a chamber's part by name, before any dent is simulated.
+
+    Raises InputError if no triangle of a zone bounds the cavity, or the windows are too small.
+    """
     surfaces = {name: chamber.on_zone(name) for name in chamber.part.zones}
     return {
         name: SeenDents.none(prepare_target(design, one, mesh)) for name, one in surfaces.items()
@@ -231,10 +244,11 @@ def see_zones(design: Design, chamber: Chamber, mesh: TriangleMesh) -> dict[str,
 
 
 def window_setting(design: Design, chamber: Chamber) -> WindowSetting:
-    """The gauge, the ball and the largest dent by which the windows of a target are prepared.
+    """Return the size of the windows, the smallest ball and the largest dent, for which the windows
+    of a target are prepared.
 
     Raises:
-        InputError: no triangle of the target bounds the cavity, or the gauge is too small for it.
+        InputError: no triangle of the target bounds the cavity, or the windows are too small.
     """
     require_target(chamber)
     design = design.simulated
@@ -267,7 +281,11 @@ def _symmetry_note(alike: int) -> tuple[str, ...]:
 
 
 def _end(replicas: int, objective: Estimate, wanted: float | None) -> tuple[str, tuple[str, ...]]:
-    """What ended a simulation, and a note on whether the wanted accuracy was reached."""
+    """Return the reason why a simulation ended, and a note on whether the wanted accuracy was
+    reached.
+
+    There is no note if no accuracy was wanted.
+    """
     if wanted is None:
         return "replicas", ()
     if objective.half_width <= wanted:

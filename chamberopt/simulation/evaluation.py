@@ -1,4 +1,4 @@
-"""The evaluation of a candidate, and its file.
+"""Hold the evaluation of a candidate, and write and read its file.
 
 A study keeps its confirmed candidates in such files, bit for bit, so that it can be resumed without
 another simulation of these candidates.
@@ -57,7 +57,7 @@ def save_evaluation(path: Path, evaluation: Evaluation) -> None:
 def load_evaluation(path: Path) -> Evaluation:
     """Read an evaluation, equal to the one that was saved.
 
-    InputError if the file is missing or damaged, or holds values that no evaluation has.
+    Raises InputError if the file is missing or damaged, or holds values that no evaluation has.
     """
     found = load_record(path, Evaluation, (Estimate, Hits, Resolution), REMEDY)
     try:
@@ -68,7 +68,9 @@ def load_evaluation(path: Path) -> Evaluation:
 
 
 def require_triangles(evaluation: Evaluation, triangles: int) -> None:
-    """Raise InputError unless all impacts are on triangles of a part with this number of them."""
+    """Raise InputError unless all impacts are on triangles of a part that has `triangles`
+    triangles.
+    """
     for hits in evaluation.hits:
         if len(hits) and not 0 <= hits.triangle.min() <= hits.triangle.max() < triangles:
             text = "confirm: an impact is on a triangle that the part does not have"

@@ -1,4 +1,4 @@
-"""Figures at places of the part, in windows round these, and figures of each of its triangles.
+"""Compute figures in windows round places of the part, and figures of each of its triangles.
 
 Notation
     x   dent density of a window at the treatment time: expected dents, by their share of it
@@ -53,13 +53,13 @@ HIGH_SPEED = 0.9  # share of the impacts that are not faster than p90_normal_spe
 
 
 def _some_at_once(dents: int, windows: int) -> Iterator[slice]:
-    """Slices of the dents, so short that the pairs of each with all windows fit into memory."""
+    """Return slices of the dents, so short that the pairs of each with all windows fit memory."""
     step = max(1, MAX_PAIRS // max(windows, 1))
     return (slice(first, first + step) for first in range(0, dents, step))
 
 
 class PartField:
-    """The impacts of an evaluation, in windows round any places of the part."""
+    """Coverage and other figures at any places of the part, from the impacts of an evaluation."""
 
     def __init__(self, design: Design, chamber: Chamber, evaluation: Evaluation) -> None:
         self._design, self._chamber = design, chamber
@@ -74,23 +74,26 @@ class PartField:
         self._scale = design.process.treatment_time / evaluation.simulated_time
 
     def reachable(self, places: Places) -> np.ndarray:
-        """Whether a ball fits at each place, (p,) bool."""
+        """Return whether a ball fits at each place, (p,) bool."""
         return ball_fits(
             self._mesh, places.place, places.normal, 0.5 * min(self._design.shot.diameters)
         )
 
     def coverage(self, places: Places) -> np.ndarray:
-        """Coverage at the treatment time round each place, (p,), without the bands of dents on
-        creases; NaN out of reach.
+        """Return the coverage at the treatment time in a window round each place, (p,); NaN out of
+        reach.
+
+        Dents on creases do not count, because they cover a band as narrow as a dent.
         """
         gauge = self._gauge_off_creases(places)
         coverage = coverage_from_dent_density(self._dents(gauge)["dent_density"])
         return np.where(self.reachable(places), coverage, np.nan)
 
     def display(self) -> DisplayField:
-        """The values at the vertices of a mesh to draw, without the bands of dents on creases.
+        """Return the figures of `values` at the vertices of a mesh to draw.
 
-        These bands are as narrow as a dent. A drawing would smear them over whole triangles.
+        Dents on creases do not count in the coverage. They cover a band as narrow as a dent, and a
+        drawing would smear it over whole triangles.
         """
         from chamberopt.coverage.field.display_mesh import DisplayField, display_mesh
 
@@ -105,7 +108,7 @@ class PartField:
         return replace(self.field.gauge_round(places, self.field.radius), band=None)
 
     def values(self, places: Places, gauge: Gauge | None = None) -> dict[str, np.ndarray]:
-        """All figures in the windows round some places.
+        """Compute all figures in the windows round some places.
 
         Returns:
             Arrays (p,) by name; NaN where nothing was hit, and but for the first two out of reach.
@@ -140,7 +143,9 @@ class PartField:
         }
 
     def _moved(self, places: Places) -> dict[str, np.ndarray]:
-        """The distance by which smoothing has moved the surface, see `values`."""
+        """Return the distance [µm] by which smoothing has moved the surface at each place, as
+        moved_um. It is absent if the part is not smoothed.
+        """
         part = self._chamber.part
         if part.smoothing is None or part.file is None or part.file.original is None:
             return {}
@@ -150,7 +155,8 @@ class PartField:
         return {"moved_um": 1e6 * closest_points(facets, places.place, size).distance}
 
     def element_values(self) -> dict[str, np.ndarray]:
-        """Means of the values over each triangle of the part, and figures of the triangle itself.
+        """Compute the means of `values` over each triangle of the part, and figures of the triangle
+        itself.
 
         Returns:
             Arrays (m,) by name: the names of `values`, NaN where the triangle is not exposed, and
@@ -201,7 +207,9 @@ class PartField:
         }
 
     def _zones(self) -> dict[str, np.ndarray]:
-        """The zones of each triangle of the part, see `element_values`."""
+        """Return for each triangle of the part the number of its last zone, and marks of each zone,
+        by name. They are absent without zones.
+        """
         zones = self._chamber.part.zones
         if not zones:
             return {}
@@ -211,7 +219,9 @@ class PartField:
         return {"zone": last, **{f"zone_{k}": one.astype(np.uint8) for k, one in zones.items()}}
 
     def _dents(self, gauge: Gauge) -> dict[str, np.ndarray]:
-        """The dents in each window, and the width of the interval of its coverage."""
+        """Return the dent density, the number of dents, and the width of the interval of the
+        coverage in each window, by name.
+        """
         from chamberopt.coverage.field.windows import add_powers
 
         sums, largest = np.zeros((len(gauge.area), 3)), 0.0
@@ -232,7 +242,9 @@ class PartField:
         }
 
     def _impacts(self, gauge: Gauge) -> dict[str, np.ndarray]:
-        """Means and percentiles over the impacts in the windows, dents on creases included."""
+        """Return means and percentiles over the impacts in each window, by name, dents on creases
+        included.
+        """
         from chamberopt.coverage.field.windows import add_columns, add_to_levels
 
         points = len(gauge.area)
@@ -286,7 +298,8 @@ class PartField:
 def density_bounds(
     y: np.ndarray, v: np.ndarray, one_more: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Ends of the 95 % interval of the dent density of each window.
+    """Return the lower and the upper end of the 95 % interval of each window's dent density, (p,)
+    each.
 
     The dents of a window fall as a Poisson process, each with a weight of its own. The gamma
     interval for the sum of such weights holds for few dents and for none. It does not hold for the
@@ -319,7 +332,9 @@ def _ratio(top: np.ndarray, bottom: np.ndarray) -> np.ndarray:
 
 
 def _quantile(counts: np.ndarray, share: float) -> np.ndarray:
-    """Quantile of each row of counts (p, LEVELS), as a share of the highest level, (p,)."""
+    """Return the value that a share of the counts in each row (p, LEVELS) do not exceed, as a share
+    of the highest level, (p,).
+    """
     upto = np.cumsum(counts, axis=1)
     wanted = share * upto[:, -1]
     level = np.minimum((upto < wanted[:, None]).sum(axis=1), LEVELS - 1)
@@ -344,7 +359,7 @@ class CandidateResult:
 def complete_result(design: Design, chamber: Chamber, evaluation: Evaluation) -> CandidateResult:
     """Compute the fields and curves of a final result, which a search does without.
 
-    InputError if the evaluation is of another part, as the file of a resumed study may be.
+    Raises InputError if the evaluation is of another part, as the file of a resumed study may be.
     """
     require_triangles(evaluation, len(chamber.part.triangles))
     seen = PartField(design, chamber, evaluation)

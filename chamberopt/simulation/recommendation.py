@@ -1,4 +1,4 @@
-"""The settings that a convergence study recommends for an accuracy, and their likely cost."""
+"""Recommend the settings for an accuracy from a convergence study, and predict their cost."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ TABLE = "process.accuracy."
 
 @dataclass(frozen=True)
 class Recommendation:
-    """The settings for one accuracy."""
+    """The settings that reach one accuracy of the objective."""
 
     accuracy: float
     settings: dict[str, Any]  # by numerical parameter
@@ -37,7 +37,7 @@ class Recommendation:
 
     @property
     def lines(self) -> tuple[str, ...]:
-        """Lines to paste into a design file; other tables' settings are written as comments."""
+        """Lines to paste into a design file. Settings of other tables are written as comments."""
         remarks = tuple(f"# {text}" for text in self.remarks)
         if not self.replicas:
             return f"# ± {self.accuracy:g}: not reachable with these settings", *remarks
@@ -57,11 +57,11 @@ class Recommendation:
 
 
 def recommend(study: ConvergenceStudy, accuracy: float) -> Recommendation:
-    """Choose for each parameter the cheapest setting that is accurate enough.
+    """Choose for each numerical parameter the cheapest setting that is accurate enough.
 
-    Its bias is certainly within a third of the accuracy. A coarser setting is chosen only if its
-    CPU time is significantly less. Savings of several parameters multiply. The simulated time is
-    the cheapest for this accuracy.
+    The bias of the setting is certainly within a third of the accuracy. A coarser setting is chosen
+    only if its CPU time is significantly less. Savings of several parameters multiply. The
+    simulated time is the cheapest for this accuracy.
     """
     settings, remarks = dict(study.settings), []
     reference = study.reference.cpu.value
@@ -96,7 +96,8 @@ def recommend(study: ConvergenceStudy, accuracy: float) -> Recommendation:
 
 
 def replicas_for(study: ConvergenceStudy, accuracy: float, seconds: float) -> int:
-    """Number of replicas of this simulated time whose interval is within the accuracy.
+    """Return the number of replicas, of `seconds` of simulated time each, whose interval is within
+    the accuracy.
 
     The variance of replicas is proportional to 1/seconds. Intervals from few replicas are wider
     than this law says, so the intervals of the batches count as well.

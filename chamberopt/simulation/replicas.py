@@ -54,7 +54,9 @@ class Replica:
 
 @dataclass
 class ReplicaSet:
-    """The replicas of one candidate so far, and its target where that was prepared before."""
+    """The replicas of one candidate so far, and its target with windows if that was prepared
+    before.
+    """
 
     replicas: list[Replica] = field(default_factory=list)
     target: TargetField | None = None  # by `prepare_target`; None if it was not called
@@ -63,7 +65,7 @@ class ReplicaSet:
 def simulate_replicas(
     setting: ReplicaSetting, executor: Executor, progress: Progress | None = None
 ) -> list[Replica]:
-    """Simulate as many replicas as the design asks for."""
+    """Simulate as many replicas as the design asks for, and return them in a fixed order."""
     found: list[Replica] = []
     process, shared = setting.design.process, share(executor, setting)
     count = process.accuracy.replicas
@@ -119,14 +121,15 @@ def _result(number: int, future: Future[T]) -> T:
 
 
 def most_replicas(design: Design) -> int:
-    """The largest number of replicas that the design's accuracy may ask for."""
+    """Return the largest number of replicas that the design's accuracy may ask for."""
     accuracy = design.process.accuracy
     wanted = accuracy.objective_half_width is not None
     return accuracy.max_replicas if wanted else accuracy.replicas
 
 
 def next_replica_count(done: int, half_width: float, wanted: float, maximum: int) -> int:
-    """Number of replicas at which to look at the interval again, predicted from its width.
+    """Return the number of replicas at which to look at the interval again, predicted from its
+    width.
 
     Args:
         done: number of replicas so far.
@@ -143,7 +146,7 @@ def next_replica_count(done: int, half_width: float, wanted: float, maximum: int
 
 
 def simulate_replica(setting: ReplicaSetting, seed: int) -> Replica:
-    """Simulate one replica, on a worker."""
+    """Simulate one replica with this seed. It runs on a worker."""
     design, chamber, mesh = setting
     result = simulate_seed(design, chamber, mesh, seed)
     impacts, part_turns = result.impacts, design.effects.part_turn is not None
@@ -163,7 +166,9 @@ def simulate_replica(setting: ReplicaSetting, seed: int) -> Replica:
 def simulate_seed(
     design: Design, chamber: Chamber, mesh: TriangleMesh | AnalyticCavity, seed: int
 ) -> SimulationResult:
-    """Run the simulator once; the impacts of its result are on the chamber's triangles."""
+    """Run the simulator once with this seed, and return its result with impacts on the chamber's
+    triangles.
+    """
     from sim_core import TriangleMesh, simulate
 
     result = simulate(build_scene(design, mesh, seed, turning_axis(design, chamber.part)))

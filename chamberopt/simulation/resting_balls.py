@@ -1,4 +1,4 @@
-"""Notes on balls that no longer peen at the end of a replica: at rest, or bouncing on one spot.
+"""Write notes on balls that no longer peen when a replica ends: at rest, or bouncing on one spot.
 
 The notes name surfaces and places as the designer of a chamber would, who can make room there.
 """
@@ -41,7 +41,7 @@ class RestingBalls:
 def find_resting_balls(
     resting: Resting, balls: int, diameter: float, chamber: Chamber, part_turns: bool
 ) -> RestingBalls | None:
-    """Describe the balls at rest; None if there are none.
+    """Describe the balls at rest at the end of a replica. Return None if there are none.
 
     Args:
         balls: number of all balls.
@@ -66,7 +66,7 @@ def find_resting_balls(
 
 
 def bouncing_share(velocities: np.ndarray) -> float:
-    """Share of the balls that move straight up and down, until they meet another ball.
+    """Return the share of the balls that move straight up and down, until they meet another ball.
 
     Args:
         velocities: of the balls [m/s], (n, 3).
@@ -77,7 +77,7 @@ def bouncing_share(velocities: np.ndarray) -> float:
 
 
 def bouncing_notes(shares: Sequence[float]) -> tuple[str, ...]:
-    """A note if much of the shot ends bouncing on the spot, as between ideal parallel faces.
+    """Return a note if much of the shot ends bouncing on the spot, as between ideal parallel faces.
 
     Args:
         shares: share of bouncing balls in each replica.
@@ -94,7 +94,7 @@ def bouncing_notes(shares: Sequence[float]) -> tuple[str, ...]:
 
 
 def resting_notes(resting: Sequence[RestingBalls], replicas: int) -> tuple[str, ...]:
-    """A note on all replicas in which balls came to rest.
+    """Return a note on all replicas in which balls came to rest, or nothing if there are none.
 
     Args:
         resting: the balls at rest in each replica that has some.
@@ -118,7 +118,9 @@ def _percent(share: float) -> str:
 def _kind(
     resting: Resting, i: int, surfaces: np.ndarray, chamber: Chamber, reach: float, part_turns: bool
 ) -> str:
-    """The place of a ball, as "on the part's upper side"; ON_BALLS if other balls alone hold it."""
+    """Return what holds a ball at rest, such as "on the part's upper side", or ON_BALLS if other
+    balls alone hold it.
+    """
     under = resting.triangles[i][resting.triangles[i] >= 0]
     if resting.jammed[i]:
         known = chamber.tags != TAG_PART if part_turns else np.ones(len(chamber.tags), dtype=bool)
@@ -145,7 +147,7 @@ def _join(preposition: str, names: list[str]) -> str:
 def _triangles_near(
     chamber: Chamber, triangles: np.ndarray, position: np.ndarray, reach: float
 ) -> np.ndarray:
-    """The triangles among some that are within `reach` [m] of a position (3,)."""
+    """Return those of the given triangles that are within `reach` [m] of a position (3,)."""
     corners = chamber.vertices[chamber.triangles[triangles]]
     low, high = corners.min(axis=1), corners.max(axis=1)
     near = (np.abs(position - np.clip(position, low, high)) <= reach).all(axis=1)
@@ -154,7 +156,10 @@ def _triangles_near(
 
 
 def _with_carriers(resting: Resting, kinds: list[str]) -> list[str]:
-    """The kinds, where a ball on other balls has the kind of a ball that carries it."""
+    """Return what holds each ball at rest.
+
+    A ball that only other balls carry gets what holds one of these balls.
+    """
     row = {int(ball): i for i, ball in enumerate(resting.ball)}
     kinds = list(kinds)
     # From below upwards, because the balls that carry a ball are below it.
@@ -166,7 +171,11 @@ def _with_carriers(resting: Resting, kinds: list[str]) -> list[str]:
 
 
 def _places(resting: Resting, kinds: list[str], diameter: float) -> list[tuple[str, np.ndarray]]:
-    """The kind and the balls of each place, in falling order of the number of balls."""
+    """Return what holds the balls of each place, and the rows of these balls. The place with most
+    balls comes first.
+
+    Balls near each other that are held alike lie in one place.
+    """
     from scipy.spatial import KDTree
 
     pairs = KDTree(resting.position).query_pairs(PLACE_DISTANCE * diameter, output_type="ndarray")

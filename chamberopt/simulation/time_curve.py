@@ -1,4 +1,4 @@
-"""Coverage against peening time: mean and 5th percentile with intervals.
+"""Compute coverage against peening time: mean and 5th percentile with intervals.
 
 The errors of a calibration move the dent density x of all times by the same factor. By Avrami's
 C = 1 - exp(-x) they move a coverage C by -(1 - C) ln(1 - C) times the logarithm of this factor.
@@ -35,7 +35,7 @@ MAX_TREATMENT_TIMES = 5.0  # end of the curve at most; a longer time is another 
 def coverage_against_time(
     design: Design, field: TargetField, evaluation: Evaluation
 ) -> list[dict[str, float]]:
-    """Coverage of the target at rising peening times.
+    """Compute the coverage of the target at rising peening times.
 
     The curve ends where the 5th percentile is 98 %, but not before the treatment time, nor after
     MAX_TREATMENT_TIMES of it, nor where the mean coverage is not resolved.
@@ -76,7 +76,8 @@ def coverage_against_time(
 
 
 def _open_density(mean: Estimate) -> float:
-    """Half-width of the logarithm of the dent density by the errors of the calibration.
+    """Return the half-width of the logarithm of the dent density that the errors of the calibration
+    cause.
 
     Args:
         mean: coverage after the treatment time.
@@ -86,23 +87,25 @@ def _open_density(mean: Estimate) -> float:
 
 
 def _by_density(coverage: float) -> float:
-    """Slope of a coverage by the logarithm of its dent density."""
+    """Return the slope of a coverage over the logarithm of its dent density."""
     left = 1.0 - coverage
     return -left * math.log(left) if 0.0 < left < 1.0 else 0.0
 
 
 def _rates_of_p05(p05: Estimate, treatment: float, full: Estimate) -> list[float]:
-    """Dent density per second at the 5th percentile of coverage: low, middle and high estimate.
+    """Return low, middle and high estimate of the dent density per second at the 5th percentile of
+    coverage.
 
     A coverage near 1 hardly tells a density from twice this density, but the time to full coverage
     does.
 
     Args:
-        p05: the percentile after the treatment time [s].
-        full: time until it is FULL_COVERAGE [s].
+        p05: the percentile after the treatment time.
+        treatment: treatment time [s].
+        full: time until the percentile is FULL_COVERAGE [s].
 
     Returns:
-        Nothing where it is not resolved.
+        Three rates [1/s], or none where the percentile has no interval.
     """
     if p05.value > NEARLY_FULL:
         if not math.isfinite(full.half_width) or full.low <= 0.0:

@@ -1,4 +1,4 @@
-"""A design and changed designs, evaluated in the same replicas on the same seeds.
+"""Evaluate a design and changed designs in the same replicas on the same seeds.
 
 A chamber is chaotic, so that two runs on equal seeds correlate little. The noise of the slope
 between them falls as one over the step, and curvature makes the slope wrong by a share that grows
@@ -26,14 +26,14 @@ if TYPE_CHECKING:
 
 @dataclass
 class RunsProgress:
-    """One progress over several runs, each with the same number of replicas."""
+    """Progress of several runs, reported as one. Each run has the same number of replicas."""
 
     progress: Progress | None
     runs: int
     ended: int = 0  # number of runs before the present run
 
     def __call__(self, done: int, total: int, best: float | None) -> None:
-        """Count the replicas that are done, of the present run and of the runs before it."""
+        """Report the number of replicas done, in the present run and in the runs before it."""
         if self.progress:
             runs = max(self.runs, self.ended + 1)
             self.progress(self.ended * total + done, runs * total, best)
@@ -61,7 +61,9 @@ class Variations:
     def run(
         self, design: Design, chamber: Chamber | None = None, replicas: Sequence[Replica] = ()
     ) -> Evaluation:
-        """Evaluate a changed design. InputError or an error of sim_core if it cannot be simulated.
+        """Evaluate a changed design.
+
+        Raises InputError or an error of sim_core if it cannot be simulated.
 
         Args:
             chamber: the chamber of the changed design; None where it is the same.
