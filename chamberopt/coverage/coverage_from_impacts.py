@@ -131,7 +131,7 @@ def coverage_from_dent_density(dent_density: np.ndarray) -> np.ndarray:
 
 
 def in_batches(replicas: Sequence[T]) -> list[Sequence[T]]:
-    """Divide replicas into at most MAX_BATCHES batches whose sizes differ by at most 1.
+    """Divide the list of replicas into at most MAX_BATCHES parts whose lengths differ by at most 1.
 
     >>> in_batches("abc")
     ['a', 'b', 'c']

@@ -51,7 +51,7 @@ def dents_on_part(impacts: ImpactLog, chamber: Chamber, design: Design) -> Dents
 def dent_diameter(
     normal_speed: np.ndarray, diameter: float | np.ndarray, density: float, material: PartMaterial
 ) -> np.ndarray:
-    """Diameter of the dent that a ball leaves: d = 1.278 D (1 - e²)^¼ (rho v² / B)^¼.
+    """Return the diameter of the dent that a ball leaves: d = 1.278 D (1 - e²)^¼ (rho v² / B)^¼.
 
     The energy that the impact loses makes a spherical cap in the material.
 
@@ -79,19 +79,23 @@ def dent_diameter(
 
 
 def ball_diameters(impacts: ImpactLog, design: Design) -> float | np.ndarray:
-    """Diameter [m] of the ball of each impact, (n,), or one number if all balls are alike."""
+    """Return the diameter [m] of the ball of each impact, (n,), or one number if all balls are
+    alike.
+    """
     shot = design.shot
     return shot.diameter if shot.mix is None else np.array(shot.diameters)[impacts.ball]
 
 
 def dent_diameters(impacts: ImpactLog, design: Design) -> np.ndarray:
-    """Diameter [m] of the dent that each impact would leave on the part, (n,)."""
+    """Return the diameter [m] of the dent that each impact would leave on the part, (n,)."""
     diameters, density = ball_diameters(impacts, design), design.shot.density
     return dent_diameter(impacts.normal_speed, diameters, density, design.simulated.materials.part)
 
 
 def impact_angle_deg(velocity: np.ndarray, normal_speed: np.ndarray) -> np.ndarray:
-    """Angle between the path of the incoming ball and the surface: 90 is head on, 0 grazing.
+    """Return the angle between the path of the incoming ball and the surface.
+
+    An angle of 90 is head on, 0 is grazing.
 
     >>> impact_angle_deg(np.array([[1.0, 0.0, -1.0]]), np.array([1.0]))
     array([45.])

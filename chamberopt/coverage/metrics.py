@@ -61,7 +61,7 @@ class ObjectiveFunction:
 
 
 def exposed_target(chamber: Chamber) -> np.ndarray:
-    """Mark the part triangles of the target that bound the cavity, (m,) bool."""
+    """Return marks of the part triangles that are on the target and bound the cavity, (m,) bool."""
     return chamber.part.target & (chamber.exposed_area > 0.0)
 
 

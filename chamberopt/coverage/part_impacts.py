@@ -52,7 +52,7 @@ class Hits:
 
 @dataclass(frozen=True)
 class TargetImpacts:
-    """The impacts of some replicas on the exposed target."""
+    """The impacts of some replicas on those triangles of the target that bound the cavity."""
 
     hits: tuple[Hits, ...]  # of each replica
     time: float  # simulated time of the impacts [s]
@@ -129,7 +129,7 @@ def save_hits(path: Path, hits: HitsByTriangle) -> None:
 
 
 def load_hits(path: Path) -> HitsByTriangle:
-    """Read impacts that `save_hits` wrote.
+    """Read the impacts from an .npz file that `save_hits` wrote.
 
     Raises:
         InputError: the file is missing, damaged, or not written by this version.
@@ -145,7 +145,9 @@ def load_hits(path: Path) -> HitsByTriangle:
 
 
 def _require_sound(first: np.ndarray, columns: dict[str, np.ndarray]) -> None:
-    """Raise ValueError unless `first` is a list of rows and the columns describe impacts."""
+    """Raise ValueError unless `first` holds the first row of each triangle and the columns hold
+    impacts.
+    """
     if first.dtype != np.int64 or first.ndim != 1 or not len(first) or first[0] != 0:
         raise ValueError("first is no list of rows from 0")
     if (np.diff(first) < 0).any():
@@ -154,7 +156,9 @@ def _require_sound(first: np.ndarray, columns: dict[str, np.ndarray]) -> None:
 
 
 def require_impacts(columns: dict[str, np.ndarray], count: int) -> None:
-    """Raise ValueError unless `count` impacts have columns of the types and ranges of Hits."""
+    """Raise ValueError unless the columns have `count` rows of the types and ranges that impacts
+    have.
+    """
     for name, column in columns.items():
         shape = (count, 3) if name == "place" else (count,)
         if column.dtype != np.float32 or column.shape != shape:

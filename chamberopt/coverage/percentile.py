@@ -8,8 +8,9 @@ the remaining error. The step from this result to the result of all replicas is 
 the interval includes it. The method asks for about 25 dents in a window. The 95th percentile, which
 is too high, is corrected alike.
 
-Notation: as in coverage_intervals.py. The exposure M = x / ln 50 is the peening time over the time
-in which a place with as many dents is 98 % covered by Avrami's equation: M = 2 is "200 %".
+Notation: the dent density x is the expected sum of the shares of a window that dents take. The
+exposure M = x / ln 50 is the peening time over the time in which a place with as many dents is 98 %
+covered by Avrami's equation: M = 2 is "200 %".
 """
 
 from __future__ import annotations

@@ -33,10 +33,10 @@ class CreasePieces(NamedTuple):
 def crease_pieces(
     creases: Creases, mesh: TriangleMesh, ball_radius: float, radius: float
 ) -> CreasePieces:
-    """Divide creases into pieces and keep the pieces that a ball can touch.
+    """Divide creases into short pieces, and return the pieces that a ball can touch.
 
     Args:
-        mesh: of the chamber.
+        mesh: surface of the chamber.
         ball_radius: [m].
         radius: of the windows [m].
     """

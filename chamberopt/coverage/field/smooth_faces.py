@@ -68,7 +68,7 @@ class Faces(NamedTuple):
 
 
 class Creases(NamedTuple):
-    """Convex edges of the target at which the surface turns sharply.
+    """Creases: convex edges at which the surface of the target turns sharply.
 
     Attributes:
         ends: of each edge [m], shape (e, 2, 3).

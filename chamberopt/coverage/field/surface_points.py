@@ -119,7 +119,7 @@ def morton(places: np.ndarray) -> np.ndarray:
 def ball_fits(
     mesh: TriangleMesh, place: np.ndarray, normal: np.ndarray, radius: float
 ) -> np.ndarray:
-    """Mark the places on the surface of the cavity where a ball fits, (p,) bool.
+    """Return for each place on the surface of the cavity whether a ball fits there, (p,) bool.
 
     Args:
         mesh: the surface of the cavity.

@@ -50,7 +50,7 @@ MAX_PIECES, MAX_PIECES_OFF_TARGET = 3e6, 4e5  # pieces off the target are only f
 
 
 class WindowSetting(NamedTuple):
-    """Settings of the windows that do not depend on the chamber.
+    """The size and number of the measuring windows, and the balls and dents that they are for.
 
     Attributes:
         gauge: area of a window [m²].
@@ -234,7 +234,7 @@ class TargetField:
 
 
 def require_wide_gauge(chamber: Chamber, setting: WindowSetting) -> None:
-    """Raise InputError if the windows are too small for so large a target."""
+    """Raise InputError if windows are so small that the target would take too many pieces."""
     area, gauge = float(chamber.part.area[chamber.part.target].sum()), setting.gauge
     wanted = PIECES_PER_WINDOW * area / gauge
     if wanted > MAX_PIECES:
@@ -246,7 +246,7 @@ def require_wide_gauge(chamber: Chamber, setting: WindowSetting) -> None:
 
 
 def require_narrow_gauge(chamber: Chamber, setting: WindowSetting) -> None:
-    """Raise InputError if the windows are too wide to show differences in the target."""
+    """Raise InputError if the windows are too wide to show differences within the target."""
     area, gauge = float(chamber.part.area[chamber.part.target].sum()), setting.gauge
     if gauge * MIN_WINDOWS > area:
         raise InputError(
@@ -257,7 +257,7 @@ def require_narrow_gauge(chamber: Chamber, setting: WindowSetting) -> None:
 
 
 def require_touchable_zones(chamber: Chamber, mesh: TriangleMesh, ball: float) -> None:
-    """Raise InputError for a zone of the part that no ball of a radius [m] can touch.
+    """Raise InputError for a zone of the part that no ball with the radius `ball` [m] can touch.
 
     The test takes POINTS_OF_ZONE points. Less than a thousandth of a zone would give no figures.
     """
@@ -277,7 +277,7 @@ def find_target_field(chamber: Chamber, mesh: TriangleMesh, setting: WindowSetti
     """Return a chamber's target with all that is needed to measure coverage in windows on it.
 
     Args:
-        mesh: of the chamber.
+        mesh: surface of the chamber.
     """
     from chamberopt.coverage.field.window_areas import surface_pieces
 

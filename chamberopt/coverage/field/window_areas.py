@@ -38,7 +38,7 @@ FAR_SIDE = -0.9  # cosine of the angle beyond which a piece is the far side of a
 
 
 class SurfacePieces(NamedTuple):
-    """Pieces of a surface.
+    """Triangular pieces of the part's surface, and the share of each that a ball can touch.
 
     Attributes:
         corners: [m], shape (c, 3, 3).
@@ -63,7 +63,7 @@ def surface_pieces(
     Args:
         corners: corner [m] and normal of the surface that a ball touches there, shape (m, 3, 6).
         face: smooth face of each triangle, shape (m,).
-        mesh: of the chamber.
+        mesh: surface of the chamber.
         ball_radius: [m].
         longest: longest side that a piece may have [m].
     """

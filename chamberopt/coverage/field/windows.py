@@ -307,7 +307,8 @@ def add_to_levels(point, contact, size, level, histogram):  # type: ignore[no-un
 
 @jit
 def multiply_products(products, point, weight, scales):  # type: ignore[no-untyped-def]
-    """Multiply products[point, k] by 1 - scales[k] weight for each pair of point and weight.
+    """For each pair of a window `point` and the share `weight` of it that a dent takes, multiply
+    products[point, k] by 1 - scales[k] weight.
 
     A factor is at least 0. Negative factors would leave the mean without bias, but if a dent takes
     more than a window the product would grow beyond all bounds.
