@@ -132,18 +132,18 @@ class Run:
 
     @property
     def is_biased(self) -> bool:
-        """Whether the bias differs from 0 by more than its interval."""
+        """True if the bias differs from 0 by more than its interval."""
         return abs(self.bias.value) > self.bias.half_width
 
     @property
     def max_bias(self) -> float:
-        """Absolute bias at the far end of its interval."""
+        """The larger absolute value of the two ends of the bias's interval."""
         return max(self.bias.high, -self.bias.low)
 
 
 @dataclass(frozen=True)
 class ConvergenceStudy:
-    """The result of a convergence study."""
+    """The runs with coarser parameters, their reference, and the errors of batches of replicas."""
 
     design: Design
     settings: dict[str, Any]  # of the reference, by parameter

@@ -169,7 +169,7 @@ def with_effects_resolved(
 
 @dataclass
 class _Pilot:
-    """Short runs of a design with some of its effects switched."""
+    """Short runs of a design as it is, and with some of its effects switched on or off."""
 
     design: Design
     chamber: Chamber

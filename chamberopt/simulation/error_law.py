@@ -24,7 +24,7 @@ NORMAL = 1.96  # half-width of a 95 % interval, in standard errors
 
 @dataclass(frozen=True)
 class BatchSize:
-    """The errors of batches of one size."""
+    """The errors of the objective from batches with the same number of replicas each."""
 
     replicas: int  # number of replicas in a batch
     batches: int
@@ -35,7 +35,7 @@ class BatchSize:
 
     @property
     def error(self) -> float:
-        """Half-width of a 95 % interval of normal errors with this root mean square."""
+        """Half-width of a 95 % interval of the objective, if errors are normal with this RMS."""
         return NORMAL * self.rms
 
     @property

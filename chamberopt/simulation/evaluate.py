@@ -81,7 +81,7 @@ def evaluate(
     cavity: AnalyticCavity | None = None,
     known: ReplicaSet | None = None,
 ) -> Evaluation:
-    """Simulate a candidate in independent replicas and estimate its objective and metrics.
+    """Simulate a candidate design in independent replicas and estimate its objective and metrics.
 
     The result does not depend on the number of workers: replicas are added in order, and their
     results, never a clock, decide how many there are.

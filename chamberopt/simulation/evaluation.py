@@ -78,7 +78,9 @@ def require_triangles(evaluation: Evaluation, triangles: int) -> None:
 
 
 def _require_sound(found: Evaluation) -> None:
-    """Raise ValueError unless all values have the types, lengths and ranges of an evaluation."""
+    """Raise ValueError unless all values have types, lengths and ranges that an evaluation can
+    have.
+    """
     if not is_of_type(found, Evaluation):
         raise ValueError("a value is of another type")
     names = {*found.metrics, *found.metrics_of_wide}

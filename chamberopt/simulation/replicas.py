@@ -86,9 +86,10 @@ def run_in_order(
     numbers: Sequence[int],
     ahead: int,
 ) -> Iterator[T]:
-    """Yield task(setting, seed of the replica) for each number, in order, run on the workers.
+    """Yield the results of `task`, one for each replica's number, in order. The tasks run on the
+    workers.
 
-    The results do not depend on the number of workers.
+    Each is task(setting, seed of the replica). The results do not depend on the number of workers.
 
     Args:
         setting: the argument that all tasks share, as executor.share returns it.
@@ -146,7 +147,9 @@ def next_replica_count(done: int, half_width: float, wanted: float, maximum: int
 
 
 def simulate_replica(setting: ReplicaSetting, seed: int) -> Replica:
-    """Simulate one replica with this seed. It runs on a worker."""
+    """Simulate one replica with this seed, and return its impacts on the part and its resting
+    balls.
+    """
     design, chamber, mesh = setting
     result = simulate_seed(design, chamber, mesh, seed)
     impacts, part_turns = result.impacts, design.effects.part_turn is not None

@@ -32,7 +32,7 @@ MIN_BOUNCING_SHARE = 0.1  # share of the shot from which on there is a note
 
 @dataclass(frozen=True)
 class RestingBalls:
-    """The balls at rest at the end of a replica."""
+    """The share of the balls at rest at the end of a replica, and where they lie in words."""
 
     share: float  # their share of the shot
     line: str  # their number, what holds them and where, in words
