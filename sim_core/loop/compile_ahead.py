@@ -26,7 +26,10 @@ FIRST_SET, FURTHER_SET = 200, 50
 
 
 def _marker(physics: Physics, balls: int, alike: bool, cylinder: bool) -> Path:
-    """File that marks a set of effects as compiled. Each set has its own machine code."""
+    """Return the path of the file whose existence says that a set of effects is compiled.
+
+    Each set has its own machine code.
+    """
     effects = {**physics._asdict(), **physics.surface._asdict()}
     present = [name for name, effect in effects.items() if effect is not None]
     kind = ["many" if balls >= MIN_BALLS else "few", "alike" if alike else "mixed"]
@@ -38,7 +41,10 @@ def _marker(physics: Physics, balls: int, alike: bool, cylinder: bool) -> Path:
 
 
 def is_compiled(physics: Physics, balls: int, alike: bool = True, cylinder: bool = False) -> bool:
-    """True if compile_simulator has compiled this set before, with this version of the sources."""
+    """Return True if the code for a scene with these effects has been compiled before.
+
+    Only code from this version of the sources counts. The arguments are those of compile_simulator.
+    """
     return _marker(physics, balls, alike, cylinder).exists()
 
 
@@ -105,7 +111,10 @@ def compile_simulator(
 
 @contextlib.contextmanager
 def _few_collections() -> Iterator[None]:
-    """Have Python look for garbage rarely. The compiler's objects last, and looking took 7 %."""
+    """Let Python collect garbage rarely in this context.
+
+    The compiler's objects last, and the search for garbage took 7 % of the time.
+    """
     before = gc.get_threshold()
     gc.set_threshold(max(before[0], 100_000), 50, 1000)
     try:
@@ -117,7 +126,10 @@ def _few_collections() -> Iterator[None]:
 def _with_a_turning_box(
     physics: Physics, vertices: np.ndarray, triangles: np.ndarray, tags: np.ndarray
 ) -> tuple[Physics, np.ndarray, np.ndarray, np.ndarray]:
-    """The cube with a small turning box in a corner."""
+    """Add a small turning box in a corner of the cube in which code is compiled.
+
+    Returns: effects, vertices [m], triangles and tags of the cube with the box.
+    """
     turn = physics.part_rotation
     assert turn is not None
     shaken = [one.tag for one in physics.vibrations]

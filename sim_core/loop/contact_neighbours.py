@@ -1,7 +1,8 @@
-"""Pairs with a ball in contact, and waking the neighbours of a ball that begins to move.
+"""Find meetings with balls that roll or rest, and wake neighbours of a ball that begins to move.
 
-Balls in contact do not fly along straight lines in the free-fall frame. The filter of neighbours.py
-leaves them out, and they are examined here individually and exactly.
+Balls in contact (they roll or rest on a surface or on balls) do not fly along straight lines in the
+free-fall frame. The filter of neighbours.py leaves them out, and they are examined here
+individually and exactly.
 """
 
 import numpy as np
@@ -26,7 +27,7 @@ MAX_JAM_GAP = 2e-5
 
 @inlined
 def hide(contact: ContactState | None, neighbours: NeighbourFilter | None, ball: int) -> None:
-    """Leave a ball in contact out of the filter: as NaN it meets no other ball."""
+    """Leave a ball that rolls or rests out of the filter: as NaN it meets no other ball."""
     if contact is None or neighbours is None:
         return
     if contact.mode[ball] != FLYING:
@@ -35,7 +36,7 @@ def hide(contact: ContactState | None, neighbours: NeighbourFilter | None, ball:
 
 @jit
 def hide_all(contact: ContactState | None, neighbours: NeighbourFilter | None) -> None:
-    """Leave all balls in contact out of the filter, at a window's start."""
+    """Leave all balls that roll or rest out of the filter, after all paths were copied into it."""
     if contact is None or neighbours is None:
         return
     for k in range(contact.contact_list.length[0]):
@@ -51,9 +52,10 @@ def first_meeting(
     time: float,
     before: float,
 ) -> tuple[float, int]:
-    """Time [s] and partner of the first meeting with any ball, in flight or in contact.
+    """Return time [s] and partner of the ball's first meeting with any ball before ``before``.
 
-    The result is as in next_meeting.
+    The partner may fly, roll or rest. Without a meeting it is -1, and the time is the one up to
+    which there is certainly no meeting [s].
     """
     if contact is None:
         return next_meeting(neighbours, motion, ball, time, before)
@@ -75,9 +77,10 @@ def _with_contact(
     meeting: float,
     partner: int,
 ) -> tuple[float, int]:
-    """The earlier of a meeting with a ball in flight and the meetings with balls in contact.
+    """Return the earlier of a known meeting with a flying ball and those with balls in contact.
 
-    For a ball in contact, the result is the earliest meeting with any ball.
+    ``meeting`` [s] and ``partner``, -1 for none, are the known meeting. For a ball that rolls or
+    rests itself, the result is the earliest meeting with any ball.
     """
     best = min(meeting, before) - time
     here = place(contact, motion, ball, time)
@@ -118,7 +121,7 @@ def wake_if_it_moves(
 def wake_neighbours(
     contact: ContactState, queue: EventQueue, motion: np.ndarray, event: BallEvent
 ) -> None:
-    """Wake the balls on a ball that has begun to move, and balls held still beside it.
+    """Wake the balls that stand on a ball that has begun to move, and balls held still beside it.
 
     The balls are marked as well: a ball that is met at this very time has its events predicted
     again, and the wake-up must not be lost with the old events.
@@ -144,7 +147,7 @@ def wake_neighbours(
 def _is_near(
     contact: ContactState, motion: np.ndarray, ball: int, time: float, position: Vec3
 ) -> bool:
-    """True if a ball is so near to another ball at ``position`` [m] that it may hold it."""
+    """Return True if a ball is near enough to one at ``position`` [m] to hold it."""
     apart = sub(place(contact, motion, ball, time).position, position)
     return dot(apart, apart) < (contact.reach + MAX_JAM_GAP) ** 2
 
@@ -159,11 +162,12 @@ def _drop_supports_on(contact: ContactState, ball: int, other: int) -> None:
 
 @jit
 def count_neighbours(contact: ContactState, motion: np.ndarray, event: BallEvent) -> bool:
-    """Note the balls around a jammed ball, if any of them moves.
+    """Note which balls are around a jammed ball: their count, and the sum of their numbers.
 
-    Once a neighbour has gone, the ball may have lost its hold.
+    The count is noted as 0 if none of them moves. Once a neighbour has gone, the ball may have lost
+    its hold.
 
-    Returns: True if the neighbours are not the noted ones.
+    Returns: True if count or sum differ from what was noted before.
     """
     ball, jams = event.ball, contact.jams
     here = place(contact, motion, ball, event.time).position

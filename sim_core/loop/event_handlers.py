@@ -79,7 +79,7 @@ def _resolve_contact(
     law: RestitutionState | None,
     approach: float,
 ) -> Vec3:
-    """Velocity change [m/s], in the room's frame, of a ball that hits a surface and bounces.
+    """Return the velocity change [m/s] of a ball that bounces off a surface, in the room's frame.
 
     Args:
         rotation: rotation of the part, if the surface belongs to a turning part.
@@ -104,7 +104,7 @@ def _resolve_contact(
 
 @inlined
 def _in_room(rotation: RotationState | None, vector: Vec3, time: float) -> Vec3:
-    """Transform a vector from the surface's frame to the room's frame."""
+    """Return a vector of a surface's frame in the room's frame, at ``time`` [s]."""
     if rotation is None:
         return vector
     return to_room_frame(rotation, vector, time)
@@ -132,7 +132,10 @@ def _here(state: SimulationState, event: BallEvent) -> BallState:
 
 @inlined
 def hit_surface(state: SimulationState, event: BallEvent) -> Impact:
-    """Resolve a hit on a still or vibrating surface: change the velocity and count the hit."""
+    """Resolve a hit on a still or vibrating surface: change the velocity and count the hit.
+
+    Returns: the impact for the log. Its normal speed is 0 if the ball only rolls on.
+    """
     obstacles, ball = state.obstacles, event.ball
     tree, obstacle = obstacles.tree, int(np.int64(state.queue.obstacle[ball]))
     here = _here(state, event)
@@ -176,7 +179,10 @@ def hit_surface(state: SimulationState, event: BallEvent) -> Impact:
 def hit_part(
     rotation: RotationState | None, part: PartTree | None, state: SimulationState, event: BallEvent
 ) -> Impact:
-    """Resolve a hit on the turning part. The impact is logged in the part's frame."""
+    """Resolve a hit on the turning part: change the ball's velocity and count the hit.
+
+    Returns: the impact for the log, in the part's frame.
+    """
     if rotation is None or part is None:
         return no_impact()
     tree = part.tree
@@ -206,7 +212,7 @@ def hit_part(
 def collide(
     contact: ContactState | None, state: SimulationState, one: BallEvent, partner: int
 ) -> None:
-    """Resolve the meeting of two balls."""
+    """Resolve the meeting of two balls: change their velocities and count the collision."""
     motion, queue, time = state.motion, state.queue, one.time
     two = BallEvent(partner, time, one.time_since_start)
     state.counts[BALLS] += 1
@@ -243,7 +249,10 @@ def collide(
 def end_contact_path(
     contact: ContactState | None, state: SimulationState, event: BallEvent
 ) -> bool:
-    """Resolve a border, a stop or a wake-up of a ball in contact; False if its path goes on."""
+    """Resolve the end of a path of a ball that rolls or rests: a border, a stop or a wake-up.
+
+    Returns: False if its path goes on unchanged.
+    """
     if contact is None:
         return False
     reason = int(np.int64(state.queue.obstacle[event.ball]))
@@ -261,7 +270,10 @@ def end_contact_path(
 
 @inlined
 def _face_under(ride: Ride | None, state: SimulationState, event: BallEvent, at: BallState) -> int:
-    """Number of the face under a riding ball; -1 if the ball is beside all faces of the plane."""
+    """Return the number of the face under a ball that rides on a sonotrode.
+
+    It is -1 if the ball is beside all faces in the sonotrode's plane.
+    """
     if ride is None:
         return -1
     tree, overlap = state.obstacles.tree, state.obstacles.face_overlap
@@ -277,7 +289,7 @@ def _face_under(ride: Ride | None, state: SimulationState, event: BallEvent, at:
 
 @inlined
 def gives_up(contact: ContactState | None, queue: EventQueue, ball: int) -> bool:
-    """True for a ball in an unresolved jam, which contact mode must hold still."""
+    """Return True if a ball is in an unresolved jam, so that contact mode must hold it still."""
     if contact is None:
         return False
     if queue.events[ball] % JAM_EVENTS != 0 or contact.mode[ball] >= ASLEEP:

@@ -15,10 +15,12 @@ UNKNOWN = -2  # nothing has been predicted for this ball yet
 class Meetings(NamedTuple):
     """The next meeting of each of n balls with another ball.
 
-    time: time of the meeting [s on the window's clock], (n,), NEVER for none.
+    A window is a span of simulated time. The clock restarts from 0 at the start of each window.
+
+    time: time of the meeting [s since the window's start], (n,), NEVER for none.
     partner: the other ball, (n,) int32, -1 for none.
-    partner_path: the partner's path_number at the prediction of the meeting, (n,) int32. The
-        meeting is stale once the partner's number has changed.
+    partner_path: number of changes that the partner's path had had when the meeting was predicted,
+        (n,) int32. The meeting is stale, and will not happen, once that number has grown.
     """
 
     time: np.ndarray
@@ -27,13 +29,14 @@ class Meetings(NamedTuple):
 
 
 class EventQueue(NamedTuple):
-    """The next events of n balls.
+    """The next events of n balls. The clock restarts from 0 at the start of each window of time.
 
-    wall_time: time at which the ball meets an obstacle or its path ends [s on the window's clock],
-        (n,).
-    obstacle: the obstacle, or SEARCH_ON, UNKNOWN or the end of a path in contact, (n,) int32.
+    wall_time: time at which the ball meets an obstacle or its path ends [s since the window's
+        start], (n,).
+    obstacle: number of the obstacle; or SEARCH_ON, UNKNOWN or the negative number of a reason why
+        the path of a rolling or resting ball ends, (n,) int32.
     path_number: number of changes of the ball's path, (n,) int32.
-    events: events of the ball in this window, (n,) int32.
+    events: number of events of the ball in this window, (n,) int32.
     meetings: None if balls do not collide with one another.
     next_time: the earlier of wall time and meeting time [s], (m,), padded with NEVER. m is the next
         power of two.
@@ -50,7 +53,10 @@ class EventQueue(NamedTuple):
 
 
 def new_event_queue(balls: int, pairs: bool = True) -> EventQueue:
-    """A queue in which every ball is due at once to search for its next event."""
+    """Return a queue in which every ball is due at once to search for its next event.
+
+    ``pairs``: True if balls can meet each other.
+    """
     leaves = 1
     while leaves < balls:
         leaves *= 2
@@ -78,7 +84,7 @@ def new_event_queue(balls: int, pairs: bool = True) -> EventQueue:
 
 @inlined
 def meeting_time(meetings: Meetings | None, ball: int) -> float:
-    """Time of the ball's next meeting [s]; NEVER if balls do not meet."""
+    """Return the time of the ball's next meeting with a ball [s], or NEVER if balls do not meet."""
     if meetings is None:
         return NEVER
     return float(meetings.time[ball])
@@ -102,7 +108,10 @@ def _shift_meetings(meetings: Meetings | None, window: float) -> None:
 
 @inlined
 def reschedule(queue: EventQueue, ball: int) -> None:
-    """Enter the ball's earlier event and replay its matches. The lower ball wins a tie."""
+    """Note the earlier of the ball's two predicted events, and replay its tournament matches.
+
+    The earlier event wins a match, and in a tie the ball with the lower number.
+    """
     queue.next_time[ball] = min(meeting_time(queue.meetings, ball), queue.wall_time[ball])
     match = (len(queue.next_time) + ball) // 2
     while match >= 1:
@@ -114,13 +123,16 @@ def reschedule(queue: EventQueue, ball: int) -> None:
 
 @jit
 def forget_events(queue: EventQueue, ball: int, time: float) -> None:
-    """Drop the predictions for the ball. It is due now to search again."""
+    """Drop the predictions for the ball. It searches again at ``time`` [s], which is now."""
     schedule_now(queue, ball, time, UNKNOWN)
 
 
 @jit
 def schedule_now(queue: EventQueue, ball: int, time: float, what: int) -> None:
-    """Make an event of kind ``what`` (see EventQueue.obstacle) the ball's next event, now."""
+    """Make an event of kind ``what`` the ball's next event, at ``time`` [s], which is now.
+
+    ``what``: a value that EventQueue.obstacle can have.
+    """
     _forget_meeting(queue.meetings, ball)
     queue.wall_time[ball] = time
     queue.obstacle[ball] = what
@@ -129,7 +141,7 @@ def schedule_now(queue: EventQueue, ball: int, time: float, what: int) -> None:
 
 @jit
 def search_wall_again(queue: EventQueue, ball: int, time: float) -> None:
-    """Have the ball search again, now, for the end of its own path. Its meeting stands."""
+    """Let the ball search again, now, for the end of its own path. Its predicted meeting stays."""
     queue.wall_time[ball] = time
     queue.obstacle[ball] = SEARCH_ON
     reschedule(queue, ball)
@@ -137,7 +149,10 @@ def search_wall_again(queue: EventQueue, ball: int, time: float) -> None:
 
 @jit
 def shift_queue(queue: EventQueue, window: float) -> None:
-    """Move the clock's zero of the queue forward by ``window`` [s]. The order of events stays."""
+    """Subtract the window's length [s] from all times, and set the counts of events to 0.
+
+    This is done when a new window begins. The order of events stays.
+    """
     _shift_meetings(queue.meetings, window)
     for ball in range(len(queue.wall_time)):
         queue.wall_time[ball] -= window

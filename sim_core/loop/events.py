@@ -89,7 +89,8 @@ NEVER_BEFORE = 1e300  # finite, so that differences with it stay numbers
 def advance(state: SimulationState) -> tuple[int, int]:
     """Simulate until ``clock.stop``, or until an event stops the loop.
 
-    Returns: the reason for the stop (see the status values above), and its ball, -1 for any ball.
+    Returns: the reason for the stop (DONE, BUFFER_FULL, TOO_MANY_EVENTS, TOO_FAST or HAS_LEFT), and
+        the number of the ball that caused it, -1 for no single ball.
     """
     queue, clock, buffer = state.queue, state.clock, state.buffer
     event_limit = EVENT_LIMIT * clock.window
@@ -174,7 +175,7 @@ def advance(state: SimulationState) -> tuple[int, int]:
 
 @inlined
 def _begin_window(state: SimulationState) -> None:
-    """Begin the next window of the clock."""
+    """Begin the next time window: make all times and paths of the state count from its start."""
     window = state.clock.window
     shift_motion(state.motion, window, state.gravity, state.contact)
     shift_sorting(state.neighbours)
@@ -190,7 +191,7 @@ def _begin_window(state: SimulationState) -> None:
 
 @jit
 def _sort_neighbours(state: SimulationState, time: float) -> None:
-    """Read the paths of all balls again, and sort many balls into blocks."""
+    """Copy the paths of all balls into the filter anew, and sort many balls into blocks."""
     put_back(state.sides, state.motion, time)
     refresh_neighbours(state.neighbours, state.motion, time)
     hide_all(state.contact, state.neighbours)
@@ -198,7 +199,7 @@ def _sort_neighbours(state: SimulationState, time: float) -> None:
 
 @inlined
 def _kind_of_event(meetings: Meetings | None, state: SimulationState, ball: int) -> tuple[int, int]:
-    """Kind of the ball's next event, and the ball that it meets (or -1)."""
+    """Return the kind of the ball's next event, and the ball that it meets, -1 for none."""
     queue = state.queue
     if gives_up(state.contact, queue, ball):
         return HOLD, -1
@@ -213,7 +214,10 @@ def _kind_of_event(meetings: Meetings | None, state: SimulationState, ball: int)
 
 @inlined
 def _move(state: SimulationState, event: BallEvent, kind: int, partner: int) -> None:
-    """Take the balls of an event to its time. Paths need no step, but drag is caught up."""
+    """Apply the drag that the balls of an event have met up to its time.
+
+    Nothing else has to be moved, because paths are functions of time.
+    """
     in_contact = kind == PATH_ENDS and not is_flying(state.contact, event.ball)
     moves = kind in (MEETING, SURFACE) or in_contact
     ball = event.ball if moves else -1
@@ -245,7 +249,7 @@ def _log_meeting(
 
 @inlined
 def _note_path(state: SimulationState, ball: int, time: float) -> None:
-    """Tell the neighbour filter and the queue that a ball has another path."""
+    """Tell the neighbour filter and the queue that a ball has another path from ``time`` [s] on."""
     follow(state.neighbours, state.motion, ball, time)
     hide(state.contact, state.neighbours, ball)
     state.queue.path_number[ball] += 1
@@ -259,7 +263,7 @@ def _speed_squared(state: SimulationState, ball: int) -> float:
 
 @inlined
 def _has_left(state: SimulationState, ball: int, time: float) -> bool:
-    """True for a ball outside the chamber's bounding box.
+    """Return True if a ball is outside the chamber's bounding box at ``time`` [s].
 
     A ball that has left meets no more surfaces. It is enough to check a ball that met no surface on
     a whole piece of its path.
@@ -274,7 +278,10 @@ def _has_left(state: SimulationState, ball: int, time: float) -> bool:
 
 @inlined
 def _predict(state: SimulationState, ball: int, time: float, what: int) -> None:
-    """Find the ball's next events from ``time`` on and enter the earlier event in the queue."""
+    """Find the ball's next events from ``time`` [s] on and enter the earlier event in the queue.
+
+    ``what``: PAIRS for its meeting with a ball, WALL for the end of its own path, or ALL for both.
+    """
     queue = state.queue
     if what != WALL:
         _predict_meeting(state.neighbours, queue.meetings, state, ball, time, what)
@@ -296,7 +303,7 @@ def _predict_meeting(
     time: float,
     what: int,
 ) -> None:
-    """Find the ball's next meeting with a ball, if balls meet."""
+    """Find the ball's next meeting with a ball, if balls meet, and write it into ``meetings``."""
     if neighbours is None or meetings is None:
         return
     queue = state.queue
@@ -310,7 +317,7 @@ def _predict_meeting(
 
 @inlined
 def _until_meeting(meetings: Meetings | None, ball: int, time: float) -> float:
-    """Duration [s] of the search for a wall: until the ball's known meeting, or for one piece."""
+    """Return how long [s] to search for a wall: until the ball's known meeting, at most PIECE."""
     if meetings is None:
         return PIECE
     return min(PIECE, meetings.time[ball] - time) if meetings.partner[ball] >= 0 else PIECE
@@ -318,7 +325,10 @@ def _until_meeting(meetings: Meetings | None, ball: int, time: float) -> float:
 
 @inlined
 def _predict_wall(state: SimulationState, ball: int, time: float) -> None:
-    """Find the next obstacle of the ball, or another end of its path."""
+    """Find the obstacle that the ball meets next, or another end of its path.
+
+    Write it into the queue.
+    """
     queue, clock, obstacles = state.queue, state.clock, state.obstacles
     face_overlap = face_overlap_of_ball(state.sizes, obstacles.face_overlap, ball)
     event = BallEvent(ball, time, clock.now[1] * clock.window + time)
@@ -369,7 +379,7 @@ def _predict_wall(state: SimulationState, ball: int, time: float) -> None:
 
 @jit
 def _oscillation_time(wave: Wave | None) -> float:
-    """A little more than a period [s] of the slowest sonotrode; 0 without one."""
+    """Return a little more than a period [s] of the slowest sonotrode, or 0 without a sonotrode."""
     if wave is None:
         return 0.0
     return 2.02 * math.pi / wave.omega

@@ -1,6 +1,7 @@
 """Logs of the shot's impacts on the recorded surfaces and, on request, of collisions between balls.
 
-Both logs have one array a quantity, and a buffer that the compiled loop fills.
+Each log has one array for each quantity. The compiled event loop writes into buffers of a fixed
+size, whose rows are copied into a log when a buffer is full.
 """
 
 from dataclasses import dataclass
@@ -19,7 +20,7 @@ BUFFER_SIZE = 65_536  # rows that the compiled loop writes before it hands them 
 
 
 class Impact(NamedTuple):
-    """A hit on a surface, in the frame of that surface. A speed of 0 means no hit.
+    """A hit of a ball on a surface, in the surface's frame. A normal speed of 0 means no hit.
 
     tag: tag of the surface.
     triangle: a triangle of the flat face that was hit.
@@ -38,7 +39,9 @@ class Impact(NamedTuple):
 
 
 class ImpactBuffer(NamedTuple):
-    """Buffer of impacts that the compiled loop writes: arrays of BUFFER_SIZE rows, see ImpactLog.
+    """Arrays of BUFFER_SIZE rows into which the compiled loop writes impacts, one row an impact.
+
+    The columns are described at ImpactLog.
 
     filled: number of rows written, (1,).
     record: True if the surface of a tag is recorded, (MAX_TAGS,) bool.
@@ -55,7 +58,7 @@ class ImpactBuffer(NamedTuple):
 
 
 def new_impact_buffer(record: np.ndarray) -> ImpactBuffer:
-    """An empty buffer for the tags marked in ``record`` (MAX_TAGS,) bool."""
+    """Return an empty buffer. ``record``: True for each tag to be recorded, (MAX_TAGS,) bool."""
     return ImpactBuffer(
         time=np.zeros(BUFFER_SIZE),
         ball=np.zeros(BUFFER_SIZE, dtype=np.int32),
@@ -70,7 +73,7 @@ def new_impact_buffer(record: np.ndarray) -> ImpactBuffer:
 
 @inlined
 def no_impact() -> Impact:
-    """The impact of an event that is not a hit on a surface."""
+    """Return an Impact with normal speed 0, for an event that is not a hit on a surface."""
     zero = Vec3(0.0, 0.0, 0.0)
     return Impact(0, 0, zero, zero, zero, 0.0)
 
@@ -79,7 +82,10 @@ def no_impact() -> Impact:
 def log_impact(
     buffer: ImpactBuffer, event: BallEvent, origin: float, impact: Impact, lookup: TriangleLookup
 ) -> None:
-    """Log an impact if its surface is recorded. ``origin``: zero of the impact times [s]."""
+    """Write an impact into the buffer if its surface is recorded.
+
+    ``origin``: end of the warm-up, from which logged times count [s since the start].
+    """
     if not (impact.normal_speed > 0.0 and buffer.record[impact.tag]):
         return
     row = buffer.filled[0]
@@ -118,12 +124,14 @@ class ImpactLog:
         return len(self.time)
 
     def only(self, rows: np.ndarray) -> "ImpactLog":
-        """The impacts that ``rows`` selects, as a mask (n,) bool or as indices."""
+        """Return a log of the impacts that ``rows`` selects, a mask (n,) bool or indices."""
         return ImpactLog(**{name: column[rows] for name, column in vars(self).items()})
 
 
 class CollisionBuffer(NamedTuple):
-    """Buffer of collisions that the compiled loop writes, BUFFER_SIZE rows; see CollisionLog.
+    """Arrays of BUFFER_SIZE rows into which the compiled loop writes collisions of two balls.
+
+    The columns are described at CollisionLog.
 
     filled: number of rows written, (1,).
     record: True if collisions are logged now, (1,) bool.
@@ -141,7 +149,7 @@ class CollisionBuffer(NamedTuple):
 
 
 def new_collision_buffer(wanted: bool) -> CollisionBuffer | None:
-    """An empty buffer that is not written to yet; None unless wanted."""
+    """Return an empty buffer whose logging is still off. Return None unless ``wanted``."""
     if not wanted:
         return None
     return CollisionBuffer(
@@ -159,15 +167,16 @@ def new_collision_buffer(wanted: bool) -> CollisionBuffer | None:
 
 @inlined
 def is_full(buffer: CollisionBuffer | None) -> bool:
-    """True if no further collision can be written."""
+    """Return True if the buffer has no row left for a further collision."""
     if buffer is None:
         return False
     return bool(buffer.filled[0] == len(buffer.time))
 
 
 class Collision(NamedTuple):
-    """Two balls that meet. It is not a collision if the balls are in touch and part.
+    """Two balls at the moment when they touch. It is not a collision if they already move apart.
 
+    one, two: numbers of the balls.
     position: point where the balls touch [m].
     apart: vector from ball one to ball two [m].
     velocity: velocity of ball two relative to ball one, before the collision [m/s].
@@ -182,7 +191,10 @@ class Collision(NamedTuple):
 
 @inlined
 def log_collision(buffer: CollisionBuffer, time: float, collision: Collision) -> None:
-    """Log a collision. ``time`` [s]: as in CollisionLog."""
+    """Write a collision into the buffer if collisions are logged now and the balls approach.
+
+    ``time``: [s] since the end of the warm-up.
+    """
     apart = collision.apart
     distance = np.sqrt(dot(apart, apart))
     speed = -dot(apart, collision.velocity) / distance
@@ -228,7 +240,7 @@ Log = TypeVar("Log", ImpactLog, CollisionLog)
 
 
 def empty_buffer(buffer: ImpactBuffer | CollisionBuffer, kind: type[Log]) -> Log:
-    """Copy the logged rows out of a buffer and empty it."""
+    """Return the rows of a buffer as a log of type ``kind``, and empty the buffer."""
     rows = int(buffer.filled[0])
     buffer.filled[0] = 0
     names = kind.__dataclass_fields__
@@ -236,7 +248,10 @@ def empty_buffer(buffer: ImpactBuffer | CollisionBuffer, kind: type[Log]) -> Log
 
 
 def joined(logs: list[Log], room: TriangleMesh | AnalyticCavity) -> Log:
-    """Several logs joined in order, with positions in the room."""
+    """Return one log with the rows of all logs, in order. Its positions [m] are those in the room.
+
+    The positions in ``logs`` are relative to the room's middle.
+    """
     kind = type(logs[0])
     names = kind.__dataclass_fields__
     whole = kind(**{name: np.concatenate([vars(log)[name] for log in logs]) for name in names})

@@ -18,7 +18,7 @@ SAME_FACING = 0.99  # cosine: triangles that face alike are one surface
 def jam_message(
     scene: Scene, corners: np.ndarray | None, positions: np.ndarray, ball: int, when: str
 ) -> str:
-    """Message with the cause of a jam and its remedy.
+    """Return an error message with the cause of a ball's jam and a remedy.
 
     Args:
         corners: present corners of the triangles [m], (m, 3, 3), if some triangles turn.
@@ -53,7 +53,7 @@ def jam_message(
 def touching(
     scene: Scene, corners: np.ndarray | None, positions: np.ndarray, ball: int
 ) -> tuple[str, bool]:
-    """Names of the surfaces and balls that touch a ball; True if the turning part touches it.
+    """Return the names of all that touches a ball, and True if the turning part touches it.
 
     Example of the names: "triangle 7, the turning part (triangle 12) and ball 3".
     """
@@ -73,9 +73,11 @@ def touching(
 def _surfaces(
     scene: Scene, corners: np.ndarray | None, here: np.ndarray, radius: float
 ) -> tuple[list[str], bool]:
-    """Names of the surfaces that touch a ball, nearest first; True if the turning part does.
+    """Find the surfaces that touch a ball.
 
     ``here``: position of the ball (1, 3) [m].
+
+    Returns: the names of the surfaces, nearest first, and True if the turning part is one of them.
     """
     physics = scene.physics
     if isinstance(scene.mesh, AnalyticCavity):

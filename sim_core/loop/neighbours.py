@@ -1,9 +1,10 @@
 """Search for balls that can meet: sixteen at a time through a float32 filter, then exactly.
 
 Notation: in the free-fall frame the paths of two balls are straight lines, whatever gravity is.
-b: difference of their base positions [m]. w: difference of their velocities [m/s]. The square of
-the distance at which the balls pass each other is b² - (b w)² / w², at any time. The balls still
-approach each other at time t while b w + t w² < 0.
+A base position is where such a line is at time 0 of the clock. b: difference of the base positions
+of two balls [m]. w: difference of their velocities [m/s]. The square of the distance at which they
+pass each other is b² - (b w)² / w², at any time. They still approach each other at time t while
+b w + t w² < 0.
 
 The filter keeps every pair whose paths could come within reach, rounding included. The pairs that
 pass the filter are decided in float64, so that results do not depend on the filter.
@@ -60,19 +61,19 @@ TINY = 1e-30  # replaces a velocity component of zero, whose inverse would be in
 
 
 class NeighbourFilter(NamedTuple):
-    """The paths of the balls in the precision of the filter.
+    """Float32 copies of the paths of all balls, and the data with which a search filters them.
 
     paths: base position and velocity, a column a ball, (6, m) float32, padded with NaN, which meets
         nothing.
     probe: data of the present search, (17,) float32: the column of the ball, the present time, the
         allowances for rounding, the end of the search, and the square of a distance within reach.
         simd.py describes the entries for periodic sides.
-    reach: sum of two radii [m]; of several sizes, the largest sum.
+    reach: distance of two centres at which balls touch [m]; with several sizes, the largest one.
     max_speed: speed up to which the margins for rounding hold [m/s].
-    window: length of a window [s].
-    blocks: None unless there are many balls.
+    window: length of a time window [s]. The clock restarts from 0 at the start of each window.
+    blocks: the balls sorted into blocks of neighbours; None unless there are many balls.
     radii: radii of balls of several sizes [m], (n,); None for one size.
-    sides: None unless the box is periodic.
+    sides: the sides of a periodic box; None in any other chamber.
     """
 
     paths: np.ndarray
@@ -95,7 +96,7 @@ def new_neighbour_filter(
     radii: np.ndarray | None = None,
     sides: PeriodicSides | None = None,
 ) -> NeighbourFilter:
-    """The filter for balls with this motion (n, 6) in a room from ``low`` to ``high`` (3,) [m]."""
+    """Return a filter for balls of this motion (n, 6) in a room from ``low`` to ``high`` [m]."""
     # A base position lies up to one window's flight outside the room, and up to two where the ball
     # may be outside the room.
     flights = 1.0 if sides is None else 2.0
@@ -120,7 +121,7 @@ def new_neighbour_filter(
 
 @jit
 def refresh_neighbours(neighbours: NeighbourFilter | None, motion: np.ndarray, time: float) -> None:
-    """Read the paths of all balls again, at a window's start or when they are sorted again."""
+    """Copy the paths of all balls into the filter anew, and sort many balls into blocks."""
     if neighbours is None:
         return
     note_all_speeds(neighbours.sides, motion)
@@ -131,7 +132,7 @@ def refresh_neighbours(neighbours: NeighbourFilter | None, motion: np.ndarray, t
 
 @inlined
 def sort_is_due(neighbours: NeighbourFilter | None, time: float) -> bool:
-    """True if refresh_neighbours must be called before the event at ``time`` [s]."""
+    """Return True if the balls must be sorted into blocks anew before the event at ``time``."""
     if neighbours is None:
         return False
     return blocks_are_worn(neighbours.blocks, time)
@@ -139,7 +140,7 @@ def sort_is_due(neighbours: NeighbourFilter | None, time: float) -> bool:
 
 @inlined
 def shift_sorting(neighbours: NeighbourFilter | None) -> None:
-    """Move the clock's zero of the sorting forward by one window."""
+    """Subtract a window's length from the time of the last sorting, as a new window begins."""
     if neighbours is None:
         return
     shift_blocks(neighbours.blocks, neighbours.window)
@@ -147,7 +148,7 @@ def shift_sorting(neighbours: NeighbourFilter | None) -> None:
 
 @inlined
 def follow(neighbours: NeighbourFilter | None, motion: np.ndarray, ball: int, time: float) -> None:
-    """Read the new path of a ball that was hit at ``time`` [s]."""
+    """Copy the new path of a ball that was hit at ``time`` [s] into the filter."""
     if neighbours is None:
         return
     _write_path(neighbours, motion, ball)
@@ -157,7 +158,10 @@ def follow(neighbours: NeighbourFilter | None, motion: np.ndarray, ball: int, ti
 
 @inlined
 def speed_limit(neighbours: NeighbourFilter | None) -> float:
-    """Speed [m/s] up to which the filter's margins hold; any finite speed without the filter."""
+    """Return the speed [m/s] up to which the filter's allowance for rounding holds.
+
+    Without a filter return 1e150, which stands for any speed.
+    """
     if neighbours is None:
         return MAX_FINITE_SPEED
     return neighbours.max_speed
@@ -165,7 +169,7 @@ def speed_limit(neighbours: NeighbourFilter | None) -> float:
 
 @inlined
 def _pair_reach(radii: np.ndarray | None, reach: float, one: int, two: int) -> float:
-    """Distance [m] at which these two balls touch."""
+    """Return the distance [m] between the centres of balls ``one`` and ``two`` when they touch."""
     if radii is None:
         return reach
     return float(radii[one] + radii[two])
@@ -187,11 +191,13 @@ def _write_path(neighbours: NeighbourFilter, motion: np.ndarray, ball: int) -> N
 def next_meeting(
     neighbours: NeighbourFilter, motion: np.ndarray, ball: int, time: float, before: float
 ) -> tuple[float, int]:
-    """Time [s] and partner of the ball's first meeting after ``time`` and before ``before``.
+    """Find the ball's first meeting with another ball after ``time`` and before ``before`` [s].
 
-    Without a meeting the partner is -1, and the time is the end of the known future. This is NEVER
-    for few balls, and the time until which their blocks hold for many balls. It is no later than
-    the horizon of periodic sides.
+    Returns:
+        The time of the meeting [s] and the number of the other ball. Without a meeting the number
+        is -1, and the time is the one up to which this is certain: NEVER for few balls, the time
+        until which the boxes of the blocks hold for many balls. In a periodic box it is no later
+        than the time until which only the present nearest images can meet.
     """
     probe = neighbours.probe
     column = column_of(neighbours.blocks, ball)
@@ -205,7 +211,7 @@ def next_meeting(
 
 @inlined
 def _aim_at_images(sides: PeriodicSides | None, probe: np.ndarray) -> None:
-    """Let the filter count time from now on, because it takes the nearest images of now."""
+    """In a periodic box, let the filter count time from now. It takes the nearest images of now."""
     if sides is None:
         return
     probe[12] = probe[6]
@@ -245,10 +251,14 @@ def _search(
     before: float,
     known: float,
 ) -> tuple[float, int]:
-    """Find the first meeting as in next_meeting, in all columns or the blocks on the ball's path.
+    """Search all balls, or if there are blocks those on the ball's path, for its first meeting.
 
     Args:
-        known: end of the horizon [s].
+        known: time up to which the answer "no meeting" can be certain [s].
+
+    Returns:
+        The time of the meeting [s] and the number of the other ball, or the time [s] up to which
+        there is certainly no meeting, and -1.
     """
     if blocks is None:
         here = free_fall_position(motion, ball, time)
@@ -313,7 +323,11 @@ def _best_in_block(
     best: float,
     partner: int,
 ) -> tuple[float, int]:
-    """The earlier of the best meeting so far (a delay [s]) and the meetings in a block."""
+    """Return delay [s] and ball of the best meeting so far, or of an earlier one in a block.
+
+    ``best`` [s] and ``partner`` are those of the best meeting so far. ``block``: number of the
+    block.
+    """
     first = LANES * block
     near = _near_until(neighbours.sides, neighbours.paths, first, neighbours.probe, time, best)
     near = _without(near, column_of(neighbours.blocks, ball) - first)
@@ -324,13 +338,13 @@ def _best_in_block(
 
 @inlined
 def _without(near: int, lane: int) -> int:
-    """The bits of the columns without the ball's own column."""
+    """Return the bit mask ``near`` without the bit of the ball's own column, ``lane``."""
     return near & ~(1 << lane) if 0 <= lane < LANES else near
 
 
 @inlined
 def _aim(ray: np.ndarray, motion: np.ndarray, ball: int, time: float) -> None:
-    """Set ``ray`` to the ball's straight path from now on, in the form that boxes_hit takes."""
+    """Write the ball's path from now on into ``ray``: its position twice, and 1 / velocity."""
     here = free_fall_position(motion, ball, time)
     for axis in range(3):
         speed = motion[ball, 3 + axis]
@@ -348,7 +362,7 @@ def _aim_from_image(
     x: int,
     y: int,
 ) -> None:
-    """Move the origin of ``ray`` to an image of the ball, ``x`` and ``y`` sides away."""
+    """Move the origin of ``ray`` to the ball's image ``x`` and ``y`` sides of the box away."""
     if sides is None:
         return
     here = free_fall_position(motion, ball, time)
@@ -367,7 +381,9 @@ def _nearest(
     best: float,
     partner: int,
 ) -> tuple[float, int]:
-    """The earlier of the best meeting so far (a delay [s]) and meetings in columns ``near``.
+    """Return delay [s] and ball of the best meeting so far, or of an earlier one in ``near``.
+
+    ``near`` has a bit for each column to examine, counted from column ``first``.
 
     The lower ball wins a tie, so that the order of the columns does not matter.
     """

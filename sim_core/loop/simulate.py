@@ -51,7 +51,14 @@ CHECK_EVERY = 1.0
 
 @dataclass(frozen=True)
 class Collisions:
-    """Numbers of collisions, warm-up included, and of searches by the loop."""
+    """Numbers of events in a simulation, warm-up included.
+
+    walls: hits on surfaces that do not vibrate.
+    balls: collisions of two balls.
+    sonotrode: hits on vibrating faces.
+    searches: searches for the surface that a ball meets next.
+    stale: predicted meetings that were dropped because the other ball's path had changed.
+    """
 
     walls: int
     balls: int
@@ -61,13 +68,13 @@ class Collisions:
 
     @property
     def total(self) -> int:
-        """Number of real collisions."""
+        """Number of hits on walls and sonotrode and of collisions of two balls."""
         return self.walls + self.balls + self.sonotrode
 
 
 @dataclass(frozen=True)
 class SimulationResult:
-    """The result of a simulation.
+    """The logged impacts and collisions of a simulation, and the balls at its end.
 
     impacts: impacts on the recorded surfaces.
     balls: the balls at the end.
@@ -126,7 +133,10 @@ def simulate(
 
 
 def _checked_frames(frames: Sequence[float] | np.ndarray, scene: Scene) -> np.ndarray:
-    """Frame times as an array (f,); raises SceneError unless they ascend within the duration."""
+    """Return the times of frames [s] as an array (f,).
+
+    Raises SceneError unless they ascend within the scene's duration.
+    """
     times = np.array(frames, dtype=float).reshape(-1)
     if not np.isfinite(times).all() or (np.diff(scene.warmup + times) <= 0.0).any():
         raise SceneError("frames: not ascending times; give each once, in order")
@@ -248,7 +258,9 @@ class Simulation:
     def play(
         self, until: float, record: bool, frames: Sequence[float] | np.ndarray = ()
     ) -> list[Balls]:
-        """Simulate until a time [s], with a check of containment every CHECK_EVERY.
+        """Simulate until a time [s since the start].
+
+        Every CHECK_EVERY, check that balls are inside. ``record``: True to log impacts.
 
         Returns: the balls at each of the times ``frames`` [s since the start].
         """
@@ -277,7 +289,7 @@ class Simulation:
             self.meetings.append(empty_buffer(self.state.collision_buffer, CollisionLog))
 
     def advance_to(self, stop: float) -> None:
-        """Run the event loop until a time [s], and handle each reason for a pause."""
+        """Run the event loop until ``stop`` [s since the start]. Handle each reason for a pause."""
         self.state = self.state._replace(clock=self.state.clock._replace(stop=stop))
         while True:
             status, ball = advance(self.state)
@@ -313,7 +325,7 @@ class Simulation:
         )
 
     def _positions_and_velocities(self) -> tuple[np.ndarray, np.ndarray]:
-        """Present positions [m] and velocities [m/s] of all balls, (n, 3) each."""
+        """Return the present positions [m] and velocities [m/s] of all balls, (n, 3) each."""
         state, now = self.state, self.state.clock.now[0]
         acceleration = np.array(gravity_acceleration(state.gravity))
         if state.contact is not None:
@@ -346,7 +358,7 @@ class Simulation:
             )
 
     def _inside(self, points: np.ndarray) -> np.ndarray:
-        """True for ball centres (n, 3) [m] in the chamber."""
+        """Return True for each ball centre (n, 3) [m] that is in the chamber, (n,) bool."""
         mesh, corners, vibrations = self.scene.mesh, self._corners(), self.scene.physics.vibrations
         if isinstance(mesh, AnalyticCavity):
             return mesh.contains(points, max((one.amplitude for one in vibrations), default=0.0))
@@ -356,7 +368,7 @@ class Simulation:
         return inside
 
     def _corners(self) -> np.ndarray | None:
-        """Present corners of the triangles, if some triangles turn; otherwise None."""
+        """Return the present corners of all triangles [m], or None if no triangle turns."""
         part_rotation, mesh = self.scene.physics.part_rotation, self.scene.mesh
         state = self.state
         if part_rotation is None or state.rotation is None or isinstance(mesh, AnalyticCavity):
@@ -365,7 +377,7 @@ class Simulation:
         return turned_corners(mesh, part_rotation, angle)
 
     def balls(self) -> Balls:
-        """The balls in their present state."""
+        """Return the balls in their present state."""
         friction_state, spins = self.state.friction_state, None
         if friction_state is not None:
             spins = friction_state.spins + self.state.clock.now[0] * friction_state.twists

@@ -29,20 +29,22 @@ FAR = np.float32(1e30)  # corner of an empty box, which no path reaches
 
 
 class Blocks(NamedTuple):
-    """The order of the balls in the columns of the filter, and boxes around sixteen columns.
+    """Order of the balls in the columns of the filter, and boxes around blocks of sixteen columns.
+
+    Times count from the start of the present time window.
 
     column: column of each ball, (n,) int32.
     ball: ball in each column, -1 for none, (columns,) int32.
     boxes: low x, y, z and high x, y, z of eight boxes [m], (k, 6, 8) float32, widened by
         ``margin``.
-    margin: reach of the balls and rounding [m].
+    margin: distance of two centres that touch, plus an allowance for rounding [m].
     groups: boxes around eight nodes of ``boxes`` each, in the same form.
-    sorted_at: time at which the balls were sorted [s on the window's clock], (1,).
-    until: time until which the boxes hold the paths [s on the window's clock], (1,).
+    sorted_at: time at which the balls were sorted [s], (1,).
+    until: time until which the boxes hold the paths [s], (1,).
     interval: intended time between two sorts [s], (1,).
     changes: number of path changes since the last sort, (1,) int64.
-    low, scale: start of the curve [m], (3,), and its steps [1/m].
-    sides: None unless the box is periodic.
+    low, scale: lowest corner of the sorting curve's grid [m], (3,), and its cells per metre [1/m].
+    sides: the sides of a periodic box; None in any other chamber.
     code, starts, ray, enter: working arrays.
     """
 
@@ -72,7 +74,7 @@ def new_blocks(
     window: float,
     sides: PeriodicSides | None = None,
 ) -> Blocks:
-    """Unsorted blocks of balls in a room from ``low`` to ``high`` (3,) [m]."""
+    """Return blocks for a number of balls, unsorted, in a room from ``low`` to ``high`` [m]."""
     columns = -(-balls // LANES) * LANES
     nodes = -(-columns // (LANES * BOXES))
     return Blocks(
@@ -97,7 +99,7 @@ def new_blocks(
 
 @inlined
 def column_of(blocks: Blocks | None, ball: int) -> int:
-    """The column of a ball."""
+    """Return the column of a ball in the filter. Without blocks it is the ball's number."""
     if blocks is None:
         return ball
     return int(blocks.column[ball])
@@ -105,7 +107,10 @@ def column_of(blocks: Blocks | None, ball: int) -> int:
 
 @inlined
 def ball_in_column(blocks: Blocks | None, column: int) -> int:
-    """The ball in a column."""
+    """Return the ball in a column of the filter, -1 for none.
+
+    Without blocks it is the column's number.
+    """
     if blocks is None:
         return column
     return int(blocks.ball[column])
@@ -113,7 +118,7 @@ def ball_in_column(blocks: Blocks | None, column: int) -> int:
 
 @inlined
 def blocks_are_worn(blocks: Blocks | None, time: float) -> bool:
-    """True if the balls must be sorted again before the event at ``time`` [s]."""
+    """Return True if the balls must be sorted again before the event at ``time`` [s]."""
     if blocks is None:
         return False
     return bool(time >= blocks.until[0] or blocks.changes[0] > 2 * CHANGES * len(blocks.column))
@@ -159,14 +164,17 @@ def sort_blocks(blocks: Blocks | None, motion: np.ndarray, time: float, window: 
 
 @inlined
 def _cell(blocks: Blocks, motion: np.ndarray, ball: int, axis: int, time: float) -> int:
-    """Step of the curve's grid that holds a ball along an axis."""
+    """Return which cell of the curve's grid, along ``axis``, holds a ball at ``time`` [s]."""
     now = motion[ball, axis] + motion[ball, 3 + axis] * time
     return min(max(int((now - blocks.low[axis]) * blocks.scale), 0), (1 << BITS) - 1)
 
 
 @jit
 def _place_on_curve(x: int, y: int, z: int) -> int:
-    """Number of a cell along Hilbert's curve, which goes from cell to cell without a jump."""
+    """Return the place of cell (x, y, z) along Hilbert's curve, which goes from cell to cell.
+
+    It makes no jump.
+    """
     bit = 1 << (BITS - 1)
     while bit > 1:  # undo the turns of the curve, from the largest cubes to the smallest
         low = bit - 1
@@ -199,7 +207,7 @@ def _place_on_curve(x: int, y: int, z: int) -> int:
 
 @jit
 def shift_blocks(blocks: Blocks | None, window: float) -> None:
-    """Move the clock's zero of the blocks forward by ``window`` [s]."""
+    """Subtract the window's length [s] from the time of the last sorting: a new window begins."""
     if blocks is None:
         return
     blocks.sorted_at[0] -= window
@@ -207,7 +215,7 @@ def shift_blocks(blocks: Blocks | None, window: float) -> None:
 
 @inlined
 def widen(blocks: Blocks | None, motion: np.ndarray, ball: int, time: float) -> None:
-    """Widen the boxes of a ball so that they hold its path from ``time`` [s] on."""
+    """Widen the boxes around a ball's block so that they hold its path from ``time`` [s] on."""
     if blocks is None:
         return
     blocks.changes[0] += 1

@@ -29,12 +29,14 @@ WALLS, BALLS, SONOTRODE, SEARCHES, STALE = 0, 1, 2, 3, 4
 
 
 class Clock(NamedTuple):
-    """Time in a scene.
+    """Time in a simulation, counted in windows of one length.
 
-    now: time on the window's clock [s], and number of past windows, (2,).
+    The clock restarts from 0 in each window.
+
+    now: time since the start of the present window [s], and number of past windows, (2,).
     window: length of a window [s].
     stop: time of the next pause [s since the start].
-    origin: zero of the impact times [s since the start].
+    origin: end of the warm-up, from which the times of impacts count [s since the start].
     """
 
     now: np.ndarray
@@ -46,12 +48,14 @@ class Clock(NamedTuple):
 class SimulationState(NamedTuple):
     """All data that the event loop works on. An absent effect is None.
 
-    motion: base position [m] and velocity [m/s] of each ball in the free-fall frame, (n, 6).
-    neighbours: the filter made from the motion, None if balls do not collide with one another.
-    counts: numbers of events, (5,) int64, see WALLS.
-    collision_buffer: None unless collisions of balls are logged.
-    sides: None unless the box is periodic.
-    profiler: None unless the loop is measured.
+    motion: base position [m], where the straight path is at time 0 of the clock, and velocity
+        [m/s] of each ball in the free-fall frame, (n, 6).
+    neighbours: filter that finds balls that can meet; None if balls do not collide.
+    counts: numbers of hits on walls, on balls and on the sonotrode, of searches for a surface,
+        and of meetings that were dropped, (5,) int64.
+    collision_buffer: collisions of balls not yet in the log; None unless they are logged.
+    sides: the sides of a periodic box; None in any other chamber.
+    profiler: time spent in each part of the loop; None unless it is measured.
     """
 
     motion: np.ndarray
