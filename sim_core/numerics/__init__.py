@@ -1,1 +1,1 @@
-"""Compilation, vectors, roots of gaps, SIMD filters, profiler."""
+"""Compiler, 3-vectors, times at which gaps close, filters eight numbers at a time, and profiler."""

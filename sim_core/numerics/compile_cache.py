@@ -25,13 +25,16 @@ DIGEST_BYTES = 32
 
 
 class _InChosenFolder(CompileResultCacheImpl):
-    """Cache in the folder of jit.py, because other folders' code would outlive source edits."""
+    """Cache whose files are only in the folder that jit.py sets.
+
+    Code in numba's other folders would outlive edits of the sources.
+    """
 
     _locator_classes = [UserProvidedCacheLocator]  # noqa: RUF012
 
 
 class _CheckedFiles(IndexDataCacheFile):
-    """The files of one function, each with the digest of its content at its end."""
+    """The files of one function's compiled code, each with the digest of its content at its end."""
 
     @contextmanager
     def _open_for_write(self, filepath: str) -> Iterator[io.BytesIO]:
@@ -51,7 +54,7 @@ class _CheckedFiles(IndexDataCacheFile):
 
 
 class CheckedCache(FunctionCache):
-    """The compiled variants of one function on disk."""
+    """The compiled variants of one function on disk, which are checked for damage on reading."""
 
     _impl_class = _InChosenFolder
 
@@ -65,7 +68,7 @@ class CheckedCache(FunctionCache):
 
 
 def is_private(folder: Path) -> bool:
-    """True if nobody else can put files into the folder, whose code would be run."""
+    """Return True if nobody else can put files into the folder, whose code would be run."""
     if not hasattr(os, "getuid"):
         return True
     found = folder.lstat()
@@ -73,7 +76,7 @@ def is_private(folder: Path) -> bool:
 
 
 def _is_whole(path: Path) -> bool:
-    """True if a file exists and matches its digest. A damaged file is removed."""
+    """Return True if a file exists and matches the digest at its end. Remove a damaged file."""
     try:
         content = path.read_bytes()
     except OSError:

@@ -14,7 +14,10 @@ R = TypeVar("R")
 
 
 def computed_once(maxsize: int) -> Callable[[Callable[P, R]], Callable[P, R]]:
-    """Keep the results of the last calls, as `functools.lru_cache` does, one call at a time."""
+    """Return a decorator that keeps the results of a function's last ``maxsize`` different calls.
+
+    It works as `functools.lru_cache` does, but lets only one thread at a time call the function.
+    """
 
     def decorate(function: Callable[P, R]) -> Callable[P, R]:
         cached, lock = lru_cache(maxsize=maxsize)(function), RLock()

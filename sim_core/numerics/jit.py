@@ -31,7 +31,7 @@ MAX_CACHES = 4  # older folders are removed: each holds a few MB that nothing re
 
 
 def _cache_root() -> Path:
-    """Folder for compiled code: NUMBA_CACHE_DIR if set, else the user's cache folder."""
+    """Return the folder for compiled code: NUMBA_CACHE_DIR if set, else the user's cache folder."""
     chosen = os.environ.get("NUMBA_CACHE_DIR")
     if chosen:
         return Path(chosen)
@@ -47,7 +47,7 @@ def _cache_root() -> Path:
 
 
 def _sources_digest() -> str:
-    """Digest of numba's version and of the path and text of every source file."""
+    """Return a digest of numba's version and of the path and text of every source file."""
     digest = hashlib.sha256(numba.__version__.encode())
     package = Path(__file__).parents[1]
     for source in sorted(package.rglob("*.py")):
@@ -60,7 +60,10 @@ CACHE_FOLDER = _cache_root() / f"sim_core-{_sources_digest()}"
 
 
 def _remove_old_caches() -> None:
-    """Remove all but the newest few folders. A process that uses an old one makes it again."""
+    """Remove all but the newest MAX_CACHES folders.
+
+    A process that uses a removed one makes it again.
+    """
     folders = sorted(
         CACHE_FOLDER.parent.glob("sim_core-*"), key=lambda f: f.stat().st_mtime, reverse=True
     )
@@ -69,7 +72,7 @@ def _remove_old_caches() -> None:
 
 
 def _cache_is_usable() -> bool:
-    """True if this user, and nobody else, can write to the folder of compiled code."""
+    """Return True if this user, and nobody else, can write to the folder of compiled code."""
     try:
         if not CACHE_FOLDER.exists():
             CACHE_FOLDER.mkdir(0o700, parents=True, exist_ok=True)
@@ -84,7 +87,7 @@ CACHED = _USABLE and not _settings.DISABLE_JIT
 
 
 def user_cache() -> Path | None:
-    """This user's own folder for files that can be made again; None if there is no such folder."""
+    """Return this user's own folder for files that can be made again; None if there is none."""
     return CACHE_FOLDER.parent if _USABLE and is_private(CACHE_FOLDER.parent) else None
 
 

@@ -29,11 +29,11 @@ FAR = 1e30
 
 
 class PeriodicSides(NamedTuple):
-    """A box that is periodic along x, y or both, about its middle.
+    """The sides of a box that is periodic along x, y or both and whose middle is the origin.
 
-    x, y: L along each direction [m].
-    per_x, per_y: 1/L, and 0 where L is 0.
-    fastest: V along each direction [m/s], (2,).
+    x, y: side of the box along each direction [m], 0 where there are walls.
+    per_x, per_y: inverses of the sides [1/m], 0 where there are walls.
+    fastest: largest speed of any ball along each direction [m/s], (2,).
     low, high: extent of the boxes of all balls' paths along each direction [m], (2,), where there
         are many balls (loop/spatial_blocks.py).
     """
@@ -48,7 +48,7 @@ class PeriodicSides(NamedTuple):
 
 
 def new_periodic_sides(sides: np.ndarray) -> PeriodicSides | None:
-    """The sides (3,) [m] as compiled code needs them; None if no side is periodic."""
+    """Return the sides (3,) [m] as compiled code needs them; None if no side is periodic."""
     if not sides.any():
         return None
     x, y = (float(side) for side in sides[:2])
@@ -58,7 +58,10 @@ def new_periodic_sides(sides: np.ndarray) -> PeriodicSides | None:
 
 @inlined
 def nearest_image(sides: PeriodicSides | None, apart: Vec3) -> Vec3:
-    """The shortest of all differences [m] between the images of two places."""
+    """Return the shortest of all differences [m] between the images of two places.
+
+    ``apart``: their difference inside the box.
+    """
     if sides is None:
         return apart
     return Vec3(
@@ -70,7 +73,10 @@ def nearest_image(sides: PeriodicSides | None, apart: Vec3) -> Vec3:
 
 @jit
 def put_back(sides: PeriodicSides | None, motion: np.ndarray, time: float) -> None:
-    """Put all balls into the box at their places at ``time`` [s]. ``motion``: as in motion.py."""
+    """Move each ball by whole sides so that it is inside the box at ``time`` [s].
+
+    ``motion``: base positions and velocities of the balls, (n, 6).
+    """
     if sides is None:
         return
     for ball in range(len(motion)):
@@ -81,7 +87,7 @@ def put_back(sides: PeriodicSides | None, motion: np.ndarray, time: float) -> No
 
 @inlined
 def note_speed(sides: PeriodicSides | None, motion: np.ndarray, ball: int) -> None:
-    """Raise V to the speed of a ball with a new path."""
+    """Raise the noted largest speed to the speed of a ball with a new path."""
     if sides is None:
         return
     for axis in range(2):
@@ -90,7 +96,7 @@ def note_speed(sides: PeriodicSides | None, motion: np.ndarray, ball: int) -> No
 
 @inlined
 def note_all_speeds(sides: PeriodicSides | None, motion: np.ndarray) -> None:
-    """Set V to the present largest speed of the balls."""
+    """Set the noted largest speed to the present largest speed of the balls."""
     if sides is None:
         return
     sides.fastest[:] = 0.0
@@ -100,7 +106,10 @@ def note_all_speeds(sides: PeriodicSides | None, motion: np.ndarray) -> None:
 
 @inlined
 def top_speed(sides: PeriodicSides | None) -> float:
-    """V [m/s], which gravity along a periodic direction raises without end; 0 without sides."""
+    """Return the noted largest speed of any ball [m/s], or 0 without periodic sides.
+
+    Gravity along a periodic direction raises it without end.
+    """
     if sides is None:
         return 0.0
     return float(max(sides.fastest[0], sides.fastest[1]))
@@ -108,7 +117,7 @@ def top_speed(sides: PeriodicSides | None) -> float:
 
 @inlined
 def horizon(sides: PeriodicSides | None, motion: np.ndarray, ball: int, reach: float) -> float:
-    """Time [s] for which the ball's meetings are with the present nearest images."""
+    """Return for how long [s] the ball can meet only the present nearest images of other balls."""
     if sides is None:
         return NEVER
     x = sides.fastest[0] + abs(motion[ball, 3])
@@ -123,7 +132,7 @@ def horizon(sides: PeriodicSides | None, motion: np.ndarray, ball: int, reach: f
 
 @inlined
 def time_in_box(sides: PeriodicSides | None) -> float:
-    """Largest duration of paths [s] with which they reach few images of the box."""
+    """Return how long [s] paths may be so that they reach few images of the box."""
     if sides is None:
         return NEVER
     time = NEVER
@@ -136,7 +145,7 @@ def time_in_box(sides: PeriodicSides | None) -> float:
 
 @inlined
 def forget_extent(sides: PeriodicSides | None) -> None:
-    """Forget the extent of the boxes. It is then the extent of the paths noted from now on."""
+    """Forget the extent of the boxes around paths, so that only paths noted from now on count."""
     if sides is None:
         return
     sides.low[:] = FAR
@@ -145,7 +154,7 @@ def forget_extent(sides: PeriodicSides | None) -> None:
 
 @inlined
 def note_extent(sides: PeriodicSides | None, axis: int, low: np.float32, high: np.float32) -> None:
-    """Widen the extent of the boxes along x, y or z [m]."""
+    """Widen the noted extent of the boxes around paths so that it holds ``low`` to ``high`` [m]."""
     if sides is None:
         return
     if axis < 2:
@@ -157,7 +166,9 @@ def note_extent(sides: PeriodicSides | None, axis: int, low: np.float32, high: n
 def images(
     sides: PeriodicSides | None, motion: np.ndarray, ball: int, start: float, end: float
 ) -> tuple[int, int, int, int]:
-    """First and last of the ball's images along x, and along y, whose paths get into the boxes.
+    """Return which of the ball's images have paths that get into the boxes around other paths.
+
+    The numbers are the first and the last image along x, and the first and the last along y.
 
     Args:
         start: start of the path [s].

@@ -12,20 +12,23 @@ PARTS = ("next event", "resolve", "pairs", "walls", "event queue")
 
 
 class Profiler(NamedTuple):
-    """Clock readings [ticks of the processor]."""
+    """Time spent in each part of the event loop, in ticks of the processor's clock."""
 
     spent: np.ndarray  # time in each of PARTS, shape (parts,) int64
     last: np.ndarray  # end of the last part, shape (1,) int64
 
 
 def new_profiler() -> Profiler:
-    """A profiler with nothing recorded."""
+    """Return a profiler with nothing recorded."""
     return Profiler(np.zeros(len(PARTS), dtype=np.int64), np.zeros(1, dtype=np.int64))
 
 
 @inlined
 def add_time(profiler: Profiler | None, part: int) -> None:
-    """Add the time since the last call to this part. A negative part only starts the clock."""
+    """Add the time since the last call to part number ``part``.
+
+    A negative number only starts the clock.
+    """
     if profiler is None:
         return
     now = ticks()

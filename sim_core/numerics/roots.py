@@ -1,4 +1,4 @@
-"""Closing time of a gap: the first time a function of time is at or below zero *and* falling.
+"""Find when a gap closes: the first time at which a function of time is at most 0 and falls.
 
 A gap that opens again is never a contact, whatever rounding did to its sign: an overlapping pair
 that approaches collides now, one that separates does not (Bannerman, Strobl, Formella & Pöschel,
@@ -12,6 +12,7 @@ Notation:
     rate, curvature: first and second derivative of the gap
     depth: an overlap deeper than this is no overlap but the far side of a one-sided surface, which
         can only be met after coming out in front of it [m]
+    approach: a time at which the gap is at most 0 and falls
 """
 
 import math
@@ -31,7 +32,7 @@ NEWTON_STEPS = 60  # quadratic convergence needs 6; a double root halves the err
 
 @jit
 def first_approach(c: float, b: float, a: float, depth: float) -> float:
-    """Smallest s >= 0 at which c + b s + a s² is at most 0 and falls; NEVER if there is none."""
+    """Return the first s >= 0 at which c + b s + a s² is at most 0 and falls, or NEVER."""
     if c <= 0.0 and c > -depth and (b < 0.0 or (b == 0.0 and a < 0.0)):
         return 0.0
     if a >= 0.0 and (b >= 0.0 or c <= 0.0):
@@ -52,7 +53,10 @@ def first_approach(c: float, b: float, a: float, depth: float) -> float:
 
 
 class WaveGap(NamedTuple):
-    """Gap [m] between a ball in flight and a vibrating face; see the notation above."""
+    """Gap c + b s + a s² - A sin(omega s + theta) [m] of a flying ball from a vibrating face.
+
+    s is the time from now [s], and A the amplitude [m].
+    """
 
     c: float
     b: float
@@ -79,7 +83,7 @@ def _curvature(w: WaveGap, s: float) -> float:
 
 @jit
 def _convex_approach(w: WaveGap, start: float, end: float) -> float:
-    """First approach in [start, end], where the gap is convex.
+    """Return the first time in [start, end] at which a convex gap closes; NEVER if there is none.
 
     Newton started from the left never oversteps a root of a convex function.
     """
@@ -102,7 +106,10 @@ def _convex_approach(w: WaveGap, start: float, end: float) -> float:
 
 @jit
 def _time_of_largest_gap(w: WaveGap, start: float, end: float) -> float:
-    """Time in [start, end] at which a concave gap is largest: safeguarded Newton on its rate."""
+    """Return the time in [start, end] at which a concave gap is largest.
+
+    Search by safeguarded Newton steps on its rate.
+    """
     low = start
     high = end
     s = 0.5 * (low + high)
@@ -124,7 +131,10 @@ def _time_of_largest_gap(w: WaveGap, start: float, end: float) -> float:
 
 @jit
 def _concave_approach(w: WaveGap, start: float, end: float) -> float:
-    """First approach in [start, end], where the gap is concave: Newton from the right end."""
+    """Return the first time in [start, end] at which a concave gap closes; NEVER if there is none.
+
+    Newton starts from the right end.
+    """
     gap = _gap(w, start)
     rate = _rate(w, start)
     if gap <= 0.0 and rate < 0.0:
@@ -152,7 +162,7 @@ def _concave_approach(w: WaveGap, start: float, end: float) -> float:
 
 @jit
 def _time_to_band(w: WaveGap, depth: float) -> float:
-    """Earliest time of an approach: the ball reaches the band that the face moves in.
+    """Return the earliest time [s] at which the ball reaches the band in which the face moves.
 
     Inside the band this is the present, unless the ball leaves the band faster than the face ever
     moves: its speed is least now or on leaving. A ball more than ``depth`` behind the band must
@@ -169,7 +179,9 @@ def _time_to_band(w: WaveGap, depth: float) -> float:
 
 @jit
 def first_wave_approach(w: WaveGap, limit: float, depth: float) -> float:
-    """First s in [0, limit] at which the ball meets the vibrating face and approaches it, or NEVER.
+    """Return the first s in [0, limit] at which a ball meets the vibrating face, or NEVER.
+
+    It also approaches the face then.
 
     The search starts where the ball reaches the band that the face moves in. Inside the band the
     gap is split where its curvature changes sign, sin(angle) = -2a / (A omega²). Each piece then
@@ -211,7 +223,11 @@ def first_wave_approach(w: WaveGap, limit: float, depth: float) -> float:
 
 @jit
 def next_wave_approach(w: WaveGap, s: float, limit: float, depth: float) -> float:
-    """First approach before ``limit`` after one at s, if the ball passes through the face."""
+    """Return the next time before ``limit`` at which a ball meets and approaches a vibrating face.
+
+    The ball has met the face at time s and passes through it. The result is NEVER if it does not
+    come back in time.
+    """
     # seen from behind the face, the ball comes out where the gap with its sign changed closes
     behind = WaveGap(-w.c, -w.b, -w.a, w.amplitude, w.omega, w.theta + math.pi)
     out = s + first_wave_approach(_shifted(behind, s), limit - s, math.inf)
@@ -222,12 +238,15 @@ def next_wave_approach(w: WaveGap, s: float, limit: float, depth: float) -> floa
 
 @jit
 def _shifted(w: WaveGap, s: float) -> WaveGap:
-    """The gap with its time counted from s on."""
+    """Return the same gap with its time counted from s on."""
     height, rate = w.c + s * (w.b + w.a * s), w.b + 2.0 * w.a * s
     return WaveGap(height, rate, w.a, w.amplitude, w.omega, w.theta + w.omega * s)
 
 
 @jit
 def _piece_start(half: float, alpha: float) -> float:
-    """Angle omega s + theta [rad] at which piece number ``half`` begins."""
+    """Return the angle omega s + theta [rad] at which the piece number ``half`` begins.
+
+    The gap is convex in even pieces and concave in odd ones.
+    """
     return half * math.pi + (alpha if half % 2.0 == 0.0 else -alpha)

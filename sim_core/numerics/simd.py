@@ -1,6 +1,7 @@
 """Eight comparisons in one instruction: float32 filters in front of the exact float64 tests.
 
-A filter may let through too much but never too little, so that results do not depend on it, bit for
+The filters leave out boxes that a flight does not enter, and balls that cannot meet a given ball.
+They may let through too much but never too little, so that results do not depend on them, bit for
 bit. Each filter has a numpy version that replaces it when numba's JIT is off.
 """
 
@@ -24,7 +25,7 @@ _I32 = ir.IntType(32)
 
 
 class _Vectors:
-    """Builder of float32 code that works on ``width`` numbers at once."""
+    """Writer of machine code that works on ``width`` float32 numbers, the lanes, at once."""
 
     def __init__(self, builder: Any, width: int) -> None:
         self.builder = builder
@@ -32,18 +33,18 @@ class _Vectors:
         self.type = ir.VectorType(_F32, width)
 
     def spread(self, scalar: Any) -> Any:
-        """The scalar in every lane."""
+        """Return a vector with the scalar in every lane."""
         one = self.builder.insert_element(ir.Constant(self.type, ir.Undefined), scalar, _I32(0))
         mask = ir.Constant(ir.VectorType(_I32, self.width), [0] * self.width)
         return self.builder.shuffle_vector(one, ir.Constant(self.type, ir.Undefined), mask)
 
     def load(self, data: Any, index: Any) -> Any:
-        """Load ``width`` consecutive numbers from data[index]."""
+        """Return ``width`` consecutive numbers, read from data[index] on."""
         address = self.builder.bitcast(self.builder.gep(data, [index]), self.type.as_pointer())
         return self.builder.load(address, align=4)
 
     def store(self, vector: Any, data: Any, index: Any) -> None:
-        """Store ``width`` consecutive numbers to data[index]."""
+        """Write ``width`` consecutive numbers to data[index] and after."""
         address = self.builder.bitcast(self.builder.gep(data, [index]), self.type.as_pointer())
         self.builder.store(vector, address, align=4)
 
@@ -54,7 +55,7 @@ class _Vectors:
         return self.builder.select(self.builder.fcmp_ordered(">", a, b), a, b)
 
     def fused(self, a: Any, b: Any, c: Any) -> Any:
-        """a b + c with one rounding, which is allowed in a filter."""
+        """Return a b + c, rounded only once, which is allowed in a filter."""
         kind = ir.FunctionType(self.type, [self.type] * 3)
         function = cgutils.get_or_insert_function(
             self.builder.module, kind, f"llvm.fma.v{self.width}f32"
@@ -62,7 +63,7 @@ class _Vectors:
         return self.builder.call(function, [a, b, c])
 
     def rounded(self, a: Any) -> Any:
-        """a rounded to whole numbers."""
+        """Return a rounded to whole numbers."""
         kind = ir.FunctionType(self.type, [self.type])
         function = cgutils.get_or_insert_function(
             self.builder.module, kind, f"llvm.rint.v{self.width}f32"
@@ -70,11 +71,11 @@ class _Vectors:
         return self.builder.call(function, [a])
 
     def sum(self, total: Any | None, a: Any, b: Any) -> Any:
-        """total + a b, or a b when there is no total yet."""
+        """Return total + a b, or a b if the total is None."""
         return self.builder.fmul(a, b) if total is None else self.fused(a, b, total)
 
     def mask(self, condition: Any) -> Any:
-        """Lane conditions as the bits of an int64."""
+        """Return a condition, true or false in each lane, as the bits of an int64."""
         bits = self.builder.bitcast(condition, ir.IntType(self.width))
         return self.builder.zext(bits, ir.IntType(64))
 
@@ -132,10 +133,10 @@ def _boxes_hit_numpy(bounds: Any, node: int, ray: Any, longest: Any, enter: Any)
 def _near_filter(
     lanes: Any, probe: Any, limited: bool, periodic: bool = False
 ) -> tuple[Any, Callable[[Any, Any, Any, Any], Any]]:
-    """Signature and code of a filter of pairs.
+    """Return the signature and the code generator of a filter of pairs of balls that may meet.
 
-    limited: True for balls_near_until and images_near_until.
-    periodic: True for images_near and images_near_until.
+    limited: True to leave out pairs that cannot meet before the end of the search.
+    periodic: True to compare the nearest images of balls in a periodic box.
     """
     signature = types.int64(lanes, types.int64, probe)
 

@@ -16,7 +16,7 @@ class Vec3(NamedTuple):
 
 
 class Flight(NamedTuple):
-    """A ball's centre on its parabola: position [m], velocity [m/s] and acceleration [m/s²] now."""
+    """A ball's centre on its parabola now: position [m], velocity [m/s], acceleration [m/s²]."""
 
     position: Vec3
     velocity: Vec3
@@ -29,7 +29,7 @@ class Touch(NamedTuple):
     away: any vector along the normal, from the surface to the ball.
     relative: velocity of the ball minus the velocity of the surface, before the hit [m/s].
     tag: tag of the surface.
-    kind: kind of the obstacle.
+    kind: kind of the obstacle: FACE, CAPSULE, VIBRATING_FACE or CYLINDER_WALL.
     """
 
     away: Vec3
@@ -40,61 +40,61 @@ class Touch(NamedTuple):
 
 @jit
 def sub(a: Vec3, b: Vec3) -> Vec3:
-    """Difference a - b."""
+    """Return the difference a - b."""
     return Vec3(a.x - b.x, a.y - b.y, a.z - b.z)
 
 
 @jit
 def add_scaled(a: Vec3, s: float, b: Vec3) -> Vec3:
-    """Sum a + s b."""
+    """Return the sum a + s b."""
     return Vec3(a.x + s * b.x, a.y + s * b.y, a.z + s * b.z)
 
 
 @jit
 def scaled(s: float, a: Vec3) -> Vec3:
-    """Product s a."""
+    """Return the product s a."""
     return Vec3(s * a.x, s * a.y, s * a.z)
 
 
 @jit
 def cross(a: Vec3, b: Vec3) -> Vec3:
-    """Vector product."""
+    """Return the vector product of a and b."""
     return Vec3(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x)
 
 
 @jit
 def dot(a: Vec3, b: Vec3) -> float:
-    """Scalar product."""
+    """Return the scalar product of a and b."""
     return a.x * b.x + a.y * b.y + a.z * b.z
 
 
 @jit
 def vec3_at(array: np.ndarray, row: int) -> Vec3:
-    """The first three numbers of a row of an array (n, 3) or wider."""
+    """Return the first three numbers of a row of an array (n, 3) or wider, as a vector."""
     return Vec3(array[row, 0], array[row, 1], array[row, 2])
 
 
 @jit
 def set_vec3(array: np.ndarray, row: int, a: Vec3) -> None:
-    """Write a vector into the first three numbers of a row."""
+    """Write a vector into the first three numbers of a row of an array."""
     for axis in range(3):
         array[row, axis] = a[axis]
 
 
 @jit
 def position_after(flight: Flight, delay: float) -> Vec3:
-    """Position [m] after ``delay`` [s]."""
+    """Return the position [m] of a flying ball after ``delay`` [s]."""
     moved = add_scaled(flight.position, delay, flight.velocity)
     return add_scaled(moved, 0.5 * delay * delay, flight.acceleration)
 
 
 @jit
 def velocity_after(flight: Flight, delay: float) -> Vec3:
-    """Velocity [m/s] after ``delay`` [s]."""
+    """Return the velocity [m/s] of a flying ball after ``delay`` [s]."""
     return add_scaled(flight.velocity, delay, flight.acceleration)
 
 
 @jit
 def flight_after(flight: Flight, delay: float) -> Flight:
-    """The flight ``delay`` [s] later."""
+    """Return the flight of the same ball as it is ``delay`` [s] later."""
     return Flight(position_after(flight, delay), velocity_after(flight, delay), flight.acceleration)
