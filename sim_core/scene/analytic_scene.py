@@ -1,4 +1,4 @@
-"""Checks of a scene with an analytical cavity."""
+"""Checks of a scene with an analytical cavity: exact surfaces in place of a mesh."""
 
 import numpy as np
 

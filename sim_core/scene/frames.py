@@ -34,7 +34,10 @@ class Frames:
 
 
 def frames_of(time: np.ndarray, noted: list[Balls], balls: Balls) -> Frames:
-    """Frames of the balls noted at each time. ``balls``: the balls at any time, for their spins."""
+    """Return as Frames the balls that were noted at each of the times ``time`` (f,) [s].
+
+    ``balls``: the balls at any time, which tell whether they have spins.
+    """
 
     def column(name: str) -> np.ndarray:
         each = [getattr(one, name) for one in noted]
@@ -57,12 +60,12 @@ class Energies:
 
     @property
     def total(self) -> np.ndarray:
-        """Sum of translational, rotational and potential energy."""
+        """Sum of translational, rotational and potential energy [J], (f,)."""
         return np.asarray(self.translational + self.rotational + self.potential)
 
 
 def energies(frames: Frames, balls: Balls, gravity: Gravity | None = None) -> Energies:
-    """Energies of the balls in each frame.
+    """Return the energies [J] of all balls together in each frame.
 
     Args:
         frames: frames of a simulation.

@@ -40,7 +40,7 @@ IN_CELL, IN_CELLS = 8, 16  # intended triangles in a cell, and largest number of
 
 
 class _Projection(NamedTuple):
-    """The triangles projected along a ray."""
+    """The triangles of a mesh, projected along one of the directions RAYS."""
 
     corners: np.ndarray  # corner positions with the ray as third axis [m], shape (m, 3, 3)
     boxes: np.ndarray  # low and high of the first axis and of the second [m], shape (m, 4)
@@ -50,7 +50,7 @@ class _Projection(NamedTuple):
 
 
 class _Cells(NamedTuple):
-    """A grid of s by s cells, and the boxes that meet each cell.
+    """A grid of s by s cells across the ray, and the triangles whose boxes meet each cell.
 
     Cell (i, j) has the members from first[i s + j] up to first[i s + j + 1].
     """
@@ -63,7 +63,10 @@ class _Cells(NamedTuple):
 
 
 def _cells_of(boxes: np.ndarray, side: int) -> _Cells:
-    """Put boxes (m, 4) into cells. A grid finer than IN_CELLS cells a box is made coarser."""
+    """Return a grid of ``side``² cells over boxes (m, 4) [m], with the boxes in each cell.
+
+    A grid in which boxes meet more than IN_CELLS cells on average is made coarser.
+    """
     low, high = boxes[:, ::2].min(axis=0), boxes[:, 1::2].max(axis=0)
     while True:
         size: np.ndarray = np.maximum((high - low) / side, np.finfo(float).tiny)
@@ -88,7 +91,10 @@ def _projection(mesh: TriangleMesh, k: int) -> _Projection:
 
 
 def _project(triangles: np.ndarray, mesh: TriangleMesh, k: int, cells: int = 1) -> _Projection:
-    """Project the triangles (m, 3, 3) along ray k, in cells² cells. The mesh gives the scale."""
+    """Return the triangles (m, 3, 3) [m] projected along direction RAYS[k], in ``cells``² cells.
+
+    The mesh gives the scale of rounding.
+    """
     ray = RAYS[k] / np.linalg.norm(RAYS[k])
     side = np.cross(ray, [1.0, 0.0, 0.0])
     side /= np.linalg.norm(side)
@@ -102,7 +108,10 @@ def _project(triangles: np.ndarray, mesh: TriangleMesh, k: int, cells: int = 1) 
 
 @jit
 def _crossings(projection: _Projection, u: float, v: float, w: float) -> int:
-    """Number of triangles that the ray from (u, v, w) along axis 3 crosses; -1 if undecided."""
+    """Return how many triangles a ray from (u, v, w) along axis 3 crosses; -1 if that is undecided.
+
+    It is undecided if the ray passes through an edge up to rounding.
+    """
     crossed = 0
     corners, boxes, cells = projection.corners, projection.boxes, projection.cells
     i, j = _cell(cells, 0, u), _cell(cells, 1, v)
@@ -126,7 +135,7 @@ def _crossings(projection: _Projection, u: float, v: float, w: float) -> int:
 
 @jit
 def _cell(cells: _Cells, axis: int, x: float) -> int:
-    """Row or column of the cell nearest to a place."""
+    """Return which cell along ``axis`` is nearest to the coordinate ``x`` [m] of that axis."""
     steps = (x - cells.low[axis]) / cells.size[axis]
     return int(min(max(steps, 0.0), float(cells.side - 1)))
 
@@ -151,7 +160,7 @@ def _mark_near(projection: _Projection, points: np.ndarray, reach: float, near: 
 
 
 def triangles_near(mesh: TriangleMesh, points: np.ndarray, reach: float) -> np.ndarray:
-    """Numbers of all triangles within reach [m] of any of the points (n, 3), and of some more."""
+    """Return the numbers of all triangles within reach [m] of any point (n, 3), and some more."""
     projection, near = _projection(mesh, 0), np.zeros(len(mesh.triangles), dtype=np.bool_)
     wide = reach * (1.0 + 1e-9) + 1e-12 * float(np.abs(mesh.bounds).max())  # widened for rounding
     _mark_near(projection, np.ascontiguousarray(points @ projection.axes.T), wide, near)
@@ -167,7 +176,7 @@ def _count(projection: _Projection, points: np.ndarray, crossed: np.ndarray) -> 
 def contained(
     mesh: TriangleMesh, points: np.ndarray, corners: np.ndarray | None = None
 ) -> np.ndarray:
-    """True for points inside the mesh, by the parity of crossings along a ray.
+    """Tell which points are inside the mesh, by the parity of crossings along a ray.
 
     A turned part that goes through a wall leaves slits in the surface. A point outside by the
     parity is then outside only if the surface's solid angle, which a slit hardly changes, agrees.
@@ -179,7 +188,7 @@ def contained(
             mesh.
 
     Returns:
-        Shape (n,) bool.
+        True for each point inside, shape (n,) bool.
     """
     points = np.asarray(points, dtype=np.float64)
     inside = np.zeros(len(points), dtype=np.bool_)
@@ -204,20 +213,22 @@ def beneath_mean_plane(
     radii: np.ndarray,
     corners: np.ndarray | None = None,
 ) -> np.ndarray:
-    """True for ball centres that a vibrating face can let beneath its mean plane.
+    """Tell which ball centres a vibrating face can let beneath its mean plane, where it is at rest.
 
-    The face swings wider than the balls' radius. Such a centre is beneath the mean plane by less
-    than the amplitude minus the radius, and inside the mesh once lifted above the plane.
+    This takes a face that swings wider than the ball's radius. Such a centre is beneath the mean
+    plane by less than the amplitude minus the radius, and inside the mesh once lifted above the
+    plane.
 
     Args:
         mesh: the surface.
         vibrations: vibrations of its faces.
         points: ball centres [m], shape (n, 3).
         radii: radii of the balls [m], shape (n,).
-        corners: present corners of the triangles [m], as for ``contained``.
+        corners: present corners of the triangles [m], shape (m, 3, 3), if these differ from the
+            mesh.
 
     Returns:
-        Shape (n,) bool.
+        True for each such centre, shape (n,) bool.
     """
     inside = np.zeros(len(points), dtype=np.bool_)
     for one in vibrations:
@@ -236,7 +247,7 @@ def beneath_mean_plane(
 
 
 def enclosed(corners: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """True for points (n, 3) [m] enclosed by triangles (m, 3, 3) [m], by solid angle, (n,)."""
+    """Return True for points (n, 3) [m] enclosed by triangles (m, 3, 3), by their solid angle."""
     angle = np.zeros(len(points))
     _solid_angles(
         np.ascontiguousarray(corners), np.ascontiguousarray(points, dtype=np.float64), angle
@@ -246,7 +257,7 @@ def enclosed(corners: np.ndarray, points: np.ndarray) -> np.ndarray:
 
 @jit
 def _solid_angles(corners: np.ndarray, points: np.ndarray, angle: np.ndarray) -> None:
-    """Solid angle of all triangles, seen from each point.
+    """Add the solid angle [sr] of all triangles, seen from each point, to ``angle`` (n,).
 
     Source: van Oosterom & Strackee, IEEE Trans. Biomed. Eng. 30 (1983) 125.
     """
@@ -264,7 +275,7 @@ def _solid_angles(corners: np.ndarray, points: np.ndarray, angle: np.ndarray) ->
 def turned_corners(
     mesh: TriangleMesh, turn: PartRotation, angle: float | None = None
 ) -> np.ndarray:
-    """Corners (m, 3, 3) [m] of the mesh with the part turned by ``angle`` [rad].
+    """Return the corners (m, 3, 3) [m] of the mesh with the part turned by ``angle`` [rad].
 
     Without an angle the part is at its angle at the start.
     """
@@ -282,7 +293,7 @@ def turned_corners(
 
 @jit
 def _distance_squared(corners: np.ndarray, t: int, px: float, py: float, pz: float) -> float:
-    """Squared distance [m²] from a point to a triangle.
+    """Return the squared distance [m²] of the point (px, py, pz) from triangle number t.
 
     Source: C. Ericson, Real-Time Collision Detection (2005), section 5.1.5.
     """
@@ -340,7 +351,7 @@ def _clear(
 
 
 def clearance(corners: np.ndarray, points: np.ndarray, reach: float) -> np.ndarray:
-    """Distance (n,) [m] from points (n, 3) to the closest triangle (m, 3, 3), at most ``reach``."""
+    """Return distances (n,) [m] of points (n, 3) from the nearest triangle, at most ``reach``."""
     points = np.ascontiguousarray(points, dtype=np.float64)
     gap = np.zeros(len(points))
     _clear(corners, corners.min(axis=1), corners.max(axis=1), points, reach, gap)
@@ -348,7 +359,9 @@ def clearance(corners: np.ndarray, points: np.ndarray, reach: float) -> np.ndarr
 
 
 def closest_pair(balls: Balls, room: Room | None = None) -> tuple[float, int, int]:
-    """Smallest centre distance [m] and its two balls; (inf, -1, -1) for a single ball.
+    """Return the smallest distance of two centres [m] and their balls.
+
+    For a single ball the result is (inf, -1, -1).
 
     Args:
         balls: any balls.
@@ -364,7 +377,7 @@ def closest_pair(balls: Balls, room: Room | None = None) -> tuple[float, int, in
 
 
 def narrowest_gap(balls: Balls, room: Room | None = None) -> tuple[float, int, int]:
-    """Smallest gap [m] between two balls, negative when they overlap, and its two balls.
+    """Return the smallest gap [m] between two balls, negative if they overlap, and the two balls.
 
     The result is (inf, -1, -1) for a single ball, and for balls of several sizes if no two are
     nearer than the largest diameter. The room matters if it is periodic.
@@ -384,7 +397,7 @@ def narrowest_gap(balls: Balls, room: Room | None = None) -> tuple[float, int, i
 
 
 def _pair_tree(balls: Balls, room: Room | None) -> "KDTree":
-    """A tree of the centres, on a torus if the room is periodic."""
+    """Return a search tree of the balls' centres, on a torus if the room is periodic."""
     from scipy.spatial import KDTree
 
     if not isinstance(room, AnalyticCavity) or not room.periods.any():
@@ -397,12 +410,15 @@ def _pair_tree(balls: Balls, room: Room | None) -> "KDTree":
 
 
 def energy(balls: Balls, gravity: Gravity | None = None) -> float:
-    """Kinetic energy, with spins, plus potential energy [J], which is 0 at the origin."""
+    """Return the kinetic energy, spins included, plus the potential energy of all balls [J].
+
+    The potential energy is 0 at the origin.
+    """
     spins = None if balls.spins is None else balls.spins[None]
     now = Frames(np.zeros(1), balls.positions[None], balls.velocities[None], spins)
     return float(energies(now, balls, gravity).total[0])
 
 
 def momentum(balls: Balls) -> np.ndarray:
-    """Total momentum [kg m/s], shape (3,)."""
+    """Return the total momentum of all balls [kg m/s], shape (3,)."""
     return np.asarray(balls.masses @ balls.velocities)

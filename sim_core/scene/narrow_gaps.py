@@ -29,7 +29,7 @@ class NearSurface(NamedTuple):
 
 
 class NarrowGap(NamedTuple):
-    """A ball that does not fit."""
+    """A ball that does not fit between two triangles."""
 
     ball: int  # number of the ball
     one: int  # triangle on one side
@@ -40,10 +40,11 @@ class NarrowGap(NamedTuple):
 
 
 def find_narrow_gap(surface: NearSurface, physics: Physics, balls: Balls) -> NarrowGap | None:
-    """The first ball that does not fit at its start.
+    """Return the first ball that does not fit between surfaces at its start; None if all fit.
 
     Args:
-        surface: all triangles that are nearer to a ball than its radius and `largest_approach`.
+        surface: all triangles that are nearer to a ball than its radius plus the distance by
+            which surfaces can approach each other (`largest_approach`).
     """
     radius, approach = 0.5 * balls.diameters, largest_approach(physics)
     # a gap of -TIGHT: overlaps by half of it on two sides, or by more on one side
@@ -61,7 +62,7 @@ def find_narrow_gap(surface: NearSurface, physics: Physics, balls: Balls) -> Nar
 
 
 def surface_name(mesh: TriangleMesh, physics: Physics, triangle: int) -> str:
-    """Name of a surface for messages, e.g. "the turning part (triangle 12)"."""
+    """Return the name of a surface for messages, e.g. "the turning part (triangle 12)"."""
     turn, tag = physics.part_rotation, int(mesh.tags[triangle])
     if tag in [one.tag for one in physics.vibrations]:
         return f"{vibrating_name(physics, tag)} (triangle {triangle})"
@@ -71,22 +72,22 @@ def surface_name(mesh: TriangleMesh, physics: Physics, triangle: int) -> str:
 
 
 def vibrating_name(physics: Physics, tag: int) -> str:
-    """Name of a vibrating surface for messages, with its tag if there are several."""
+    """Return the name of a vibrating surface for messages, with its tag if several vibrate."""
     return "the vibrating surface" + (f" of tag {tag}" if len(physics.vibrations) > 1 else "")
 
 
 def largest_approach(physics: Physics) -> float:
-    """Bound on the distance [m] by which two surfaces approach each other after the start."""
+    """Return a bound on the distance [m] by which vibrations bring two surfaces nearer together."""
     return sum(2.0 * one.amplitude for one in physics.vibrations)
 
 
 def _tightest(
     surface: NearSurface, physics: Physics, here: np.ndarray, radius: float
 ) -> tuple[int, int, float, bool] | None:
-    """The two triangles that leave a ball the least room.
+    """Find the two triangles that leave a ball at ``here`` (3,) [m] the least room.
 
     Returns: the numbers of the triangles, the missing width [m], and True if the gap is narrow by
-    vibration.
+    vibration; or None if the ball fits.
     """
     turn, reach = physics.part_rotation, radius + largest_approach(physics)
     corners, tags = surface.corners, surface.tags
@@ -116,7 +117,7 @@ def _tightest(
 
 
 def _nearest_points(corners: np.ndarray, point: np.ndarray) -> np.ndarray:
-    """The point of each triangle (m, 3, 3) closest to a point (3,): on its face or its border."""
+    """Return the point of each triangle that is closest to ``point``, on its face or border."""
     a, edge = corners, np.roll(corners, -1, axis=1) - corners
     tiny = np.finfo(float).tiny  # a triangle may have no area
     square = np.maximum(np.einsum("mki,mki->mk", edge, edge), tiny)

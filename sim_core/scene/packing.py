@@ -1,4 +1,4 @@
-"""First positions without overlap: random sequential placement, from the bottom up.
+"""Place balls at random, one after another, without overlaps, from the bottom of the chamber up.
 
 The shot lies at the bottom of the chamber before peening.
 """
@@ -33,7 +33,7 @@ def pack_balls(
     part_rotation: PartRotation | None = None,
     floor: float = -np.inf,
 ) -> np.ndarray:
-    """Positions of balls inside the cavity, without overlaps.
+    """Return random positions of balls inside the cavity, without overlaps.
 
     Balls are placed from low z upwards, and the larger balls first.
 
@@ -80,7 +80,7 @@ def pack_balls(
 def _free_selector(
     mesh: TriangleMesh | AnalyticCavity, part_rotation: PartRotation | None
 ) -> Callable[[np.ndarray, float], np.ndarray]:
-    """A function that selects free points, from points (n, 3) [m] and a distance [m].
+    """Return a function that selects the free points from points (n, 3) [m] and a distance [m].
 
     A free point is inside the cavity and at least the distance away from every surface.
     """
@@ -104,7 +104,7 @@ def _free_selector(
 
 
 class _Layer(NamedTuple):
-    """The layer in which balls of one size are placed."""
+    """The cavity, and the limits within it, in which balls of one size are placed."""
 
     mesh: TriangleMesh | AnalyticCavity  # the cavity
     # function that selects points inside the cavity and far enough from every surface
@@ -115,7 +115,7 @@ class _Layer(NamedTuple):
 
 
 def _place(placed: "_PlacedBalls", layer: _Layer, count: int, rng: np.random.Generator) -> None:
-    """Add ``count`` balls of one size."""
+    """Add ``count`` balls of one size to the placed balls. Raises SceneError if they do not fit."""
     mesh, diameter = layer.mesh, layer.diameter
     radius = 0.5 * diameter + GAP
     reach = radius + layer.clear
@@ -147,7 +147,7 @@ def _place(placed: "_PlacedBalls", layer: _Layer, count: int, rng: np.random.Gen
 
 
 class _PlacedBalls:
-    """Balls without overlaps. Balls whose centres are in grid cells of one hash form a chain."""
+    """The balls placed so far. Balls whose centres are in grid cells of one hash form a chain."""
 
     def __init__(self, most: int, edge: float, periods: np.ndarray) -> None:
         """Make room for ``most`` balls in cells of width ``edge`` [m], twice the largest radius.
@@ -160,7 +160,7 @@ class _PlacedBalls:
         self.older = np.full(most, -1)  # the next ball of its chain
 
     def add(self, points: np.ndarray, radius: float, most: int) -> None:
-        """Add the points (n, 3) in turn that overlap no ball, up to a number of ``most`` balls."""
+        """Add a ball at each point (n, 3) where it overlaps none, up to ``most`` balls in all."""
         at = self.points, self.radii, self.newest, self.older
         grid = self.edge, self.periods
         self.count = _add(np.ascontiguousarray(points), radius, most, self.count, *grid, *at)
@@ -179,7 +179,9 @@ def _add(
     newest: np.ndarray,
     older: np.ndarray,
 ) -> int:
-    """Add new balls, see `_PlacedBalls`.
+    """Add the balls ``new`` (n, 3) [m] that overlap no placed ball, until there are ``most`` balls.
+
+    ``edge``, ``periods`` and the last four arrays are the attributes of `_PlacedBalls`.
 
     Returns: the number of balls afterwards.
     """
@@ -213,7 +215,7 @@ def _add(
 
 @jit
 def _hash(i: int, j: int, k: int) -> int:
-    """Number of a grid cell, spread over the integers by three large primes.
+    """Return the hash of grid cell (i, j, k), which three large primes spread over the integers.
 
     Source: M. Teschner et al., "Optimized spatial hashing for collision detection of deformable
     objects", Vision, Modeling and Visualization 2003.

@@ -34,7 +34,7 @@ class Physics(NamedTuple):
         gravity: uniform gravity.
         restitution: restitution of surfaces and balls.
         vibration: vibration of one surface, or a tuple for several surfaces.
-        rest: contact mode.
+        rest: contact mode, in which balls roll and come to rest.
         part_rotation: rotation of one part.
         friction: friction of surfaces and balls, with spin.
         random_phase: random phase of the vibration, for each ball.
@@ -61,13 +61,13 @@ class Physics(NamedTuple):
 
     @property
     def vibrations(self) -> tuple[Vibration, ...]:
-        """The vibrations as a tuple."""
+        """The vibrations as a tuple, which is empty if nothing vibrates."""
         if self.vibration is None:
             return ()
         return (self.vibration,) if isinstance(self.vibration, Vibration) else self.vibration
 
     def begun_at(self, time: float) -> "Physics":
-        """These effects on a clock that begins ``time`` [s] later.
+        """Return these effects on a clock that begins ``time`` [s] later.
 
         Vibrations and the turning part have gone on. Turns are counted as fractions, so that their
         number takes no digits from the phase.
@@ -87,5 +87,5 @@ class Physics(NamedTuple):
 
 
 def _phase_after(phase: float, rate: float | Fraction, time: float) -> float:
-    """A phase [rad] that grows by ``rate`` turns a second, after ``time`` [s]."""
+    """Return a phase [rad] after ``time`` [s], in which it grows by ``rate`` turns a second."""
     return phase + 2.0 * math.pi * float(Fraction(rate) * Fraction(float(time)) % 1)

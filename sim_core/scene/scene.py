@@ -56,7 +56,7 @@ EFFECT_TYPES = {
 
 @dataclass(frozen=True)
 class Scene:
-    """A cavity, balls inside it, the effects, and the duration.
+    """Complete input of a simulation: a cavity, balls inside it, the effects and the duration.
 
     Args:
         mesh: a closed mesh or an analytical cavity.
@@ -112,7 +112,7 @@ class Scene:
 
     @property
     def physics_at_start(self) -> Physics:
-        """The effects with their phases at the scene's start."""
+        """The effects with the phases that they have at the scene's start."""
         return self.physics.begun_at(self.start_time)
 
     def _require_physics(self) -> None:
@@ -228,7 +228,7 @@ class Scene:
         self._require_room_between(near)
 
     def _near(self, corners: np.ndarray | None) -> NearSurface:
-        """The triangles that balls may touch or that may come near balls, at their rest positions.
+        """Return the triangles that may touch balls or come near balls, at their rest positions.
 
         Args:
             corners: corners of all triangles [m], shape (m, 3, 3), if some triangles are turned.
@@ -242,7 +242,10 @@ class Scene:
         return NearSurface(number, self.mesh.tags[number], corners[number])
 
     def _require_room_above_sonotrode(self, near: NearSurface) -> None:
-        """Check the balls against vibrating surfaces, which are displaced by their phases."""
+        """Raise SceneError for a ball that overlaps a vibrating surface, displaced by its phase.
+
+        The corners of vibrating triangles in ``near`` are displaced for good.
+        """
         balls = self.balls
         for vibration in self.physics_at_start.vibrations:
             vibrating = near.tags == vibration.tag
@@ -283,7 +286,7 @@ def require_free_rotation(mesh: TriangleMesh, turn: PartRotation, diameter: floa
 
 @computed_once(32)  # replicas of one chamber share the answer
 def _inside_out(mesh: TriangleMesh) -> int:
-    """A triangle whose own closed shell is wound the wrong way round; -1 if there is none.
+    """Return a triangle whose closed shell is wound the wrong way round; -1 if there is none.
 
     The mesh as a whole encloses a positive volume for either winding of a small body in it. A shell
     is tested at its largest triangle, and is wrong only if the cavity is behind that triangle and
