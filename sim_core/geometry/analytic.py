@@ -79,7 +79,7 @@ class AnalyticCavity:
         return np.where(np.isin(np.arange(3), self.periodic), sides, 0.0)
 
     def put_back(self, points: np.ndarray) -> np.ndarray:
-        """The images of points (..., 3) [m] inside a periodic box."""
+        """Return points (..., 3) [m], moved by whole sides into the box where it is periodic."""
         if not self.periodic:
             return points
         sides = self.periods
@@ -110,7 +110,7 @@ class AnalyticCavity:
 
     @property
     def axis(self) -> CylinderAxis | None:
-        """Axis of a cylinder relative to the middle; None for a prism."""
+        """Axis of a cylinder relative to the middle of its bounding box; None for a prism."""
         if self.radius is None:
             return None
         return CylinderAxis(*(float(x) for x in (self.centre - self.middle[:2])))
@@ -126,7 +126,10 @@ class AnalyticCavity:
 
     @property
     def planes(self) -> tuple[np.ndarray, np.ndarray]:
-        """Unit normals towards the shot (p, 3) and offsets (p,) [m] of the plane surfaces."""
+        """Unit normals towards the shot (p, 3) of the plane surfaces, and their offsets (p,) [m].
+
+        An offset is the distance from the origin along the normal.
+        """
         start = self.edges[:, 0]
         edge = self.edges[:, 1] - start
         inward = np.column_stack([-edge[:, 1], edge[:, 0]]) / np.hypot(*edge.T)[:, None]
@@ -137,7 +140,7 @@ class AnalyticCavity:
 
     @property
     def corners(self) -> np.ndarray:
-        """A triangle in each plane surface [m], wound as in a mesh, shape (k, 3, 3).
+        """Corners of one triangle in each plane surface [m], wound as in a mesh, shape (k, 3, 3).
 
         The triangle of a cylinder wall has no area.
         """
@@ -149,7 +152,10 @@ class AnalyticCavity:
         return np.array(flat + sides)
 
     def gaps(self, points: np.ndarray) -> np.ndarray:
-        """Distance [m] of points (n, 3) [m] from each surface, shape (n, k); negative outside."""
+        """Return the distance [m] of points (n, 3) from each surface, (n, k).
+
+        It is negative outside.
+        """
         normals, offsets = self.planes
         flat = points @ normals.T - offsets
         if self.radius is None:
@@ -158,13 +164,13 @@ class AnalyticCavity:
         return np.column_stack([flat, wall])
 
     def contains(self, points: np.ndarray, amplitude: float = 0.0) -> np.ndarray:
-        """True for points (n, 3) [m] inside with the floor one amplitude down, (n,) bool."""
+        """Return True for points (n, 3) inside when the floor is ``amplitude`` [m] lower, (n,)."""
         gaps = self.gaps(points)
         gaps[:, FLOOR] += amplitude
         return np.asarray((gaps > 0.0).all(axis=1))
 
     def narrowest(self) -> tuple[float, int, int]:
-        """Smallest distance [m] between two opposite sides, and the numbers of these sides."""
+        """Return the smallest distance [m] of two opposite sides, and the numbers of the two."""
         if self.radius is not None:
             return 2.0 * self.radius, SIDE, SIDE
         normals, offsets = (values[SIDE:] for values in self.planes)
@@ -176,7 +182,7 @@ class AnalyticCavity:
         return float(distance[one, two]), SIDE + int(one), SIDE + int(two)
 
     def touched(self, point: np.ndarray, reach: float, floor_shift: float) -> list[str]:
-        """Names of the surfaces near a point, nearest first.
+        """Return the names of the surfaces near a point, nearest first.
 
         Args:
             point: position [m], shape (3,).
@@ -188,7 +194,7 @@ class AnalyticCavity:
         return [self.name(int(surface)) for surface in np.argsort(gaps) if gaps[surface] <= reach]
 
     def name(self, surface: int) -> str:
-        """Name of a surface for messages, e.g. "the floor" or "side 5"."""
+        """Return the name of a surface for messages, e.g. "the floor" or "side 5"."""
         if surface < SIDE:
             return ("the floor", "the ceiling")[surface]
         return "the cylinder wall" if self.radius is not None else f"side {surface}"
@@ -293,12 +299,12 @@ def periodic_box(
 
 
 def periods_of(room: TriangleMesh | AnalyticCavity) -> np.ndarray:
-    """Side lengths of a cavity along its periodic axes [m], 0 along the other axes, shape (3,)."""
+    """Return the side lengths of a cavity along its periodic axes [m], 0 along other axes, (3,)."""
     return room.periods if isinstance(room, AnalyticCavity) else np.zeros(3)
 
 
 def _all_tags(tags: Sequence[int], sides: int) -> np.ndarray:
-    """One tag for each surface. If only the first side has a tag, all sides get it."""
+    """Return one tag for each surface. If only the first side has a tag, all sides get it."""
     each = [*tags, *([tags[-1]] * (sides - 1) if sides and len(tags) == SIDE + 1 else [])]
     valid = all(tag == int(tag) and 0 <= tag < MAX_TAGS for tag in each)
     if len(each) != SIDE + sides or not valid:
@@ -318,7 +324,7 @@ def _cavity(
     radius: float | None,
     periodic: tuple[int, ...] = (),
 ) -> AnalyticCavity:
-    """A cavity with read-only arrays; raises SceneError unless the top is above the bottom."""
+    """Return a cavity with read-only arrays. Raises SceneError unless top is above bottom."""
     if not (np.isfinite([bottom, top]).all() and bottom < top):
         raise SceneError(f"an analytical cavity from {bottom} to {top} m: top must be above bottom")
     for array in (outline, centre, tags):
@@ -329,10 +335,11 @@ def _cavity(
 def build_analytic_table(
     cavity: AnalyticCavity, radius: float, vibrating_tag: int, amplitude: float
 ) -> ObstacleTable:
-    """Obstacles of a cavity for balls of one radius, relative to its middle: one row a surface.
+    """Return the obstacles that centres of balls of one radius meet in a cavity, one row a surface.
 
-    A plane is a face without borders, because no ball in a convex cavity gets beyond them. The
-    bounding box of floor, ceiling and plane sides is flat. Any other surface has the cavity's box.
+    Coordinates are relative to the cavity's middle. A plane is a face without borders, because no
+    ball in a convex cavity gets beyond them. The bounding box of floor, ceiling and plane sides is
+    flat. Any other surface has the cavity's box.
 
     Args:
         cavity: the cavity.

@@ -25,7 +25,10 @@ class BallSizes(NamedTuple):
 
 
 def new_ball_sizes(balls: Balls, roots: np.ndarray) -> BallSizes | None:
-    """Sizes of the balls, with ``roots`` (k,) of ObstacleSet; None if all balls are alike."""
+    """Return the sizes and masses of the balls; None if all balls are alike.
+
+    ``roots``: nodes of the search tree where the obstacles for each size begin, (k,).
+    """
     if balls.alike:
         return None
     size = np.searchsorted(balls.sizes, balls.diameters).astype(np.int32)
@@ -36,7 +39,7 @@ def new_ball_sizes(balls: Balls, roots: np.ndarray) -> BallSizes | None:
 
 @inlined
 def root_of_ball(sizes: BallSizes | None, ball: int) -> int:
-    """Node of the tree where the ball's obstacles begin."""
+    """Return the node of the search tree where the obstacles for this ball begin."""
     if sizes is None:
         return 0
     return int(sizes.root[sizes.size[ball]])
@@ -44,7 +47,7 @@ def root_of_ball(sizes: BallSizes | None, ball: int) -> int:
 
 @inlined
 def radius_of_ball(sizes: BallSizes | None, radius: float, ball: int) -> float:
-    """Radius of a ball [m]; ``radius`` if all balls are alike."""
+    """Return the radius of a ball [m], which is ``radius`` if all balls are alike."""
     if sizes is None:
         return radius
     return float(sizes.radius[sizes.size[ball]])
@@ -52,7 +55,10 @@ def radius_of_ball(sizes: BallSizes | None, radius: float, ball: int) -> float:
 
 @inlined
 def face_overlap_of_ball(sizes: BallSizes | None, face_overlap: float, ball: int) -> float:
-    """Overlap of neighbouring faces for a ball [m]; ``face_overlap`` if all balls are alike."""
+    """Return by how much neighbouring faces overlap for a ball [m].
+
+    It is ``face_overlap`` if all balls are alike.
+    """
     if sizes is None:
         return face_overlap
     return float(sizes.face_overlap[sizes.size[ball]])
@@ -60,7 +66,9 @@ def face_overlap_of_ball(sizes: BallSizes | None, face_overlap: float, ball: int
 
 @inlined
 def share_by_mass(sizes: BallSizes | None, ball: int, other: int, change: Vec3) -> Vec3:
-    """Velocity change [m/s] of the first ball of a pair, from the ``change`` at equal masses.
+    """Return the velocity change [m/s] of ``ball`` when it collides with ``other``.
+
+    ``change`` [m/s] is what it would be at equal masses.
 
     The reduced mass is m1 m2 / (m1 + m2), half a mass for equal balls. Momentum is kept.
     """

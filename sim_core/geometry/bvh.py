@@ -81,9 +81,9 @@ def build_tree(table: ObstacleTable, radius: float) -> Tree:
 
 
 def join_trees(trees: list[Tree]) -> tuple[Tree, np.ndarray]:
-    """Join several trees, with the radius of the last tree.
+    """Join the trees for several ball radii into one tree, which has the radius of the last tree.
 
-    Returns: the tree, and the node at which each tree begins, shape (k,).
+    Returns: the tree, and the node at which each of the k trees begins, shape (k,).
     """
     if len(trees) == 1:
         return trees[0], np.zeros(1, dtype=np.int64)
@@ -118,7 +118,10 @@ def _grow(
     sweep: np.ndarray,
     groups: np.ndarray,
 ) -> int:
-    """Fill bounds and children, and sort ``order`` so that leaf i holds obstacle order[i].
+    """Build the nodes of the tree from the root down: fill ``bounds`` and ``children``.
+
+    ``boxes.order`` is sorted so that leaf i holds obstacle order[i]. ``ranges``, ``bins``,
+    ``sweep`` and ``groups`` are working arrays.
 
     Returns: the number of nodes.
     """
@@ -164,7 +167,7 @@ def _grow(
 
 @jit
 def _area_of(boxes: _Boxes, start: int, end: int) -> float:
-    """Half the surface area of the box around a group [m²]."""
+    """Return half the surface area [m²] of the box around obstacles ``start`` to ``end``."""
     low, high, order = boxes.low, boxes.high, boxes.order
     x0, y0, z0, x1, y1, z1 = np.inf, np.inf, np.inf, -np.inf, -np.inf, -np.inf
     for k in range(start, end):
@@ -197,9 +200,11 @@ def _merge(box: np.ndarray, row: int, other: np.ndarray, other_row: int) -> None
 
 @jit
 def _cheapest(bins: np.ndarray, left: np.ndarray) -> tuple[float, int]:
-    """Find the cut with the least sum of area times count on both sides.
+    """Find the cut between bins with the least sum of box area times number of obstacles.
 
-    Returns: this sum, and the last bin of the left side.
+    ``left`` is a working array.
+
+    Returns: this sum [m²], and the last bin of the left side.
     """
     _clear(left)
     for b in range(BINS):  # left[b]: all bins up to b
@@ -234,7 +239,9 @@ def _bin_of(boxes: _Boxes, i: int, axis: int, first: float, scale: float) -> int
 
 @jit
 def _cut(boxes: _Boxes, start: int, end: int, bins: np.ndarray, sweep: np.ndarray) -> int:
-    """Sort a group into two at the cheapest of BINS - 1 cuts along each axis.
+    """Cut a group of obstacles in two, at the cheapest of BINS - 1 places along each axis.
+
+    The group is the obstacles ``start`` to ``end`` of the order, which is sorted accordingly.
 
     Returns: the start of the second part.
     """

@@ -62,7 +62,10 @@ def closest_points(
 
 @computed_once(8)
 def _tree_of(mesh: TriangleMesh, tag: int | None) -> Tree:
-    """A tree of the triangles themselves. Each obstacle holds a triangle's nine coordinates."""
+    """Return a search tree of the triangles of one tag; None means all triangles.
+
+    Each obstacle holds a triangle's nine coordinates.
+    """
     own = np.flatnonzero((mesh.tags == tag) | (tag is None)).astype(np.int32)
     if not len(own):
         raise SceneError(f"the mesh has no triangle of tag {tag}")
@@ -128,7 +131,7 @@ def _box_distance_squared(bounds: np.ndarray, node: int, child: int, at: Vec3) -
 
 @jit
 def _point_on_triangle(numbers: np.ndarray, row: int, at: Vec3) -> Vec3:
-    """The point of a triangle closest to a place."""
+    """Return the point of triangle ``row`` that is closest to the place ``at`` [m]."""
     a = Vec3(numbers[row, 0], numbers[row, 1], numbers[row, 2])
     b = Vec3(numbers[row, 3], numbers[row, 4], numbers[row, 5])
     c = Vec3(numbers[row, 6], numbers[row, 7], numbers[row, 8])
@@ -150,7 +153,7 @@ def _point_on_triangle(numbers: np.ndarray, row: int, at: Vec3) -> Vec3:
 
 @jit
 def _point_on_side(a: Vec3, b: Vec3, at: Vec3) -> Vec3:
-    """The point of the segment from a to b closest to a place."""
+    """Return the point of the segment from a to b that is closest to the place ``at`` [m]."""
     side = sub(b, a)
     length = dot(side, side)
     share = 0.0

@@ -33,7 +33,10 @@ STRAIGHT = 1e-10
 
 
 class FlatFaces(NamedTuple):
-    """The k flat faces of a mesh of m triangles."""
+    """The k flat faces of a mesh of m triangles.
+
+    A flat face is made of connected triangles of one surface that lie in one plane.
+    """
 
     of_triangle: np.ndarray  # flat face of each triangle, LONE if none, shape (m,) int32
     seed: np.ndarray  # triangle that gives each flat face its plane, shape (k,) int32
@@ -55,7 +58,10 @@ class _Triangles(NamedTuple):
 
 
 def in_plane_tolerance(vertices: np.ndarray) -> float:
-    """Largest distance from a plane [m] of a corner in the plane, for vertices (n, 3) [m]."""
+    """Return how far [m] a corner may be from a plane and count as in it.
+
+    The vertices (n, 3) [m] set the rounding.
+    """
     rounding = ROUNDINGS * float(np.finfo(np.float64).eps * np.abs(vertices).max())
     return min(max(IN_PLANE, rounding), MAX_IN_PLANE)
 
@@ -63,7 +69,7 @@ def in_plane_tolerance(vertices: np.ndarray) -> float:
 def find_flat_faces(
     corners: np.ndarray, partners: np.ndarray, surface: np.ndarray, tolerance: float
 ) -> FlatFaces:
-    """Find flat faces of MIN_TRIANGLES triangles and more.
+    """Find the flat faces of a mesh: MIN_TRIANGLES or more connected triangles in one plane.
 
     Args:
         corners: corner positions [m], shape (m, 3, 3).
@@ -94,7 +100,10 @@ def find_flat_faces(
 
 
 def _outlines(of_triangle: np.ndarray, partners: np.ndarray, count: int) -> list[np.ndarray]:
-    """The directed edges between each flat face and the rest."""
+    """Return the directed edges that border each of ``count`` flat faces.
+
+    A directed edge has the number 3 triangle + corner.
+    """
     edges = np.arange(len(partners))
     here, there = of_triangle[edges // 3], of_triangle[partners // 3]
     border = edges[(here != there) & (here != LONE)]
@@ -113,7 +122,9 @@ def _grow(
     queue: np.ndarray,
     tried: np.ndarray,
 ) -> int:
-    """Fill ``of_triangle`` and ``seeds``.
+    """Let flat faces grow from the largest triangles: fill ``of_triangle`` and ``seeds``.
+
+    ``queue`` and ``tried`` are working arrays.
 
     Returns: the number of flat faces.
     """
@@ -152,7 +163,7 @@ def _grow(
 
 @jit
 def _lies_in_plane(mesh: _Triangles, triangle: int, seed: int, tolerance: float) -> bool:
-    """True if the triangle lies in the seed's plane and faces the same way."""
+    """Return True if the triangle lies in the plane of triangle ``seed`` and faces the same way."""
     corners, normals = mesh.corners, mesh.normals
     facing = 0.0
     for axis in range(3):
@@ -197,7 +208,7 @@ def cover_with_quadrangles(outline: np.ndarray, area: float) -> np.ndarray | Non
 
 
 def _doubled_area(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
-    """Twice the signed area [m²] of triangles with these corners (n, 2)."""
+    """Return twice the signed area [m²] of triangles with corners a, b and c, (n, 2) [m] each."""
     one, two = b - a, c - a
     return np.asarray(one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0])
 
@@ -230,7 +241,7 @@ def _cut(region: shapely.Geometry) -> list[shapely.Geometry]:
 
 
 def _quadrangles(polygon: shapely.Geometry) -> np.ndarray:
-    """Convex quadrangles (k, 4, 2) of a polygon, with no corner added.
+    """Return convex quadrangles (k, 4, 2) [m] that make up a polygon, with no corner added.
 
     A cut that passes a corner by a rounding leaves a side of 1e-17 m. Such a side has no direction
     and would shut balls out of the piece, so that its corner is left out.
@@ -264,7 +275,10 @@ class SurfaceTriangles(NamedTuple):
 def surface_triangles(
     mesh: TriangleMesh, vibrating_tags: tuple[int, ...] = (), amplitudes: tuple[float, ...] = ()
 ) -> SurfaceTriangles:
-    """The triangles of a mesh. Triangles with ``vibrating_tags`` move by ``amplitudes`` [m]."""
+    """Return the triangles of a mesh with all data that obstacles are made from.
+
+    Triangles with the tag vibrating_tags[i] vibrate with the amplitude amplitudes[i] [m].
+    """
     corners = mesh.corners - mesh.middle
     amplitude = np.zeros(len(corners))
     for tag, largest in zip(vibrating_tags, amplitudes, strict=True):

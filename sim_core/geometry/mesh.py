@@ -12,7 +12,7 @@ MAX_TAGS = 256
 
 @dataclass(frozen=True, eq=False)  # hashed by identity, so that objects built from it can be cached
 class TriangleMesh:
-    """Surface of a cavity.
+    """Closed surface of the cavity that the balls move in, made of tagged triangles.
 
         outside      ___________          normals point out of the cavity; a tag is a number
                     |  cavity   |         the user chooses, e.g. 0 part, 1 sonotrode, 2 wall
@@ -100,7 +100,10 @@ class TriangleMesh:
 
 
 def _whole_numbers(name: str, numbers: np.ndarray) -> np.ndarray:
-    """The numbers as int64; raises SceneError for a number that is not whole or beyond int32."""
+    """Return the numbers as int64.
+
+    Raises SceneError for a number that is not whole or beyond int32.
+    """
     try:
         whole = (numbers == np.floor(numbers)) & (np.abs(numbers) <= np.iinfo(np.int32).max)
     except TypeError:
@@ -114,13 +117,13 @@ def _whole_numbers(name: str, numbers: np.ndarray) -> np.ndarray:
 
 
 def enclosed_volume(vertices: np.ndarray, triangles: np.ndarray) -> float:
-    """Volume [m³] enclosed by a closed surface; negative if the surface is inside out."""
+    """Return the volume [m³] that a closed surface encloses, negative if it is inside out."""
     a, b, c = np.moveaxis(vertices[triangles] - vertices.mean(axis=0), 1, 0)
     return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6.0)
 
 
 def normals_towards_shot(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Unit normals towards the shot and doubled areas of triangles.
+    """Return unit normals towards the shot and doubled areas of triangles.
 
     Args:
         corners: corner positions [m], shape (m, 3 corners, 3).
@@ -136,7 +139,10 @@ def normals_towards_shot(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def edge_partners(triangles: np.ndarray) -> np.ndarray:
-    """The opposite of each directed edge (3 triangle + corner) of a closed mesh, shape (3 m,)."""
+    """Return, for each directed edge of a closed mesh, the edge that runs the opposite way, (3 m,).
+
+    A directed edge has the number 3 triangle + corner.
+    """
     count = int(triangles.max()) + 1
     a = triangles.reshape(-1).astype(np.int64)
     b = np.roll(triangles, -1, axis=1).reshape(-1).astype(np.int64)
@@ -146,7 +152,7 @@ def edge_partners(triangles: np.ndarray) -> np.ndarray:
 
 
 def connected_components(edges: np.ndarray, count: int) -> np.ndarray:
-    """Number of the connected component of each vertex, shape (count,).
+    """Return the number of the connected component that each vertex belongs to, shape (count,).
 
     Args:
         edges: vertex indices of both ends, shape (n, 2).

@@ -45,7 +45,7 @@ def build_obstacle_set(
     amplitudes: tuple[float, ...] = (),
     axis: RotationAxis | None = None,
 ) -> ObstacleSet:
-    """Build the obstacles of a scene.
+    """Build the obstacles of a scene for the centres of its balls.
 
     Args:
         mesh: the cavity.
@@ -82,7 +82,7 @@ def build_obstacle_set(
 def _swept_bounds(
     mesh: TriangleMesh | AnalyticCavity, amplitude: float, axis: RotationAxis | None
 ) -> np.ndarray:
-    """Bounding box (2, 3) [m] of the mesh about its middle, with all that its surfaces sweep."""
+    """Return the box (2, 3) [m] about the mesh's middle that holds all that its surfaces sweep."""
     low, high = mesh.bounds - mesh.middle
     periodic = periods_of(mesh) > 0.0
     low[periodic], high[periodic] = -UNBOUNDED, UNBOUNDED

@@ -41,7 +41,7 @@ MAX_CORNER_OVERLAPS = 3.0
 
 
 class ObstacleTable(NamedTuple):
-    """Obstacles that the centre of a ball can hit, one row an obstacle; k = faces + capsules."""
+    """The k obstacles (faces and capsules) that the centre of a ball can hit, one row each."""
 
     # Geometry [m], shape (k, 20).
     # A face holds its unit normal towards the shot (0:3), the offset of its moved plane (3), and
@@ -61,7 +61,7 @@ class ObstacleTable(NamedTuple):
 
 @jit
 def same_plane(numbers: np.ndarray, row: int, other: int) -> bool:
-    """True if two faces hold the same plane, bit for bit, as the faces of a flat sonotrode do."""
+    """Return True if two faces hold the same plane, bit for bit. Faces of a flat sonotrode do."""
     return bool(
         numbers[row, 0] == numbers[other, 0]
         and numbers[row, 1] == numbers[other, 1]
@@ -71,7 +71,7 @@ def same_plane(numbers: np.ndarray, row: int, other: int) -> bool:
 
 
 def face_overlap_of(radius: float) -> float:
-    """Overlap of neighbouring faces [m] for balls of this radius [m]."""
+    """Return by how much neighbouring faces overlap [m], for balls of this radius [m]."""
     return min(FACE_OVERLAP, FACE_OVERLAP_PER_RADIUS * radius)
 
 
@@ -90,7 +90,11 @@ def build_obstacle_table(surface: SurfaceTriangles, radius: float) -> ObstacleTa
 
 
 def _faces(surface: SurfaceTriangles, radius: float, border: SonotrodeBorder) -> ObstacleTable:
-    """One face for each triangle with an area outside flat faces, and a few for each flat face."""
+    """Return the faces among the obstacles for balls of one radius [m].
+
+    There is one face for each triangle with an area outside flat faces, a few for each flat face,
+    and one for each wall that goes on beneath a vibrating face.
+    """
     corners, flat_faces = surface.corners, surface.flat_faces
     of_triangle = flat_faces.of_triangle
     each = [np.flatnonzero((surface.doubled > 0.0) & (of_triangle == LONE))]
@@ -135,7 +139,10 @@ def _faces(surface: SurfaceTriangles, radius: float, border: SonotrodeBorder) ->
 def _few_faces(
     corners: np.ndarray, outline: np.ndarray, frame: np.ndarray, area: float
 ) -> np.ndarray | None:
-    """Corners (k, 4, 3) [m] of the faces that cover a flat face of this area [m²], or None."""
+    """Return the corners (k, 4, 3) [m] of a few faces that cover a flat face of this area [m²].
+
+    The result is None if the outline cannot be covered.
+    """
     origin, axes = frame[0], frame[1:]
     start, end = corners[outline // 3, outline % 3], corners[outline // 3, (outline % 3 + 1) % 3]
     faces = cover_with_quadrangles((np.stack([start, end], axis=1) - origin) @ axes.T, area)
@@ -148,13 +155,16 @@ def _few_faces(
 
 
 def _box_area(pieces: np.ndarray) -> float:
-    """Area [m²] of the boxes round pieces (k, 4, 3), a measure of how often flights enter them."""
+    """Return half the surface area [m²] of all boxes round pieces (k, 4, 3) [m] together.
+
+    It is a measure of how often flights enter the boxes.
+    """
     x, y, z = np.ptp(pieces, axis=1).T
     return float((x * y + y * z + z * x).sum())
 
 
 def _share_plane(numbers: np.ndarray, vibrating: np.ndarray) -> None:
-    """Give vibrating faces in one plane up to rounding the same plane, to solve it once."""
+    """Give vibrating faces in one plane up to rounding exactly one plane, to solve it only once."""
     rows = np.flatnonzero(vibrating)
     while len(rows):
         first = numbers[rows[0], 0:4]
@@ -165,9 +175,10 @@ def _share_plane(numbers: np.ndarray, vibrating: np.ndarray) -> None:
 
 
 def _capsules(surface: SurfaceTriangles, radius: float, border: SonotrodeBorder) -> ObstacleTable:
-    """One capsule for each convex edge, or straight run of edges between two flat faces.
+    """Return the capsules among the obstacles for balls of one radius [m].
 
-    Each edge that goes on beneath a vibrating face has a capsule too.
+    There is one for each convex edge, or straight run of edges between two flat faces. Each edge
+    that goes on beneath a vibrating face has a capsule too.
     """
     mesh, corners, normals = surface.mesh, surface.corners, surface.normals
     of_triangle, vibrating = surface.flat_faces.of_triangle, surface.vibrating

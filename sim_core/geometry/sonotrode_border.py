@@ -77,7 +77,7 @@ def find_border(surface: SurfaceTriangles, radius: float) -> SonotrodeBorder:
 
 
 def largest_amplitude(mesh: TriangleMesh, tag: int, radius: float) -> tuple[float, np.ndarray, str]:
-    """Largest amplitude of a surface beside its walls, for balls of one radius [m].
+    """Return the largest amplitude of a surface beside its walls, for balls of one radius [m].
 
     Returns:
         Zero-to-peak amplitude [m], inf where every wall is upright; the place [m] that limits it,
@@ -105,7 +105,7 @@ def _beside(triangles: np.ndarray, normals: np.ndarray, vibrating: np.ndarray) -
 
 
 def _largest_amplitude(run: np.ndarray, rise: np.ndarray, radius: float) -> np.ndarray:
-    """Amplitude [m], shape (k,), beyond which a face and the wall beside it part.
+    """Return the amplitude [m], shape (k,), beyond which a face and the wall beside it part.
 
     Beside a slope that rises outwards, the raised face comes out of the slope. Under a wall that
     leans over it, a ball on the lowered face gets past the face's border.
@@ -119,7 +119,7 @@ def _largest_amplitude(run: np.ndarray, rise: np.ndarray, radius: float) -> np.n
 
 
 def _leaning(angle: float) -> str:
-    """Slope of a wall in words, by its angle [degrees] to the face's plane."""
+    """Return the slope of a wall in words, by its angle [degrees] to the face's plane."""
     if angle < 90.0:
         return f"lies flat or rises by only {angle:.3g} degrees"
     return f"leans over it by {angle - 90.0:.3g} degrees"
@@ -128,7 +128,7 @@ def _leaning(angle: float) -> str:
 def _beneath(
     surface: SurfaceTriangles, beside: _Beside, radius: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """The walls and edges beneath surfaces beside vibrating faces, as in SonotrodeBorder.
+    """Return the last four fields of SonotrodeBorder: walls and edges beneath vibrating faces.
 
     A wall goes on in its plane to the line that this plane has in common with the next wall's
     plane. A convex corner towards the shot is an edge there. A concave corner is behind both walls,
@@ -172,7 +172,9 @@ def _beneath(
 def _next_wall(
     partners: np.ndarray, vibrating: np.ndarray, edge: int, last: int
 ) -> tuple[int, int]:
-    """The wall beside the next edge of the border, round the first or ``last`` end of an edge.
+    """Find the wall beside the next edge of the border, round one end of an edge.
+
+    ``last``: 0 for the first end of the edge, 1 for its last end.
 
     Returns:
         The wall's triangle, and the number of its side on the border.

@@ -13,7 +13,7 @@ TRIANGLES_PER_SQUARE = 2.0
 
 
 class TriangleLookup(NamedTuple):
-    """The grids over k flat faces of a mesh of m triangles."""
+    """Grids over k flat faces that find the triangle at a point, in a mesh of m triangles."""
 
     of_triangle: np.ndarray  # flat face of each triangle, shape (m,) int32, as in FlatFaces
     frames: np.ndarray  # frames of the flat faces, shape (k, 3, 3), as in FlatFaces
@@ -79,7 +79,10 @@ def build_lookup(corners: np.ndarray, flat_faces: FlatFaces, face_overlap: float
 
 @jit
 def find_triangle(lookup: TriangleLookup, seed: int, at: Vec3) -> int:
-    """The triangle of the seed's flat face that holds a point of its plane, or is nearest."""
+    """Return the triangle of a flat face that holds a point of its plane, or is nearest to it.
+
+    ``seed``: any triangle of the flat face. ``at``: the point [m].
+    """
     flat = lookup.of_triangle[seed]
     if flat == LONE:
         return seed
@@ -133,7 +136,7 @@ def _find_each(lookup: TriangleLookup, seed: int, points: np.ndarray, found: np.
 
 @jit
 def _distance_outside(corners: np.ndarray, triangle: int, u: float, v: float) -> float:
-    """Distance of a point outside the sides of a clockwise triangle [m]; negative inside."""
+    """Return how far [m] point (u, v) is outside a clockwise triangle. It is negative inside."""
     worst = -np.inf
     for k in range(3):
         a, b = 2 * k, 2 * ((k + 1) % 3)

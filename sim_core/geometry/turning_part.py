@@ -23,7 +23,7 @@ TOUCH = 1e-9
 
 
 class PartTree(NamedTuple):
-    """Obstacles of the part at angle 0, relative to the mesh's middle."""
+    """Obstacles of the turning part at angle 0, relative to the mesh's middle."""
 
     tree: Tree  # the obstacles
     # least distance along the axis, from its point, at which a ball's centre can touch [m]
@@ -36,11 +36,13 @@ class PartTree(NamedTuple):
 def part_rows(
     table: ObstacleTable, mesh: TriangleMesh, axis: RotationAxis, radius: float
 ) -> np.ndarray:
-    """True for obstacles that turn with the part, shape (k,) bool, for balls of this radius [m].
+    """Tell which obstacles turn with the part, for balls of this radius [m].
+
+    Returns: True for each such obstacle, shape (k,) bool.
 
     Raises:
-        SceneError: for a part that cannot turn, see require_free_axis, and for a part that meets
-            the chamber in an edge that balls can touch.
+        SceneError: for a part that cannot turn in its chamber, and for a part that meets the
+            chamber in an edge that balls can touch.
     """
     require_free_axis(mesh, axis, radius)
     sides = (mesh.tags == axis.tag)[table.triangles]
@@ -91,12 +93,12 @@ def build_part_tree(
 
 
 def select_rows(table: ObstacleTable, rows: np.ndarray) -> ObstacleTable:
-    """The rows of a table that ``rows`` selects."""
+    """Return a table of only those obstacles that ``rows`` selects, a mask (k,) bool."""
     return ObstacleTable(*(np.ascontiguousarray(column[rows]) for column in table))
 
 
 def _in_axis_frame(points: np.ndarray, axis: RotationAxis) -> np.ndarray:
-    """Points (..., 3) [m] in a frame about the axis: two coordinates across, then along."""
+    """Return points (..., 3) [m] in a frame about the axis: two coordinates across, then along."""
     along = np.array(axis.axis)
     side = np.cross(along, np.eye(3)[np.abs(along).argmin()])
     side /= np.linalg.norm(side)
@@ -106,7 +108,10 @@ def _in_axis_frame(points: np.ndarray, axis: RotationAxis) -> np.ndarray:
 
 
 def _joint(mesh: TriangleMesh, turning: np.ndarray) -> np.ndarray:
-    """The edges between part and chamber: triangle of each and both vertices, shape (n, 4)."""
+    """Return the edges between part and chamber, shape (n, 4).
+
+    Each row has the triangle of the part, the triangle of the chamber, and both vertices.
+    """
     partner = edge_partners(mesh.triangles)
     edges = np.flatnonzero(np.repeat(turning, 3) & ~turning[partner // 3])
     ends = mesh.triangles.reshape(-1)[edges], mesh.triangles[edges // 3, (edges % 3 + 1) % 3]
@@ -142,7 +147,7 @@ def _require_round_joint(
 
 
 class _Sweep(NamedTuple):
-    """Range of the corners' rotation, and places where corners may pass through triangles."""
+    """How far the part turns, and beside which edges corners may pass through triangles."""
 
     joint: np.ndarray  # edges in the frame of the axis [m], shape (n, 2, 3)
     amplitude: float  # largest angle to each side [rad]
@@ -180,7 +185,10 @@ def _require_free_corners(
 def _passes_through(
     corners: np.ndarray, triangles: np.ndarray, sweep: _Sweep, place: np.ndarray
 ) -> bool:
-    """True if a corner's arc about the axis crosses a triangle. ``place`` gets their indices."""
+    """Return True if a corner's arc about the axis crosses a triangle.
+
+    ``place`` gets their indices.
+    """
     for t in range(len(triangles)):
         a, b, c = triangles[t, 0, 2], triangles[t, 1, 2], triangles[t, 2, 2]
         low, high = min(a, b, c) + TOUCH, max(a, b, c) - TOUCH
@@ -193,7 +201,7 @@ def _passes_through(
 
 @jit
 def _crosses(triangles: np.ndarray, t: int, corners: np.ndarray, i: int, sweep: _Sweep) -> bool:
-    """True if the arc of corner i crosses triangle t away from the joint."""
+    """Return True if the arc of corner i about the axis crosses triangle t away from the joint."""
     height = corners[i, 2]
     found = 0  # the triangle's cut at the corner's height is a segment
     x0, y0, x1, y1 = 0.0, 0.0, 0.0, 0.0
@@ -232,7 +240,7 @@ def _crosses(triangles: np.ndarray, t: int, corners: np.ndarray, i: int, sweep: 
 
 @jit
 def _near(sweep: _Sweep, at: Vec3) -> bool:
-    """True if a point is too near the joint to count."""
+    """Return True if a point is so near the joint that a crossing there does not count."""
     joint = sweep.joint
     for k in range(len(joint)):
         start = Vec3(joint[k, 0, 0], joint[k, 0, 1], joint[k, 0, 2])
