@@ -1,1 +1,1 @@
-"""Tools of every package: errors, TOML fields and messages, file writing, progress, workers."""
+"""Tools that all packages use: errors, TOML fields, files, progress, estimates and workers."""

@@ -1,4 +1,4 @@
-"""Child processes of Python: they work for this process, their parent, and end with it.
+"""Run Python functions in child processes, which end when this process, their parent, ends.
 
 The standard input of a child is a pipe from its parent. The operating system closes the pipe when
 the parent ends, also when the parent is killed. A thread of the child waits for the pipe to close.
@@ -39,7 +39,7 @@ SERVE = (
 
 
 def start_python(code: str, *arguments: str, **options: Any) -> subprocess.Popen[Any]:
-    """Start a child with pipes at its standard input and output.
+    """Start a Python process with pipes at its standard input and output.
 
     Args:
         code: Python code, which must end the child when the standard input closes; `signal` and
@@ -54,11 +54,11 @@ def start_python(code: str, *arguments: str, **options: Any) -> subprocess.Popen
 
 
 class ChildLostError(Exception):
-    """A child ended before it answered.
+    """Error for a child process that ended before it answered.
 
     Attributes:
         status: exit status of the child, negative for the signal that ended it.
-        is_late: whether the child was ended by a limit of time.
+        is_late: True if a limit of time ended the child.
     """
 
     def __init__(self, status: int, is_late: bool) -> None:
@@ -67,10 +67,10 @@ class ChildLostError(Exception):
 
 
 class Child:
-    """A child that does one job after another until the end of a `with` block, which kills it."""
+    """Child process that does one job after another. The end of its `with` block kills it."""
 
     def __init__(self, seconds: float = math.inf, folder: str = "", **options: Any) -> None:
-        """Start the child.
+        """Start the child process.
 
         Args:
             seconds: time after which the child is killed.
@@ -91,7 +91,7 @@ class Child:
 
     @property
     def pid(self) -> int | None:
-        """Number of the process; None after its end."""
+        """Process number (PID) of the child; None after its end."""
         return self._process.pid if self._process.poll() is None else None
 
     def ask(self, function: Callable[..., Any], *arguments: Any) -> None:
@@ -105,7 +105,9 @@ class Child:
             _send(job, self._process.stdin)
 
     def answer(self) -> Any:
-        """Wait for the next answer. An exception that the job raises is its last answer.
+        """Wait for the next answer of the job that was asked, and return it.
+
+        An exception that the job raises is its last answer.
 
         Raises:
             ChildLostError: the child has ended.
@@ -138,7 +140,11 @@ class Child:
 
 
 def serve(folder: str) -> None:
-    """Do the jobs of a Child in the process that it started; `folder` as in Child."""
+    """Do the jobs that the parent sends, in the child process, until the parent ends.
+
+    Args:
+        folder: path of a folder to remove when the parent has ended.
+    """
     if hasattr(signal, "SIGHUP"):  # a terminal that closes ends the parent, which ends this
         signal.signal(signal.SIGHUP, signal.SIG_IGN)
     questions, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
@@ -160,7 +166,10 @@ def serve(folder: str) -> None:
 
 
 def interrupt_with_parent() -> None:
-    """Interrupt this process as Ctrl-C does when its parent has ended, and end it after GRACE_S."""
+    """Wait in a thread for the end of the parent, then interrupt this process as Ctrl-C does.
+
+    The process is ended GRACE_S seconds later.
+    """
 
     def interrupt() -> None:
         if os.name == "posix":
@@ -173,11 +182,11 @@ def interrupt_with_parent() -> None:
 
 
 def _end_with_parent(receive: Callable[[], object], last_act: Callable[[], None]) -> None:
-    """End this process after a last act when the parent has ended.
+    """Wait in a thread for the end of the parent, then call `last_act` and end this process.
 
     Args:
-        receive: reads from the pipe in a thread; false, or an error of CLOSED, at its end.
-        last_act: called before the end.
+        receive: called again and again to read from the parent's pipe. At the end of the pipe it
+            returns a false value or raises an error of CLOSED.
     """
 
     def watch() -> None:
@@ -191,7 +200,10 @@ def _end_with_parent(receive: Callable[[], object], last_act: Callable[[], None]
 
 
 def _answers(job: bytes) -> Iterator[bytes]:
-    """Pickles of (True, answer) for the answers of a pickled job, or of (False, exception)."""
+    """Do a pickled job, and yield the pickle of (True, answer) for each of its answers.
+
+    If the job raises an exception, the last item is the pickle of (False, exception).
+    """
     try:
         function, arguments = pickle.loads(job)
         answer = function(*arguments)
@@ -207,7 +219,7 @@ def _send(content: bytes, pipe: Any) -> None:
 
 
 def _picklable(error: Exception) -> Exception:
-    """Return the error, or one with its text if its class takes other arguments than it stores."""
+    """Return the error, or an error with the same text if it cannot be pickled."""
     try:
         pickle.loads(pickle.dumps(error))
     except Exception:

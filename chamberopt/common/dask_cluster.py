@@ -1,6 +1,6 @@
 """Run replicas and candidates on a Dask cluster.
 
-Only this file imports the package distributed, which the extra `dask` installs.
+Only this file imports the package `distributed`; pip install chamberopt[dask] installs it.
 """
 
 from __future__ import annotations
@@ -30,8 +30,8 @@ class DaskExecutor(Executor):
     """Executor that runs tasks on the workers of a Dask scheduler.
 
     If a worker dies, the scheduler runs its task again on another worker. A task that takes several
-    workers down (distributed.scheduler.allowed-failures) raises WorkerLostError. An exception that
-    leaves the `with` block cancels the tasks.
+    workers down (more than Dask's setting distributed.scheduler.allowed-failures) raises
+    WorkerLostError. An exception that leaves the `with` block cancels the tasks.
     """
 
     def __init__(self, cluster: str, timeout: float | None = None) -> None:
@@ -77,7 +77,10 @@ class DaskExecutor(Executor):
         return self._client.submit(pickle.loads, pickled, pure=False)
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
-        """Queue a task. Its future raises this package's errors instead of Dask's."""
+        """Queue a call of `fn`, and return its future.
+
+        The future raises ClusterLostError or WorkerLostError in place of Dask's own errors.
+        """
         dask_future = self._executor.submit(fn, *args, **kwargs)
         future: Future[Any] = Future()
 
@@ -90,7 +93,7 @@ class DaskExecutor(Executor):
         return future
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        """Disconnect. The cluster keeps running."""
+        """Disconnect from the cluster, which keeps running."""
         self._executor.shutdown(wait and not cancel_futures)
         self._client.close()
 
@@ -166,7 +169,11 @@ async def _kind_of_server(address: str) -> str:
 
 
 def _copy_outcome(dask_future: Future[Any], future: Future[Any]) -> None:
-    """Set a future to the result or error of Dask's future, with Dask's errors translated."""
+    """Copy the result or error of Dask's finished future to `future`.
+
+    Dask's errors for a cancelled task and a killed worker become ClusterLostError and
+    WorkerLostError.
+    """
     from distributed import KilledWorker
 
     try:

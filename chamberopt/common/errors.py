@@ -1,4 +1,4 @@
-"""Errors that a user can correct, errors of lost workers, and text that is safe to show."""
+"""Define the errors of the program, and make texts safe to show in terminals and spreadsheets."""
 
 from __future__ import annotations
 
@@ -27,32 +27,33 @@ class UnreadableError(InputError):
 
 
 class OutputTakenError(InputError):
-    """Error for the place of a result that holds something, or that another process writes to."""
+    """Error for an output path that already holds files or that another process writes to."""
 
 
 class WorkerLostError(BrokenExecutor):
-    """Error for a task whose worker died, and whose second worker died too."""
+    """Error for a task whose worker process died, and died again when the task was repeated."""
 
 
 class ClusterLostError(BrokenExecutor):
-    """Error for a cluster that ended too early. The command line exits with status 1."""
+    """Error for a Dask cluster that ended before its tasks. The command exits with status 1."""
 
 
 def visible(text: str) -> str:
-    """The text with control characters as escapes. Tabs and line breaks stay."""
+    """Return the text with control characters written as escapes. Tabs and line breaks stay."""
     return CONTROL.sub(lambda one: one[0].encode("unicode_escape").decode(), text)
 
 
 def one_line(text: str) -> str:
-    """The text with control characters and line breaks as escapes."""
+    """Return the text as one line, with control characters and line breaks written as escapes."""
     return visible(text).replace("\n", "\\n")
 
 
 def spreadsheet_cell(value: Any) -> Any:
-    """A value of a .csv file. A text that a spreadsheet would take for a formula is quoted.
+    """Return a value as it is written to a .csv file.
 
-    A carriage return becomes a line feed: the csv module leaves it without quotes, and a
-    spreadsheet begins a row after it.
+    A text that a spreadsheet would take for a formula gets an apostrophe in front. A carriage
+    return becomes a line feed: the csv module leaves it without quotes, and a spreadsheet begins a
+    row after it.
 
     Source: OWASP, "CSV Injection".
     """
@@ -69,7 +70,7 @@ def spreadsheet_cell(value: Any) -> Any:
 
 
 def first_wrong_value(error: ValidationError) -> str:
-    """Place of the first wrong value in a file of the program, and its fault."""
+    """Return the dotted name of the first wrong value in a file, and what is wrong with it."""
     first = error.errors(include_url=False, include_input=False)[0]
     where, why = ".".join(map(str, first["loc"])), first["msg"].removeprefix("Value error, ")
     return f"{where}: {why}" if where else why

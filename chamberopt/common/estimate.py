@@ -1,4 +1,4 @@
-"""Estimates of any quantity with 95 % confidence intervals from independent replicas.
+"""Estimate a quantity, with its 95 % confidence interval, from independent replicas.
 
 Notation
 n       number of replicas
@@ -34,7 +34,7 @@ ZERO_TOLERANCE = 1e-12  # a smaller value is a rounding error of zero
 
 @dataclass(frozen=True)
 class Estimate:
-    """A value with its 95 % interval.
+    """Value of a quantity with its 95 % confidence interval.
 
     Example:
         >>> coverage = estimate([0.90, 0.92, 0.91], lowest=0.0, highest=1.0)
@@ -68,9 +68,9 @@ class Estimate:
 
     @property
     def beyond_scatter(self) -> float:
-        """Width of the interval beyond the scatter of replicas and the shared errors.
+        """Part of the half-width that neither scatter of replicas nor shared errors explain.
 
-        It is the bias, and the extra width of a steep interval.
+        It is the bias, or more if the interval was widened, as `at_least_as_wide` does.
         """
         if not self.pseudovalues or not math.isfinite(self.half_width):
             return self.bias
@@ -78,18 +78,24 @@ class Estimate:
         return max(self.bias, self.half_width - scatter) if math.isfinite(scatter) else self.bias
 
     def interval_json(self) -> dict[str, Any]:
-        """Value and half-width as JSON values, null if they are not finite, and the words."""
+        """Return value, half-width and any words that replace the number, as JSON values.
+
+        A value or half-width that is not finite becomes None.
+        """
         interval = {"value": _finite(self.value), "half_width": _finite(self.half_width)}
         return interval | ({"in_words": self.in_words} if self.in_words else {})
 
     def to_json(self) -> dict[str, Any]:
-        """The estimate as JSON values, with its pseudo-values for later comparisons."""
+        """Return the whole estimate as JSON values, with pseudo-values for later comparisons."""
         return {**self.interval_json(), "pseudovalues": list(self.pseudovalues),
                 "bias": _finite(self.bias), "shared": list(self.shared)}  # fmt: skip
 
     @classmethod
     def from_json(cls, data: Mapping[str, Any]) -> Estimate:
-        """The estimate that `to_json` wrote; KeyError, TypeError or ValueError for other data."""
+        """Return the estimate that `to_json` wrote.
+
+        Raises KeyError, TypeError or ValueError for other data.
+        """
         pseudovalues = tuple(float(x) for x in data["pseudovalues"])
         bias = math.inf if data["bias"] is None else float(data["bias"])
         shared = tuple(float(x) for x in data["shared"])
@@ -97,17 +103,20 @@ class Estimate:
         return replace(found, pseudovalues=pseudovalues, bias=bias, shared=shared)
 
     def not_known(self, in_words: str) -> Estimate:
-        """The value without an interval, with words in the interval's place."""
+        """Return the estimate with an unknown (infinite) interval, and words to show instead."""
         return replace(self, half_width=math.inf, in_words=in_words)
 
     def at_least_as_wide(self, half_width: float) -> Estimate:
-        """The estimate with at least this half-width of its interval. An exact 0 stays exact."""
+        """Return the estimate, widened to `half_width` if its interval is narrower.
+
+        A value of 0 that is exact (half-width 0) stays as it is.
+        """
         if self.value == self.half_width == 0.0:
             return self
         return replace(self, half_width=max(self.half_width, half_width))
 
     def times(self, factor: float) -> Estimate:
-        """The estimate multiplied by an exact factor above 0."""
+        """Return the estimate multiplied by an exact factor above 0."""
         return replace(
             self,
             value=factor * self.value,
@@ -118,7 +127,12 @@ class Estimate:
         )
 
     def with_shared(self, first: int, errors: Sequence[float]) -> Estimate:
-        """The estimate with more shared errors, from the position `first` on."""
+        """Return the estimate with more shared errors, and its interval wider by them.
+
+        Args:
+            first: position of the first new error in `shared`.
+            errors: signed standard errors by causes that replicas do not show.
+        """
         if len(self.shared) > first:
             raise ValueError(f"{len(self.shared)} shared errors, at most {first} were expected")
         shared = (*self.shared, *(0.0,) * (first - len(self.shared)), *errors)
@@ -129,7 +143,11 @@ class Estimate:
         return replace(self, shared=shared, half_width=self.half_width - scatter + wider)
 
     def of_another_metal(self) -> Estimate:
-        """The estimate with an independent error in place of its metal's error."""
+        """Return the estimate as one of another metal than the estimates it is compared with.
+
+        Its error by the metal moves to another position of `shared`, so that it does not cancel
+        in differences.
+        """
         if len(self.shared) <= OF_METAL:
             return self
         before, own = self.shared[: OF_METAL - 1], self.shared[OF_METAL]
@@ -137,7 +155,7 @@ class Estimate:
 
     @classmethod
     def from_interval_json(cls, data: Mapping[str, Any]) -> Estimate:
-        """The value, half-width and words that `interval_json` wrote."""
+        """Return an estimate with the value, half-width and words that `interval_json` wrote."""
         value, half_width = data["value"], data["half_width"]
         value = math.nan if value is None else float(value)
         half_width = math.inf if half_width is None else float(half_width)
@@ -145,7 +163,7 @@ class Estimate:
 
 
 def _finite(number: float) -> float | None:
-    """The number, or None for NaN and infinity, because JSON has neither.
+    """Return the number, or None for NaN and infinity, because JSON has neither.
 
     The half-width of a single replica is infinite, for example, and so is the bias without a dent.
     """
@@ -160,9 +178,10 @@ def estimate(
     confidence: float = CONFIDENCE,
     shared: Sequence[float] = (),
 ) -> Estimate:
-    """Mean of the pseudo-values with its Student-t interval.
+    """Return the mean of the pseudo-values with its Student-t confidence interval.
 
     Args:
+        pseudovalues: one value for each replica.
         lowest, highest: range of the quantity, to which the mean is clipped.
         bias: bound on the error that more replicas would not remove.
         shared: signed standard errors by causes that replicas do not show.
@@ -182,10 +201,12 @@ def estimate(
 
 
 def jackknife(values: np.ndarray) -> np.ndarray:
-    """Pseudo-values about a value whose bias needs no correction.
+    """Return jackknife pseudo-values, one for each batch, (g,).
+
+    They are shifted so that their mean is the value of all batches: its bias is not corrected.
 
     Args:
-        values: the value of all batches, and the values without each batch, (g + 1,).
+        values: the value of all g batches, then the values with one batch left out, (g + 1,).
     """
     batches = len(values) - 1
     if batches == 1:
@@ -195,25 +216,37 @@ def jackknife(values: np.ndarray) -> np.ndarray:
 
 
 def shared_half_width(shared: Sequence[float], confidence: float = CONFIDENCE) -> float:
-    """Half-width of the interval by causes that replicas do not show."""
+    """Return the half-width of a confidence interval by the shared errors alone.
+
+    Args:
+        shared: signed standard errors by causes that replicas do not show.
+    """
     return normal_quantile(confidence) * math.hypot(*shared)
 
 
 def sum_of_shared(terms: Iterable[tuple[float, Estimate]]) -> tuple[float, ...]:
-    """Shared standard errors of a sum of weights times estimates of one part."""
+    """Return the shared standard errors of a weighted sum of estimates of one part.
+
+    Args:
+        terms: the weight and the estimate of each term.
+    """
     rows = [[weight * one for one in term.shared] for weight, term in terms]
     return tuple(sum(column) for column in zip_longest(*rows, fillvalue=0.0))
 
 
 def normal_quantile(confidence: float) -> float:
-    """Half-width of a two-sided interval in standard errors, by the normal distribution."""
+    """Return the half-width of a two-sided normal interval, in standard errors."""
     from scipy.special import ndtri
 
     return float(ndtri(0.5 + confidence / 2.0))
 
 
 def student_quantile(freedom: float, confidence: float = CONFIDENCE) -> float:
-    """Half-width of a two-sided interval in standard errors, by Student's distribution."""
+    """Return the half-width of a two-sided Student-t interval, in standard errors.
+
+    Args:
+        freedom: degrees of freedom.
+    """
     from scipy.special import stdtrit  # scipy.stats would take a second to import
 
     return float(stdtrit(freedom, 0.5 + confidence / 2.0))
@@ -222,7 +255,7 @@ def student_quantile(freedom: float, confidence: float = CONFIDENCE) -> float:
 def paired_difference(
     after: Estimate, before: Estimate, confidence: float = CONFIDENCE
 ) -> Estimate:
-    """Difference after - before of replicas that ran on the same seeds, pair by pair.
+    """Return the difference after - before, from the differences of replicas with equal seeds.
 
     A peening chamber is chaotic, so that equal seeds hardly correlate. If they do, the interval is
     still right. Estimates with different numbers of replicas are taken as independent.
@@ -239,7 +272,7 @@ def paired_difference(
 def independent_difference(
     after: Estimate, before: Estimate, confidence: float = CONFIDENCE
 ) -> Estimate:
-    """Difference after - before of two independently simulated estimates (Welch's t)."""
+    """Return the difference after - before of two independent estimates, by Welch's t interval."""
     value, bias = after.value - before.value, after.beyond_scatter + before.beyond_scatter
     if min(len(after.pseudovalues), len(before.pseudovalues)) < 2:
         # Without numbers of replicas, the intervals are added in quadrature.
@@ -256,9 +289,12 @@ def welch_half_width(
     confidence: float = CONFIDENCE,
     times: float = 1.0,
 ) -> float:
-    """Half-width of the interval of a difference of two means.
+    """Return the half-width of the confidence interval of a difference of two means.
 
-    The samples count as if each had `times` as many values of the same scatter.
+    Args:
+        after, before: the two samples.
+        times: factor on the numbers of values, to tell the interval of larger samples that scatter
+            as these do.
 
     Source: B. L. Welch, "The generalization of 'Student's' problem when several different
     population variances are involved", Biometrika 34 (1947) 28.

@@ -1,7 +1,7 @@
-"""Choose where replicas and candidates run: threads or processes here, a Dask cluster, or serially.
+"""Choose what runs replicas and candidates: threads, processes, a Dask cluster or one thread.
 
-All are a `concurrent.futures.Executor`. `share` sends an argument that many tasks have in common,
-such as a chamber, once to each worker and not with every task.
+Each of these is a `concurrent.futures.Executor`. `share` sends an argument that many tasks have in
+common, such as a chamber, once to each worker and not with every task.
 """
 
 import os
@@ -20,7 +20,7 @@ MAX_THREADS = 8
 
 
 def core_count() -> int:
-    """Number of cores that this process may use, of which a batch system may leave only some."""
+    """Return the number of cores that this process may use; a batch system may allow only some."""
     if hasattr(os, "sched_getaffinity"):
         return max(1, len(os.sched_getaffinity(0)))
     return max(1, os.cpu_count() or 1)
@@ -57,7 +57,8 @@ def open_executor(
     Args:
         workers: --workers, None if it is not given.
         cluster: --cluster, None if it is not given.
-        kind: of workers on this machine; None for threads up to MAX_THREADS, else processes.
+        kind: of workers on this machine; None for threads if there are at most MAX_THREADS
+            workers, and for processes if there are more.
 
     Raises:
         InputError: both options are given, or an option cannot be used.
@@ -74,13 +75,16 @@ def open_executor(
 
 
 def share(executor: Executor, value: Any) -> Any:
-    """Return a stand-in for a value among the arguments of many tasks; they receive the value."""
+    """Return what to pass to many tasks in place of a large value that they all need.
+
+    The tasks receive the value itself. It is sent once to each worker and not with every task.
+    """
     share_with_workers = getattr(executor, "share", None)
     return value if share_with_workers is None else share_with_workers(value)
 
 
 class ThreadExecutor(ThreadPoolExecutor):
-    """Worker threads; an exception that leaves the `with` block cancels the tasks that wait.
+    """Executor with worker threads. An exception in its `with` block cancels the waiting tasks.
 
     Ctrl-C leaves the block at once: the command line then ends the process, and the tasks with it.
     """
@@ -91,7 +95,10 @@ class ThreadExecutor(ThreadPoolExecutor):
 
 
 class SerialExecutor(Executor):
-    """The calling thread as the worker: for cluster workers, tests, debuggers and profilers."""
+    """Executor that runs each task at once in the calling thread.
+
+    It serves cluster workers, tests, debuggers and profilers.
+    """
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
         future: Future[Any] = Future()

@@ -1,4 +1,4 @@
-"""Limits on data from files, checked before memory is taken. A message names its limit."""
+"""Check that data from files keep within limits of size, before memory is taken for them."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ MAX_COPIES = 10_000  # copies of bodies that a file puts in several places
 
 
 def read_limited(path: Path, most: int, what: str, follow: bool = False) -> bytes:
-    """The bytes of a file.
+    """Return the content of a file that is not too large.
 
     Args:
         most: largest number of bytes.
@@ -59,7 +59,7 @@ def read_limited(path: Path, most: int, what: str, follow: bool = False) -> byte
 
 
 def limit_memory() -> None:
-    """Refuse this process more memory than MAX_READER_BYTES, if the system can do that."""
+    """Refuse this process more memory than MAX_READER_BYTES, if the system has such a limit."""
     try:
         import resource
     except ImportError:  # Windows
@@ -70,7 +70,10 @@ def limit_memory() -> None:
 
 
 def limit_cpu_time(seconds: float) -> None:
-    """End this process after so much computing time, without a dump, if the system can do that."""
+    """Let the system end this process after `seconds` of CPU time, without a core dump.
+
+    Systems without such a limit (Windows) do nothing.
+    """
     try:
         import resource
     except ImportError:  # Windows
@@ -82,7 +85,7 @@ def limit_cpu_time(seconds: float) -> None:
 
 
 def raise_cpu_time(seconds: float) -> None:
-    """Allow this process so much computing time beyond `limit_cpu_time`, if it was limited."""
+    """Add `seconds` to the CPU time that this process may use, if that time is limited."""
     try:
         import resource
     except ImportError:
@@ -93,23 +96,34 @@ def raise_cpu_time(seconds: float) -> None:
 
 
 def require_size(path: Path, size: int, most: int, what: str) -> None:
-    """Raise InputError if `what`, of `size` bytes, exceeds `most` bytes."""
+    """Raise InputError if a file has more than `most` bytes.
+
+    Args:
+        size: bytes of the file.
+        what: kind of the file in the message, such as "mesh file".
+    """
     if size > most:
         given = f"a {what} of {size / MEBIBYTE:,.1f} MiB"
         raise InputError(f"{path}: {given}, at most {most / MEBIBYTE:,g} MiB are read; reduce it")
 
 
 def require_few(path: Path, count: int, what: str, most: int = MAX_ELEMENTS) -> None:
-    """Raise InputError if a file has more than `most` of something."""
+    """Raise InputError if a mesh file has more than `most` items.
+
+    Args:
+        count: number of items in the file.
+        what: kind of the items in the message, such as "triangles".
+    """
     if count > most:
         text = f"{plain(count)} {what}, at most {most:,} are read; export a coarser mesh"
         raise InputError(f"{path}: {text}")
 
 
 def parse_json(content: bytes | str) -> Any:
-    """The value of a JSON text of a result; ValueError except for plain numbers up to MAX_NUMBER.
+    """Return the value of a JSON text from a result folder.
 
-    Python would read NaN, and numbers too large for arithmetic, such as 1e999 or 400 digits.
+    Raises ValueError for a text that is not JSON, and for numbers that Python would read although
+    nothing can be computed with them: NaN, and sizes above MAX_NUMBER, such as 1e999.
     """
     value = json.loads(
         content, parse_constant=_plain_number, parse_float=_plain_number, parse_int=_whole_number
@@ -119,7 +133,14 @@ def parse_json(content: bytes | str) -> Any:
 
 
 def require_text(content: bytes | str, value: Any) -> None:
-    """Raise ValueError if a text of a JSON value has half a character, which no file can hold."""
+    """Raise ValueError if a text in a JSON value has half a character, which no file can hold.
+
+    Such halves are escapes, for example \\ud800 without its second half.
+
+    Args:
+        content: the JSON text.
+        value: the value that was read from it.
+    """
     if ("\\ud" if isinstance(content, str) else b"\\ud") in content.lower():  # type: ignore[operator]
         json.dumps(value, ensure_ascii=False).encode()  # UnicodeEncodeError is a ValueError
 

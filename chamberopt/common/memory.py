@@ -1,4 +1,4 @@
-"""Memory that this process may take, and a budget for arrays that can be computed again."""
+"""Tell how much memory is free, and keep a budget for arrays that can be computed again."""
 
 from __future__ import annotations
 
@@ -23,12 +23,18 @@ FILES = {
 
 
 def free_memory() -> float:
-    """Bytes that programs can still take on this machine; infinite if the machine does not tell."""
+    """Return the bytes of memory that this process can still take.
+
+    Limits of a container or a batch job count. Infinite if the machine does not tell.
+    """
     return min(_free_of_machine(), *_free_of_groups(), math.inf)
 
 
 def _free_of_machine() -> float:
-    """Free bytes of the machine; its whole memory on macOS, infinite on Windows."""
+    """Return the free memory of the machine in bytes.
+
+    On macOS this is the whole memory, and on Windows infinity, because they do not tell.
+    """
     with suppress(OSError, LookupError, ValueError):
         for line in Path("/proc/meminfo").read_text().splitlines():
             if line.startswith("MemAvailable:"):
@@ -41,7 +47,7 @@ def _free_of_machine() -> float:
 
 
 def _free_of_groups() -> Iterator[float]:
-    """Bytes left of the limits of this process's groups and of the groups above them."""
+    """Yield the bytes left of each memory limit of the Linux control groups of this process."""
     with suppress(OSError, ValueError):
         for line in Path("/proc/self/cgroup").read_text().splitlines():
             _, kinds, name = line.split(":", 2)
@@ -53,7 +59,14 @@ def _free_of_groups() -> Iterator[float]:
 
 
 def _free_of_group(group: Path, limit: str, used: str) -> float:
-    """Bytes left of one limit. Files that the kernel can drop count as free."""
+    """Return the bytes left of the memory limit of one Linux control group.
+
+    Cached files that the kernel can drop count as free. Infinite if the group has no limit.
+
+    Args:
+        group: folder of the group.
+        limit, used: names of its files with the limit and the memory in use.
+    """
     with suppress(OSError, ValueError):
         most, taken = int((group / limit).read_text()), int((group / used).read_text())
         rows = (group / "memory.stat").read_text().splitlines()
@@ -63,7 +76,7 @@ def _free_of_group(group: Path, limit: str, used: str) -> float:
 
 
 class MemoryBudget:
-    """The bytes that this process may spend on arrays that could be computed again.
+    """Number of bytes that this process may spend on arrays that could be computed again.
 
     The budget is a share of the free memory when the first array is kept. The worker processes of
     one command divide it among them.
@@ -75,7 +88,10 @@ class MemoryBudget:
         self.processes = 1
 
     def keeps(self, *arrays: np.ndarray) -> bool:
-        """True if there is room for the arrays. They count until the first of them is freed."""
+        """Take the size of the arrays from the budget; return False if they are too large for it.
+
+        The size is given back when the first of the arrays is freed.
+        """
         size = float(sum(one.nbytes for one in arrays))
         with self._lock:
             if self._left is None:

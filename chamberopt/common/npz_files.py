@@ -1,8 +1,8 @@
-"""Arrays, and records that hold arrays, in .npz files: plain data, never pickles.
+"""Write and read arrays, and dataclasses that hold arrays (records), in .npz files.
 
-A record's file has one more entry, `tree`: JSON of all content except arrays. In it {"array": name}
-stands for an array and {"is": class, "of": fields} for a dataclass. Sequences come back as tuples.
-Everything else comes back exactly.
+The files hold plain data and never pickles. A record's file has one more entry, `tree`: JSON of
+all content except arrays. In it {"array": name} for an array and {"is": class, "of": fields}
+for a dataclass. Sequences come back as tuples. Everything else comes back exactly.
 """
 
 from __future__ import annotations
@@ -31,7 +31,10 @@ Record = TypeVar("Record")
 
 
 def read_arrays(path: Path, remedy: str) -> dict[str, np.ndarray]:
-    """The arrays of an .npz file by their names; InputError if the file is missing or damaged."""
+    """Return the arrays of an .npz file by their names.
+
+    Raises InputError, which ends with `remedy`, if the file is missing or damaged.
+    """
     try:
         with open_plain(path) as file:
             with zipfile.ZipFile(file) as packed:
@@ -48,13 +51,16 @@ def read_arrays(path: Path, remedy: str) -> dict[str, np.ndarray]:
 
 
 def save_arrays(path: Path, **arrays: Any) -> None:
-    """Write arrays by their names."""
+    """Write arrays to an .npz file under the names of their arguments."""
     with new_file(path) as file:
         np.savez(file, **arrays)
 
 
 def save_record(path: Path, record: object) -> None:
-    """Write a dataclass with all its content; raises OSError if the file cannot be written."""
+    """Write a dataclass with all its content to an .npz file.
+
+    Raises OSError if the file cannot be written.
+    """
     arrays: dict[str, np.ndarray] = {}
     tree = json.dumps(_to_tree(record, arrays)).encode()
     packed = io.BytesIO()  # in memory first, so that a full disk is one plain OSError
@@ -63,7 +69,7 @@ def save_record(path: Path, record: object) -> None:
 
 
 def load_record(path: Path, kind: type[Record], others: Sequence[type], remedy: str) -> Record:
-    """Read a record, equal to the saved record.
+    """Return the dataclass that `save_record` wrote to an .npz file.
 
     Args:
         kind: class of the record.
@@ -88,7 +94,7 @@ def load_record(path: Path, kind: type[Record], others: Sequence[type], remedy: 
 
 
 def is_of_type(value: Any, hint: Any) -> bool:
-    """True if a value from a file, with all its content, has the types of its class.
+    """Return True if a value from a file, with all its content, has the types of `hint`.
 
     A whole number may stand for a float. True and false are no numbers.
 
@@ -112,7 +118,7 @@ def _unreadable(path: Path, error: BaseException, remedy: str) -> InputError:
 
 
 def _to_tree(value: Any, arrays: dict[str, np.ndarray]) -> Any:
-    """The value as plain JSON values. Arrays go into `arrays` under new names."""
+    """Return the value as plain JSON values. Arrays in it are put into `arrays` under new names."""
     if isinstance(value, np.ndarray):
         name = f"a{len(arrays)}"
         arrays[name] = value

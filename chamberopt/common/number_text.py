@@ -1,6 +1,6 @@
-"""Numbers and estimates as text: the same digits in console, pictures, tables and reports.
+"""Write numbers and estimates as text, alike in console, pictures, tables and reports.
 
-An interval has one or two digits, and its value has the same decimals.
+The half-width of an interval has one or two digits, and its value has the same decimals.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ THIN_SPACE = "\u202f"  # gap between thousands, at which no line breaks
 def estimate_text(
     estimate: Estimate, factor: float = 1.0, unit: str = "", sign: bool = False
 ) -> str:
-    """The estimate with its interval, or the words that replace its number.
+    """Return an estimate as text: value ± half-width, or the words that replace its number.
 
     Args:
         factor: number shown over number stored.
@@ -31,7 +31,7 @@ def estimate_text(
 
 
 def share_in_words(share: Estimate) -> str:
-    """Words such as "more than 99.9 %" for a share that is so near 1; "" for other shares.
+    """Return words such as "more than 99.9 %" for a share that is nearly 1, and "" for others.
 
     The words have as many nines as the interval of the share allows.
     """
@@ -43,9 +43,9 @@ def share_in_words(share: Estimate) -> str:
 
 
 def plain(value: float | str, digits: int = 4) -> str:
-    """The number with ``digits`` significant digits, without an exponent if it is of usual size.
+    """Return a number as text with `digits` significant digits.
 
-    A text stays as it is.
+    Only sizes below 1e-4 and from 1e9 on have an exponent. A text is returned as it is.
     """
     if isinstance(value, str):
         return value
@@ -60,9 +60,9 @@ def plain(value: float | str, digits: int = 4) -> str:
 
 
 def with_interval(value: float, half_width: float, unit: str = "", sign: bool = False) -> str:
-    """Value and interval such as "0.809 ± 0.004 mm", both to the decimals of the half-width.
+    """Return a value with its half-width as text such as "0.809 ± 0.004 mm".
 
-    Exact values stand alone.
+    Both have the decimals of the half-width. A value with half-width 0 stands alone.
 
     Args:
         sign: True to put a plus before positive values.
@@ -92,7 +92,10 @@ def _rounded(value: float, decimals: int) -> str:
 
 
 def typeset(text: str) -> str:
-    """Text with gaps between thousands from 10 000 on, and a minus as long as a plus."""
+    """Return a text with its numbers as print has them.
+
+    They have gaps between thousands from 10 000 on, and a minus sign as long as a plus.
+    """
 
     def grouped(number: re.Match[str]) -> str:
         return f"{int(number[0]):,}".replace(",", THIN_SPACE)

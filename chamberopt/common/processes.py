@@ -1,4 +1,4 @@
-"""Worker processes on this machine.
+"""Run tasks in worker processes on this machine.
 
 Python code runs in parallel in them, and a task that crashes its process fails alone. The process
 pool of concurrent.futures breaks as a whole when one process dies, and does not tell which task
@@ -31,7 +31,11 @@ MAX_SHARED = 4  # shared values that a worker keeps, one for each candidate in p
 
 
 class SharedFile:
-    """A value that each worker reads once from a file; the pickle of this holds the path alone."""
+    """Stand-in for a large value, which is written to a file once.
+
+    Its pickle holds only the path of the file. A worker that unpickles it gets the value, and reads
+    the file only the first time.
+    """
 
     def __init__(self, value: Any, path: Path) -> None:
         self.path = path
@@ -53,7 +57,7 @@ def _remove(path: Path) -> None:
 
 
 class ProcessExecutor(Executor):
-    """Worker processes, each started by its first task.
+    """Executor with worker processes, each started by its first task.
 
     A task whose process dies runs once more, in a new process. If that dies too, the task raises
     WorkerLostError. An exception that leaves the `with` block ends the processes at once.
@@ -71,14 +75,20 @@ class ProcessExecutor(Executor):
         return self._resources.enter_context(private_folder())
 
     def share(self, value: Any) -> SharedFile:
-        """Write a value to a file, which lasts as long as the returned object and the executor."""
+        """Write a value that many tasks need to a file, and return a stand-in to pass to the tasks.
+
+        The file is removed with the stand-in, and at the latest with the executor.
+        """
         return SharedFile(value, Path(self._folder, f"{next(self._numbers)}.pickle"))
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
         return self._feeders.submit(self._run, fn, args, kwargs)
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        """End the processes after their tasks or, if `wait` is false, with this program."""
+        """End the worker processes.
+
+        If `wait` is true, this waits for their tasks. Otherwise they end with this program.
+        """
         self._feeders.shutdown(wait, cancel_futures=cancel_futures)
         if wait:
             self._end()
@@ -91,11 +101,14 @@ class ProcessExecutor(Executor):
 
     @property
     def pids(self) -> list[int]:
-        """Numbers of the living worker processes."""
+        """Process numbers (PIDs) of the living worker processes."""
         return [pid for worker in self._workers if (pid := worker.pid) is not None]
 
     def _run(self, fn: Callable[..., Any], args: tuple[Any, ...], kwargs: dict[str, Any]) -> Any:
-        """Run a task in this thread's process; raises the task's exception, or WorkerLostError."""
+        """Return the value of a task, run in the worker process of this thread.
+
+        Raises the exception of the task, or WorkerLostError if the process dies MAX_ATTEMPTS times.
+        """
         for _ in range(MAX_ATTEMPTS):
             if self._ended:
                 break
@@ -111,7 +124,7 @@ class ProcessExecutor(Executor):
         raise WorkerLostError(f"{text}; give fewer --workers, or look at the machine's log")
 
     def _worker(self) -> Child:
-        """Return the process of this thread, started if need be."""
+        """Return the worker process of this thread. Start it if there is none."""
         worker: Child | None = getattr(self._of_thread, "worker", None)
         if worker is None:
             worker = self._of_thread.worker = Child(folder=self._folder)
@@ -126,7 +139,11 @@ class ProcessExecutor(Executor):
 
 
 def _do(count: int, fn: Callable[..., Any], args: tuple[Any, ...], kwargs: dict[str, Any]) -> Any:
-    """Do a task in this worker process, one of `count`."""
+    """Do a task in a worker process, and return its value.
+
+    Args:
+        count: number of worker processes, which divide the memory among them.
+    """
     MEMORY.processes = count
     return fn(*args, **kwargs)
 

@@ -1,6 +1,6 @@
-"""Progress on stderr: the named steps of a command, with counts, the best value and the time left.
+"""Show on stderr how far a command is: its named steps with counts, best value and time left.
 
-After `write_json_lines` each step is lines of JSON, for a program that reads them: {"step": name,
+After `write_json_lines` each step writes lines of JSON, for a program to read: {"step": name,
 "done": 3, "total": 20, "best": 0.81}, and at its end {"step": name, "ended": true}.
 """
 
@@ -29,7 +29,7 @@ _displays: list[Display] = []
 
 
 def write_json_lines() -> None:
-    """Write steps as lines of JSON from now on."""
+    """Make all later steps write their progress as lines of JSON."""
     global _json_lines
     _json_lines = True
 
@@ -38,9 +38,10 @@ def write_json_lines() -> None:
 def step(
     what: str, total: int | None = None, *, stream: TextIO | None = None
 ) -> Iterator[Progress]:
-    """Show a named step during a `with` block, and yield the function that counts in it.
+    """Show a named step of a command during a `with` block.
 
-    The total is the number known at the beginning.
+    Yields the function that the block calls as progress(done, total, best value so far or None).
+    `total` is the number of items to do, if it is known at the beginning.
 
     On a terminal the step has a line on stderr (or `stream`) from its beginning to its end, below
     the line of the step around it. Logs and pipes stay clean: a long step writes a plain line to
@@ -77,7 +78,7 @@ def _update(display: Display, row: Any, done: int, total: int, best: float | Non
 
 @contextmanager
 def _display(stream: TextIO) -> Iterator[Display]:
-    """The display on the terminal, begun by the outermost step."""
+    """Yield the terminal's progress display. The outermost step opens it, inner steps share it."""
     if _displays:
         yield _displays[0]
         return

@@ -1,4 +1,4 @@
-"""Error messages for TOML files: file, line, field, given value, allowed values and a remedy.
+"""Write error messages for TOML files: file, line, field, given value and allowed values.
 
 All problems of a file are reported at once, the first MOST_PROBLEMS problems in words. Messages are
 made from the pydantic models of the files. A field's bounds, unit and description are stated once,
@@ -36,14 +36,17 @@ MAX_VALUE_TEXT = 60  # characters of a given value that a message repeats
 
 @dataclass(frozen=True)
 class Problem:
-    """A problem of a field that the user must correct."""
+    """Wrong field of a TOML file, which the user must correct."""
 
     field: str  # dotted name; "" for the whole file
     text: str  # sentence with the value given and the remedy
 
 
 class CrossCheckError(ValueError):
-    """Error of pydantic validators for fields in range that contradict each other."""
+    """Error of pydantic validators for values that are wrong although each is in its range.
+
+    For example, they contradict each other.
+    """
 
     def __init__(self, problems: Iterable[Problem]) -> None:
         self.problems = tuple(problems)
@@ -51,14 +54,16 @@ class CrossCheckError(ValueError):
 
 
 def closest_name(name: str, known: Iterable[str]) -> str | None:
-    """The known name most similar to `name`, if any is similar; case is ignored."""
+    """Return the known name most similar to `name`, or None if none is similar. Ignores case."""
     by_lower = {word.lower(): word for word in known}
     close = difflib.get_close_matches(name.lower(), by_lower, n=1, cutoff=SIMILARITY)
     return by_lower[close[0]] if close else None
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:
-    """A hint: "did you mean 'x'?", the allowed names, or both if there are few.
+    """Return a hint for a wrong name: "did you mean 'x'?" or, without a similar name, all names.
+
+    A hint with a similar name also lists all names if they are few.
 
     A dotted name with a known table is compared only within this table, because no other table has
     the same keys.
@@ -73,10 +78,12 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
 
 
 def format_problems(problems: Iterable[Problem], path: Path | None = None, source: str = "") -> str:
-    """Lines `file:line: field: text` for the first problems, and the number of further problems.
+    """Return lines `file:line: field: text` for the first MOST_PROBLEMS problems of a file.
+
+    A last line counts the further problems.
 
     Args:
-        source: the file's text.
+        source: the file's text, in which the lines are looked up.
     """
     line_of = key_lines(source)
     texts, problems = [], list(problems)
@@ -94,9 +101,12 @@ def format_problems(problems: Iterable[Problem], path: Path | None = None, sourc
 
 
 def explain_validation_error(error: ValidationError, model: type[BaseModel]) -> list[Problem]:
-    """Pydantic's errors as problems in the words of the file.
+    """Return pydantic's errors as problems of named fields of the file.
 
-    Words take time. Problems beyond MOST_PROBLEMS are counted and have no words.
+    Texts take time to make: problems beyond MOST_PROBLEMS, which are only counted, have none.
+
+    Args:
+        model: pydantic model of the whole file.
     """
     problems: dict[Problem, None] = {}  # a union reports the same error for each alternative
     details = error.errors(include_url=False)
@@ -120,7 +130,12 @@ def explain_validation_error(error: ValidationError, model: type[BaseModel]) -> 
 
 
 def explain_missing_file(path: Path, what: str, pattern: str) -> str:
-    """One sentence about a file that does not exist, with similar names from its folder."""
+    """Return a sentence about a file that does not exist, with similar names from its folder.
+
+    Args:
+        what: kind of the file, such as "mesh file".
+        pattern: pattern of the names that are suggested, such as "*.toml".
+    """
     folder = path.parent
     if not folder.is_dir():
         return f"{path}: no such {what}; the folder {folder} does not exist"
@@ -138,10 +153,13 @@ def explain_missing_file(path: Path, what: str, pattern: str) -> str:
 def numeric_fields(
     table: BaseModel | type[BaseModel], prefix: str = ""
 ) -> Iterator[tuple[str, FieldInfo]]:
-    """Dotted name and field of every number in a table; in lists such as part.offset_mm.0.
+    """Yield the dotted name and the pydantic field of every number in a table of a TOML file.
 
-    For a model class the result has the numbers that its tables can hold. For an instance it
-    includes the tables of its lists.
+    Numbers in lists have names such as part.offset_mm.0. For a model class these are the numbers
+    that its tables can hold, without lists of tables. For an instance they include such lists.
+
+    Args:
+        prefix: beginning of all names.
     """
     is_class = isinstance(table, type)
     for name, field in (table if isinstance(table, type) else type(table)).model_fields.items():
@@ -167,7 +185,10 @@ def numeric_fields(
 
 
 def text_choices(table: BaseModel, prefix: str) -> Iterator[tuple[str, tuple[str, ...]]]:
-    """Dotted name and allowed texts of every set text of a table that has few allowed texts."""
+    """Yield the dotted name and the allowed texts of every text field that is a choice.
+
+    Fields that the table leaves empty are skipped. `prefix` is the dotted name of the table.
+    """
     for name, field in type(table).model_fields.items():
         allowed = get_args(_alternatives(field.annotation)[0])
         if isinstance(getattr(table, name), str) and len(allowed) > 1:
@@ -175,7 +196,7 @@ def text_choices(table: BaseModel, prefix: str) -> Iterator[tuple[str, tuple[str
 
 
 def key_lines(source: str) -> dict[str, int]:
-    """Line number of every table header and key in a TOML text, by dotted name.
+    """Return the line number of every table header and key in a TOML text, by dotted name.
 
     A simple scan is enough to point a person at the place. It does not find the keys of inline
     tables.
@@ -207,7 +228,7 @@ def key_lines(source: str) -> dict[str, int]:
 
 
 def describe_allowed(field: FieldInfo) -> str:
-    """Values that a field accepts: 'a number from 2 to 2000 mm (inner height of the chamber)'."""
+    """Return what a field accepts: 'a number from 2 to 2000 mm (inner height of the chamber)'."""
     bounds: dict[str, str] = {}
     for constraint in field.metadata:
         found = ((k, getattr(constraint, k, None)) for k in ("ge", "le"))
@@ -237,19 +258,25 @@ def _without_quotes(key: str) -> str:
 
 
 def _alternatives(annotation: Any) -> tuple[Any, ...]:
-    """The types of an optional field, without None and annotations; otherwise the type itself."""
+    """Return the types that a field accepts besides None, without their annotations.
+
+    A type that does not allow None is returned alone, also if it is a union.
+    """
     types = get_args(annotation)
     types = tuple(t for t in types if t is not type(None)) if type(None) in types else (annotation,)
     return tuple(map(_bare, types))
 
 
 def _bare(annotation: Any) -> Any:
-    """A type without its annotations."""
+    """Return the type T of Annotated[T, ...]; other types stay as they are."""
     return get_args(annotation)[0] if get_origin(annotation) is Annotated else annotation
 
 
 def _table_of(field: FieldInfo, of_rows: bool = False) -> type[BaseModel] | None:
-    """Model of a field that is a table, or of the rows of a list of tables."""
+    """Return the pydantic model of a field that is a table, or None for other fields.
+
+    With `of_rows`, return the model of the rows of a field that is a list of tables.
+    """
     types = (*_alternatives(field.annotation), *map(_bare, get_args(field.annotation)[1:]))
     if of_rows:
         lists = (t for t in _alternatives(field.annotation) if get_origin(t) is tuple)
@@ -260,7 +287,14 @@ def _table_of(field: FieldInfo, of_rows: bool = False) -> type[BaseModel] | None
 def _find_field(
     model: type[BaseModel], loc: tuple[int | str, ...]
 ) -> tuple[type[BaseModel], FieldInfo | None]:
-    """The innermost table on the way to `loc`, and the field there if the table has it."""
+    """Return the model of the innermost table that contains a field, and the field.
+
+    The field is None if the table does not have it.
+
+    Args:
+        model: pydantic model of the whole file.
+        loc: names and list positions that lead to the field.
+    """
     field: FieldInfo | None = None
     free_name = False  # the next step is a key that the user chooses
     for step in loc:
@@ -286,12 +320,19 @@ def _shortened(text: str, most: int = MAX_VALUE_TEXT) -> str:
 
 
 def _without_alternative(loc: tuple[int | str, ...]) -> tuple[int | str, ...]:
-    """The place of a field, without the alternative of its union that pydantic tried."""
+    """Return the names that lead to a field, without a type name that pydantic appended.
+
+    For a union of types, pydantic appends the type that it tried, such as "float".
+    """
     return loc[:-1] if loc[-1:] and loc[-1] in ALTERNATIVES else loc
 
 
 def _explain(detail: ErrorDetails, model: type[BaseModel]) -> Problem:
-    """One of pydantic's errors in the words of the file."""
+    """Return one of pydantic's errors as a problem of a named field of the file.
+
+    Args:
+        model: pydantic model of the whole file.
+    """
     loc, kind, value = _without_alternative(detail["loc"]), detail["type"], detail["input"]
     name = _dotted(loc)
     table, field = _find_field(model, loc)
@@ -321,7 +362,11 @@ def _explain(detail: ErrorDetails, model: type[BaseModel]) -> Problem:
 
 
 def _explain_unknown_key(key: str, table: type[BaseModel], model: type[BaseModel]) -> str:
-    """Hint for an unknown key: its new name, a similar key, its place, or the allowed keys.
+    """Return a hint for an unknown key: its new name, a similar key, its place or allowed keys.
+
+    Args:
+        table: model of the table that holds the key.
+        model: model of the whole file.
 
     A model lists former names of its keys in RENAMED, and the fate of removed keys in REMOVED.
     """
@@ -343,7 +388,7 @@ def _explain_unknown_key(key: str, table: type[BaseModel], model: type[BaseModel
 
 
 def _all_names(model: type[BaseModel], prefix: str = "") -> Iterator[str]:
-    """Dotted names of all keys of a model and its tables."""
+    """Yield the dotted names of all keys of a model and its tables."""
     for name, field in model.model_fields.items():
         yield prefix + name
         if (table := _table_of(field)) is not None:

@@ -1,4 +1,4 @@
-"""Reading of TOML files, and their field types: numbers with a unit, lists, positions, files."""
+"""Read TOML files, and define their field types: numbers with a unit, lists, positions, files."""
 
 import math
 import os
@@ -78,26 +78,42 @@ Names = Annotated[
 
 
 def quantity(low: float, high: float, unit: str, what: str, default: Any = ...) -> Any:
-    """Field of a bounded number. Error messages show its unit and meaning."""
+    """Return a pydantic field for a number from `low` to `high`.
+
+    Args:
+        unit, what: unit and meaning of the number in error messages.
+        default: value if the file leaves the number out; without it the number is required.
+    """
     return Field(default, ge=low, le=high, description=what, json_schema_extra={"unit": unit})
 
 
 def allowed_range(field: FieldInfo) -> tuple[float, float]:
-    """The least and the largest value of a field made by `quantity`; infinite without a bound."""
+    """Return the least and the largest allowed value of a number field.
+
+    A side without a bound gives an infinite value.
+    """
     low = max((one.ge for one in field.metadata if hasattr(one, "ge")), default=-math.inf)
     high = min((one.le for one in field.metadata if hasattr(one, "le")), default=math.inf)
     return low, high
 
 
 def list_field(form: str, what: str, default: Any = ...) -> Any:
-    """Field of a list. Error messages show its form and meaning."""
+    """Return a pydantic field for a list.
+
+    Args:
+        form: form of the list in error messages, such as "three numbers [x, y, z] in mm".
+        what: meaning of the list in error messages.
+        default: value if the file leaves the list out; without it the list is required.
+    """
     return Field(default, description=what, json_schema_extra={"form": form})
 
 
 def from_file(path: str, context: Mapping[str, Any] | None) -> Path:
-    """Absolute path of a file that a design file names relative to its own folder.
+    """Return the absolute path of a file that a design names relative to the design's folder.
 
-    `context`: context of the pydantic validation, from `validate` in design/design.py.
+    Args:
+        context: context of the pydantic validation: under "folder" the design's folder, and under
+            "recorded" True for a design that a result recorded, whose links are not followed.
     """
     context = context or {}
     named = context.get("folder", Path()) / path
@@ -106,13 +122,13 @@ def from_file(path: str, context: Mapping[str, Any] | None) -> Path:
 
 
 def unit_vector(direction: Vector) -> Vector:
-    """Scale a direction to length 1."""
+    """Return the direction scaled to length 1."""
     x, y, z = (float(k) / math.hypot(*direction) for k in direction)
     return x, y, z
 
 
 def metres(millimetres: Vector) -> Vector:
-    """Convert a position from mm to m."""
+    """Return a position in m that is given in mm."""
     x, y, z = (k * 1e-3 for k in millimetres)
     return x, y, z
 
@@ -120,7 +136,15 @@ def metres(millimetres: Vector) -> Vector:
 def read_toml(
     path: Path, kind: str, remedy: str = "start from a copy of a shipped one"
 ) -> tuple[str, dict[str, Any]]:
-    """Text and content of a TOML file of a kind, such as "design"; InputError if unusable."""
+    """Return the text of a TOML file, and the values read from it.
+
+    Args:
+        kind: kind of the file in messages, such as "design".
+        remedy: end of the message on a file that is empty or no such file.
+
+    Raises:
+        InputError: if the file is missing, too large or not TOML.
+    """
     if path.is_dir():
         inside = sorted(p.name for p in path.glob("*.toml"))
         hint = f"; files in it: {', '.join(inside[:8])}" if inside else ""

@@ -1,4 +1,4 @@
-"""Versions of Python, packages and this program's own sources, on which figures depend."""
+"""Tell the versions of Python, packages and this program's sources, on which results depend."""
 
 from __future__ import annotations
 
@@ -24,13 +24,16 @@ COMPILER_SETTINGS = (
 
 
 def versions() -> dict[str, str]:
-    """Versions of Python, system and packages, and number of cores, for the record of a result."""
+    """Return the versions of Python, system and packages, and the number of cores.
+
+    Results record them.
+    """
     machine = {"system": platform.platform(), "cores": str(core_count())}
     return {"python": platform.python_version(), **machine, **package_versions()}
 
 
 def program_versions() -> dict[str, str]:
-    """Versions of all that a candidate's figures depend on, except the machine.
+    """Return the versions of all that a study's figures depend on, except the machine.
 
     A study can only be resumed where all these versions are the same.
     """
@@ -39,7 +42,10 @@ def program_versions() -> dict[str, str]:
 
 
 def simulation_versions() -> dict[str, str]:
-    """Versions of all that a replica's figures depend on, on any machine."""
+    """Return the versions and compiler settings on which the figures of a replica depend.
+
+    Two machines where they are equal simulate alike.
+    """
     settings = {name: os.environ.get(name, "not set") for name in COMPILER_SETTINGS}
     python = ".".join(platform.python_version_tuple()[:2])
     packages = package_versions((*SIMULATION_PACKAGES, "llvmlite"))
@@ -47,7 +53,7 @@ def simulation_versions() -> dict[str, str]:
 
 
 def package_versions(packages: Iterable[str] = PACKAGES) -> dict[str, str]:
-    """Version of each package."""
+    """Return the installed version of each package, by its name."""
     found = {}
     for package in packages:
         try:
@@ -59,7 +65,7 @@ def package_versions(packages: Iterable[str] = PACKAGES) -> dict[str, str]:
 
 @cache
 def sources_digest() -> str:
-    """Digest of all source files, which tells programs with edited sources apart."""
+    """Return a digest of all source files, which tells programs with edited sources apart."""
     digest = hashlib.sha256()
     for package in ("chamberopt", "sim_core"):
         spec = find_spec(package)  # find_spec finds the package without importing it

@@ -1,4 +1,4 @@
-"""The file layer: all opening, writing, claiming and removing of files in a user's folders.
+"""Open, write, claim and remove files in a user's folders; only this package does so.
 
 Each output has one writer, overwrites nothing, and is written whole or not at all. No link is
 followed in a folder that the program writes to, or in its results and studies. See docs/trust.md.

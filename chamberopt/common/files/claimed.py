@@ -1,4 +1,4 @@
-"""Claims on outputs: each output has one writer and overwrites nothing."""
+"""Claim output files and folders, so that each has one writer and overwrites nothing."""
 
 from __future__ import annotations
 
@@ -35,14 +35,22 @@ LOCKED_BYTE = 1 << 30  # after the holder's name, because Windows lets nobody re
 
 
 def is_new_or_empty(folder: Path) -> bool:
-    """True if results can be written to a folder: it does not exist, or holds nothing."""
+    """Return True if a folder does not exist or holds nothing, so that it can take results.
+
+    Files that a killed command left do not count.
+    """
     if not os.path.lexists(folder):
         return True
     return not folder.is_symlink() and folder.is_dir() and all(map(is_leftover, folder.iterdir()))
 
 
 def make_output_folder(path: str | Path) -> Path:
-    """Make a folder for results; InputError if it holds files or cannot be written."""
+    """Make a folder for results, if it does not exist, and return its path.
+
+    Raises:
+        OutputTakenError: if it is a file or already holds files.
+        InputError: if it is a link or cannot be written.
+    """
     folder = Path(path)
     if os.path.lexists(folder) and not os.path.isdir(folder):
         what = "is a file" if os.path.exists(folder) else "is a link that leads nowhere"
@@ -62,7 +70,7 @@ def make_output_folder(path: str | Path) -> Path:
 def claim_folder(
     path: str | Path, is_own: Callable[[Path], bool] = lambda folder: False
 ) -> Iterator[Path]:
-    """Make a folder for results and hold it against other processes during a `with` block.
+    """Make a folder for results, and keep other processes from it during a `with` block.
 
     Folders that are made here and are empty at the end are removed.
 
@@ -94,10 +102,14 @@ def claim_folder(
 
 @contextmanager
 def claim_file(path: Path, wait: float = 0.0) -> Iterator[Path]:
-    """Hold a new output file against other processes; raises errors as claim_folder does.
+    """Keep other processes from writing an output file during a `with` block.
 
     Args:
         wait: longest time to wait for another writer [s].
+
+    Raises:
+        OutputTakenError: if another process writes the file.
+        InputError: if its folder cannot be written.
     """
     with _only_writer(path.with_name(f"{LOCK}-{path.name}"), path, "choose another name", wait):
         yield path
@@ -105,7 +117,10 @@ def claim_file(path: Path, wait: float = 0.0) -> Iterator[Path]:
 
 @contextmanager
 def _only_writer(lock_file: Path, output: Path, remedy: str, wait: float = 0.0) -> Iterator[None]:
-    """Hold the lock of an output, after a check of the free space.
+    """Hold a lock file during a `with` block, so that no other process writes the same output.
+
+    Raises InputError if the disk is nearly full, and OutputTakenError if another process still
+    holds the lock after `wait` seconds. Messages name `output` and end with `remedy`.
 
     The lock belongs to the operating system and ends with its process, however the process ends. A
     forked child would share the lock until both have ended, so that workers are spawned. The lock
@@ -170,7 +185,10 @@ def _locked(folder: OpenFolder, name: str) -> int | None:
 
 
 def _lock(file: int) -> None:
-    """Lock a file for this process alone; raises an OSError of HELD if another process has it."""
+    """Lock an open file for this process alone.
+
+    Raises an OSError with an error number of HELD if another process has locked it.
+    """
     if sys.platform == "win32":
         os.lseek(file, LOCKED_BYTE, os.SEEK_SET)
         try:
@@ -182,7 +200,7 @@ def _lock(file: int) -> None:
 
 
 def _holder(folder: OpenFolder, name: str) -> str:
-    """Name of the writer, as it stated it itself."""
+    """Return the name of the process that holds a lock, as it wrote it into the lock file."""
     with suppress(OSError, InputError):
         file = folder.open(name, os.O_RDONLY)
         try:
@@ -194,7 +212,10 @@ def _holder(folder: OpenFolder, name: str) -> str:
 
 @contextmanager
 def _writing_in(place: Path | str, remedy: str) -> Iterator[None]:
-    """Turn an error of the operating system into an InputError."""
+    """Turn an OSError in the `with` block into an InputError that `place` cannot be written.
+
+    The message ends with `remedy`.
+    """
     try:
         yield
     except OSError as error:
@@ -203,7 +224,10 @@ def _writing_in(place: Path | str, remedy: str) -> Iterator[None]:
 
 
 def check_new_file(path: Path) -> Path:
-    """Return the path of a new file; InputError if it exists or cannot be written."""
+    """Return `path` if a new file can be written there.
+
+    Raises InputError if the file exists, or if its folder is missing or cannot be written.
+    """
     if os.path.lexists(path):
         text = "already exists, and nothing is ever overwritten: choose another name or remove it"
         raise InputError(f"{path}: {text}")
@@ -212,7 +236,11 @@ def check_new_file(path: Path) -> Path:
 
 
 def require_place(path: Path, option: str = "") -> None:
-    """Raise InputError, beginning with the option, unless a file can be written at the path."""
+    """Raise InputError unless a file can be written at the path.
+
+    Args:
+        option: beginning of the message, such as the option that gave the path.
+    """
     folder = path.parent
     if not folder.is_dir():
         text = f"the folder {path.parent} does not exist; make it first"
@@ -227,13 +255,13 @@ def require_place(path: Path, option: str = "") -> None:
 
 
 def _require_writable(folder: Path) -> None:
-    """Raise OSError now rather than after an hour's work."""
+    """Raise OSError if no file can be made in the folder, now rather than after an hour's work."""
     with tempfile.TemporaryFile(dir=folder):
         pass
 
 
 def _require_space(folder: Path) -> None:
-    """Raise OSError if the disk hardly has room for results."""
+    """Raise OSError if the folder's disk has less than LEAST_FREE bytes free."""
     disk = shutil.disk_usage(folder)
     # some file systems do not tell: all their sizes are 0
     if disk.free < LEAST_FREE and disk.total:

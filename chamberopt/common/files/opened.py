@@ -1,4 +1,4 @@
-"""Opening of plain files and folders.
+"""Open plain files and folders without following links that others made.
 
 A link in a folder that came from elsewhere leads to a place that its author chose. No such link is
 followed. Links on the way to a folder, and links to files that a design names, are the user's own.
@@ -55,19 +55,30 @@ def open_plain(path: Path, follow: bool = False) -> BufferedReader:
 
 
 def read_file(path: Path, follow: bool = False) -> bytes:
-    """The bytes of a plain file; raises errors as open_plain does."""
+    """Return the content of a plain file.
+
+    Args:
+        follow: True to follow links, which users may have among their own files.
+    Raises:
+        OSError: if the file does not exist or cannot be read.
+        InputError: if the path is a link, a folder, a pipe or a device.
+    """
     with open_plain(path, follow) as file:
         return file.read()
 
 
 def require_plain(path: Path, status: os.stat_result) -> None:
-    """Raise InputError unless this is the status of a plain file."""
+    """Raise InputError, which names `path`, unless `status` is that of a plain file."""
     if not stat.S_ISREG(status.st_mode):
         raise InputError(f"{path}: {_kind(status)}; put a plain file in its place, or remove it")
 
 
 def require_plain_folder(path: Path, remedy: str = "put a plain folder in its place") -> Path:
-    """Return the path of a folder; InputError for a link, OSError if there is no folder."""
+    """Return `path` if it is a folder and no link.
+
+    Raises InputError, which ends with `remedy`, for a link or a file, and OSError for a path that
+    does not exist.
+    """
     status = path.lstat()
     if is_link(status):
         where = os.path.realpath(path)
@@ -78,7 +89,7 @@ def require_plain_folder(path: Path, remedy: str = "put a plain folder in its pl
 
 
 def require_plain_content(folder: Path) -> None:
-    """Raise InputError for any content of a program's folder except plain files and folders."""
+    """Raise InputError if a folder holds a link, a pipe or a device, also one folder below."""
     for one in sorted(folder.iterdir()):
         status = one.lstat()
         if stat.S_ISDIR(status.st_mode) and not is_link(status):
@@ -93,7 +104,7 @@ def is_link(status: os.stat_result) -> bool:
 
 
 def is_of_the_program(folder: Path) -> bool:
-    """True for the folder of a result or a study, in which no link is followed."""
+    """Return True if the folder holds a result or a study, in which no link is followed."""
     return any(os.path.lexists(folder / name) for name in (RESULT, INPUTS))
 
 
@@ -122,14 +133,21 @@ class OpenFolder:
             os.close(self._file)
 
     def status(self, name: str) -> os.stat_result | None:
-        """Status of a name, of a link itself and not of its target; None if the name is free."""
+        """Return the status of the file with this name, or None if there is no such file.
+
+        The status of a link is that of the link itself and not of its target.
+        """
         try:
             return os.stat(self._at(name), dir_fd=self._file, follow_symlinks=False)
         except FileNotFoundError:
             return None
 
     def open(self, name: str, flags: int) -> int:
-        """Open a plain file and return its descriptor; InputError for anything else."""
+        """Open a plain file and return its descriptor. Raises InputError for anything else.
+
+        Args:
+            flags: flags of os.open, such as os.O_RDONLY.
+        """
         if (there := self.status(name)) is not None:
             require_plain(self.path / name, there)
         file = os.open(self._at(name), flags | PLAIN, 0o666, dir_fd=self._file)
@@ -141,12 +159,15 @@ class OpenFolder:
         return file
 
     def rename(self, name: str, new: str) -> None:
-        """Give a file a new name and replace the file with that name."""
+        """Give a file a new name. A file that has this name already is replaced."""
         at = {"src_dir_fd": self._file, "dst_dir_fd": self._file}
         os.replace(self._at(name), self._at(new), **at)
 
     def swap(self, name: str, other: str) -> bool:
-        """Exchange the names of two files at once; False if the system cannot do that."""
+        """Exchange the names of two files in one step.
+
+        Returns False, with nothing changed, if the system cannot do that.
+        """
         if self._file is None:
             return False
         library = ctypes.CDLL(None, use_errno=True)
@@ -161,7 +182,7 @@ class OpenFolder:
         raise OSError(error, os.strerror(error))
 
     def remove(self, name: str) -> None:
-        """Remove a name, if it exists. The target of a link stays."""
+        """Remove the file with this name, if it exists. Of a link, the target stays."""
         with suppress(FileNotFoundError):
             os.unlink(self._at(name), dir_fd=self._file)
 
@@ -169,7 +190,7 @@ class OpenFolder:
         os.mkdir(self._at(name), dir_fd=self._file)
 
     def sync(self) -> None:
-        """Write the names to the disk, so that they survive a power cut."""
+        """Write the folder's list of names to the disk, so that it survives a power cut."""
         if self._file is not None:
             with suppress(OSError):  # some file systems cannot
                 os.fsync(self._file)

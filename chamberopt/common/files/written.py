@@ -1,4 +1,4 @@
-"""Writing of files, whole or not at all, and making and removing of files and folders."""
+"""Write files, whole or not at all, and make and remove files and folders."""
 
 from __future__ import annotations
 
@@ -66,7 +66,14 @@ def new_file(path: Path, look: Callable[[Path], None] | None = None) -> Iterator
 def _put_in_place(
     folder: OpenFolder, temporary: str, path: Path, look: Callable[[Path], None] | None
 ) -> None:
-    """Give a file its name, after a look at the file that it replaces."""
+    """Give a written file its final name, in place of the file that has it.
+
+    `look` checks the replaced file. If it raises an error, the replaced file keeps its name.
+
+    Args:
+        temporary: name of the written file in `folder`.
+        path: path with the final name.
+    """
     if look is None or not folder.swap(temporary, path.name):
         if look is not None:
             look(path)
@@ -83,7 +90,12 @@ def _put_in_place(
 def write_bytes(
     path: Path, content: bytes | memoryview, look: Callable[[Path], None] | None = None
 ) -> None:
-    """Write a file, whole or not at all. `look`: as in new_file."""
+    """Write a file, whole or not at all.
+
+    Args:
+        look: called with a file that holds the replaced content. If it raises an error, that
+            content stays in place.
+    """
     with new_file(path, look) as file:
         file.write(content)
 
@@ -108,7 +120,10 @@ def write_new_texts(texts: Mapping[Path, str]) -> None:
 
 
 def append_bytes(path: Path, content: bytes, survives_power_cut: bool = True) -> None:
-    """Add to the end of a file, all or nothing, and make the file if it does not exist.
+    """Add all of `content`, or nothing, to the end of a file. Make the file if it does not exist.
+
+    Args:
+        survives_power_cut: True to wait until the content is on the disk.
 
     Raises:
         OSError: if the file cannot be written.
@@ -151,7 +166,10 @@ def remove_file(path: Path) -> None:
 
 
 def make_folder(path: Path) -> Path:
-    """Make a folder inside a folder of the program, if it does not exist; InputError for a link."""
+    """Make a folder if it does not exist, and return its path.
+
+    Raises InputError if a link or a file is in its place.
+    """
     with OpenFolder(path.parent) as parent, suppress(FileExistsError):
         parent.make(path.name)
     return require_plain_folder(path)
@@ -159,7 +177,10 @@ def make_folder(path: Path) -> Path:
 
 @contextmanager
 def whole_or_nothing(folder: Path) -> Iterator[None]:
-    """Empty a folder, which was new or empty before, if the `with` block fails."""
+    """Empty a folder again if the `with` block that fills it fails.
+
+    The folder must be new or empty before the block.
+    """
     try:
         yield
     except BaseException:
@@ -168,12 +189,15 @@ def whole_or_nothing(folder: Path) -> Iterator[None]:
 
 
 def remove_leftovers(folder: Path) -> None:
-    """Remove the temporary files of killed commands from a folder that is held."""
+    """Remove the temporary files of killed commands from a folder that this process has claimed."""
     _empty(folder, lambda name: name.startswith(WRITING))
 
 
 def _empty(folder: Path, which: Callable[[str], bool]) -> None:
-    """Remove the content of a folder, as far as it can be removed."""
+    """Remove the files and folders in a folder whose names `which` selects.
+
+    What cannot be removed stays, without an error.
+    """
     with suppress(OSError), os.scandir(folder) as there:
         for one in [one for one in there if which(one.name)]:
             with suppress(OSError):
@@ -184,7 +208,7 @@ def _empty(folder: Path, which: Callable[[str], bool]) -> None:
 
 
 def is_leftover(path: Path) -> bool:
-    """True if a killed command may have left this path. Commands leave only plain files."""
+    """Return True if this is a plain file with a name that only killed commands leave."""
     return path.name.startswith(LEFTOVER_PREFIXES) and stat.S_ISREG(path.lstat().st_mode)
 
 
@@ -194,7 +218,10 @@ def private_folder() -> AbstractContextManager[str]:
 
 
 def csv_text(rows: Sequence[Mapping[str, Any]]) -> str:
-    """A table with a header and the columns of all rows together. Missing values stay empty."""
+    """Return a table as CSV text, with a header.
+
+    Its columns are all names that occur in any row. Values that a row lacks stay empty.
+    """
     text = io.StringIO()
     columns = dict.fromkeys(name for row in rows for name in row)
     table = csv.DictWriter(text, list(columns), lineterminator="\n")
