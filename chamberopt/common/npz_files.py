@@ -1,8 +1,8 @@
 """Write and read arrays, and dataclasses that hold arrays (records), in .npz files.
 
 The files hold plain data and never pickles. A record's file has one more entry, `tree`: JSON of
-all content except arrays. In it {"array": name} for an array and {"is": class, "of": fields}
-for a dataclass. Sequences come back as tuples. Everything else comes back exactly.
+all content except arrays. In it {"array": name} stands for an array and {"is": class, "of":
+fields} for a dataclass. Sequences come back as tuples. Everything else comes back exactly.
 """
 
 from __future__ import annotations
