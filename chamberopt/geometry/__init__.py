@@ -1,1 +1,1 @@
-"""Triangles, solids and mesh files. This package knows nothing about shot or designs."""
+"""Work with triangles, solids and mesh files. Nothing here knows about shot or designs."""

@@ -1,4 +1,4 @@
-"""Faces of a surface: connected triangles whose neighbours turn by less than a given angle."""
+"""Divide a surface into faces: connected triangles whose neighbours turn by less than an angle."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ SAME = 0.02  # relative difference of size and extent below which faces count as
 
 
 class Faces:
-    """The faces of a closed surface.
+    """Faces of a closed surface, each a number from 0 on.
 
     Args:
         vertices: vertex positions [m], shape (n, 3).
@@ -40,39 +40,43 @@ class Faces:
         self.area = np.bincount(self.of_triangle, self._weight)  # [m²], (count,)
 
     def at(self, place: np.ndarray) -> tuple[int, float]:
-        """The face closest to a place (3,) [m], and its distance [m]."""
+        """Return the number of the face closest to a point (3,) [m], and its distance [m]."""
         points = closest_on_each(self._corners, np.broadcast_to(place, (len(self._corners), 3)))
         away = np.linalg.norm(points - place, axis=1)
         return int(self.of_triangle[away.argmin()]), float(away.min())
 
     def normal(self, face: int) -> np.ndarray:
-        """Mean unit normal (3,) of a face; 0 for a face that bends all round."""
+        """Return the mean unit normal (3,) of a face; zero for a face that bends all round."""
         own = self.of_triangle == face
         mean = self._weight[own] @ self._normal[own] / max(float(self._weight[own].sum()), 1e-30)
         length = float(np.linalg.norm(mean))
         return np.asarray(mean / length if length > SAME else 0.0 * mean)
 
     def place(self, face: int) -> np.ndarray:
-        """A place (3,) [m] on a face: the middle of its triangle closest to the face's middle."""
+        """Return a point (3,) [m] on a face: the middle of its triangle closest to its centre."""
         own = np.flatnonzero(self.of_triangle == face)
         middles = self._corners[own].mean(axis=1)
         middle = np.average(middles, axis=0, weights=self._weight[own] + 1e-30)
         return np.asarray(middles[np.linalg.norm(middles - middle, axis=1).argmin()])
 
     def alike(self, face: int) -> np.ndarray:
-        """Mark the faces (count,) that are congruent with the given face or its mirror image."""
+        """Return marks (count,) of the faces that are congruent with a face or its mirror image."""
         figures = self._figures
         scale = np.maximum(np.abs(figures[face]), 1e-12 * np.abs(figures).max())
         return np.asarray((np.abs(figures - figures[face]) <= SAME * scale).all(axis=1))
 
     @cached_property
     def _figures(self) -> np.ndarray:
-        """Area, extents along the principal axes, and bend of each face, (count, 5), in metres."""
+        """Five lengths [m] of each face by which congruent faces are recognised, (count, 5).
+
+        They are the root of the area, the extents along the three principal axes, and the root of
+        the area times the length of the mean unit normal.
+        """
         face, corners = self.of_triangle, self._corners
         weight = self._weight / np.maximum(self.area, 1e-30)[face]
 
         def per_face(values: np.ndarray) -> np.ndarray:
-            """Sums of values (m, ...) over the triangles of each face."""
+            """Return the sums (count, ...) of values (m, ...) over the triangles of each face."""
             flat = values.reshape(len(values), -1)
             sums = [np.bincount(face, column, self.count) for column in flat.T]
             return np.stack(sums, axis=1).reshape(self.count, *values.shape[1:])

@@ -1,9 +1,10 @@
-"""Remeshing of the target with triangles of a given size, without changing its surface.
+"""Remesh the target, the part's surface to be peened, with triangles of a given size.
 
-Sides longer than 4/3 of the size are halved, and sides shorter than 0.6 of it are collapsed. Edges
-are turned until they are Delaunay. Points move towards the mean of their neighbours. Each change is
-made only where the surface stays the same: within a flat face, or along a straight edge between two
-flat faces. A surface that curves in steps finer than the size keeps these steps.
+The surface itself does not change. Sides longer than 4/3 of the size are halved, and sides shorter
+than 0.6 of it are collapsed. Edges are turned until they are Delaunay. Points move towards the mean
+of their neighbours. Each change is made only where the surface stays the same: within a flat face,
+or along a straight edge between two flat faces. A surface that curves in steps finer than the size
+keeps these steps.
 
 Notation: a triangle's side k runs from its corner k to the next. Side 3 t + k is side k of triangle
 t. A crease is an edge between two flat faces.
@@ -38,10 +39,10 @@ MAX_CHANGES = 20
 def remesh(
     vertices: np.ndarray, triangles: np.ndarray, target: np.ndarray, kinds: np.ndarray, size: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Remesh the target of a closed surface with triangles whose sides are about `size` [m] long.
+    """Remesh part of a closed surface with triangles whose sides are about `size` [m] long.
 
     Args:
-        target: marks the target's triangles, (m,) bool.
+        target: marks the triangles to remesh, (m,) bool.
         kinds: kind of each triangle, (m,). Triangles of different kinds are never mixed.
     Returns:
         Vertices, triangles (k, 3), and for each new triangle a given triangle of the same flat face
@@ -58,7 +59,10 @@ def remesh(
 
 
 def triangle_quality(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """4 √3 area / sum of squared sides, (m,): 1 for an equilateral triangle, 0 without area."""
+    """Return the shape quality of each triangle, (m,): 1 if equilateral, 0 without area.
+
+    It is 4 √3 times the area, over the sum of the squared sides.
+    """
     corners = vertices[triangles]
     squares = ((corners - np.roll(corners, 1, axis=1)) ** 2).sum(axis=(1, 2))
     top = 4.0 * np.sqrt(3.0) * areas(vertices, triangles)
@@ -66,7 +70,10 @@ def triangle_quality(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 
 
 def _flat_faces(vertices: np.ndarray, triangles: np.ndarray, kinds: np.ndarray) -> np.ndarray:
-    """The flat face of each triangle, (m,): connected triangles of one kind in one plane."""
+    """Return the number of the flat face to which each triangle belongs, (m,).
+
+    A flat face consists of connected triangles of one kind in one plane.
+    """
     tolerance = FLAT * float(np.linalg.norm(np.ptp(vertices, axis=0)))
     vectors = area_vectors(vertices, triangles)
     normal = unit_vectors(vectors)
@@ -86,7 +93,7 @@ def _flat_faces(vertices: np.ndarray, triangles: np.ndarray, kinds: np.ndarray) 
 
 
 class _TargetMesh:
-    """A closed surface while its target is remeshed.
+    """Closed surface while part of it, the target, is remeshed.
 
     Each change is made at many places at once, chosen so that no two places touch.
 
@@ -114,7 +121,7 @@ class _TargetMesh:
         self.rng = np.random.default_rng(0)
 
     def split(self) -> bool:
-        """Halve sides of the target until none is too long; True if any was halved."""
+        """Halve sides of the target until none is too long. Return True if any was halved."""
         any_long = False
         while self._split_once():
             # turned now, because the halves of a thin triangle would otherwise be halved as they
@@ -124,7 +131,7 @@ class _TargetMesh:
         return any_long
 
     def _split_once(self) -> bool:
-        """Halve one side that is too long in each triangle; False if there is no such side."""
+        """Halve one side that is too long in each triangle. Return True if any was halved."""
         edges, sides, _ = self._edges()
         length = self._lengths(edges)
         beside = self.target[sides // 3].any(axis=1)
@@ -149,7 +156,11 @@ class _TargetMesh:
         return len(chosen) > 0
 
     def turn(self) -> None:
-        """Turn edges within flat faces until the two angles opposite each are at most 180°."""
+        """Turn edges within flat faces until they are Delaunay.
+
+        The two angles opposite each edge then sum to at most 180°. To turn an edge is to replace it
+        by the other diagonal of its two triangles.
+        """
         for _ in range(MAX_PASSES):
             sides = self._edges()[1]
             (t, u), (k, j) = (sides // 3).T, (sides % 3).T
@@ -175,7 +186,10 @@ class _TargetMesh:
             self.triangles[t[chosen]], self.triangles[u[chosen]] = one[chosen], two[chosen]
 
     def collapse(self) -> bool:
-        """Merge points that do not shape the surface into near neighbours; True if any was."""
+        """Merge points into near neighbours where this does not change the surface.
+
+        Returns True if any point was merged.
+        """
         changed = False
         for _ in range(MAX_CHANGES):
             edges, sides, crease = self._edges()
@@ -235,7 +249,10 @@ class _TargetMesh:
         self.turn()
 
     def _edges(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Edges (e, 2), the two sides (e, 2) at each edge, and marks (e,) of the creases."""
+        """Return the edges (e, 2) as pairs of points, their two sides (e, 2), and marks of creases.
+
+        Side k of triangle t has the number 3 t + k. The marks (e,) are True at creases.
+        """
         keys = edge_keys(self.triangles)
         sides = np.argsort(keys, kind="stable").reshape(-1, 2)
         self.edge_order = keys[sides[:, 0]]
@@ -243,7 +260,10 @@ class _TargetMesh:
         return sides_of(self.triangles)[sides[:, 0]], sides, face[:, 0] != face[:, 1]
 
     def _are_linked(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
-        """True where points a and b (e,) are the ends of an edge, by the last call of `_edges`."""
+        """Return True where points a and b (e,) are the ends of an edge.
+
+        The edges are those that the last call of `_edges` found.
+        """
         keys = np.minimum(a, b) * (int(self.triangles.max()) + 1) + np.maximum(a, b)
         at = np.minimum(np.searchsorted(self.edge_order, keys), len(self.edge_order) - 1)
         return np.asarray(self.edge_order[at] == keys)
@@ -256,7 +276,7 @@ class _TargetMesh:
         return area_vectors(self.vertices, triangles)
 
     def _angle(self, t: np.ndarray, k: np.ndarray) -> np.ndarray:
-        """The angle (e,) of triangles t opposite their sides k."""
+        """Return the angle [rad] of each triangle of t (e,) opposite its side of k (e,), (e,)."""
         a, b, apex = (self.vertices[self.triangles[t, (k + j) % 3]] for j in range(3))
         to_a, to_b = a - apex, b - apex
         sine = np.linalg.norm(np.cross(to_a, to_b), axis=1)
@@ -265,7 +285,14 @@ class _TargetMesh:
     def _independent(
         self, triangle: np.ndarray, change: np.ndarray, rank: np.ndarray, wanted: np.ndarray
     ) -> np.ndarray:
-        """The wanted changes (c,) that are first by rank in every triangle (k,) they touch."""
+        """Return the indices of wanted changes of which no two touch the same triangle.
+
+        Of changes that compete for a triangle, the change of lowest rank is made.
+
+        Args:
+            triangle, change: pairs of a triangle and a change that touches it, (k,) each.
+            rank, wanted: rank of each change, and mark of the changes to make, (c,) each.
+        """
         at = np.flatnonzero(wanted)
         place = np.full(len(rank), len(at))
         place[at[np.argsort(rank[at], kind="stable")]] = np.arange(len(at))
@@ -275,7 +302,11 @@ class _TargetMesh:
         return at[~np.isin(at, change[beaten])]
 
     def _movable(self, edges: np.ndarray, crease: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Marks of points (n,) inside flat faces, and on straight creases, in touched triangles."""
+        """Return marks of points that may move in their face, and along their crease, (n,) each.
+
+        The first lie inside flat faces, the others on straight creases. All triangles around them
+        must be free to change.
+        """
         n = len(self.vertices)
         inside = np.ones(n, dtype=bool)
         inside[self.triangles[~self.touched]] = False
@@ -289,7 +320,7 @@ class _TargetMesh:
         return inside & (count == 0), inside & (count == 2) & straight
 
     def _rings(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Triangles around each of some points (p,): their indices, and the index of the point."""
+        """Return the triangles around points (p,), and for each triangle the index of its point."""
         corner = np.argsort(self.triangles.ravel(), kind="stable")
         start = np.searchsorted(self.triangles.ravel()[corner], np.arange(len(self.vertices) + 1))
         count = start[points + 1] - start[points]
@@ -298,7 +329,7 @@ class _TargetMesh:
         return corner[start[points][point] + inside] // 3, point
 
     def _collapses_well(self, moved: np.ndarray, kept: np.ndarray) -> np.ndarray:
-        """True where points `moved` can be merged into points `kept`, all (p,).
+        """Return True where points `moved` can be merged into points `kept`, all (p,).
 
         The surface must stay the same closed surface, without long sides or thinner triangles.
         """

@@ -1,4 +1,4 @@
-"""Removal of slivers: triangles too thin to have a direction.
+"""Remove slivers from a surface: triangles too thin to have a direction.
 
 A boolean operation leaves triangles 1e-12 m high where two faces nearly coincide. The rounding of
 their corners is as large as their height. Their normals are therefore arbitrary, and a ball could
@@ -21,12 +21,13 @@ Triangle = tuple[int, int, int]
 
 
 def remove_slivers(surface: SolidSurface) -> SolidSurface:
-    """The surface without triangles lower than MIN_HEIGHT, where these can be removed.
+    """Return the surface without triangles lower than MIN_HEIGHT, where these can be removed.
 
     A needle (one edge shorter than MIN_HEIGHT) is removed by merging that edge's ends. Any other
-    sliver gets an edge turned. Within one source triangle, the edge is turned if the thinner of the
-    two triangles becomes thicker. Across two source triangles, the edge is turned only if the
-    sliver's apex lies on it, and then both halves belong to the neighbour.
+    sliver gets an edge turned: replaced by the other diagonal of its two triangles. Within one
+    source triangle, the edge is turned if the thinner of the two triangles becomes thicker. Across
+    two source triangles, the edge is turned only if the sliver's apex lies on it, and then both
+    halves belong to the neighbour.
     """
     found = np.flatnonzero(heights(surface.vertices, surface.triangles) < MIN_HEIGHT)
     if not len(found):
@@ -40,7 +41,7 @@ def remove_slivers(surface: SolidSurface) -> SolidSurface:
 
 
 class _EditableMesh:
-    """A closed surface whose neighbour relations are kept while triangles come and go."""
+    """Closed surface that keeps track of neighbours while triangles come and go."""
 
     def __init__(self, surface: SolidSurface, slivers: list[int]) -> None:
         self.vertices = surface.vertices
@@ -54,19 +55,22 @@ class _EditableMesh:
             self._add(index, (a, b, c))
 
     def slivers(self) -> list[int]:
-        """The triangles that are too low now."""
+        """Return the indices of the triangles that are now lower than MIN_HEIGHT."""
         present = (k for k in dict.fromkeys(self.candidates) if k in self.triangles)
         return [k for k in present if self._height(self.triangles[k]) < MIN_HEIGHT]
 
     def surface(self) -> SolidSurface:
-        """The surface as it is now."""
+        """Return the surface with all changes made so far."""
         kept = np.array(sorted(self.triangles))
         triangles = np.array([self.triangles[k] for k in kept.tolist()], dtype=np.int32)
         surface = SolidSurface(self.vertices, triangles, self.solid[kept], self.source[kept])
         return surface.select(np.ones(len(kept), dtype=bool))
 
     def merge(self, index: int) -> bool:
-        """Merge the ends of the shortest edge if it is short and the surface stays closed."""
+        """Merge the ends of a triangle's shortest edge. Return True if it was merged.
+
+        The edge must be shorter than MIN_HEIGHT, and the surface must stay closed.
+        """
         u, v = min(_edges(self.triangles[index]), key=lambda edge: self._length(*edge))
         if self._length(u, v) >= MIN_HEIGHT:
             return False
@@ -84,7 +88,10 @@ class _EditableMesh:
         return True
 
     def turn(self, index: int) -> bool:
-        """Turn the edge that leaves the highest pair of triangles, if it is higher than before."""
+        """Turn the edge of a triangle that gives the thickest new pair of triangles.
+
+        Returns False, with nothing changed, if no edge gives a thicker pair than before.
+        """
         options = []
         for a, b in _edges(self.triangles[index]):
             beyond = self.of_edge[b, a]
@@ -112,12 +119,15 @@ class _EditableMesh:
         return True
 
     def _faces_alike(self, new: tuple[Triangle, Triangle], old: tuple[Triangle, Triangle]) -> bool:
-        """True if two new triangles face as the old pair does: a convex quadrilateral."""
+        """Return True if two new triangles face the same way as the old pair.
+
+        This holds if the pair is a convex quadrilateral.
+        """
         facing = area_vectors(self.vertices, np.array(old)).sum(axis=0)
         return all(float(v @ facing) > 0.0 for v in area_vectors(self.vertices, np.array(new)))
 
     def _apex_on(self, a: int, b: int, c: int) -> bool:
-        """True if c is within MIN_HEIGHT of the edge a-b, between its ends."""
+        """Return True if vertex c is within MIN_HEIGHT of the edge a-b, between its ends."""
         along, to_apex = self.vertices[b] - self.vertices[a], self.vertices[c] - self.vertices[a]
         length = float(np.linalg.norm(along))
         if length == 0.0 or not 0.0 < float(to_apex @ along) < length * length:

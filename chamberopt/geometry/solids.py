@@ -1,4 +1,4 @@
-"""Solids and the operations on them: unite, subtract, sweep, project.
+"""Make solids of closed surfaces, and unite, subtract, sweep and project them.
 
 This is the only file that imports manifold3d. Each triangle of a result remembers its solid and the
 triangle of that solid on which it lies. manifold3d keeps this only for meshes with reserved ids. An
@@ -31,7 +31,7 @@ SAME_VOLUME = 1e-9
 
 @dataclass(frozen=True)
 class SolidSurface:
-    """The closed surface of a solid."""
+    """Closed surface of a solid, whose triangles remember the solid they come from."""
 
     vertices: np.ndarray  # (n, 3) float64 [m]
     triangles: np.ndarray  # (k, 3) int32, rows of the vertices; normals point outward
@@ -39,7 +39,7 @@ class SolidSurface:
     source: np.ndarray  # (k,) int32, index in that solid of the triangle on which it lies
 
     def select(self, keep: np.ndarray) -> SolidSurface:
-        """The triangles marked by `keep` (k,), with only the vertices that they use."""
+        """Return the surface of the triangles marked by `keep` (k,), without unused vertices."""
         used, renumbered = np.unique(self.triangles[keep], return_inverse=True)
         triangles = renumbered.reshape(-1, 3).astype(np.int32)
         return SolidSurface(self.vertices[used], triangles, self.solid[keep], self.source[keep])
@@ -47,7 +47,7 @@ class SolidSurface:
 
 @dataclass(frozen=True)
 class Solid:
-    """A closed body."""
+    """Closed body on which solid operations work."""
 
     body: Manifold
     label: int  # label of its own triangles; -1 for the result of an operation
@@ -59,7 +59,7 @@ class Solid:
         return float(self.body.volume()) * 1e-9
 
     def surface(self) -> SolidSurface:
-        """The surface, each triangle with its origin."""
+        """Return the surface [m], each triangle with the solid and triangle that it comes from."""
         mesh = self.body.to_mesh64()
         ends = np.asarray(mesh.run_index, dtype=np.int64)
         runs: np.ndarray = (ends[1:] - ends[:-1]) // 3
@@ -70,7 +70,7 @@ class Solid:
 
 
 def snap_to_grid(vertices: np.ndarray) -> np.ndarray:
-    """Move positions (n, 3) [m] to the grid of the solids, by at most 0.5 nm per axis."""
+    """Return positions (n, 3) [m] rounded to the grid of the solids, by at most 0.5 nm per axis."""
     return _grid_mm(vertices) * 1e-3
 
 
@@ -108,7 +108,9 @@ def make_solid(
 def simplify_planes(
     vertices: np.ndarray, triangles: np.ndarray, label: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """A closed surface without the vertices inside its planes and on their straight borders.
+    """Return a closed surface without the vertices that its planes do not need.
+
+    Those are the vertices inside planes and on their straight borders.
 
     Args:
         vertices: vertex positions [m], shape (n, 3).
@@ -136,10 +138,10 @@ def simplify_planes(
 
 
 def split_bodies(vertices: np.ndarray, triangles: np.ndarray, name: str) -> tuple[list[Solid], int]:
-    """Solids of a surface of one or several bodies, and the number of filled voids.
+    """Return a solid for each body of a surface, and the number of voids, which are filled.
 
     The solids must be united before use: a mesh of bodies that overlap would be subtracted wrongly,
-    without an error. Sources count in the whole list of triangles.
+    without an error. The source of a solid's triangle is its index in the whole list of triangles.
     """
     shells, volumes = find_shells(vertices, triangles)
     if len(volumes) == 1:
@@ -152,7 +154,10 @@ def split_bodies(vertices: np.ndarray, triangles: np.ndarray, name: str) -> tupl
 
 
 def sweep_face(face: SolidSurface, way: np.ndarray, name: str) -> Solid:
-    """The prism over a flat face, its normals outward, up to the face moved by ``way`` [m]."""
+    """Return the prism that a flat face sweeps when it moves by `way` (3,) [m].
+
+    The normals of the face must point away from the prism.
+    """
     count, (a, b) = len(face.vertices), border_edges(face.triangles).T
     walls = np.concatenate([np.c_[b, a, a + count], np.c_[b, a + count, b + count]])
     triangles = np.concatenate([face.triangles, face.triangles[:, ::-1] + count, walls])
@@ -191,25 +196,31 @@ def subtract(whole: Solid, taken: Solid) -> Solid:
 
 @dataclass(frozen=True)
 class Outline:
-    """An area in plan, which may have several pieces and holes."""
+    """Area seen from above, which may have several pieces and holes."""
 
     section: CrossSection
 
     def offset(self, by: float, facets: int) -> Outline:
-        """The area within a distance `by` [m] of this area; a negative distance shrinks the area.
+        """Return the area grown by a distance `by` [m] all round, or shrunk if it is negative.
 
-        The round corners of the result are parts of circles with ``facets`` sides.
+        Its round corners are parts of circles with `facets` sides.
         """
         from manifold3d import JoinType
 
         return Outline(self.section.offset(1e3 * by, JoinType.Round, circular_segments=facets))
 
     def hull(self, tolerance: float) -> np.ndarray:
-        """Corners (n, 2) [m] of the convex hull, counter-clockwise, up to a tolerance [m]."""
+        """Return the corners (n, 2) [m] of the convex hull, counter-clockwise.
+
+        Corners that matter by less than `tolerance` [m] are left out.
+        """
         return _corners(self.section.hull().simplify(1e3 * tolerance))[0]
 
     def without_holes(self, tolerance: float) -> list[np.ndarray]:
-        """Corners of each piece, in the form of `hull`, without holes."""
+        """Return the corners (n, 2) [m] of each piece, counter-clockwise, with its holes filled.
+
+        Corners that matter by less than `tolerance` [m] are left out.
+        """
         from manifold3d import CrossSection
 
         outer = []
@@ -222,7 +233,10 @@ class Outline:
 
 
 def plan_outline(vertices: np.ndarray, triangles: np.ndarray, below: float) -> Outline:
-    """The area in plan of the part of a closed surface, normals outward, below a height [m]."""
+    """Return the area, seen from above, of all that lies below a height z [m] in closed bodies.
+
+    The normals of the surface point outward.
+    """
     from manifold3d import CrossSection, OpType
 
     sections = [
@@ -233,7 +247,10 @@ def plan_outline(vertices: np.ndarray, triangles: np.ndarray, below: float) -> O
 
 
 def extrude(outline: np.ndarray, height: float) -> tuple[np.ndarray, np.ndarray]:
-    """Vertices [m] and triangles of the prism from z = 0 to a height [m] over an outline (n, 2)."""
+    """Return the prism over an outline (n, 2) [m] from z = 0 to a height [m].
+
+    It is given by its vertices [m] and triangles.
+    """
     from manifold3d import CrossSection
 
     mesh = CrossSection([1e3 * outline]).extrude(1e3 * height).to_mesh64()
@@ -242,14 +259,17 @@ def extrude(outline: np.ndarray, height: float) -> tuple[np.ndarray, np.ndarray]
 
 
 def overlap_volume(one: Solid, two: Solid) -> float:
-    """Common volume [m³] of two solids."""
+    """Return the volume [m³] that two solids have in common."""
     common = one.body ^ two.body
     text = f"{one.name} and {two.name} cannot be intersected"
     return float(_checked(common, text).volume()) * 1e-9
 
 
 def find_cavities(surface: SolidSurface) -> list[np.ndarray]:
-    """Masks (k,) of the separate cavities, the largest first: outer shell and islands in it."""
+    """Return marks (k,) of the triangles of each separate cavity, the largest cavity first.
+
+    A cavity consists of its outer shell and the islands that stand in it.
+    """
     shells, volumes = find_shells(surface.vertices, surface.triangles)
     outer = sorted(np.flatnonzero(volumes > 0.0).tolist(), key=lambda shell: -volumes[shell])
     cavities = {shell: shells == shell for shell in outer}
@@ -270,7 +290,7 @@ def _grid_mm(vertices: np.ndarray) -> np.ndarray:
 
 
 def _checked(body: Manifold, what: str) -> Manifold:
-    """The body, unless manifold3d reports an error, with which all results would be empty."""
+    """Return the body, or raise InputError, which begins with `what`, if manifold3d rejects it."""
     from manifold3d import Error
 
     if body.status() != Error.NoError:

@@ -1,4 +1,4 @@
-"""Geometry of triangle meshes: edges, connected pieces, areas, normals, inside or outside.
+"""Measure triangle meshes: edges, connected pieces, areas, normals, inside or outside.
 
 A surface is given by vertices (n, 3) [m] and triangles (m, 3), rows of the vertices. Side k of
 triangle t runs from its corner k to the next corner. The sides of all triangles count as 3 t + k.
@@ -11,7 +11,10 @@ MAX_SAMPLES = 8  # points of a shell that are tested for lying in another shell
 
 
 def unique_rows(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """First index and inverse of the distinct rows, as np.unique(axis=0), but six times faster."""
+    """Return the index of the first of each set of equal rows, and the set of each row.
+
+    The result is that of np.unique(axis=0) with index and inverse, but six times faster.
+    """
     order = np.lexsort(rows.T[::-1])
     ordered = rows[order]
     is_new = np.ones(len(rows), dtype=bool)
@@ -22,12 +25,17 @@ def unique_rows(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def count_up(times: np.ndarray) -> np.ndarray:
-    """The numbers from 0 to n - 1 for each n of `times` (k,), one after another."""
+    """Return the numbers from 0 to n - 1 for each n of `times` (k,), joined to one array."""
     return np.asarray(np.arange(times.sum()) - np.repeat(np.cumsum(times) - times, times))
 
 
 def connected_pieces(a: np.ndarray, b: np.ndarray, count: int) -> tuple[int, np.ndarray]:
-    """Number of connected pieces of a graph with links a (k,) to b (k,); piece of each node."""
+    """Return the number of connected pieces of a graph, and the piece of each node, (count,).
+
+    Args:
+        a, b: nodes at both ends of each link, (k,).
+        count: number of nodes.
+    """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
@@ -37,31 +45,37 @@ def connected_pieces(a: np.ndarray, b: np.ndarray, count: int) -> tuple[int, np.
 
 
 def sides_of(triangles: np.ndarray) -> np.ndarray:
-    """Start and end of each side, shape (3 m, 2)."""
+    """Return the start and end vertex of each side, shape (3 m, 2)."""
     return triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
 
 
 def edge_keys(triangles: np.ndarray) -> np.ndarray:
-    """A number for each side, shape (3 m,), the same for both directions of an edge."""
+    """Return a number for the edge of each side, shape (3 m,), the same in both directions."""
     count = int(triangles.max()) + 1
     a, b = sides_of(triangles).T.astype(np.int64)
     return np.asarray(np.minimum(a, b) * count + np.maximum(a, b))
 
 
 def side_pairs(triangles: np.ndarray) -> np.ndarray:
-    """The two sides at each edge of a closed surface, shape (e, 2)."""
+    """Return the numbers of the two sides at each edge of a closed surface, shape (e, 2)."""
     return np.argsort(edge_keys(triangles), kind="stable").reshape(-1, 2)
 
 
 def border_edges(triangles: np.ndarray) -> np.ndarray:
-    """Sides (k, 2) of a piece of surface that no other triangle of the piece shares."""
+    """Return start and end vertex (k, 2) of the sides at the border of a piece of surface.
+
+    No other triangle of the piece shares such a side.
+    """
     sides = sides_of(triangles).astype(np.int64)
     count = int(sides.max()) + 1
     return sides[~np.isin(sides[:, 0] * count + sides[:, 1], sides[:, 1] * count + sides[:, 0])]
 
 
 def sharp_edges(vertices: np.ndarray, triangles: np.ndarray, degrees: float = 30.0) -> np.ndarray:
-    """Ends (k, 2) of the edges of a closed surface at which it turns by more than an angle."""
+    """Return both end vertices (k, 2) of the edges at which a closed surface turns sharply.
+
+    Sharply means by more than an angle in `degrees`.
+    """
     normals, pairs = unit_vectors(area_vectors(vertices, triangles)), side_pairs(triangles)
     one, two = normals[pairs.T // 3]
     is_sharp = np.einsum("ij,ij->i", one, two) < np.cos(np.radians(degrees))
@@ -69,7 +83,7 @@ def sharp_edges(vertices: np.ndarray, triangles: np.ndarray, degrees: float = 30
 
 
 def find_shells(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The connected piece of each triangle (m,), and the volume that each piece encloses [m³]."""
+    """Return the connected piece of each triangle (m,), and the volume in each piece [m³]."""
     a, b = triangles[:, [0, 1]].T.ravel(), triangles[:, [1, 2]].T.ravel()
     _, piece = connected_pieces(a, b, len(vertices))
     shells = np.unique(piece[triangles[:, 0]], return_inverse=True)[1].reshape(-1)
@@ -77,13 +91,16 @@ def find_shells(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray
 
 
 def tetrahedron_volumes(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Signed volumes (m,) [m³] over the mean of all vertices. Their sum is the enclosed volume."""
+    """Return the signed volumes (m,) [m³] between triangles and the mean of all vertices.
+
+    Their sum is the volume that a closed surface encloses.
+    """
     a, b, c = (vertices[triangles[:, k]] - vertices.mean(axis=0) for k in range(3))
     return np.asarray(np.einsum("ij,ij->i", a, np.cross(b, c)) / 6.0)
 
 
 def winding_number(points: np.ndarray, corners: np.ndarray) -> np.ndarray:
-    """Winding number (p,) of a closed surface (m, 3, 3) around each point (p, 3).
+    """Return the winding number (p,) of a closed surface (m, 3, 3) around each point (p, 3).
 
     It is 1 inside and 0 outside: the sum of the triangles' solid angles over 4 pi.
 
@@ -100,7 +117,13 @@ def winding_number(points: np.ndarray, corners: np.ndarray) -> np.ndarray:
 def shell_winding(
     vertices: np.ndarray, triangles: np.ndarray, shells: np.ndarray, outer: int, inner: int
 ) -> float:
-    """Winding number of a shell around another shell: 1 if that is inside, 0 if beside."""
+    """Return the winding number of shell `outer` around shell `inner`.
+
+    It is 1 if the inner shell lies inside the outer shell, and 0 if it lies beside it.
+
+    Args:
+        shells: shell of each triangle, (m,), as `find_shells` returns it.
+    """
     points = vertices[triangles[shells == inner]].mean(axis=1)
     points = points[:: max(1, len(points) // MAX_SAMPLES)]
     return float(np.median(winding_number(points, vertices[triangles[shells == outer]])))
@@ -109,10 +132,12 @@ def shell_winding(
 def find_unwalled_border(
     vertices: np.ndarray, triangles: np.ndarray, face: np.ndarray
 ) -> np.ndarray | None:
-    """A point (3,) at the border of flat triangles beside which the surface does not rise.
+    """Return a point (3,) [m] at the border of a floor where no wall rises beside it.
 
-    Normals point out of the room: a floor's neighbours should rise into the room as walls. The
-    result is None if they rise all round the flat triangles, which `face` (m,) marks.
+    Returns None if walls rise all round. Normals point out of the room.
+
+    Args:
+        face: marks the flat triangles of the floor, (m,).
     """
     sides, pairs = sides_of(triangles), side_pairs(triangles)
     one, two = pairs[face[pairs[:, 0] // 3] != face[pairs[:, 1] // 3]].T
@@ -128,7 +153,7 @@ def find_unwalled_border(
 
 
 def heights(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Smallest height of each triangle, shape (m,) [m]; 0 for a triangle without area."""
+    """Return the smallest height of each triangle, shape (m,) [m]; 0 for one without area."""
     corners = vertices[triangles]
     longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
     twice = 2.0 * areas(vertices, triangles)
@@ -136,20 +161,21 @@ def heights(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 
 
 def areas(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Area of each triangle, shape (m,) [m²]."""
+    """Return the area of each triangle, shape (m,) [m²]."""
     return np.asarray(np.linalg.norm(area_vectors(vertices, triangles), axis=1))
 
 
 def area_vectors(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Unit normal times area of each triangle, shape (m, 3) [m²]."""
+    """Return the unit normal times the area of each triangle, shape (m, 3) [m²]."""
     a, b, c = (vertices[triangles[:, k]] for k in range(3))
     return 0.5 * np.cross(b - a, c - a)
 
 
 def interpolate(values: np.ndarray, corners: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """Interpolate values (p, 3, c) linearly from corners (p, 3, 3) of triangles to places (p, 3).
+    """Return values (p, c) at points (p, 3), interpolated linearly from corners of triangles.
 
-    A place beside the plane of its triangle counts as the nearest place in the plane. A triangle
+    Each point has its own triangle, with corners (p, 3, 3) and values (p, 3, c) at the corners. A
+    point beside the plane of its triangle counts as the nearest point in the plane. A triangle
     without area has the mean of its values.
     """
     a, b, c = corners.swapaxes(0, 1)
@@ -164,25 +190,28 @@ def interpolate(values: np.ndarray, corners: np.ndarray, places: np.ndarray) -> 
 
 
 def unit_normals(corners: np.ndarray) -> np.ndarray:
-    """Unit normals of triangles with corners (..., 3, 3), shape (..., 3); zero without area."""
+    """Return the unit normals (..., 3) of triangles with corners (..., 3, 3).
+
+    The normal is zero for a triangle without area.
+    """
     first = corners[..., 0, :]
     return unit_vectors(np.cross(corners[..., 1, :] - first, corners[..., 2, :] - first))
 
 
 def unit_vectors(vectors: np.ndarray) -> np.ndarray:
-    """Vectors (..., 3) scaled to length 1; a zero vector stays zero."""
+    """Return vectors (..., 3) scaled to length 1. A zero vector stays zero."""
     length = np.linalg.norm(vectors, axis=-1, keepdims=True)
     return np.asarray(np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0.0))
 
 
 def angles_between(one: np.ndarray, two: np.ndarray) -> np.ndarray:
-    """Angles [rad] between unit vectors (..., 3), shape (...)."""
+    """Return the angles [rad] between unit vectors (..., 3), shape (...)."""
     half = 0.5 * np.linalg.norm(one - two, axis=-1)
     return np.asarray(2.0 * np.arcsin(np.clip(half, 0.0, 1.0)))
 
 
 def closest_on_each(corners: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """The point of each triangle (n, 3, 3) closest to the matching point (n, 3), shape (n, 3)."""
+    """Return the point of each triangle (n, 3, 3) closest to its own point (n, 3), (n, 3) [m]."""
     from trimesh.triangles import closest_point
 
     # In mm, because trimesh takes fourth powers of lengths below 1e-13 for zero. In metres this
@@ -191,7 +220,10 @@ def closest_on_each(corners: np.ndarray, points: np.ndarray) -> np.ndarray:
 
 
 def rotation_matrix(degrees: tuple[float, float, float]) -> np.ndarray:
-    """Matrix (3, 3) of rotations about the fixed axes x, y, z in turn; exact for quarter turns."""
+    """Return the matrix (3, 3) of rotations about the fixed axes x, then y, then z.
+
+    It is exact for quarter turns.
+    """
     matrix = np.eye(3)
     for axis, angle in enumerate(degrees):
         quarters, rest = divmod(angle, 90.0)

@@ -1,1 +1,1 @@
-"""Mesh files of parts and set-ups: read them, close their surface, find their groups."""
+"""Read mesh files of parts and set-ups, close their surface, and find their named groups."""

@@ -1,4 +1,6 @@
-"""Reader of Abaqus input files: shells, solids, parts and instances; sets and surfaces as groups.
+"""Read Abaqus input files with shells, solids, parts and instances.
+
+Sets and surfaces of the file become groups of triangles.
 
 The reader never ignores an unsupported keyword that makes or moves nodes or elements. It refuses
 the file and names the keyword.
@@ -50,7 +52,7 @@ _FindRows = Callable[[Iterable[Member]], np.ndarray]
 
 @dataclass
 class _Scope:
-    """The content between *PART and *END PART, or outside of all parts, by the file's numbers."""
+    """Nodes, elements and sets of one *PART of the file, or of all that stands outside of parts."""
 
     nodes: dict[int, list[float]] = field(default_factory=dict)
     elements: dict[int, tuple[str, list[int]]] = field(default_factory=dict)
@@ -64,7 +66,11 @@ class _Instance(NamedTuple):
     lines: list[list[float]]
 
     def place(self, points: np.ndarray) -> np.ndarray:
-        """Move by the first data line, then rotate about the axis a-b of the second, in degrees."""
+        """Return a part's points (n, 3) at the place of this instance.
+
+        The first data line of *INSTANCE moves them. The second then turns them about an axis
+        through two points.
+        """
         if self.lines:
             points = points + np.array((self.lines[0] + [0.0] * 3)[:3])
         if len(self.lines) > 1:
@@ -78,7 +84,10 @@ class _Instance(NamedTuple):
 
 
 def read_abaqus(path: Path, content: bytes) -> RawMesh:
-    """Read the surface of an input file; InputError names the refused keyword and its line."""
+    """Read the surface of an Abaqus input file.
+
+    Raises InputError, which names the line, for a keyword that is not supported or is damaged.
+    """
     scopes, instances, notes = _read_scopes(path, content.decode("utf-8", errors="replace"))
     try:
         placed = [scopes[instance.part] for instance in instances.values()]
@@ -91,7 +100,7 @@ def read_abaqus(path: Path, content: bytes) -> RawMesh:
 
 
 def _keywords(text: str) -> list[tuple[str, Options, list[str], int]]:
-    """Keyword, options, data lines and line number of each block, without comments."""
+    """Return the blocks of a file: keyword, options, data lines and line number of each."""
     blocks: list[tuple[str, Options, list[str], int]] = []
     continued = False
     for number, line in enumerate(text.splitlines(), start=1):
@@ -116,7 +125,10 @@ def _keywords(text: str) -> list[tuple[str, Options, list[str], int]]:
 def _read_scopes(
     path: Path, text: str
 ) -> tuple[dict[str, _Scope], dict[str, _Instance], list[str]]:
-    """Parts by upper-case name ("": outside of parts), instances by name, and notes."""
+    """Return the parts and the instances of a file by upper-case name, and notes for the user.
+
+    What stands outside of parts has the name "".
+    """
     scopes, instances, left_out = {"": _Scope()}, {}, Counter[str]()
     current = ""
     for keyword, options, data, line in _keywords(text):
@@ -196,7 +208,7 @@ def _one(instance: str, number: int | str) -> Member:
 
 
 def _members(options: Options, data: list[str], sets: dict[str, Members]) -> Members:
-    """The members that *ELSET or *NSET lists, generates, or copies from another set."""
+    """Return the members that an *ELSET or *NSET lists, generates, or copies from another set."""
     members: Members = {}
     instance = options.get("INSTANCE", "").upper()
     by_upper = {name.upper(): name for name in sets}
@@ -218,7 +230,7 @@ def _members(options: Options, data: list[str], sets: dict[str, Members]) -> Mem
 def _assemble(
     scopes: dict[str, _Scope], instances: dict[str, _Instance], notes: list[str]
 ) -> ElementMesh:
-    """Join all instances into one mesh; without instances, join everything in the file.
+    """Return one mesh of all instances or, in a file without instances, of everything in it.
 
     Elements keep the file's numbers. If several instances number their own elements, the numbers
     are positions.
@@ -275,7 +287,11 @@ def _assemble(
 
 
 def _add_groups(mesh: ElementMesh, scope: _Scope, elements: _FindRows, nodes: _FindRows) -> None:
-    """Add the sets and surfaces of a scope, with the listed rows of elements and nodes."""
+    """Add the sets and surfaces of a part of the file to the mesh.
+
+    Args:
+        elements, nodes: functions that return the mesh's rows of members of a set.
+    """
     for name, members in scope.element_sets.items():
         mesh.element_sets[name] = np.r_[mesh.element_sets.get(name, NO_ROWS), elements(members)]
     for name, members in scope.node_sets.items():

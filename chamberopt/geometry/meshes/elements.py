@@ -1,4 +1,6 @@
-"""Make triangles of finite elements: shells as they are, the skin of solids, sets as groups.
+"""Make triangles of finite elements: of shells as they are, and of the skin of solids.
+
+Sets of elements, faces or points become groups of triangles.
 
 A quadrilateral with mid-edge nodes becomes six triangles: the corner triangles (0 4 7) (1 5 4)
 (2 6 5) (3 7 6), then the middle 4 5 6 7, cut along its shorter diagonal. If the file leaves out a
@@ -48,9 +50,9 @@ NONE = -1
 
 
 class Block(NamedTuple):
-    """Elements of one kind.
+    """Elements of one kind, such as triangles or tetrahedra.
 
-    Nodes are corners first, then mid-edge nodes (or NONE). Further nodes are ignored.
+    Their nodes are corners first, then mid-edge nodes (or NONE). Further nodes are ignored.
     """
 
     kind: str  # a key of FACES
@@ -59,7 +61,7 @@ class Block(NamedTuple):
 
 @dataclass
 class ElementMesh:
-    """A finite element mesh. Element numbers count through all blocks.
+    """Finite element mesh. Its elements are counted through all blocks.
 
     Sets have a name each: sets of elements (e,), sets of elements with a face of each, and sets of
     points. A triangle is in the group of a node set if all its corners are in the set.
@@ -77,7 +79,7 @@ class ElementMesh:
 
 
 class _Polygons(NamedTuple):
-    """Faces with n corners."""
+    """Faces of elements that all have the same number n of corners."""
 
     corners: np.ndarray  # (k, n) points
     mids: np.ndarray  # (k, n) points in the middle of edges, or NONE
@@ -90,7 +92,10 @@ class _Polygons(NamedTuple):
 
 
 def extract_surface(mesh: ElementMesh) -> RawMesh:
-    """The triangles that bound the elements, in the elements' order, with the sets as groups."""
+    """Return the triangles that bound the elements, in the elements' order.
+
+    The sets of the mesh become groups of triangles.
+    """
     corners, owners, origins, groups, notes = [], [], [], [], list(mesh.notes)
     has_solids = any(block.kind in SOLIDS for block in mesh.blocks)
     for n in (3, 4):
@@ -118,10 +123,10 @@ def extract_surface(mesh: ElementMesh) -> RawMesh:
 
 
 def _origin(mesh: ElementMesh, faces: _Polygons) -> tuple[np.ndarray, np.ndarray]:
-    """Element number (k,) of each face, and number of the face of a solid from 1, or 0 for a shell.
+    """Return the element number (k,) of each face, and the number (k,) of the face in its element.
 
-    If a shell lies on a solid, the shell counts, because the file's author put it there to show
-    results.
+    Faces of solids are numbered from 1 on, and a shell has the number 0. If a shell lies on
+    a solid, the shell counts, because the file's author put it there to show results.
     """
     has_shell = faces.shell != NONE
     is_solid = [np.full(len(block.nodes), block.kind in SOLIDS) for block in mesh.blocks]
@@ -131,7 +136,7 @@ def _origin(mesh: ElementMesh, faces: _Polygons) -> tuple[np.ndarray, np.ndarray
 
 
 def _polygons(mesh: ElementMesh, n: int, kinds: tuple[str, ...]) -> _Polygons:
-    """All faces with n corners of the elements of some kinds."""
+    """Return all faces with n corners of the elements of the given kinds."""
     none = np.zeros(0, dtype=np.int64)
     rows = [(none.reshape(0, n), none.reshape(0, n), none, none, none)]
     first = 0
@@ -146,7 +151,10 @@ def _polygons(mesh: ElementMesh, n: int, kinds: tuple[str, ...]) -> _Polygons:
 
 
 def _mids(block: Block, face: Face) -> np.ndarray:
-    """Points (k, n) in the middle of a face's edges; NONE if an element has no mid-edge node."""
+    """Return the mid-edge nodes (k, n) of a face in each element of a block.
+
+    They are NONE where an element has no mid-edge node.
+    """
     edges = {frozenset(edge): CORNERS[block.kind] + k for k, edge in enumerate(EDGES[block.kind])}
     columns = [edges[frozenset((face[k], face[(k + 1) % len(face)]))] for k in range(len(face))]
     if block.nodes.shape[1] <= max(edges.values()):
@@ -155,7 +163,7 @@ def _mids(block: Block, face: Face) -> np.ndarray:
 
 
 def _skin(faces: _Polygons, points: np.ndarray, blocks: list[Block]) -> _Polygons:
-    """The faces that belong to only one solid, turned to face away from it."""
+    """Return the faces that belong to only one solid, turned to face away from it."""
     keys = np.sort(faces.corners, axis=1)
     _, same, times = np.unique(keys, axis=0, return_inverse=True, return_counts=True)
     faces = faces.select(times[same.reshape(-1)] == 1)
@@ -172,7 +180,7 @@ def _skin(faces: _Polygons, points: np.ndarray, blocks: list[Block]) -> _Polygon
 
 
 def _with_shells(skin: _Polygons, shells: _Polygons) -> tuple[_Polygons, int]:
-    """The skin with the shell elements on it, and the number of shells that are not on the skin."""
+    """Return the skin with the shell on each face noted, and the number of shells not on it."""
     if not len(shells.corners):
         return skin, 0
     keys = np.sort(np.concatenate([skin.corners, shells.corners]), axis=1)
@@ -185,7 +193,10 @@ def _with_shells(skin: _Polygons, shells: _Polygons) -> tuple[_Polygons, int]:
 
 
 def _groups(mesh: ElementMesh, faces: _Polygons) -> dict[str, np.ndarray]:
-    """The faces of each group, (k,) bool, by name. Node and element sets may share a name."""
+    """Return marks (k,) of the faces in each set of the mesh, by the name of the set.
+
+    Sets of nodes, faces and elements that share a name are joined.
+    """
     groups: dict[str, np.ndarray] = {
         name: np.isin(faces.owner, elements) | np.isin(faces.shell, elements)
         for name, elements in mesh.element_sets.items()
@@ -200,7 +211,10 @@ def _groups(mesh: ElementMesh, faces: _Polygons) -> dict[str, np.ndarray]:
 
 
 def _triangulate(faces: _Polygons, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Triangles (t, 3) of points, and the face (t,) of each. Collapsed triangles are left out."""
+    """Divide faces into triangles (t, 3) of points, and return these and the face (t,) of each.
+
+    Triangles with two equal corners are left out.
+    """
     curved = (faces.mids != NONE).any(axis=1)
     plain, bent = np.flatnonzero(~curved), np.flatnonzero(curved)
     pieces = [_split(faces.corners[plain], plain, points)]
@@ -222,7 +236,15 @@ def _triangulate(faces: _Polygons, points: np.ndarray) -> tuple[np.ndarray, np.n
 def _split(
     polygons: np.ndarray, of_face: np.ndarray, points: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Keep triangles, and cut quadrilaterals along the shorter diagonal."""
+    """Cut quadrilaterals into triangles along the shorter diagonal; triangles stay as they are.
+
+    Args:
+        polygons: corners of the polygons, rows of the points, (k, 3) or (k, 4).
+        of_face: face of each polygon, (k,).
+
+    Returns:
+        Triangles (t, 3), and the face (t,) of each.
+    """
     if polygons.shape[1] == 3:
         return polygons, of_face
     a, b, c, d = (points[polygons[:, k]] for k in range(4))

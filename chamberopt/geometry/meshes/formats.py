@@ -1,4 +1,4 @@
-"""The supported mesh formats. A file is recognised by its content, then by its name."""
+"""Find the format of a mesh file, by its content and then by its name, and read the file."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from chamberopt.geometry.meshes.vtk import read_vtk
 
 
 class MeshFormat(NamedTuple):
-    """A mesh format and its reader."""
+    """Mesh format: how its files are recognised, and the function that reads them."""
 
     name: str
     suffixes: tuple[str, ...]  # usual endings of file names
@@ -38,7 +38,7 @@ def _begins_with(pattern: str) -> re.Pattern[bytes]:
 
 
 def _has_line(pattern: str) -> re.Pattern[bytes]:
-    """A pattern that matches a line anywhere in the file that begins with ``pattern``."""
+    """Return a pattern that matches any line of a file that begins with `pattern`."""
     return re.compile(rb"^[ \t]*(?:" + pattern.encode() + rb")", re.M | re.I)
 
 
@@ -60,10 +60,13 @@ BINARY_HEAD = 1 << 10
 
 
 def read_raw_mesh(path: Path, content: bytes, how: Tessellation | None = None) -> RawMesh:
-    """Read a mesh file. `how` applies to CAD faces.
+    """Read the triangles of a mesh file of any supported format.
+
+    Args:
+        how: fineness of the triangles of a STEP file; None for the usual fineness.
 
     Raises:
-        InputError: for an unknown format, a format without CAD faces if `how` is given, or a
+        InputError: for an unknown format, for another format than STEP if `how` is given, or for a
             damaged or truncated file.
     """
     found = _find_format(path, content)
@@ -87,7 +90,7 @@ def read_raw_mesh(path: Path, content: bytes, how: Tessellation | None = None) -
 
 @contextmanager
 def _libraries_quiet() -> Iterator[None]:
-    """Suppress messages of libraries on a damaged file, because the mesh is checked as a whole."""
+    """Suppress messages of libraries during a `with` block, because the mesh is checked later."""
     before = logging.root.manager.disable
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")

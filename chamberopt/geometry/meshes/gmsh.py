@@ -1,7 +1,7 @@
-"""Reader of Gmsh's .msh, versions 2.2 and 4.1, text and binary; physical groups as groups.
+"""Read Gmsh's .msh files of versions 2.2 and 4.1, text and binary.
 
-Both encodings hold the same numbers in the same order, so that one reader serves both. It asks a
-stream for "two int, three double".
+Physical groups of the file become groups of triangles. Text and binary files hold the same numbers
+in the same order, so that one reader serves both. It asks a stream for "two int, three double".
 
 Source: Gmsh reference manual, sections "MSH file format" and "Node ordering".
 """
@@ -47,7 +47,7 @@ PHYSICAL = re.compile(rb"^\s*(\d)\s+(-?\d+)\s+\"([^\"]*)\"", re.M)
 
 
 class _Stream:
-    """The numbers of one section, as text or as bytes."""
+    """Numbers of one section of a file, stored as text or as bytes, and taken one after another."""
 
     def __init__(self, path: Path, section: bytes, text: bool, order: str) -> None:
         self.path, self.text, self.order, self.at = path, text, order, 0
@@ -67,14 +67,14 @@ class _Stream:
         return int(self.sizes(1)[0])
 
     def text_size(self) -> int:
-        """Read a count that is text even in binary files."""
+        """Return the next number, a count that is text even in binary files."""
         if self.text:
             return self.one_size()
         line, _, self.bytes = self.bytes.partition(b"\n")
         return int(line)
 
     def numbered_points(self, count: int) -> tuple[np.ndarray, np.ndarray]:
-        """Read an int and three doubles `count` times: numbers (count,) and points (count, 3)."""
+        """Return the next `count` nodes: their numbers (count,) and points (count, 3)."""
         if self.text:
             rows = self.reals(4 * count).reshape(count, 4)
             return rows[:, 0].astype(np.int64), rows[:, 1:]
@@ -97,7 +97,7 @@ class _Stream:
 
 
 class _GmshMesh(NamedTuple):
-    """Nodes and elements by Gmsh's numbers."""
+    """Nodes and elements of a file, with the numbers that Gmsh gave them."""
 
     numbers: list[np.ndarray]
     points: list[np.ndarray]
@@ -106,7 +106,10 @@ class _GmshMesh(NamedTuple):
 
 
 def read_gmsh(path: Path, content: bytes) -> RawMesh:
-    """Read the surface of a .msh; InputError for other versions and unsupported elements."""
+    """Read the surface of a Gmsh .msh file.
+
+    Raises InputError for other versions of the format and for elements that are not supported.
+    """
     found = re.match(
         rb"\s*\$MeshFormat\s+([\d.]+)\s+([01])\s+(\d+)[ \t]*\r?\n?(.{0,4})", content, re.S
     )
@@ -200,7 +203,13 @@ def _node_count(path: Path, kind: int) -> int:
 
 
 def _element_mesh(path: Path, mesh: _GmshMesh, name_of: dict[tuple[int, int], str]) -> ElementMesh:
-    """The elements with a surface, and the elements of each physical group. Group 0 means none."""
+    """Return the elements with a surface, with each physical group as a set of elements.
+
+    The group number 0 means no group.
+
+    Args:
+        name_of: name of each group by its dimension and number.
+    """
     numbers = np.concatenate([np.zeros(0, dtype=np.int64), *mesh.numbers])
     points = np.concatenate([np.zeros((0, 3)), *(point.reshape(-1, 3) for point in mesh.points)])
     by_number = np.argsort(numbers, kind="stable")
@@ -227,7 +236,7 @@ def _element_mesh(path: Path, mesh: _GmshMesh, name_of: dict[tuple[int, int], st
 
 
 def _reorder(kind: str, nodes: np.ndarray) -> np.ndarray:
-    """Order the mid-edge nodes as in `elements.EDGES`."""
+    """Return the nodes of elements with mid-edge nodes in the order of EDGES instead of Gmsh's."""
     corners = CORNERS[kind]
     if kind not in MIDS or nodes.shape[1] == corners:
         return nodes

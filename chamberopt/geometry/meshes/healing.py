@@ -1,4 +1,4 @@
-"""Repair of loose triangles to one closed surface that faces outward.
+"""Join loose triangles to one closed surface that faces outward, and repair small faults.
 
 Each change gives a note for the user. Faults that need a guess are refused.
 """
@@ -39,7 +39,9 @@ MAX_RIM_EDGES = 64  # the time for a rim grows with the cube of its edges
 def close_holes(
     points: np.ndarray, triangles: np.ndarray, open_edges: np.ndarray, tolerance: float
 ) -> tuple[np.ndarray, list[str]]:
-    """Triangles (k, 3) that close the small holes and face as their neighbours do; and notes.
+    """Return new triangles (k, 3) that close small holes and cracks, and notes for the user.
+
+    The triangles face as their neighbours do.
 
     Args:
         open_edges: edges (j, 2) that belong to only one triangle.
@@ -71,14 +73,14 @@ def close_holes(
 
 
 def count_holes(edges: np.ndarray) -> int:
-    """Number of connected pieces of open edges (k, 2)."""
+    """Return the number of holes: of connected pieces of the open edges (k, 2)."""
     ends, numbers = np.unique(edges, return_inverse=True)
     a, b = numbers.reshape(-1, 2).T
     return connected_pieces(a, b, len(ends))[0]
 
 
 def _simple_rims(triangles: np.ndarray, edges: np.ndarray) -> list[list[int]]:
-    """Closed loops of open edges, each in the direction that new triangles need.
+    """Return the rims of holes: closed loops of points, in the direction that new triangles need.
 
     This direction is opposite to the side of the triangle beside the first edge. Holes that touch
     in a corner are left out.
@@ -105,7 +107,11 @@ def _simple_rims(triangles: np.ndarray, edges: np.ndarray) -> list[list[int]]:
 
 
 def _least_area_patch(corners: np.ndarray) -> tuple[float, list[tuple[int, int, int]]]:
-    """Least area [m²] that closes a rim with corners (n, 3) [m], and its triangles."""
+    """Return the least area [m²] that closes a hole, and the triangles that have this area.
+
+    Args:
+        corners: corners of the hole's rim in order, (n, 3) [m].
+    """
     n = len(corners)
     # least[i, j]: least area over the part of the rim from i to j. apex[i, j]: third corner of the
     # triangle at the side from i to j.
@@ -134,7 +140,7 @@ WELD = 1e-6  # share of the bounding box's diagonal: rounding of a text format w
 
 
 class SewnSurface(NamedTuple):
-    """Triangles with common vertices."""
+    """Triangles that share vertices, and what was changed to join them."""
 
     points: np.ndarray  # (n, 3) [m]
     triangles: np.ndarray  # (k, 3), rows of the points
@@ -143,7 +149,13 @@ class SewnSurface(NamedTuple):
 
 
 def sew_bodies(path: Path, corners: np.ndarray, bodies: np.ndarray) -> SewnSurface:
-    """Sew triangles (m, 3, 3) [m] body by body (m,). Bodies that touch keep their own vertices."""
+    """Join triangles (m, 3, 3) [m] into a closed surface for each body.
+
+    Bodies that touch keep their own vertices.
+
+    Args:
+        bodies: number of the body of each triangle, (m,).
+    """
     rows = [np.flatnonzero(bodies == body) for body in np.unique(bodies)]
     sewn = [sew(path, corners[own]) for own in rows]
     first = np.cumsum([0, *(len(one.points) for one in sewn)])
@@ -161,7 +173,10 @@ def sew_bodies(path: Path, corners: np.ndarray, bodies: np.ndarray) -> SewnSurfa
 
 
 def sew(path: Path, corners: np.ndarray) -> SewnSurface:
-    """Join triangles (m, 3, 3) [m] into a surface with two at each edge, or raise SurfaceError."""
+    """Join triangles (m, 3, 3) [m] into a surface with two triangles at each edge.
+
+    Raises SurfaceError if that is not possible.
+    """
     first, numbers = unique_rows(corners.reshape(-1, 3))
     surface = _drop_useless(
         corners.reshape(-1, 3)[first], numbers.reshape(-1, 3), np.arange(len(corners))
@@ -212,7 +227,10 @@ def _require_closed(path: Path, points: np.ndarray, triangles: np.ndarray) -> No
 
 
 def _drop_useless(points: np.ndarray, triangles: np.ndarray, source: np.ndarray) -> SewnSurface:
-    """Drop triangles with two corners in one place, and second copies. The order stays."""
+    """Return the surface without triangles that have two equal corners, or that come twice.
+
+    The other triangles keep their order.
+    """
     notes = []
     flat = (triangles == np.roll(triangles, 1, axis=1)).any(axis=1)
     if flat.any():
@@ -230,10 +248,11 @@ def _drop_useless(points: np.ndarray, triangles: np.ndarray, source: np.ndarray)
 
 
 def _drop_strays(surface: SewnSurface) -> SewnSurface:
-    """Drop stray facets: loose facets, and facets that hang by an edge that is closed without them.
+    """Return the surface without stray facets.
 
-    Stray facets form pieces, joined where exactly two triangles meet, that have at least as many
-    open edges as triangles. A body with a hole has few open edges.
+    They are loose, or hang by an edge that is closed without them. Stray facets form pieces,
+    joined where exactly two triangles meet, that have at least as many open edges as triangles. A
+    body with a hole has few open edges.
     """
     points, triangles = surface.points, surface.triangles
     _, edge, times = np.unique(edge_keys(triangles), return_inverse=True, return_counts=True)
@@ -257,9 +276,10 @@ def _drop_strays(surface: SewnSurface) -> SewnSurface:
 
 
 def _weld(points: np.ndarray, tolerance: float) -> tuple[np.ndarray, np.ndarray]:
-    """Merge points within a tolerance [m].
+    """Merge points (n, 3) that are closer than a tolerance [m].
 
-    Returns: the remaining points, and the number of each given point among them.
+    Returns:
+        The remaining points, and the index among them of each given point, (n,).
     """
     from scipy.spatial import cKDTree
 
@@ -270,7 +290,10 @@ def _weld(points: np.ndarray, tolerance: float) -> tuple[np.ndarray, np.ndarray]
 
 
 def _edges(triangles: np.ndarray, count: int) -> np.ndarray:
-    """Edges (k, 2) that belong to one triangle (count=1), or to at least three (count=3)."""
+    """Return the edges (k, 2) that belong to one triangle if `count` is 1.
+
+    If `count` is 3, return the edges that belong to at least three triangles.
+    """
     keys, times = np.unique(edge_keys(triangles), return_counts=True)
     chosen = keys[times == 1] if count == 1 else keys[times >= count]
     return np.stack(np.divmod(chosen, int(triangles.max()) + 1), axis=1)
@@ -279,7 +302,10 @@ def _edges(triangles: np.ndarray, count: int) -> np.ndarray:
 def turn_outward(
     path: Path, vertices: np.ndarray, triangles: np.ndarray
 ) -> tuple[np.ndarray, list[str]]:
-    """Turn triangles (m, 3) so that neighbours agree and volumes are positive; and notes."""
+    """Return the triangles (m, 3) of a closed surface, turned to face outward, and notes.
+
+    Raises InputError if the surface is one-sided, or if a piece of it encloses no volume.
+    """
     notes = []
     wrong = _against_neighbours(path, triangles)
     if wrong.any():
@@ -299,7 +325,9 @@ def turn_outward(
 
 
 def _against_neighbours(path: Path, triangles: np.ndarray) -> np.ndarray:
-    """Triangles (m,) to turn so that neighbours agree, the fewest of each piece of the surface.
+    """Return marks (m,) of the triangles to turn over, so that neighbours face the same way.
+
+    Of each connected piece of the surface, the fewest possible triangles are marked.
 
     In a graph each triangle has two nodes, one as it is and one turned. Nodes that agree across an
     edge are linked. A piece of the surface then falls into two halves, each the other's mirror

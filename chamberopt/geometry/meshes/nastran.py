@@ -1,8 +1,9 @@
-"""Reader of Nastran bulk data (CATIA V5, Patran, HyperMesh ...); properties and sets as groups.
+"""Read Nastran bulk data (from CATIA V5, Patran, HyperMesh ...).
 
-The reader never ignores an unsupported geometry card. It refuses the file and names the card.
-Fields come in the small format (8 columns), the large format (16 columns, name with *) and the free
-format (commas).
+Properties and sets of the file become groups of triangles. The reader never ignores an
+unsupported geometry card (an entry of the file). It refuses the file and names the card. Fields
+come in the small format (8 columns), the large format (16 columns, name with *) and the free format
+(commas).
 
 Source: MSC Nastran Quick Reference Guide.
 """
@@ -54,7 +55,10 @@ Card = tuple[str, list[str], int]
 
 
 def read_nastran(path: Path, content: bytes) -> RawMesh:
-    """Read the surface of bulk data; InputError names the refused card and its line."""
+    """Read the surface of Nastran bulk data.
+
+    Raises InputError, which names the line, for a card that is not supported or is damaged.
+    """
     text = content.decode("latin-1")
     cards: dict[str, list[Card]] = defaultdict(list)
     left_out: Counter[str] = Counter()
@@ -79,7 +83,7 @@ def read_nastran(path: Path, content: bytes) -> RawMesh:
 
 
 def _cards(text: str) -> list[Card]:
-    """Name, further fields and line number of each card. Continuation lines are joined."""
+    """Return the name, further fields and line number of each card, continuation lines joined."""
     lines = text.splitlines()
     starts = (k + 1 for k, line in enumerate(lines) if re.match(r"\s*BEGIN\s+BULK", line, re.I))
     start = next(starts, 0)
@@ -99,7 +103,7 @@ def _cards(text: str) -> list[Card]:
 
 
 def _fields(line: str) -> tuple[str, list[str]]:
-    """The first field of a line, without the large format's *, and the values after it."""
+    """Return the first field of a line, without the large format's *, and the fields after it."""
     if "," in line:
         head, *values = (value.strip() for value in line.split(","))
         count = 4 if "*" in head else 8
@@ -112,7 +116,10 @@ def _fields(line: str) -> tuple[str, list[str]]:
 
 
 def _number(text: str, line: int, what: str) -> float:
-    """Value of 1.5, 1.5E-3, 1.5D-3 or Nastran's 1.5-3; blank means 0."""
+    """Return the value of a number such as 1.5, 1.5E-3, 1.5D-3 or Nastran's 1.5-3.
+
+    A blank means 0. `line` and `what` are line number and meaning of the number in messages.
+    """
     if not text:
         return 0.0
     found = NUMBER.match(text.upper())
@@ -128,7 +135,10 @@ def _whole(text: str, line: int, what: str) -> int:
 
 
 def _points(cards: dict[str, list[Card]]) -> tuple[np.ndarray, dict[int, int]]:
-    """Points (n, 3) in the basic coordinate system, and the row of each grid number."""
+    """Return the points (n, 3) of all GRID cards, and the row of each by its GRID number.
+
+    The points are in Nastran's basic coordinate system.
+    """
     systems = {
         _whole(fields[0], line, f"{name}'s number"): (name, fields, line)
         for system in SYSTEMS
@@ -154,10 +164,15 @@ def _points(cards: dict[str, list[Card]]) -> tuple[np.ndarray, dict[int, int]]:
 def _to_basic(
     systems: dict[int, Card], number: int, points: np.ndarray, above: tuple[int, ...] = ()
 ) -> np.ndarray:
-    """Transform points (n, 3) from a system CORD2R, CORD2C or CORD2S to the basic system.
+    """Return points (n, 3) of a coordinate system in the basic coordinate system.
 
-    A card gives the origin A, a point B on the z axis and a point C in the xz plane, perhaps in
-    another system. ``above``: numbers of the systems that refer to this system.
+    A card CORD2R, CORD2C or CORD2S gives the origin A, a point B on the z axis and a point C in
+    the xz plane, perhaps in another system.
+
+    Args:
+        systems: cards by the number of their system.
+        number: number of the system.
+        above: numbers of the systems that refer to this system.
     """
     if number == 0:
         return points
@@ -183,7 +198,13 @@ def _to_basic(
 def _add_blocks(
     mesh: ElementMesh, cards: dict[str, list[Card]], row_of: dict[int, int]
 ) -> np.ndarray:
-    """Add blocks of elements, in the file's order within each card; return properties (e,)."""
+    """Add the elements of all cards to the mesh, and return the property number (e,) of each.
+
+    Elements from cards of one name keep the file's order.
+
+    Args:
+        row_of: row of each point by its GRID number.
+    """
     numbers: list[int] = []
     properties: list[int] = []
     for card, kind in KINDS.items():
@@ -210,7 +231,7 @@ def _add_blocks(
 
 
 def _add_groups(mesh: ElementMesh, properties: np.ndarray, text: str) -> None:
-    """Add a group for each property, by number and name, and for each set."""
+    """Add a set of elements to the mesh for each property, by number and name, and each SET."""
     names = _property_names(text)
     for number in np.unique(properties).tolist():
         members = np.flatnonzero(properties == number)
@@ -225,7 +246,7 @@ def _add_groups(mesh: ElementMesh, properties: np.ndarray, text: str) -> None:
 
 
 def _property_names(text: str) -> dict[int, str]:
-    """Names of properties from the comments of HyperMesh, ANSA, Patran and Femap."""
+    """Return the names of properties by number, from comments of HyperMesh, ANSA, Patran, Femap."""
     names = {}
     for pattern in (
         r"^\$HMNAME (?:PROP|COMP)\s+(?P<number>\d+)\s*\"(?P<name>[^\"]+)\"",
@@ -240,7 +261,7 @@ def _property_names(text: str) -> dict[int, str]:
 
 
 def _sets(text: str) -> dict[int, list[tuple[int, int]]]:
-    """First and last elements of the case control's sets, such as SET 4 = 1, 2, 10 THRU 20."""
+    """Return the ranges of elements, first and last, of each set such as SET 4 = 1, 10 THRU 20."""
     sets = {}
     for found in re.finditer(r"^\s*SET\s+(\d+)\s*=((?:[^\n,]*,\s*\n?)*[^\n]*)", text, re.M | re.I):
         ranges = re.findall(r"(\d+)(?:\s+THRU\s+(\d+))?", found[2], re.I)

@@ -1,7 +1,8 @@
-"""Read files with libraries in C++, in a child: a damaged file can end the process that reads it.
+"""Read files with libraries in C++, in a child process.
 
-A damaged file can also keep a library busy for ever, so the child's memory and computing time are
-limited. Computing time does not count how long other programs use the processor.
+A damaged file can end the process that reads it, and so ends only the child. It can also keep a
+library busy for ever, so the child's memory and computing time are limited. Computing time does not
+count how long other programs use the processor.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ WALL_CLOCK_S = 1800.0  # limit for a child that waits, and where computing time 
 
 
 class NativeReader(NamedTuple):
-    """How a format is read in a child.
+    """Function that reads files of a format in a child process, with its limits.
 
     Attributes:
         read: function of the path of a file and further arguments, called in the child.
@@ -43,7 +44,7 @@ class NativeReader(NamedTuple):
 
 
 def read_in_child(reader: NativeReader, path: Path, content: bytes, *arguments: object) -> Any:
-    """Read a file's content in a child, and return the value of `reader.read`.
+    """Read a file's content in a child process, and return what `reader.read` returns.
 
     Args:
         path: file of the content, for messages.
@@ -79,14 +80,17 @@ def _too_long(seconds: float, content: bytes) -> str:
 
 
 def _read_limited(seconds: float, read: Callable[..., Any], given: Path, *arguments: Any) -> Any:
-    """Limit the memory and computing time of this child, and read a file."""
+    """Limit the memory and computing time of this child process, and return what `read` returns."""
     limit_memory()
     limit_cpu_time(seconds)
     return read(given, *arguments)
 
 
 def given_seconds() -> float:
-    """Computing time [s] that the user allows a reader by VARIABLE; 0 if it is not set."""
+    """Return the computing time [s] that the user allows a reader; 0 if the user does not say.
+
+    The user says it by the environment variable CHAMBEROPT_READER_S.
+    """
     text = os.environ.get(VARIABLE, "")
     try:
         seconds = float(text or "0")
@@ -98,6 +102,6 @@ def given_seconds() -> float:
 
 
 def allow_more(seconds: float) -> None:
-    """Allow this child more computing time [s], unless the user has set the time by VARIABLE."""
+    """Allow this child process more computing time [s], unless the user has set a time."""
     if not given_seconds():
         raise_cpu_time(seconds)

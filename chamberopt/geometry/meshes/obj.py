@@ -1,4 +1,4 @@
-"""Reader of Wavefront OBJ files."""
+"""Read Wavefront OBJ files."""
 
 from __future__ import annotations
 
@@ -11,7 +11,10 @@ from chamberopt.geometry.meshes.raw_mesh import ElementNumbers, RawMesh
 
 
 def read_obj(path: Path, content: bytes) -> RawMesh:
-    """Read an OBJ file; o, g and usemtl give names. Faces with more corners become fans."""
+    """Read an OBJ file. Its objects (o), groups (g) and materials (usemtl) become groups.
+
+    Faces with more than three corners become fans of triangles.
+    """
     points: list[list[float]] = []
     directions: list[list[float]] = [[0.0, 0.0, 0.0]]  # the first row stands for no direction
     # rows of directions at the corners of the triangles
@@ -64,7 +67,11 @@ def read_obj(path: Path, content: bytes) -> RawMesh:
 
 
 def _direction(word: str, count: int) -> int:
-    """Row of the normal that a corner such as 3/1/2 names, of ``count`` rows; 0 for none."""
+    """Return the row of the normal that a corner such as 3/1/2 names, or 0 if it names none.
+
+    Args:
+        count: number of rows so far, from which negative numbers count backwards.
+    """
     parts = word.split("/")
     number = int(parts[2]) if len(parts) > 2 and parts[2] else 0
     return number if number >= 0 else max(count + number, 0)

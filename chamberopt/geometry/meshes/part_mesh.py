@@ -1,4 +1,4 @@
-"""Reader of part meshes: one closed surface in metres with outward normals.
+"""Read a part from a mesh file: one closed surface in metres with outward normals.
 
 A file passes through these steps:
     formats: recognise the format and read its triangles;
@@ -38,7 +38,7 @@ MEANT = 0.5  # cosine between a facet and a stated normal, below which the norma
 
 @dataclass(frozen=True, eq=False)  # a mesh that was read once is recognised by its identity
 class PartMesh:
-    """A closed part in the coordinates of its file."""
+    """Closed surface of a part, in metres along the axes of its file."""
 
     vertices: np.ndarray  # (n, 3) float64 [m]
     triangles: np.ndarray  # (m, 3) int32, in the file's order; normals point outward
@@ -65,7 +65,7 @@ class PartMesh:
 
 @dataclass(frozen=True)
 class TriangleSoup:
-    """The triangles of a file in metres, before they become a closed surface."""
+    """Loose triangles of a file in metres, before they become a closed surface."""
 
     path: Path
     corners: np.ndarray  # (m, 3, 3) [m], in the coordinates of the file
@@ -80,9 +80,10 @@ class TriangleSoup:
 
 
 def read_part(path: Path, unit: str = "guess", how: Tessellation | None = None) -> PartMesh:
-    """Read a part whose numbers are in um, mm, cm, m or in, or guess the unit.
+    """Read a part from a mesh file, as one closed surface in metres.
 
     Args:
+        unit: unit of the file's numbers: um, mm, cm, m, in, or "guess" if it is not known.
         how: fineness of the triangles of a STEP file.
 
     Raises:
@@ -99,7 +100,10 @@ def read_part(path: Path, unit: str = "guess", how: Tessellation | None = None) 
 
 
 def read_part_cached(path: Path, unit: str = "guess", how: Tessellation | None = None) -> PartMesh:
-    """Read a part only if its file has changed, because a study builds many chambers."""
+    """Return a part from a mesh file, read only if the file has changed since the last call.
+
+    Args and errors are those of `read_part`. A study builds many chambers with the same part.
+    """
     try:
         stamp = path.stat()
     except OSError:
@@ -117,7 +121,16 @@ def _read_part_cached(
 def read_triangles(
     path: Path, unit: str = "guess", how: Tessellation | None = None
 ) -> TriangleSoup:
-    """Read a mesh file without making a closed surface; raises InputError as read_part does."""
+    """Read the triangles of a mesh file in metres, without making a closed surface of them.
+
+    Args:
+        unit: unit of the file's numbers: um, mm, cm, m, in, or "guess" if it is not known.
+        how: fineness of the triangles of a STEP file.
+
+    Raises:
+        InputError: for a file that is missing, empty, truncated or not finite, and for a size that
+            no part has.
+    """
     content = _read_content(path)
     raw = read_raw_mesh(path, content, how)
     corners = raw.corners
@@ -144,7 +157,7 @@ def close_surface(soup: TriangleSoup, only: np.ndarray | None = None) -> PartMes
     """Make one closed surface of all triangles, or of the triangles marked by `only` (m,).
 
     Raises:
-        SurfaceError: with the place where the surface is open, not manifold or crosses itself.
+        SurfaceError: if the surface is open, not manifold or crosses itself; it names the place.
     """
     path = soup.path
     chosen = np.arange(len(soup.corners)) if only is None else np.flatnonzero(only)
@@ -168,9 +181,14 @@ def close_surface(soup: TriangleSoup, only: np.ndarray | None = None) -> PartMes
 
 
 def _normals_at(soup: TriangleSoup, corners: np.ndarray, given: np.ndarray) -> np.ndarray | None:
-    """Normals at the corners (k, 3, 3) of triangles, from the file's triangles `given` (k,).
+    """Return the normals at the corners (k, 3, 3) of triangles, as the file states them, or None.
 
-    A corner without a plausible normal in the file has the normal of its facet.
+    None means that the file states no normals.
+
+    A corner without a plausible normal in the file has the normal of its triangle.
+
+    Args:
+        given: the file's triangle from which each triangle comes, -1 for a new triangle, (k,).
     """
     if soup.normals is None:
         return None
@@ -188,7 +206,7 @@ def _normals_at(soup: TriangleSoup, corners: np.ndarray, given: np.ndarray) -> n
 def select_triangles(
     groups: Mapping[str, np.ndarray], names: Iterable[str], count: int, field: str
 ) -> np.ndarray:
-    """Mark the triangles (count,) of the named groups; "all" means every triangle.
+    """Return marks (count,) of the triangles in the named groups. "all" means every triangle.
 
     Case matters only between names of the file that differ in nothing else.
 
@@ -213,7 +231,10 @@ def select_triangles(
 
 
 def _read_content(path: Path) -> bytes:
-    """The bytes of a file that exists, can be read and is not empty."""
+    """Return the content of a mesh file.
+
+    Raises InputError if the file is missing, a folder, empty or too large.
+    """
     if path.is_dir():
         raise InputError(f"{path}: is a folder; give a mesh file")
     try:

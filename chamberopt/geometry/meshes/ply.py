@@ -1,4 +1,4 @@
-"""Reader of PLY files, text and binary, with trimesh; colours give names."""
+"""Read PLY files, text and binary, with trimesh. Colours become groups of triangles."""
 
 from __future__ import annotations
 
@@ -16,7 +16,10 @@ MAX_COLOURS = 64  # more colours are a photograph on the part, not names of grou
 
 
 def read_ply(path: Path, content: bytes) -> RawMesh:
-    """Read a PLY file. Triangles of one colour, by face or corners, are named "#rrggbb"."""
+    """Read a PLY file. Triangles of one colour become a group with the name "#rrggbb".
+
+    A triangle has the colour of its face or, if they are alike, of its corners.
+    """
     import trimesh
 
     _require_all_lines(path, content)
@@ -54,7 +57,10 @@ def _require_all_lines(path: Path, content: bytes) -> None:
 
 
 def _triangle_colours(mesh: Any) -> np.ndarray | None:
-    """Red, green, blue of each triangle, (m, 3); -1 if its corners differ. None without colours."""
+    """Return red, green and blue of each triangle, (m, 3), or None if the file has no colours.
+
+    The values are -1 for a triangle whose corners differ in colour.
+    """
     if mesh.visual.kind == "face":
         return np.asarray(mesh.visual.face_colors)[:, :3].astype(np.int64)
     if mesh.visual.kind == "vertex":

@@ -1,4 +1,4 @@
-"""Result of each reader: triangles as in the file, with element numbers and group names."""
+"""Define what each mesh reader returns: a file's triangles, element numbers and groups."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 
 @dataclass(frozen=True)
 class ElementNumbers:
-    """The file's element of each of m triangles. Results can be exported by element.
+    """Numbers of the file's elements to which m triangles belong, for export by element.
 
     The triangles of a quadrilateral share a number. If the file does not number its elements (`own`
     is false), the number is the position from 1 of the triangle, polygon (OBJ) or cell (VTK).
@@ -24,7 +24,12 @@ class ElementNumbers:
     instance: str = ""  # Abaqus instance in which the numbers count, if any
 
     def select(self, rows: np.ndarray) -> ElementNumbers:
-        """Numbers of triangles, by a mask (m,) or by indices. Index -1: not in the file."""
+        """Return the numbers of some triangles.
+
+        Args:
+            rows: marks (m,) of the triangles, or their indices, -1 for a triangle that is not in
+                the file.
+        """
         if rows.dtype == bool:
             rows = np.flatnonzero(rows)
         elements, faces = (
@@ -34,13 +39,13 @@ class ElementNumbers:
 
 
 def number_by_position(count: int) -> ElementNumbers:
-    """Numbers for a file that has none: its triangles from 1 on."""
+    """Return the numbers for a file without element numbers: its triangles from 1 on."""
     return ElementNumbers(np.arange(1, count + 1), np.zeros(count, dtype=np.int8))
 
 
 @dataclass(frozen=True)
 class RawMesh:
-    """The triangles of a file, before they are checked.
+    """Triangles of a mesh file as they were read, before they are checked.
 
     Groups are the file's sets, groups, properties or colours: triangles (m,) bool by name.
     """
@@ -57,7 +62,10 @@ class RawMesh:
 
 
 def read_scene(file: BinaryIO | Path, kind: str) -> RawMesh:
-    """Read a file of a kind ("stl", "3mf", "glb") with trimesh. Meshes of one name are a group."""
+    """Read a file of the kind "stl", "3mf" or "glb" with trimesh.
+
+    The triangles of all meshes with one name become a group.
+    """
     import trimesh
 
     scene = trimesh.load_scene(file, file_type=kind, process=False)

@@ -1,5 +1,6 @@
-"""Check for surfaces that cross themselves: cutting such a part out of a chamber fails silently.
+"""Find triangles of a closed surface that cross each other.
 
+A part whose surface crosses itself cannot be cut out of a chamber, and the attempt gives no error.
 Candidate pairs come from a tree of boxes over the triangles, in the order of a k-d tree. The tree
 is compared with itself level by level. Each pair is then tested exactly.
 
@@ -22,7 +23,7 @@ TOUCH = 1e-6
 
 
 def refuse_self_intersection(path: Path, vertices: np.ndarray, triangles: np.ndarray) -> None:
-    """Raise SurfaceError with the place if a body's closed surface crosses itself.
+    """Raise SurfaceError, which names the place, if a body's closed surface crosses itself.
 
     Several bodies may overlap: they are united where the chamber is made.
     """
@@ -43,7 +44,7 @@ def refuse_self_intersection(path: Path, vertices: np.ndarray, triangles: np.nda
 
 
 def crossing_pairs(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Pairs (2, k) of triangles (m, 3) that cross each other and belong to one closed body."""
+    """Return the pairs (2, k) of triangles of one closed body that cross each other."""
     corners = vertices[triangles]
     touch = TOUCH * float(np.linalg.norm(np.ptp(vertices, axis=0)))
     shells, _ = find_shells(vertices, triangles)
@@ -58,7 +59,10 @@ def crossing_pairs(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 
 
 def _close_pairs(corners: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Pairs of triangles (m, 3, 3) whose boxes overlap, each pair once, in chunks."""
+    """Yield the pairs of triangles (m, 3, 3) whose bounding boxes overlap, each pair once.
+
+    Each item holds the first and the second triangles of many pairs.
+    """
     from scipy.spatial import cKDTree
 
     # this order keeps neighbours together
@@ -99,7 +103,7 @@ def _close_pairs(corners: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]
 def _crossing(
     corners: np.ndarray, a: np.ndarray, b: np.ndarray, touch: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The pairs of triangles a, b (k,) that pass through each other by more than `touch` [m]."""
+    """Return those pairs of triangles a, b (k,) that cross each other by more than `touch` [m]."""
     for _ in range(2):  # each triangle must have corners on both sides of the other's plane
         distance = _distances(corners[a], corners[b])
         through = (distance.min(axis=1) < -touch) & (distance.max(axis=1) > touch)
@@ -116,14 +120,26 @@ def _crossing(
 
 
 def _distances(corners: np.ndarray, planes: np.ndarray) -> np.ndarray:
-    """Distances (k, 3) of triangles' corners from the planes of other triangles, both (k, 3, 3)."""
+    """Return the distances (k, 3) [m] of triangles' corners from the planes of other triangles.
+
+    Args:
+        corners, planes: corners of the triangles, and of the other triangles, (k, 3, 3) each.
+    """
     return np.asarray(np.einsum("kij,kj->ki", corners - planes[:, :1], unit_normals(planes)))
 
 
 def _interval(
     corners: np.ndarray, distance: np.ndarray, along: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """First and last position (k,) of triangles on the line where they cross the other planes."""
+    """Return where triangles begin and end on the lines in which they cross other planes.
+
+    Both are positions along the lines [m], (k,).
+
+    Args:
+        corners: corners of the triangles [m], (k, 3, 3).
+        distance: distances of the corners from the other planes [m], (k, 3).
+        along: unit vectors of the lines, (k, 3).
+    """
     positions = []
     for i, j in ((0, 1), (1, 2), (2, 0)):
         through = distance[:, i] * distance[:, j] < 0.0

@@ -1,4 +1,4 @@
-"""Reader of STEP parts and assemblies, in the file's unit; names and colours are groups."""
+"""Read STEP parts and assemblies, in the file's unit. Names and colours become groups."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ NO_NAMES = ("", "NONE")
 
 
 class StepFace(NamedTuple):
-    """A face of a solid."""
+    """Face of a solid, as the text of a STEP file describes it."""
 
     name: str  # "" if the face has no name
     # mean of its corners, (3,), in the file's numbers; nan for a face without corners
@@ -66,7 +66,7 @@ class StepFace(NamedTuple):
 
 
 def stated_unit(text: str) -> str | None:
-    """Unit of the lengths of a STEP file, as in part.unit; None if it is another unit."""
+    """Return the unit of the lengths of a STEP file: m, mm, cm, um, in, or None for another."""
     assigned = UNIT_ASSIGNED.search(text)
     for number in REFERENCE.findall(assigned[1]) if assigned else ():
         entity = re.search(rf"#{number}\s*=([^;]*);", text)
@@ -79,17 +79,17 @@ def stated_unit(text: str) -> str | None:
 
 
 def read_solids(text: str) -> list[list[StepFace]]:
-    """The faces of each solid, in the order of its shells."""
+    """Return the faces of each solid in the text of a STEP file, in the file's order."""
     entities = {number: (kind, value) for number, kind, value in ENTITY.findall(text)}
 
     def linked(number: str, kinds: tuple[str, ...]) -> list[str]:
-        """Entities of these kinds to which an entity refers."""
+        """Return the numbers of the entities of some kinds to which an entity refers."""
         found = REFERENCE.findall(STRING.sub("", entities[number][1]))
         return [one for one in found if one in entities and entities[one][0] in kinds]
 
     @cache
     def corners(number: str) -> frozenset[str]:
-        """The points at the ends of a face's edges."""
+        """Return the numbers of the points at the ends of a face's edges."""
         kind = entities[number][0]
         if kind == "CARTESIAN_POINT":
             return frozenset([number])
@@ -117,13 +117,16 @@ def read_solids(text: str) -> list[list[StepFace]]:
 
 
 def _decoded(text: str) -> str:
-    """A string of ISO 10303-21 as text; "" for a placeholder of a missing name."""
+    """Return a name from a STEP file with its escape sequences decoded.
+
+    A placeholder that CAD programs write for a missing name gives "".
+    """
     text = ESCAPE.sub(_character, text.translate(IGNORED)).strip()
     return "" if text.upper() in NO_NAMES else text
 
 
 def _character(escape: re.Match[str]) -> str:
-    """The character of an escape sequence. Half a character becomes U+FFFD."""
+    """Return the characters that an escape sequence stands for. Half a character becomes U+FFFD."""
     kind = str(escape.lastgroup)
     given = escape[kind]
     if kind in ("utf16", "utf32"):
@@ -201,15 +204,17 @@ def read_step(path: Path, content: bytes, how: Tessellation | None = None) -> Ra
 
 
 def _face_names(solids: list[list[StepFace]], middles: np.ndarray) -> tuple[str, ...] | None:
-    """Names of the faces of a body, in order.
+    """Return the names of the faces of a body, in order.
 
     Faces have the order of the solid in the file. The solid is recognised by the middles of its
     faces, which coincide with the body's after a motion.
 
     Args:
+        solids: faces of each solid in the file.
         middles: mean of each face's corners, (k, 3), in the file's numbers.
     Returns:
-        The names. None if no solid is the body, or if several solids with different names could be.
+        The names; an empty tuple if the file names no faces. None if no solid is the body, or if
+        several solids with different names could be.
     """
     if not any(face.name for faces in solids for face in faces):
         return ()
@@ -223,7 +228,10 @@ def _face_names(solids: list[list[StepFace]], middles: np.ndarray) -> tuple[str,
 
 
 def _is_moved(one: np.ndarray, other: np.ndarray) -> bool:
-    """True if places (k, 3) are the other places, moved and turned; nan is left out."""
+    """Return True if points (k, 3) are the other points (k, 3), moved and turned.
+
+    Points that are nan are left out.
+    """
     kept = np.isfinite(one).all(axis=1) & np.isfinite(other).all(axis=1)
     if not kept.any():
         return False

@@ -1,4 +1,4 @@
-"""Meshing of STEP faces with Gmsh, in a separate process.
+"""Mesh the faces of STEP files with Gmsh, in a separate process.
 
 The side h of the triangles follows the radius of curvature r of surfaces and edges, so that fillets
 are fine and planes coarse:
@@ -40,11 +40,12 @@ Grid = tuple[tuple[int, int, int], tuple[int, int, int]]
 
 
 def lay_grids(model: Any, faces: list[int], side_at: Callable[[float], float]) -> None:
-    """Lay grids on faces with four sides, and leave all other faces to the mesher.
+    """Make Gmsh lay grids on curved faces with four sides. Other faces get its usual triangles.
 
     Args:
         model: gmsh.model.
-        side_at: wanted side of triangles by the radius of curvature.
+        faces: Gmsh's numbers of the faces.
+        side_at: function that returns the wanted side of triangles at a radius of curvature [mm].
     """
     curved = (face for face in faces if model.getType(2, face) != "Plane")
     grids = {face: grid for face in curved if (grid := _find_grid(model, face, side_at))}
@@ -63,7 +64,11 @@ def lay_grids(model: Any, faces: list[int], side_at: Callable[[float], float]) -
 
 
 def _find_grid(model: Any, face: int, side_at: Callable[[float], float]) -> Grid | None:
-    """The edges at the four ends of a face's parameters, and the rows between; None if absent."""
+    """Return the grid that fits a face, or None if none does.
+
+    For each of the two directions, a grid has the two edges at its ends and a number of rows. A
+    grid needs four edges at which one of the face's two parameters is smallest or largest.
+    """
     edges = [tag for _, tag in model.getBoundary([(2, face)], oriented=False)]
     low, high = map(np.array, model.getParametrizationBounds(2, face))
     at_end: dict[tuple[int, int], int] = {}
@@ -93,9 +98,13 @@ def _find_grid(model: Any, face: int, side_at: Callable[[float], float]) -> Grid
 
 
 def _line(points: np.ndarray, side_at: Callable[[float], float]) -> tuple[float, float, float]:
-    """Length of the longest line, shortest wanted side, and waste of lines (points, lines, 3).
+    """Return the longest length, the shortest wanted side and the waste of a face's lines.
 
     The waste is the number of even rows over the number of rows with the side wanted in each place.
+
+    Args:
+        points: points along the lines, (points, lines, 3).
+        side_at: function that returns the wanted side of triangles at a radius of curvature.
     """
     steps = np.diff(points, axis=0)
     length = np.maximum(np.linalg.norm(steps, axis=2), 1e-12)
@@ -131,14 +140,19 @@ class Tessellation(NamedTuple):
     side: float = 0.0  # longest side [m]; 0: a fortieth of the part's diagonal
 
     def side_at(self, radius: float) -> float:
-        """Wanted side of triangles at a radius of curvature [m]."""
+        """Return the wanted side [m] of triangles at a radius of curvature [m]."""
         radius = max(radius, SMALLEST_RADIUS_IN_CHORDS * self.chord)
         by_angle = max(self.angle * radius, SHORTEST_IN_CHORDS * self.chord)
         return min(self.side, by_angle, math.sqrt(5.0 * self.chord * radius))
 
 
 def tessellate(source: Path, chord: float, angle: float, side: float) -> dict[str, np.ndarray]:
-    """Mesh a STEP file; lengths in mm, angle in rad.
+    """Mesh a STEP file with triangles. All lengths are in mm.
+
+    Args:
+        chord: largest distance of triangles from the surface.
+        angle: largest angle between neighbours [rad].
+        side: longest side of triangles; 0 for a fortieth of the part's diagonal.
 
     Returns:
         `corners` of the triangles (m, 3, 3); `normals` of the faces at the corners (m, 3, 3), up to
@@ -218,7 +232,12 @@ def _mesh(gmsh: Any, source: str, how: Tessellation) -> dict[str, np.ndarray]:
 
 
 def _normals(model: Any, face: int, nodes: np.ndarray) -> np.ndarray:
-    """Normals of a face at the nodes (3 m,) of its triangles, up to their sign, (m, 3, 3)."""
+    """Return the normals (m, 3, 3) of a face at the corners of its triangles, up to their sign.
+
+    Args:
+        face: Gmsh's number of the face.
+        nodes: Gmsh's numbers of the corners, (3 m,).
+    """
     tags, _, places = model.mesh.getNodes(2, face, True, True)
     first = np.unique(tags, return_index=True)[1]  # a node on a seam comes twice
     normals = np.reshape(model.getNormal(face, places), (-1, 3))[first]
@@ -227,19 +246,19 @@ def _normals(model: Any, face: int, nodes: np.ndarray) -> np.ndarray:
 
 
 class _TriangleCount:
-    """Approximate number of triangles of a model's faces, by their fineness."""
+    """Estimate of the number of triangles that a meshed model will have, by their fineness."""
 
     def __init__(self, model: Any, faces: list[int]) -> None:
         self._areas = np.array([model.occ.getMass(2, face) for face in faces])
         self._radii = [_radii(model, face) for face in faces]
 
     def __call__(self, how: Tessellation) -> float:
-        """Approximate number of equilateral triangles with the wanted sides."""
+        """Return about how many triangles there will be, if equilateral with the wanted sides."""
         each = [np.mean([how.side_at(one) ** -2.0 for one in own]) for own in self._radii]
         return float(self._areas @ np.array(each)) * 4.0 / math.sqrt(3.0)
 
     def advice(self, how: Tessellation) -> str:
-        """Sentence on too many triangles, with the smallest value that gives fewer."""
+        """Return a message on too many triangles, with a side or chord that gives few enough."""
         if not math.isfinite(self(how)):
             return f"has a face of no finite area; {REMEDY}"
         is_side = self(how._replace(side=math.inf)) <= MOST_TRIANGLES
@@ -252,7 +271,7 @@ class _TriangleCount:
 
 
 def _radii(model: Any, face: int) -> list[float]:
-    """Radii of curvature of a face, at places all over it."""
+    """Return the radii of curvature of a face, at points all over it."""
     low, high = map(np.array, model.getParametrizationBounds(2, face))
     shares = (np.arange(SAMPLES) + 0.5) / SAMPLES
     u, v = np.meshgrid(*(low + shares[:, None] * (high - low)).T)
@@ -261,7 +280,7 @@ def _radii(model: Any, face: int) -> list[float]:
 
 
 def _middle(model: Any, face: int) -> np.ndarray:
-    """Mean of a face's corners, (3,); nan if the face has none."""
+    """Return the mean of a face's corners, (3,); nan if the face has none."""
     corners = [tag for dim, tag in model.getBoundary([(2, face)], recursive=True) if dim == 0]
     places = [model.getValue(0, tag, []) for tag in corners]
     return np.mean(places, axis=0) if places else np.full(3, np.nan)

@@ -1,4 +1,4 @@
-"""Reader of STL files: binary files as an array of records, text with trimesh.
+"""Read STL files: binary files as an array of records, and text files with trimesh.
 
 Reading the records is faster than importing trimesh, and most parts are binary STL files.
 """
@@ -19,7 +19,7 @@ RECORD = TRIANGLE.itemsize
 
 
 def read_stl(path: Path, content: bytes) -> RawMesh:
-    """Read an STL file. The solids of a text file give names."""
+    """Read an STL file. The named solids of a text file become groups of triangles."""
     content = _complete_stl(path, content)
     if _is_text_stl(content):
         return read_scene(io.BytesIO(content), "stl")
@@ -27,13 +27,18 @@ def read_stl(path: Path, content: bytes) -> RawMesh:
 
 
 def is_binary_stl(content: bytes) -> bool:
-    """True if the length fits the number of triangles, the only mark of a binary STL file."""
+    """Return True if the content is a binary STL file.
+
+    Its only mark is that the length fits the number of triangles that it states.
+    """
     length = HEADER + RECORD * _declared_triangles(content)
     return len(content) >= HEADER and len(content) == length and not _is_text_stl(content)
 
 
 def _complete_stl(path: Path, content: bytes) -> bytes:
-    """The STL content without data that some exporters append; InputError if it is truncated.
+    """Return the content of an STL file without data that some exporters append.
+
+    Raises InputError if it is truncated.
 
     A binary STL states its number of triangles, a text STL ends with "endsolid".
     """
@@ -58,5 +63,5 @@ def _declared_triangles(content: bytes) -> int:
 
 
 def _is_text_stl(content: bytes) -> bool:
-    """True for text STL. Binary files may begin with "solid" too."""
+    """Return True if the content is a text STL file. Binary files may begin with "solid" too."""
     return content.lstrip()[:5].lower() == b"solid" and b"facet" in content[:2000].lower()

@@ -1,4 +1,4 @@
-"""Errors that show the fault of a surface and its place; lengths as text for messages."""
+"""Define errors that hold a faulty surface for a picture, and write lengths for messages."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from chamberopt.common.errors import InputError
 
 
 class SurfaceError(InputError):
-    """Error for a surface that cannot be used, as it is or at its place.
+    """Error for a surface that cannot be used, by itself or where it stands.
 
     Args:
         corners: corners of the surface's triangles as read, (m, 3, 3) [m].
@@ -26,10 +26,10 @@ class OpenSurfaceError(SurfaceError):
 
 
 def format_box(sides: np.ndarray) -> str:
-    """Sides (3,) [m] of a bounding box as text: '44 x 44 x 70 mm'."""
+    """Return the sides (3,) [m] of a bounding box as text: '44 x 44 x 70 mm'."""
     return " x ".join(f"{1e3 * side:.5g}" for side in sides) + " mm"
 
 
 def format_point(point: np.ndarray) -> str:
-    """A position (3,) [m] as text: '(1, 2, 3) mm'."""
+    """Return a position (3,) [m] as text: '(1, 2, 3) mm'."""
     return "(" + ", ".join(f"{1e3 * value + 0.0:.5g}" for value in point) + ") mm"

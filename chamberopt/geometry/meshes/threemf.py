@@ -1,4 +1,4 @@
-"""Reader of 3MF files with trimesh."""
+"""Read 3MF files with trimesh."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ OBJECT = re.compile(rb'<(?:\w+:)?(object|component)\s[^>]*?\b(?:object)?id\s*=\s
 
 
 def read_3mf(path: Path, content: bytes) -> RawMesh:
-    """Read the objects that a 3MF file builds, by name. The file states its unit."""
+    """Read a 3MF file, in the unit that it states. Objects of one name become a group."""
     with zipfile.ZipFile(io.BytesIO(content)) as archive:
         unpacked = sum(entry.file_size for entry in archive.infolist())
         require_size(path, unpacked, MAX_UNPACKED_BYTES, "file that unpacks to data")
@@ -35,7 +35,10 @@ def read_3mf(path: Path, content: bytes) -> RawMesh:
 
 
 def _copies(model: bytes) -> int:
-    """Largest number of bodies of one object, because components of components can be very many."""
+    """Return the largest number of bodies of one object of a 3MF model.
+
+    An object may consist of other objects, and these again, so that they can be very many.
+    """
     bodies: dict[bytes, int] = {}
     current = b""
     for kind, number in OBJECT.findall(model):

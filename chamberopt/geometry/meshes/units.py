@@ -1,4 +1,4 @@
-"""The unit of a file's numbers: given by the design, stated by the file, or guessed by size."""
+"""Find the unit of a file's numbers: given by the design, stated by the file, or guessed."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ MIN_GUESSED_SIZE, MAX_GUESSED_SIZE = 3e-3, 1.5
 def find_unit(
     path: Path, content: bytes, corners: np.ndarray, given: str, stated: str | None
 ) -> tuple[str, list[str]]:
-    """The unit of the corners (m, 3, 3) of a file, and a note if a person should check it.
+    """Return the unit of the corners (m, 3, 3) of a file, and a note unless the design gives it.
 
     Args:
         given: the design's part.unit, or "guess".
@@ -65,7 +65,11 @@ def find_unit(
 
 
 def _guess(path: Path, content: bytes, sides: np.ndarray) -> tuple[str, str]:
-    """The guessed unit, and the reason for it: a comment in the file, or the size."""
+    """Return the guessed unit, and the reason for it: a comment in the file, or else the size.
+
+    Args:
+        sides: sides (3,) of the bounding box in the file's unit.
+    """
     comment = UNIT_COMMENT.search(content[:4096])
     name = comment[1].decode().lower() if comment else ""
     if comment and name in UNIT_NAMES:

@@ -1,4 +1,4 @@
-"""Reader of VTK files with VTK's own readers: legacy .vtk, XML .vtp and .vtu.
+"""Read VTK files with VTK's own readers: legacy .vtk, XML .vtp and .vtu.
 
 VTK trusts the counts in a file. With wrong counts it may end the process, or fill the memory.
 """
@@ -34,7 +34,10 @@ FAULT = "cannot be read as VTK, it is damaged or truncated; export it again"
 
 
 def read_vtk(path: Path, content: bytes) -> RawMesh:
-    """Read the surface of a VTK file. Integer cell data give groups: "FIELD 3" where FIELD is 3."""
+    """Read the surface of a VTK file.
+
+    Integer cell data give groups: the cells where the field NAME is 3 are the group "NAME 3".
+    """
     legacy = re.search(rb"^DATASET\s+(\w+)", content[:4096], re.M | re.I)
     xml = re.search(rb'<VTKFile[^>]*\btype\s*=\s*"(\w+)"', content[:4096])
     found = legacy or xml
@@ -81,7 +84,13 @@ def _require_counts(path: Path, content: bytes) -> None:
 
 
 def unpack(given: Path, reader_name: str) -> dict[str, Any]:
-    """Return the arrays of a VTK file; InputError for what VTK only reports."""
+    """Return the points, cells and cell fields of a VTK file, as arrays by name.
+
+    Raises InputError if VTK reports an error or a warning.
+
+    Args:
+        reader_name: name of VTK's class that reads the file.
+    """
     from vtkmodules import vtkIOLegacy, vtkIOXML
     from vtkmodules.util.numpy_support import vtk_to_numpy
     from vtkmodules.vtkCommonCore import vtkLogger
@@ -129,7 +138,12 @@ READER = NativeReader(unpack, "part.vtk", FAULT, seconds_per_mb=10.0)
 
 
 def _groups_of_fields(fields: dict[str, np.ndarray], cells: np.ndarray) -> dict[str, np.ndarray]:
-    """Sets of elements by the values of integer fields of their cells (e,)."""
+    """Return a set of elements for each value of each integer cell field, by field and value.
+
+    Args:
+        fields: values of each field in all cells of the file.
+        cells: cell of each element, (e,).
+    """
     groups: dict[str, np.ndarray] = {}
     for name, field in fields.items():
         values = field[cells]

@@ -1,1 +1,1 @@
-"""The smooth surface behind a part's triangles: its rounds, its normals, and a finer mesh of it."""
+"""Find the smooth surface behind a part's triangles: its rounds, its normals and a finer mesh."""

@@ -1,4 +1,4 @@
-"""Division of triangles: edges along which the smooth surface bends are split at moved middles.
+"""Divide triangles: edges along which the smooth surface bends are split at moved middles.
 
 Each edge decides alone about its split. The triangles on both sides therefore always meet at whole
 edges, and a closed surface stays closed. The middle of an edge lies on the arc through its ends
@@ -58,7 +58,7 @@ _THREE = ((0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5))
 
 @dataclass(frozen=True)
 class Surface:
-    """A mesh with its normals, creases and limits of the smooth surface behind it.
+    """Triangle mesh with the normals and creases of the smooth surface behind it.
 
     Attributes:
         vertices: vertex positions [m], shape (n, 3).
@@ -78,7 +78,9 @@ class Surface:
 
 
 def divide(surface: Surface, limit: np.ndarray, narrow: np.ndarray) -> Surface:
-    """Split edges until none bends by more than the lower limit of the parents at both sides.
+    """Return the surface with edges split until none bends by more than its limit.
+
+    The limit of an edge is the lower limit of the file's triangles on both sides.
 
     Args:
         limit: largest bend of each triangle of the file [rad], shape (m,); infinite where no edge
@@ -98,7 +100,14 @@ def divide(surface: Surface, limit: np.ndarray, narrow: np.ndarray) -> Surface:
 def _split_once(
     surface: Surface, limit: np.ndarray, narrow: np.ndarray, whole: np.ndarray
 ) -> tuple[Surface, np.ndarray]:
-    """Split once all edges that bend too much, except where a new triangle would turn over."""
+    """Split once all edges that bend too much, except where a new triangle would turn over.
+
+    Args:
+        whole: marks the sides that must not be split, shape (k, 3).
+
+    Returns:
+        The finer surface, and marks of its sides that must not be split.
+    """
     sides = np.argsort(edge_keys(surface.triangles), kind="stable").reshape(-1, 2)
     place, normal, bend, width, is_near = _middles(surface, sides)
     most, least = (
@@ -128,7 +137,7 @@ def _split_once(
 
 
 def _folds(surface: Surface, limit: np.ndarray) -> np.ndarray:
-    """Mark (k, 3) the longest side of each triangle that leans by more than the limit.
+    """Return marks (k, 3) of the longest side of each triangle that leans by more than its limit.
 
     A long and narrow triangle leans away from the surface's normals by the rise along its longest
     side over its height, although no side bends by much. Two such triangles make a fold.
@@ -141,7 +150,7 @@ def _folds(surface: Surface, limit: np.ndarray) -> np.ndarray:
 
 
 def _middles(surface: Surface, sides: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Middles of edges with two sides (e, 2) each.
+    """Return where the middles of edges with two sides (e, 2) each would move, and their bends.
 
     Returns:
         Places [m], shape (e, 3); normals on both sides, shape (2, e, 3); the bend along each edge
@@ -185,7 +194,9 @@ def _middles(surface: Surface, sides: np.ndarray) -> tuple[np.ndarray, ...]:
 def _tilts(
     surface: Surface, sides: np.ndarray, normal: np.ndarray, e: np.ndarray, is_crease: np.ndarray
 ) -> np.ndarray:
-    """The vectors f of edges on both sides, (2, e, 3). At creases each side has its own W.
+    """Return the vectors f of the module docstring for both sides of edges, (2, e, 3).
+
+    At creases each side has its own shape operator W.
 
     Args:
         normal: vector of any length along the normal in the middle of the edges, shape (2, e, 3).
@@ -203,7 +214,7 @@ def _tilts(
     m = unit_vectors(np.cross(unit_vectors(normal), e))
 
     def components(vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Components along e and along m, (2, e) each."""
+        """Return the components of vectors along e and along m, (2, e) each."""
         return np.einsum("sei,ei->se", vectors, e), np.einsum("sei,sei->se", vectors, m)
 
     along, height = components(away)
@@ -220,12 +231,14 @@ def _tilts(
 
 
 def _lean(normal: np.ndarray, e: np.ndarray) -> np.ndarray:
-    """Angles [rad] by which normals (e, 3) lean along unit vectors."""
+    """Return the angles [rad], (e,), by which normals (e, 3) lean along unit vectors e (e, 3)."""
     return np.asarray(np.abs(np.arcsin(np.clip(np.einsum("ei,ei->e", normal, e), -1.0, 1.0))))
 
 
 def _curve_normals(n0: np.ndarray, n1: np.ndarray, e: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Normals of creases at their starts and ends, in the plane in which each curve bends.
+    """Return the normals (e, 3) of crease edges at their starts, and at their ends.
+
+    They lie in the plane in which each crease bends.
 
     Args:
         n0, n1: normals of the surfaces on both sides at the starts and ends, shape (2, e, 3).
@@ -240,7 +253,10 @@ def _curve_normals(n0: np.ndarray, n1: np.ndarray, e: np.ndarray) -> tuple[np.nd
 
 
 def _tangent(one: np.ndarray, two: np.ndarray, e: np.ndarray) -> np.ndarray:
-    """Unit tangents of creases from the normals of both sides; e where these hardly differ."""
+    """Return the unit tangents (e, 3) of creases, from the normals of both sides.
+
+    Where these hardly differ, the tangent is the unit vector e along the edge.
+    """
     cross = np.cross(one, two)
     cross *= np.sign(np.einsum("ei,ei->e", cross, e))[:, None]
     weak = np.linalg.norm(cross, axis=1) < WEAK
@@ -250,7 +266,7 @@ def _tangent(one: np.ndarray, two: np.ndarray, e: np.ndarray) -> np.ndarray:
 def _divided(
     surface: Surface, vertices: np.ndarray, new: np.ndarray, normal: np.ndarray
 ) -> tuple[Surface, np.ndarray, np.ndarray]:
-    """Divide triangles at the middles of their sides.
+    """Return the surface with its triangles divided at the middles of their sides.
 
     Args:
         vertices: vertices of the surface and new vertices [m].
@@ -310,7 +326,10 @@ def _divided(
 
 
 def _sides_of_codes() -> np.ndarray:
-    """The side (6, 6) of a triangle on which two of its corners and middles lie; otherwise -1."""
+    """Return a table (6, 6) of the side of a triangle on which two of its points lie, or -1.
+
+    Its points are corners 0 to 2 and middles of sides 3 to 5.
+    """
     table = np.full((6, 6), -1)
     for k in range(3):
         on_side = [k, 3 + k, (k + 1) % 3]

@@ -1,4 +1,4 @@
-r"""Normals of the smooth surface behind the facets of a mesh.
+r"""Find the normals of the smooth surface behind the facets of a mesh.
 
 Notation
 t      turn of an edge [rad], convex positive                            Edges.turn, (e,)
@@ -57,7 +57,7 @@ APEX, SMALL_APEX, OF_AROUND = 0.5, np.radians(3.0), 4.0
 
 
 class Facets(NamedTuple):
-    """Measures of the triangles of a surface.
+    """Normals, areas and sides of the triangles of a surface.
 
     Attributes:
         normal: outward unit normals, shape (m, 3).
@@ -73,12 +73,12 @@ class Facets(NamedTuple):
 
     @property
     def height(self) -> np.ndarray:
-        """Height [m] over each side, shape (m, 3)."""
+        """Height [m] of each triangle over each of its sides, shape (m, 3)."""
         return np.asarray(2.0 * self.area[:, None] / np.maximum(self.length, 1e-30))
 
 
 def measure_facets(vertices: np.ndarray, triangles: np.ndarray) -> Facets:
-    """Measures of the triangles (m, 3) over vertices (n, 3) [m]."""
+    """Return normals, areas and sides of triangles (m, 3) over vertices (n, 3) [m]."""
     vector = area_vectors(vertices, triangles)
     normal = unit_vectors(vector)
     start, end = sides_of(triangles).T
@@ -90,7 +90,7 @@ def measure_facets(vertices: np.ndarray, triangles: np.ndarray) -> Facets:
 
 
 class Pieces(NamedTuple):
-    """The facets of a surface: quadrangles of strips and other small planes, or single triangles.
+    """Facets of a surface: small planes, such as quadrangles, or single triangles.
 
     Attributes:
         number: number of the piece of each triangle, shape (m,).
@@ -102,11 +102,14 @@ class Pieces(NamedTuple):
 
     @property
     def has_several(self) -> np.ndarray:
-        """Mark the triangles of pieces with several triangles, shape (m,)."""
+        """Marks of the triangles of pieces with several triangles, shape (m,)."""
         return np.asarray(np.bincount(self.number)[self.number] > 1)
 
     def around(self, triangle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The outer sides (k,) of the pieces of triangles (r,), and the row (k,) of each side."""
+        """Return the outer sides of the pieces of some triangles (r,).
+
+        Returns the row in `triangle` for which each side was found, (k,), and the sides, (k,).
+        """
         outer = np.flatnonzero(~self.inner)
         outer = outer[np.argsort(self.number[outer // 3], kind="stable")]
         ends = np.searchsorted(self.number[outer // 3], np.arange(int(self.number.max()) + 2))
@@ -117,7 +120,10 @@ class Pieces(NamedTuple):
 
 
 def find_pieces(edges: Edges, count: int) -> Pieces:
-    """The facets of ``count`` triangles: planes of no more than MANY_SIDES, and other triangles."""
+    """Return the facets of `count` triangles.
+
+    A plane of at most MANY_SIDES outer sides is one facet. In larger planes each triangle is one.
+    """
     number = plane_facets(edges, count)
     one, two = number[edges.triangles].T
     inner = np.zeros(3 * count, dtype=bool)
@@ -137,7 +143,9 @@ def fit_phi(
     doubted: np.ndarray | None = None,
     told: np.ndarray | None = None,
 ) -> np.ndarray:
-    """The angles phi (m, 3) [rad]; 0 off the fitted triangles.
+    """Return the angles phi (m, 3) [rad] that fit the turns of the edges best.
+
+    The module docstring defines phi. It is 0 off the fitted triangles.
 
     Args:
         is_crease: marks the creases, shape (e,).
@@ -177,7 +185,7 @@ def fit_phi(
 def _straight_to_creases(
     facets: Facets, pieces: Pieces, edges: Edges, is_crease: np.ndarray
 ) -> np.ndarray:
-    """Mark the sides (3 m,) of pieces at creases, towards which no other side shows a bend.
+    """Return marks (3 m,) of sides of facets at creases, towards which no other side bends.
 
     Such sides are at the ends of a cylinder or cone, whose facets turn only along them.
     """
@@ -195,7 +203,13 @@ def _straight_to_creases(
 
 
 def _rows(unknown: np.ndarray, sides: np.ndarray, factor: np.ndarray) -> csr_array:
-    """A sparse matrix with a row for each row of sides (r, c), with factors (r, c)."""
+    """Return a sparse matrix of equations between the unknown phi of sides.
+
+    Each row of `sides` (r, c) gives a row of the matrix, with the factors (r, c) of its sides.
+
+    Args:
+        unknown: column of the phi of each side, -1 if that phi is not unknown, (3 m,).
+    """
     from scipy.sparse import csr_array
 
     row = np.repeat(np.arange(len(sides)), sides.shape[1])
@@ -209,7 +223,9 @@ def _rows(unknown: np.ndarray, sides: np.ndarray, factor: np.ndarray) -> csr_arr
 def _bend_differences(
     facets: Facets, edges: Edges, smooth: np.ndarray, unknown: np.ndarray, apexes: np.ndarray
 ) -> list[csr_array]:
-    """Matrices of l dS_ee, sqrt(l² + h²) dS_em, h dS_mm at the smooth edges.
+    """Return the matrices that give l dS_ee, sqrt(l² + h²) dS_em and h dS_mm of smooth edges.
+
+    They multiply the unknown phi. The module docstring explains the symbols.
 
     At the apex of a cone the sum of both S_ee replaces the difference, because a cone is straight
     along its edges, and dS_em counts as zero.
@@ -243,7 +259,9 @@ def _bend_differences(
 def _solve(
     matrices: list[csr_array], right: list[np.ndarray], weights: list[np.ndarray], steps: int
 ) -> np.ndarray:
-    """Minimise sums of weighted absolute values: of turns, of bends (three rows each), of creases.
+    """Return the unknown phi that minimise the sum of the module docstring.
+
+    It is a sum of weighted absolute values: of turns, of bends (three rows each) and of creases.
 
     The method is least squares whose weights are divided by the residuals of the previous step.
     """
@@ -276,20 +294,23 @@ def _solve(
 
 
 def phi_of_normals(facets: Facets, normals: np.ndarray) -> np.ndarray:
-    """The angles phi (m, 3) [rad] of known normals (m, 3, 3) at the corners."""
+    """Return the angles phi (m, 3) [rad] from facets to known normals (m, 3, 3) at the corners."""
     middle = normals + np.roll(normals, -1, axis=1)
     sine = np.einsum("mki,mki->mk", middle, facets.across)
     return np.asarray(np.arctan2(sine, np.einsum("mki,mi->mk", middle, facets.normal)))
 
 
 def shape_operators(facets: Facets, phi: np.ndarray) -> np.ndarray:
-    """S of each facet [1/m], shape (m, 3, 3)."""
+    """Return the shape operator of each facet from its angles phi, shape (m, 3, 3) [1/m]."""
     weight = facets.length * phi / facets.area[:, None]
     return np.asarray(np.einsum("mk,mki,mkj->mij", weight, facets.across, facets.across))
 
 
 def hollow_curvature(facets: Facets, phi: np.ndarray) -> np.ndarray:
-    """Largest hollow curvature of each facet [1/m], 0 for a facet without it, shape (m,)."""
+    """Return the largest curvature of each facet in a hollow [1/m], shape (m,).
+
+    It is 0 for a facet that is not hollow in any direction.
+    """
     return np.asarray(np.maximum(-np.linalg.eigvalsh(shape_operators(facets, phi))[:, 0], 0.0))
 
 
@@ -303,7 +324,7 @@ def corner_normals(
     phi: np.ndarray,
     apex: np.ndarray,
 ) -> np.ndarray:
-    """Unit normals of the surface at the corners of the triangles, shape (m, 3, 3).
+    """Return unit normals of the smooth surface at the corners of triangles, shape (m, 3, 3).
 
     Args:
         phi: angles of the module docstring, shape (m, 3).
@@ -320,7 +341,7 @@ def corner_normals(
     opening = _opening(facets).ravel()
 
     def sums_of(weight: np.ndarray, values: np.ndarray) -> np.ndarray:
-        """Weighted sums (count, 3) over the corners of each fan."""
+        """Return the weighted sums (count, 3) of vectors over the corners of each fan."""
         return np.column_stack([np.bincount(fan, weight * one, count) for one in values.T])
 
     mean = unit_vectors(sums_of(opening, own))
@@ -346,10 +367,11 @@ def _at_corners_of_pieces(
     is_crease: np.ndarray,
     phi: np.ndarray,
 ) -> np.ndarray:
-    """Unit normals (3 m, 3) at corners of pieces with several triangles, by the sides beside them.
+    """Return unit normals at the corners (3 m, 3), corrected in facets of several triangles.
 
-    The normal leans by phi across each side of the piece that ends at the corner. A side at a
-    crease with a phi of 0 shows nothing, because a cone leans only across its straight lines.
+    Other normals stay those of `own` (3 m, 3). In a facet of several triangles, the normal leans by
+    phi across each side of the facet that ends at the corner. A side at a crease with a phi of 0
+    shows nothing, because a cone leans only across its straight lines.
     """
     corners = np.flatnonzero(np.repeat(pieces.has_several, 3))
     told = ~pieces.inner & np.repeat(pieces.has_several, 3)
@@ -383,7 +405,7 @@ def _even_along_lines(
     fan: np.ndarray,
     is_smooth: np.ndarray,
 ) -> np.ndarray:
-    """Normals (f, 3) of fans, the same along each line in which two plane facets meet.
+    """Return the normals (f, 3) of fans, made equal along each line where two plane facets meet.
 
     Two plane facets of several triangles each belong to a developable surface, whose normal does
     not change along such a line. New vertices then lie in planes too, which are few faces for a
@@ -416,13 +438,19 @@ def _even_along_lines(
 
 
 def plane_facets(edges: Edges, count: int) -> np.ndarray:
-    """The plane facet of each of ``count`` triangles, shape (m,)."""
+    """Return the number of the plane facet of each of `count` triangles, shape (m,).
+
+    A plane facet consists of connected triangles in one plane.
+    """
     one, two = edges.triangles[np.abs(edges.turn) < PLANE].T
     return connected_pieces(one, two, count)[1]
 
 
 def fans(triangles: np.ndarray, edges: Edges, joins: np.ndarray) -> np.ndarray:
-    """The fan of each corner, shape (3 m,): corners of a vertex joined by edges (e,)."""
+    """Return the number of the fan of each corner, shape (3 m,).
+
+    A fan consists of corners at one vertex whose triangles meet at edges marked by `joins` (e,).
+    """
     one, two = edges.sides[joins].T
     # Side k begins at corner k. The side across the edge runs in the other direction.
     next_of_one, next_of_two = (3 * (s // 3) + (s % 3 + 1) % 3 for s in (one, two))
@@ -432,7 +460,10 @@ def fans(triangles: np.ndarray, edges: Edges, joins: np.ndarray) -> np.ndarray:
 def find_apexes(
     facets: Facets, triangles: np.ndarray, edges: Edges, is_crease: np.ndarray
 ) -> np.ndarray:
-    """Mark (n,) the vertices without creases at which the surface comes to a point."""
+    """Return marks (n,) of vertices at which the surface comes to a point, as a cone does.
+
+    Vertices at creases are not marked.
+    """
     count = int(triangles.max()) + 1
     defect = 2.0 * np.pi - np.bincount(triangles.ravel(), _opening(facets).ravel(), count)
     start, end = sides_of(triangles)[edges.sides[:, 0]].T
@@ -444,7 +475,7 @@ def find_apexes(
 
 
 def _opening(facets: Facets) -> np.ndarray:
-    """Angle [rad] at each corner, shape (m, 3)."""
+    """Return the angle of each triangle at each of its corners [rad], shape (m, 3)."""
     into = -facets.across  # vectors of the sides k and k - 1, which meet at corner k
     cosine = -np.einsum("mki,mki->mk", into, np.roll(into, 1, axis=1))
     return np.asarray(np.arccos(np.clip(cosine, -1.0, 1.0)))

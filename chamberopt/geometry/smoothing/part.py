@@ -1,7 +1,7 @@
-"""The part's mesh with divided rounds on its target, and facts about its facets.
+"""Divide the rounds of a part's mesh into finer facets, and tell facts about the facets.
 
-A ball meets the drawn surface, while the file has facets. The rounds of target and zones are
-divided, and rounds so near that a ball can touch them at the same time.
+A ball meets the drawn surface, while the file has facets. The rounds of the target (the surface to
+peen) and of zones are divided, and rounds so near that a ball can touch them at the same time.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ MOST_KEPT = 40  # number of records that are kept: each holds a few MB
 
 
 def key_of(values: Iterable[object]) -> str:
-    """A digest of arrays and other values, and of this program's sources."""
+    """Return a digest of arrays and other values, and of this program's sources."""
     digest = hashlib.sha256(sources_digest().encode())
     for value in values:
         if isinstance(value, np.ndarray):
@@ -54,11 +54,13 @@ def key_of(values: Iterable[object]) -> str:
 def kept(
     kind: type[Record], others: Sequence[type], key: str, make: Callable[[], Record]
 ) -> Record:
-    """The record of a key, made only if it is not kept yet.
+    """Return the record of a key from the user's cache, or make and keep it if it is not there.
 
     Args:
         kind: class of the record.
         others: classes of the objects in the record.
+        key: name of the record, such as a digest of all on which it depends.
+        make: called to make the record.
     """
     cache = user_cache()
     if cache is None:
@@ -116,7 +118,7 @@ class SmoothingFacts:
 
 @dataclass(frozen=True)
 class SmoothPart:
-    """A part with divided rounds.
+    """Mesh of a part with divided rounds.
 
     Attributes:
         vertices: vertex positions [m], shape (n, 3).
@@ -135,7 +137,11 @@ class SmoothPart:
     facts: SmoothingFacts
 
     def of_part(self, mesh: PartMesh) -> PartMesh:
-        """The divided mesh of a part, with the numbers and groups of the file's triangles."""
+        """Return a part with this divided mesh, and the numbers and groups of the file's triangles.
+
+        Args:
+            mesh: the part as its file has it.
+        """
         # The number of triangles is no test: a simplified mesh may have as many after its division.
         if np.array_equal(self.triangles, mesh.triangles):
             return mesh
@@ -168,7 +174,7 @@ class Rule(NamedTuple):
 
 
 def smooth(mesh: PartMesh, target: Rule, zones: list[Rule]) -> SmoothPart:
-    """Divide the rounds of a part, or load the result of an earlier command.
+    """Return a part with divided rounds, loaded if an earlier command has made it.
 
     Args:
         target: rule for the triangles to cover, and for triangles near them and near the zones.
@@ -180,7 +186,12 @@ def smooth(mesh: PartMesh, target: Rule, zones: list[Rule]) -> SmoothPart:
 
 
 def _smooth(mesh: PartMesh, target: Rule, zones: list[Rule]) -> SmoothPart:
-    """Divide the rounds of a part, with the arguments of `smooth`."""
+    """Divide the rounds of a part, simplified first if its facets have vertices inside.
+
+    Args:
+        target: rule for the triangles to cover, and for triangles near them and near the zones.
+        zones: rules for surfaces that may lie on the target.
+    """
     rules = [target, *zones]
     if mesh.normals is None and _has_points_in_facets(mesh, rules):
         plain, plain_rules = _without_points_in_planes(mesh, rules)
@@ -191,7 +202,7 @@ def _smooth(mesh: PartMesh, target: Rule, zones: list[Rule]) -> SmoothPart:
 
 
 def _has_points_in_facets(mesh: PartMesh, rules: list[Rule]) -> bool:
-    """True if a facet of a round to be divided has vertices of the file inside.
+    """Return True if a facet of a round to be divided has vertices of the file inside.
 
     Such vertices are on the facet, and not on the surface behind it.
     """
@@ -213,9 +224,9 @@ def _has_points_in_facets(mesh: PartMesh, rules: list[Rule]) -> bool:
 
 
 def _without_points_in_planes(mesh: PartMesh, rules: list[Rule]) -> tuple[PartMesh, list[Rule]]:
-    """The part with as few triangles as its planes need, and its rules.
+    """Return the part with as few triangles as its planes need, and the rules for these triangles.
 
-    Borders of the rules' triangles stay in place.
+    The borders between triangles of different rules stay in place.
     """
     marks = np.stack([rule.triangles for rule in rules], axis=1)
     kinds, label = np.unique(marks, axis=0, return_inverse=True)
@@ -231,11 +242,16 @@ def _without_points_in_planes(mesh: PartMesh, rules: list[Rule]) -> tuple[PartMe
 
 
 def _on_file(found: SmoothPart, plain: PartMesh, mesh: PartMesh) -> SmoothPart:
-    """A divided part whose origins are triangles of the file, not of its simplified mesh.
+    """Return a divided part with origins among the file's triangles.
 
     The origin of a new triangle is the file's triangle closest to its middle, moved into the
     origin's plane. If this middle is beyond the plane's border, the middle of the simplified
     triangle counts.
+
+    Args:
+        found: the divided part, with origins in the simplified mesh.
+        plain: the simplified mesh.
+        mesh: the mesh of the file.
     """
     from sim_core import TriangleMesh, closest_points
 
@@ -253,7 +269,12 @@ def _on_file(found: SmoothPart, plain: PartMesh, mesh: PartMesh) -> SmoothPart:
 
 
 def _divided(mesh: PartMesh, target: Rule, zones: list[Rule]) -> SmoothPart:
-    """Divide the rounds of a part whose vertices are all on its surface."""
+    """Divide the rounds of a part whose vertices all lie on the smooth surface.
+
+    Args:
+        target: rule for the triangles to cover, and for triangles near them and near the zones.
+        zones: rules for surfaces that may lie on the target.
+    """
     vertices, triangles, on_target = mesh.vertices, mesh.triangles, target.triangles
     near = _near(vertices, triangles, np.any([one.triangles for one in (target, *zones)], axis=0))
     surfaces = find_surfaces(vertices, triangles, near, mesh.normals)
@@ -305,7 +326,15 @@ def _divided(mesh: PartMesh, target: Rule, zones: list[Rule]) -> SmoothPart:
 def _divide_apart(
     mesh: PartMesh, surfaces: Surfaces, limit: np.ndarray, narrow: np.ndarray
 ) -> tuple[Surface, np.ndarray]:
-    """Divide the rounds, except rounds that would cross others, which are marked (m,)."""
+    """Divide the rounds, except rounds that would then cross others.
+
+    Args:
+        limit: turn [rad] above which edges are split, (m,); infinite where nothing is divided.
+        narrow: width [m] below which facets are not divided, (m,).
+
+    Returns:
+        The divided surface, and marks of the triangles left whole because they would cross, (m,).
+    """
     crossing = np.zeros(len(mesh.triangles), dtype=bool)
     while True:
         stays = surfaces.noisy | crossing
@@ -328,7 +357,10 @@ def _divide_apart(
 
 
 def _near(vertices: np.ndarray, triangles: np.ndarray, chosen: np.ndarray) -> np.ndarray:
-    """Mark (m,) the chosen triangles, and the triangles with a corner near a chosen corner."""
+    """Return marks (m,) of chosen triangles and of triangles with a corner near a chosen corner.
+
+    Near means at most NEAR away.
+    """
     from scipy.spatial import cKDTree
 
     corners = np.unique(triangles[chosen])
@@ -337,7 +369,14 @@ def _near(vertices: np.ndarray, triangles: np.ndarray, chosen: np.ndarray) -> np
 
 
 def _usual_turn(turn: np.ndarray, area: np.ndarray, chosen: np.ndarray) -> float:
-    """The turn (m,) [rad] that most of the chosen facets of rounds do not exceed; or 0."""
+    """Return the turn [rad] that nine tenths of the chosen area do not exceed.
+
+    Only triangles with a turn above 0 count. The result is 0 if none of them does.
+
+    Args:
+        turn, area: largest turn [rad] and area [m²] of each triangle, (m,).
+        chosen: marks the triangles that count, (m,).
+    """
     rows = np.flatnonzero(chosen & (turn > 0.0))
     if not len(rows):
         return 0.0

@@ -1,4 +1,4 @@
-"""Edges of a part's surface, told apart: edges that divide a round into facets, and creases.
+"""Tell apart the edges of a part's surface: edges between the facets of a round, and creases.
 
 An angle alone cannot tell them apart: the facets of a coarse fillet turn by as much as the faces of
 a chamfer. A round shows by its neighbours: several facets beside each other turn in the same
@@ -65,12 +65,15 @@ class Edges(NamedTuple):
 
     @property
     def triangles(self) -> np.ndarray:
-        """The two triangles at each edge, shape (e, 2)."""
+        """Numbers of the two triangles at each edge, shape (e, 2)."""
         return np.asarray(self.sides // 3)
 
 
 def find_edges(vertices: np.ndarray, triangles: np.ndarray) -> Edges:
-    """The edges of a closed surface (n, 3) [m], (m, 3) with normals outward."""
+    """Return the edges of a closed surface with vertices (n, 3) [m] and triangles (m, 3).
+
+    The normals of the triangles point outward.
+    """
     sides = side_pairs(triangles)
     normal = unit_vectors(area_vectors(vertices, triangles))
     start, end = sides_of(triangles)[sides[:, 0]].T
@@ -83,12 +86,12 @@ def find_edges(vertices: np.ndarray, triangles: np.ndarray) -> Edges:
 
 
 def is_hard(edges: Edges) -> np.ndarray:
-    """Mark (e,) the edges that are creases in any neighbourhood."""
+    """Return marks (e,) of edges that turn so much that they are creases beside any neighbours."""
     return np.asarray((edges.turn > CONVEX_CREASE) | (edges.turn < -HOLLOW_CREASE))
 
 
 def find_creases(edges: Edges, area: np.ndarray) -> np.ndarray:
-    """Mark (e,) the edges without evidence of a round.
+    """Return marks (e,) of the creases: edges without evidence that they belong to a round.
 
     Args:
         area: areas of the triangles [m²], shape (m,).
@@ -113,7 +116,7 @@ def find_creases(edges: Edges, area: np.ndarray) -> np.ndarray:
 def _has_evidence(
     edges: Edges, level: np.ndarray, hard: np.ndarray, area: np.ndarray
 ) -> np.ndarray:
-    """Mark (e,) the edges that belong to a round.
+    """Return marks (e,) of the edges that belong to a round, by the facets beside them.
 
     Args:
         level: marks the edges within facets, shape (e,).
@@ -138,7 +141,7 @@ def _has_evidence(
 
 
 def _is_in_round(facet: np.ndarray, edges: Edges, sure: np.ndarray, area: np.ndarray) -> np.ndarray:
-    """True for edges that belong to a round, shape (k,), among edges that turn in one direction.
+    """Return marks (k,) of the edges that belong to a round, among edges that turn one way.
 
     Args:
         facet: facets on both sides of each edge, shape (k, 2).
@@ -164,11 +167,11 @@ def _is_in_round(facet: np.ndarray, edges: Edges, sure: np.ndarray, area: np.nda
 
 
 def _bends_beside(facet: np.ndarray, bend: np.ndarray, along: np.ndarray, count: int) -> np.ndarray:
-    """Bends about each edge of the other edges of the facets on both sides, (k, 2).
+    """Return how much the other edges of both facets at each edge bend about it [m rad], (k, 2).
 
-    A bend about an axis across the edge does not count: the round of a shaft shows nothing about
-    the edge at its end. The round of a cone does not count either, although its lines are not quite
-    across its end.
+    A bend is a turn times the length of its edge. A bend about an axis across the edge does not
+    count: the round of a shaft shows nothing about the edge at its end. The round of a cone does
+    not count either, although its lines are not quite across its end.
     """
     tensor = np.einsum("k,ki,kj->kij", bend, along, along).reshape(-1, 9)
     sums = np.stack(
@@ -188,6 +191,6 @@ def _bends_beside(facet: np.ndarray, bend: np.ndarray, along: np.ndarray, count:
 
 
 def _are_alike(curvature: np.ndarray, factor: float) -> np.ndarray:
-    """True where the curvatures of facet pairs (k, 2) differ by at most ``factor``, shape (k,)."""
+    """Return True where two curvatures (k, 2) differ by at most a factor, shape (k,)."""
     low, high = np.sort(curvature, axis=1).T
     return np.asarray(high <= factor * low)

@@ -1,4 +1,4 @@
-"""The smooth surface of a part whose file has facets.
+"""Find the smooth surface of a part whose file has facets.
 
 The facets of a round touch a ball elsewhere than the round does. In a hollow a ball lies across two
 facets and leaves a bare strip between them. Rounds are therefore found and their triangles divided,
@@ -52,7 +52,7 @@ SWEEPS = 20  # triangles in a row, each of which takes the curvature of the prev
 
 
 def valleys(edges: Edges, pieces: Pieces, is_crease: np.ndarray) -> np.ndarray:
-    """Mark (e,) the creases that irregular triangles of one round may have between them.
+    """Return marks (e,) of creases that may lie between irregular triangles of one round.
 
     Both triangles are single triangles with other edges that turn in the other direction, and by
     more. Two rows of triangles, each half a triangle ahead of the other, have such an edge along
@@ -72,7 +72,7 @@ def valleys(edges: Edges, pieces: Pieces, is_crease: np.ndarray) -> np.ndarray:
 def find_continued(
     sides: np.ndarray, edges: Edges, facets: Facets, is_crease: np.ndarray, phi: np.ndarray
 ) -> np.ndarray:
-    """Mark (e,) the creases across which a round goes on.
+    """Return marks (e,) of the creases across which a round goes on, so that they are none.
 
     Args:
         sides: sides of the triangles, as vectors [m], shape (m, 3, 3).
@@ -124,7 +124,7 @@ TOLD = 3.0  # degrees: smaller turns say nothing about noise
 
 
 class Surfaces(NamedTuple):
-    """Normals, curvatures and creases of a part's surface before it is divided.
+    """Normals, curvatures and creases of the smooth surface, for each triangle of the file.
 
     Attributes:
         normals: unit normals of the smooth surface at the corners, shape (m, 3, 3).
@@ -150,7 +150,7 @@ class Surfaces(NamedTuple):
 def find_surfaces(
     vertices: np.ndarray, triangles: np.ndarray, wanted: np.ndarray, given: np.ndarray | None = None
 ) -> Surfaces:
-    """Find rounds and creases of a part, and the normals of the surface behind its facets.
+    """Return rounds and creases of a part, and the normals of the surface behind its facets.
 
     Args:
         vertices: vertex positions [m], shape (n, 3).
@@ -208,7 +208,7 @@ def divide_rounds(
     limit: np.ndarray,
     narrow: np.ndarray,
 ) -> Surface:
-    """Divide the triangles of rounds. The new vertices lie on the smooth surface.
+    """Return the mesh with the triangles of rounds divided, new vertices on the smooth surface.
 
     Args:
         limit: turn [rad] above which each triangle's edges are split, shape (m,); infinite where
@@ -227,7 +227,7 @@ def divide_rounds(
 
 
 def moves(vertices: np.ndarray, triangles: np.ndarray, finer: Surface) -> np.ndarray:
-    """Distance of the divided surface from each triangle that was divided [m], shape (m,)."""
+    """Return how far the divided surface lies from each triangle of the file [m], shape (m,)."""
     normal = unit_normals(vertices[triangles])[finer.parent]
     start = vertices[triangles[finer.parent, 0]][:, None]
     height = np.abs(np.einsum("kci,ki->kc", finer.vertices[finer.triangles] - start, normal))
@@ -237,7 +237,7 @@ def moves(vertices: np.ndarray, triangles: np.ndarray, finer: Surface) -> np.nda
 
 
 def _stated_creases(edges: Edges, normals: np.ndarray) -> np.ndarray:
-    """Mark (e,) the edges at which the file's normals on both sides differ."""
+    """Return marks (e,) of edges at which the normals that the file states differ on both sides."""
     triangle, k = np.divmod(edges.sides.T, 3)
     start, end = normals[triangle, k], normals[triangle, (k + 1) % 3]
     cosine = [np.einsum("ei,ei->e", start[0], end[1]), np.einsum("ei,ei->e", end[0], start[1])]
@@ -253,7 +253,7 @@ def _continued(
     lone: np.ndarray,
     wanted: np.ndarray,
 ) -> np.ndarray:
-    """Mark (e,) the edges without evidence across which a round goes on.
+    """Return marks (e,) of edges that look like creases, but across which a round goes on.
 
     Args:
         lone: marks the edges without evidence, shape (e,).
@@ -273,7 +273,7 @@ def _continued(
 def _faces_to_fit(
     edges: Edges, facets: Facets, is_crease: np.ndarray, wanted: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Number of each triangle's round, and marks of the triangles whose normals are to be found.
+    """Return the round of each triangle, and marks of triangles whose normals are to be found.
 
     Args:
         wanted: marks the triangles that are to be divided, shape (m,).
@@ -295,7 +295,7 @@ def _faces_to_fit(
 
 
 def _planes(edges: Edges, facets: Facets, is_crease: np.ndarray) -> np.ndarray:
-    """Mark (m,) the triangles of plane facets that are far larger than all facets beside them.
+    """Return marks (m,) of triangles of plane facets far larger than all facets beside them.
 
     The facets of a round are nearly alike, so that these planes are not part of it. A few irregular
     triangles of a round may lie in one plane by chance. Beside single triangles, each triangle of
@@ -312,7 +312,11 @@ def _planes(edges: Edges, facets: Facets, is_crease: np.ndarray) -> np.ndarray:
 
 
 def _with_neighbours(marked: np.ndarray, pairs: np.ndarray) -> np.ndarray:
-    """The marked triangles (m,) and their neighbours, by pairs of neighbours (e, 2)."""
+    """Return marks (m,) of the marked triangles and their neighbours.
+
+    Args:
+        pairs: triangles that are neighbours, (e, 2).
+    """
     both = pairs[marked[pairs].any(axis=1)]
     result = marked.copy()
     result[both] = True
@@ -327,7 +331,7 @@ def _noise(
     fitted: np.ndarray,
     ends: np.ndarray,
 ) -> np.ndarray:
-    """Share of the turns of each face that no round and no line of creases explains, shape (f,).
+    """Return the share of each face's turns that no round and no line of creases explains, (f,).
 
     Args:
         lone: marks the edges without evidence of a round, shape (e,).
@@ -358,9 +362,9 @@ def _noise(
 def _turns_and_rises(
     edges: Edges, facets: Facets, is_crease: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Largest turn [rad] at the smooth sides of each triangle, and its rise [m], shape (m,) each.
+    """Return the largest turn [rad] at smooth sides of each triangle, and its rise [m], (m,) each.
 
-    The rise belongs to the circle of which the triangle is a facet, over its chord.
+    The rise is the height of a circle's arc over its chord. The triangle's facet is the chord.
     """
     turn = np.zeros(3 * len(facets.area))
     turn[edges.sides[~is_crease]] = np.abs(edges.turn[~is_crease])[:, None]
