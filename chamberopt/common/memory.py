@@ -76,7 +76,7 @@ def _free_of_group(group: Path, limit: str, used: str) -> float:
 
 
 class MemoryBudget:
-    """Number of bytes that this process may spend on arrays that could be computed again.
+    """Account of the bytes that this process may spend on arrays that could be computed again.
 
     The budget is a share of the free memory when the first array is kept. The worker processes of
     one command divide it among them.

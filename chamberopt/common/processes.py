@@ -107,7 +107,7 @@ class ProcessExecutor(Executor):
     def _run(self, fn: Callable[..., Any], args: tuple[Any, ...], kwargs: dict[str, Any]) -> Any:
         """Return the value of a task, run in the worker process of this thread.
 
-        Raises the exception of the task, or WorkerLostError if the process dies MAX_ATTEMPTS times.
+        Raises the exception of the task, or WorkerLostError if the process dies at each attempt.
         """
         for _ in range(MAX_ATTEMPTS):
             if self._ended:

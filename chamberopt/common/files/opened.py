@@ -89,7 +89,7 @@ def require_plain_folder(path: Path, remedy: str = "put a plain folder in its pl
 
 
 def require_plain_content(folder: Path) -> None:
-    """Raise InputError if a folder holds a link, a pipe or a device, also one folder below."""
+    """Raise InputError unless a folder holds only plain files, and folders of plain files."""
     for one in sorted(folder.iterdir()):
         status = one.lstat()
         if stat.S_ISDIR(status.st_mode) and not is_link(status):
@@ -115,7 +115,7 @@ def _kind(status: os.stat_result) -> str:
 
 
 class OpenFolder:
-    """An open folder. No name in it is looked up through a link.
+    """Open folder, for work on the files in it. No name in it is looked up through a link.
 
     On systems with descriptors of folders, the object stays the same folder, even if another one
     takes its place meanwhile.
