@@ -47,7 +47,7 @@ class SolidSurface:
 
 @dataclass(frozen=True)
 class Solid:
-    """Closed body on which solid operations work."""
+    """Closed body that can be united with other bodies, or cut out of them."""
 
     body: Manifold
     label: int  # label of its own triangles; -1 for the result of an operation
@@ -55,7 +55,7 @@ class Solid:
 
     @property
     def volume(self) -> float:
-        """Enclosed volume [m³]."""
+        """Volume that the solid encloses [m³]."""
         return float(self.body.volume()) * 1e-9
 
     def surface(self) -> SolidSurface:

@@ -59,7 +59,7 @@ class PartMesh:
 
     @property
     def size(self) -> np.ndarray:
-        """Sides (3,) of the bounding box [m]."""
+        """Sides (3,) of the part's bounding box [m]."""
         return np.asarray(np.ptp(self.vertices, axis=0))
 
 
@@ -102,7 +102,14 @@ def read_part(path: Path, unit: str = "guess", how: Tessellation | None = None) 
 def read_part_cached(path: Path, unit: str = "guess", how: Tessellation | None = None) -> PartMesh:
     """Return a part from a mesh file, read only if the file has changed since the last call.
 
-    Args and errors are those of `read_part`. A study builds many chambers with the same part.
+    A study builds many chambers with the same part.
+
+    Args:
+        unit: unit of the file's numbers: um, mm, cm, m, in, or "guess" if it is not known.
+        how: fineness of the triangles of a STEP file.
+
+    Raises:
+        InputError: for a file that cannot be used, and for a surface that is not closed.
     """
     try:
         stamp = path.stat()

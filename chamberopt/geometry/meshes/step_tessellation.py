@@ -140,7 +140,7 @@ class Tessellation(NamedTuple):
     side: float = 0.0  # longest side [m]; 0: a fortieth of the part's diagonal
 
     def side_at(self, radius: float) -> float:
-        """Return the wanted side [m] of triangles at a radius of curvature [m]."""
+        """Return the wanted side of triangles at a radius of curvature, in the unit of `chord`."""
         radius = max(radius, SMALLEST_RADIUS_IN_CHORDS * self.chord)
         by_angle = max(self.angle * radius, SHORTEST_IN_CHORDS * self.chord)
         return min(self.side, by_angle, math.sqrt(5.0 * self.chord * radius))

@@ -102,7 +102,7 @@ class Pieces(NamedTuple):
 
     @property
     def has_several(self) -> np.ndarray:
-        """Marks of the triangles of pieces with several triangles, shape (m,)."""
+        """Marks of the triangles that share their piece with others, shape (m,)."""
         return np.asarray(np.bincount(self.number)[self.number] > 1)
 
     def around(self, triangle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -1,5 +1,6 @@
 """Divide the rounds of a part's mesh into finer facets, and tell facts about the facets.
 
+A round is a curved surface, such as a fillet, that the file divides into plane facets.
 A ball meets the drawn surface, while the file has facets. The rounds of the target (the surface to
 peen) and of zones are divided, and rounds so near that a ball can touch them at the same time.
 """
@@ -87,7 +88,7 @@ MOST_TRIANGLES = 1.5e6  # triangles of a part: more take too long to fly among
 
 @dataclass(frozen=True)
 class SmoothingFacts:
-    """Results of the smoothing of a part, and the remaining facets.
+    """Figures on the smoothing of a part: what moved, and which facets remain coarse.
 
     Attributes:
         largest_move: largest move of the surface [m].
@@ -156,7 +157,7 @@ class SmoothPart:
 
 
 class Rule(NamedTuple):
-    """Rule for the smoothing of some triangles of the file.
+    """Rule that says how finely some triangles of the file are divided.
 
     Attributes:
         triangles: marks the triangles, shape (m,).

@@ -1,5 +1,8 @@
 """Tell apart the edges of a part's surface: edges between the facets of a round, and creases.
 
+A round is a curved surface, such as a fillet, that the file divides into plane facets. A crease is
+an edge of the part itself.
+
 An angle alone cannot tell them apart: the facets of a coarse fillet turn by as much as the faces of
 a chamfer. A round shows by its neighbours: several facets beside each other turn in the same
 direction, with nearly the same curvature. An edge without such evidence is a crease.
@@ -49,7 +52,7 @@ FEW_EDGES = 64
 
 
 class Edges(NamedTuple):
-    """Edges of a closed surface.
+    """Edges of a closed surface, with their turns and lengths.
 
     Attributes:
         sides: the two sides at each edge, 3 t + k for side k of triangle t, shape (e, 2).

@@ -72,7 +72,7 @@ def valleys(edges: Edges, pieces: Pieces, is_crease: np.ndarray) -> np.ndarray:
 def find_continued(
     sides: np.ndarray, edges: Edges, facets: Facets, is_crease: np.ndarray, phi: np.ndarray
 ) -> np.ndarray:
-    """Return marks (e,) of the creases across which a round goes on, so that they are none.
+    """Return marks (e,) of supposed creases across which a round goes on.
 
     Args:
         sides: sides of the triangles, as vectors [m], shape (m, 3, 3).
