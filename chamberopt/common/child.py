@@ -168,7 +168,7 @@ def serve(folder: str) -> None:
 def interrupt_with_parent() -> None:
     """Wait in a thread for the end of the parent, then interrupt this process as Ctrl-C does.
 
-    The process is ended GRACE_S seconds later.
+    If the process still runs GRACE_S seconds later, it is ended.
     """
 
     def interrupt() -> None:

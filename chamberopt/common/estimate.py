@@ -235,7 +235,11 @@ def sum_of_shared(terms: Iterable[tuple[float, Estimate]]) -> tuple[float, ...]:
 
 
 def normal_quantile(confidence: float) -> float:
-    """Return the half-width of a two-sided normal interval, in standard errors."""
+    """Return the half-width of a two-sided normal interval, in standard errors.
+
+    Args:
+        confidence: probability of the interval, such as 0.95.
+    """
     from scipy.special import ndtri
 
     return float(ndtri(0.5 + confidence / 2.0))
@@ -246,6 +250,7 @@ def student_quantile(freedom: float, confidence: float = CONFIDENCE) -> float:
 
     Args:
         freedom: degrees of freedom.
+        confidence: probability of the interval, such as 0.95.
     """
     from scipy.special import stdtrit  # scipy.stats would take a second to import
 

@@ -208,7 +208,7 @@ def _empty(folder: Path, which: Callable[[str], bool]) -> None:
 
 
 def is_leftover(path: Path) -> bool:
-    """Return True if this is a plain file with a name that only killed commands leave."""
+    """Return True if this is a plain file whose name is one that killed commands leave behind."""
     return path.name.startswith(LEFTOVER_PREFIXES) and stat.S_ISREG(path.lstat().st_mode)
 
 
