@@ -194,9 +194,9 @@ def _middles(surface: Surface, sides: np.ndarray) -> tuple[np.ndarray, ...]:
 def _tilts(
     surface: Surface, sides: np.ndarray, normal: np.ndarray, e: np.ndarray, is_crease: np.ndarray
 ) -> np.ndarray:
-    """Return the vectors f of the module docstring for both sides of edges, (2, e, 3).
+    """Return the vectors f, (2, e, 3), that tilt the normals in the middles of edges.
 
-    At creases each side has its own shape operator W.
+    The module docstring gives f. At creases each side has its own shape operator W.
 
     Args:
         normal: vector of any length along the normal in the middle of the edges, shape (2, e, 3).

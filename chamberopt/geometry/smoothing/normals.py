@@ -106,9 +106,9 @@ class Pieces(NamedTuple):
         return np.asarray(np.bincount(self.number)[self.number] > 1)
 
     def around(self, triangle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the outer sides of the pieces of some triangles (r,).
+        """Return the outer sides of the pieces to which some triangles (r,) belong.
 
-        Returns the row in `triangle` for which each side was found, (k,), and the sides, (k,).
+        The first array has the row in `triangle` of each side, (k,), the second the sides, (k,).
         """
         outer = np.flatnonzero(~self.inner)
         outer = outer[np.argsort(self.number[outer // 3], kind="stable")]
@@ -145,7 +145,8 @@ def fit_phi(
 ) -> np.ndarray:
     """Return the angles phi (m, 3) [rad] that fit the turns of the edges best.
 
-    The module docstring defines phi. It is 0 off the fitted triangles.
+    phi is the angle from a triangle's normal to the normal of the smooth surface, in the middle of
+    each side. It is 0 off the fitted triangles.
 
     Args:
         is_crease: marks the creases, shape (e,).
@@ -203,12 +204,12 @@ def _straight_to_creases(
 
 
 def _rows(unknown: np.ndarray, sides: np.ndarray, factor: np.ndarray) -> csr_array:
-    """Return a sparse matrix of equations between the unknown phi of sides.
+    """Return a sparse matrix that multiplies the unknown angles phi of sides.
 
     Each row of `sides` (r, c) gives a row of the matrix, with the factors (r, c) of its sides.
 
     Args:
-        unknown: column of the phi of each side, -1 if that phi is not unknown, (3 m,).
+        unknown: column of the phi of each side, -1 if that phi is fixed at 0, (3 m,).
     """
     from scipy.sparse import csr_array
 
@@ -223,9 +224,10 @@ def _rows(unknown: np.ndarray, sides: np.ndarray, factor: np.ndarray) -> csr_arr
 def _bend_differences(
     facets: Facets, edges: Edges, smooth: np.ndarray, unknown: np.ndarray, apexes: np.ndarray
 ) -> list[csr_array]:
-    """Return the matrices that give l dS_ee, sqrt(l² + h²) dS_em and h dS_mm of smooth edges.
+    """Return the matrices that give the jumps of curvature across smooth edges.
 
-    They multiply the unknown phi. The module docstring explains the symbols.
+    They multiply the unknown angles phi, and give l dS_ee, sqrt(l² + h²) dS_em and h dS_mm. The
+    module docstring explains these symbols.
 
     At the apex of a cone the sum of both S_ee replaces the difference, because a cone is straight
     along its edges, and dS_em counts as zero.
@@ -259,9 +261,10 @@ def _bend_differences(
 def _solve(
     matrices: list[csr_array], right: list[np.ndarray], weights: list[np.ndarray], steps: int
 ) -> np.ndarray:
-    """Return the unknown phi that minimise the sum of the module docstring.
+    """Return the unknown angles phi [rad] that minimise a sum of weighted absolute values.
 
-    It is a sum of weighted absolute values: of turns, of bends (three rows each) and of creases.
+    The sum, which the module docstring gives, has terms for turns, for jumps of curvature (three
+    rows each) and for creases.
 
     The method is least squares whose weights are divided by the residuals of the previous step.
     """
@@ -294,14 +297,24 @@ def _solve(
 
 
 def phi_of_normals(facets: Facets, normals: np.ndarray) -> np.ndarray:
-    """Return the angles phi (m, 3) [rad] from facets to known normals (m, 3, 3) at the corners."""
+    """Return the angles phi (m, 3) [rad] from facets to the smooth surface with known normals.
+
+    Each is the angle in the middle of a side.
+
+    Args:
+        normals: unit normals of the smooth surface at the corners, (m, 3, 3).
+    """
     middle = normals + np.roll(normals, -1, axis=1)
     sine = np.einsum("mki,mki->mk", middle, facets.across)
     return np.asarray(np.arctan2(sine, np.einsum("mki,mi->mk", middle, facets.normal)))
 
 
 def shape_operators(facets: Facets, phi: np.ndarray) -> np.ndarray:
-    """Return the shape operator of each facet from its angles phi, shape (m, 3, 3) [1/m]."""
+    """Return the curvature tensor (shape operator) of each facet, shape (m, 3, 3) [1/m].
+
+    Args:
+        phi: angles from the facet to the smooth surface at its sides [rad], (m, 3).
+    """
     weight = facets.length * phi / facets.area[:, None]
     return np.asarray(np.einsum("mk,mki,mkj->mij", weight, facets.across, facets.across))
 
@@ -327,7 +340,7 @@ def corner_normals(
     """Return unit normals of the smooth surface at the corners of triangles, shape (m, 3, 3).
 
     Args:
-        phi: angles of the module docstring, shape (m, 3).
+        phi: angles from the facets to the smooth surface at their sides [rad], shape (m, 3).
         apex: marks vertices, shape (n,), at which each facet keeps its own normal.
     """
     lean = np.tan(phi)[..., None] * facets.across  # at the middles of the sides
