@@ -1,1 +1,1 @@
-"""Results folders: writing them and reading them back."""
+"""Write results folders, read them back, compare them, and simulate their replicas again."""

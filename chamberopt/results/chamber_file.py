@@ -1,4 +1,4 @@
-"""chamber.npz: cavity, part and target of a result, bit for bit as they were simulated.
+"""Read chamber.npz, which stores a result's cavity, part and target as they were simulated.
 
 A finished result reads only chamber.npz, never again the files that its design names.
 """
@@ -31,7 +31,7 @@ _Column: TypeAlias = tuple[str, np.ndarray, str, tuple[int, ...], tuple[int, int
 
 
 def load_chamber(result: Result) -> Chamber:
-    """Load the chamber of a result as it was simulated.
+    """Return the cavity, part and target of a result, read from chamber.npz in its folder.
 
     The whole chamber is checked, because compiled functions trust their input.
 

@@ -28,12 +28,12 @@ FIT_NAMES = "two parameters", "three parameters"
 
 
 def write_record(path: Path, record: Table) -> None:
-    """Write a record as JSON."""
+    """Write a record as a JSON file at `path`."""
     write_text(path, json.dumps(record.as_json(), indent=2, allow_nan=False) + "\n")
 
 
 class ArcHeight(Table):
-    """The arc height after a multiple of the saturation time."""
+    """The arc height of a virtual strip after a multiple of the saturation time."""
 
     times_saturation: float
     time_s: float
@@ -43,7 +43,10 @@ class ArcHeight(Table):
 
 
 class KirkFitRecord(Table):
-    """A curve through the five arc heights. Its formula is in peening/kirk_fit.py."""
+    """A saturation curve fitted to the five arc heights: its constants a, b and c and its result.
+
+    The formula is in peening/kirk_fit.py.
+    """
 
     a: float
     b: float
@@ -53,7 +56,7 @@ class KirkFitRecord(Table):
 
 
 class CurvePoint(Table):
-    """A point of the saturation curve."""
+    """A point of the drawn saturation curve: the arc height after one peening time."""
 
     time_s: float
     arc_height: float
@@ -61,7 +64,14 @@ class CurvePoint(Table):
 
 
 class StripRecord(Table):
-    """A virtual strip. Arc heights and the intensity are in `unit`."""
+    """The content of strip.json: a simulated Almen strip. Arc heights and intensity are in `unit`.
+
+    Args:
+        type: type of the strip.
+        place: where in the chamber the strip lies.
+        calibrated: True if the arc heights come from a calibrated model.
+        fits: fitted saturation curves by their number of parameters.
+    """
 
     format: int
     type: str
@@ -80,7 +90,7 @@ class StripRecord(Table):
 
 
 def strip_record(strip: VirtualStrip) -> StripRecord:
-    """The record of a peened strip."""
+    """Return the content of strip.json for a simulated Almen strip."""
     process = strip.setting.design.process
     heights = zip(MULTIPLES, strip.at, strip.heights, strict=True)
     curve = zip(strip.drawn_at, strip.drawn, strict=True)
@@ -133,7 +143,14 @@ class ParameterRecord(Table):
 
 
 class MisfitRecord(Table):
-    """The misfit between the model and the measurements of one kind."""
+    """The misfit between the model and all measurements of one kind.
+
+    Args:
+        chi2: sum of squared deviations, each over its standard deviation.
+        values: number of measured values.
+        error_scale: factor by which the stated errors were widened to explain the misfit.
+        explained: True if no widening was needed.
+    """
 
     kind: str
     chi2: float
@@ -143,7 +160,7 @@ class MisfitRecord(Table):
 
 
 class MeasuredRecord(Table):
-    """Measurements of one kind in one set-up, each with its prediction."""
+    """Measurements of one kind in one set-up, each with the calibrated model's prediction."""
 
     kind: str
     label: str
@@ -155,7 +172,15 @@ class MeasuredRecord(Table):
 
 
 class PredictionRecord(Table):
-    """A predicted figure of the design, with standard deviations of its logarithm."""
+    """A predicted figure of the design, with standard deviations of its logarithm.
+
+    Args:
+        log_sd_before: before the calibration.
+        log_sd: after the calibration.
+        log_noise: by the noise of the simulations alone.
+        next_measurement: the measurement that would leave the least standard deviation.
+        log_sd_after_next: the standard deviation that it would leave.
+    """
 
     value: float
     log_sd_before: float
@@ -166,7 +191,10 @@ class PredictionRecord(Table):
 
 
 class CalibrationRecord(Table):
-    """A calibration of the model to one machine. `machine` is the content of machine.toml."""
+    """The content of calibration.json: a calibration of the model to one peening machine.
+
+    `machine` is the content of machine.toml.
+    """
 
     format: int
     machine: dict[str, Any]
@@ -184,7 +212,7 @@ class CalibrationRecord(Table):
 def calibration_record(
     found: Calibrated, predictions: list[Prediction], notes: list[str]
 ) -> CalibrationRecord:
-    """The record of a calibration."""
+    """Return the content of calibration.json for a calibration and the figures it predicts."""
     posterior, prior = found.posterior, found.posterior.prior
     sd = [found.table.log_sd(name) for name in prior.names]
     return CalibrationRecord(
@@ -235,14 +263,14 @@ def calibration_record(
 
 
 class ReferenceRecord(Table):
-    """The reference run, with which all other runs are compared."""
+    """The settings of an accuracy study's reference run, with which all other runs are compared."""
 
     text: str
     settings: dict[str, Any]
 
 
 class ErrorLawRecord(Table):
-    """The law error = scale cost^-power. An infinite half-width is null."""
+    """The fitted curve error = scale · cost^-power. An infinite half-width of `power` is null."""
 
     scale: float
     power: float
@@ -250,7 +278,10 @@ class ErrorLawRecord(Table):
 
 
 class HalvingRecord(Table):
-    """The factor in cost that halves the error. Null if no cost halves the error."""
+    """The factor `times` in cost that halves the error, with its interval from low to high.
+
+    The numbers are null if no cost halves the error.
+    """
 
     times: float | None
     low: float | None
@@ -259,7 +290,7 @@ class HalvingRecord(Table):
 
 
 class RecommendationRecord(Table):
-    """The settings for one accuracy. 0 replicas if the accuracy is out of reach."""
+    """The recommended settings for one wanted accuracy. 0 replicas if it cannot be reached."""
 
     accuracy: float
     settings: dict[str, Any]
@@ -270,7 +301,10 @@ class RecommendationRecord(Table):
 
 
 class ConvergenceRecord(Table):
-    """A convergence study. Each row is a run or a number of replicas."""
+    """The content of accuracy.json: how the error of the figures falls with the simulation's cost.
+
+    Each row holds the settings and errors of one run, or of a number of replicas of one run.
+    """
 
     format: int
     reference: ReferenceRecord
@@ -285,7 +319,14 @@ class ConvergenceRecord(Table):
 
 
 class DifferenceRecord(Table):
-    """A difference to the first candidate, and the simulation time that would show it."""
+    """A figure of a later candidate minus that of the first, and what would prove the difference.
+
+    Args:
+        paired: True if replicas were compared pair by pair on the same seeds.
+        real: True if the difference is larger than its half-width.
+        times_as_long: factor in simulated time with which the difference would be real.
+        replicas: number of replicas with which the difference would be real.
+    """
 
     value: float | None
     half_width: float | None
@@ -297,7 +338,7 @@ class DifferenceRecord(Table):
 
 
 class HistogramRecord(Table):
-    """The share of each candidate in each bin."""
+    """A histogram with common bins: for each candidate, the share of its values in each bin."""
 
     unit: str
     edges: list[float]
@@ -305,7 +346,10 @@ class HistogramRecord(Table):
 
 
 class DistributionsRecord(Table):
-    """Distributions over the target. Means are null for a candidate without impacts."""
+    """Histograms of coverage, impact speed and impact angle on the target, for all candidates.
+
+    Means are null for a candidate without impacts.
+    """
 
     coverage: HistogramRecord
     normal_speed: HistogramRecord
@@ -316,7 +360,10 @@ class DistributionsRecord(Table):
 
 
 class LocalDifferenceRecord(Table):
-    """Shares of the target where a later candidate really covers more or less than the first."""
+    """Shares of the target's area where a later candidate covers more or less than the first.
+
+    Only differences beyond their 95 % interval count.
+    """
 
     share_more: float
     share_less: float
@@ -324,7 +371,7 @@ class LocalDifferenceRecord(Table):
 
 
 class ComparisonRecord(Table):
-    """Candidates side by side."""
+    """The content of compare.json: figures of candidates, and their differences to the first."""
 
     results: list[str]
     labels: list[str]
@@ -340,7 +387,13 @@ class ComparisonRecord(Table):
 def comparison_record(
     comparison: Comparison, spread: Distributions, local: list[LocalDifference]
 ) -> ComparisonRecord:
-    """The record of a comparison."""
+    """Return the content of compare.json.
+
+    Args:
+        comparison: figures and their differences.
+        spread: histograms over the target.
+        local: coverage of each later candidate minus that of the first, place by place.
+    """
     return ComparisonRecord(
         results=[str(result.folder) for result in comparison.results],
         labels=list(comparison.labels),
@@ -370,7 +423,7 @@ def comparison_record(
 
 
 def difference_record(gap: Difference) -> DifferenceRecord:
-    """The record of one difference."""
+    """Return a difference between two candidates in the form in which compare.json stores it."""
     return DifferenceRecord(
         **gap.estimate.interval_json(),
         paired=gap.paired,

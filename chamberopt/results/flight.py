@@ -1,4 +1,4 @@
-"""Some milliseconds of ball flight, frame by frame.
+"""Simulate some milliseconds of ball flight again and record them frame by frame.
 
 The simulator computes every position at the time of its frame. No position is interpolated.
 """
@@ -110,13 +110,19 @@ def simulate_flight(
 
 
 def face_displacement(vibration: Vibration, time: np.ndarray) -> np.ndarray:
-    """Displacement of a vibrating face [m], shape (f, 3), at times since the scene's start [s]."""
+    """Return the displacement of a vibrating face [m], shape (f, 3).
+
+    Times [s] count from the start of the simulation, before the warm-up.
+    """
     phase = 2.0 * math.pi * vibration.frequency * time + vibration.phase
     return np.asarray(np.sin(phase)[:, None] * vibration.peak)
 
 
 def rotation_angle(rotation: PartRotation | None, time: np.ndarray) -> np.ndarray:
-    """Angle of a part [rad], shape (f,), at times since the scene's start [s]. 0 if it is fixed."""
+    """Return the angle [rad] by which the part has turned, shape (f,). 0 if it is fixed.
+
+    Times [s] count from the start of the simulation, before the warm-up.
+    """
     if rotation is None:
         return np.zeros(len(time))
     if rotation.rpm is not None:
@@ -130,7 +136,15 @@ def rotation_angle(rotation: PartRotation | None, time: np.ndarray) -> np.ndarra
 def require_simulated(
     scene: Scene, start: float, span: float, frames: int, trail: int = TRAIL
 ) -> None:
-    """Raise InputError for frames outside a replica's recorded time, or for too many frames."""
+    """Raise InputError if frames are outside a replica's recorded time, or if there are too many.
+
+    Args:
+        scene: the replica.
+        start: time of the first frame after the warm-up [s].
+        span: time from the first to the last frame [s].
+        frames: number of frames.
+        trail: recorded positions of each ball per frame.
+    """
     duration, positions = scene.duration, trail * len(scene.balls)
     if not 0.0 <= start < duration:
         raise InputError(

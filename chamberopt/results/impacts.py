@@ -1,4 +1,4 @@
-"""Impacts of a result, simulated again.
+"""Simulate the replicas of a result again to get their impacts.
 
 A result does not store its impact logs. The same design, chamber and seed give the same impacts to
 the last bit. A command that needs impacts therefore simulates the replicas again. It compares the
@@ -92,7 +92,10 @@ def simulate_impacts(
 
 
 def replica_count(result: Result, replicas: int | None) -> int:
-    """Number of replicas to simulate, by default all. Raise InputError for 0 or too many."""
+    """Return `replicas`, or the number of all replicas of the result if it is None.
+
+    Raises InputError if `replicas` is below 1 or above the number of the result.
+    """
     there = result.record.replicas
     if replicas is not None and not 1 <= replicas <= there:
         raise InputError(f"--replicas: given {replicas}; the result has {there}, give 1 to {there}")
@@ -102,13 +105,15 @@ def replica_count(result: Result, replicas: int | None) -> int:
 def simulate_dents(
     replica: RebuiltReplica, time: float, progress: Callable[[float], None] = lambda seconds: None
 ) -> Dents:
-    """Dents of a replica, simulated for a time [s] that may exceed the recorded time.
+    """Simulate a replica for `time` [s] and return its dents on the part.
+
+    The time may exceed the recorded time.
 
     Args:
         progress: function that sim_core.simulate calls.
 
     Raises:
-        InputError: the time is too long, see require_dent_time.
+        InputError: the time is above MAX_SIMULATED_TREATMENT.
         sim_core.SimulationError: the simulation had to stop.
     """
     from sim_core import simulate
@@ -120,7 +125,7 @@ def simulate_dents(
 
 
 def require_dent_time(time: float) -> None:
-    """Raise InputError for a time [s] that is too long to simulate."""
+    """Raise InputError unless `time` [s] is above 0 and at most MAX_SIMULATED_TREATMENT."""
     if not 0.0 < time <= MAX_SIMULATED_TREATMENT:
         raise InputError(
             f"--at-s: given {time:g}; a dent map simulates all of it: more than 0, at most "
@@ -129,7 +134,10 @@ def require_dent_time(time: float) -> None:
 
 
 def simulation_seconds(replica: RebuiltReplica, time: float) -> float:
-    """Approximate run time [s] of simulating a replica for a time [s], from a short trial run."""
+    """Estimate how many seconds a simulation of `time` seconds of a replica will run.
+
+    The estimate comes from a short trial run.
+    """
     from sim_core import simulate
 
     scene, seconds = replica.scene, 0.0
@@ -141,7 +149,10 @@ def simulation_seconds(replica: RebuiltReplica, time: float) -> float:
 
 
 def dented_share(dents: Dents, chamber: Chamber) -> float:
-    """Share of the target inside dents, from sample points. Dents cover only what faces them."""
+    """Return the share of the target's area inside dents, from sample points on the target.
+
+    A dent covers only surface that faces it.
+    """
     from chamberopt.coverage.field.windows import Places, Windows
 
     if not len(dents):
@@ -160,14 +171,20 @@ def dented_share(dents: Dents, chamber: Chamber) -> float:
 
 
 def _replicas_ahead(result: Result) -> int:
-    """Number of replicas to begin ahead: one per core, fewer if the impact logs are long."""
+    """Return how many replicas may be simulated before the caller asks for their impacts.
+
+    This is one per core, fewer if the impact logs would fill the memory.
+    """
     part = load_part(result)
     impacts = float(part["impacts"].sum()) / result.record.replicas
     return max(0, min(core_count(), int(MAX_IMPACTS_IN_MEMORY / max(impacts, 1.0)) - 1))
 
 
 def _impact_log(setting: Any, seed: int) -> ImpactLog:
-    """Simulate one replica on a worker."""
+    """Simulate one replica on a worker and return its impact log.
+
+    `setting` is the design, the chamber, and the mesh or analytical cavity to simulate.
+    """
     design, chamber, mesh = setting
     return simulate_seed(design, chamber, mesh, seed).impacts
 

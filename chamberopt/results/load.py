@@ -91,7 +91,7 @@ class Result:
 
     @property
     def seeds(self) -> tuple[int, str]:
-        """The number process.seed and the name of the random stream."""
+        """The design's process.seed and the name of the random stream that seeds the replicas."""
         return self.record.seed, self.record.stream
 
     @property
@@ -100,7 +100,7 @@ class Result:
 
     @property
     def gauge_mm2(self) -> float:
-        """Area of the windows in which coverage is measured."""
+        """Area [mm²] of the windows in which coverage is measured."""
         return self.design.process.accuracy.gauge_mm2
 
     @property
@@ -176,7 +176,7 @@ def load_trials(folder: Path) -> list[dict[str, Any]]:
 
 
 def unchanged_file(folder: Path, name: str, sha256: Mapping[str, str]) -> Path:
-    """Path of a data file in a results folder. Raise InputError if its digest is wrong.
+    """Return the path of a data file in a results folder. Raise InputError if it was changed.
 
     Args:
         sha256: digest of each data file by its name, from result.json.
@@ -196,7 +196,7 @@ def unchanged_file(folder: Path, name: str, sha256: Mapping[str, str]) -> Path:
 
 
 def file_sha256(path: Path) -> str:
-    """Digest of a file. Raise InputError if the file cannot be read."""
+    """Return the sha256 digest of a file. Raise InputError if the file cannot be read."""
     try:
         with open_plain(path) as file:
             return hashlib.file_digest(file, "sha256").hexdigest()
@@ -207,17 +207,26 @@ def file_sha256(path: Path) -> str:
 
 
 def load_part(result: Result) -> Surface:
-    """Read part.vtp. Raise InputError if it is missing, damaged or from another result."""
+    """Read part.vtp of a result: the part's triangles with their values.
+
+    Raises InputError if the file is missing, damaged or from another result.
+    """
     return read_part(result.path(PART))
 
 
 def load_field(result: Result, part: Surface) -> Surface:
-    """Read coverage.vtp. Raise InputError as load_part does."""
+    """Read coverage.vtp of a result: a finer mesh of `part` with coverage at each vertex.
+
+    Raises InputError if the file is missing, damaged or from another result.
+    """
     return read_field(result.path(COVERAGE), part)
 
 
 def load_cavity(result: Result) -> Surface:
-    """Read chamber.vtp. Raise InputError as load_part does."""
+    """Read chamber.vtp of a result: the closed cavity.
+
+    Raises InputError if the file is missing, damaged or from another result.
+    """
     return read_surface(result.path(CHAMBER), ("tag",))
 
 
@@ -252,7 +261,10 @@ def read_field(path: Path, part: Surface) -> Surface:
 
 
 def summary(evaluation: Evaluation | Result) -> str:
-    """One line of text: the objective with its interval, and mean and spread of coverage."""
+    """Return a line of text with the objective, and with mean and standard deviation of coverage.
+
+    Each figure has its interval.
+    """
     mean, spread = (evaluation.metrics[name] for name in ("mean_coverage", "std_coverage"))
     name = evaluation.objective_name.replace("_", " ")
     shares = f"mean {estimate_text(mean, 100.0, '%')}   std {estimate_text(spread, 100.0, '%')}"
@@ -262,7 +274,7 @@ def summary(evaluation: Evaluation | Result) -> str:
 
 @contextmanager
 def _damage_explained(file: Path) -> Iterator[None]:
-    """Turn the errors of reading a result.json into InputError."""
+    """Turn errors in the enclosed code, which reads a result.json, into InputError."""
     try:
         yield
     except OSError as error:
@@ -301,6 +313,9 @@ def _of_another_format(file: Path, data: dict[str, Any]) -> InputError:
 
 
 def content_sha256(data: Mapping[str, Any]) -> str:
-    """Digest of a result.json without its key sha256. The order of keys does not matter."""
+    """Return the sha256 digest of the content of a result.json, without its key sha256.
+
+    The order of the keys does not matter.
+    """
     rest = {name: value for name, value in data.items() if name != "sha256"}
     return hashlib.sha256(json.dumps(rest, sort_keys=True).encode()).hexdigest()

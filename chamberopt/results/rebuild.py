@@ -1,4 +1,4 @@
-"""Replicas of a result, rebuilt to be simulated again bit for bit."""
+"""Rebuild the replicas of a result so that they can be simulated again bit for bit."""
 
 from __future__ import annotations
 
@@ -37,7 +37,11 @@ class RebuiltChamber:
 
 @dataclass(frozen=True)
 class RebuiltReplica:
-    """One replica of a result, ready to be simulated again. `cavity` is as in RebuiltChamber."""
+    """One replica of a result, ready to be simulated again.
+
+    cavity: analytical cavity that was simulated in place of the mesh; None if the mesh was.
+    scene: input of the simulator: cavity, balls, motions and seed.
+    """
 
     result: Result
     chamber: Chamber
@@ -99,13 +103,16 @@ def rebuild_replica(result: Result, number: int = 0) -> RebuiltReplica:
 
 
 def _identity(triangle: np.ndarray, speed: np.ndarray) -> np.ndarray:
-    """A number for each impact, shape (n,) int64, from its triangle and the bits of its speed."""
+    """Return a number for each impact, shape (n,) int64, from its triangle and its speed's bits.
+
+    Two impacts have the same number only if both agree.
+    """
     bits = speed.astype(np.float32).view(np.int32).astype(np.int64)
     return np.asarray((triangle.astype(np.int64) << 32) + bits)
 
 
 def made_by(result: Result) -> str:
-    """Text with the versions of the programs that made a result."""
+    """Return a text with the versions of the program, libraries and system that made a result."""
     made = result.record.versions
     names = ("chamberopt", "manifold3d", "numba", "numpy", "system")
     return ", ".join(f"{name} {made[name]}" for name in names if name in made)

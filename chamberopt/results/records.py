@@ -1,4 +1,4 @@
-"""The record of a result: the typed content of result.json.
+"""Define the typed content of result.json, the record of a result.
 
 Writers and readers of result.json share the fields of these classes. A results folder may come from
 another person, and its digests only prove that it is complete. The type of every value is therefore
@@ -52,7 +52,7 @@ class Table(BaseModel):
     model_config = ConfigDict(strict=True, allow_inf_nan=False)
 
     def as_json(self) -> dict[str, Any]:
-        """The table as JSON values, without the keys that its writer did not set."""
+        """Return the table as JSON values, without the keys that its writer did not set."""
         return self.model_dump(mode="json", exclude_unset=True)
 
 
@@ -104,7 +104,7 @@ else:  # an estimate is stored with fewer or more of its numbers, as readers nee
 
 
 def _with_units(metrics: dict[str, Estimate]) -> dict[str, dict[str, Any]]:
-    """Metrics as JSON values, each with its unit."""
+    """Return metrics as JSON values, each with its unit."""
 
     def unit(name: str) -> str:
         metric = find_metric(name)
@@ -176,7 +176,7 @@ class ZoneLimit(Table):
 
 
 class ZoneRecord(Table):
-    """A zone of the part, with its limits and whether they are met."""
+    """A zone of the part, with the limits that the design sets for it and whether they are met."""
 
     name: str
     triangles: Count
@@ -200,7 +200,15 @@ class ChamberRecord(Table):
 
 
 class AdviceRecord(Table):
-    """The advice of pilot runs on one effect, with the reason."""
+    """Whether pilot runs advise to simulate an optional physical effect, and the reason.
+
+    Args:
+        effect: name of the effect.
+        on: True if it should be simulated.
+        verdict: the advice in a few words.
+        said: the advice as one text.
+        changes: change of each figure by the effect.
+    """
 
     effect: str
     on: bool
@@ -210,7 +218,18 @@ class AdviceRecord(Table):
 
 
 class SliceRecord(Table):
-    """The model of a study's score along one parameter."""
+    """How a study's fitted model of the score depends on one parameter, at the best design.
+
+    Args:
+        flat: range or texts of the parameter for which the score loses no more than noise.
+        choices: allowed texts, for a parameter that is a choice.
+        share_of_variance: share of the score's variance that this parameter explains.
+        values: values of the parameter at which the curves are given.
+        mean: score at each value, with the other parameters as in the best design.
+        half_width: half-width of the score's interval at each value.
+        main_effect: score at each value, averaged over the other parameters.
+        or_worse: True where the model knows only that the score is no better than the mean.
+    """
 
     flat: Ends
     choices: list[str] = []
@@ -324,7 +343,7 @@ class StudyRecord(Table):
 
 
 class ToleratedRange(Table):
-    """A number with a tolerance, and the changed value that was also simulated."""
+    """A number of the design with its tolerance, and the changed value that was also simulated."""
 
     low: int | float
     nominal: int | float
@@ -354,7 +373,14 @@ class ToleratedFigureRecord(Table):
 
 
 class TolerancesRecord(Table):
-    """Figures over the box that the tolerances of all numbers span."""
+    """How figures vary while all toleranced numbers of the design vary within their tolerances.
+
+    Args:
+        box: the toleranced numbers with their ranges, by dotted name.
+        worst_for: figure that is lowest in the worst corner. Empty if no figure is resolved.
+        corner: values of the numbers in the worst corner.
+        figures: each figure's spread, by name.
+    """
 
     box: dict[str, ToleratedRange]
     worst_for: str
@@ -394,7 +420,7 @@ class ResultRecord(Table):
 
 
 class SweepFacts(Table):
-    """A sweep, in numbers."""
+    """What a sweep varied, how many candidates it simulated, and its best candidate."""
 
     objective: str
     vary: dict[str, Ends]

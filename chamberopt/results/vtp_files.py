@@ -95,7 +95,10 @@ def read_arrays(path: Path) -> SurfaceArrays:
 
 
 def _surface(piece: ElementTree.Element, most: int) -> SurfaceArrays:
-    """Check and convert a surface. Points and triangles may take `most` bytes together."""
+    """Return the checked surface of a Piece element of a .vtp file.
+
+    Points and triangles together may take `most` bytes.
+    """
     count, faces = _count(piece, "NumberOfPoints"), _count(piece, "NumberOfPolys")
     if not count or not faces:
         raise DamagedSurfaceError("no triangles could be read")
@@ -137,7 +140,10 @@ def _count(piece: ElementTree.Element, name: str) -> int:
 def _columns(
     piece: ElementTree.Element, place: str, rows: int, others: dict[str, int] | None = None
 ) -> dict[str, np.ndarray]:
-    """Arrays of one XML element by name. `others` gives the arrays with another number of rows."""
+    """Return the arrays inside the XML element `place` by name, each with `rows` rows.
+
+    `others` gives the number of rows of the arrays that have another number.
+    """
     found: dict[str, np.ndarray] = {}
     for one in piece.iterfind(f"./{place}/DataArray"):
         name = one.get("Name", "")
@@ -148,7 +154,7 @@ def _columns(
 
 
 def _array(element: ElementTree.Element, rows: int) -> np.ndarray:
-    """One array, shape (rows,) or (rows, components)."""
+    """Return the numbers of a DataArray element, shape (rows,) or (rows, components)."""
     name, parts = element.get("Name", "")[:40], element.get("NumberOfComponents", "1")
     kind = TYPES.get(element.get("type", ""))
     if kind is None or parts not in "123456789" or element.get("format") != "binary":
@@ -159,7 +165,10 @@ def _array(element: ElementTree.Element, rows: int) -> np.ndarray:
 
 
 def _unpacked(text: str, name: str, size: int) -> bytes:
-    """Unpack the bytes of an array. Raise DamagedSurfaceError unless there are `size` bytes."""
+    """Return the bytes of the array `name`, decoded from base64 and unpacked.
+
+    Raises DamagedSurfaceError unless there are `size` bytes.
+    """
     packed = "".join(text.split())
     try:
         count = int(np.frombuffer(base64.b64decode(packed[:8])[:4], HEADER)[0])
@@ -340,7 +349,7 @@ def read_surface(path: Path, cells: Sequence[str] = (), points: Sequence[str] = 
 
 
 def size_text(surface: Surface) -> str:
-    """Length, width and height of a surface, as text."""
+    """Return the length, width and height of a surface [mm] as text."""
     x, y, z = np.ptp(np.reshape(surface.bounds, (3, 2)), axis=1)
     return f"{x:.4g} × {y:.4g} × {z:.4g} mm"
 

@@ -110,7 +110,11 @@ def write_sweep(folder: Path, sweep: SweepResult) -> SweepRecord:
 
 
 def best_row_note(sweep: SweepResult) -> str:
-    """Explain why the figures of the best row of a sweep are too good, or why there is none."""
+    """Return a note on a sweep's best candidate.
+
+    It says that the candidate's figures are too good, or why there is none if no candidate meets
+    the constraints.
+    """
     if sweep.best is None:
         return (
             "no candidate meets the constraints, so there is no best.toml: loosen the constraints "
@@ -148,7 +152,7 @@ def write_result(
 
 
 def advice_record(advice: Advice) -> AdviceRecord:
-    """The record of an advice on an effect."""
+    """Return advice on an optional physical effect in the form in which result.json stores it."""
     return AdviceRecord(
         effect=advice.effect,
         on=advice.on,
@@ -159,7 +163,10 @@ def advice_record(advice: Advice) -> AdviceRecord:
 
 
 def data_digests(folder: Path) -> dict[str, str]:
-    """Digest of each data file of a results folder, without pictures, which no code reads."""
+    """Return the sha256 digest of each data file of a results folder, by name.
+
+    Pictures are left out, because no code reads them.
+    """
     files = (one for one in sorted(folder.iterdir()) if one.is_file())
     skipped = RESULT, ".png"
     return {
@@ -215,7 +222,10 @@ def _write_candidate(folder: Path, candidate: CandidateResult, **more: Any) -> C
 
 
 def _about_zones(design: Design, chamber: Chamber, evaluation: Evaluation) -> list[ZoneRecord]:
-    """Records of the zones, with their limits. The figures of zones are among the metrics."""
+    """Return the records of the part's zones, with their limits and whether they are met.
+
+    The figures of zones are among the metrics.
+    """
     judged = judge_zones(design, evaluation.metrics)
     return [
         ZoneRecord(
@@ -230,7 +240,10 @@ def _about_zones(design: Design, chamber: Chamber, evaluation: Evaluation) -> li
 
 
 def _about_field(design: Design, evaluation: Evaluation) -> FieldRecord:
-    """Record of the windows that measure coverage, with the figures in windows twice as wide."""
+    """Return the record of the windows in which coverage is measured.
+
+    It also holds the figures in windows of twice the width.
+    """
     found = evaluation.resolution
     return FieldRecord(
         gauge_mm2=design.process.accuracy.gauge_mm2,
@@ -251,12 +264,12 @@ def _about_field(design: Design, evaluation: Evaluation) -> FieldRecord:
 
 
 def _number(value: float) -> float | None:
-    """The value, or None for infinity, which JSON does not have."""
+    """Return the value. Return None in place of infinity, which JSON does not have."""
     return value if math.isfinite(value) else None
 
 
 def study_record(result: StudyResult) -> StudyRecord:
-    """The record of a finished study."""
+    """Return the key `study` of result.json for a finished study."""
     study, replicas = result.study, result.best.evaluation.replicas
     search = [trial for trial in result.trials if trial.stage == "search"]
     more: dict[str, Any] = {}
@@ -323,7 +336,7 @@ def _about_model(found: Sensitivity) -> ModelRecord:
 
 
 def _about_front(result: StudyResult) -> list[FrontPoint]:
-    """The confirmed Pareto front, in falling order of the first objective."""
+    """Return the points of the Pareto front that were confirmed, best first objective first."""
     names = result.study.objective.goals
     points = pareto.pareto_points(result)
     front = [one for one in points if one.on_front and one.stage == "confirm"]

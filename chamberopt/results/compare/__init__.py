@@ -1,1 +1,1 @@
-"""Comparison of candidates, figure by figure and place by place."""
+"""Compare candidates: their figures, and their coverage at each place of the target."""

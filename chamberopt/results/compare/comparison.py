@@ -40,7 +40,7 @@ def require_several(paths: Sequence[Path]) -> None:
 
 
 def require_same_time(paths: Sequence[Path], designs: Sequence[Design]) -> None:
-    """Raise InputError if treatment times differ."""
+    """Raise InputError if candidates were peened for different treatment times."""
     first = designs[0].process.treatment_time_s
     for path, design in zip(paths, designs, strict=True):
         seconds = design.process.treatment_time_s
@@ -164,7 +164,9 @@ def compare(paths: Sequence[str | Path]) -> Comparison:
 
 
 def comparison_of(results: Sequence[Result], names: Sequence[str]) -> Comparison:
-    """Compare results under these names. Raise InputError as `compare` does.
+    """Compare loaded results with the first of them. `names` are their names in the comparison.
+
+    Raises InputError if parts, targets, windows, treatment times or calibrations differ.
 
     Results on the same seeds are compared replica by replica. Other results are compared as
     independent samples (Welch).
@@ -198,7 +200,7 @@ def comparison_of(results: Sequence[Result], names: Sequence[str]) -> Comparison
 
 
 def part_unit(result: Result) -> str:
-    """The unit in which the part's file was read."""
+    """Return the unit of length in which the part's file was read."""
     return result.record.part_unit or result.design.part.unit
 
 
@@ -215,12 +217,15 @@ def _difference(name: str, first: Result, other: Result, confidence: float) -> D
 
 
 def _metal(design: Design) -> tuple[Any, ...]:
-    """Key of the part's metal. Results with equal keys share its error in Estimate.shared."""
+    """Return a key that is equal for results with the same part material, ball density and sizes.
+
+    Such results share the error of the dent size, so it cancels in their difference.
+    """
     return design.materials.part, design.shot.density, set(design.shot.diameters)
 
 
 def labels(paths: Sequence[Path]) -> tuple[str, ...]:
-    """The last names of each path, as few as make it unique."""
+    """Return a short label for each path: as few of its last folder names as make it unique."""
     resolved = [path.resolve() for path in paths]
     for depth in range(1, max(len(path.parts) for path in resolved) + 1):
         names = tuple("/".join(path.parts[-depth:]) for path in resolved)
@@ -230,7 +235,10 @@ def labels(paths: Sequence[Path]) -> tuple[str, ...]:
 
 
 def _differing_values(results: Sequence[Result]) -> dict[str, tuple[Any, ...]]:
-    """Design values that differ between the results, by dotted name. Missing values are None."""
+    """Return the design values that differ between the results, by dotted name.
+
+    A value that a result lacks is None.
+    """
     designs = [_design_values(result) for result in results]
     # v0_for repeats the values of v0_m_s, the ball, the hardness and C0.
     all_names = (name for design in designs for name in design)
@@ -243,7 +251,11 @@ def _differing_values(results: Sequence[Result]) -> dict[str, tuple[Any, ...]]:
 
 
 def _design_values(result: Result) -> dict[str, Any]:
-    """All values of a result's design, and settings of the result that its design lacks."""
+    """Return all values of a result's design by dotted name.
+
+    The number of replicas, the digest of a custom shape and whether the cavity is analytical are
+    added from the result.
+    """
     values = _flattened(result.design.model_dump(mode="json", exclude={"part": {"mesh", "unit"}}))
     for name in STOPPING_RULES:
         values.pop(name, None)
@@ -258,7 +270,7 @@ def _design_values(result: Result) -> dict[str, Any]:
 
 
 def _flattened(table: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
-    """Nested tables and lists of tables as a single table with dotted names."""
+    """Return nested tables and lists of tables as a single table with dotted names."""
     flat: dict[str, Any] = {}
     for name, value in table.items():
         if isinstance(value, list | tuple) and any(isinstance(one, Mapping) for one in value):

@@ -1,4 +1,4 @@
-"""Difference of a figure between two candidates, and the replicas that would show it is real."""
+"""Subtract a figure of two candidates, and find how many replicas would prove the difference."""
 
 from __future__ import annotations
 
@@ -53,12 +53,12 @@ class Difference:
 
     @property
     def estimate(self) -> Estimate:
-        """The difference with its interval."""
+        """The difference as an Estimate, with its interval and words."""
         return Estimate(self.value, self.half_width, in_words=self.in_words)
 
 
 def confidence_of_each(comparisons: int) -> float:
-    """Confidence of each interval with which all intervals hold together with 95 %.
+    """Return the confidence of each of several intervals so that all hold together with 95 %.
 
     Source: Bonferroni's inequality, O. J. Dunn, "Multiple comparisons among means",
     J. Am. Stat. Assoc. 56 (1961) 52.
@@ -69,7 +69,7 @@ def confidence_of_each(comparisons: int) -> float:
 def difference(
     after: Estimate, before: Estimate, same_seeds: bool, confidence: float = CONFIDENCE
 ) -> Difference:
-    """The difference `after` - `before` with its interval.
+    """Return the difference `after` - `before` with its interval.
 
     Replicas are compared pair by pair if both results have the same seeds and number of replicas.
     """
@@ -98,7 +98,10 @@ def difference(
 
 
 def _paired_half_width(gap: Estimate, confidence: float) -> Callable[[float], float]:
-    """The half-width as a function of the number of pairs over the present number."""
+    """Return a function that predicts the half-width of a paired difference.
+
+    Its argument is the number of pairs over the present number of pairs.
+    """
     count, deviation = len(gap.pseudovalues), float(np.std(gap.pseudovalues, ddof=1))
     return lambda ratio: (
         student_quantile(count * ratio - 1.0, confidence) * deviation / math.sqrt(count * ratio)
@@ -106,9 +109,9 @@ def _paired_half_width(gap: Estimate, confidence: float) -> Callable[[float], fl
 
 
 def _smallest_number(half_width: Callable[[float], float], count: int, gap: float) -> int | None:
-    """The smallest number of replicas above `count` whose half-width is below the gap.
+    """Return the smallest number of replicas above `count` with a half-width below `gap`.
 
-    None if the number exceeds MAX_TIME_RATIO * count.
+    None if MAX_TIME_RATIO * count replicas are not enough.
     """
     low, high = count, MAX_TIME_RATIO * count
     if half_width(high) >= gap:

@@ -49,7 +49,7 @@ class Distributions:
 
 
 def distributions(candidates: Sequence[TargetSurface]) -> Distributions:
-    """Compute the distributions of results with the same part and target."""
+    """Return histograms of coverage, impact speed and angle for results with the same target."""
     speeds = [one.hits.speed.astype(float) for one in candidates]
     angles = [one.hits.angle.astype(float) for one in candidates]
     top_speed = max([0.1, *(float(np.quantile(one, 0.999)) for one in speeds if len(one))])
@@ -64,7 +64,7 @@ def distributions(candidates: Sequence[TargetSurface]) -> Distributions:
 
 
 def _coverage_histogram(candidates: Sequence[TargetSurface]) -> Histogram:
-    """Histogram of the target's area by coverage in per cent."""
+    """Return a histogram, for each candidate, of the target's area by coverage in per cent."""
     values = [100.0 * one.coverage for one in candidates]
     low = 5.0 * np.floor(min(one.min() for one in values) / 5.0)
     high = 5.0 * np.ceil(max(one.max() for one in values) / 5.0)
@@ -77,7 +77,10 @@ def _coverage_histogram(candidates: Sequence[TargetSurface]) -> Histogram:
 
 
 def _impact_histogram(unit: str, edges: np.ndarray, columns: Sequence[np.ndarray]) -> Histogram:
-    """Histogram of impacts. Values beyond the last edge count in the last bin."""
+    """Return a histogram of each column of impact values, in shares of its number of impacts.
+
+    Values beyond the last edge count in the last bin.
+    """
     shares = [
         np.histogram(np.minimum(one, edges[-1]), edges)[0] / max(1, len(one)) for one in columns
     ]

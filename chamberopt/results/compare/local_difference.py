@@ -1,4 +1,4 @@
-"""Differences in coverage between two candidates at each place of the target."""
+"""Subtract the coverage of two candidates at each place of the target."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ NEAREST = 3  # nearest examined vertices with a similar normal; they give the va
 
 @dataclass(frozen=True)
 class TargetSurface:
-    """The field of a result on the target.
+    """Coverage and impacts of a result on the target, as its folder stores them.
 
     Args:
         corners: corners of the part's triangles in the chamber [mm], shape (m, 3, 3).
@@ -50,7 +50,11 @@ class TargetSurface:
     hits: Hits
 
     def at(self, other: TargetSurface) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Coverage, interval and `resolved` at the vertices of another result."""
+        """Return this result's coverage, interval and `resolved` at the vertices of another.
+
+        Each value is a mean over this result's nearest vertices with a similar normal, weighted by
+        inverse distance.
+        """
         from scipy.spatial import cKDTree
 
         place, normal = self._moved(other)
@@ -69,7 +73,7 @@ class TargetSurface:
         return coverage, interval, resolved > 0.5
 
     def _moved(self, other: TargetSurface) -> tuple[np.ndarray, np.ndarray]:
-        """Vertices and normals of another result, moved to the pose of the part in this result.
+        """Return another result's vertices and normals, moved to this result's pose of the part.
 
         The rotation fits the triangles of one result to the triangles of the other
         (W. Kabsch, Acta Cryst. A32 (1976) 922).
@@ -83,7 +87,10 @@ class TargetSurface:
 
 
 def read_target_surface(result: Result) -> TargetSurface:
-    """Read the target of a result. Raise InputError if files are missing or damaged."""
+    """Read coverage and impacts of a result on its target.
+
+    Raises InputError if files are missing or damaged.
+    """
     part = load_part(result)
     field = load_field(result, part)
     triangles = np.asarray(field.regular_faces)[np.asarray(field["target"]) > 0]
@@ -136,7 +143,7 @@ class LocalDifference:
 
 
 def local_difference(first: TargetSurface, other: TargetSurface) -> LocalDifference:
-    """Compute `other` - `first` for two results of the same part and target.
+    """Return coverage of `other` minus coverage of `first`, two results with the same target.
 
     Both coverages are averaged over the same discs, wide enough for DENTS dents. The interval of
     the difference follows from the intervals of the two coverages, which assume independent dents.
@@ -160,7 +167,10 @@ def local_difference(first: TargetSurface, other: TargetSurface) -> LocalDiffere
 
 
 def _averages(surface: TargetSurface, radius: float) -> Callable[[np.ndarray], np.ndarray]:
-    """A function that averages values (v,) over a disc round each place, on similar normals."""
+    """Return a function that averages values, shape (v,), over a disc round each vertex.
+
+    Vertices with another direction of the normal are left out. The radius is in mm.
+    """
     if radius == 0.0:
         return np.asarray
     from scipy.spatial import cKDTree
