@@ -244,7 +244,13 @@ def show(result: Result, screenshot: str | Path | None = None) -> None:
 
 
 def _require(name: str, given: object, kind: type, source: str) -> None:
-    """Raise InputError unless the argument is of this kind. A path is a common mistake."""
+    """Raise InputError unless an argument has the type `kind`. A path is a common mistake.
+
+    Args:
+        name: name of the argument.
+        given: its value.
+        source: function of this package that returns such a value.
+    """
     if not isinstance(given, kind):
         raise InputError(
             f"{name}: given {given!r}; give a {kind.__name__}, as chamberopt.{source} returns it"

@@ -1,1 +1,1 @@
-"""Documents: the sentences, tables and charts about a result, in a file for each capability."""
+"""Write what is said of a result: sentences, tables and charts, in a file for each subject."""

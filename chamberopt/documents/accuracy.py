@@ -1,4 +1,4 @@
-"""Text about a convergence study: its reference, the error law, biases, recommendations."""
+"""Text about an accuracy study: how the error of the figures falls with the simulation's cost."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def accuracy_lines(study: ConvergenceStudy) -> list[str]:
-    """Lines that the command `accuracy` prints."""
+    """Return the lines that the command `accuracy` prints about a study."""
     lines = [
         describe_reference(study),
         "",
@@ -48,7 +48,10 @@ def _signed(bias: Estimate) -> str:
 
 
 def describe_reference(study: ConvergenceStudy) -> str:
-    """Sentence with the settings and estimates of the reference."""
+    """Return a sentence with the settings and estimates of the reference run.
+
+    All other runs of the study are compared with this run.
+    """
     run = study.reference
     settings = ", ".join(
         f"{short_name(name)} {setting_text(value)}" for name, value in study.settings.items()
@@ -63,7 +66,10 @@ def describe_reference(study: ConvergenceStudy) -> str:
 
 
 def describe_error_law(study: ConvergenceStudy) -> str:
-    """Sentence with the cost of halving the error, and the reason if the factor is not 4."""
+    """Return a sentence with the factor in cost that halves the error.
+
+    It gives a reason if the factor is not the 4 of independent replicas.
+    """
     law, sizes = study.law, study.sizes
     middle, low, high = law.halving
     unresolved = [str(size.replicas) for size in sizes if not size.is_resolved]

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def answer(result: Result, start: Result | None, gain: Estimate | None) -> str:
-    """The answer in one sentence, with its uncertainty.
+    """Return the answer of a result in one sentence, with its uncertainty.
 
     Study: the objective of start and best, and whether the change is more than noise.
     Simulation: the coverage.
@@ -67,7 +67,10 @@ def answer(result: Result, start: Result | None, gain: Estimate | None) -> str:
 
 
 def answer_lines(result: Result) -> list[AnswerLine]:
-    """Sentences on zones, on constraints, and on doubts about the calibration."""
+    """Return sentences that qualify the answer.
+
+    They tell which limits of zones and constraints are met, and doubts about the calibration.
+    """
     lines = [*zone_lines(result), *_constraint_lines(result)]
     calibration = result.design.calibration
     doubts = [*misfit_texts(calibration), calibration.not_mmA] if calibration else []
@@ -77,7 +80,7 @@ def answer_lines(result: Result) -> list[AnswerLine]:
 
 
 def _constraint_lines(result: Result) -> Iterator[AnswerLine]:
-    """Sentences on violated constraints of the best, the start and candidates better than the best.
+    """Yield sentences on constraints that the best, the start or a better candidate violates.
 
     Limits of the best design's zones are left out, because zone_lines speaks of them.
     """
@@ -103,7 +106,7 @@ def _constraint_lines(result: Result) -> Iterator[AnswerLine]:
 
 
 def full_coverage(result: Result) -> str:
-    """Half a sentence with the time at which 95 % of the target's area is covered to 98 %."""
+    """Return half a sentence with the time at which 95 % of the target's area is 98 % covered."""
     time = result.metrics.get("time_to_98_s")
     if time is None:
         return "this older result does not say when it would be covered to 98 %"

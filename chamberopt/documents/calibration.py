@@ -31,7 +31,10 @@ FAR = 3.0  # standard deviations from the prior mean
 
 
 def calibration_lines(found: Calibrated, predictions: Sequence[Prediction]) -> list[str]:
-    """Lines that `calibrate` prints: parameters, misfits, predictions, the next measurement."""
+    """Return the lines that the command `calibrate` prints.
+
+    They give the parameters, the misfits, the predictions and the most useful next measurement.
+    """
     prior, table = found.posterior.prior, found.table
     lines = [f"{'parameter':32}{'before':>20}{'now':>20}    (median ± standard deviation)"]
     for k, name in enumerate(prior.names):
@@ -61,7 +64,7 @@ def calibration_lines(found: Calibrated, predictions: Sequence[Prediction]) -> l
 
 
 def calibration_notes(found: Calibrated) -> list[str]:
-    """Cautions to read before trusting the calibration."""
+    """Return cautions to read before trusting the calibration."""
     kinds, prior = {one.kind for one in found.data}, found.posterior.prior
     off = np.abs(found.posterior.mean - prior.mean) / prior.sd
     texts = [
@@ -108,7 +111,10 @@ def _value(log_mean: float, log_sd: float, unit: str) -> str:
 
 
 def _percent(log_sd: float) -> str:
-    """A standard deviation of a logarithm as percent. A large one is a factor or "not known"."""
+    """Return a standard deviation of a logarithm as text in per cent.
+
+    Above 0.5 the text is a factor, and above UNKNOWN it is "not known".
+    """
     if log_sd > UNKNOWN:
         return "not known"
     if log_sd > 0.5:

@@ -14,7 +14,10 @@ HEADER = ("difference", "real", "to know: simulate")
 
 
 def comparison_text(comparison: Comparison) -> str:
-    """A single table for two candidates. For more, a table of figures, then of differences."""
+    """Return the comparison as text: design values that differ, figures and differences.
+
+    Two candidates share a single table. For more, a table of differences follows the figures.
+    """
     first, *later = comparison.labels
     rows = [
         [name, *(_shown(value) for value in values)]
@@ -43,7 +46,7 @@ def comparison_text(comparison: Comparison) -> str:
 
 
 def _legend(comparison: Comparison) -> list[str]:
-    """Lines that explain the table."""
+    """Return lines that explain the signs and words of the tables."""
     first, *later = comparison.labels
     lines = [
         "(±: 95 % interval. real: the difference is larger than its interval, which holds for each "
@@ -78,7 +81,10 @@ def _legend(comparison: Comparison) -> list[str]:
 
 
 def _cells(gap: Difference) -> list[str]:
-    """Cells of a difference: its value, whether it is real, and the replicas that would show it."""
+    """Return the three cells of a difference in a table.
+
+    They are its value, whether it is more than noise, and the replicas that would prove it.
+    """
     shown = estimate_text(Estimate(gap.value, gap.half_width, in_words=gap.in_words), sign=True)
     if gap.half_width == 0.0 and not gap.in_words:
         return [shown, "exact", ""]
@@ -100,7 +106,7 @@ def _shown(value: object) -> str:
 
 
 def _aligned(rows: Sequence[Sequence[str]]) -> list[str]:
-    """Align the cells of rows. The first row is the header."""
+    """Return the rows as lines of text with aligned columns. The first row is the header."""
     count = max(map(len, rows))
     whole = [[*row, *[""] * (count - len(row))] for row in rows]
     widths = [max(len(row[i]) for row in whole) for i in range(count)]

@@ -41,7 +41,10 @@ class Figure:
 
 
 def figures(result: Result, start: Result | None) -> list[Figure]:
-    """The objective and the metrics, without metrics of zones and the objective's own metric."""
+    """Return the figures of a result: its objective, then its metrics.
+
+    Metrics of zones, and a metric that is the objective itself, are left out.
+    """
     label = objective_label(result.objective_name)
     before = None if start is None else start.objective
     entries = [(result.objective_name, label, result.objective, before)]
@@ -59,7 +62,10 @@ def figures(result: Result, start: Result | None) -> list[Figure]:
 
 
 def change(after: Estimate, before: Estimate, result: Result, start: Result) -> Estimate:
-    """The difference, from pairs of replicas if both results ran on the same seeds."""
+    """Return `after` - `before`, a figure of the result and of its start, with its interval.
+
+    Replicas are compared pair by pair if both results have the same seeds, else as independent.
+    """
     if after == before:  # the start is the best: the change is exactly 0
         return Estimate(0.0, 0.0) if after.has_number else Estimate(0.0, 0.0).not_known("not known")
     same_seeds = result.seeds == start.seeds
@@ -68,7 +74,7 @@ def change(after: Estimate, before: Estimate, result: Result, start: Result) -> 
 
 
 def tiles(shown: Sequence[Figure]) -> Tiles:
-    """The objective and the main metrics."""
+    """Return the objective and the main metrics as large numbers for the head of a report."""
     chosen = [shown[0], *(one for one in shown[1:] if one.name in SHOWN_AS_TILES)]
     return Tiles(
         [
@@ -85,7 +91,10 @@ def tiles(shown: Sequence[Figure]) -> Tiles:
 def coverage_section(
     shown: Sequence[Figure], of: Mapping[str, Result], scenes: Mapping[str, PartScene]
 ) -> Section:
-    """Section with figures, their windows, and coverage over area and over time.
+    """Return the report's section on coverage.
+
+    It has the figures, the windows in which coverage is measured, and charts of coverage over area
+    and over time.
 
     Args:
         of: results by name: the start, if there is one, then the result.
@@ -147,7 +156,7 @@ def _compared(shown: Sequence[Figure]) -> Table:
 
 
 def _standing(changed: Estimate) -> str:
-    """A word for a change: "exact", "yes" if it is more than noise, or "no"."""
+    """Return whether a change is real: "exact" without noise, "yes" beyond its interval, or "no"."""
     if changed.half_width == 0.0 and not changed.in_words:
         return "exact"
     return "yes" if abs(changed.value) > changed.half_width else "no"
@@ -164,7 +173,10 @@ def _over_time(curves: Mapping[str, Sequence[CoverageAtTime]], treatment_time: f
 
 
 def _windows(field: FieldRecord) -> tuple[Sentence, Fold]:
-    """Text about the windows that measure coverage, and figures of windows twice as wide."""
+    """Return a sentence on the windows in which coverage is measured, and a table to unfold.
+
+    The table has the same figures in windows twice as wide.
+    """
     text = (
         f"Coverage is the share dented in a window of {plain(field.gauge_mm2)} mm² round each "
         f"point of the target. The median window has {plain(field.dents_in_median_window, 2)} "

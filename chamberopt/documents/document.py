@@ -146,12 +146,12 @@ class Document:
 
     @property
     def scenes(self) -> list[PartScene]:
-        """The parts in three dimensions."""
+        """All parts that the document shows in three dimensions."""
         views = (one for one in self.blocks() if isinstance(one, PartView))
         return [scene for view in views for scene in view.scenes]
 
     def blocks(self) -> Iterator[Block]:
-        """Every block, also the blocks inside other blocks."""
+        """Yield every block of the document, also the blocks inside other blocks."""
         for section in self.sections:
             yield from _inside(section.content)
 

@@ -1,4 +1,4 @@
-"""The report of a result as a document."""
+"""Compose the report of a result as a document, which a printer turns into a page."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ COLLISIONS = {
 
 
 def report(folder: str | Path) -> Document:
-    """The report of a results folder.
+    """Return the report of a results folder as a document.
 
     Raises:
         InputError: the folder is no finished result.
@@ -117,12 +117,12 @@ def report(folder: str | Path) -> Document:
 
 
 def notes_of(result: Result) -> list[str]:
-    """The notes of the study and of the evaluation."""
+    """Return the notes of a result: those of the study, if it is one, then of the simulation."""
     return [*(result.study.notes if result.study else ()), *result.notes]
 
 
 def limits_of_intervals(result: Result) -> str:
-    """Sentence on errors that the intervals of a result do not cover."""
+    """Return a sentence on errors that the intervals of a result do not cover."""
     return LIMITS_OF_INTERVALS if result.design.calibration is None else LIMITS_OF_CALIBRATED
 
 
@@ -147,7 +147,7 @@ def _accuracy_and_cost(result: Result, trials: Sequence[Mapping[str, Any]]) -> S
 
 
 def _accuracy(result: Result) -> dict[str, str]:
-    """Rows on the intervals of the answer, and the replicas behind the intervals."""
+    """Return rows on the intervals of the main figures and on the replicas behind them."""
     objective, mean = objective_label(result.objective_name), metric_label("mean_coverage")
     record, field = result.record, result.record.field
     needed = field.simulated_s_needed.p05_times_intensity
@@ -173,7 +173,7 @@ def _accuracy(result: Result) -> dict[str, str]:
 
 
 def _cost_of_answer(result: Result) -> dict[str, str]:
-    """Rows on simulated time, collisions and run time of the result itself."""
+    """Return rows on simulated time, collisions and run time of the result's own simulation."""
     record, collisions = result.record, result.record.collisions
     kinds = [
         f"{_count(collisions[name])} {kind}"
@@ -188,7 +188,7 @@ def _cost_of_answer(result: Result) -> dict[str, str]:
 
 
 def _cost_of_study(study: StudyRecord, trials: Sequence[Mapping[str, Any]]) -> dict[str, str]:
-    """Rows on the evaluations of the study, and the run time of all evaluations."""
+    """Return rows with the numbers of the study's evaluations, and the run time of all."""
     return {
         "in the search": _count(study.evaluations),
         "of these not simulated": _count(study.failed),
@@ -204,7 +204,7 @@ def _count(number: float) -> str:
 
 
 def _effects(result: Result) -> Section:
-    """Section on the effects: their settings, and the estimates of a pilot run."""
+    """Return the section on optional physical effects: their settings and pilot estimates."""
     effects = result.design.effects.model_dump(mode="json", exclude={"auto"})
     switched = [(name, _effect_text(name, value)) for name, value in effects.items()]
     in_result = Table("In this result", (), switched, numbers=False)
@@ -256,7 +256,10 @@ def _notes(result: Result) -> Section:
 
 
 def _design(result: Result, start: Result | None) -> Section:
-    """Section on the design: changes from the start, every value by dotted name, and the file."""
+    """Return the section on the design.
+
+    It has the changes from the start, every value by dotted name, and the design file.
+    """
     values = _design_values(result)
     before = _design_values(start) if start else values
     changed = [
@@ -278,7 +281,7 @@ def _design(result: Result, start: Result | None) -> Section:
 
 
 def _design_values(result: Result) -> dict[str, str]:
-    """Each value of the design by its dotted name.
+    """Return each value of the design as text, by its dotted name.
 
     The folder of the mesh is private to the machine, so only the file's name is shown.
     """
@@ -315,5 +318,5 @@ def _made_with(result: Result) -> Section:
 
 
 def seed_text(result: Result) -> str:
-    """Text with the seed and the name of the random stream."""
+    """Return a text with the seed and the name of the random stream of a result."""
     return f"{result.seeds[0]}, stream “{result.seeds[1]}”"

@@ -1,4 +1,4 @@
-"""The content of a process sheet: blocks of names and values from a result."""
+"""Compose a process sheet: what an operator sets, expects and measures, from a result."""
 
 from __future__ import annotations
 
@@ -31,7 +31,10 @@ TIME = "time_to_98_s"
 
 
 def cautions(result: Result) -> Iterator[str]:
-    """Sentences on differences between simulation and machine, and on goals not reached."""
+    """Yield warnings for the operator.
+
+    They tell how the simulation differs from the machine, and which goals are not reached.
+    """
     yield from _time(result)
     if result.design.effects.friction is None:
         yield (
@@ -53,7 +56,7 @@ def cautions(result: Result) -> Iterator[str]:
 
 
 def _time(result: Result) -> Iterator[str]:
-    """A sentence if the peening time is too short to cover the target."""
+    """Yield a sentence if the peening time is too short to cover the target, else nothing."""
     time, planned = result.metrics.get(TIME), result.design.process.treatment_time
     if time is None or time.in_words == "not resolved" or time.value <= planned:
         return
@@ -128,10 +131,10 @@ class Sheet:
 
 
 def process_sheet(result: Result, face_mm: tuple[float, ...]) -> Sheet:
-    """The process sheet of a result.
+    """Return the content of the process sheet of a result.
 
     Args:
-        face_mm: size of the sonotrode, as face_size_mm gives it.
+        face_mm: size of the sonotrode's face [mm].
     """
     record = result.record
     start = load_start(result) if result.study else None
@@ -147,10 +150,10 @@ def process_sheet(result: Result, face_mm: tuple[float, ...]) -> Sheet:
 
 
 def setting_blocks(result: Result, face_mm: tuple[float, ...]) -> list[Block]:
-    """Blocks on the chamber and its settings, expected figures and allowed tolerances.
+    """Return blocks on the chamber and its settings, expected figures and allowed tolerances.
 
     Args:
-        face_mm: size of the sonotrode, as face_size_mm gives it.
+        face_mm: size of the sonotrode's face [mm].
     """
     found = (
         ("Part and pose", _part(result)),
@@ -214,7 +217,7 @@ def _chamber(result: Result) -> Iterator[Row]:
 
 
 def _key_row(key: str, value: Any) -> Row:
-    """A number of the chamber with its name in the file. The unit is moved to the value."""
+    """Return the name and the text of a chamber's value. The unit moves from name to text."""
     unit = next((unit for end, unit in UNITS.items() if key.endswith(end)), "")
     name = key.removesuffix(next(end for end in UNITS if UNITS[end] == unit)) if unit else key
     if isinstance(value, bool):
@@ -262,12 +265,15 @@ def _shot(result: Result) -> Iterator[Row]:
 
 
 def _weighed_g(result: Result) -> float:
-    """Mass of the whole balls [g]."""
+    """Return the mass of all balls together [g], for their whole number."""
     return 1e3 * result.design.shot.ball_mass * result.design.shot.count
 
 
 def _expected(result: Result) -> Iterator[Row]:
-    """Peening time and figures. Without a calibration, the reason why there is no mmA."""
+    """Yield rows with the peening time and the expected figures.
+
+    Without a calibration, a row says why there is no intensity in mmA.
+    """
     yield "peening time", f"{plain(result.design.process.treatment_time)} s"
     objective, *others = figures(result, None)
     calibration = result.design.calibration
@@ -286,7 +292,7 @@ def _expected(result: Result) -> Iterator[Row]:
 
 
 def _zones(result: Result) -> Iterator[Row]:
-    """A sentence for each zone. Zones with limits that are not met come first."""
+    """Yield a sentence for each zone. Zones with limits that are not met come first."""
     lines = [one for one in answer_lines(result) if one.about == "zone"]
     lines.sort(key=lambda line: not line.warns)
     for one in lines[:MOST_ROWS]:
@@ -295,7 +301,10 @@ def _zones(result: Result) -> Iterator[Row]:
 
 
 def _tolerances(result: Result) -> Iterator[Row]:
-    """Ranges of the tolerances, and their cost if the result has simulated it."""
+    """Yield rows with the tolerance range of each number.
+
+    If the result simulated the tolerances, rows say what they cost.
+    """
     box = tolerance_box(result.design)
     for name, (low, high) in [*box.items()][:MOST_ROWS]:
         yield name, f"{plain(low)} to {plain(high)}, as designed {plain(result.design.value(name))}"
@@ -339,7 +348,7 @@ def _identity(result: Result) -> Iterator[Row]:
 
 
 def first_checks(result: Result) -> list[Check]:
-    """Quantities to measure first, each with its expected value."""
+    """Return the quantities to measure before production, each with its expected value."""
     design, calibration = result.design, result.design.calibration
     wanted = 2.0 * design.sonotrode.zero_to_peak_um
     expected = f"{plain(wanted)} µm peak to valley"
@@ -372,9 +381,9 @@ def first_checks(result: Result) -> list[Check]:
 
 
 def calibrated_to(result: Result) -> str:
-    """Sentence on the measurements that the machine was calibrated by, and on missing kinds.
+    """Return a sentence on the measurements that the machine was calibrated by.
 
-    An empty text without a calibration.
+    It also names the missing kinds of measurement. It is empty without a calibration.
     """
     if result.design.calibration is None:
         return ""
@@ -391,7 +400,10 @@ def _restitution(law: Any) -> str:
 
 
 def _half_covered(rows: list[CoverageAtTime]) -> CoverageAtTime | None:
-    """The row of the curve nearest to half coverage, where a measurement is most informative."""
+    """Return the row with a mean coverage nearest to 0.5, where measuring tells most.
+
+    None if there are no rows.
+    """
     return min(rows, key=lambda row: abs(row.mean_coverage - 0.5), default=None)
 
 

@@ -1,4 +1,4 @@
-"""Text about a virtual strip."""
+"""Text about a virtual strip, a simulated Almen strip."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def strip_lines(strip: VirtualStrip) -> list[str]:
-    """Lines that the command `strip` prints."""
+    """Return the lines that the command `strip` prints about a simulated Almen strip."""
     first = "intensity I" if strip.is_calibrated else "peening strength S"
     lines = [
         f"{strip.setting.type} strip, {strip.setting.place}",

@@ -48,7 +48,10 @@ NO_CONSTRAINTS = "There were no constraints."
 
 
 def question_section(result: Result) -> Section:
-    """Section on the question: the coverage of a single chamber, or the best chamber of a study."""
+    """Return the section that says what was asked.
+
+    A simulation asks for the coverage in one chamber, a study for the best chamber.
+    """
     design, study = result.design, result.study
     part, reach = design.part.mesh_path.name, ""
     if area := result.record.chamber.target_exposed_area_mm2:
@@ -84,7 +87,7 @@ def question_section(result: Result) -> Section:
 
 
 def _constraints(result: Result) -> list[str]:
-    """The limits of the study file and of the zones, as text."""
+    """Return the limits of the study file and of the design's zones, each as text."""
     tables: dict[str, Any] = {}
     if STUDY in result.record.files:
         tables = tomllib.loads(read_file(result.path(STUDY)).decode())
@@ -101,7 +104,7 @@ def _constraints(result: Result) -> list[str]:
 
 
 def front_section(study: StudyRecord) -> Section | None:
-    """Section on the Pareto front. None for a study with a single objective."""
+    """Return the section on the Pareto front, or None for a study with a single objective."""
     if not study.front:
         return None
     labels = {name: objective_label(name) for name in study.front[0].objectives}
@@ -124,7 +127,10 @@ def front_section(study: StudyRecord) -> Section | None:
 
 
 def search_section(result: Result, trials: Sequence[Mapping[str, Any]]) -> Section | None:
-    """Section on every evaluation in its order, and the reasons for failed evaluations."""
+    """Return the section with every evaluation in its order and the reasons for failed ones.
+
+    None without evaluations.
+    """
     if not trials:
         return None
     label = objective_label(result.objective_name)
@@ -181,7 +187,7 @@ class Influence:
 
 
 def influence_section(study: StudyRecord, label: Label) -> Section:
-    """Section on the influence of each parameter."""
+    """Return the section on the influence of each parameter on the objective."""
     rows = influences(study, label)
     content: list[Block] = [Items(influence_sentences(study, rows, label))]
     if rows:
@@ -222,7 +228,9 @@ def influence_section(study: StudyRecord, label: Label) -> Section:
 
 
 def influences(study: StudyRecord, label: Label) -> list[Influence]:
-    """The influence of each parameter, the most important first. Empty without a model.
+    """Return the influence of each parameter on the objective, the most important first.
+
+    The list is empty if the study has no model of its evaluations.
 
     Args:
         label: label of the objective, in whose unit numbers are returned.
@@ -259,7 +267,10 @@ def _influence(name: str, model: ModelRecord, label: Label) -> Influence:
 
 
 def influence_sentences(study: StudyRecord, rows: Sequence[Influence], label: Label) -> list[str]:
-    """Sentences on the result of the model, or on the reason why there is no model."""
+    """Return sentences on the influence of the parameters by the study's model.
+
+    If the study has no model, a sentence gives the reason.
+    """
     model, count = study.model, study.evaluations
     if not model:
         return [_reason_without_model(count, study.failed, len(study.vary))]
@@ -289,7 +300,10 @@ def influence_sentences(study: StudyRecord, rows: Sequence[Influence], label: La
 
 
 def _shares(rows: Sequence[Influence]) -> str:
-    """Sentence on the share of the variance over the bounds that single parameters explain."""
+    """Return a sentence on the share of the objective's variance that single parameters explain.
+
+    The variance is over all values within the bounds of the study.
+    """
     shares, rest = sum(row.curve.share for row in rows), ""
     if shares < 0.8:
         rest = (

@@ -1,4 +1,4 @@
-"""What is said of an evaluation, of a study and of a sweep on a terminal: a figure a line."""
+"""Lines for a terminal about a simulation, a study or a sweep, with one figure on each line."""
 
 from __future__ import annotations
 
@@ -17,12 +17,15 @@ if TYPE_CHECKING:
 
 
 def estimate_line(name: str, estimate: Estimate) -> str:
-    """The estimate with its interval behind its name."""
+    """Return a line with a figure's name, its estimate and its interval."""
     return f"{name:34}{estimate_text(estimate)}"
 
 
 def evaluation_lines(evaluation: Evaluation) -> list[str]:
-    """Objective and metrics, one line each, with their 95 % intervals; last the gauge."""
+    """Return a line for the objective and each metric, with their 95 % intervals.
+
+    The last line gives the area of the windows in which coverage is measured.
+    """
     rows = {evaluation.objective_name: evaluation.objective, **evaluation.metrics}
     lines = [estimate_line(name, estimate) for name, estimate in rows.items()]
     found = evaluation.resolution
@@ -34,7 +37,7 @@ def evaluation_lines(evaluation: Evaluation) -> list[str]:
 
 
 def zone_limit_lines(design: Design, evaluation: Evaluation) -> list[str]:
-    """Whether the limits of each zone are met, a line each."""
+    """Return a line for each limit of each zone that says whether it is met."""
     return [
         f"zone {zone}: {row['key']} {row['limit']:g}: {row['standing']} "
         f"({row['metric']} {estimate_text(evaluation.metrics[row['metric']])})"
@@ -44,12 +47,12 @@ def zone_limit_lines(design: Design, evaluation: Evaluation) -> list[str]:
 
 
 def note_lines(notes: Iterable[str]) -> list[str]:
-    """A line for each note."""
+    """Return a line for each note, with the word "note" before it."""
     return [f"note: {note}" for note in notes]
 
 
 def replicas_text(design: Design) -> str:
-    """How many replicas a design asks for, in words."""
+    """Return a text that says how many replicas a design asks for."""
     accuracy = design.process.accuracy
     if accuracy.objective_half_width is not None:
         return f"as many replicas as give ± {accuracy.objective_half_width:g}"
@@ -57,7 +60,7 @@ def replicas_text(design: Design) -> str:
 
 
 def study_lines(result: StudyResult) -> list[str]:
-    """Parameters and figures of start and best, the gain, and the effort."""
+    """Return lines with parameters and figures of a study's start and best, its gain and effort."""
     study, start, best = result.study, result.start, result.best
     lines = [f"{'parameter':34}{'start':>12}{'best':>12}"]
     for name in study.vary:
@@ -87,7 +90,7 @@ def study_lines(result: StudyResult) -> list[str]:
 
 
 def sweep_lines(result: SweepResult) -> list[str]:
-    """The effort, and the best candidate with its figures."""
+    """Return lines with the effort of a sweep, and its best candidate with its figures."""
     study, best = result.study, result.best
     effort = replicas_text(study.at_search_accuracy(study.design))
     lines = [f"{len(result.trials)} candidates in {result.seconds:.0f} s, {effort} each"]

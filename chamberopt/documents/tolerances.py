@@ -19,13 +19,16 @@ MAX_CHARTS = 3
 
 
 def tolerated_figures(found: TolerancesRecord) -> list[tuple[Label, ToleratedFigureRecord]]:
-    """Each figure with its label. The figure of the worst corner comes first."""
+    """Return each figure over the tolerances with its label.
+
+    The figure that is lowest in the worst corner comes first.
+    """
     names = sorted(found.figures, key=lambda name: name != found.worst_for)
     return [(metric_label(name), found.figures[name]) for name in names]
 
 
 def tolerance_section(found: TolerancesRecord | None) -> Section | None:
-    """The section on tolerances. None for a result without tolerances."""
+    """Return the report's section on tolerances, or None for a result without tolerances."""
     if not found:
         return None
     text = (
@@ -80,7 +83,10 @@ def _is_resolved(ends: EffectEnds) -> bool:
 
 
 def tolerance_lines(found: ToleranceResult) -> list[str]:
-    """Lines for a terminal: figures over the box, the worst corner, each tolerance's effect."""
+    """Return lines for a terminal about the tolerances of a design.
+
+    They give the figures over all tolerances, the worst corner and the effect of each tolerance.
+    """
     rows = [["over the tolerances", "as designed", "q05", "q95", "in the worst corner"]]
     for name, figure in found.figures.items():
         known = (figure.nominal, figure.q05, figure.q95, figure.simulated)

@@ -38,23 +38,23 @@ class Label:
         return f"{self.text} [{self.unit}]" if self.unit else self.text
 
     def format(self, estimate: Estimate, sign: bool = False) -> str:
-        """The estimate with its interval and unit, as text."""
+        """Return an estimate as text with its interval, in the unit shown and with that unit."""
         return number_text.typeset(
             number_text.estimate_text(estimate, self.factor, self.unit, sign)
         )
 
     def number(self, estimate: Estimate, sign: bool = False) -> str:
-        """The estimate with its interval in the unit shown, as text without the unit."""
+        """Return an estimate as text with its interval, in the unit shown but without its name."""
         return number_text.typeset(number_text.estimate_text(estimate, self.factor, sign=sign))
 
     def scale(self, estimate: Estimate) -> Estimate:
-        """The estimate in the unit shown."""
+        """Convert an estimate from the stored unit to the unit shown."""
         value, half_width = self.factor * estimate.value, abs(self.factor) * estimate.half_width
         return Estimate(value, half_width, in_words=estimate.in_words)
 
 
 def metric_label(name: str) -> Label:
-    """The label of a metric. Shares of the surface are shown in per cent."""
+    """Return the label of a metric by its name. Shares of the surface are shown in per cent."""
     metric = find_metric(name)
     if metric is None:
         return Label(name.replace("_", " "))
@@ -64,7 +64,10 @@ def metric_label(name: str) -> Label:
 
 
 def objective_label(name: str) -> Label:
-    """The label of an objective. A multiple of a single metric has the metric's label."""
+    """Return the label of an objective by its name.
+
+    If the objective is a multiple of a single metric, this is the metric's label.
+    """
     try:
         objective = parse_objective(name)
     except InputError:  # written by another version of the program
@@ -79,7 +82,10 @@ def objective_label(name: str) -> Label:
 
 
 def _sum_text(terms: Mapping[str, float]) -> str:
-    """A sum as text, e.g. "mean coverage of the target − 0.001 × number of balls"."""
+    """Return a weighted sum of metrics as text.
+
+    An example is "mean coverage of the target − 0.001 × number of balls".
+    """
     text = ""
     for name, weight in terms.items():
         metric = find_metric(name)
@@ -94,25 +100,31 @@ def _sum_text(terms: Mapping[str, float]) -> str:
 
 
 def plain(value: float | str, digits: int = 4) -> str:
-    """A number with `digits` significant digits. Numbers of usual size have no exponent."""
+    """Return a number as text with `digits` significant digits.
+
+    Numbers of usual size have no exponent.
+    """
     return number_text.typeset(number_text.plain(value, digits))
 
 
 def with_unit(value: float, unit: str = "") -> str:
-    """A number with two significant digits and its unit."""
+    """Return a number as text with two significant digits and its unit."""
     return f"{plain(value, 2)} {unit}".rstrip()
 
 
 def with_interval(value: float, half_width: float, unit: str = "", sign: bool = False) -> str:
-    """A value with its interval, e.g. "0.809 ± 0.004 mm". Exact values have no interval."""
+    """Return a value and its interval as text, e.g. "0.809 ± 0.004 mm".
+
+    An exact value is shown without an interval.
+    """
     return number_text.typeset(number_text.with_interval(value, half_width, unit, sign))
 
 
 def interval_text(shown: Estimate, unit: str = "", sign: bool = False) -> str:
-    """An estimate in the unit shown, as text."""
+    """Return an estimate that is already in the unit shown as text, with its interval and unit."""
     return number_text.typeset(number_text.estimate_text(shown, unit=unit, sign=sign))
 
 
 def per_cent(value: float) -> str:
-    """A share in whole per cent."""
+    """Return a share from 0 to 1 as text in whole per cent."""
     return f"{100.0 * value:.0f} %"

@@ -19,14 +19,17 @@ SIGNS = {"min": "≥", "max": "≤"}
 
 
 def limit_text(limit: ZoneLimit) -> str:
-    """A limit as text, e.g. "coverage_min = 0.98". An end of a band is "intensity_mmA ≥ 0.1"."""
+    """Return a limit of a zone as text, e.g. "coverage_min = 0.98".
+
+    The lower end of a band of allowed values is "intensity_mmA ≥ 0.1".
+    """
     sides = dict(LIMITED[limit.key])
     sign = "=" if len(sides) == 1 else SIGNS[sides[limit.metric.rpartition(".")[2]]]
     return f"{limit.key} {sign} {limit.limit:g}"
 
 
 def zone_lines(result: Result) -> list[AnswerLine]:
-    """A sentence on each zone for the answer. It warns if a limit is not certainly met."""
+    """Return a sentence on each zone, which warns if a limit is not certainly met."""
     lines = []
     for zone in result.record.zones:
         judged = "; ".join(
@@ -43,7 +46,10 @@ def zone_lines(result: Result) -> list[AnswerLine]:
 
 
 def zones_section(result: Result) -> Section | None:
-    """Section with the figures of all zones side by side, and whether they meet their limits."""
+    """Return the section with the figures of all zones, and whether they meet their limits.
+
+    None for a part without zones.
+    """
     zones = result.record.zones
     if not zones:
         return None
@@ -82,6 +88,6 @@ def _limit_label(limit: ZoneLimit) -> Label:
 
 
 def _of_zone(name: str) -> Label:
-    """The label of a metric, with "the zone" in place of "the target"."""
+    """Return the label of a metric, with "the zone" in place of "the target"."""
     label = metric_label(name)
     return replace(label, text=label.text.replace("the target", "the zone"))
