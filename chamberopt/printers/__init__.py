@@ -1,1 +1,1 @@
-"""Printers: documents as an HTML page, a printed sheet and JSON values."""
+"""Turn documents into HTML pages, into a printed sheet and into JSON values."""

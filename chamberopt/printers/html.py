@@ -1,4 +1,7 @@
-"""A document as HTML. This module escapes all text: names of files may hold markup."""
+"""Turn the blocks of a document into HTML.
+
+All text is escaped, because names of files may hold markup.
+"""
 
 from __future__ import annotations
 
@@ -29,7 +32,7 @@ NUMBER = ' class="number"'
 
 
 def text(value: object) -> str:
-    """The value as escaped text. A number and its interval stay on one line."""
+    """Return a value as escaped HTML text. A number and its interval stay on one line."""
     return html.escape(str(value), quote=True).replace(" ± ", "\u00a0±\u00a0")
 
 
@@ -38,13 +41,13 @@ def paragraph(value: object, kind: str = "") -> str:
 
 
 def items(values: Iterable[object]) -> str:
-    """An HTML list, or an empty text without items."""
+    """Return an HTML list of the values, or an empty text if there are none."""
     rows = "".join(f"<li>{text(value)}</li>" for value in values)
     return f"<ul>{rows}</ul>" if rows else ""
 
 
 def section(printed: Section, view: Callable[[Sequence[PartScene]], str]) -> str:
-    """A section with its title, as HTML.
+    """Return the HTML of a section with its title.
 
     Args:
         view: function that gives the HTML of parts in 3D.
@@ -55,7 +58,11 @@ def section(printed: Section, view: Callable[[Sequence[PartScene]], str]) -> str
 
 
 def block(printed: Block, view: Callable[[Sequence[PartScene]], str]) -> str:
-    """A block of a section, as HTML."""
+    """Return the HTML of a block of a section.
+
+    Args:
+        view: function that gives the HTML of parts in 3D.
+    """
     match printed:
         case Sentence():
             return paragraph(printed.text, printed.kind)
@@ -110,7 +117,7 @@ def _text_file(printed: TextFile) -> str:
 
 
 def _chart(printed: Chart) -> str:
-    """A chart as HTML. Its caption is also its description for screen readers."""
+    """Return the HTML of a chart. Its caption is also its description for screen readers."""
     name, caption = text(printed.name), text(printed.caption)
     svg = svg_text(printed.figure, printed.name, printed.tooltips)
     place = f'<div id="{name}" class="chart" role="img" aria-label="{caption}">{svg}'
@@ -118,7 +125,10 @@ def _chart(printed: Chart) -> str:
 
 
 def embedded_json(value: Any, name: str) -> str:
-    """A value as JSON in a script element with the id `name`. No text in it can end the element."""
+    """Return a script element with the id `name` that holds a value as JSON.
+
+    No text in the value can end the element.
+    """
     inside = json.dumps(value, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
     return f'<script type="application/json" id="{text(name)}">{inside}</script>'
 

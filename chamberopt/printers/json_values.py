@@ -1,4 +1,7 @@
-"""A document as JSON values. A chart becomes its name, a view of parts their number."""
+"""Turn a document into JSON values.
+
+A chart becomes its name, and a view of parts in 3D becomes the number of parts.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +12,7 @@ from chamberopt.documents.document import Chart, Document, PartView
 
 
 def json_values(document: Document) -> dict[str, Any]:
-    """All texts of the document, and remarks on its views of parts."""
+    """Return all texts of a document as JSON values, with remarks on its parts in 3D."""
     values: dict[str, Any] = _values(document)
     remarks = [remark for scene in document.scenes for remark in scene.remarks]
     return {**values, "remarks": remarks}

@@ -1,4 +1,4 @@
-"""The HTML pages of results. A page is a single file and fetches nothing from a network."""
+"""Write HTML pages of results. A page is a single file and fetches nothing from a network."""
 
 from __future__ import annotations
 
@@ -36,7 +36,9 @@ HELP = (
 
 @dataclass(frozen=True)
 class PageFile:
-    """A kind of file. A new file may replace an older file of the same kind, but no other file.
+    """A kind of file that may be replaced, such as a report.
+
+    A new file may replace an older file of the same kind, but no other file.
 
     endings: allowed endings of the file's name, the usual ending first.
     is_one: function that tells from a file's content whether the file is of this kind.
@@ -88,7 +90,8 @@ def write_part_page(results: Sequence[Path], path: Path) -> list[str]:
         Remarks, e.g. on triangles that were left out.
 
     Raises:
-        InputError: a part is too large for a page, or a reason of write_report.
+        InputError: a folder is no finished result, a part is too large for a page, or the path
+            holds anything but a page of this program.
     """
     with claim_file(require_free_page(path)):
         return _write_part_page([load_result(one) for one in results], path)
@@ -105,7 +108,7 @@ def _write_part_page(loaded: Sequence[Result], path: Path) -> list[str]:
 
 
 def parts_content(results: Sequence[Path]) -> tuple[str, dict[str, Any]]:
-    """HTML of the parts of results in 3D, and the data that `showParts` of part.js draws.
+    """Return the HTML of the parts of results in 3D, and the data that part.js draws there.
 
     Raises:
         InputError: a folder is no finished result, or a part is too large for a page.
@@ -115,7 +118,10 @@ def parts_content(results: Sequence[Path]) -> tuple[str, dict[str, Any]]:
 
 
 def _scenes(loaded: Sequence[Result]) -> tuple[list[str], list[PartScene]]:
-    """Names of results, and their parts in 3D. For several results, remarks begin with the name."""
+    """Return the names of results and their parts in 3D.
+
+    For several results, each remark begins with the name of its result.
+    """
     names = _unique_names([one.folder.resolve() for one in loaded])
     scenes = [part_scene(one, name) for one, name in zip(loaded, names, strict=True)]
     for scene, one in zip(scenes, loaded, strict=True):
@@ -130,14 +136,21 @@ def _scenes(loaded: Sequence[Result]) -> tuple[list[str], list[PartScene]]:
 
 
 def _unique_names(folders: Sequence[Path]) -> list[str]:
-    """Names of folders, with the parent folder if two names are equal or a name is "start"."""
+    """Return a name for each folder: its own name, or with its parent if that is not unique.
+
+    The parent is also added if a name is "start", the start of a study.
+    """
     names = [folder.name for folder in folders]
     unique = len(set(names)) == len(names) and START not in names
     return names if unique else ["/".join(folder.parts[-2:]) for folder in folders]
 
 
 def require_free_page(path: str | Path, file: PageFile = REPORT_FILE) -> Path:
-    """Return the path. Raise InputError unless it is free or holds an older page of this kind."""
+    """Return the path of a page to write.
+
+    Raises InputError if its ending is wrong, or if it holds anything but an older file of the kind
+    `file`.
+    """
     path, first = Path(path), file.endings[0]
     remedy = f"give another name (--out FILE{first})"
     if path.suffix.lower() not in file.endings:
@@ -157,7 +170,7 @@ def require_free_page(path: str | Path, file: PageFile = REPORT_FILE) -> Path:
 
 
 def viewer(scenes: Sequence[PartScene]) -> str:
-    """HTML of the parts in 3D and their controls. part.js draws the parts."""
+    """Return the HTML of parts in 3D and of their controls. part.js draws the parts."""
     drawn = [scene.data for scene in scenes if scene.data]
     remarks = "".join(
         html.paragraph(remark, "soft") for scene in scenes for remark in scene.remarks
@@ -196,7 +209,11 @@ def viewer(scenes: Sequence[PartScene]) -> str:
 
 
 def write_page(path: Path, title: str, body: str, scenes: Sequence[PartScene]) -> None:
-    """Compose a page and write it, whole or not at all."""
+    """Write an HTML page from the HTML of its body, whole or not at all.
+
+    Args:
+        scenes: parts in 3D that the body shows.
+    """
     data = ""
     if drawn := [scene.data for scene in scenes if scene.data]:
         data = html.embedded_json(_content(drawn), "parts")
@@ -214,7 +231,7 @@ def write_page(path: Path, title: str, body: str, scenes: Sequence[PartScene]) -
 
 
 def _content(drawn: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """Data for part.js: the scenes, their quantities and the colours of the quantities."""
+    """Return the data for part.js: parts in 3D, the quantities they show, and their colours."""
     quantities = quantities_in_all(drawn)
     scales = {name: hex_colours(name) for name in {one["colours"] for one in quantities}}
     return {"quantities": quantities, "scenes": drawn, "scales": scales}
@@ -222,5 +239,5 @@ def _content(drawn: Sequence[dict[str, Any]]) -> dict[str, Any]:
 
 @cache
 def _asset(name: str) -> str:
-    """Text of a script or style sheet of the pages."""
+    """Return the text of a script or style sheet of the pages."""
     return read_file(Path(__file__).parents[1] / "page" / "browser" / name, follow=True).decode()

@@ -35,7 +35,10 @@ MOST_LINES = 4  # lines of a text; a longer text ends in an ellipsis
 
 
 class Writer:
-    """Writer of text at the top left corner of its place [mm]. Without axes it only measures."""
+    """Write text on a page at the top left corner of its place [mm].
+
+    Without axes it writes nothing and only measures heights.
+    """
 
     def __init__(self, axes: Axes | None, size: float) -> None:
         """Prepare to write letters of this size [pt]."""
@@ -43,13 +46,13 @@ class Writer:
 
     @property
     def line(self) -> float:
-        """Height of a line [mm]."""
+        """Height of a line of text [mm]."""
         return self.size * LEADING * MM_PER_PT
 
     def write(
         self, text: str, x: float, top: float, width: float, bold: bool = False, grey: bool = False
     ) -> float:
-        """Write a text in lines of limited width and return the height of its bottom."""
+        """Write a text in lines of limited width and return the height of its bottom [mm]."""
         lines = broken(text, width, self.size, bold)
         for number, one in enumerate(lines):
             if self.axes is not None:
@@ -66,7 +69,7 @@ class Writer:
         return top - len(lines) * self.line
 
     def block(self, block: Block, x: float, top: float, width: float) -> float:
-        """Write a block and return the height of its bottom."""
+        """Write a title with its rows and return the height of their bottom on the page [mm]."""
         y = self.write(block.title, x, top, width, bold=True) - 0.1 * self.line
         if self.axes is not None:
             self.axes.plot([x, x + width], [y, y], color=GREY, lw=0.5)
@@ -135,13 +138,13 @@ def broken(text: str, width: float, size: float, bold: bool = False) -> list[str
 
 
 def text_width(text: str, size: float, bold: bool = False) -> float:
-    """Width of a line of text [mm]."""
+    """Return the width of a line of text [mm]. `size` is the size of the letters [pt]."""
     return _width_over_size(text, bold) * size * MM_PER_PT
 
 
 @cache
 def _width_over_size(text: str, bold: bool) -> float:
-    """Width of a line of text over the size of its letters. It is the same for all sizes."""
+    """Return the width of a line of text over the size of its letters, the same for all sizes."""
     from matplotlib.textpath import TextToPath
 
     font = _font(bold)
@@ -150,14 +153,14 @@ def _width_over_size(text: str, bold: bool) -> float:
 
 @cache
 def _letters(bold: bool) -> frozenset[int]:
-    """The characters that the font has."""
+    """Return the code points of the characters that the page's font has."""
     from matplotlib.font_manager import findfont, get_font
 
     return frozenset(get_font(findfont(_font(bold))).get_charmap())
 
 
 def _font(bold: bool) -> FontProperties:
-    """The font of the page, 1 pt high."""
+    """Return the font of the page, 1 pt high."""
     from matplotlib.font_manager import FontProperties
 
     return FontProperties(size=1.0, weight="bold" if bold else "normal")
