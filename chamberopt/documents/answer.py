@@ -82,7 +82,7 @@ def answer_lines(result: Result) -> list[AnswerLine]:
 def _constraint_lines(result: Result) -> Iterator[AnswerLine]:
     """Yield sentences on constraints that the best, the start or a better candidate violates.
 
-    Limits of the best design's zones are left out, because zone_lines speaks of them.
+    Limits of the best design's zones are left out, because each zone has its own sentence.
     """
     limited = {limit.metric for zone in result.record.zones for limit in zone.limits}
     study, label = result.study, objective_label(result.objective_name)

@@ -156,7 +156,7 @@ def _compared(shown: Sequence[Figure]) -> Table:
 
 
 def _standing(changed: Estimate) -> str:
-    """Return whether a change is real: "exact" without noise, "yes" beyond its interval, or "no"."""
+    """Return "exact" for a change without noise, "yes" for one beyond its interval, else "no"."""
     if changed.half_width == 0.0 and not changed.in_words:
         return "exact"
     return "yes" if abs(changed.value) > changed.half_width else "no"

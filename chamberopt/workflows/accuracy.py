@@ -56,7 +56,7 @@ def save_accuracy(folder: Path, study: ConvergenceStudy) -> None:
 
 
 def convergence_record(study: ConvergenceStudy) -> ConvergenceRecord:
-    """The record of a convergence study."""
+    """Return the content of accuracy.json for an accuracy study."""
     law = study.law
     times, low, high = map(_finite, law.halving)
     return ConvergenceRecord(
@@ -76,7 +76,7 @@ def convergence_record(study: ConvergenceStudy) -> ConvergenceRecord:
 
 
 def _finite(value: float) -> float | None:
-    """The value, or None for infinity, which JSON does not have."""
+    """Return the value. Return None in place of infinity, which JSON does not have."""
     return value if math.isfinite(value) else None
 
 
@@ -90,7 +90,10 @@ def _recommendation(advice: Recommendation) -> RecommendationRecord:
 
 
 def rows(study: ConvergenceStudy) -> list[dict[str, Any]]:
-    """Rows of all runs and all numbers of replicas. None where a column does not apply."""
+    """Return the rows of accuracy.csv: one for each run, and one for each number of replicas.
+
+    A value is None where its column does not apply.
+    """
     runs, sizes = [], []
     for run in (study.reference, *study.runs):
         row: dict[str, Any] = {

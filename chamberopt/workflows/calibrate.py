@@ -77,7 +77,7 @@ def save_calibration(folder: Path, found: Calibrated) -> list[str]:
 
 
 def machine_text(table: Calibration) -> str:
-    """The content of machine.toml."""
+    """Return the content of machine.toml for a calibration."""
     import tomlkit
 
     return HEADER + tomlkit.dumps(table.model_dump())

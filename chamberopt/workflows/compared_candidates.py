@@ -1,4 +1,4 @@
-"""The candidates of `compare`: results, and designs, which are simulated first."""
+"""Read the candidates of the command `compare`, and simulate those that are designs."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Candidate:
-    """An argument of `compare`.
+    """A design or a result that the command `compare` was given.
 
     Args:
         label: short name, unique among the candidates.
@@ -105,7 +105,9 @@ def read_candidates(
 def simulate_missing(
     candidates: Sequence[Candidate], folder: Path, executor: Executor, teller: Teller
 ) -> tuple[list[Result], list[str]]:
-    """Simulate where needed; the result of each candidate, and remarks for the user.
+    """Simulate the candidates that have no result yet.
+
+    Return the result of each candidate, and remarks for the user.
 
     Designs are simulated with seed, stream and number of replicas of the first candidate. Results
     of another treatment time keep their own settings. New results are written to folders inside
@@ -151,7 +153,7 @@ def _simulate(
 
 
 def _with_seeds(design: Design, settings: SeedSettings) -> Design:
-    """The design with the settings, so that its file tells how it was simulated."""
+    """Return the design with this seed and number of replicas in place of its own."""
     values: dict[str, Any] = {"process.seed": settings.seed}
     if settings.plan.count is not None:
         values["process.accuracy.replicas"] = settings.plan.count
@@ -160,7 +162,7 @@ def _with_seeds(design: Design, settings: SeedSettings) -> Design:
 
 
 def _overridden(one: Candidate, settings: SeedSettings) -> list[str]:
-    """Remarks on values of a design that are replaced by the first candidate's settings."""
+    """Return remarks on values of a design that are replaced by the first candidate's settings."""
     process, accuracy = one.design.process, one.design.process.accuracy
     changes = []
     if process.seed != settings.seed:
@@ -191,7 +193,10 @@ def _with_treatment_time(one: Candidate, seconds: float) -> Candidate:
 
 
 def _named(path: Path) -> Path:
-    """The path that names a candidate: a design without .toml, or the folder of a result."""
+    """Return the path by which a candidate is named.
+
+    This is a design's path without .toml, or the folder of a result.
+    """
     if path.suffix == ".toml":
         return path.with_suffix("")
     return path.parent if path.name == "result.json" else path
@@ -215,7 +220,10 @@ def _seed_settings(result: Result) -> SeedSettings:
 
 
 def _folder_names(candidates: Sequence[Candidate]) -> list[str]:
-    """The last name of each path, with a number where two names are the same."""
+    """Return a folder name for each candidate: the last name of its path.
+
+    A number is added if another candidate has the same name.
+    """
     names: list[str] = []
     for one in candidates:
         name, number = _named(one.path).resolve().name, 1

@@ -68,7 +68,7 @@ def write_comparison(folder: str | Path, comparison: Comparison) -> list[str]:
     compare.png: the parts side by side on one colour scale.
     distributions.png: histograms of the candidates.
     difference.vtp, difference.png: coverage of each later candidate minus coverage of the first.
-    compare.json: the record, which is written last.
+    compare.json: all figures and differences. It is written last.
     """
     folder = Path(folder)
     if (folder / COMPARE).exists():
@@ -105,7 +105,10 @@ def comparison_picture(picture: str | Path, comparison: Comparison) -> str | Non
 def _draw_differences(
     folder: Path, comparison: Comparison, local: list[LocalDifference]
 ) -> str | None:
-    """Write the map of differences and draw it. Return why there is no image, or None."""
+    """Write difference.vtp and draw it: coverage of later candidates minus that of the first.
+
+    Return why there is no image, or None.
+    """
     first, *later = comparison.labels
     columns = [(one.value, one.real) for one in local]
     write_differences(folder / DIFFERENCE, comparison.results[0].folder / COVERAGE, columns)

@@ -1,4 +1,4 @@
-"""Run or resume a study in its folder: the one workflow of Python and of the command line."""
+"""Run or resume a study in its folder. Python users and the command line share this workflow."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ if TYPE_CHECKING:
 class Optimised:
     """A study that has ended and was saved.
 
-    chamber: of the study's design.
-    advice: the reasons for effects that the design left to the program.
-    remarks: of the saving, such as why a picture was skipped.
+    chamber: chamber of the study's design.
+    advice: reasons for the optional effects, if the design left their choice to the program.
+    remarks: remarks for the user, such as why a picture was skipped.
     """
 
     result: StudyResult
@@ -44,7 +44,7 @@ def optimise_study(
     """Run or resume the study of a folder, and save its result there.
 
     Args:
-        stop: asked before each evaluation; the study ends with KeyboardInterrupt if it is True.
+        stop: called before each evaluation. If it returns True, KeyboardInterrupt is raised.
 
     Raises:
         InputError: the start cannot be simulated, no candidate meets the constraints, or one needs
@@ -70,7 +70,10 @@ def optimise_study(
 
 
 def _candidates_at_once(study: Study, chamber: Chamber, teller: Teller) -> int:
-    """The number of candidates of a batch that fit into memory; InputError if one does not."""
+    """Return how many candidates of a batch fit into memory at once.
+
+    Raises InputError if not even one fits.
+    """
     settings = study.optimizer
     replicas = settings.confirm_replicas * 2 ** (settings.confirm_rounds - 1)
     replicas = max(replicas, most_replicas(study.design))

@@ -68,7 +68,7 @@ def save_study(
 ) -> list[str]:
     """Complete the folder of a finished study.
 
-    Adds the files of results.write.write_study and the pictures coverage.png (the best design),
+    Adds the data files of best design and start, and the pictures coverage.png (the best design),
     before_after.png, convergence.png, slices.png (if a model could be fitted) and pareto.png (for
     two objectives). result.json is written last. A study that is stopped while it is being saved
     therefore counts as unfinished, and is saved again when it is resumed.
@@ -102,7 +102,7 @@ def save_study(
 def save_sweep(folder: str | Path, sweep: SweepResult) -> list[str]:
     """Complete the folder of a finished sweep and return remarks for the user.
 
-    Adds the files of results.write.write_sweep, map.png and, as the last file, result.json.
+    Adds history.csv, best.toml (if a candidate is feasible), map.png and, last, result.json.
     """
     folder = Path(folder)
     record = write_sweep(folder, sweep)
@@ -121,7 +121,10 @@ def _draw_diagrams(folder: Path, study_result: StudyResult) -> None:
 
 
 def _draw_start_and_best(folder: Path, study_result: StudyResult, threads: Executor) -> list[str]:
-    """Draw the coverage of a study from its data files. Return remarks on skipped pictures."""
+    """Draw the coverage of a study's start and best design from the study's data files.
+
+    Return remarks on skipped pictures.
+    """
     start, best = study_result.start.evaluation, study_result.best.evaluation
     folders, names = [folder / START, folder], ["start", "best design"]
     pictures = [

@@ -33,21 +33,34 @@ if TYPE_CHECKING:
 
 
 class Teller:
-    """A listener of a workflow. This class reports only the progress of counted steps."""
+    """The object to which a workflow reports its steps.
+
+    This class passes on only the progress of counted steps. The command line has one that prints.
+    """
 
     def __init__(self, progress: Progress | None = None) -> None:
         self._progress = progress
 
     def step(self, what: str, total: int | None = None) -> AbstractContextManager[Progress]:
-        """Begin a named step. The context gives the function that counts the step's progress."""
+        """Return a context for a step of the workflow.
+
+        Entering it gives the function to call with the step's progress.
+
+        Args:
+            what: name of the step.
+            total: number of units that the step counts; None if it counts nothing.
+        """
         is_counted = self._progress is not None and total is not None
         return nullcontext(self._progress if is_counted and self._progress else _uncounted)
 
     def compile(self, design: Design, chamber: Chamber, cavity: AnalyticCavity | None) -> None:
-        """Compile the simulator before the first replica. This class leaves that to the replica."""
+        """Compile the simulator before the first replica.
+
+        This class does nothing, so the first replica compiles it.
+        """
 
     def check(self, design: Design, chamber: Chamber, which: str = "") -> list[str] | None:
-        """Warnings on the design; None where it is not checked.
+        """Return warnings on the design. This class does not check it and returns None.
 
         Args:
             which: name of the design where there are several, such as " of the best design".
@@ -55,7 +68,7 @@ class Teller:
         return None
 
     def tell(self, text: str) -> None:
-        """Tell the user a sentence."""
+        """Tell the user a sentence. This class drops it."""
 
 
 def _uncounted(done: int, total: int, best: float | None) -> None:
@@ -119,7 +132,10 @@ def simulate_design(
 def resolve_effects(
     design: Design, chamber: Chamber, executor: Executor, teller: Teller
 ) -> tuple[Design, list[Advice]]:
-    """Choose effects that are "auto" by pilot runs. Return the new design and the advice."""
+    """Choose the optional physical effects that the design leaves to the program, by pilot runs.
+
+    Return the design with the chosen effects, and the reasons.
+    """
     if not design.effects.auto:
         return design, []
     with teller.step("pilot runs") as progress:
