@@ -1,1 +1,4 @@
-"""Files for other programs: impacts, fields on the part's mesh, the chamber, a study's table."""
+"""Write files for other programs.
+
+They hold impacts, values on the part's mesh, the chamber, or the table of a study.
+"""

@@ -1,4 +1,4 @@
-"""The chamber for the workshop, in mm: the cavity as one closed body, or its surfaces by name.
+"""Write the chamber for the workshop, in mm, as one closed body or as its surfaces by name.
 
 Normals point out of the cavity. The 3MF file holds one closed object. Its triangles have named base
 materials, one for each surface. Programs without materials see one body.
@@ -42,7 +42,7 @@ class NamedSurfaces(NamedTuple):
 
 
 def read_cavity(folder: Path) -> NamedSurfaces:
-    """Read the chamber of a results folder.
+    """Read the cavity of a results folder and return it with its named surfaces.
 
     The surfaces are named part, sonotrode and wall, and, as in the design, sonotrodes.0,
     chamber.holes.0, chamber.deflectors.0 and so on.
@@ -61,7 +61,7 @@ def read_cavity(folder: Path) -> NamedSurfaces:
 
 
 def write_cavity(folder: Path, file: Path) -> None:
-    """Write the whole cavity as binary STL."""
+    """Write the whole cavity of a results folder as a binary STL file."""
     cavity = read_cavity(folder)
     write_stl(file, cavity.vertices, cavity.triangles)
 

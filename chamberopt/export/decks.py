@@ -1,4 +1,4 @@
-"""Fields as decks of Abaqus and Nastran.
+"""Write the values of a part's elements as input decks of Abaqus and Nastran.
 
 Abaqus gets *DISTRIBUTION on elements, with one RATIO for each element. Nastran gets pressures on
 shells, PLOAD4 in the large field format, with a load set for each quantity. P1 alone is a pressure
@@ -27,7 +27,7 @@ NUMBERS_PER_LINE = 16  # limit of Abaqus for the data lines of *ELSET
 
 
 def abaqus_deck(header: list[str], mesh: PartMesh, fields: ElementFields) -> dict[str, str]:
-    """Return the text of each file by the suffix of its name.
+    """Return the Abaqus deck of element values: the text of each file by the suffix of its name.
 
     There is one file, "", unless the part's deck has an instance. Then the element sets are in a
     second file, "_sets", because distributions belong to the model and sets to the assembly.
@@ -69,7 +69,10 @@ def _abaqus_mesh(mesh: PartMesh) -> list[str]:
 
 
 def _sets(fields: ElementFields, instance: str) -> list[str]:
-    """Element sets by bands of coverage, without empty bands."""
+    """Return Abaqus lines that put elements into a set for each band of coverage.
+
+    Empty bands are left out. `instance` is added to the keyword *Elset.
+    """
     lines = []
     coverage = fields.columns["coverage"]
     for low, high in pairwise(COVERAGE_BANDS):
@@ -88,7 +91,10 @@ FIRST_SID = 9001  # load set identifiers in a deck are usually smaller
 
 
 def nastran_deck(header: list[str], mesh: PartMesh, fields: ElementFields) -> dict[str, str]:
-    """Return the text of the only file, with the suffix "". InputError for solid elements."""
+    """Return the Nastran deck of element values: the text of its only file, with the suffix "".
+
+    Raises InputError for solid elements.
+    """
     own = mesh.numbering.own
     if own and mesh.numbering.faces.any():
         raise InputError(
@@ -122,7 +128,7 @@ def _nastran_mesh(mesh: PartMesh) -> list[str]:
 
 
 def _real(value: float) -> str:
-    """A real number in at most 16 characters, with the decimal point that Nastran requires."""
+    """Return a number in at most 16 characters, with the decimal point that Nastran requires."""
     for digits in range(12, 0, -1):
         mantissa, exponent, power = f"{value:.{digits}g}".upper().partition("E")
         text = mantissa + ("" if "." in mantissa else ".") + exponent + power

@@ -1,4 +1,4 @@
-"""The values of the elements of the part's file, from the values of the part's triangles."""
+"""Compute values for the elements of the part's file from the values of the part's triangles."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ ZONE_COLUMN = "zone_"  # start of the name of each zone's column
 
 
 def combination_of(column: str) -> tuple[str, str]:
-    """Meaning and combination of a column, as in COLUMNS."""
+    """Return what a column of part.vtp means, and how its values combine over triangles."""
     if column.startswith(ZONE_COLUMN):
         return f"1: in the zone {column.removeprefix(ZONE_COLUMN)}", "any"
     return COLUMNS[column]
@@ -72,7 +72,7 @@ class ElementFields:
 
 
 def fields_of_elements(surface: Surface, number: np.ndarray) -> ElementFields:
-    """Combine the columns of part.vtp for each element.
+    """Return values for each element, combined from the columns of part.vtp.
 
     Args:
         surface: part.vtp as PyVista reads it.
@@ -85,8 +85,9 @@ def fields_of_elements(surface: Surface, number: np.ndarray) -> ElementFields:
 def fields_of_remeshed_elements(
     surface: Surface, number: np.ndarray, original: PartMesh, simulated: PartMesh
 ) -> ElementFields:
-    """Combine the columns of a part that was simulated in other triangles than its file has.
+    """Return values for each element of a part that was simulated in other triangles.
 
+    The part's file then has other triangles than part.vtp.
     A triangle counts for the element around its centre. An element without such a centre gets the
     values of the triangles around the centres of its own triangles. Sums are left out, because
     triangles reach across elements.
@@ -116,7 +117,7 @@ def _combined(
     share: np.ndarray,
     names: tuple[str, ...],
 ) -> ElementFields:
-    """Combine triangles by element number.
+    """Return values for each element, combined from its triangles.
 
     Args:
         cells: rows of the triangles, (k,).

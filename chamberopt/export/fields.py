@@ -1,4 +1,4 @@
-"""The fields of a result for other programs: ParaView files, Abaqus and Nastran decks."""
+"""Write the values on a result's part for ParaView, Abaqus or Nastran."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ FIELD_FORMATS = ("vtp", "vtkhdf", *DECKS)
 
 
 def write_fields(folder: str | Path, path: str | Path, to: str) -> list[str]:
-    """Write the fields of a results folder to a file, and return remarks for the user.
+    """Write the values on the part of a result to a file, and return remarks for the user.
 
     Args:
         folder: the results folder.
@@ -93,7 +93,10 @@ def _write_deck(result: Result, surface: Surface, to: str, path: Path) -> list[s
 
 
 def _elements_left_out(fields: ElementFields) -> list[str]:
-    """Remarks on elements without a value, with a remark for each number of such elements."""
+    """Return remarks on elements that have no value.
+
+    Columns that lack the same number of elements share a remark.
+    """
     names: dict[int, list[str]] = {}
     for name, values in fields.columns.items():
         names.setdefault(int(np.isnan(values).sum()), []).append(name)
@@ -106,7 +109,10 @@ def _elements_left_out(fields: ElementFields) -> list[str]:
 
 
 def _part_of_file(result: Result, surface: Surface) -> PartOfFile:
-    """The part as simulated, and as its file has it. InputError if the part is another result's."""
+    """Return the part as it was simulated and as its file has it, from chamber.npz.
+
+    Raises InputError if it is not the part of `surface`, which was read from part.vtp.
+    """
     file = load_chamber(result).part.file
     if file is None or len(file.simulated.triangles) != surface.n_cells:
         raise InputError(
@@ -116,7 +122,10 @@ def _part_of_file(result: Result, surface: Surface) -> PartOfFile:
 
 
 def _origin(result: Result) -> list[str]:
-    """The origin of the numbers, for the first lines of a deck."""
+    """Return the first lines of a deck.
+
+    They name the program's version, the part's file, the peening time and the seed.
+    """
     design, version = result.design, result.record.versions["chamberopt"]
     return [
         f"chamberopt {version}: simulated ultrasonic shot peening, values of each element",

@@ -1,4 +1,4 @@
-"""The formats that `chamberopt export` can write, with an entry for each format."""
+"""List the formats that `chamberopt export` can write."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ FrameName = Literal["part", "chamber"]
 
 @dataclass(frozen=True)
 class ExportFormat:
-    """A format and its writer.
+    """A format that `chamberopt export` can write, and the function that writes it.
 
     Args:
         file: name of the file in a folder of exports; a name without an ending is a folder.
@@ -128,11 +128,11 @@ def formats_by_name(names: Sequence[str]) -> dict[str, ExportFormat]:
 
 
 def is_file(out: Path, formats: dict[str, ExportFormat]) -> bool:
-    """Return True if --out names a file, False if it names a folder.
+    """Return True if the option --out names a file, False if it names a folder.
 
     Raises:
-        InputError: it names a file, but there are several formats, or its ending is another
-            format's.
+        InputError: it names a file, but several formats are to be written, or its ending belongs
+            to another format.
     """
     if not _has_ending(out, [ending for one in FORMATS.values() for ending in one.endings]):
         return False

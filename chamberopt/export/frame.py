@@ -48,7 +48,10 @@ class Frame:
 
 
 def frame_of(name: FrameName, part: Part) -> Frame:
-    """Return the named frame. Lengths in the chamber's frame are in mm."""
+    """Return the frame "part" or "chamber".
+
+    Lengths are in the unit of the part's file, or in mm in the chamber's frame.
+    """
     if name == "chamber" or part.file is None:
         return Frame(name, "mm", np.eye(3), np.zeros(3))
     return Frame(name, part.unit, part.file.rotation, part.file.shift)

@@ -1,4 +1,7 @@
-"""The table of every impact of a result, for residual stress solvers: .parquet, .csv, .csv.gz."""
+"""Write a table of every impact of a result for residual stress solvers.
+
+The formats are .parquet, .csv and .csv.gz.
+"""
 
 from __future__ import annotations
 
@@ -79,7 +82,7 @@ class Column(NamedTuple):
 
 
 def columns_of(frame: Frame) -> tuple[Column, ...]:
-    """Return the columns in their order. A new column is a line in this function."""
+    """Return the columns of the table in their order. A new column is a line in this function."""
     unit = frame.unit
     return (
         Column(
@@ -139,7 +142,7 @@ def columns_of(frame: Frame) -> tuple[Column, ...]:
 def impact_rows(
     impacts: ReplicaImpacts, chamber: Chamber, design: Design, frame: Frame
 ) -> Iterator[ImpactRows]:
-    """Split the impacts of a replica into pieces of ROWS_AT_ONCE rows."""
+    """Yield the impacts of a replica in pieces of at most ROWS_AT_ONCE rows."""
     ball = np.asarray(design.shot.diameters, dtype=float)
     dents = dent_diameters(impacts.log, design)
     for begin in range(0, len(impacts.log), ROWS_AT_ONCE):
@@ -199,7 +202,11 @@ def write_impacts(
 
 
 def require_writable(files: Sequence[Path]) -> None:
-    """Raise InputError if a file exists already, or needs pyarrow and it is missing."""
+    """Raise InputError if a table cannot be written.
+
+    This is so if pyarrow is missing for a .parquet file, or if the JSON file that describes a .csv
+    file exists already.
+    """
     for file in files:
         if _is_parquet(file):
             _pyarrow()
@@ -220,7 +227,7 @@ def _pyarrow() -> Any:
 def _metadata(
     result: Result, rebuilt: RebuiltChamber, frame: Frame, columns: Sequence[Column], replicas: int
 ) -> dict[str, object]:
-    """Describe the rows: their origin, frame, unit and columns."""
+    """Return a description of the table: origin, frame, unit and columns of its rows."""
     design = result.design
     return {
         "result": result.folder.resolve().name,

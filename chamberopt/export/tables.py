@@ -1,4 +1,4 @@
-"""Tables for spreadsheets: the effects of tolerances, and the evaluations of a study or sweep."""
+"""Write tables for spreadsheets: effects of tolerances, and evaluations of a study or sweep."""
 
 from __future__ import annotations
 
@@ -15,7 +15,9 @@ if TYPE_CHECKING:
 
 
 def write_study_table(folder: Path, file: Path) -> None:
-    """Write the evaluations recorded so far as .csv. NAME_pm is the 95 % half-width of NAME.
+    """Write the evaluations of a study or sweep, as many as there are so far, as .csv.
+
+    The column NAME_pm is the 95 % half-width of the column NAME.
 
     Raises:
         InputError: there are no evaluations.
@@ -24,7 +26,10 @@ def write_study_table(folder: Path, file: Path) -> None:
 
 
 def write_tolerance_table(folder: Path, file: Path) -> None:
-    """Write a row for each figure and number. InputError for a result without tolerances."""
+    """Write the effects of tolerances as .csv: a row for each figure and toleranced number.
+
+    Raises InputError for a result without tolerances.
+    """
     result = load_result(folder)
     found = result.record.tolerances
     if not found:
