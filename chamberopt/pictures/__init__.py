@@ -1,1 +1,1 @@
-"""Pictures and films of the part in its chamber, drawn with pyvista."""
+"""Draw pictures and films of the part in its chamber with pyvista."""

@@ -1,4 +1,4 @@
-"""Actors of a plotter: the part, the chamber as glass, discs and colour bars."""
+"""Add what is drawn in 3D to a pyvista plotter: the part, the chamber as glass, and discs."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def light(plotter: Any) -> None:
 
 
 def colour_meanings(parts: Sequence[DrawnPart]) -> list[tuple[str, str]]:
-    """The colours on these parts that stand for no value, with their meanings."""
+    """Return each colour on these parts that stands for no value, with its meaning."""
     entries = (
         (any(part.rest.n_cells for part in parts), GREY, "not in the target"),
         (any(not np.all(part.target["resolved"]) for part in parts), FEW_DENTS, "too few dents"),
@@ -139,7 +139,7 @@ class Discs(NamedTuple):
     colour: np.ndarray
 
     def only(self, rows: np.ndarray) -> Discs:
-        """A copy with only the given rows."""
+        """Return a copy with only the given rows."""
         return Discs(*(column[rows] for column in self))
 
 
@@ -180,7 +180,7 @@ def disc_actor(discs: Discs, ambient: float = 1.0) -> Any:
 
 
 def escape_dollars(text: str) -> str:
-    """Escape `$`, so that VTK does not typeset a folder's name as a formula."""
+    """Return a text with `$` escaped, so that VTK does not typeset a folder's name as a formula."""
     return text.replace("$", r"\$")
 
 

@@ -1,4 +1,4 @@
-"""Camera directions that show most of a target, found by drawing it from dozens of directions.
+"""Find camera directions that show most of a target, by drawing it from dozens of directions.
 
 Every patch of the target has its own colour, and all that may hide it is white. So the pixels of a
 small picture tell the visible area of each patch.
@@ -31,7 +31,11 @@ WORTHWHILE = 0.15  # least area that a second view adds, over the area of the fi
 
 
 def view_frame(eye: np.ndarray) -> np.ndarray:
-    """Unit vectors (3, 3) to the right, upwards and to the eye, with z upright if possible."""
+    """Return the unit vectors to the right, upwards and to the eye of a picture, shape (3, 3).
+
+    Args:
+        eye: direction from the part to the eye. z is upright unless the eye looks along it.
+    """
     to_eye = np.asarray(eye, dtype=float) / np.linalg.norm(eye)
     upright = (0.0, 0.0, 1.0) if abs(to_eye[2]) < 0.99 else (0.0, 1.0, 0.0)
     right = np.cross(upright, to_eye)
@@ -40,7 +44,10 @@ def view_frame(eye: np.ndarray) -> np.ndarray:
 
 
 def directions(steep: bool = True) -> np.ndarray:
-    """Unit vectors to the eyes to try, (e, 3). With steep=False all of them show chambers well."""
+    """Return unit vectors from the part to the eye to try for a picture, shape (e, 3).
+
+    With steep=False, steep directions, which show a chamber badly, are left out.
+    """
     turn = 2.0 * np.pi * (np.arange(AZIMUTHS) + 0.5) / AZIMUTHS
     rows = [
         np.stack([np.cos(up) * np.cos(turn), np.cos(up) * np.sin(turn), np.sin(up) + 0 * turn], 1)
@@ -50,13 +57,16 @@ def directions(steep: bool = True) -> np.ndarray:
 
 
 def near_directions(target: Surface) -> np.ndarray:
-    """Directions to try for a target seen from near. A flat target is also seen face on."""
+    """Return directions to the eye to try for a near picture of a target, shape (e, 3).
+
+    For a flat target one of them is square to it.
+    """
     normal = flat_normal(target)
     return directions() if normal is None else np.vstack([directions(), normal])
 
 
 def flat_normal(target: Surface) -> np.ndarray | None:
-    """The unit vector that a flat target faces, (3,), or None for a target that is not flat."""
+    """Return the unit normal of a flat target, shape (3,), or None if the target is not flat."""
     corners = np.asarray(target.points, dtype=float)[np.asarray(target.regular_faces)]
     vectors = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     mean = vectors.sum(axis=0) / np.linalg.norm(vectors, axis=1).sum()
@@ -65,7 +75,9 @@ def flat_normal(target: Surface) -> np.ndarray | None:
 
 
 def seen_area(target: Surface, hiding: Sequence[Surface], eyes: np.ndarray) -> np.ndarray:
-    """Visible area of each patch from each direction, as it appears [mm²], (e, patches).
+    """Return the area of each patch of a target that is visible from each direction [mm²].
+
+    The area is the area in the picture. The shape is (e, patches).
 
     Args:
         target: at least one triangle. Neighbouring triangles that face the same way are a patch.
@@ -109,7 +121,10 @@ def seen_area(target: Surface, hiding: Sequence[Surface], eyes: np.ndarray) -> n
 
 
 def _patches(surface: Surface) -> np.ndarray:
-    """Number of the patch of each triangle, (n,)."""
+    """Return the number of the patch to which each triangle belongs, shape (n,).
+
+    A patch is a group of neighbouring triangles that face the same way.
+    """
     corners = np.asarray(surface.points, dtype=float)[np.asarray(surface.regular_faces)]
     cell = np.linalg.norm(np.ptp(surface.points, axis=0)) / PATCHES
     key = np.hstack([corners.mean(axis=1) // cell, np.rint(2.0 * unit_normals(corners))])
@@ -124,25 +139,26 @@ def pushed_back(actor: Any) -> None:
 
 
 def target_in_chamber(part: Surface) -> tuple[Surface, Surface]:
-    """The target inside the chamber, and the rest of the part, which may hide it.
+    """Return the target inside the chamber, and the rest of the part, which may hide it.
 
     Args:
-        part: with cell data "target" and "exposed_area_mm2".
+        part: surface with cell data "target" and "exposed_area_mm2".
     """
     chosen = (np.asarray(part["target"]) > 0) & (np.asarray(part["exposed_area_mm2"]) > 0.0)
     return cells_of(part, chosen), cells_of(part, ~chosen)
 
 
 def cells_of(surface: Surface, chosen: np.ndarray) -> Surface:
-    """The chosen triangles of a surface, as a surface."""
+    """Return the chosen triangles of a surface as a surface of their own."""
     return surface.extract_cells(chosen).extract_surface(algorithm="dataset_surface")
 
 
 def near_views(seen: np.ndarray, eyes: np.ndarray) -> list[np.ndarray]:
-    """The direction that shows most of a target, and a direction that shows the hidden rest.
+    """Return the direction that shows most of a target, and one that shows what is hidden there.
 
     Args:
-        seen: as from seen_area. The targets of several results stand beside one another.
+        seen: visible area of each patch from each direction, shape (e, patches). Patches of several
+            results stand beside one another.
         eyes: unit vectors, (e, 3).
     Returns:
         One direction if a second would add little, else two.
@@ -157,13 +173,21 @@ def near_views(seen: np.ndarray, eyes: np.ndarray) -> list[np.ndarray]:
 
 
 def chamber_view(seen: np.ndarray, eyes: np.ndarray) -> np.ndarray:
-    """The direction that shows most of a target in its chamber. Arguments as for near_views."""
+    """Return the direction to the eye that shows most of a target in its chamber.
+
+    Args:
+        seen: visible area of each patch from each direction, shape (e, patches).
+        eyes: unit vectors, (e, 3).
+    """
     worth = _worth(eyes) * np.where(eyes[:, 2] < 0.0, FROM_BELOW, 1.0)
     return np.asarray(eyes[int(np.argmax(worth * seen.sum(axis=1)))])
 
 
 def _worth(eyes: np.ndarray) -> np.ndarray:
-    """Weight of the same area from each direction, (e,)."""
+    """Return the weight of visible area from each direction, shape (e,).
+
+    Directions near the usual one, and not steep, weigh more.
+    """
     nearness = eyes @ USUAL / np.linalg.norm(USUAL)
     is_middle = _is_middle(np.degrees(np.arcsin(eyes[:, 2])))
     return np.asarray(np.where(is_middle, 1.0, STEEP) * (1.0 + NEARNESS * nearness))

@@ -1,4 +1,4 @@
-"""The picture distributions.png of a comparison: coverage over area and time, speeds and angles."""
+"""Draw distributions.png of a comparison: coverage over area and time, speeds and angles."""
 
 from __future__ import annotations
 
@@ -15,7 +15,10 @@ from chamberopt.results.compare.distributions import Distributions, Histogram
 
 
 def draw_distributions(path: Path, comparison: Comparison, found: Distributions) -> None:
-    """Write the four panels as .png. Their legends hold the numbers."""
+    """Write the chart of a comparison as .png.
+
+    Its four panels show coverage over area, coverage over time, impact speeds and impact angles.
+    """
     coverage_labels = [
         f"{label}: mean {estimate_text(mean, 100.0, '%')}"
         for label, mean in zip(comparison.labels, comparison.metrics["mean_coverage"], strict=True)
@@ -76,7 +79,12 @@ def _time_to_98(time: Estimate) -> str:
 def _impact_labels(
     comparison: Comparison, found: Distributions, means: Sequence[float | None], unit: str
 ) -> list[str]:
-    """Legend texts with the number of impacts of each result and their mean."""
+    """Return a legend text for each result with its number of impacts and their mean.
+
+    Args:
+        means: mean speed or angle of each result, None without impacts.
+        unit: unit of the means.
+    """
     labels = []
     for label, count, mean in zip(comparison.labels, found.impacts, means, strict=True):
         average = "" if mean is None else f", mean {mean:.3g} {unit}"

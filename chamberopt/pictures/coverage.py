@@ -1,4 +1,4 @@
-"""Coverage of one result, or of several below one another on one colour scale, as a .png."""
+"""Draw the coverage of one result, or of several below one another on one colour scale."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ def draw_coverage(
     """Draw the coverage of one result, or of several below one another on one colour scale.
 
     Args:
-        folders: each with coverage.vtp and chamber.vtp.
-        titles: of the results.
+        folders: results folders, each with coverage.vtp and chamber.vtp.
+        titles: a title for each result.
         picture: file to write, .png.
 
     Returns:
@@ -35,7 +35,10 @@ def draw_coverage(
 
 
 def render_coverage(job: dict[str, Any]) -> None:
-    """Draw each result in its chamber and its target from near, in a child."""
+    """Draw the picture of draw_coverage; this runs in a child process.
+
+    Each result is shown in its chamber, and its target from near.
+    """
     folders, titles = [Path(folder) for folder in job["folders"]], job["titles"]
     chambers = [read_surface(folder / CHAMBER) for folder in folders]
     parts = [
@@ -60,7 +63,10 @@ def render_coverage(job: dict[str, Any]) -> None:
 
 
 def coverage_bar(parts: Sequence[DrawnPart], limits: tuple[float, float]) -> ColourBar:
-    """The colour bar of the quantity, with its limits unless they are 0 and 100 %."""
+    """Return the colour bar of the quantity that the parts show.
+
+    Its label has the limits unless they are 0 and 100 %.
+    """
     quantity = parts[0].quantity
     shown = np.concatenate([part.target["shown"] for part in parts])
     shown = shown[np.isfinite(shown)]

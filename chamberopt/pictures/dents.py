@@ -72,7 +72,7 @@ def require_pixels(pixels: int) -> None:
 
 
 def render_dents(job: dict[str, Any]) -> None:
-    """Draw the picture in a child."""
+    """Draw the picture of draw_dents; this runs in a child process."""
     diameter = 2e6 * job["radius"]  # µm
     low, high = np.percentile(diameter, [1.0, 99.0]) if len(diameter) else (0.0, 1.0)
     colours, limits = dent_colours(), (float(low), max(float(high), float(low) + 1.0))
@@ -98,7 +98,7 @@ def dent_colours() -> Colormap:
 
 
 def _views(part: DrawnPart, wanted: Vector | None) -> list[np.ndarray]:
-    """Directions to the eye: the wanted direction, or the directions that show the target."""
+    """Return the wanted direction to the eye, or if it is None, directions that show the target."""
     if wanted is not None:
         return [np.array(wanted)]
     eyes = near_directions(part.whole)
@@ -111,8 +111,8 @@ def render_side(
     """Render the black target and its dents from one direction.
 
     Args:
-        part: shown with its whole target. The rest of the part is grey.
-        discs: the dents, in order of time.
+        part: the part to draw, with its whole target. The rest of it is grey.
+        discs: dents in order of time.
         view: direction to the eye.
         pixels: longer side of the image.
     Returns:
@@ -162,7 +162,10 @@ def _screenshot(plotter: Any) -> np.ndarray:
 
 
 def _with_rims(discs: Discs, pixel_mm: float) -> Discs:
-    """Turn each large disc into a darker disc under a smaller disc of its own colour."""
+    """Return the discs with a darker rim round each large one.
+
+    A large disc becomes a darker disc under a smaller disc of its own colour.
+    """
     rimmed = 2.0 * discs.radius > MIN_RIM_PIXELS * pixel_mm
     row = np.repeat(np.arange(len(rimmed)), 1 + rimmed)
     found = discs.only(row)

@@ -1,4 +1,4 @@
-"""A picture, as a .png, of the places where later candidates cover more or less than the first."""
+"""Draw the places where later candidates cover more or less than the first candidate."""
 
 from __future__ import annotations
 
@@ -49,7 +49,12 @@ def write_differences(
 
 
 def draw_difference(surface: str | Path, titles: Sequence[str], picture: str | Path) -> str | None:
-    """Draw the file of write_differences, with all candidates on one scale.
+    """Draw where later candidates cover more or less than the first, all on one colour scale.
+
+    Args:
+        surface: .vtp file that write_differences wrote.
+        titles: a title for each later candidate.
+        picture: file to write, .png.
 
     Returns:
         None, or one line that says why there is no picture.
@@ -59,7 +64,10 @@ def draw_difference(surface: str | Path, titles: Sequence[str], picture: str | P
 
 
 def render_difference(job: dict[str, Any]) -> None:
-    """Draw each candidate in a child, from the direction with the largest area."""
+    """Draw the picture of draw_difference; this runs in a child process.
+
+    The camera looks from where most of the target is visible.
+    """
     surface, titles = read_surface(Path(job["surface"])), job["titles"]
     limit = _scale_limit(surface, len(titles))
     on_target = np.asarray(surface["target"]) > 0

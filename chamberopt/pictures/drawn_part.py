@@ -1,4 +1,4 @@
-"""The part of a result, ready for drawing: its target coloured by a quantity, and the rest."""
+"""Prepare the part of a result for drawing: its target with a quantity's values, and the rest."""
 
 from __future__ import annotations
 
@@ -93,7 +93,11 @@ class DrawnPart:
         self.target["shown"] = self.values(quantity, times)
 
     def values(self, quantity: Quantity, times: float = 1.0) -> np.ndarray:
-        """Values at the points of `target` in the quantity's unit, with `times` as in show."""
+        """Return a quantity's values at the points of `target`, in the quantity's unit.
+
+        Args:
+            times: peening time over treatment time.
+        """
         if quantity.name == "coverage":
             return 100.0 * coverage_from_dent_density(times * self.target["dent_density"])
         if quantity.column not in self.target.point_data:
@@ -104,13 +108,17 @@ class DrawnPart:
         return scale * np.asarray(self.target[quantity.column])
 
     def covered_to(self, share: float, times: float = 1.0) -> np.ndarray:
-        """Mark the triangles of `target` with at least a coverage [%], with `times` as in show."""
+        """Return True for each triangle of `target` whose coverage is at least `share` [%].
+
+        Args:
+            times: peening time over treatment time.
+        """
         values = self.values(QUANTITIES["coverage"], times)
         return np.asarray(values[self.target.regular_faces].mean(axis=1) >= share)
 
 
 def _is_outside(surface: Surface, chamber: Surface) -> np.ndarray:
-    """Mark the triangles (c,) of a part's surface that are no boundary of its chamber."""
+    """Return True for each triangle of a part's surface that lies outside its chamber, (c,)."""
     of_part = np.asarray(chamber["tag"]) == TAG_PART
     if not surface.n_cells or not of_part.any():
         return np.zeros(surface.n_cells, dtype=bool)
@@ -122,7 +130,7 @@ def _is_outside(surface: Surface, chamber: Surface) -> np.ndarray:
 
 
 def _majority(marked: np.ndarray, among: np.ndarray, corners: np.ndarray) -> np.ndarray:
-    """Majority of the marks among each point's neighbours, so that single dents make no specks.
+    """Return marks that agree with most neighbours of each point, so that dents make no specks.
 
     Args:
         marked: (v,) bool.
@@ -138,7 +146,10 @@ def _majority(marked: np.ndarray, among: np.ndarray, corners: np.ndarray) -> np.
 
 
 def _neighbours(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Points and their neighbours along each side of each triangle, both ways, (6 c,) each."""
+    """Return each point and its neighbour along each side of each triangle, both ways.
+
+    Both arrays have the shape (6 c,) for c triangles.
+    """
     sides = corners[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
     return np.concatenate([sides[:, 0], sides[:, 1]]), np.concatenate([sides[:, 1], sides[:, 0]])
 
@@ -146,7 +157,10 @@ def _neighbours(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def _fill_from_neighbours(
     columns: dict[str, np.ndarray], name: str, known: np.ndarray, corners: np.ndarray
 ) -> None:
-    """Give unreachable points the mean of their neighbours, so that colours do not fade there."""
+    """Replace unknown values of a column by the mean of their known neighbours.
+
+    Otherwise colours would fade at the edge of the reachable surface.
+    """
     values = np.asarray(columns[name])
     known = known & np.isfinite(values)
     of, to = _neighbours(corners)
@@ -157,7 +171,7 @@ def _fill_from_neighbours(
 
 
 def point_areas(surface: Surface) -> np.ndarray:
-    """Surface area of each point [mm²], from the cell data "area"."""
+    """Return the area of the surface round each point [mm²], from the cell data "area"."""
     corners = np.asarray(surface.regular_faces)
     return np.bincount(corners.ravel(), np.repeat(surface["area"] / 3.0, 3), surface.n_points)
 
@@ -181,7 +195,7 @@ def colour_range(parts: Sequence[DrawnPart]) -> tuple[float, float]:
 
 
 def _round_range(low: float, high: float) -> tuple[float, float]:
-    """Widen limits to round numbers, and the lower limit to 0 if it is near."""
+    """Return limits widened to round numbers. The lower limit becomes 0 if it is near 0."""
     span = high - low if high > low else max(abs(high), 1e-12)
     step = 10.0 ** np.floor(np.log10(span)) / 2.0
     low = 0.0 if 0.0 <= low < 0.4 * high else step * np.floor(low / step)

@@ -31,7 +31,10 @@ BLOCK = 16  # pixels: every MP4 player shows sides that are multiples of 16
 
 
 def film_path(film: str | Path) -> Path:
-    """Return the path of a film. InputError if its suffix or its place cannot be used."""
+    """Return the path of a film to write.
+
+    Raises InputError if its ending is not supported, or if it cannot be written there.
+    """
     path = file_path(film, (".gif", ".mp4"), "films are written as .gif or .mp4")
     missing = [name for name in ("imageio", "imageio_ffmpeg") if find_spec(name) is None]
     if path.suffix.lower() == ".mp4" and missing:
@@ -180,7 +183,10 @@ def draw_replay(
 
 
 def render_replay(job: dict[str, Any]) -> Iterator[int | None]:
-    """Draw all frames in a child, in one plotter; yields as draw_in_subprocess wants it."""
+    """Draw the film of draw_replay; this runs in a child process.
+
+    Yields the number of frames drawn so far after each frame, and None at the end.
+    """
     plotter = pyvista().Plotter(off_screen=True, window_size=list(job["size"]))
     scene = _ReplayScene(plotter, Path(job["folder"]), job["flight"], job)
     frames = []
@@ -221,7 +227,7 @@ class _ReplayScene:
         plotter.enable_anti_aliasing("ssaa")
 
     def show(self, number: int) -> None:
-        """Bring everything to the time of a frame."""
+        """Move sonotrodes, part, balls and dents to where they are at the time of a frame."""
         flight, now = self.flight, self.flight["time"][number]
         for tag, displacement in zip(flight["tags"], flight["displacements"], strict=True):
             self.sonotrodes[int(tag)].position = displacement[number]
@@ -249,7 +255,10 @@ class _ReplayScene:
         self.plotter.render()
 
     def _clock(self, number: int, dents: int) -> str:
-        """A line with the time of a frame, and the numbers of impacts and dents until then."""
+        """Return a line with the time of a frame and the number of impacts until then.
+
+        It also names `dents`, the number of dents.
+        """
         flight, now = self.flight, self.flight["time"][number]
         impacts = int((flight["hit_time"] <= now).sum())
         return (
@@ -293,8 +302,9 @@ class _ReplayScene:
 
 
 def rotation_about_line(point: np.ndarray, axis: np.ndarray, angle: float) -> np.ndarray:
-    """Rotation (4, 4) about the line through a point along a unit vector, by Rodrigues' formula.
+    """Return the matrix (4, 4) of a rotation about the line through a point along a unit vector.
 
+    The angle is in rad. The matrix follows from Rodrigues' formula.
     A zero vector gives no rotation.
     """
     x, y, z = axis

@@ -1,4 +1,7 @@
-"""Text and charts over a view: title, colour bar, legend, a triangle's numbers, list of keys."""
+"""Draw text and charts over a 3D view.
+
+These are the title, the colour bar, the legend, the numbers of a triangle and the list of keys.
+"""
 
 from __future__ import annotations
 
@@ -31,13 +34,16 @@ Size = tuple[int, int]
 
 
 def fonts(size: Size) -> tuple[int, int]:
-    """Return the small and the large font size of a view."""
+    """Return the small and the large font size for a view of `size` [pixels]."""
     scale = min(max(size[0] / FULL_WIDTH, MIN_SCALE), 1.0)
     return round(SMALL_FONT * scale), round(LARGE_FONT * scale)
 
 
 def wrap(text: str, width: float, font: int) -> str:
-    """Wrap text to lines of a width [pixels]. A number stays with its interval and its unit."""
+    """Return a text wrapped to lines of a width [pixels].
+
+    A number stays on a line with its interval and its unit.
+    """
     text = NUMBER.sub(lambda one: one[0].replace(" ", "\xa0"), text)
     letters = max(int(width / (LETTER_WIDTH * font)), MIN_LETTERS)
     lines = (textwrap.wrap(line, letters) for line in text.splitlines())
@@ -45,7 +51,7 @@ def wrap(text: str, width: float, font: int) -> str:
 
 
 def show_margins(plotter: Any, room: Room, size: Size) -> None:
-    """Keep the part out of the room for text with white sides of the view."""
+    """Cover the sides of a view that are kept free for text with white, so that no part shows."""
     import vtk
 
     left, right = room.left / size[0], 1.0 - room.right / size[0]
@@ -65,13 +71,13 @@ def show_margins(plotter: Any, room: Room, size: Size) -> None:
 
 
 def title_height(title: str, size: Size) -> float:
-    """Height [pixels] of the text of show_title."""
+    """Return the height of the title that show_title draws in a view [pixels]."""
     large = fonts(size)[1]
     return 2 * EDGE + LINE_HEIGHT * large * len(wrap(title, TITLE * size[0], large).splitlines())
 
 
 def show_title(plotter: Any, title: str, lines: Sequence[str], size: Size) -> None:
-    """Write the title in the upper left, and below it the lines on a triangle."""
+    """Write the title in the upper left of a view, and below it the lines on a chosen triangle."""
     small, large = fonts(size)
     title = wrap(title, TITLE * size[0], large)
     text = _add_text(plotter, "title", title, (EDGE, size[1] - EDGE), large)
@@ -87,7 +93,7 @@ def show_title(plotter: Any, title: str, lines: Sequence[str], size: Size) -> No
 def show_colour_bar(
     plotter: Any, quantity: Quantity, limits: tuple[float, float], actor: Any, name: str, size: Size
 ) -> None:
-    """Draw the colour bar of an actor at the right edge of the view, its title above it."""
+    """Draw the colour bar of a coloured surface at the right edge of the view, under its title."""
     steps, number_format = colour_bar_ticks(limits)
     bar = plotter.add_scalar_bar(
         title=name,  # blanks, because VTK would shrink a title to the bar: it is written below
@@ -109,10 +115,11 @@ def show_colour_bar(
 def show_legend(
     plotter: Any, entries: Sequence[tuple[str, str]], remarks: Sequence[str], size: Size, width: int
 ) -> None:
-    """Draw a patch of each colour with its meaning in the lower left, and remarks above.
+    """Draw a patch of each colour with its meaning in the lower left of a view, and remarks above.
 
     Args:
-        width: of the legend [pixels].
+        entries: colours with their meanings.
+        width: width of the legend [pixels].
     """
     small, _ = fonts(size)
     line, x, row = LINE_HEIGHT * small, EDGE, 0
@@ -159,7 +166,7 @@ def mark_triangle(plotter: Any, corners: np.ndarray, length: float) -> None:
 
 
 def show_keys(plotter: Any, text: str, size: Size) -> None:
-    """Write the list of keys over everything."""
+    """Write the list of keys of the window over everything else."""
     font = fonts(size)[0]
     left = max(EDGE, 0.5 * size[0] - 30 * font)
     prop = _add_text(plotter, "keys", text, (left, 0.5 * size[1]), font).prop
@@ -170,7 +177,7 @@ def show_keys(plotter: Any, text: str, size: Size) -> None:
 
 
 def _add_text(plotter: Any, name: str, text: str, place: tuple[float, float], font: int) -> Any:
-    """Add text whose lower left corner is at a place [pixels] of the view."""
+    """Add a text to a view with its lower left corner at a place [pixels]. Return its actor."""
     return plotter.add_text(
         escape_dollars(text), position=place, font_size=font, color=DARK, name=name, render=False
     )

@@ -1,4 +1,4 @@
-"""The views of a part: in its chamber with dimensions, and its target from near."""
+"""Draw the views of a part: in its chamber with dimensions, and its target from near."""
 
 from __future__ import annotations
 
@@ -39,11 +39,11 @@ Add = Callable[[Any], None]
 def choose_views(
     parts: Sequence[tuple[Surface, Surface]], chambers: Sequence[Surface]
 ) -> tuple[np.ndarray, list[np.ndarray]]:
-    """Directions to the eyes, common to several results.
+    """Choose the directions to the eye from which all results are drawn.
 
     Args:
         parts: for each result the target, and the surface that may hide it.
-        chambers: with cell data "tag".
+        chambers: for each result the cavity, with cell data "tag".
     Returns:
         The direction that shows chambers, and one or two directions that show targets from near.
     """
@@ -63,7 +63,13 @@ def part_panels(
     chamber: Surface,
     views: tuple[np.ndarray, Sequence[np.ndarray]],
 ) -> list[Panel]:
-    """The part in its chamber with dimensions, and its target from near. `add` adds the part."""
+    """Draw the part in its chamber with dimensions, and its target from near. Return the panels.
+
+    Args:
+        add: function that adds the part to a plotter.
+        target, part, chamber: surfaces that fill the views.
+        views: direction to the eye for the chamber, and one or two for the target from near.
+    """
 
     def add_both(plotter: Any) -> None:
         add(plotter)
@@ -82,7 +88,10 @@ def part_panels(
 def near_panels(
     add: Add, target: Surface, part: Surface, eyes: Sequence[np.ndarray]
 ) -> list[Panel]:
-    """The target from near, from one or two directions."""
+    """Draw the target from near, from one or two directions to the eye, and return the panels.
+
+    `add` adds the part to a plotter.
+    """
     length, whole = (np.linalg.norm(np.ptp(one.points, axis=0)) for one in (target, part))
     is_cut = bool(whole > WHOLE * length)
     points = np.asarray((target if is_cut else part).points)
@@ -93,10 +102,12 @@ def near_panels(
 
 
 def chamber_dimensions(chamber: Surface, eye: np.ndarray) -> list[Dimension]:
-    """Size of a chamber, and the distance from the sonotrode to the part's lowest point.
+    """Return the dimensions to write at a chamber.
+
+    They are its size, and the distance from the sonotrode to the part's lowest point.
 
     Args:
-        chamber: with cell data "tag".
+        chamber: cavity with cell data "tag".
         eye: direction to the eye.
     """
     frame = view_frame(eye)
@@ -137,7 +148,7 @@ def chamber_dimensions(chamber: Surface, eye: np.ndarray) -> list[Dimension]:
 
 
 def _upright(foot: np.ndarray, low: float, high: float, row: int) -> Dimension:
-    """The height between two levels, drawn at the place of a foot."""
+    """Return the vertical dimension between two levels [mm], drawn at the place of `foot`."""
     ends = np.array([foot, foot])
     ends[:, 2] = low, high
     return Dimension(ends, f"{high - low:.4g} mm", row)

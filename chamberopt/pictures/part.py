@@ -1,4 +1,4 @@
-"""A part as its file has it, as a .png: its target in the chamber, or its faults."""
+"""Draw a part as its file has it: its target in the chamber, or the faults of its mesh."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def draw_part(
     """Draw a part with its target in its chamber, or with its faults.
 
     Args:
-        corners: of its triangles [m], shape (n, 3, 3).
+        corners: corners of its triangles [m], shape (n, 3, 3).
         title: written above the picture.
         picture: file to write, .png.
         marked: marks the triangles of the target, shape (n,).
@@ -77,7 +77,7 @@ def draw_part(
 
 
 def render_part(job: dict[str, Any]) -> None:
-    """Draw the part in a child: in its chamber, and its target or its faults."""
+    """Draw the picture of draw_part; this runs in a child process."""
     corners, marked, missed, edges = (
         job[name] for name in ("corners", "marked", "missed", "edges")
     )

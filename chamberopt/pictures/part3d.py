@@ -1,4 +1,4 @@
-"""The part in its chamber in 3D: its surfaces, and the numbers by which the page colours it.
+"""Prepare the part in its chamber for a 3D view on a page: surfaces, and numbers to colour them.
 
 The browser makes the colours (part.js). The page carries the numbers at each point of the target
 once, in single precision. It shows any number, or the coverage at any time: 1 - exp(-dent density ·
@@ -31,14 +31,14 @@ PART_GREY, SONOTRODE, GLASS, EDGES = "#b9bec4", "#c58b52", "#9fc3dd", "#6f8796"
 
 @dataclass(frozen=True)
 class PartScene:
-    """One result for the page.
+    """The part of one result for a 3D view on a page.
 
     Args:
-        data: for part.js; None for a part that is too large.
+        data: surfaces and numbers for part.js; None for a part that is too large.
         remarks: sentences on surfaces that are not shown.
         coverage: at points of the target, 0..1, 0 out of reach, shape (k,). None if single places
             have too few simulated dents.
-        area: of the surface around each point [mm²], shape (k,).
+        area: area of the surface around each point [mm²], shape (k,).
     """
 
     data: dict[str, Any] | None
@@ -48,10 +48,11 @@ class PartScene:
 
 
 def part_scene(result: Result, title: str, max_triangles: int = MAX_TRIANGLES) -> PartScene:
-    """Part and chamber of a result.
+    """Return part and chamber of a result for a 3D view on a page.
 
     Args:
-        max_triangles: of a larger part only the target is drawn. A larger target is not drawn.
+        max_triangles: largest number of triangles to draw. If the part has more, only its target
+            is drawn. If the target has more, nothing is drawn.
     Raises:
         InputError: a surface is missing, damaged or of another result.
     """
@@ -114,7 +115,7 @@ def part_scene(result: Result, title: str, max_triangles: int = MAX_TRIANGLES) -
 
 
 def quantities_in_all(scenes: Sequence[dict[str, Any]]) -> list[dict[str, str]]:
-    """The quantities that all scenes have."""
+    """Return the quantities that all 3D views of a page can show, as JSON values."""
     keys = ("name", "label", "unit", "title", "colours")
     return [
         {key: getattr(one, key) for key in keys}
@@ -126,7 +127,11 @@ def quantities_in_all(scenes: Sequence[dict[str, Any]]) -> list[dict[str, str]]:
 def _surfaces(
     part: DrawnPart, rest: Surface | None, chamber: Surface, eye: np.ndarray
 ) -> dict[str, dict[str, Any]]:
-    """The surfaces that view3d.js draws, by name: part, few, unreached, rest, sonotrode, glass."""
+    """Return the surfaces that view3d.js draws, by name.
+
+    part: target with enough dents; few: target with too few dents; unreached: target that no ball
+    can touch; rest: the rest of the part; sonotrode; glass: the walls.
+    """
     tags = np.asarray(chamber["tag"])
     target, resolved = part.target, np.asarray(part.target["resolved"])
     corners = target.regular_faces
@@ -153,7 +158,7 @@ def _surfaces(
 
 
 def _eye(normal: np.ndarray) -> np.ndarray:
-    """Direction to the camera that most of the target faces, a little aside.
+    """Return the direction to the camera that most of the target faces, a little aside.
 
     It is from above, where the border of the chamber hides least, unless twice as much faces down.
     If all sides show about the same, as on a gear, it is USUAL.
@@ -175,7 +180,7 @@ def _eye(normal: np.ndarray) -> np.ndarray:
 
 
 def _view(chamber: Surface, eye: np.ndarray) -> dict[str, object]:
-    """Middle of the cavity, place of the eye, and size of the scene that fills the view [mm]."""
+    """Return the middle of the cavity, the place of the eye and the size of the view [mm]."""
     around = np.asarray(chamber.points, dtype=float)
     size = float(np.linalg.norm(np.ptp(around, axis=0)))
     middle = 0.5 * (around.min(axis=0) + around.max(axis=0))
@@ -187,7 +192,7 @@ def _view(chamber: Surface, eye: np.ndarray) -> dict[str, object]:
 
 
 def _edges(chamber: Surface, tags: np.ndarray) -> np.ndarray:
-    """Ends of the sharp edges of the cavity, edge after edge, (2 n, 3)."""
+    """Return the ends of the sharp edges of the cavity, edge after edge, shape (2 n, 3)."""
     around = chamber.extract_cells(tags != TAG_PART).extract_surface(algorithm="dataset_surface")
     lines = around.extract_feature_edges(
         feature_angle=EDGE_ANGLE, manifold_edges=False, non_manifold_edges=False

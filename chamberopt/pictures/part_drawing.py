@@ -1,4 +1,4 @@
-"""The chamber with its dimensions, to scale: a section through its axis, and a plan from above."""
+"""Draw the chamber to scale with its dimensions: a section through its axis, and a plan."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def dimension(
 
 
 def across_line(axes: Axes, start: Point, end: Point, name: str = "") -> None:
-    """Draw the line of an axis, or of a section with its name at both ends."""
+    """Draw a dash-dotted line: an axis, or with a name at both ends the place of a section."""
     axes.plot(*zip(start, end, strict=True), color=DARK_GREY, lw=0.5, ls=(0, (9, 2, 1.5, 2)))
     if name:
         length = math.dist(start, end)
@@ -114,11 +114,11 @@ class View:
     outside: np.ndarray
 
     def place(self, points: ArrayLike) -> np.ndarray:
-        """Places on the page [mm] of points (..., 2) [mm] in the chamber."""
+        """Return the places on the page [mm] of points (..., 2) [mm] in the chamber."""
         return np.asarray(self.corner + self.scale * (np.asarray(points) - self.low))
 
     def window(self, axes: Axes) -> Rectangle:
-        """The drawn area, as a patch to clip with."""
+        """Return the area of the view on the page, as a rectangle to clip drawings with."""
         from matplotlib.patches import Rectangle
 
         sides, above = self.outside
@@ -129,12 +129,12 @@ class View:
 
 
 def draw_chamber(axes: Axes, chamber: Chamber, left: float, top: float, size: Point) -> str:
-    """Draw both views at a place on the page, and return the scale, such as "1:2".
+    """Draw section and plan of a chamber on a page, and return the scale, such as "1:2".
 
     Args:
-        axes: of the whole page, in mm.
-        left, top: corner of the place.
-        size: its width and height.
+        axes: axes of the whole page, in mm.
+        left, top: upper left corner of the drawing.
+        size: width and height that it may have.
     """
     mm = 1e3 * chamber.vertices
     low, high = mm.min(axis=0), mm.max(axis=0)
@@ -163,7 +163,10 @@ def draw_chamber(axes: Axes, chamber: Chamber, left: float, top: float, size: Po
 def _fit(
     cavity: np.ndarray, across: int, beyond: np.ndarray, size: np.ndarray
 ) -> tuple[float, np.ndarray, float]:
-    """The largest scale at which both views fit, the drawn length outside, and their width."""
+    """Return the largest scale at which section and plan fit into `size` [mm].
+
+    Also return the drawn lengths of the part beyond the cavity, and the width of both views [mm].
+    """
     for scale in SCALES:
         outside = np.minimum(MOST_OUTSIDE, scale * beyond)
         wide = scale * (cavity[across] + cavity[0]) + 2.0 * outside[0] + 4.0 * BESIDE
@@ -174,7 +177,7 @@ def _fit(
 
 
 def _place_of_section(chamber: Chamber, axis: int) -> float:
-    """Place of the section [mm]: the chamber's axis if it meets the part.
+    """Return where the section cuts an axis [mm]: at the chamber's axis if it meets the part.
 
     Otherwise it is the middle of the part inside the chamber.
     """

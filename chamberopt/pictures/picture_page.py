@@ -1,4 +1,4 @@
-"""A page of views with captions, dimensions, axes, a colour bar and a legend, as a .png.
+"""Write a picture of several views with captions, dimensions, a colour bar and a legend.
 
 Only the views are drawn in 3D. Matplotlib lays out all else round them, so nothing lies over the
 part, and the size of texts does not depend on the picture's size.
@@ -34,7 +34,10 @@ AXIS_COLOURS = {"x": "#a33530", "y": "#2e7d32", "z": "#1f4e9c"}
 
 
 class Dimension(NamedTuple):
-    """A length between two points [mm], (2, 3), to write at a view. Row 1 is farther out."""
+    """A dimension to draw at a view between two points [mm], `ends`, shape (2, 3).
+
+    `row` tells how far outside it is drawn: row 1 is farther out than row 0.
+    """
 
     ends: np.ndarray
     text: str
@@ -45,10 +48,10 @@ class Panel(NamedTuple):
     """A view with its caption.
 
     Attributes:
-        view: to show.
+        view: the image to show.
         caption: short text above the view.
-        dimensions: lengths that are written outside of the points.
-        outside: these points [mm], (k, 3).
+        dimensions: lengths to draw round the points `outside`.
+        outside: points [mm], (k, 3), that no dimension may cross.
         is_cut: true if the part reaches beyond the view, which then has a frame.
     """
 
@@ -86,7 +89,7 @@ def write_page(
 
     Args:
         picture: .png file to write.
-        rows: with the same number of panels each.
+        rows: rows of views, each with the same number of views.
         legend: colours and their meaning.
         bar: drawn beside the views.
         remarks: sentences below the views.
@@ -107,7 +110,7 @@ def write_page(
     figure = new_figure(across / PER_INCH, total / PER_INCH)
 
     def place(x: float, y: float, width: float, height: float) -> tuple[float, float, float, float]:
-        """Shares of the figure. The rectangle's top is y pixels below the figure's top."""
+        """Convert a rectangle from pixels to shares of the figure. y counts from its top."""
         return x / across, 1.0 - (y + height) / total, width / across, height / total
 
     top = float(EDGE)
@@ -129,7 +132,7 @@ def write_page(
 
 
 def _wrapped(text: str, pixels: float, font: int) -> str:
-    """Text in lines of at most a width [pixels]."""
+    """Return a text broken into lines of at most a width [pixels]."""
     letters = max(int(pixels / (LETTER * font)), 12)
     return "\n".join(fill(line, letters) for line in text.split("\n"))
 
@@ -154,7 +157,7 @@ def _draw_panel(axes: Axes, panel: Panel) -> None:
 
 
 def draw_scale(axes: Axes, view: View, place: tuple[float, float]) -> None:
-    """Draw a bar of a round length, at most a quarter of the image's width."""
+    """Draw a scale bar of a round length in mm, at most a quarter of the image's width."""
     longest = 0.25 * view.image.shape[1] * view.pixel_mm
     power = 10.0 ** np.floor(np.log10(longest))
     length = max(step * power for step in (1.0, 2.0, 5.0) if step * power <= longest)
@@ -165,7 +168,7 @@ def draw_scale(axes: Axes, view: View, place: tuple[float, float]) -> None:
 
 
 def _draw_triad(axes: Axes, frame: np.ndarray, place: tuple[float, float]) -> None:
-    """Draw the directions of x, y and z. Directions towards the eye come last."""
+    """Draw the x, y and z axes as arrows. Arrows that point towards the eye are drawn last."""
     for k in np.argsort(frame[2]):
         name = "xyz"[k]
         step = TRIAD * frame[:2, k] * [1.0, -1.0]
@@ -218,7 +221,7 @@ def _draw_bar(axes: Axes, bar: ColourBar) -> None:
 def _legend_lines(
     legend: Sequence[tuple[str, str]], across: float
 ) -> list[list[tuple[float, str, str]]]:
-    """Place, colour and meaning of each legend entry, in lines of at most `across` pixels."""
+    """Return the place, colour and meaning of each legend entry, in lines of `across` pixels."""
     lines: list[list[tuple[float, str, str]]] = []
     x = across
     for colour, meaning in legend:

@@ -1,4 +1,4 @@
-"""Geometry for drawings: plane cuts of meshes, the enclosed areas, and the sonotrode's size."""
+"""Compute plane cuts of meshes, the areas inside them, and the sonotrode's size for drawings."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ FEWEST_CORNERS = 8  # of a face that is drawn as round
 def cut(
     vertices: np.ndarray, triangles: np.ndarray, axis: int, at: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The lines in which a plane square to an axis cuts a mesh.
+    """Return the lines in which a plane square to an axis cuts a mesh.
 
     Args:
         vertices: (n, 3) [m].
@@ -55,7 +55,10 @@ def cut(
 
 
 def inside(lines: np.ndarray) -> Path | None:
-    """The areas inside the lines of closed bodies, which may overlap, or None without lines."""
+    """Return the areas inside the outlines of closed bodies, which may overlap.
+
+    None if there are no lines.
+    """
     import shapely
     from matplotlib.path import Path
 
@@ -72,7 +75,10 @@ def inside(lines: np.ndarray) -> Path | None:
 
 
 def _turns_around(lines: np.ndarray, point: Point) -> int:
-    """Number of turns of the lines round a point: upward less downward lines to its right."""
+    """Return how often the lines go round a point.
+
+    This is the number of upward lines to its right minus the number of downward lines.
+    """
     (x1, y1), (x2, y2) = lines[:, 0].T, lines[:, 1].T
     way = (y2 > point.y).astype(int) - (y1 > point.y)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -81,7 +87,10 @@ def _turns_around(lines: np.ndarray, point: Point) -> int:
 
 
 def face_size_mm(chamber: Chamber) -> tuple[float, ...]:
-    """Diameter of a round sonotrode, or the lengths of another sonotrode along x and y [mm]."""
+    """Return the size of the sonotrode's face [mm].
+
+    It is the diameter of a round face, or the lengths of another face along x and y.
+    """
     face = chamber.triangles[chamber.tags == TAG_SONOTRODE]
     rim = np.unique(border_edges(face))
     rim = rim if len(rim) else np.unique(face)

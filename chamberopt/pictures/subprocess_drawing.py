@@ -1,4 +1,4 @@
-"""Draw pictures with VTK in a child.
+"""Draw pictures with VTK in a child process.
 
 Where OpenGL's library is installed without a driver, VTK raises no error: it ends the process. In a
 child, the end costs the picture, never the result.
@@ -59,7 +59,10 @@ def without_display() -> dict[str, str]:
 
 
 def picture_path(picture: str | Path, option: str = "--screenshot ") -> Path:
-    """Return the path of a .png that an option may write; raises as file_path."""
+    """Return the path of a .png that an option of a command may write.
+
+    Raises InputError for another ending, a missing folder, or a place that cannot be written.
+    """
     return file_path(picture, (".png",), "pictures are written as .png", option)
 
 
@@ -82,7 +85,7 @@ def file_path(file: str | Path, suffixes: tuple[str, ...], written: str, option:
 
 
 def require_opengl(picture: Path) -> Path:
-    """Return a picture's path; InputError where this machine cannot draw it."""
+    """Return the path of a picture. Raise InputError if this machine has no library to draw it."""
     if missing := missing_opengl():
         raise InputError(f"{picture}: cannot be drawn: {missing}")
     return picture
@@ -103,7 +106,7 @@ def draw_in_subprocess(
     count: Callable[[int], None] = lambda drawn: None,
     folder: str = "",
 ) -> str | None:
-    """Draw a picture in a child.
+    """Draw a picture in a child process.
 
     Args:
         render: function that draws the picture in the child. For a film it yields the number of

@@ -1,4 +1,4 @@
-"""A view of surfaces along parallel lines of sight, so lengths are the same all over it."""
+"""Render surfaces along parallel lines of sight, so lengths are the same all over the image."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class View(NamedTuple):
     pixel_mm: float
 
     def pixels(self, points: np.ndarray) -> np.ndarray:
-        """Columns and rows (k, 2) in the image of points [mm], (k, 3)."""
+        """Return the columns and rows (k, 2) in the image of points [mm], (k, 3)."""
         flat = np.asarray(points, dtype=float) @ self.frame[:2].T
         return np.asarray((flat - self.corner) * [1.0, -1.0] / self.pixel_mm)
 
@@ -42,13 +42,14 @@ def render_view(
     size: tuple[int, int],
     border: int,
 ) -> View:
-    """Render the actors that `add` puts into a plotter.
+    """Render surfaces from one direction, in an image that they fill.
 
     Args:
+        add: function that adds the surfaces to a plotter.
         eye: direction to the eye.
         points: points that fill the image [mm], (k, 3).
         size: largest width and height [pixels]. A side that is not filled is made shorter.
-        border: round the points [pixels].
+        border: free border round the points [pixels].
     """
     frame = view_frame(eye)
     flat = np.asarray(points, dtype=float) @ frame.T
@@ -69,10 +70,11 @@ def render_view(
 
 
 def aim_along(plotter: Any, frame: np.ndarray, middle: np.ndarray, half_height: float) -> None:
-    """Look at a point along parallel lines.
+    """Point the camera of a plotter at `middle`, with parallel lines of sight.
 
     Args:
-        half_height: of the image [mm].
+        frame: unit vectors to the right, upwards and to the eye, (3, 3).
+        half_height: half of the image's height [mm].
     """
     distance = 2.0 * np.linalg.norm(np.ptp(np.reshape(plotter.bounds, (3, 2)), axis=1)) + 1.0
     plotter.camera_position = [middle + distance * frame[2], middle, frame[1]]

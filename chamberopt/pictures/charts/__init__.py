@@ -1,1 +1,1 @@
-"""Charts of studies, sweeps, accuracy and coverage, drawn with matplotlib."""
+"""Draw charts of studies, sweeps, accuracy and coverage with matplotlib."""

@@ -1,4 +1,4 @@
-"""The picture of a convergence study (`chamberopt accuracy`): errors and biases over cost."""
+"""Draw the picture of an accuracy study (`chamberopt accuracy`): errors and biases over cost."""
 
 from __future__ import annotations
 
@@ -35,7 +35,10 @@ def accuracy_picture(path: Path, study: ConvergenceStudy) -> None:
 
 
 def _draw_errors(axes: Axes, study: ConvergenceStudy) -> None:
-    """Draw batches with their law, biases at the cost of the design's replicas, recommendations."""
+    """Draw error against cost: numbers of replicas with a fitted curve, biases, recommendations.
+
+    Biases stand at the cost of the design's own replicas.
+    """
     axes.set_xscale("log")
     axes.set_yscale("log")
     for accuracy in ACCURACIES:
@@ -62,7 +65,10 @@ def _draw_errors(axes: Axes, study: ConvergenceStudy) -> None:
 
 
 def _draw_bias_marks(axes: Axes, study: ConvergenceStudy) -> None:
-    """Draw a filled mark for a significant bias, else an open mark at its upper limit."""
+    """Draw a mark for the bias of each run.
+
+    It is filled if the bias is more than noise, else open and at the bias's upper limit.
+    """
     # The gauge changes the measured quantity, not its accuracy.
     names = dict.fromkeys(run.parameter for run in study.runs)
     others = (name for name in names if name not in (DESIGNED, GAUGE, TIME))
@@ -83,7 +89,7 @@ def _draw_bias_marks(axes: Axes, study: ConvergenceStudy) -> None:
 
 
 def _draw_biases(axes: Axes, study: ConvergenceStudy) -> None:
-    """Draw the signed bias of each run with its interval, and name its CPU time."""
+    """Draw the signed bias of each run with its interval, and write its CPU time beside it."""
     from matplotlib.ticker import MaxNLocator
 
     runs = study.runs

@@ -1,4 +1,7 @@
-"""The picture of a calibration: measured points on predicted bands, a panel a kind of data."""
+"""Draw the picture of a calibration: measured points on predicted bands.
+
+Each kind of measurement has a panel.
+"""
 
 from __future__ import annotations
 
@@ -52,7 +55,10 @@ def calibration_picture(path: Path, found: Calibrated) -> None:
 
 
 def _band(found: Calibrated, model: Model) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Middle and ends of the 95 % band, of figures and not of logarithms."""
+    """Return the predicted figures, and the lower and upper ends of their 95 % band.
+
+    The model predicts logarithms. They are converted to the figures themselves.
+    """
     at = model(found.posterior.values)
     sd = np.sqrt(found.posterior.sd(model) ** 2 + at.noise.diagonal())
     low, middle, high = (np.exp(at.values + sign * Z * sd) for sign in (-1.0, 0.0, 1.0))
@@ -60,7 +66,10 @@ def _band(found: Calibrated, model: Model) -> tuple[np.ndarray, np.ndarray, np.n
 
 
 def _bars(one: Data) -> tuple[np.ndarray, np.ndarray]:
-    """Measured figures and the ends of their bars, (2, n)."""
+    """Return measured figures, shape (n,), and the lengths of their 95 % bars, shape (2, n).
+
+    The lengths are those below and above each figure.
+    """
     y, sd = np.exp(one.y), np.sqrt(one.covariance.diagonal())
     ends = np.exp(one.y + Z * np.array([[-1.0], [1.0]]) * sd)
     return y, np.abs(ends - y)
@@ -82,7 +91,7 @@ def _arcs(axes: Axes, found: Calibrated, some: list[Data]) -> None:
 
 
 def _coverage(axes: Axes, found: Calibrated, some: list[Data]) -> None:
-    """Draw coverage against time, 1 - exp(-x t)."""
+    """Draw measured and predicted coverage against time t, where 1 - exp(-x t) is predicted."""
     for one, colour in zip(some, COLOURS * len(some), strict=False):
         times = np.linspace(0.0, 1.3 * float(one.at.max()), TIMES)
         middle, low, high = (-100.0 * np.expm1(-x[0] * times) for x in _band(found, one.model))
@@ -99,7 +108,7 @@ def _coverage(axes: Axes, found: Calibrated, some: list[Data]) -> None:
 
 
 def _ratios(axes: Axes, found: Calibrated, some: list[Data]) -> None:
-    """Draw measured over predicted single figures, and the band of the prediction."""
+    """Draw the ratio of each measured figure to its prediction, on the band of the prediction."""
     names, place = [], 0
     for one in some:
         middle, low, high = _band(found, one.model)

@@ -1,4 +1,4 @@
-"""Colours of all pictures and of the report: lines, candidates and colour maps."""
+"""Choose the colours of all pictures and of the report: lines, candidates and colour maps."""
 
 from __future__ import annotations
 
@@ -27,17 +27,17 @@ _LINES = ("-", "--", "-.", ":", *((0, dashes) for dashes in _DASHES))
 
 
 def zone_colour(index: int) -> str:
-    """Colour of the zone with this index. Colours repeat for later zones."""
+    """Return the colour of the zone with this index. Colours repeat after five zones."""
     return (SKY, PURPLE, GREEN, BLUE, BLACK)[index % 5]  # unlike the sonotrode's colour
 
 
 def line_style(index: int) -> dict[str, Any]:
-    """Colour and line style of the compared result with this index."""
+    """Return the colour and line style of the compared result with this index."""
     return {"color": _COLOURS[index % len(_COLOURS)], "ls": _LINES[index % len(_LINES)]}
 
 
 def hex_colours(colour_map: Colormap | str, count: int = 10) -> list[str]:
-    """Evenly spaced colours of a matplotlib colour map, or of its name, as #rrggbb."""
+    """Return `count` evenly spaced colours of a matplotlib colour map as texts like #rrggbb."""
     from matplotlib import colormaps
     from matplotlib.colors import to_hex
 

@@ -1,4 +1,4 @@
-"""Charts of coverage and impacts: histograms, and coverage over peening time."""
+"""Draw charts of coverage and impacts: histograms, and coverage over peening time."""
 
 from __future__ import annotations
 
@@ -84,7 +84,9 @@ def distributions_picture(
     treatment_time: float,
     impacts: Sequence[HistogramData],
 ) -> None:
-    """Write a picture of four panels, each with a legend that has its numbers, as .png.
+    """Write a picture with histograms of coverage and impacts and coverage over time, as .png.
+
+    The legends of its four panels have the numbers.
 
     Args:
         treatment_time: [s].
@@ -159,7 +161,11 @@ def draw_coverage_over_time(
 
 
 def _known_lines(rows: Sequence[CoverageAtTime], max_half_width: float) -> list[np.ndarray]:
-    """Mean and 5th percentile, each with rows times, values, half-widths, shape (3, n)."""
+    """Return the lines of mean coverage and of its 5th percentile, as far as they are known.
+
+    Each line has rows with times, values and half-widths, shape (3, n). It ends before the first
+    point with a half-width above `max_half_width`.
+    """
     means = [(row.time_s, row.mean_coverage, row.half_width) for row in rows]
     percentiles = [
         (row.time_s, row.p05_coverage, row.p05_half_width)
@@ -174,10 +180,13 @@ def _known_lines(rows: Sequence[CoverageAtTime], max_half_width: float) -> list[
 
 
 def _draw_time_to_98(axes: Axes, curve: CoverageCurve, end: float, height: float) -> None:
-    """Mark the time to 98 % with its interval, or draw an arrow at the edge for a later time.
+    """Mark the time at which 95 % of the area is 98 % covered, with its interval.
+
+    A time beyond the end of the axis is an arrow at the edge.
 
     Args:
-        height: of the mark [%]. Each result has its own height, so that near marks do not overlap.
+        end: end of the axis [s].
+        height: height of the mark [%]. Each result has its own, so that near marks do not overlap.
     """
     assert curve.time_to_98 is not None
     time, half_width = curve.time_to_98.value, curve.time_to_98.half_width
@@ -192,7 +201,12 @@ def _draw_time_to_98(axes: Axes, curve: CoverageCurve, end: float, height: float
 def coverage_over_time_figure(
     curves: Mapping[str, Sequence[CoverageAtTime]], treatment_time: float
 ) -> Figure:
-    """Mean and 5th percentile of coverage over peening time [s], by name of the result."""
+    """Return a chart of mean and 5th percentile of coverage over peening time [s].
+
+    Args:
+        curves: coverage at several times, by the name of the result.
+        treatment_time: [s].
+    """
     figure = new_figure(*NARROW)
     axes = figure.subplots()
     drawn = [CoverageCurve(name, rows, STYLES[name]) for name, rows in curves.items()]
@@ -204,7 +218,7 @@ def coverage_over_time_figure(
 
 
 def histogram_figure(coverage_and_area: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> Figure:
-    """Share of the target's area by its coverage.
+    """Return a histogram of the target's area by its coverage.
 
     Args:
         coverage_and_area: for each result by name, coverage 0..1 and area of triangles, (k,) each.

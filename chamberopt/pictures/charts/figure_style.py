@@ -25,7 +25,7 @@ SVG = "http://www.w3.org/2000/svg"
 
 
 def new_figure(width: float, height: float) -> Figure:
-    """An empty figure of this size [inch] that needs no display."""
+    """Return an empty figure of this size [inch] that needs no display."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -36,7 +36,7 @@ def new_figure(width: float, height: float) -> Figure:
 
 
 def ignore_settings_here() -> None:
-    """Ignore settings files of matplotlib, since a file beside a design may run programs."""
+    """Make matplotlib ignore a settings file in the current folder, which could run programs."""
     import matplotlib
 
     if Path("matplotlibrc").exists():
@@ -44,14 +44,14 @@ def ignore_settings_here() -> None:
 
 
 def save_picture(figure: Figure, path: Path) -> None:
-    """Write the figure as .png, atomically."""
+    """Write a figure as .png, whole or not at all."""
     content = io.BytesIO()
     figure.savefig(content, format="png")
     write_bytes(path, content.getvalue())
 
 
 def svg_text(figure: Figure, name: str, tooltips: Mapping[str, Sequence[str]] | None = None) -> str:
-    """The figure as an SVG element for an HTML page. Its text can be selected and searched.
+    """Return a figure as an SVG element for an HTML page. Its text can be selected and searched.
 
     Args:
         name: makes the ids inside unique among the figures of a page.
@@ -82,7 +82,7 @@ def svg_text(figure: Figure, name: str, tooltips: Mapping[str, Sequence[str]] | 
 
 
 def style_axes(axes: Axes, x_label: str = "", y_label: str = "") -> None:
-    """Axes with a light grid, without a frame at the top and right."""
+    """Give axes a light grid and labels, and remove their frame at the top and right."""
     axes.spines[["top", "right"]].set_visible(False)
     axes.grid(alpha=0.25, lw=0.6)
     axes.set_axisbelow(True)
@@ -99,7 +99,7 @@ def name_choices(axis: Axis, texts: Sequence[str]) -> None:
 
 
 def value_range(estimates: Sequence[Estimate]) -> tuple[float, float]:
-    """Axis limits that show every value, and its interval up to the span of the values.
+    """Return axis limits that show every value, and its interval up to the span of the values.
 
     A wider interval, for example of a time that may be infinite, would flatten everything else.
     """
@@ -116,11 +116,14 @@ def value_range(estimates: Sequence[Estimate]) -> tuple[float, float]:
 
 
 def literal(text: str) -> str:
-    """Text that shows names as they are: for matplotlib $ begins a formula, and _ hides a label."""
+    """Return a text that matplotlib shows as it is.
+
+    Otherwise `$` begins a formula, and a label that begins with `_` is hidden.
+    """
     text = text.replace("$", r"\$")
     return f" {text}" if text.startswith("_") else text
 
 
 def readable(name: str) -> str:
-    """The name of an objective as text for an axis."""
+    """Return the name of an objective as text for an axis, with blanks in place of `_`."""
     return name.replace("_", " ")

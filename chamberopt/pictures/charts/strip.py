@@ -1,4 +1,7 @@
-"""The picture of a virtual strip (`chamberopt strip`): its saturation curve and a shop's fits."""
+"""Draw the picture of a virtual Almen strip (`chamberopt strip`).
+
+It has the saturation curve, and the curves that a shop would fit to five arc heights.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +28,10 @@ MULTIPLE_NAMES = "T/4", "T/2", "T", "2 T", "4 T"
 
 
 def fit_text(fit: KirkFit, strip: VirtualStrip) -> str:
-    """Intensity and saturation time of a fit, and their distance from the curve's."""
+    """Return a text with intensity and saturation time of a fitted curve.
+
+    Each has its deviation [%] from the value of the virtual strip itself.
+    """
     off = 100.0 * (fit.intensity / strip.intensity.value - 1.0)
     late = 100.0 * (fit.saturation_time / strip.time.value - 1.0)
     symbol = "I" if strip.is_calibrated else "S"

@@ -1,4 +1,4 @@
-"""Charts of a study: its search, slices through its best design, and the Pareto front."""
+"""Draw charts of a study: its search, the influence of each parameter, and the Pareto front."""
 
 from __future__ import annotations
 
@@ -100,7 +100,9 @@ def draw_convergence(
     y_label: str,
     smaller_is_better: bool = False,
 ) -> dict[str, list[str]]:
-    """Draw every evaluation in its order with 95 % intervals, the best so far, and confirmations.
+    """Draw the objective of every evaluation in its order, with 95 % intervals.
+
+    The best so far and the confirmations of candidates are drawn too.
 
     Returns:
         Tooltips for svg_text: value and parameters of each point, by gid of its line.
@@ -193,12 +195,15 @@ def _draw_parameter(
 
 
 def is_there(value: float | str, texts: Sequence[str]) -> bool:
-    """True if a candidate has a parameter. A missing parameter has the text parameters.NONE."""
+    """Return True if a candidate has a parameter: a number, or one of the allowed texts.
+
+    A parameter that a candidate lacks has another text as its value.
+    """
     return not isinstance(value, str) or value in texts
 
 
 def slices_picture(path: Path, result: StudyResult, sensitivity: Sensitivity) -> None:
-    """Write the model's objective over each parameter, as .png."""
+    """Write the objective over each parameter, as the study's model predicts it, as .png."""
     figure = slices_figure(
         sensitivity.slices,
         result.start.parameters,
@@ -216,7 +221,9 @@ def slices_figure(
     flat_label: str,
     y_label: str,
 ) -> Figure:
-    """The model's objective over each parameter, with main effect, interval and flat range.
+    """Return a chart of the objective over each parameter, as the study's model predicts it.
+
+    It shows the interval, the mean over the other parameters, and the range without real loss.
 
     Args:
         start, best: parameter values of these two designs.
@@ -308,7 +315,7 @@ def pareto_picture(path: Path, result: StudyResult) -> None:
 def convergence_figure(
     candidates: Sequence[EvaluatedCandidate], y_label: str, smaller_is_better: bool
 ) -> tuple[Figure, dict[str, list[str]]]:
-    """Every evaluation in its order, and tooltips with the parameters of each."""
+    """Return a chart of every evaluation in its order, and tooltips with the parameters of each."""
     figure = new_figure(*WIDE)
     axes = figure.subplots()
     tooltips = draw_convergence(axes, candidates, fill(y_label, Y_LABEL), smaller_is_better)
@@ -323,6 +330,6 @@ def influence_figure(
     best: Mapping[str, float | str],
     y_label: str,
 ) -> Figure:
-    """The objective over each parameter by the study's model."""
+    """Return a chart of the objective over each parameter, as the study's model predicts it."""
     label = fill(y_label, Y_LABEL)
     return slices_figure(slices, start, best, "loses no more than the noise", label)

@@ -1,4 +1,4 @@
-"""The map of a sweep: its objective over one or more parameters."""
+"""Draw the map of a sweep: its objective over one or more parameters."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ def _draw_curve(axes: Axes, sweep: SweepResult, name: str) -> None:
 def _draw_maps(
     figure: Figure, sweep: SweepResult, pairs: list[tuple[str, str]], shape: tuple[int, int]
 ) -> None:
-    """Draw one map a pair of parameters, with one colour bar and one legend."""
+    """Draw a map for each pair of parameters, with one colour bar and one legend for all."""
     is_grid = sweep.plan.method == "grid" and len(sweep.study.vary) == 2
     panels, colours = [], None
     for i, pair in enumerate(pairs):
@@ -117,7 +117,10 @@ def _draw_maps(
 
 
 def _draw_squares(axes: Axes, sweep: SweepResult, pair: tuple[str, str]) -> QuadMesh:
-    """Draw a grid of two parameters. Candidates that could not be simulated stay white."""
+    """Draw the objective as coloured squares on the grid of two parameters.
+
+    Candidates that could not be simulated stay white.
+    """
     x, y = (np.unique(_places(sweep, sweep.trials, name)) for name in pair)
     objective = [trial.objective.value if trial.objective else np.nan for trial in sweep.trials]
     values = np.array(objective).reshape(len(x), len(y))  # the second parameter runs fastest
@@ -136,7 +139,10 @@ def _draw_points(axes: Axes, sweep: SweepResult, pair: tuple[str, str]) -> PathC
 
 
 def _draw_marks(axes: Axes, sweep: SweepResult, pair: tuple[str, str]) -> None:
-    """Mark the design as it is, the best candidate, and candidates that failed."""
+    """Mark the unchanged design, the best candidate, and candidates without a valid result.
+
+    These could not be simulated or miss a constraint.
+    """
     infeasible = [trial for trial in sweep.trials if trial.objective and not trial.feasible]
     failed = [trial for trial in sweep.trials if not trial.objective]
 
@@ -158,7 +164,10 @@ def _draw_marks(axes: Axes, sweep: SweepResult, pair: tuple[str, str]) -> None:
 
 
 def _places(sweep: SweepResult, trials: Sequence[Trial], name: str) -> list[float]:
-    """Values of a parameter. A text gives its position."""
+    """Return the value of a parameter in each trial, for an axis.
+
+    A text gives its position among the allowed texts.
+    """
     return [sweep.study.vary[name].place(trial.parameters[name]) for trial in trials]
 
 

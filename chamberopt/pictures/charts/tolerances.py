@@ -1,4 +1,4 @@
-"""A tornado chart: the effect of each single tolerance on a figure."""
+"""Draw tornado charts, which show the effect of each single tolerance on a figure."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 class TornadoBar(NamedTuple):
-    """Change of the figure at the low and at the high end of a number."""
+    """Changes of a figure at the low and at the high end of a number's tolerance."""
 
     name: str
     low: Estimate
@@ -24,7 +24,7 @@ class TornadoBar(NamedTuple):
 
 
 class TornadoPanel(NamedTuple):
-    """The bars of one figure, by the names of the numbers."""
+    """The chart of one figure: its bars by the names of the toleranced numbers."""
 
     title: str
     x_label: str
@@ -32,7 +32,10 @@ class TornadoPanel(NamedTuple):
 
 
 def tornado_figure(panels: Sequence[TornadoPanel]) -> Figure:
-    """A tornado of each figure, one beside the other, in the order of the first."""
+    """Return the tornado charts of several figures side by side.
+
+    The numbers are ordered by their effect on the first figure.
+    """
 
     def size(name: str) -> float:
         return max(abs(end.value) for end in panels[0].bars[name][1:])
