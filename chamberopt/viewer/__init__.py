@@ -1,1 +1,1 @@
-"""The window of `chamberopt inspect`."""
+"""Show results in 3D in the window of `chamberopt inspect`."""

@@ -1,4 +1,4 @@
-"""A result opened in the viewer: its surfaces and impacts, checked against its result.json."""
+"""Open a result in the viewer: its surfaces and impacts, checked against its result.json."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ _REMEDIES = {  # for a quantity that a result lacks
 
 @dataclass(frozen=True)
 class ResultInfo:
-    """The data of a result.json for the viewer, plain enough to send to the child that draws.
+    """The data of a result.json for the viewer, which can be sent to the process that draws.
 
     Attributes:
-        treatment_s: peening time.
-        longest_s: end of the time slider.
-        sha256: of each data file by its name.
+        treatment_s: peening time [s].
+        longest_s: end of the time slider [s].
+        sha256: digest of each data file by its name.
         zones: names of the part's zones.
     """
 
@@ -59,7 +59,10 @@ def result_info(result: Result) -> ResultInfo:
 
 
 class OpenedResult:
-    """A result's surfaces and impacts. InputError if files are missing, damaged or another's."""
+    """The surfaces and impacts of a result.
+
+    Raises InputError if files are missing, damaged or of another result.
+    """
 
     def __init__(self, info: ResultInfo) -> None:
         self.info = info
@@ -78,7 +81,7 @@ class OpenedResult:
 
     @cached_property
     def hits(self) -> HitsByTriangle:
-        """The single impacts. They are read when needed, because they are most of a result."""
+        """All impacts on the part by triangle. They are many, so they are read when first needed."""
         return load_matching_hits(self._path(HITS_FILE), np.asarray(self.surface["impacts"]))
 
     def time_ratio(self, state: ViewState) -> float:
@@ -86,7 +89,10 @@ class OpenedResult:
         return 1.0 if state.time_s is None else state.time_s / self.info.treatment_s
 
     def show(self, state: ViewState) -> None:
-        """Colour the part by the state's quantity. InputError if the result lacks it."""
+        """Colour the part by the quantity that the state shows.
+
+        Raises InputError if the result lacks the quantity.
+        """
         if state.quantity not in self.quantities:
             remedy = _REMEDIES.get(state.quantity, "simulate again")
             raise InputError(
@@ -96,13 +102,19 @@ class OpenedResult:
         self.part.show(QUANTITIES[state.quantity], self.time_ratio(state))
 
     def above_threshold(self, state: ViewState) -> np.ndarray | None:
-        """Mark the triangles of the drawn target that are covered at least to the threshold."""
+        """Return True for each triangle of the drawn target that the threshold makes pale.
+
+        Its coverage is at least `state.below`. Return None without such a threshold.
+        """
         if state.below is None:
             return None
         return self.part.covered_to(state.below, self.time_ratio(state))
 
     def describe_triangle(self, triangle: int, state: ViewState) -> list[str]:
-        """Return all values of a triangle, one a line. InputError if there is no such triangle."""
+        """Return lines of text, each with one value of a triangle.
+
+        Raises InputError if there is no such triangle.
+        """
         surface = self.surface
         if not 0 <= triangle < surface.n_cells:
             raise InputError(
@@ -127,7 +139,7 @@ class OpenedResult:
         return [*lines, f"simulated: {impacts} impacts, {dents} dents"]
 
     def _value(self, name: str, triangle: int, state: ViewState) -> float:
-        """Return the mean of a quantity over a triangle."""
+        """Return the mean of a quantity over a triangle of the part, in the quantity's unit."""
         quantity, times = QUANTITIES[name], self.time_ratio(state)
         if name == "coverage" and state.time_s is not None:
             density = self.surface["dent_density"][triangle] * times
@@ -137,7 +149,7 @@ class OpenedResult:
 
 
 def common_quantities(results: Sequence[OpenedResult]) -> list[str]:
-    """Names of the quantities that all results have."""
+    """Return the names of the quantities that all results have."""
     return [name for name in QUANTITIES if all(name in one.quantities for one in results)]
 
 
@@ -153,7 +165,7 @@ def colour_limits(results: Sequence[OpenedResult], state: ViewState) -> tuple[fl
 
 
 def same_part(results: Sequence[OpenedResult]) -> bool:
-    """True if all results have the same triangles, wherever the part stands."""
+    """Return True if all results have the same triangles, wherever the part stands."""
     first = results[0].surface
     return all(
         one.surface.n_cells == first.n_cells

@@ -1,4 +1,4 @@
-"""The views of `inspect`, one view for each result. Everything in them follows from a ViewState."""
+"""Draw the views of `inspect`, one for each result, as a ViewState asks for."""
 
 from __future__ import annotations
 
@@ -58,8 +58,8 @@ class ResultPlotter:
     """A plotter with one view for each result.
 
     Attributes:
-        plotter: of pyvista.
-        results: opened.
+        plotter: the plotter of pyvista.
+        results: the shown results.
         linked: true if the views turn together, because they show the same part.
         quantities: names of the quantities that all results have.
     """
@@ -76,7 +76,7 @@ class ResultPlotter:
         Args:
             results: at most MAX_RESULTS.
             off_screen: true to draw without a window.
-            size: of each view [pixels]; by default it depends on the number of results.
+            size: size of each view [pixels]; by default it depends on the number of results.
             menu: true to list the keys of the quantities.
         """
         if len(results) > MAX_RESULTS:
@@ -106,7 +106,10 @@ class ResultPlotter:
         self._actors: list[set[str]] = [set() for _ in results]  # names of the actors in each view
 
     def draw(self, state: ViewState) -> None:
-        """Draw everything for a state, except cameras. InputError if a result cannot show it."""
+        """Draw all views as a state asks for, without moving the cameras.
+
+        Raises InputError if a result cannot show the state.
+        """
         limits = colour_limits(self.results, state)
         for number, result in enumerate(self.results):
             self._select_view(number)
@@ -130,7 +133,10 @@ class ResultPlotter:
             self.plotter.link_views()
 
     def _room(self, number: int, state: ViewState) -> Room:
-        """Room in a view for title, colour bar or chart, legend and a triangle's numbers."""
+        """Return the room to keep free in a view for text [pixels].
+
+        The text is the title, the colour bar or chart, the legend and the numbers of a triangle.
+        """
         size, left, right = self.view_size(), LEFT, RIGHT
         if state.triangle is not None and state.view in (None, number):
             left, right = (int(one * size[0]) for one in (overlay.NUMBERS, CHART))
@@ -139,7 +145,11 @@ class ResultPlotter:
         return Room(left, right, BELOW, overlay.title_height(title, size))
 
     def _eye(self, results: Sequence[OpenedResult], state: ViewState) -> np.ndarray:
-        """Direction to the eye: as wanted, from the chosen triangle, or facing most targets."""
+        """Return the direction to the eye.
+
+        It is the wanted direction. Without one, it faces the chosen triangle. Without both, it
+        shows most of the targets.
+        """
         if state.eye is not None:
             return np.array(state.eye)
         first = results[0]
@@ -152,7 +162,14 @@ class ResultPlotter:
         return chamber_view(seen, eyes) if state.chamber else near_views(seen, eyes)[0]
 
     def _seen_area(self, result: OpenedResult, chamber: bool, eyes: np.ndarray) -> np.ndarray:
-        """Visible area of a result's target, as from seen_area, computed once."""
+        """Return the area of each patch of a result's target that is visible from each direction.
+
+        It is computed once for each result.
+
+        Args:
+            chamber: True if the sonotrode may hide the target.
+            eyes: unit vectors to the eye, (e, 3).
+        """
         key = self.results.index(result), chamber
         if key not in self._seen:
             target, *hiding = target_in_chamber(result.surface)
@@ -163,7 +180,10 @@ class ResultPlotter:
         return self._seen[key]
 
     def pick_triangle(self, x: float, y: float) -> tuple[int, int] | None:
-        """Return view and triangle at a point of the window [pixels], or None beside the part."""
+        """Return the number of the view and of the triangle at a point of the window [pixels].
+
+        None if no part is drawn at the point.
+        """
         import vtk
 
         renderer = self.plotter.iren.get_poked_renderer(x, y)
@@ -176,7 +196,7 @@ class ResultPlotter:
         return number, int(pyvista().wrap(picker.GetDataSet())["triangle"][picker.GetCellId()])
 
     def view_size(self) -> tuple[int, int]:
-        """Width and height of one view [pixels]."""
+        """Return the width and height of one view [pixels]."""
         width, height = self.plotter.window_size
         return width // self.shape[1], height // self.shape[0]
 
@@ -235,12 +255,12 @@ class ResultPlotter:
 
 
 def _bar_name(number: int) -> str:
-    """Name of a view's colour bar. VTK writes it, so each view has another number of blanks."""
+    """Return a name of blanks for a view's colour bar, which VTK needs to be unique and writes."""
     return " " * (number + 1)
 
 
 def _menu(names: Sequence[str], state: ViewState) -> str:
-    """List the keys of the quantities, with the shown quantity in brackets."""
+    """Return a line with the keys of the quantities, with the shown quantity in brackets."""
     keys = [
         f"[{key} {name}]" if name == state.quantity else f"{key} {name}"
         for key, name in enumerate(QUANTITIES, 1)
@@ -257,7 +277,10 @@ def _triangle_lines(
 
 
 def _remarks(result: OpenedResult, state: ViewState, pale: np.ndarray | None) -> list[str]:
-    """Return remarks on sizes, time and threshold."""
+    """Return remarks on a view: the size of the part, the shown time and the pale threshold.
+
+    `pale` marks the triangles that are drawn pale.
+    """
     quantity, part = QUANTITIES[state.quantity], result.part
     remarks = [f"part {size_text(result.surface)}"]
     if state.chamber:
@@ -286,7 +309,7 @@ def _legend(result: OpenedResult, state: ViewState) -> list[tuple[str, str]]:
 
 
 def _cut(actors: Sequence[Any], cut: Plane, result: OpenedResult) -> None:
-    """Cut away everything on the normal's side of a plane."""
+    """Cut away the parts of actors that lie on the normal's side of a plane."""
     normal, origin = cut
     point = result.chamber.center if origin is None else origin
     plane = pyvista().core.utilities.helpers.generate_plane(-np.array(normal), point)
@@ -295,7 +318,10 @@ def _cut(actors: Sequence[Any], cut: Plane, result: OpenedResult) -> None:
 
 
 def _points(result: OpenedResult, state: ViewState) -> np.ndarray:
-    """Points (k, 3) [mm] of everything drawn, or of the target if the chamber is not drawn."""
+    """Return the points that a view has to show [mm], shape (k, 3).
+
+    They are those of part and chamber, or those of the target if the chamber is not drawn.
+    """
     if not state.chamber:
         return np.asarray(result.part.whole.points)
     return np.concatenate([result.surface.points, result.chamber.points])

@@ -1,4 +1,4 @@
-"""The state of `inspect`: every option and every key changes one ViewState."""
+"""Read the options and keys of `inspect`, each of which changes what its views show."""
 
 from __future__ import annotations
 
@@ -83,7 +83,9 @@ class ViewState:
 
 
 def parse_clip(text: str) -> Plane:
-    """Read --clip: X, Y or Z, and an optional place on the axis in mm.
+    """Return the cutting plane that the option --clip asks for, as normal and point.
+
+    The text is X, Y or Z, and an optional place on this axis in mm.
 
     >>> parse_clip("Z=12.5")
     ((0.0, 0.0, 1.0), (0.0, 0.0, 12.5))
@@ -103,7 +105,7 @@ def parse_clip(text: str) -> Plane:
 
 
 def parse_view(text: str) -> Vector:
-    """Read --view: three numbers, the direction from the part to the eye."""
+    """Return the direction from the part to the eye that the option --view gives as X,Y,Z."""
     try:
         x, y, z = (float(number) for number in text.split(","))
     except ValueError:
@@ -119,7 +121,7 @@ def parse_view(text: str) -> Vector:
 def state_after_key(
     state: ViewState, key: str, first: ViewState, quantities: Sequence[str]
 ) -> ViewState:
-    """Return the state after a key.
+    """Return what the views show after a key of the window was pressed.
 
     Args:
         first: the state that key r returns to.

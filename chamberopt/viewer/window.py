@@ -1,4 +1,4 @@
-"""The window of `inspect`, whose keys and handles change a ViewState, or its picture."""
+"""Open the window of `inspect`, which keys, slider and clicks change, or write its picture."""
 
 from __future__ import annotations
 
@@ -32,8 +32,8 @@ def inspect(
     """Show results in a window, or write a picture of the window.
 
     Args:
-        infos: of the results.
-        state: first state of the window.
+        infos: the results to show.
+        state: what the window shows first.
         screenshot: .png file to write; no window is opened then.
     Raises:
         InputError: a result's files are missing, damaged or another's, a result lacks a wanted
@@ -56,7 +56,7 @@ def inspect(
 
 
 def render_inspect(job: dict[str, Any]) -> None:
-    """Draw the window's content in a child."""
+    """Draw the content of the window into a picture; this runs in a child process."""
     state = job["state"]
     view = ResultPlotter(open_results(job["results"], state), off_screen=True)
     view.draw(state)
@@ -65,7 +65,10 @@ def render_inspect(job: dict[str, Any]) -> None:
 
 
 def open_results(infos: Sequence[ResultInfo], state: ViewState) -> list[OpenedResult]:
-    """Open results. InputError if a result cannot show the state."""
+    """Return opened results, coloured as the state asks for.
+
+    Raises InputError if a result cannot show the state.
+    """
     results = [OpenedResult(one) for one in infos]
     for one in results:
         one.show(state)
@@ -151,7 +154,10 @@ class Window:
             self.select_triangle(*found)
 
     def _seconds(self) -> float:
-        """Return the shown time, of the first result if each shows its own treatment time."""
+        """Return the shown peening time [s].
+
+        If each result shows its own treatment time, it is that of the first result.
+        """
         time = self.state.time_s
         return self.view.results[0].info.treatment_s if time is None else time
 
