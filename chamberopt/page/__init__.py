@@ -1,4 +1,4 @@
-"""A page in the browser that edits a design: view, numbers, target, pose, runs and results.
+"""Serve a page in the browser that edits a design and shows its part, runs and results.
 
 It keeps nothing of its own: each thing done on it is a file that the commands accept.
 """

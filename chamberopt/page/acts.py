@@ -1,4 +1,4 @@
-"""Acts of the page of one design: each act takes a question and gives an answer."""
+"""Answer the requests of the page that edits one design."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def list_results(folder: Path) -> list[dict[str, Any]]:
 
 
 def shown(folders: Sequence[Path]) -> dict[str, Any]:
-    """Content of the 3D view of results, side by side, and the text of their comparison.
+    """Return the 3D view of results side by side, and the text of their comparison.
 
     Raises:
         InputError: a folder has no usable result, or the results cannot be compared.
@@ -69,9 +69,10 @@ COMMANDS = ("simulate", "run", "sweep", "report", "sheet")
 
 
 class Acts:
-    """The acts of the page of one design. An act has the name of its address.
+    """The requests that the page of one design can make: a method for each address of the server.
 
-    The `read` of a question is the digest of the file's text that its page has read.
+    A request holds JSON values. Its value `read` is the digest of the design file's text that the
+    page has read.
 
     Args:
         path: the design file.
@@ -92,7 +93,7 @@ class Acts:
             self._command.end()
 
     def read(self, _: Any) -> dict[str, Any]:
-        """The design file as it is now, for a page that begins or begins again."""
+        """Return the design file as it is now, for a page that is opened or reloaded."""
         return self._as_read(self._read())
 
     def part(self, asked: Any) -> bytes:
@@ -134,7 +135,10 @@ class Acts:
         return file
 
     def _file(self, asked: Any) -> EditedFile:
-        """The design file as the asking page has read it."""
+        """Return the design file as the asking page has read it.
+
+        Raises InputError if the page has to be reloaded.
+        """
         file = self._files.get(str(asked["read"]))
         if file is None:
             raise InputError("this page has read an older file: reload it")
@@ -156,7 +160,7 @@ class Acts:
         }
 
     def study(self, asked: Any) -> dict[str, Any]:
-        """Write a study beside the design, and remove it if it is no valid study."""
+        """Write a study file beside the design, and remove it again if it is no valid study."""
         name, evaluations = str(asked["name"]), float(asked["evaluations"])
         if not STUDY_NAME.fullmatch(name):
             raise InputError(f"{name!r}: give a name of letters and digits that ends in .toml")
@@ -221,21 +225,27 @@ class Acts:
         return shown([self.inside(str(one)) for one in asked["folders"][:2]])
 
     def inside(self, name: str) -> Path:
-        """The path of a name in the design's folder; InputError if the path leads out of it."""
+        """Return the path of a name in the design's folder.
+
+        Raises InputError if the path leads out of the folder.
+        """
         path = (self._path.parent / name).resolve()
         if not path.is_relative_to(self._path.parent):
             raise InputError(f"{name}: outside the design's folder")
         return path
 
     def _free_folder(self, name: str) -> str:
-        """The first free folder of results/NAME, results/NAME-2, ..."""
+        """Return the first folder of results/NAME, results/NAME-2, ... that is new or empty."""
         folders = (Path("results", f"{name}-{k}" if k > 1 else name) for k in count(1))
         self.inside("results")  # the folder may be a link to elsewhere
         return next(one for one in folders if is_new_or_empty(self._path.parent / one)).as_posix()
 
 
 def _files_beside(design: Path) -> list[dict[str, str]]:
-    """The readable designs and studies in a design's folder, the design itself first."""
+    """Return name and kind of each readable design and study in a design's folder.
+
+    The design itself comes first.
+    """
     rows = []
     for path in sorted(design.parent.glob("*.toml"), key=lambda one: (one != design, one.name)):
         with suppress(InputError):

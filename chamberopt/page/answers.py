@@ -1,4 +1,4 @@
-"""Answers on a design that the page draws and shows: part, shape, cavity and reach."""
+"""Compute what the page shows of a design: its part, shape, cavity and the reach of the shot."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ KINDS = {"f": "<f4", "i": "<u4", "u": "<u4", "b": "u1"}
 
 
 def part_answer(design: Design) -> bytes:
-    """The part in its file's frame [mm], and the names of the file with their areas [mm²]."""
+    """Return the part as its file has it [mm], and the names in the file with their areas [mm²]."""
     mesh = preview_part(design).mesh
     size = areas(mesh.vertices, mesh.triangles)
     names = [
@@ -48,7 +48,7 @@ def part_answer(design: Design) -> bytes:
 
 
 def shape_answer(design: Design) -> bytes:
-    """The chamber's shape without the part [mm], the part's place, and its target."""
+    """Return the chamber's shape without the part [mm], the part's pose in it, and its target."""
     part = preview_part(design)
     shape = design.chamber.surface(part.vertices, part.mesh.triangles)
     state = _state(part.target, part.zones)
@@ -91,7 +91,7 @@ def check_answers(design: Design) -> Iterator[bytes]:
 
 
 def _state(target: np.ndarray, zones: dict[str, np.ndarray]) -> np.ndarray:
-    """REST, TARGET or ZONE of each triangle of the part (m,)."""
+    """Return for each triangle of the part whether it is REST, TARGET or ZONE, shape (m,)."""
     state = np.where(target, TARGET, REST).astype(np.uint8)
     for zone in zones.values():
         state[zone] = ZONE
@@ -101,7 +101,7 @@ def _state(target: np.ndarray, zones: dict[str, np.ndarray]) -> np.ndarray:
 def _surface(
     vertices: np.ndarray, triangles: np.ndarray, tags: np.ndarray
 ) -> dict[str, np.ndarray]:
-    """Walls and sonotrode of a closed surface, and its sharp edges, in mm."""
+    """Return the walls, the sonotrode and the sharp edges of a closed cavity, in mm."""
     ends, moving = sharp_edges(vertices, triangles), is_sonotrode(tags)
     return {
         "points": 1e3 * vertices,
@@ -112,8 +112,9 @@ def _surface(
 
 
 def packed(head: Mapping[str, Any], **arrays: np.ndarray) -> bytes:
-    """Bytes of an answer: the length of the head (4 bytes), the head as JSON, and the arrays.
+    """Return an answer to the page as bytes.
 
+    They are the length of the head (4 bytes), the head as JSON, and the arrays.
     The head also gives each array's kind and length. Each array begins at a multiple of 4 bytes.
     """
     blocks = []

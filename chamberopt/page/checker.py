@@ -1,4 +1,7 @@
-"""Check designs in children, so that the server answers meanwhile; a newer question goes first."""
+"""Check designs in child processes, so that the server answers meanwhile.
+
+A newer question ends the check of an older one.
+"""
 
 from __future__ import annotations
 
@@ -19,11 +22,11 @@ ENDED = "the check's process ended (killed from outside, or out of memory)"
 
 
 class SupersededError(Exception):
-    """A newer question was asked."""
+    """The answer to a question is no longer wanted, because a newer question was asked."""
 
 
 class Checker:
-    """The two answers of `check_answers` to questions on one file: the cavity, then the reach.
+    """Answer questions on the texts of one design: first its cavity, then the reach of its shot.
 
     A question ends the child that still works at the reach of an older question. A spare child,
     which has read the part already, takes the place of the ended child.
@@ -36,7 +39,7 @@ class Checker:
         self._asked: dict[Child, int] = {}  # number of the question that a child works at
 
     def cavity(self, text: str) -> tuple[int, bytes]:
-        """Return the number of this question, and the cavity of the design in a text.
+        """Return the number of this question, and the cavity of the design with this text.
 
         Raises:
             InputError, SceneError: the design cannot be built.
@@ -54,7 +57,12 @@ class Checker:
             return mine, self._answer(self._now, mine)
 
     def reach(self, number: int) -> bytes:
-        """Return the reach in the cavity of a question; raises as `cavity` does."""
+        """Return which surface the shot can reach in the cavity of the question with this number.
+
+        Raises:
+            InputError, SceneError: the reach cannot be computed.
+            SupersededError: a newer question was asked meanwhile.
+        """
         with self._reaching:
             child = self._now
             if self._asked.get(child) != number:
@@ -64,7 +72,7 @@ class Checker:
             return answer
 
     def stop(self) -> None:
-        """End the children."""
+        """End the child processes."""
         for child in (self._now, self._spare):
             child.end()
 
@@ -92,7 +100,10 @@ class Checker:
 
 
 def _read_ahead(path: Path, text: str) -> Iterator[bytes]:
-    """Read the part of a design, which this child keeps for later checks; give no answer."""
+    """Read the part of a design, which this child process keeps for later checks.
+
+    Yields no answer.
+    """
     if hasattr(os, "nice"):
         os.nice(10)  # the page's own answers come first
     with suppress(Exception):  # the first check meets the same fault, and tells it
@@ -101,7 +112,10 @@ def _read_ahead(path: Path, text: str) -> Iterator[bytes]:
 
 
 def _check(path: Path, text: str) -> Iterator[bytes]:
-    """Give the two answers on a design's text; InputError or SceneError if it cannot be built."""
+    """Yield the cavity of the design with this text, then the reach of its shot.
+
+    Raises InputError or SceneError if the design cannot be built.
+    """
     try:
         yield from check_answers(validate(Design, tomllib.loads(text), path, text))
     except (InputError, SceneError):

@@ -1,4 +1,4 @@
-"""The design file that pages edit: its text with changes, its fields, and saving."""
+"""Change the text of the design file that a page edits, list its fields, and save it."""
 
 from __future__ import annotations
 
@@ -62,16 +62,21 @@ class EditedFile:
 
     @property
     def digest(self) -> str:
-        """Digest of the text, by which a page names the text that it read."""
+        """The sha256 digest of the text, by which a page names the text that it read."""
         return hashlib.sha256(self.text.encode()).hexdigest()
 
     def with_changes(self, changes: Changes) -> Design:
-        """The design of the text with changes; InputError names every problem."""
+        """Return the design with changes of its values by dotted name.
+
+        Raises InputError, which names every problem, if the changed design is not valid.
+        """
         text = self.changed_text(changes)
         return validate(Design, tomllib.loads(text), self.path, text)
 
     def changed_text(self, changes: Changes) -> str:
-        """The text of the file with changes; comments, order and other lines stay.
+        """Return the text of the file with changes of its values by dotted name.
+
+        Comments, order and other lines stay.
 
         Raises:
             InputError: the page may not change a key, or the key stands in the file in a form that
@@ -94,7 +99,7 @@ class EditedFile:
         return tomlkit.dumps(document) if changes else self.text
 
     def save(self, changes: Changes) -> None:
-        """Write the file with changes.
+        """Write the file with changes of its values by dotted name.
 
         Raises:
             InputError: the file has changed since it was read, is read-only, or would be no valid
@@ -126,7 +131,10 @@ class EditedFile:
             )
 
     def is_fixed(self, name: str) -> bool:
-        """Whether a text of the file, such as a metal's name, stands for a number's table."""
+        """Return True if a number cannot be edited because its table is given by a name.
+
+        For example, the name of a metal stands for the table of its numbers.
+        """
         inner: Any = tomllib.loads(self.text)
         for step in name.split(".")[:-1]:
             inner = inner.get(step, {}) if isinstance(inner, dict) else {}
@@ -135,7 +143,7 @@ class EditedFile:
         return False
 
     def _change(self, document: Any, name: str, value: Any) -> None:
-        """Set or remove one key, and make the tables and lists on the way to it."""
+        """Set or remove one key in the parsed file, and make missing tables and lists around it."""
         import tomlkit
 
         steps, table = name.split("."), document
@@ -169,7 +177,7 @@ class EditedFile:
             table.append(_table(value))
 
     def _present(self, steps: list[str]) -> Any:
-        """The design's value at the end of a path of names."""
+        """Return the value of the design whose dotted name has these steps."""
         value: Any = self.design
         for step in steps:
             value = getattr(value, step)
@@ -177,14 +185,20 @@ class EditedFile:
 
 
 def custom_shape(data: Mapping[str, Any]) -> str:
-    """The Python file that a design's data name as the chamber's shape; "" if they name none."""
+    """Return the Python file that a design names as its chamber's shape, or "" for other shapes.
+
+    `data` is the content of the design file.
+    """
     chamber = data.get("chamber")
     shape = chamber.get("shape") if isinstance(chamber, Mapping) else None
     return str(shape) if is_custom(shape) else ""
 
 
 def _inline(value: Any) -> Any:
-    """The value with each table on one line of its own; a value without tables as it is."""
+    """Return a value for a TOML file with each table on one line.
+
+    A value without tables is returned as it is.
+    """
     import tomlkit
 
     if isinstance(value, dict):
@@ -215,7 +229,10 @@ NOT_SHOWN = ("calibration.", "part.target.", "zones.", "tolerances.", "part.tess
 
 
 def design_fields(file: EditedFile) -> list[dict[str, Any]]:
-    """Every number and choice of the design, in the order of its tables."""
+    """Return what the page shows of every number and choice of a design, in the file's order.
+
+    Each row has the name, value, unit, allowed range and explanation.
+    """
     design, varied = file.design, set(file.design.numbers())
     rows: list[dict[str, Any]] = []
     for name, field in _numbers(design):
@@ -233,12 +250,15 @@ def design_fields(file: EditedFile) -> list[dict[str, Any]]:
 
 
 def field_names(design: Design) -> set[str]:
-    """The names of the fields that `design_fields` gives."""
+    """Return the dotted names of all numbers and choices that the page shows of a design."""
     return {*(name for name, _ in _numbers(design)), *_choices(design)}
 
 
 def _numbers(design: Design) -> Iterator[tuple[str, FieldInfo]]:
-    """Names and fields of the shown numbers, without items of lists that the design leaves out."""
+    """Yield dotted name and field of each number that the page shows.
+
+    Items of lists that the design leaves out are skipped.
+    """
     for name, field in numeric_fields(design):
         in_list = name.rpartition(".")[2].isdecimal()
         if not name.startswith(NOT_SHOWN) and (not in_list or _value(design, name) is not None):
@@ -246,14 +266,17 @@ def _numbers(design: Design) -> Iterator[tuple[str, FieldInfo]]:
 
 
 def _choices(design: Design) -> dict[str, tuple[str, ...]]:
-    """Allowed texts of each key with a choice, but not of the shape, which has keys of its own."""
+    """Return the allowed texts of each key that is a choice, by its dotted name.
+
+    The chamber's shape is left out, because each shape has other keys.
+    """
     tables = {"chamber": design.chamber, "sonotrode": design.sonotrode}
     found = (one for name, table in tables.items() for one in text_choices(table, name))
     return {name: texts for name, texts in found if name not in ("chamber.unit", "chamber.shape")}
 
 
 def _value(design: Design, name: str) -> Any:
-    """A number of the design, None where it is not set."""
+    """Return the number of the design with this dotted name, or None if it is not set."""
     value: Any = design
     for step in name.split("."):
         value = value[int(step)] if isinstance(value, tuple) else getattr(value, step, None)
@@ -261,7 +284,7 @@ def _value(design: Design, name: str) -> Any:
 
 
 def _bounds(field: FieldInfo) -> dict[str, float]:
-    """The least and largest allowed value of a field, if it has such bounds."""
+    """Return the least and the largest allowed value of a field, if it has such bounds."""
     found: dict[str, float] = {}
     for constraint in field.metadata:
         for key, name in (("ge", "least"), ("le", "most")):
@@ -271,6 +294,6 @@ def _bounds(field: FieldInfo) -> dict[str, float]:
 
 
 def _unit(name: str) -> str:
-    """The unit at the end of a list's name; "" if there is none."""
+    """Return the unit that a key's name ends with, as text, or "" if it names none."""
     key = name.rstrip("0123456789.").rpartition(".")[2]
     return {"mm": "mm", "deg": "degrees", "um": "µm", "s": "s"}.get(key.rpartition("_")[2], "")

@@ -1,4 +1,4 @@
-"""Changes of a design's keys that choose target, zones and pose by clicks on the part."""
+"""Turn clicks on the part into changes of a design's target, zones and pose."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Picker:
     def with_face(
         self, design: Design, table: str, triangle: int, crease_deg: float, alike: bool, add: bool
     ) -> dict[str, Any]:
-        """Changes that add the face of a triangle to a target, or take the face away.
+        """Return changes of a design that add the face of a triangle to a target, or remove it.
 
         A target that is chosen in another way becomes the list of its faces.
 
@@ -80,12 +80,12 @@ class Picker:
         return {f"{table}.faces": rows, **{f"{table}.{key}": None for key in ways}}
 
     def face(self, design: Design, triangle: int, crease_deg: float, alike: bool) -> Row:
-        """The face of a triangle, as an item of `faces`."""
+        """Return the face of a triangle as a design file names it in a list `faces`."""
         faces = self._faces(preview_part(design).mesh, crease_deg)
         return _row(faces, _face_of(faces, triangle), crease_deg, alike)
 
     def face_down(self, design: Design, triangle: int, crease_deg: float) -> dict[str, Any]:
-        """Changes that turn the part so that the face of a triangle faces the sonotrode."""
+        """Return changes of a design that turn the face of a triangle towards the sonotrode."""
         faces = self._faces(preview_part(design).mesh, crease_deg)
         normal = faces.normal(_face_of(faces, triangle))
         if not normal.any():
@@ -102,7 +102,7 @@ class Picker:
         return self._known[key][1]
 
     def _mask(self, row: Row, mesh: PartMesh) -> np.ndarray:
-        """Mask (m,) of the triangles that an item of `faces` chooses."""
+        """Return True for each triangle that an item of a design's list `faces` chooses, (m,)."""
         faces = self._faces(mesh, row.get("crease_deg", 30.0))
         face, _ = faces.at(1e-3 * np.array(row["at_mm"]))
         if row.get("alike"):
@@ -116,7 +116,13 @@ class Picker:
 def _selection(
     design: Design, table: str, target: np.ndarray, zones: dict[str, np.ndarray]
 ) -> tuple[Selection, np.ndarray]:
-    """A target's table, and the mask (m,) of the triangles that the table chooses."""
+    """Return the table of a target, and True for each triangle that it chooses, shape (m,).
+
+    Args:
+        table: dotted name of the target, e.g. part.target.
+        target: triangles of the part's target, shape (m,) bool.
+        zones: triangles of each zone by its name.
+    """
     if table == TARGET_TABLE:
         return design.part.target, target
     places = {f"zones.{k}.target": zone for k, zone in enumerate(design.zones)}

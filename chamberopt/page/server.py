@@ -1,4 +1,4 @@
-"""The page's server, for one person on this machine: its addresses and who may use them."""
+"""Serve the page that edits a design, to the one person who started the server."""
 
 from __future__ import annotations
 
@@ -87,7 +87,11 @@ class OnePerson:
         await self._app(scope, receive, send_with_headers)
 
     def _refusal(self, request: Request) -> Response | None:
-        """The refusal of a request, or a cookie for the right token; None to serve the request."""
+        """Return None if a request may be served.
+
+        Otherwise return a refusal, or, for a request with the right token, an answer that sets the
+        cookie of later requests.
+        """
         if request.headers.get("host") not in self._hosts:
             return _refused("this server is for this machine only")
         origin = request.headers.get("origin")
@@ -141,7 +145,10 @@ TOO_LONG = f"this question has more than {1e-6 * MOST_BYTES:g} MB; ask for less 
 
 
 def make_app(acts: Acts, port: int) -> OnePerson:
-    """Make the server's application, with an address for each act, the page and its files."""
+    """Return the server's application.
+
+    It has an address for each request that `acts` answers, for the page and for the page's files.
+    """
 
     def route(name: str, method: str) -> Route:
         act = getattr(acts, name)

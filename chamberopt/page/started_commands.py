@@ -1,4 +1,4 @@
-"""Commands of the command line that the page starts, each in a child process."""
+"""Run commands of the command line that the page starts, each in a child process."""
 
 from __future__ import annotations
 
@@ -43,7 +43,10 @@ class StartedCommand:
         self._reader.start()
 
     def status(self) -> dict[str, Any]:
-        """Texts and steps of the command for the page; `exit` is None while the command runs."""
+        """Return what the page shows of the command: its printed lines and the progress of steps.
+
+        `exit` is its exit status, or None while it runs.
+        """
         code = self._process.poll()
         if code is not None:
             self._reader.join(5.0)
@@ -88,7 +91,7 @@ class StartedCommand:
 
 
 def _step(line: str) -> dict[str, Any] | None:
-    """Progress of a step that a line tells (see common/progress.py); None for other lines."""
+    """Return the progress of a step that a printed line of JSON tells, or None for other lines."""
     if not line.startswith('{"step"'):
         return None
     try:
