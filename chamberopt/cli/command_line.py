@@ -65,7 +65,10 @@ def run_command(arguments: Sequence[str] | None = None) -> int:
 
 
 def _without_progress(given: list[str]) -> list[str]:
-    """The arguments without `--progress jsonl`, which every command takes."""
+    """Return the arguments without `--progress jsonl`, which every command accepts.
+
+    If they have it, progress is written as lines of JSON from now on.
+    """
     if PROGRESS not in given:
         return given
     k = given.index(PROGRESS)

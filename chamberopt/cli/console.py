@@ -1,4 +1,4 @@
-"""Output of commands: results on stdout, remarks on stderr, files in a results folder."""
+"""Print what commands say: results on stdout, remarks on stderr. Claim their results folders."""
 
 from __future__ import annotations
 
@@ -23,7 +23,10 @@ RESULTS = Path("results")  # parent folder of results without --out
 
 
 def results_folder(out: Path | None, name: str) -> AbstractContextManager[Path]:
-    """Claim --out, a new or empty folder. By default claim a free results/NAME, NAME-2 ..."""
+    """Reserve the folder that the option --out gives, which must be new or empty, for a result.
+
+    Without --out, reserve the first free folder of results/NAME, results/NAME-2 and so on.
+    """
     from chamberopt.common.files import claim_folder
 
     return claimed_folder(out, name, claim_folder)
@@ -33,7 +36,13 @@ def results_folder(out: Path | None, name: str) -> AbstractContextManager[Path]:
 def claimed_folder(
     out: Path | None, name: str, claim: Callable[[Path], AbstractContextManager[T]]
 ) -> Iterator[T]:
-    """Claim --out or the first free folder with `claim`, which may accept other --out folders."""
+    """Reserve a folder for a result and yield what `claim` returns for it.
+
+    Args:
+        out: folder that the option --out gives. None for the first free folder of results/NAME,
+            results/NAME-2 and so on.
+        claim: function that reserves a folder. It decides which folders `out` may be.
+    """
     from chamberopt.common.errors import OutputTakenError
     from chamberopt.common.files import is_new_or_empty, require_plain_folder
 
@@ -85,7 +94,7 @@ def print_json(values: Mapping[str, Any]) -> None:
 
 
 def _json_value(value: Any) -> Any:
-    """An estimate or a record as JSON values. Raise TypeError for other types."""
+    """Return an estimate or a record as JSON values. Raise TypeError for other types."""
     from chamberopt.common.estimate import Estimate
     from chamberopt.results.records import Table
 
@@ -119,7 +128,10 @@ def print_finished(folder: Path, what: str, lines: Sequence[str], as_json: bool)
 
 
 def table_lines(table: Mapping[str, Any], prefix: str = "") -> list[str]:
-    """A nested table as aligned lines. Each of its notes and warnings is a line."""
+    """Return a nested table as lines of text in aligned columns.
+
+    Each of its notes and warnings is a line.
+    """
     lines: list[str] = []
     for name, value in table.items():
         label = f"{prefix + name:33} "
@@ -138,7 +150,7 @@ def table_lines(table: Mapping[str, Any], prefix: str = "") -> list[str]:
 
 
 def _list_text(values: list[Any], name: str) -> str:
-    """A list as text. Sizes are written "1 x 2 x 3", other values are separated by commas."""
+    """Return a list as text. Sizes are written "1 x 2 x 3", other values with commas between."""
     if values and isinstance(values[0], float):
         separator = " x " if name.startswith("bounding_box") else ", "
         return separator.join(f"{value:g}" for value in values)

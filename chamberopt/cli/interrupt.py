@@ -1,4 +1,4 @@
-"""Ctrl-C: it ends a command at once, and a study after its running evaluations."""
+"""Handle Ctrl-C: it ends a command at once, and a study after its running evaluations."""
 
 from __future__ import annotations
 

@@ -9,7 +9,10 @@ from cyclopts import App, CoercionError, Parameter, Token, convert
 
 
 def _convert(kind: Any, tokens: Sequence[Token]) -> Any:
-    """Convert the value of an option. Refuse 1.5 as a whole number, which cyclopts would round."""
+    """Return the value of an option, converted from its text.
+
+    Raises CoercionError for a whole number such as 1.5, which cyclopts would round.
+    """
     if int in (kind, *get_args(kind)):
         for token in tokens:
             if "." in token.value and token.value.rpartition(".")[2].strip("0"):

@@ -1,4 +1,4 @@
-"""Steps before a simulation: compilation with a message, pilot runs, loading a replica."""
+"""Prepare a simulation: compile with a message, make pilot runs, load a replica."""
 
 from __future__ import annotations
 
@@ -47,7 +47,10 @@ def compile_with_message(
 
 
 def advise_effects(design: Design, chamber: Chamber) -> list[dict[str, Any]]:
-    """Find by pilot runs which effects a design needs. Return the advice as JSON values."""
+    """Find by pilot runs which optional physical effects matter for a design.
+
+    Return the advice on each effect as JSON values.
+    """
     from chamberopt.common.executor import local_executor
     from chamberopt.common.progress import step
     from chamberopt.results.write import advice_record
@@ -77,7 +80,9 @@ def advise_effects(design: Design, chamber: Chamber) -> list[dict[str, Any]]:
 
 
 def seconds_of(progress: Progress, whole: float) -> Callable[[float], None]:
-    """Convert a progress to the function of simulated seconds that sim_core.simulate calls.
+    """Return a function of simulated seconds that reports them to `progress`.
+
+    sim_core.simulate calls such a function.
 
     Args:
         whole: simulated time of the whole step [s].

@@ -1,4 +1,4 @@
-"""Resuming an interrupted study or sweep: the command, and the remarks that name it."""
+"""Tell the user how to resume an interrupted study or sweep."""
 
 from __future__ import annotations
 
@@ -16,7 +16,10 @@ if TYPE_CHECKING:
 
 
 def resume_command(study: Path, folder: Path, plan: Mapping[str, Any] | None = None) -> str:
-    """The command that resumes a study, or a sweep with this plan, quoted for a shell."""
+    """Return the command that resumes a run in `folder`, quoted for a shell.
+
+    It is a sweep if `plan` gives its method, count and seed. Without a plan it is a study.
+    """
     if plan is None:
         return quoted("run", study, "--out", folder)
     seed = () if plan["seed"] is None else ("--seed", plan["seed"])
@@ -24,13 +27,16 @@ def resume_command(study: Path, folder: Path, plan: Mapping[str, Any] | None = N
 
 
 def quoted(*words: object) -> str:
-    """A chamberopt command, quoted for a shell."""
+    """Return a chamberopt command of these words, quoted for a shell."""
     return shlex.join(["chamberopt", *map(str, words)])
 
 
 @contextmanager
 def resume_note(folder: StudyFolder, command: str) -> Iterator[None]:
-    """Add a note on how to resume to any error but InputError, if the study has begun."""
+    """Add a note on how to resume to an error in the enclosed code, if the study has begun.
+
+    An InputError gets no note.
+    """
     try:
         yield
     except InputError:
@@ -42,7 +48,7 @@ def resume_note(folder: StudyFolder, command: str) -> Iterator[None]:
 
 
 def unfinished(study: Path, name: str) -> list[str]:
-    """Remarks on interrupted runs of a study, for a command that begins a new run.
+    """Return remarks on interrupted runs of a study, for a command that begins a new run.
 
     Args:
         name: name of the folder in results/ that the command would use.

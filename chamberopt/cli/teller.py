@@ -1,4 +1,4 @@
-"""The listener that shows the progress of a workflow on the terminal."""
+"""Show the steps and the progress of a workflow on the terminal."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 class TerminalTeller(Teller):
-    """A listener that shows steps, compilation and warnings on stderr."""
+    """Show the steps, compilation and warnings that a workflow reports on stderr."""
 
     def step(self, what: str, total: int | None = None) -> AbstractContextManager[Progress]:
         return step(what, total)
@@ -37,7 +37,7 @@ class TerminalTeller(Teller):
 
 
 class SearchTeller(TerminalTeller):
-    """Lets Ctrl-C wait for the running evaluations of a search, and says how to resume it."""
+    """Show a search on stderr, let Ctrl-C wait for its running evaluations, say how to resume it."""
 
     def __init__(self, interrupt: Interrupt, how_to_resume: str) -> None:
         super().__init__()

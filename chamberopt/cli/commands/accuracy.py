@@ -1,4 +1,4 @@
-"""The command `accuracy`: a convergence study of the numerical parameters of one design."""
+"""The command `accuracy`: how the error of a design's figures depends on numerical settings."""
 
 from __future__ import annotations
 

@@ -97,7 +97,10 @@ def _text(number: float | None) -> str:
 
 
 def _columns(rows: Sequence[Sequence[str]]) -> list[str]:
-    """Align rows of cells: the first column to the left, the other columns to the right."""
+    """Return rows of cells as lines of text in aligned columns.
+
+    The first column is aligned to the left, the others to the right.
+    """
     first, *others = (max(map(len, column)) for column in zip(*rows, strict=True))
     return [
         "  ".join([row[0].ljust(first), *map(str.rjust, row[1:], others)]).rstrip() for row in rows

@@ -48,7 +48,11 @@ def edit(
 
 
 def _trusted(path: Path, trusted: bool) -> bool:
-    """True if the design may run its shape, a Python file. Raise InputError for a wrong design."""
+    """Return True if the design may run a Python file as its chamber's shape.
+
+    The user is asked unless `trusted` is True. Raises InputError if the design is wrong, or if it
+    has such a shape and the user does not allow it.
+    """
     from chamberopt.common.toml_fields import read_toml
     from chamberopt.page.edited_file import EditedFile, custom_shape
 

@@ -58,7 +58,10 @@ def example(name: Literal["gear", "plate", "blade", "fir_tree"], /, *, out: Out 
 
 
 def shipped_files() -> Path:
-    """The folder that holds designs/ and studies/, in the wheel or at the root of a checkout."""
+    """Return the folder of the shipped designs/ and studies/.
+
+    It is in the installed package, or else at the root of a source checkout.
+    """
     import chamberopt
 
     package = Path(chamberopt.__file__).parent

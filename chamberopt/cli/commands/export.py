@@ -94,7 +94,10 @@ def export(
 def _files(
     formats: dict[str, ExportFormat], out: Path | None, name: str
 ) -> Iterator[dict[str, Path]]:
-    """The file of each format: --out itself if it is a file, else a file in a new folder."""
+    """Yield the path to write for each format.
+
+    It is --out itself if that names a file, else a file in a new folder.
+    """
     from chamberopt.common.files import check_new_file, claim_file, whole_or_nothing
 
     if out is not None and export_formats.is_file(out, formats):

@@ -122,7 +122,7 @@ def _picked(known: Sequence[Surface]) -> Sequence[str]:
 
 
 def _summary(made: Proposal) -> list[str]:
-    """Lines with each proposed number and its reason, and other possible targets."""
+    """Return lines with each proposed value and its reason, and other possible targets."""
     lines = [f"{'part.target':38}{one_line(made.reasons['part.target'])}"]
     for table, values in made.tables.items():
         for key, value in values.items():
@@ -134,7 +134,7 @@ def _summary(made: Proposal) -> list[str]:
 
 
 def _listed(known: Sequence[Surface], most: int) -> list[str]:
-    """Lines with the surfaces to choose from."""
+    """Return lines with at most `most` surfaces of the part to choose a target from."""
     lines = []
     for one in known[:most]:
         place = f", one at {one.keys['faces'][0]['at_mm']} mm" if "faces" in one.keys else ""

@@ -79,7 +79,10 @@ def strip(
 
 
 def _size(disc_mm: float | None, size_mm: tuple[float, float] | None) -> StripSize:
-    """The strip's size. Raise InputError if both are given or a number is out of range."""
+    """Return the size of the Almen strip: a disc's diameter, or length and width [mm].
+
+    Raises InputError if both are given or a number is out of range.
+    """
     from chamberopt.peening.strip import StripSize
 
     if disc_mm is not None and size_mm is not None:
@@ -95,7 +98,10 @@ def _size(disc_mm: float | None, size_mm: tuple[float, float] | None) -> StripSi
 
 
 def _require_zone(at: str, design: Design, of_lids: Mapping[str, object]) -> None:
-    """Raise InputError if the design lacks the zone, or if an option for lids is given."""
+    """Raise InputError if the design lacks the zone `at`.
+
+    It is also raised if an option is given that holds only for a strip on the chamber's lid.
+    """
     from chamberopt.design.zones import LID
 
     names = [zone.name for zone in design.zones]

@@ -93,7 +93,10 @@ def sweep(
 
 
 def _workers_that_fit(study: Study, chamber: Chamber, wanted: int | None) -> int | None:
-    """Number of wanted worker processes that fit into memory. Raise InputError if none fits."""
+    """Return the number of worker processes to start: as many as wanted and fit into memory.
+
+    Raises InputError if not even one fits.
+    """
     from chamberopt.common.executor import core_count
     from chamberopt.coverage.field.memory import PROCESS, evaluation_bytes, how_many_fit
     from chamberopt.simulation.replicas import most_replicas
