@@ -1,4 +1,4 @@
-"""Records of the commands strip, calibrate, accuracy and compare.
+"""Define the content of the JSON files of the commands strip, calibrate, accuracy and compare.
 
 A record is the whole content of a JSON file. The program writes these files and never reads them.
 """

@@ -27,7 +27,9 @@ MAX_POSITIONS = 10_000_000  # balls × frames × trail; 480 MB together with the
 
 @dataclass(frozen=True)
 class FlightFrames:
-    """Frames of one replica. Times count from the end of its warm-up, as in its impact log.
+    """Where balls, sonotrodes and part of one replica are at evenly spaced times (frames).
+
+    Times count from the end of the replica's warm-up, as in its impact log.
 
     time: time of each frame [s], shape (f,).
     balls: centres of the balls [m], shape (f, n, 3).

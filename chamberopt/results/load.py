@@ -73,7 +73,7 @@ class Result:
 
     @property
     def study(self) -> StudyRecord | None:
-        """The record of the study. None for a simulation."""
+        """What result.json says about the study. None if the result is of a simulation."""
         return self.record.study
 
     @property
@@ -105,12 +105,12 @@ class Result:
 
     @property
     def resolves_places(self) -> bool:
-        """True if the windows have enough dents for figures of single places."""
+        """True if enough dents were simulated to tell the coverage of single places."""
         field = self.record.field
         return field.dents_in_median_window >= (field.dents_needed.p05_times_intensity or 0.0)
 
     def path(self, name: str) -> Path:
-        """Path of a data file of the result. Raise InputError if the file was changed."""
+        """Return the path of a data file of the result. Raise InputError if it was changed."""
         return unchanged_file(self.folder, name, self.record.files)
 
 

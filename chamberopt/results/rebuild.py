@@ -26,7 +26,7 @@ REMEDY = "simulate the design again, and use that result"
 
 @dataclass(frozen=True)
 class RebuiltChamber:
-    """The chamber of a result.
+    """The chamber of a result, loaded to be simulated again.
 
     cavity: analytical cavity that was simulated in place of the mesh; None if the mesh was.
     """

@@ -68,7 +68,7 @@ class _IntervalValues(Table):
 
 
 class _KnownValues(_IntervalValues):
-    """An interval with a value, and with a half-width or words in its place."""
+    """An interval whose value must be known. Words may take the place of its half-width."""
 
     @model_validator(mode="after")
     def _is_known(self) -> Self:
@@ -159,7 +159,7 @@ class FieldRecord(Table):
 
 
 class CoverageAtTime(Table):
-    """Coverage after one peening time."""
+    """Coverage of the target after one peening time: mean and 5th percentile over its area."""
 
     time_s: Positive
     mean_coverage: Share
@@ -186,7 +186,7 @@ class ZoneRecord(Table):
 
 
 class ChamberRecord(Table):
-    """The chamber as simulated.
+    """Volume, target and mesh of the chamber that was simulated.
 
     pieces_in_air: number of pieces of the part that reach no wall.
     facets_left: True if the coarse facets of the part's file were not divided.
@@ -436,13 +436,13 @@ class SweepFacts(Table):
 
 
 class SweepRecord(ResultRecord):
-    """The result of a sweep. The program reads only its digests again."""
+    """The content of a sweep's result.json. The program reads only its digests again."""
 
     sweep: SweepFacts
 
 
 class CandidateRecord(ResultRecord):
-    """The result of a simulation, or of the best design of a study."""
+    """The content of result.json for a simulation, or for a study with its best design."""
 
     REQUIRED: ClassVar = [name for name, metric in METRICS.items() if metric.required]
 

@@ -60,7 +60,7 @@ class DamagedSurfaceError(ValueError):
 
 @dataclass(frozen=True)
 class SurfaceArrays:
-    """A checked surface of triangles.
+    """The arrays of a surface of triangles, read from a .vtp file and checked.
 
     points: corners of the triangles [mm], finite, shape (n, 3), float32 or float64.
     triangles: numbers of the corners, 0 to n - 1, shape (m, 3).
@@ -227,7 +227,10 @@ Surface = Any
 
 
 def pyvista() -> Any:
-    """Import pyvista only when it is used, because the import takes half a second."""
+    """Import pyvista and return the module.
+
+    It is imported only when it is used, because this takes half a second.
+    """
     import pyvista
 
     return pyvista

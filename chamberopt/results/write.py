@@ -421,7 +421,7 @@ def _accuracy(design: Design) -> AccuracyRecord:
 
 
 def _design_values(design: Design, folder: Path) -> dict[str, Any]:
-    """Values of the design as in its file, with paths relative to `folder`."""
+    """Return the values of a design as in its file, with paths relative to `folder`."""
     values: dict[str, Any] = with_paths_from(
         folder.resolve(), design.model_dump(mode="json", exclude_none=True)
     )

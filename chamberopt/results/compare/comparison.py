@@ -131,7 +131,7 @@ STOPPING_RULES = ("process.accuracy.objective_half_width", "process.accuracy.max
 
 @dataclass(frozen=True)
 class Comparison:
-    """Two or more results of the same part.
+    """The comparison of two or more results of the same part with the first of them.
 
     Args:
         results: the results.

@@ -1,4 +1,4 @@
-"""Histograms of coverage, impact speed and impact angle over the target, in common bins."""
+"""Compute histograms of coverage, impact speed and angle on the target for several results."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ BINS = 40
 
 @dataclass(frozen=True)
 class Histogram:
-    """A histogram of several results.
+    """A histogram of one quantity for several results, which share the bins.
 
     Args:
         unit: unit of the edges.
@@ -29,11 +29,11 @@ class Histogram:
 
 @dataclass(frozen=True)
 class Distributions:
-    """Distributions of several results over one target.
+    """Histograms of coverage and of impacts on the target, for several results.
 
     Args:
         coverage: shares of the target's area. Area that no ball can touch has coverage 0.
-        speed: shares of the impacts by normal speed.
+        speed: shares of the impacts by speed along the surface normal.
         angle: shares of the impacts by angle.
         impacts: number of impacts of each result.
         mean_speed: mean normal speed of each result [m/s]. None for a result without impacts.
