@@ -1,4 +1,4 @@
-"""The answer of a result in one sentence, with the sentences on its limits."""
+"""Say what a result answers in one sentence, with sentences on constraints and zones."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A comparison as text: different values, every figure, and whether each difference is real."""
+"""Text about a comparison: design values that differ, figures, and whether they differ really."""
 
 from __future__ import annotations
 

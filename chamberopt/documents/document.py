@@ -1,4 +1,4 @@
-"""A document: sections of sentences, tables and charts, which any printer can show.
+"""Define a document: sections of sentences, tables and charts, which any printer can show.
 
 Documents import no printer. Printers know only the blocks of this module, not their subjects.
 """
@@ -60,7 +60,7 @@ class Chart:
 
 @dataclass(frozen=True)
 class Tile:
-    """A figure of the answer, with its value at the start of a study."""
+    """A main figure of a result as text, with its value at the start of a study."""
 
     label: str
     value: str
@@ -69,7 +69,7 @@ class Tile:
 
 @dataclass(frozen=True)
 class Tiles:
-    """The main figures of the answer."""
+    """The main figures of a result, shown large beside one another."""
 
     tiles: Sequence[Tile]
 
@@ -110,7 +110,7 @@ Block: TypeAlias = Sentence | Items | Table | Chart | Tiles | TextFile | PartVie
 
 @dataclass(frozen=True)
 class Section:
-    """Blocks below a title. The section of the answer stands out."""
+    """Blocks below a title. The section that holds the answer is emphasised."""
 
     title: str
     content: Sequence[Block]
@@ -119,7 +119,7 @@ class Section:
 
 @dataclass(frozen=True)
 class AnswerLine:
-    """A sentence that belongs to the answer.
+    """A sentence that qualifies the answer of a result, such as a limit that is not met.
 
     about: subject of the sentence. "best" is the result itself.
     warns: True if a limit is not certainly met, or for a caution about the calibration.

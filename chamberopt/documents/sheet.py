@@ -98,7 +98,7 @@ Row = tuple[str, str]  # a name and its value, or "" and a sentence
 
 @dataclass(frozen=True)
 class Block:
-    """A title with rows below it."""
+    """A part of the process sheet: a title with rows of names and values below it."""
 
     title: str
     rows: tuple[Row, ...]

@@ -1,4 +1,4 @@
-"""Numbers of the report as text, and the label and unit of each metric and objective."""
+"""Write numbers of the report as text, and name each metric and objective with its unit."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from chamberopt.coverage.metrics import OBJECTIVES, find_metric, parse_objective
 
 @dataclass(frozen=True)
 class Label:
-    """Text of a metric or an objective.
+    """How a metric or an objective is named and shown.
 
     Args:
         text: name in plain words.
@@ -29,12 +29,12 @@ class Label:
 
     @property
     def in_full(self) -> str:
-        """The text with its meaning, e.g. "weighted sum (mean coverage − 0.001 × ...)"."""
+        """The name with its meaning, e.g. "weighted sum (mean coverage − 0.001 × ...)"."""
         return f"{self.text} ({self.meaning})" if self.meaning else self.text
 
     @property
     def with_unit(self) -> str:
-        """The text with its unit, e.g. "mean coverage [%]"."""
+        """The name with its unit, e.g. "mean coverage [%]"."""
         return f"{self.text} [{self.unit}]" if self.unit else self.text
 
     def format(self, estimate: Estimate, sign: bool = False) -> str:
