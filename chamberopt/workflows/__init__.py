@@ -1,1 +1,1 @@
-"""Workflows from a design to a saved result. They print nothing on the terminal."""
+"""Take a design to a saved result in one call. Nothing here prints on the terminal."""

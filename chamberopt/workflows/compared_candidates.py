@@ -57,7 +57,7 @@ class Candidate:
 
 
 class SeedSettings(NamedTuple):
-    """The random numbers, the number of replicas and the objective of a simulation."""
+    """The seed of a simulation, and the number of its replicas with their objective."""
 
     seed: int
     plan: ReplicaPlan
