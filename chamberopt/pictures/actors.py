@@ -124,7 +124,7 @@ def add_edges(plotter: Any, part: Surface) -> None:
 
 
 class Discs(NamedTuple):
-    """Flat discs on a surface, one disc a row.
+    """Flat discs to draw on a surface, such as dents. Each row of the arrays is a disc.
 
     Attributes:
         place: centres [mm], shape (k, 3).

@@ -199,7 +199,7 @@ def render_replay(job: dict[str, Any]) -> Iterator[int | None]:
 
 
 class _ReplayScene:
-    """The chamber with part, balls and dents, shown frame after frame."""
+    """Show the chamber with part, balls and dents in a plotter, frame after frame."""
 
     def __init__(
         self, plotter: Any, folder: Path, flight: dict[str, np.ndarray], job: dict[str, Any]

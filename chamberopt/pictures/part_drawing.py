@@ -95,7 +95,7 @@ LEGEND = (
 
 @dataclass(frozen=True)
 class View:
-    """One view of the chamber on the page.
+    """The place and scale of one view of the chamber on the page.
 
     Attributes:
         right: axis of the chamber (0, 1, 2) that points to the right.

@@ -63,7 +63,7 @@ class Panel(NamedTuple):
 
 
 class ColourBar(NamedTuple):
-    """The colours of a quantity between two limits."""
+    """A colour bar to draw: the colours of a quantity between two limits, with a label."""
 
     label: str
     colours: str | Colormap
@@ -72,7 +72,7 @@ class ColourBar(NamedTuple):
 
 
 class Row(NamedTuple):
-    """Panels beside one another, and their title."""
+    """A row of a picture: views beside one another, and their title."""
 
     title: str
     panels: Sequence[Panel]

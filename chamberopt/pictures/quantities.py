@@ -1,4 +1,4 @@
-"""The quantities that viewer and report show on the part, with their colour maps."""
+"""List the quantities that viewer and report can show on the part, with their colour maps."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from chamberopt.pictures.charts.colours import COUNT_MAP, COVERAGE_MAP, WIDTH_MA
 
 @dataclass(frozen=True)
 class Quantity:
-    """A number that can be shown at each place of the part."""
+    """A quantity that can be shown as colours on the part, such as coverage."""
 
     name: str
     label: str

@@ -15,7 +15,7 @@ NARROWEST = 0.6  # shortest side of an image over the largest side
 
 
 class View(NamedTuple):
-    """An image, and the place of its pixels in space.
+    """A rendered image of surfaces, and the place of its pixels in space.
 
     Attributes:
         image: uint8, shape (rows, columns, 3).

@@ -41,7 +41,7 @@ STYLES = {
 
 @dataclass(frozen=True)
 class HistogramData:
-    """A histogram of several results in the same bins.
+    """A histogram to draw: several results in the same bins, with texts and styles.
 
     Args:
         edges: bin edges, shape (n + 1,).
@@ -62,7 +62,7 @@ class HistogramData:
 
 @dataclass(frozen=True)
 class CoverageCurve:
-    """Coverage of one result over peening time.
+    """The coverage of one result over peening time, to draw as a curve.
 
     Args:
         label: legend.

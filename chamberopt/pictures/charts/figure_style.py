@@ -1,4 +1,4 @@
-"""Common functions of all pictures: make a figure, save it, style axes and choose their range."""
+"""Make a matplotlib figure, save it, style its axes and choose their range, for all charts."""
 
 from __future__ import annotations
 
