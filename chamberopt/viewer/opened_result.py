@@ -59,7 +59,7 @@ def result_info(result: Result) -> ResultInfo:
 
 
 class OpenedResult:
-    """The surfaces and impacts of a result.
+    """The surfaces and impacts of a result, read from its folder and ready to be drawn.
 
     Raises InputError if files are missing, damaged or of another result.
     """
@@ -81,7 +81,7 @@ class OpenedResult:
 
     @cached_property
     def hits(self) -> HitsByTriangle:
-        """All impacts on the part by triangle. They are many, so they are read when first needed."""
+        """All impacts on the part, by triangle. As they are many, they are read on first use."""
         return load_matching_hits(self._path(HITS_FILE), np.asarray(self.surface["impacts"]))
 
     def time_ratio(self, state: ViewState) -> float:

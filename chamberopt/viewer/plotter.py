@@ -55,7 +55,7 @@ PIN_LENGTH = 0.06  # length of the mark on a triangle, over the target's size
 
 
 class ResultPlotter:
-    """A plotter with one view for each result.
+    """Draw several results with pyvista, each in a view of its own.
 
     Attributes:
         plotter: the plotter of pyvista.

@@ -78,7 +78,7 @@ def open_results(infos: Sequence[ResultInfo], state: ViewState) -> list[OpenedRe
 
 
 class Window:
-    """A ResultPlotter on the screen. Keys, slider, plane and clicks change its state."""
+    """Show results on the screen. Keys, slider, cutting plane and clicks change what is shown."""
 
     def __init__(
         self, results: Sequence[OpenedResult], state: ViewState, off_screen: bool = False
