@@ -28,11 +28,11 @@ MODEL = "3D/3dmodel.model"
 
 
 class NamedSurfaces(NamedTuple):
-    """A cavity, and the surfaces that bound it.
+    """The mesh of a cavity, and which of its triangles belong to which named surface.
 
     Args:
         vertices: [mm], shape (n, 3).
-        triangles: closed, normals out of the cavity, shape (k, 3).
+        triangles: a closed mesh with normals out of the cavity, shape (k, 3).
         surfaces: by name, marks of the surface's triangles, shape (k,) bool.
     """
 

@@ -60,7 +60,7 @@ WEIGHTS = {"area": "exposed_area_mm2", "impacts": "impacts", "dents": "dents"}
 
 @dataclass(frozen=True)
 class ElementFields:
-    """Values of the elements of the part's file.
+    """Values for the elements of the part's file, such as coverage, by column.
 
     Args:
         numbers: element numbers in ascending order, shape (e,) int64.

@@ -1,4 +1,4 @@
-"""Coordinate frames of exported positions and directions: of the part's file, or of the chamber."""
+"""Convert exported positions and directions to the frame of the part's file or of the chamber."""
 
 from __future__ import annotations
 

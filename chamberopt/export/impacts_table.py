@@ -38,7 +38,7 @@ ROWS_AT_ONCE = 1 << 16  # also the rows of a Parquet row group
 
 
 class ImpactRows(NamedTuple):
-    """A piece of the impacts of one replica, from which columns are computed.
+    """Some of the impacts of one replica, from which rows of the table are computed.
 
     Args:
         replica: number of the replica.
@@ -64,7 +64,7 @@ class ImpactRows(NamedTuple):
 
 
 class Column(NamedTuple):
-    """A column of the table.
+    """A column of the table of impacts, and how it is computed.
 
     Args:
         name: ends with the unit.
