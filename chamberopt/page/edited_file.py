@@ -33,7 +33,7 @@ PICKED = re.compile(
 
 
 class EditedFile:
-    """A design file as one page read it.
+    """The text of a design file as one page has read it, with the changes that the page may make.
 
     Args:
         path: the design file.

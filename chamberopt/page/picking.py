@@ -21,7 +21,7 @@ Row = dict[str, Any]  # an item of `faces` in a target's table
 
 
 class Picker:
-    """The faces of the part, found once for each crease angle, and changes that use them."""
+    """Turn clicks into changes of a design. The part's faces are found once per crease angle."""
 
     def __init__(self) -> None:
         self._known: dict[tuple[int, float], tuple[PartMesh, Faces]] = {}

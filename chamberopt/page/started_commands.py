@@ -21,7 +21,7 @@ COMMAND = (
 
 
 class StartedCommand:
-    """A command that runs in a folder, with the lines that it has printed."""
+    """A chamberopt command that runs in a folder, and the lines that it has printed so far."""
 
     def __init__(self, arguments: Sequence[str], folder: Path) -> None:
         self.arguments = list(arguments)
