@@ -1,4 +1,4 @@
-"""The command line. commands/ has a file for each command, and this folder their common code.
+"""Run the command line. commands/ has a file for each command, this folder their common code.
 
 Results go to stdout. Progress, remarks and errors go to stderr.
 

@@ -75,7 +75,7 @@ def _would_be_lost(frame: FrameType | None) -> bool:
 
 
 class Interrupt:
-    """A handler of SIGINT for a study's `with` block.
+    """Handle Ctrl-C while a study runs inside the `with` block of this object.
 
     requested: True once the user wants to stop.
 

@@ -1,4 +1,4 @@
-"""The application object, and the options that several commands share."""
+"""Define the application object, and the options that several commands share."""
 
 from collections.abc import Sequence
 from importlib.metadata import version

@@ -37,7 +37,7 @@ class TerminalTeller(Teller):
 
 
 class SearchTeller(TerminalTeller):
-    """Show a search on stderr, let Ctrl-C wait for its running evaluations, say how to resume it."""
+    """Show a search on stderr. On Ctrl-C, wait for running evaluations and say how to resume it."""
 
     def __init__(self, interrupt: Interrupt, how_to_resume: str) -> None:
         super().__init__()

@@ -1,4 +1,4 @@
-"""The commands, in a file each. Importing this package registers all commands with `app`."""
+"""Define the commands, in a file each. Importing this package registers all of them with `app`."""
 
 from importlib import import_module
 from pkgutil import walk_packages

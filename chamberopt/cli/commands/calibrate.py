@@ -1,4 +1,4 @@
-"""The command `calibrate`: the parameters of a machine, from measurements on it."""
+"""The command `calibrate`: estimate the parameters of a machine from measurements on it."""
 
 from __future__ import annotations
 

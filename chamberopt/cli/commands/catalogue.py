@@ -1,4 +1,4 @@
-"""The commands `materials` and `shot`: the catalogue of alloys and of balls as they are sold."""
+"""The commands `materials` and `shot`: list the known alloys, and balls as they are sold."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The command `compare`: designs and results, compared with the first candidate."""
+"""The command `compare`: compare designs and results with the first of them."""
 
 from __future__ import annotations
 

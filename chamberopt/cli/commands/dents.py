@@ -1,4 +1,4 @@
-"""The command `dents`: an image of every dent that a replica of a result leaves on the part."""
+"""The command `dents`: draw every dent that a replica of a result leaves on the part."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The command `edit`: a design on a page in the browser."""
+"""The command `edit`: edit a design on a page in the browser."""
 
 from __future__ import annotations
 

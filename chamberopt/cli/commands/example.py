@@ -1,4 +1,4 @@
-"""The command `example`: a shipped design, its part and a study, to try the program with."""
+"""The command `example`: copy a shipped design, its part and a study, to try the program with."""
 
 from __future__ import annotations
 

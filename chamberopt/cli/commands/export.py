@@ -1,4 +1,4 @@
-"""The command `export`: results in the formats of other programs."""
+"""The command `export`: write results in the formats of other programs."""
 
 from __future__ import annotations
 

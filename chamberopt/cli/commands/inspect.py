@@ -1,4 +1,4 @@
-"""The command `inspect`: results in 3D, coloured by any quantity."""
+"""The command `inspect`: show results in 3D, coloured by any quantity."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The command `new`: a first design and study for a part."""
+"""The command `new`: propose a first design and study for a part."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The command `replay`: a film of the ball flight in one replica of a result."""
+"""The command `replay`: make a film of the ball flight in one replica of a result."""
 
 from __future__ import annotations
 

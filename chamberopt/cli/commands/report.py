@@ -1,4 +1,4 @@
-"""The command `report`: a result as an HTML page, or as a process sheet to print."""
+"""The command `report`: write a result as an HTML page, or as a process sheet to print."""
 
 from __future__ import annotations
 

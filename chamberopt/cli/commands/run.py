@@ -1,4 +1,4 @@
-"""The command `run`: the search for a better design."""
+"""The command `run`: search for a better design."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The command `simulate`: the coverage of one design."""
+"""The command `simulate`: simulate the coverage of one design."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The command `strip`: arc heights of a virtual Almen strip."""
+"""The command `strip`: simulate the arc heights of an Almen strip."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The command `sweep`: a map of a study's parameters."""
+"""The command `sweep`: simulate a design over the range of a study's parameters and draw a map."""
 
 from __future__ import annotations
 
