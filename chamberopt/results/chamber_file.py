@@ -49,7 +49,10 @@ def load_chamber(result: Result) -> Chamber:
 
 
 def _require_sound(chamber: Chamber) -> None:
-    """Raise ValueError unless all arrays have the types, shapes and ranges that kernels expect."""
+    """Raise ValueError unless all arrays of a chamber have their types, shapes and ranges.
+
+    The compiled simulator does not check them again.
+    """
     part, file = chamber.part, chamber.part.file
     if not isinstance(part, Part) or not isinstance(file, PartOfFile):
         raise ValueError("without its part")

@@ -134,7 +134,7 @@ def strip_record(strip: VirtualStrip) -> StripRecord:
 
 
 class ParameterRecord(Table):
-    """Mean and standard deviation of a parameter's logarithm, before and after the calibration."""
+    """A calibrated parameter: mean and standard deviation of its logarithm before and after."""
 
     log_mean_before: float
     log_sd_before: float

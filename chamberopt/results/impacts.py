@@ -58,7 +58,7 @@ def simulate_impacts(
     replicas: int | None = None,
     progress: Progress | None = None,
 ) -> Iterator[ReplicaImpacts]:
-    """Simulate the replicas of a result again and yield the impacts on its part, one at a time.
+    """Simulate the replicas of a result again and yield the impacts of each on the part.
 
     Only a few replicas are in memory at a time.
 

@@ -155,13 +155,13 @@ def load_result(path: str | Path) -> Result:
 
 
 def load_start(study: Result) -> Result:
-    """Read the results folder of a study's start, which is inside the study's folder."""
+    """Return the result of the design with which a study began, from its folder `start`."""
     with _damage_explained(study.folder / START):
         return load_result(require_plain_folder(study.folder / START, RESTORE))
 
 
 def load_trials(folder: Path) -> list[dict[str, Any]]:
-    """Load the trial log of a study or sweep, finished or not.
+    """Return the rows of the trial log of a study or sweep, which need not be finished.
 
     Raises:
         InputError: the folder has no trial log, or a file of a finished study was changed.
@@ -231,7 +231,11 @@ def load_cavity(result: Result) -> Surface:
 
 
 def read_part(path: Path) -> Surface:
-    """Read part.vtp. Raise InputError if a triangle within reach of the shot lacks values."""
+    """Read part.vtp: the part's triangles with their values.
+
+    Raises InputError if the file is damaged, for example if a triangle that is exposed to the shot
+    lacks its coverage.
+    """
     part = read_surface(path, ELEMENT_COLUMNS)
     exposed = np.asarray(part["exposed_area_mm2"])
     if not np.isfinite(exposed).all() or np.isnan(part["coverage"][exposed > 0.0]).any():
@@ -242,7 +246,10 @@ def read_part(path: Path) -> Surface:
 
 
 def read_field(path: Path, part: Surface) -> Surface:
-    """Read coverage.vtp. Raise InputError unless it belongs to this part.vtp."""
+    """Read coverage.vtp: a finer mesh of the part with coverage at each vertex.
+
+    Raises InputError if it is damaged or does not belong to `part`, which was read from part.vtp.
+    """
     field = read_surface(path, ("triangle", *OF_ELEMENT), FIELD_COLUMNS)
     triangle = np.asarray(field["triangle"])
     covers_all = np.array_equal(np.unique(triangle), np.arange(part.n_cells))

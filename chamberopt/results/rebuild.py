@@ -77,7 +77,7 @@ class RebuiltReplica:
 
 
 def rebuild_chamber(result: Result) -> RebuiltChamber:
-    """Load the chamber of a result. Raise InputError if its file was changed."""
+    """Return the chamber of a result as it was simulated. Raise InputError if its file changed."""
     chamber = load_chamber(result)
     return RebuiltChamber(
         chamber, analytic_cavity(result.design, chamber) if result.record.analytic else None

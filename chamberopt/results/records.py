@@ -47,7 +47,7 @@ def _dated(text: str) -> str:
 
 
 class Table(BaseModel):
-    """A table of result.json. Unknown keys are allowed and ignored."""
+    """The base of all tables of result.json. Unknown keys are allowed and ignored."""
 
     model_config = ConfigDict(strict=True, allow_inf_nan=False)
 
@@ -291,7 +291,7 @@ class StartRecord(CandidatePoint):
 
 
 class AccuracyRecord(Table):
-    """The accuracy of a candidate's simulation: process.accuracy of the design."""
+    """How accurately a candidate was simulated: the table process.accuracy of its design."""
 
     model_config = ConfigDict(extra="allow")
 
@@ -325,7 +325,7 @@ class StudyRecord(Table):
 
     @property
     def on_bounds(self) -> list[str]:
-        """Names of the numbers of the best design that lie on a bound of the search."""
+        """Names of the parameters whose best value lies on a bound of the search."""
         return [
             name
             for name, ends in self.vary.items()
@@ -490,7 +490,7 @@ class CandidateRecord(ResultRecord):
 
 
 def read_record(data: dict[str, Any]) -> ResultRecord:
-    """Check the content of a result.json. Raise ValueError that names the first wrong key."""
+    """Return the checked content of a result.json. Raise ValueError that names a wrong key."""
     model = ResultRecord if data.get("kind") == "sweep" else CandidateRecord
     try:
         return model.model_validate(data)

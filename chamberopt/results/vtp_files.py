@@ -76,7 +76,7 @@ class SurfaceArrays:
 
 
 def read_arrays(path: Path) -> SurfaceArrays:
-    """Read a .vtp file.
+    """Return the arrays of a .vtp file that this module wrote, checked.
 
     Raises:
         DamagedSurfaceError: the file is no .vtp file, or was altered.
@@ -314,7 +314,7 @@ def save_surface(path: Path, surface: Surface) -> None:
 
 
 def write_stl(path: Path, vertices: np.ndarray, triangles: np.ndarray) -> None:
-    """Write triangles as binary STL."""
+    """Write a mesh of triangles as a binary STL file."""
     from trimesh import Trimesh
 
     content: Any = Trimesh(vertices, triangles, process=False).export(file_type="stl")
@@ -322,10 +322,14 @@ def write_stl(path: Path, vertices: np.ndarray, triangles: np.ndarray) -> None:
 
 
 def read_surface(path: Path, cells: Sequence[str] = (), points: Sequence[str] = ()) -> Surface:
-    """Read a .vtp of a results folder.
+    """Return a surface of a results folder, read from its .vtp file.
+
+    Args:
+        cells: names of the columns that must be there with a value for each triangle.
+        points: names of the columns that must be there with a value for each point.
 
     Raises:
-        InputError: the file is missing or damaged, or lacks a column of `cells` or `points`.
+        InputError: the file is missing or damaged, or lacks a column.
     """
     if not path.is_file():
         raise InputError(

@@ -177,7 +177,10 @@ def data_digests(folder: Path) -> dict[str, str]:
 
 
 def _write_candidate(folder: Path, candidate: CandidateResult, **more: Any) -> CandidateRecord:
-    """Write the surfaces and impacts of a candidate. Return its record with the fields `more`."""
+    """Write the surfaces and impacts of a simulated design into a folder.
+
+    Return its record for result.json, with the further keys `more`.
+    """
     design, chamber, evaluation = candidate.design, candidate.chamber, candidate.evaluation
     write_coverage(folder, chamber, candidate.element_values, candidate.display)
     hits = sort_hits_by_triangle(evaluation.hits, len(chamber.part.triangles))
