@@ -49,7 +49,7 @@ class Chart:
     """A chart with its caption.
 
     name: name that is unique in the document.
-    tooltips: texts at the markers of a line, by the gid of the line.
+    tooltips: texts that appear at the markers of a line, by the line's id (gid) in the figure.
     """
 
     name: str
@@ -76,7 +76,7 @@ class Tiles:
 
 @dataclass(frozen=True)
 class TextFile:
-    """A file that the reader can save."""
+    """A text file, such as the design, that the reader can save from the page."""
 
     name: str
     text: str
@@ -84,7 +84,7 @@ class TextFile:
 
 @dataclass(frozen=True)
 class PartView:
-    """Parts in their chambers in three dimensions. They stand side by side and turn together."""
+    """A 3D view of parts in their chambers. They stand side by side and turn together."""
 
     scenes: Sequence[PartScene]
 

@@ -118,7 +118,9 @@ class Sheet:
 
     name: name of the part and the result.
     kind: kind of the result, with its date.
-    answer: the sentence of the report.
+    answer: the result in one sentence, as in the report.
+    blocks: settings and expected figures.
+    measure_first: quantities to measure before production.
     calibration: sentence on the measurements that the machine was calibrated by.
     """
 
