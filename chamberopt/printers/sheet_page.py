@@ -90,7 +90,7 @@ class Writer:
         """Write blocks in two columns of similar length and return the bottom of the longer column.
 
         Args:
-            sizes: width of a column, and the gap between the columns.
+            sizes: width of a column and gap between the columns [mm].
         """
         width, gap = sizes
         measure = Writer(None, self.size)
@@ -104,7 +104,7 @@ class Writer:
 
 
 def broken(text: str, width: float, size: float, bold: bool = False) -> list[str]:
-    """Break a text into lines no wider than `width` [mm]. Wider words are cut.
+    """Return a text broken into lines no wider than `width` [mm]. Wider words are cut.
 
     A number stays on a line with its interval and unit. A letter that the font lacks becomes "?".
     """
@@ -201,7 +201,11 @@ def write_sheet(result: str | Path, path: str | Path | None = None) -> tuple[Pat
 
 
 def draw_sheet(sheet: Sheet, chamber: Chamber) -> Figure:
-    """Draw the page: heading, drawing, blocks in two columns, first measurements, signatures."""
+    """Return the process sheet as a figure.
+
+    It has the heading, a drawing of the chamber, blocks in two columns, the quantities to measure
+    first, and lines for signatures.
+    """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -225,7 +229,7 @@ def draw_sheet(sheet: Sheet, chamber: Chamber) -> Figure:
 
 
 def _heading(axes: Axes, sheet: Sheet) -> float:
-    """Write title, name and answer. Return the height of their bottom."""
+    """Write title, name and answer of the sheet. Return the height of their bottom [mm]."""
     y = Writer(axes, 15.0).write("Process sheet", MARGIN, HEIGHT - MARGIN, 60.0, bold=True)
     beside, width = MARGIN + 62.0, INNER - 62.0
     name = Writer(axes, 9.0).write(sheet.name, beside, HEIGHT - MARGIN, width, bold=True)
@@ -236,7 +240,7 @@ def _heading(axes: Axes, sheet: Sheet) -> float:
 
 
 def _text(write: Writer, sheet: Sheet, top: float) -> float:
-    """Write the blocks and the table "Measure first". Return the height of their bottom."""
+    """Write the blocks and the table "Measure first". Return the height of their bottom [mm]."""
     column = 0.5 * (INNER - GAP)
     y = write.columns(sheet.blocks, MARGIN, top, (column, GAP)) - 0.3 * write.line
     head = ("Measure first", "expected", "measured")
@@ -263,7 +267,7 @@ def _signatures(axes: Axes) -> None:
 
 
 def _save(path: Path, figure: Figure, title: str) -> None:
-    """Write the page, with text that can be selected, whole or not at all."""
+    """Write the page as a PDF file with text that can be selected, whole or not at all."""
     from matplotlib import rc_context
 
     content = io.BytesIO()
