@@ -66,7 +66,7 @@ class SeedSettings(NamedTuple):
 def read_candidates(
     paths: Sequence[str | Path], treatment_time_s: float | None = None
 ) -> list[Candidate]:
-    """Read the candidates without simulating them.
+    """Return the candidates that `compare` was given, without simulating them.
 
     Args:
         paths: design files and results folders.

@@ -112,7 +112,7 @@ def save_sweep(folder: str | Path, sweep: SweepResult) -> list[str]:
 
 
 def _draw_diagrams(folder: Path, study_result: StudyResult) -> None:
-    """Draw the diagrams of a study's trials and of its model."""
+    """Draw convergence.png, slices.png and pareto.png of a study, as far as it has their data."""
     convergence_picture(folder / "convergence.png", study_result)
     if study_result.sensitivity:
         slices_picture(folder / "slices.png", study_result, study_result.sensitivity)

@@ -72,7 +72,7 @@ class Teller:
 
 
 def _uncounted(done: int, total: int, best: float | None) -> None:
-    """Ignore the progress of a step."""
+    """Do nothing with the progress of a step, where nobody listens."""
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,7 @@ class Simulated:
 
     design: the design with its effects chosen.
     advice: reasons for the effects, if the design left their choice to the program.
-    remarks: remarks of the saving, such as why a picture was skipped.
+    remarks: remarks for the user, such as why a picture was skipped.
     """
 
     design: Design
