@@ -23,7 +23,7 @@ NO_RENDER = {"render": False, "reset_camera": False}  # while actors are added t
 
 
 def light(plotter: Any) -> None:
-    """Make the background white and put a light beside the camera."""
+    """Make the background of a plotter white and put a light beside its camera."""
     plotter.set_background(BACKGROUND)
     plotter.remove_all_lights()
     plotter.add_light(pyvista().Light(light_type="headlight"))
@@ -43,10 +43,13 @@ def colour_meanings(parts: Sequence[DrawnPart]) -> list[tuple[str, str]]:
 def add_part(
     plotter: Any, part: DrawnPart, limits: tuple[float, float], pale: np.ndarray | None = None
 ) -> list[Any]:
-    """Add the target, coloured by its quantity where it is resolved, and the rest of the part.
+    """Add a part to a plotter: its target, coloured by its quantity, and the rest.
+
+    The target has another colour where too few dents were simulated for a value.
 
     Args:
-        pale: marks the triangles of `part.target` that are drawn pale instead.
+        limits: values at the ends of the colour bar.
+        pale: True for triangles of `part.target` that are drawn pale instead.
     Returns:
         The actors. The mapper of the first actor has the colours.
     """
@@ -80,7 +83,7 @@ def add_part(
 
 
 def _add_zones(plotter: Any, part: DrawnPart) -> list[Any]:
-    """Add the part with each zone in its own colour, without a colour bar."""
+    """Add a part to a plotter with each zone in its own colour. Return the actors."""
     actors = []
     for number, surface in part.zones.items():
         colour = zone_colour(number - 1) if number else GREY
@@ -92,7 +95,9 @@ def _add_zones(plotter: Any, part: DrawnPart) -> list[Any]:
 
 
 def add_chamber(plotter: Any, chamber: Surface) -> tuple[dict[int, Any], list[Any]]:
-    """Add the sonotrodes, and the walls as glass with their edges. Clicks pass through them.
+    """Add a chamber to a plotter: the sonotrodes, and the walls as glass with their edges.
+
+    Clicks pass through them.
 
     Returns:
         The actors of the sonotrodes by tag, and the actors of the walls.
@@ -112,7 +117,7 @@ def add_chamber(plotter: Any, chamber: Surface) -> tuple[dict[int, Any], list[An
 
 
 def add_edges(plotter: Any, part: Surface) -> None:
-    """Add the sharp edges of a part as thin lines."""
+    """Add the sharp edges of a part to a plotter as thin lines."""
     whole = pyvista().PolyData(part.points, part.faces).clean()
     edges = whole.extract_feature_edges(
         SHARP_EDGE, boundary_edges=False, non_manifold_edges=False, manifold_edges=False

@@ -198,7 +198,7 @@ def _is_middle(height: float | np.ndarray) -> bool | np.ndarray:
 
 
 class Room(NamedTuple):
-    """Pixels at the sides of a view that stay free for text."""
+    """Widths of the sides of a view that stay free for text [pixels]."""
 
     left: float
     right: float
@@ -209,12 +209,13 @@ class Room(NamedTuple):
 def fit_camera(
     plotter: Any, points: np.ndarray, eye: np.ndarray, size: tuple[int, int], room: Room
 ) -> None:
-    """Point the camera at points so that they fill a view beside its room for text.
+    """Point the camera of a plotter at points so that they fill a view beside its text.
 
     Args:
         points: [mm], (k, 3).
         eye: direction to the eye.
         size: width and height of the view [pixels].
+        room: sides of the view that stay free for text.
     """
     frame = view_frame(eye)
     middle = 0.5 * (points.min(axis=0) + points.max(axis=0))

@@ -49,12 +49,12 @@ def draw_dents(
 
     Args:
         result: results folder whose coverage.vtp holds the part.
-        dents: in order of time.
+        dents: dents in order of time.
         title: written above the picture.
         picture: file to write, .png.
         view: direction from the part to the eye. None shows a flat target face on, and any other
             target from the direction that shows most of it.
-        pixels: longer side of one view, as require_pixels accepts it.
+        pixels: longer side of one view [pixels].
     Returns:
         None, or one line that says why there is no picture.
     Raises:
@@ -66,7 +66,7 @@ def draw_dents(
 
 
 def require_pixels(pixels: int) -> None:
-    """Raise InputError for a picture too small to read or too large to draw."""
+    """Raise InputError if a picture's longer side [pixels] is too small to read or too large."""
     if not MIN_PIXELS <= pixels <= MAX_PIXELS:
         raise InputError(f"--pixels: given {pixels}; {MIN_PIXELS} to {MAX_PIXELS} are supported")
 

@@ -23,10 +23,10 @@ PALE, NO_TARGET = "#e6e9ec", "#a9b0b7"
 def write_differences(
     path: Path, field: Path, columns: Sequence[tuple[np.ndarray, np.ndarray]]
 ) -> None:
-    """Write a part with the differences of later candidates from the first candidate.
+    """Write a part as .vtp with the coverage of each later candidate minus that of the first.
 
-    Candidate k = 1, 2, ... has point data difference_k [percentage points] and real_k. The
-    triangles have cell data target.
+    Candidate k = 1, 2, ... has the columns difference_k [percentage points] and real_k (1 where
+    the difference is more than noise) at the vertices. The triangles have the column target.
 
     Args:
         path: .vtp file to write.

@@ -46,7 +46,14 @@ def film_path(film: str | Path) -> Path:
 
 
 def require_playable(fps: int, size: tuple[int, int], frames: int, path: Path) -> None:
-    """Raise InputError for a film that players cannot show properly or memory cannot hold."""
+    """Raise InputError for a film that players cannot show properly or memory cannot hold.
+
+    Args:
+        fps: frames a second.
+        size: width and height [pixels].
+        frames: number of frames.
+        path: file of the film.
+    """
     if not 1 <= fps <= MAX_FPS:
         raise InputError(f"--fps: given {fps}; 1 to {MAX_FPS} are supported")
     given = f"--size: given {size[0]} {size[1]}"
@@ -63,7 +70,10 @@ def require_playable(fps: int, size: tuple[int, int], frames: int, path: Path) -
 
 
 def write_film(path: Path, frames: Sequence[np.ndarray], fps: int) -> None:
-    """Write frames, each (rows, columns, 3) uint8, at `fps` frames a second. A GIF repeats."""
+    """Write frames as a film of `fps` frames a second. A .gif repeats.
+
+    Each frame has the shape (rows, columns, 3), uint8.
+    """
     if path.suffix.lower() == ".gif":
         write_bytes(path, _gif(frames, fps))
         return
@@ -139,10 +149,10 @@ def draw_replay(
 
     Args:
         result: results folder with the chamber and part.
-        flight: to show.
-        film: file to write, as film_path accepts it.
-        fps: frames a second, as require_playable accepts them.
-        size: width and height [pixels], as require_playable accepts them.
+        flight: frames to show.
+        film: file to write, .gif or .mp4.
+        fps: frames a second.
+        size: width and height [pixels].
         view: direction from the chamber's middle to the eye; None for a direction that shows the
             target.
         count: called after each frame with the number of drawn frames.
@@ -275,7 +285,10 @@ class _ReplayScene:
         self._replace(name, mesh, color=colour, smooth_shading=True, specular=0.4)
 
     def _show_dents(self, number: int) -> int:
-        """Show the dents until a frame, with the recent dents coloured, and return their number."""
+        """Show the dents made until the time of a frame, recent ones in another colour.
+
+        Return their number.
+        """
         flight, now = self.flight, self.flight["time"][number]
         made = flight["dent_time"] <= now
         recent = flight["dent_time"][made] > now - self.recent

@@ -137,7 +137,7 @@ def show_legend(
 
 
 def show_histogram(plotter: Any, speed: np.ndarray) -> None:
-    """Draw the impact speeds (k,) [m/s] of a triangle as a chart in the lower right."""
+    """Draw a histogram of a triangle's impact speeds (k,) [m/s] in the lower right of a view."""
     chart = pyvista().Chart2D(size=(0.36, 0.33), loc=(0.63, 0.02))
     counts, edges = np.histogram(speed, BINS, (0.0, float(speed.max()) or 1.0))
     chart.bar(0.5 * (edges[:-1] + edges[1:]), counts.astype(float), color=MARK)
@@ -154,7 +154,10 @@ def show_histogram(plotter: Any, speed: np.ndarray) -> None:
 
 
 def mark_triangle(plotter: Any, corners: np.ndarray, length: float) -> None:
-    """Outline a triangle (3, 3) [mm] and put a pin of a length [mm] on it."""
+    """Outline a triangle in a view and put a pin of a length [mm] on it.
+
+    `corners` are its corners [mm], shape (3, 3).
+    """
     centre = corners.mean(axis=0)
     tip = centre + length * unit_normals(corners)
     style = {"color": MARK, "lighting": False, "pickable": False, **NO_RENDER}

@@ -32,7 +32,7 @@ STUB = 3.5  # mm, of arrows outside
 def dimension(
     axes: Axes, start: Point, end: Point, away: float, text: str, upright: bool = False
 ) -> None:
-    """Draw a dimension between two points: side by side, or one above the other if upright.
+    """Draw a dimension: the horizontal distance of two points, or if upright the vertical one.
 
     Args:
         away: distance of its line below the points, or left of the points if upright.

@@ -184,7 +184,7 @@ def _draw_triad(axes: Axes, frame: np.ndarray, place: tuple[float, float]) -> No
 
 
 def _draw_dimension(axes: Axes, panel: Panel, one: Dimension) -> None:
-    """Draw a dimension line outside of everything, with extension lines and its length."""
+    """Draw a dimension with extension lines and its length, outside of all that the view shows."""
     assert panel.outside is not None
     around = panel.view.pixels(panel.outside)
     start, end = panel.view.pixels(one.ends)
@@ -237,7 +237,12 @@ def _legend_lines(
 def _draw_foot(
     axes: Axes, remarks: Sequence[str], lines: Sequence[Sequence[tuple[float, str, str]]]
 ) -> None:
-    """Write the legend and the remarks into axes in pixels from the upper left corner."""
+    """Write the legend and the remarks at the foot of a picture.
+
+    Args:
+        axes: axes in pixels from the upper left corner of the foot.
+        lines: place, colour and meaning of each legend entry, in lines.
+    """
     from matplotlib.patches import Rectangle
 
     for row, entries in enumerate(lines):

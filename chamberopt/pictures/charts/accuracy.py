@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 def accuracy_picture(path: Path, study: ConvergenceStudy) -> None:
-    """Write error against CPU seconds, and the bias of every run, as .png."""
+    """Write a chart of error against CPU seconds, and of the bias of every run, as .png."""
     figure = new_figure(13.0, 6.6)
     left, right = figure.subplots(1, 2, width_ratios=[1.5, 1.0])
     _draw_errors(left, study)

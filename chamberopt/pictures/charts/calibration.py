@@ -33,7 +33,10 @@ Z = normal_quantile(0.95)
 
 
 def calibration_picture(path: Path, found: Calibrated) -> None:
-    """Write a panel for each kind of data, with 95 % bars of points and 95 % bands, as .png."""
+    """Write a chart for each kind of measurement into one .png.
+
+    Measured points have 95 % bars, and predictions 95 % bands.
+    """
     kinds = list(dict.fromkeys(one.kind for one in found.data))
     rows = -(-len(kinds) // COLUMNS)
     figure = new_figure(6.4 * min(COLUMNS, len(kinds)), 4.4 * rows)

@@ -42,7 +42,10 @@ def fit_text(fit: KirkFit, strip: VirtualStrip) -> str:
 
 
 def strip_picture(path: Path, strip: VirtualStrip) -> None:
-    """Write arc height against time with its band, the five points and both fits, as .png."""
+    """Write a chart of arc height against peening time as .png.
+
+    It shows the virtual strip with its interval, the five arc heights and both fitted curves.
+    """
     figure = new_figure(8.6, 5.6)
     axes = figure.subplots()
     times = np.r_[0.0, strip.drawn_at]

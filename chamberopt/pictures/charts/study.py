@@ -57,7 +57,7 @@ class EvaluatedCandidate:
 
 
 def convergence_picture(path: Path, result: StudyResult) -> None:
-    """Write the objective against evaluation and against each parameter, as .png."""
+    """Write charts of the objective by order of evaluation and over each parameter, as .png."""
     candidates = [
         EvaluatedCandidate(t.number + 1, t.stage, t.objective, t.feasible, t.parameters)
         for t in result.trials
@@ -161,7 +161,10 @@ def _tooltip(candidate: EvaluatedCandidate) -> str:
 def _draw_parameter(
     axes: Axes, result: StudyResult, candidates: Sequence[EvaluatedCandidate], name: str
 ) -> None:
-    """Draw the search over one parameter, later candidates darker, and confirmed start and best."""
+    """Draw the objective of each candidate over one parameter, later candidates darker.
+
+    The confirmed start and best design are marked.
+    """
     varied = result.study.vary[name]
     search = [one for one in candidates if one.stage == "search"]
     shown = [
@@ -272,7 +275,10 @@ def _place(of: Slice, value: float | str) -> float:
 
 
 def pareto_picture(path: Path, result: StudyResult) -> None:
-    """Write both objectives of every candidate, with the confirmed Pareto front, as .png."""
+    """Write a chart of one objective against the other for every candidate, as .png.
+
+    It shows the confirmed Pareto front.
+    """
     from chamberopt.search.pareto import pareto_points
 
     figure = new_figure(8.0, 6.0)

@@ -50,9 +50,9 @@ def tornado_figure(panels: Sequence[TornadoPanel]) -> Figure:
 
 
 def draw_tornado(axes: Axes, bars: Sequence[TornadoBar], x_label: str) -> None:
-    """Draw a bar with its 95 % interval for each end of each number, the first number on top.
+    """Draw the change of a figure at each end of each number's tolerance, with 95 % intervals.
 
-    Bars in the noise are grey.
+    The first number is on top. Bars no longer than their interval are grey.
     """
     for row, bar in enumerate(bars):
         for end, colour in ((bar.low, ORANGE), (bar.high, BLUE)):
