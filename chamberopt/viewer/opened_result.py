@@ -45,7 +45,7 @@ class ResultInfo:
 
 
 def result_info(result: Result) -> ResultInfo:
-    """Collect the viewer's data from a result."""
+    """Return the data of a result that the viewer needs to open it."""
     treatment = result.design.process.treatment_time
     times = [row.time_s for row in result.record.coverage_against_time]
     return ResultInfo(
@@ -85,7 +85,7 @@ class OpenedResult:
         return load_matching_hits(self._path(HITS_FILE), np.asarray(self.surface["impacts"]))
 
     def time_ratio(self, state: ViewState) -> float:
-        """Return the shown time over the treatment time."""
+        """Return the peening time that the state shows over the result's treatment time."""
         return 1.0 if state.time_s is None else state.time_s / self.info.treatment_s
 
     def show(self, state: ViewState) -> None:
@@ -154,7 +154,10 @@ def common_quantities(results: Sequence[OpenedResult]) -> list[str]:
 
 
 def colour_limits(results: Sequence[OpenedResult], state: ViewState) -> tuple[float, float]:
-    """Show the state's quantity on all results and return their common colour scale."""
+    """Colour all results by the quantity that the state shows.
+
+    Return the values at the ends of their common colour scale.
+    """
     for one in results:
         one.show(state)
     if state.quantity == "zones":

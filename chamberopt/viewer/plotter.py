@@ -121,7 +121,10 @@ class ResultPlotter:
             self._actors[0].add("keys")
 
     def aim(self, state: ViewState) -> None:
-        """Point all cameras the same way, at everything that is drawn."""
+        """Point the camera of each view at everything that is drawn there.
+
+        All cameras look the same way if the views show the same part.
+        """
         groups = [self.results] * len(self.results) if self.linked else [[r] for r in self.results]
         eye = None
         for number, group in enumerate(groups):
@@ -272,7 +275,7 @@ def _menu(names: Sequence[str], state: ViewState) -> str:
 def _triangle_lines(
     result: OpenedResult, triangle: int, state: ViewState
 ) -> tuple[list[str], np.ndarray]:
-    """Return lines of text on a triangle, and its impact speeds (k,) [m/s]."""
+    """Return lines of text with the values of a triangle, and its impact speeds (k,) [m/s]."""
     return result.describe_triangle(triangle, state), result.hits.of(triangle).speed
 
 
@@ -297,7 +300,7 @@ def _remarks(result: OpenedResult, state: ViewState, pale: np.ndarray | None) ->
 
 
 def _legend(result: OpenedResult, state: ViewState) -> list[tuple[str, str]]:
-    """Return pairs of a colour that stands for no value, and its meaning."""
+    """Return the legend of a view: each colour that is not on the colour bar, with its meaning."""
     if state.quantity == "zones":
         entries = [(zone_colour(k), name) for k, name in enumerate(result.info.zones)]
         entries.append((GREY, "in no zone"))

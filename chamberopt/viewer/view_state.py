@@ -40,13 +40,14 @@ class ViewState:
     """The shown quantity, time, cut and other settings of a view.
 
     Attributes:
-        quantity: name in QUANTITIES.
-        time_s: peening time of quantities that grow; None for each result's treatment time.
+        quantity: name of the quantity that colours the part, a key of QUANTITIES.
+        time_s: shown peening time [s] of quantities that grow with it. None for each result's
+            treatment time.
         below: coverage [%] from which triangles are pale; None for no threshold.
         cut: plane that cuts the chamber open; None for no cut.
         cut_part: true if the part is cut too.
         chamber: true if the chamber is drawn.
-        triangle: its numbers are shown; None for no triangle.
+        triangle: number of the triangle whose values are shown; None for no triangle.
         view: number of the triangle's result; None for all results.
         eye: direction from the part to the eye; None for a direction that shows the target.
         keys: true if the list of keys is shown.

@@ -128,17 +128,20 @@ class Window:
             self.view.plotter.render()
 
     def set_time(self, seconds: float) -> None:
-        """React to a release of the time slider."""
+        """Show the peening time [s] at which the time slider was released."""
         if seconds != self._seconds():
             self.change(replace(self.state, time_s=seconds))
 
     def select_triangle(self, view: int, triangle: int) -> None:
-        """React to a click on a triangle, in all views of the same part."""
+        """Show the values of a clicked triangle.
+
+        They are shown in all views if these show the same part, else only in the clicked view.
+        """
         view_shown = None if self.view.linked else view
         self.change(replace(self.state, triangle=triangle, view=view_shown))
 
     def move_plane(self, normal: Sequence[float], origin: Sequence[float]) -> None:
-        """React to a release of the cutting plane."""
+        """Cut the chamber open where the cutting plane was released."""
         if self.state.cut is not None:
             self.change(replace(self.state, cut=(tuple(normal), tuple(origin))))  # type: ignore[arg-type]
 
