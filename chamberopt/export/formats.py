@@ -34,7 +34,7 @@ class ExportFormat:
     arguments: tuple[str, ...] = ()
 
     def write(self, folder: Path, file: Path) -> list[str]:
-        """Write the file from a results folder and return remarks for the user."""
+        """Write a result in this format to a file and return remarks for the user."""
         module, function = str(self.writer).split(".")
         write = getattr(import_module(f"chamberopt.export.{module}"), function)
         return write(folder, file, *self.arguments) or []
