@@ -180,7 +180,10 @@ class Acts:
         return {"study": path.name}
 
     def start(self, asked: Any) -> dict[str, Any]:
-        """Start a command on the saved design, a study beside it or a result below it."""
+        """Start a command of the command line.
+
+        It works on the saved design, on a study beside it or on a result below its folder.
+        """
         command, what = str(asked["command"]), self.inside(str(asked["of"]))
         if command not in COMMANDS:
             raise InputError(f"{command}: not a command of this page: {', '.join(COMMANDS)}")

@@ -66,7 +66,10 @@ def shape_answer(design: Design) -> bytes:
 
 
 def check_answers(design: Design) -> Iterator[bytes]:
-    """Yield the facts of `check` in two answers: the cavity at once, then the reach of the shot."""
+    """Yield what the command `check` tells of a design, as two answers to the page.
+
+    The first has the cavity. The second takes longer and has what the shot can reach.
+    """
     chamber = build_chamber(design)
     mesh = chamber_mesh(chamber)
     head: dict[str, Any] = {

@@ -198,7 +198,7 @@ def make_app(acts: Acts, port: int) -> OnePerson:
 
 
 async def _body(request: Request) -> bytes | None:
-    """Read the body of a request; None if it is too long, or announces such a length."""
+    """Return the body of a request, or None if it is too long or announces such a length."""
     if int(request.headers.get("content-length", 0)) > MOST_BYTES:
         return None
     body = bytearray()
