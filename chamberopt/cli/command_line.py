@@ -79,7 +79,7 @@ def _without_progress(given: list[str]) -> list[str]:
 
 
 def _fail(message: str, status: int, error: BaseException | None = None) -> int:
-    """Print the message and the notes of the error, and return the exit status.
+    """Print a message and the notes of an error to stderr, and return `status`.
 
     Notes name the candidate concerned and how to go on.
     """

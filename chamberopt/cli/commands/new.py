@@ -93,7 +93,7 @@ def new(
 
 
 def _require_file(part: Path) -> None:
-    """Raise InputError unless the part is a file that a design can name."""
+    """Raise InputError unless the part is a plain file whose name can stand in a design file."""
     from chamberopt.common.errors import InputError
 
     if not part.is_file():
@@ -108,7 +108,7 @@ def _require_file(part: Path) -> None:
 
 
 def _picked(known: Sequence[Surface]) -> Sequence[str]:
-    """Ask the user for surfaces and return their names."""
+    """Ask the user which of the part's surfaces are to be peened, and return their names."""
     from chamberopt.common.errors import InputError
 
     show(_listed(known, len(known)))
