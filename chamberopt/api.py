@@ -229,7 +229,7 @@ def measure_accuracy(
 
 
 def show(result: Result, screenshot: str | Path | None = None) -> None:
-    """Show the part in its chamber, coloured by coverage.
+    """Show the part of a result in its chamber, coloured by coverage, in a window.
 
     Args:
         screenshot: image file to write instead of opening a window.
