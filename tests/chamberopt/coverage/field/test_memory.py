@@ -8,7 +8,8 @@ import pytest
 
 from chamberopt.chamber.build import build_chamber
 from chamberopt.cli import main
-from chamberopt.cli.commands import run, sweep
+from chamberopt.cli.commands import sweep
+from chamberopt.cli.teller import TerminalTeller
 from chamberopt.common import memory
 from chamberopt.common.executor import SerialExecutor
 from chamberopt.common.memory import MEMORY, MemoryBudget
@@ -18,6 +19,7 @@ from chamberopt.design.design import Design
 from chamberopt.design.load import save_design
 from chamberopt.search.study import load_study
 from chamberopt.simulation.evaluate import ReplicaPlan, evaluate
+from chamberopt.workflows import optimise
 from tests.helpers.synthetic import plate_design
 
 GIGA = 1e9
@@ -121,6 +123,6 @@ def test_fewer_run_at_a_time_where_not_all_fit(
         assert sweep._workers_that_fit(study, chamber, 8) == workers
         told = capsys.readouterr().err
         assert (f"memory for {workers} of 8 worker processes" in told) == (workers < 8)
-        found = run._candidates_at_once(study, chamber)
+        found = optimise._candidates_at_once(study, chamber, TerminalTeller())
         assert (found == 8) == all_candidates
         assert ("candidates of optimizer.batch at a time" in capsys.readouterr().err) == (found < 8)
