@@ -173,9 +173,9 @@ def _over_time(curves: Mapping[str, Sequence[CoverageAtTime]], treatment_time: f
 
 
 def _windows(field: FieldRecord) -> tuple[Sentence, Fold]:
-    """Return a sentence on the windows in which coverage is measured, and a table to unfold.
+    """Return a sentence on the areas, called windows, in which coverage is measured, and a table.
 
-    The table has the same figures in windows twice as wide.
+    The table has the metrics of coverage in windows of twice the radius. It is collapsed at first.
     """
     text = (
         f"Coverage is the share dented in a window of {plain(field.gauge_mm2)} mm² round each "

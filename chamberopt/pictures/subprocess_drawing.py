@@ -38,7 +38,10 @@ def missing_opengl() -> str | None:
 
 
 def offscreen_window() -> str | None:
-    """Return VTK's name of a window that needs no display, or None if no library is installed."""
+    """Return the name of the VTK window class that draws without a display.
+
+    None if no OpenGL library for such a window is installed.
+    """
     for library, window in OFFSCREEN_WINDOWS:
         try:
             ctypes.CDLL(library)
@@ -67,12 +70,12 @@ def picture_path(picture: str | Path, option: str = "--screenshot ") -> Path:
 
 
 def file_path(file: str | Path, suffixes: tuple[str, ...], written: str, option: str = "") -> Path:
-    """Return the path of a file that may be written.
+    """Check that a file can be written at a path, and return the path.
 
     Args:
-        suffixes: supported endings of its name, in lower case.
-        written: sentence on the endings in the message.
-        option: beginning of the message.
+        suffixes: supported endings of the file's name, in lower case.
+        written: the part of the error message that names the supported endings.
+        option: the beginning of every error message, such as the command's option.
 
     Raises:
         InputError: another suffix, a missing folder, or a place that cannot be written.

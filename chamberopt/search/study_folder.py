@@ -352,10 +352,14 @@ class StudyFolder:
     def append(
         self, trial: Trial, evaluation: Evaluation | Exception | None, seconds: float
     ) -> None:
-        """Write a trial to the log, and the whole evaluation of a confirmation to a file.
+        """Write a trial as one row of the log.
 
-        Both are on the disk when this returns. Raises OSError if they cannot be written, and
-        InputError if a file that the design names has changed since the study began.
+        The evaluation of a trial of the stage "confirm" goes to a file of its own, if the trial was
+        simulated. Row and file are on the disk when this method returns.
+
+        Raises:
+            OSError: they cannot be written.
+            InputError: a file that the design names has changed since the study began.
         """
         require_same_files(self.study.design, self._inputs, self.path)
         if trial.stage == "confirm" and isinstance(evaluation, Evaluation):

@@ -161,9 +161,10 @@ class PartField:
         Returns:
             Arrays (m,) by name: the names of `values`, NaN where the triangle is not exposed, and
 
-            impacts, dents: simulated numbers on the triangle itself.
+            impacts, dents: counts of simulated impacts and dents on the triangle.
             exposed_area_mm2, reachable_area_mm2: its areas in the cavity, and where a ball fits.
-            target, element: of the triangle; its number in the part's file.
+            target: whether the triangle belongs to the target.
+            element: number of the triangle's element in the part's file.
             zone: number of the last zone with the triangle, from 1, or 0; zone_NAME: whether the
                 zone NAME has the triangle. Both only where there are zones.
         """

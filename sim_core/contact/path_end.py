@@ -194,10 +194,11 @@ def _leaves_edge(
 
 @jit
 def _leaves_round(supports: Supports, ball: int, support: int, flight: Flight, line: Vec3) -> float:
-    """Return the time [s] until a ball on a round object has moved too far along its support.
+    """Return the time [s] until a ball on a round object needs a new support plane.
 
-    The support is a plane, which stands for the object up to Supports.ranges. Motion along ``line``
-    (a unit vector, or zero) does not count.
+    The plane touches the object under the ball. It stands for the round object only up to a
+    distance, ``supports.ranges``. Motion along the straight direction ``line`` of the object, a
+    unit vector, does not count. ``line`` is zero if the object has no straight direction.
     """
     origins = supports.origins
     origin = Vec3(origins[ball, support, 0], origins[ball, support, 1], origins[ball, support, 2])

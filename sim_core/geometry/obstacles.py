@@ -164,7 +164,11 @@ def _box_area(pieces: np.ndarray) -> float:
 
 
 def _share_plane(numbers: np.ndarray, vibrating: np.ndarray) -> None:
-    """Give vibrating faces in one plane up to rounding exactly one plane, to solve it only once."""
+    """Set the planes of vibrating faces equal where they differ only by rounding, in place.
+
+    The event loop then looks for the hit on a shared plane only once. The first four columns of
+    ``numbers`` are the plane of each face.
+    """
     rows = np.flatnonzero(vibrating)
     while len(rows):
         first = numbers[rows[0], 0:4]

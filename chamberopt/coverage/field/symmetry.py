@@ -50,10 +50,11 @@ class Symmetry:
         axis.
 
         Args:
-            margin: distance from the sector [m] up to which a place counts as there too.
+            margin: distance from the sector [m] up to which a turned place is returned too.
         Returns:
-            Rows of the places, and their turns in steps. Each row comes once, with the turn into
-            the sector. Then come the rows that another turn brings near the sector.
+            Row numbers of `place`, and for each the number of steps of the symmetry by which the
+            place is turned. Each row comes once, with the turn into the sector. Rows that another
+            turn brings closer to the sector than `margin` come again after these.
         """
         angle = np.arctan2(place[:, 1], place[:, 0])
         sector = np.round(angle / self.step)

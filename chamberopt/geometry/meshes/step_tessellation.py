@@ -5,7 +5,9 @@ are fine and planes coarse:
 
     h = min(side, sqrt(5 chord r), max(angle r, 4 chord)), where r is 3 chord at least
 
-Neighbours then turn by about the angle, except at radii too small for a ball. The middle of an
+side is the largest side of a triangle, chord the largest distance of a triangle from the face, and
+angle the largest angle between neighbouring triangles. That angle is kept, except at radii too
+small for a ball. The middle of an
 equilateral triangle is h² / 6 r below a sphere. The factor 5 instead of 6 leaves room for sides
 longer than wanted. Faces with four sides get grids, with longer cells where the face is straight.
 """
