@@ -27,7 +27,7 @@ from pydantic import (
 from chamberopt.common.errors import InputError, first_wrong_value
 from chamberopt.common.estimate import Estimate
 from chamberopt.coverage.metrics import METRICS, find_metric, parse_objective
-from chamberopt.search.study.parameters import is_on_bound
+from chamberopt.search.study.parameters import bound_at
 
 FORMAT = 7
 ROUNDING = 1e-9
@@ -327,9 +327,7 @@ class StudyRecord(Table):
     def on_bounds(self) -> list[str]:
         """Names of the parameters whose best value lies on a bound of the search."""
         return [
-            name
-            for name, ends in self.vary.items()
-            if is_on_bound(self.best.parameters[name], ends)
+            name for name, ends in self.vary.items() if bound_at(self.best.parameters[name], ends)
         ]
 
     @model_validator(mode="after")

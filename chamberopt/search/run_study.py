@@ -25,6 +25,7 @@ from chamberopt.search.candidate import Candidate, CandidateEvaluator, Confirmed
 from chamberopt.search.optimiser.gaussian_process import one_thread
 from chamberopt.search.sensitivity import Sensitivity, analyse_sensitivity
 from chamberopt.search.study.constraints import NOT_KNOWN
+from chamberopt.search.study.parameters import bound_at
 from chamberopt.search.study_folder import STUDY, StudyFolder
 from chamberopt.search.trial_log import Trial
 from chamberopt.simulation.evaluate import ReplicaPlan, evaluate, prepare_target
@@ -77,14 +78,10 @@ class StudyResult:
         sentences = tolerance_notes(lost, which) if self.study.design.tolerances else []
         numbers = {name: one for name, one in self.study.vary.items() if not one.texts}
         for name, varied in numbers.items():
-            low, high = varied.bounds
             value = self.best.parameters[name]
-            if isinstance(value, str):
-                continue
-            for bound, side in ((low, "lower"), (high, "upper")):
-                if abs(value - bound) < 1e-3 * (high - low):
-                    place = f"{name} = {value:g} lies on its {side} bound"
-                    sentences.append(f"{place}: a better design may lie beyond; widen [vary]")
+            if side := bound_at(value, varied.bounds):
+                place = f"{name} = {value:g} lies on its {side} bound"
+                sentences.append(f"{place}: a better design may lie beyond; widen [vary]")
         return tuple(sentences)
 
     @property

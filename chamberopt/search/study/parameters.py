@@ -419,13 +419,13 @@ class ParameterSpace:
         return min(max(round(value, decimals), float(low)), float(high))
 
 
-def is_on_bound(value: float | str, ends: Sequence[float | str]) -> bool:
-    """Return whether a number lies on one of its two bounds, to a thousandth of their distance.
+def bound_at(value: float | str, ends: Sequence[float | str]) -> str:
+    """Return "lower" or "upper" for a number on that bound, to a thousandth of their distance.
 
-    Args:
-        ends: both bounds of a number, or all texts of a parameter that is a text.
+    Return "" for a number between the bounds, and for a text.
     """
     if isinstance(value, str):
-        return False
+        return ""
     low, high = (float(end) for end in ends)
-    return min(abs(value - low), abs(value - high)) < ON_BOUND * (high - low)
+    near = ON_BOUND * (high - low)
+    return "lower" if abs(value - low) < near else "upper" if abs(value - high) < near else ""
