@@ -82,13 +82,16 @@ class Estimate:
 
         A value or half-width that is not finite becomes None.
         """
-        interval = {"value": _finite(self.value), "half_width": _finite(self.half_width)}
+        interval = {
+            "value": finite_or_none(self.value),
+            "half_width": finite_or_none(self.half_width),
+        }
         return interval | ({"in_words": self.in_words} if self.in_words else {})
 
     def to_json(self) -> dict[str, Any]:
         """Return the whole estimate as JSON values, with pseudo-values for later comparisons."""
         return {**self.interval_json(), "pseudovalues": list(self.pseudovalues),
-                "bias": _finite(self.bias), "shared": list(self.shared)}  # fmt: skip
+                "bias": finite_or_none(self.bias), "shared": list(self.shared)}  # fmt: skip
 
     @classmethod
     def from_json(cls, data: Mapping[str, Any]) -> Estimate:
@@ -162,7 +165,7 @@ class Estimate:
         return cls(value, half_width, in_words=str(data.get("in_words", "")))
 
 
-def _finite(number: float) -> float | None:
+def finite_or_none(number: float) -> float | None:
     """Return the number, or None for NaN and infinity, because JSON has neither.
 
     The half-width of a single replica is infinite, for example, and so is the bias without a dent.

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import json
-import math
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from chamberopt.chamber.checks.fillets import facets_are_left
+from chamberopt.common.estimate import finite_or_none
 from chamberopt.common.files import RESULT, make_folder, write_text
 from chamberopt.common.npz_files import save_record
 from chamberopt.common.versions import versions
@@ -256,19 +256,14 @@ def _about_field(design: Design, evaluation: Evaluation) -> FieldRecord:
             mean_and_std=found.needed_for_mean, p05_times_intensity=found.needed_for_places
         ),
         simulated_s_needed=Needed(
-            mean_and_std=_number(found.time_for(found.needed_for_mean)),
-            p05_times_intensity=_number(found.time_for(found.needed_for_places)),
+            mean_and_std=finite_or_none(found.time_for(found.needed_for_mean)),
+            p05_times_intensity=finite_or_none(found.time_for(found.needed_for_places)),
         ),
         reachable_share=evaluation.reachable,
         crease_share=evaluation.crease_share,
         alike_places=evaluation.alike,
         double_gauge=evaluation.metrics_of_wide,
     )
-
-
-def _number(value: float) -> float | None:
-    """Return the value. Return None in place of infinity, which JSON does not have."""
-    return value if math.isfinite(value) else None
 
 
 def study_record(result: StudyResult) -> StudyRecord:

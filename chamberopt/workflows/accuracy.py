@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from chamberopt.common.estimate import finite_or_none
 from chamberopt.common.files import csv_text, write_text
 from chamberopt.common.versions import versions
 from chamberopt.design.load import save_design
@@ -58,13 +58,13 @@ def save_accuracy(folder: Path, study: ConvergenceStudy) -> None:
 def convergence_record(study: ConvergenceStudy) -> ConvergenceRecord:
     """Return the content of accuracy.json for an accuracy study."""
     law = study.law
-    times, low, high = map(_finite, law.halving)
+    times, low, high = map(finite_or_none, law.halving)
     return ConvergenceRecord(
         format=3,
         reference=ReferenceRecord(text=describe_reference(study), settings=study.settings),
         rows=rows(study),
         law=ErrorLawRecord(
-            scale=law.scale, power=law.power, power_half_width=_finite(law.half_width)
+            scale=law.scale, power=law.power, power_half_width=finite_or_none(law.half_width)
         ),
         halving=HalvingRecord(times=times, low=low, high=high, text=describe_error_law(study)),
         recommendations=[_recommendation(recommend(study, one)) for one in ACCURACIES],
@@ -73,11 +73,6 @@ def convergence_record(study: ConvergenceStudy) -> ConvergenceRecord:
         design=study.design.model_dump(mode="json", exclude_none=True, exclude={"part": {"mesh"}}),
         versions=versions(),
     )
-
-
-def _finite(value: float) -> float | None:
-    """Return the value. Return None in place of infinity, which JSON does not have."""
-    return value if math.isfinite(value) else None
 
 
 def _recommendation(advice: Recommendation) -> RecommendationRecord:
