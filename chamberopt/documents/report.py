@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from datetime import UTC, datetime
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from chamberopt.common.files import read_file
@@ -34,7 +33,7 @@ from chamberopt.documents.tolerances import tolerance_section
 from chamberopt.documents.wording import metric_label, objective_label, plain
 from chamberopt.documents.zones import zones_section
 from chamberopt.pictures.part3d import part_scene
-from chamberopt.results.load import START, load_result, load_start, load_trials
+from chamberopt.results.load import START, load_start, load_trials
 
 if TYPE_CHECKING:
     from chamberopt.results.load import Result
@@ -69,13 +68,12 @@ COLLISIONS = {
 }
 
 
-def report(folder: str | Path) -> Document:
-    """Return the report of a results folder as a document.
+def report(result: Result) -> Document:
+    """Return the report of a result as a document.
 
     Raises:
-        InputError: the folder is no finished result.
+        InputError: a file of the result is missing or damaged.
     """
-    result = load_result(folder)
     study, name = result.study, result.folder.resolve().name
     start = load_start(result) if study else None
     trials = load_trials(result.folder) if study else []

@@ -69,7 +69,7 @@ def write_report(result: str | Path, path: str | Path | None = None) -> tuple[Pa
     loaded = load_result(result)
     path = require_free_page(loaded.folder / REPORT if path is None else path)
     with claim_file(path):
-        document = report(result)
+        document = report(loaded)
         _write_document(path, document)
     return path, document
 

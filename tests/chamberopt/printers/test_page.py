@@ -102,7 +102,7 @@ def rows_of(document: Document, title: str, caption: str) -> list:
 
 
 def test_a_simulation_is_answered_in_one_sentence(simulation: Path) -> None:
-    document, result = report(simulation), load_result(simulation)
+    document, result = report(load_result(simulation)), load_result(simulation)
     mean = result.metrics["mean_coverage"]
     assert with_interval(100 * mean.value, 100 * mean.half_width, "%") in document.answer
     assert document.answer.startswith("After 5 s the target is covered to ")
@@ -113,7 +113,7 @@ def test_a_simulation_is_answered_in_one_sentence(simulation: Path) -> None:
 
 
 def test_a_study_is_answered_with_its_gain(study: Path, tmp_path: Path) -> None:
-    document, about = report(study), load_result(study).study
+    document, about = report(load_result(study)), load_result(study).study
     assert about is not None
     gain = about.gain
     assert with_interval(gain.value, gain.half_width, sign=True) in document.answer
@@ -137,7 +137,7 @@ def test_no_gain_is_reported_as_none(study: Path, tmp_path: Path) -> None:
     start = json.loads((folder / "start" / "result.json").read_text())
     same = {name: best[name] for name in ("objective", "metrics")}
     replace_result(folder / "start", start | same)
-    document = report(folder)
+    document = report(load_result(folder))
     assert "No better chamber than the start was found" in document.answer
     rows = rows_of(document, "Compared with the start", "± 95 % intervals")
     assert rows[0][-1] == "exact"
@@ -251,7 +251,7 @@ def test_words_stand_where_there_is_no_number(simulation: Path, tmp_path: Path) 
             tmp_path / words,
             lambda data, words=words: data["metrics"]["time_to_98_s"].update(in_words=words),
         )
-        assert told in report(folder).answer
+        assert told in report(load_result(folder)).answer
 
 
 def test_the_windows_and_what_they_take_are_told(simulation: Path, tmp_path: Path) -> None:
@@ -333,14 +333,14 @@ def test_the_command(study: Path, tmp_path: Path, capsys: pytest.CaptureFixture)
     assert main(["report", str(folder)]) == 0
     out = capsys.readouterr().out
     assert f"report in {folder / 'report.html'}" in out
-    assert report(folder).answer in out
+    assert report(load_result(folder)).answer in out
     assert load_result(folder).record == load_result(study).record
     assert main(["report", str(folder), "--json", "--out", str(tmp_path / "r.html")]) == 0
     found = json.loads(capsys.readouterr().out)
     assert found["report"] == str(tmp_path / "r.html")
-    assert found["answer"] == report(folder).answer
+    assert found["answer"] == report(load_result(folder)).answer
     assert [one["title"] for one in found["sections"]] == [
-        one.title for one in report(folder).sections
+        one.title for one in report(load_result(folder)).sections
     ]
     assert main(["report", str(tmp_path)]) == 2
     assert "not a results folder" in capsys.readouterr().err

@@ -51,7 +51,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_the_report_has_a_section_and_a_chart(folder: Path, tmp_path: Path) -> None:
-    (section,) = (one for one in report(folder).sections if one.title == "Tolerances")
+    (section,) = (one for one in report(load_result(folder)).sections if one.title == "Tolerances")
     _, ranges, figures, *_ = section.content
     assert [row[0] for row in ranges.rows] == ["sonotrode.amplitude_um", "shot.mass_g"]
     assert figures.rows[0][0] == "coverage that 95 % of the target's area exceeds [%]"
@@ -76,7 +76,7 @@ def test_a_result_without_tolerances_has_no_table(folder: Path, tmp_path: Path) 
     try:
         del data["tolerances"]
         replace_result(folder, data)
-        assert "Tolerances" not in {one.title for one in report(folder).sections}
+        assert "Tolerances" not in {one.title for one in report(load_result(folder)).sections}
         with pytest.raises(InputError, match="without tolerances; simulate a design"):
             write_tolerance_table(folder, tmp_path / "table.csv")
     finally:

@@ -55,7 +55,7 @@ def test_zones_read_back_and_are_shown_from_the_folder_alone(tmp_path: Path) -> 
     assert load_chamber(result).part.zones["left"].sum() == found.triangles
     part = load_part(result)
     assert part["zone"].sum() == part["zone_left"].sum() == found.triangles
-    document = report(moved)
+    document = report(load_result(moved))
     tables = {one.title: one.content for one in document.sections}
     judged = tables["Zones"][0].rows[0]
     assert judged[2].startswith("coverage that 95 % of the zone's area exceeds: ")
