@@ -91,6 +91,11 @@ def _rounded(value: float, decimals: int) -> str:
     return text if float(text) else text.removeprefix("-")
 
 
+def typeset_plain(value: float | str, digits: int = 4) -> str:
+    """Return the number as `plain` does, with the gaps and the minus of `typeset`."""
+    return typeset(plain(value, digits))
+
+
 def typeset(text: str) -> str:
     """Return a text with its numbers as print has them.
 

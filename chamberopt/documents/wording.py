@@ -104,7 +104,7 @@ def plain(value: float | str, digits: int = 4) -> str:
 
     Numbers of usual size have no exponent.
     """
-    return number_text.typeset(number_text.plain(value, digits))
+    return number_text.typeset_plain(value, digits)
 
 
 def with_unit(value: float, unit: str = "") -> str:
@@ -118,11 +118,6 @@ def with_interval(value: float, half_width: float, unit: str = "", sign: bool = 
     An exact value is shown without an interval.
     """
     return number_text.typeset(number_text.with_interval(value, half_width, unit, sign))
-
-
-def interval_text(shown: Estimate, unit: str = "", sign: bool = False) -> str:
-    """Return an estimate that is already in the unit shown as text, with its interval and unit."""
-    return number_text.typeset(number_text.estimate_text(shown, unit=unit, sign=sign))
 
 
 def per_cent(value: float) -> str:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from chamberopt.common.number_text import plain, typeset
+from chamberopt.common.number_text import typeset_plain as plain
 from chamberopt.design.shapes import TAG_PART, TAG_SONOTRODE, TAG_WALL
 from chamberopt.geometry.triangles import border_edges
 from chamberopt.pictures.charts.colours import BLACK, BLUE, DARK_GREY, ORANGE
@@ -157,7 +157,7 @@ def draw_chamber(axes: Axes, chamber: Chamber, left: float, top: float, size: Po
     at = _place_of_section(chamber, 1 - across)
     _draw_section(axes, chamber, section, at)
     _draw_plan(axes, chamber, plan, across, at)
-    return typeset(f"{plain(scale)}:1" if scale >= 1.0 else f"1:{plain(1.0 / scale)}")
+    return f"{plain(scale)}:1" if scale >= 1.0 else f"1:{plain(1.0 / scale)}"
 
 
 def _fit(
@@ -209,12 +209,12 @@ def _draw_section(axes: Axes, chamber: Chamber, view: View, at: float) -> None:
         look: Any = {"facecolor": "white", "edgecolor": BLUE, "hatch": "xxxx", "lw": 1.0}
         axes.fill_between([x1, x2], y - FACE, y, **look)
         size = face_size_mm(chamber)
-        text = typeset(f"Ø {plain(size[0])}" if len(size) == 1 else plain(float(np.ptp(face))))
+        text = f"Ø {plain(size[0])}" if len(size) == 1 else plain(float(np.ptp(face)))
         dimension(axes, (x1, y - FACE), (x2, y - FACE), 4.0, text)
     wide = float((view.high - view.low)[0])
     if not face.size or wide > np.ptp(face) + WIDER:
         low, high = view.place([[view.low[0], 0.0], [view.high[0], 0.0]])[:, 0]
-        dimension(axes, (low, y - FACE), (high, y - FACE), 8.5, typeset(plain(wide)))
+        dimension(axes, (low, y - FACE), (high, y - FACE), 8.5, plain(wide))
     own = chamber.vertices[np.unique(chamber.triangles[chamber.tags == TAG_PART]), 2]
     lowest = 1e3 * float(own.min())
     left, low_at = view.place([view.low[0], lowest]) - np.array([view.outside[0], 0.0])

@@ -8,7 +8,7 @@ import pytest
 from chamberopt.common.estimate import Estimate
 from chamberopt.common.number_text import estimate_text, share_in_words
 from chamberopt.coverage.metrics import OBJECTIVES
-from chamberopt.documents.wording import interval_text, metric_label
+from chamberopt.documents.wording import metric_label
 from chamberopt.results.compare.difference import difference
 from chamberopt.simulation.estimates import weighted_sum
 from tests.helpers.synthetic import evaluation_of, plane_chamber, plate_design, random_dents
@@ -37,7 +37,7 @@ def test_full_coverage_is_said_in_words_and_stays_a_number() -> None:
         assert one.has_number
         assert estimate_text(one) == one.in_words
         label = metric_label(name)
-        assert label.format(one) == interval_text(label.scale(one), "%") == one.in_words
+        assert label.format(one) == label.number(one) == one.in_words
         again = Estimate.from_json(one.to_json())
         assert (again.value, again.in_words) == (one.value, one.in_words)
     uniform = weighted_sum(OBJECTIVES["uniform_coverage"], found)
