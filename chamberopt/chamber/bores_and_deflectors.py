@@ -45,7 +45,7 @@ if TYPE_CHECKING:
     from chamberopt.design.design import Design
     from chamberopt.design.shapes.hole_and_deflector_tables import Deflector, Hole
 
-DEFLECTOR_SIDES = 64  # flat sides of a round rod, their corners on the circle
+SIDES = 64  # flat sides of a round rod or bore, their corners on the circle
 
 
 class DeflectorMesh(NamedTuple):
@@ -100,19 +100,13 @@ def _mesh_about_its_middle(
     if deflector.kind == "plate":
         box = trimesh.creation.box(deflector.size)
         return np.asarray(box.vertices), np.asarray(box.faces), []
-    angle = 2.0 * np.pi * np.arange(DEFLECTOR_SIDES) / DEFLECTOR_SIDES
+    angle = 2.0 * np.pi * np.arange(SIDES) / SIDES
     circle = deflector.diameter / 2.0 * np.c_[np.cos(angle), np.sin(angle)]
     half = deflector.length / 2.0
-    rod = lofted(
-        [
-            np.c_[circle, np.full(DEFLECTOR_SIDES, -half)],
-            np.c_[circle, np.full(DEFLECTOR_SIDES, half)],
-        ]
-    )
+    rod = lofted([np.c_[circle, np.full(SIDES, -half)], np.c_[circle, np.full(SIDES, half)]])
     return rod.vertices, rod.triangles, []
 
 
-SIDES = 64  # flat sides of a round bore, their corners on the circle
 DEPTH_IN_ROOM = 1e-4  # m: how far a bore continues into the room
 WALL_TOLERANCE = 1e-6  # m: a point this close to a wall is on it
 AREA_TOLERANCE = 1e-6  # relative area change of a face that stays whole; rounding makes 1e-12

@@ -50,8 +50,9 @@ class Teller:
             what: name of the step.
             total: number of units that the step counts; None if it counts nothing.
         """
-        is_counted = self._progress is not None and total is not None
-        return nullcontext(self._progress if is_counted and self._progress else _uncounted)
+        if self._progress is None or total is None:
+            return nullcontext(_uncounted)
+        return nullcontext(self._progress)
 
     def compile(self, design: Design, chamber: Chamber, cavity: AnalyticCavity | None) -> None:
         """Compile the simulator before the first replica.
