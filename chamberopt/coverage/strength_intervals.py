@@ -232,11 +232,11 @@ def _saturated(found: StrengthHistograms, some: np.ndarray) -> Saturated:
 def _without(
     found: StrengthHistograms, total: np.ndarray, whole: Saturated, batch: int
 ) -> Saturated:
-    """Return strength and saturation time of the windows without the dents of one batch.
-
-    They are searched near the values of all batches.
+    """Return strength and saturation time of the windows, from all batches but one.
 
     Args:
+        whole: strength and saturation time from all batches, near which the search begins.
+        batch: number of the batch to leave out.
         total: sum of the histograms of all batches, (p, LEVELS).
     """
     rate, seconds = dent_rates(total - found.parts[batch]), float(found.seconds.sum())

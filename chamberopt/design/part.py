@@ -128,9 +128,9 @@ class TessellationTable(FileTable):
 class SmoothingTable(FileTable):
     """How finely facets of curved surfaces are divided, and how far that may move the surface.
 
-    A ball of radius r in a hollow touches facets that turn by an angle a at r tan(a / 2) from their
-    edge, on both sides. Dents of a diameter d cover the strip between them if a < d / 2 r. Dents
-    are 0.15 to 0.25 r wide, which asks for 4 to 7 degrees.
+    A ball of radius r in a hollow touches two neighbouring facets, a distance r tan(a / 2) from
+    their common edge, where a is the angle between the facets. Dents of diameter d cover the strip
+    along the edge if a < d / (2 r). Dents are 0.15 to 0.25 r wide, so a must be 4 to 7 degrees.
     """
 
     off: bool = Field(

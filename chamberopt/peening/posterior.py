@@ -65,7 +65,8 @@ class Surface(NamedTuple):
     spread: np.ndarray
 
     def weights(self, place: np.ndarray) -> np.ndarray:
-        """Return the weight (r,) of each run in the figures at a point.
+        """Return the weight of each run, (r,). The polynomial at a point is the weighted sum of the
+        runs' figures.
 
         Args:
             place: logarithms of the parameters at the point, (k,).

@@ -234,8 +234,10 @@ def _as_measured(
     """Return the figures of a real strip from simulated ones, with the errors of the calibration.
 
     Args:
-        found: arc strength at the saturation time, this time, and arc strengths at `times`.
-        slopes: slopes of each figure by the parameters that took a run.
+        found: the figures: arc height at the saturation time, the saturation time, and arc heights
+            at `times`.
+        slopes: for each figure its slope by each parameter of the calibration, from runs with this
+            parameter changed.
         times: times of the arc strengths [s].
     """
     calibration = setting.design.calibration

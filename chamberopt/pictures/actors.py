@@ -30,7 +30,7 @@ def light(plotter: Any) -> None:
 
 
 def colour_meanings(parts: Sequence[DrawnPart]) -> list[tuple[str, str]]:
-    """Return each colour on these parts that stands for no value, with its meaning."""
+    """Return the colours of surface without a value on these parts, each with its meaning."""
     entries = (
         (any(part.rest.n_cells for part in parts), GREY, "not in the target"),
         (any(not np.all(part.target["resolved"]) for part in parts), FEW_DENTS, "too few dents"),

@@ -163,9 +163,10 @@ def draw_chamber(axes: Axes, chamber: Chamber, left: float, top: float, size: Po
 def _fit(
     cavity: np.ndarray, across: int, beyond: np.ndarray, size: np.ndarray
 ) -> tuple[float, np.ndarray, float]:
-    """Return the largest scale at which section and plan fit into `size` [mm].
+    """Return the largest scale at which section and plan of a cavity fit on a page.
 
-    Also return the drawn lengths of the part beyond the cavity, and the width of both views [mm].
+    Also return how much is drawn of the part where it leaves the cavity, and the width of both
+    views [mm].
     """
     for scale in SCALES:
         outside = np.minimum(MOST_OUTSIDE, scale * beyond)

@@ -201,11 +201,12 @@ class _Pilot:
         return sorted(advice, key=lambda one: -one.largest_change)
 
     def measure(self, effects: Mapping[str, bool]) -> dict[str, np.ndarray]:
-        """Simulate the design with some effects switched, and return three figures of every
-        replica, by name, (REPLICAS,) each.
+        """Simulate the design with some effects switched, and return what the pilot compares.
 
-        These are the mean speed of impacts, and the coverage of the target's nearer and farther
-        half.
+        Returns:
+            For each replica the mean normal speed of impacts [m/s], and the coverage of two halves
+            of the target, which are nearer to and farther from the sonotrode. By the names in
+            MEASURED, (REPLICAS,) each.
         """
         self.runs.ended += 1
         variant, replicas = self._simulate(effects)

@@ -2,13 +2,13 @@
 
 A fast hit is an ordinary collision. The reaction of a surface behind a ball is the next event.
 
-A slow hit is slower than Restitution.elastic_below. A ball that lies still acts as a still surface
-for slow hits: friction holds it, and the momentum that is not handed on is below elastic_below²/2
-of energy per mass. A slow hit between two moving balls is a single constrained impact: a ball on
-supports changes its velocity only by the projection P(d) of an impulse along d onto the directions
-that its supports leave free. Its share of the inverse mass is therefore |P(d)|² in place of 1, and
-an elastic hit keeps the energy of the two balls together. Slow hits between moving balls have no
-friction.
+A slow hit is slower than Restitution.elastic_below. For slow hits a ball that lies still acts as a
+still surface: friction holds it. This neglects an energy per mass below elastic_below²/2. A slow
+hit between two moving balls is a single constrained impact: the velocity of a ball on supports
+changes only by the projection P(d) of an impulse along the unit vector d onto the directions that
+the supports leave free. The inverse mass of such a ball along d is therefore |P(d)|² in place of 1,
+and an elastic hit keeps the energy of the two balls together. Slow hits between moving balls have
+no friction.
 
 Source: B. Brogliato, Nonsmooth Mechanics (2016), section 5.2.
 """

@@ -76,12 +76,18 @@ def braked(
     velocity: Vec3,
     acceleration: Vec3,
 ) -> tuple[Vec3, Vec3, int]:
-    """Return velocity [m/s], acceleration [m/s²] and mode of a ball on supports that slow it down.
+    """Slow a ball in contact down by resistance and friction. With friction, also set its spin.
 
-    Resistance and friction slow it down. With friction the ball's spin is set here.
+    Args:
+        friction_state: friction and spins of all balls; None for smooth balls.
+        contact: state of contact mode, with the planes (supports) on which the ball stands.
+        event: the ball and the present time.
+        velocity, acceleration: of the ball [m/s, m/s²], without the parts that would push it into a
+            support.
 
-    ``velocity`` and ``acceleration``: vectors that are already projected onto the cone of the
-    supports.
+    Returns:
+        Velocity [m/s] and acceleration [m/s²] with which the ball goes on, and the way in which it
+        moves then: FLYING, SLIDING or ASLEEP.
     """
     if friction_state is None:
         return _resisted(contact, event.ball, velocity, acceleration)
@@ -219,10 +225,11 @@ def stopped_if_creeping(
     velocity: Vec3,
     creeping: float,
 ) -> Vec3:
-    """Return ``velocity`` [m/s], or zero for a ball with friction slower than ``creeping`` [m/s].
+    """Return ``velocity`` [m/s], or zero if the ball is slower than ``creeping`` and friction holds
+    it.
 
-    Friction holds such a ball. Without this stop a ball between two surfaces would go on in ever
-    smaller hops, kept up by its slip.
+    ``creeping``: speed [m/s] below which friction holds a ball. Without this stop a spinning ball
+    between two surfaces would go on in ever smaller hops.
     """
     if friction_state is None:
         return velocity

@@ -250,12 +250,15 @@ def _straight_runs(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Join edges between the same two flat faces, which lie on one line, to runs.
 
+    An edge has two sides, one in each of its triangles. Side k of triangle t has the number
+    3 t + k, and lies between corner k and the next corner.
+
     Args:
         triangles: vertex indices, shape (m, 3).
         corners: corner positions [m], shape (m, 3, 3).
         of_triangle: flat face of each triangle, shape (m,).
-        one: first side of each edge as a directed edge, shape (n,).
-        two: second side of each edge as a directed edge, shape (n,).
+        one: number of the first side of each edge, shape (n,).
+        two: number of the second side of each edge, shape (n,).
 
     Returns:
         The first edge of each run, shape (k,), and the end of each run [m], shape (k, 3).

@@ -303,7 +303,11 @@ def _predict_meeting(
     time: float,
     what: int,
 ) -> None:
-    """Find the ball's next meeting with a ball, if balls meet, and write it into ``meetings``."""
+    """Find the next meeting of a ball with another ball, and write it into ``meetings``.
+
+    Nothing is done in a scene whose balls fly through each other. ``what``: ALL if the end of the
+    ball's own path is not known yet, or PAIRS.
+    """
     if neighbours is None or meetings is None:
         return
     queue = state.queue

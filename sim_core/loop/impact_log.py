@@ -58,7 +58,10 @@ class ImpactBuffer(NamedTuple):
 
 
 def new_impact_buffer(record: np.ndarray) -> ImpactBuffer:
-    """Return an empty buffer. ``record``: True for each tag to be recorded, (MAX_TAGS,) bool."""
+    """Return an empty buffer for impacts.
+
+    ``record``: True for each surface whose impacts are recorded, by its tag, (MAX_TAGS,) bool.
+    """
     return ImpactBuffer(
         time=np.zeros(BUFFER_SIZE),
         ball=np.zeros(BUFFER_SIZE, dtype=np.int32),

@@ -15,7 +15,7 @@ from sim_core.effects.gravity import Gravity, gravity_acceleration
 
 @dataclass(frozen=True)
 class Frames:
-    """All n balls at f times, each on its flight at that very time.
+    """State of all n balls at each of f times.
 
     time: [s] since the end of the warm-up, (f,).
     positions: positions of the centres [m], (f, n, 3).

@@ -21,9 +21,9 @@ from sim_core.effects.vibration import Vibration
 class BallCollisions(NamedTuple):
     """Collisions of balls with one another.
 
-    Without this effect there is no neighbour filter, and overlaps are not checked. A single ball,
-    or shot so thin that its balls hardly ever meet, then spends no time on pairs. The other effects
-    decide the result of a collision.
+    Restitution and friction decide the result of a collision. Without this effect balls fly through
+    each other, overlaps are not checked, and no time is spent on pairs. This suits a single ball,
+    and shot so thin that its balls hardly ever meet.
     """
 
 

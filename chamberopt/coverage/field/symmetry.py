@@ -1,13 +1,15 @@
 """Find the turns about the chamber's axis that change nothing, and count alike places together.
 
 Notation
-    n   number of turns by 2 pi / n that leave cavity, target and sonotrode as they are  (copies)
+    n       number of turns, by multiples of 2 pi / n, that leave cavity, target and sonotrode as
+            they are (``copies``)
+    window  disc of the surface round a point of the target, in which dents are counted
 
-Such turns bring n places to one another. All of them are hit equally often and equally hard, so
-their windows count as one window of n times the area, which gets n times the dents from one
-simulation. All impacts and all windows are turned into one sector of the chamber. Impacts near its
-borders count again beyond the borders. The mean over the target does not change. The scatter from
-place to place is smaller. Nothing is lost, because the choice of a dent's place among the n places
+A turn takes each point of the target to a point that is hit equally often and equally hard. So the
+n windows of such points count as one window of n times the area, which gets n times the dents from
+one simulation. All impacts and all windows are turned into one sector of the chamber. Impacts near
+the sector's borders count again beyond the borders. The mean over the target does not change, and
+the scatter from point to point is smaller. Nothing is lost: which of the n windows a dent lies in
 tells nothing about their common rate (Rao and Blackwell; E. L. Lehmann and G. Casella, "Theory of
 Point Estimation", Springer 1998, section 1.7).
 """

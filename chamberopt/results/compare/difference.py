@@ -53,7 +53,7 @@ class Difference:
 
     @property
     def estimate(self) -> Estimate:
-        """The difference as an Estimate: its value, half-width and words."""
+        """The difference as an Estimate: its value, and its half-width or why it has none."""
         return Estimate(self.value, self.half_width, in_words=self.in_words)
 
 

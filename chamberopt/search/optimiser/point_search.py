@@ -188,7 +188,14 @@ class PointSearch:
             yield from self._evaluate(point, self._budget)
 
     def _climb(self, algorithm: str, limit: int, step: float, nlopt: NloptThread) -> Wait:
-        """Run an algorithm of NLopt from the best point so far."""
+        """Run an algorithm of NLopt from the best point so far, and yield each point to evaluate.
+
+        Args:
+            algorithm: NLopt's name of the algorithm.
+            limit: largest number of points.
+            step: first step, as a share of the unit cube's side.
+            nlopt: thread in which NLopt runs.
+        """
         yield from self._wait()
         best = self.points[int(np.argmax(self.scores))]
         # Some algorithms keep asking for points that have scores already: 100 calls per point of

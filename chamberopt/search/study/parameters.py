@@ -1,8 +1,8 @@
 """The parameters that a study varies: which values they may have, and their place in the unit cube.
 
 A search works on points of the unit cube [0, 1]^d, where d is the number of parameters in [vary];
-0 and 1 are the bounds of each. A number gets no more decimals than a shop can set: three digits of
-the width of its bounds, so that the best design is rounded when it is simulated.
+0 and 1 are the bounds of each. Numbers are rounded before they are simulated, because a shop
+cannot set more decimals: to about a thousandth of the distance between the bounds.
 
 If `chamber.shape` varies, a key of the chamber that only some of the shapes have is a parameter of
 their candidates alone; the others have NONE in its place.
