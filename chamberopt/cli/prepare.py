@@ -95,9 +95,7 @@ def load_replica(folder: Path, number: int) -> tuple[Result, RebuiltReplica]:
     from chamberopt.coverage.part_impacts import HITS_FILE
     from chamberopt.results.load import load_result
     from chamberopt.results.rebuild import rebuild_replica
-    from chamberopt.results.vtp_files import CHAMBER, COVERAGE, PART
 
     loaded = load_result(folder)
-    for name in (PART, COVERAGE, CHAMBER, HITS_FILE):  # a missing file is told at once
-        loaded.path(name)
+    loaded.path(HITS_FILE)  # a missing file is told at once
     return loaded, rebuild_replica(loaded, number)

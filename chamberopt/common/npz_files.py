@@ -14,6 +14,7 @@ import zlib
 from collections.abc import Sequence
 from dataclasses import fields, is_dataclass
 from pathlib import Path
+from types import UnionType
 from typing import Any, TypeVar, get_args, get_origin, get_type_hints
 
 import numpy as np
@@ -99,12 +100,14 @@ def is_of_type(value: Any, hint: Any) -> bool:
     A whole number may stand for a float. True and false are no numbers.
 
     Args:
-        hint: a plain class, a dataclass, tuple[T, ...] or dict[str, T].
+        hint: a plain class, a dataclass, tuple[T, ...], dict[str, T] or a union of them.
     """
     if is_dataclass(hint):
         parts = get_type_hints(hint).items()
         return type(value) is hint and all(is_of_type(getattr(value, k), one) for k, one in parts)
     kind, inner = get_origin(hint), get_args(hint)
+    if kind is UnionType:
+        return any(is_of_type(value, one) for one in inner)
     if kind is tuple:
         return type(value) is tuple and all(is_of_type(one, inner[0]) for one in value)
     if kind is dict:

@@ -170,11 +170,11 @@ def require_impacts(columns: dict[str, np.ndarray], count: int) -> None:
 
 def load_matching_hits(path: Path, impacts: np.ndarray) -> HitsByTriangle:
     """Return the single impacts of a results folder, after a check that they belong to its
-    part.vtp.
+    arrays.npz.
 
     Args:
         path: of the hits.npz.
-        impacts: number of impacts of each triangle by part.vtp, (m,).
+        impacts: number of impacts of each triangle by arrays.npz, (m,).
 
     Raises:
         InputError: the file is missing, damaged or belongs to another result.
@@ -182,7 +182,7 @@ def load_matching_hits(path: Path, impacts: np.ndarray) -> HitsByTriangle:
     found = load_hits(path)
     if not np.array_equal(np.diff(found.first), impacts):
         raise InputError(
-            f"{path}: its impacts are not those of the part.vtp beside it but of another "
+            f"{path}: its impacts are not those of the arrays.npz beside it but of another "
             "result; simulate again"
         )
     return found

@@ -17,8 +17,9 @@ import numpy as np
 from chamberopt.chamber.bores_and_deflectors import fitting_names
 from chamberopt.common.files import make_output_folder, new_file
 from chamberopt.design.shapes import TAG_PART, TAG_SONOTRODE, TAG_WALL, further_sonotrode_tag
-from chamberopt.results.load import load_cavity, load_result
-from chamberopt.results.vtp_files import write_stl
+from chamberopt.results.arrays_file import load_chamber
+from chamberopt.results.load import load_result
+from chamberopt.results.vtp_files import MM, write_stl
 
 NAMES = {TAG_PART: "part", TAG_SONOTRODE: "sonotrode", TAG_WALL: "wall"}
 PART_COLOUR, WALL_COLOUR, SONOTRODE_COLOUR = "#B9BEC4", "#9DB7CC", "#E08A2E"
@@ -48,16 +49,15 @@ def read_cavity(folder: Path) -> NamedSurfaces:
     chamber.holes.0, chamber.deflectors.0 and so on.
     """
     result = load_result(folder)
-    chamber = load_cavity(result)
-    tags = np.asarray(chamber["tag"])
-    stored = "fitting" in chamber.array_names
-    fitting = np.asarray(chamber["fitting"]) if stored else np.full(len(tags), -1)
+    chamber = load_chamber(result)
+    tags, fitting = chamber.tags, chamber.fitting
+    if fitting is None:
+        fitting = np.full(len(tags), -1)
     surfaces = {_name(int(tag)): (tags == tag) & (fitting < 0) for tag in np.unique(tags)}
     for number, name in enumerate(fitting_names(result.design)):
         surfaces[name] = fitting == number
     surfaces = {name: own for name, own in surfaces.items() if own.any()}
-    points, triangles = np.asarray(chamber.points), np.asarray(chamber.regular_faces)
-    return NamedSurfaces(points, triangles, surfaces)
+    return NamedSurfaces(chamber.vertices * MM, chamber.triangles, surfaces)
 
 
 def write_cavity(folder: Path, file: Path) -> None:

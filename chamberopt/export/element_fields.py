@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -11,7 +12,6 @@ from chamberopt.geometry.triangles import areas
 
 if TYPE_CHECKING:
     from chamberopt.geometry.meshes.part_mesh import PartMesh
-    from chamberopt.results.vtp_files import Surface
 
 # Meaning of each column of part.vtp, and the combination of an element's triangles: their sum, or
 # a mean weighted with exposed area, impacts or dents. Values of the field, which are measured in
@@ -50,8 +50,8 @@ def combination_of(column: str) -> tuple[str, str]:
     return COLUMNS[column]
 
 
-def _columns(surface: Surface) -> tuple[str, ...]:
-    zones = (name for name in surface.cell_data if name.startswith(ZONE_COLUMN))
+def _columns(values: Mapping[str, np.ndarray]) -> tuple[str, ...]:
+    zones = (name for name in values if name.startswith(ZONE_COLUMN))
     return (*COLUMNS, *zones)
 
 
@@ -71,23 +71,23 @@ class ElementFields:
     columns: dict[str, np.ndarray]
 
 
-def fields_of_elements(surface: Surface, number: np.ndarray) -> ElementFields:
-    """Return values for each element, combined from the columns of part.vtp.
+def fields_of_elements(values: Mapping[str, np.ndarray], number: np.ndarray) -> ElementFields:
+    """Return values for each element, combined from the part's triangles.
 
     Args:
-        surface: part.vtp as PyVista reads it.
+        values: columns with a value for each triangle of the part.
         number: element number of each triangle, shape (m,); 0 for triangles in no element.
     """
     cells = np.flatnonzero(number > 0)
-    return _combined(surface, cells, number[cells], np.ones(len(cells)), _columns(surface))
+    return _combined(values, cells, number[cells], np.ones(len(cells)), _columns(values))
 
 
 def fields_of_remeshed_elements(
-    surface: Surface, number: np.ndarray, original: PartMesh, simulated: PartMesh
+    values: Mapping[str, np.ndarray], number: np.ndarray, original: PartMesh, simulated: PartMesh
 ) -> ElementFields:
     """Return values for each element of a part that was simulated in other triangles.
 
-    The part's file then has other triangles than part.vtp.
+    The part's file then has other triangles.
     A triangle counts for the element around its centre. An element without such a centre gets the
     values of the triangles around the centres of its own triangles. Sums are left out, because
     triangles reach across elements.
@@ -106,12 +106,12 @@ def fields_of_remeshed_elements(
         share_around = own_area / areas(simulated.vertices, simulated.triangles[around])
         cells, share = np.r_[cells, around], np.r_[share, share_around]
     numbers = np.r_[number[number > 0], original.elements[small]]
-    names = tuple(name for name in _columns(surface) if combination_of(name)[1] != "sum")
-    return _combined(surface, cells, numbers, share, names)
+    names = tuple(name for name in _columns(values) if combination_of(name)[1] != "sum")
+    return _combined(values, cells, numbers, share, names)
 
 
 def _combined(
-    surface: Surface,
+    values: Mapping[str, np.ndarray],
     cells: np.ndarray,
     number: np.ndarray,
     share: np.ndarray,
@@ -127,23 +127,23 @@ def _combined(
     """
     numbers, element = np.unique(number, return_inverse=True)
 
-    def total(values: np.ndarray) -> np.ndarray:
-        return np.bincount(element, values, len(numbers))
+    def total(column: np.ndarray) -> np.ndarray:
+        return np.bincount(element, column, len(numbers))
 
     columns = {}
     for name in names:
-        if name not in surface.cell_data:
+        if name not in values:
             continue
-        values = np.asarray(surface[name], dtype=np.float64)[cells]
+        column = values[name].astype(np.float64)[cells]
         combination = combination_of(name)[1]
         if combination == "sum":
-            columns[name] = total(values)
+            columns[name] = total(column)
         elif combination == "any":
-            columns[name] = (total(values) > 0.0).astype(np.float64)
+            columns[name] = (total(column) > 0.0).astype(np.float64)
         else:
-            weight = np.asarray(surface[WEIGHTS[combination]])[cells] * share
-            weight = np.where(np.isfinite(values), weight, 0.0)
-            sums, weights = total(weight * np.nan_to_num(values)), total(weight)
+            weight = values[WEIGHTS[combination]][cells] * share
+            weight = np.where(np.isfinite(column), weight, 0.0)
+            sums, weights = total(weight * np.nan_to_num(column)), total(weight)
             columns[name] = np.divide(
                 sums, weights, out=np.full(len(numbers), np.nan), where=weights > 0.0
             )

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 
-from chamberopt.chamber.part import PartOfFile
 from chamberopt.common.errors import InputError
 from chamberopt.common.files import check_new_file, require_place, write_new_texts
 from chamberopt.export.decks import abaqus_deck, nastran_deck
@@ -18,9 +17,9 @@ from chamberopt.export.element_fields import (
     fields_of_remeshed_elements,
 )
 from chamberopt.geometry.meshes.part_mesh import PartMesh
-from chamberopt.results.chamber_file import CHAMBER_FILE, load_chamber
-from chamberopt.results.load import Result, load_part, load_result
-from chamberopt.results.vtp_files import PART, Surface, save_surface
+from chamberopt.results.arrays_file import ResultArrays, load_result_arrays
+from chamberopt.results.load import Result, load_result
+from chamberopt.results.vtp_files import save_surface
 
 DECKS: dict[str, Callable[[list[str], PartMesh, ElementFields], dict[str, str]]] = {
     "abaqus": abaqus_deck,
@@ -51,24 +50,25 @@ def write_fields(folder: str | Path, path: str | Path, to: str) -> list[str]:
         )
     require_place(path)
     result = load_result(folder)
-    surface = load_part(result)
+    arrays = load_result_arrays(result)
     if to not in DECKS:
-        save_surface(path, surface)
+        save_surface(path, arrays.part)
         return []
-    return _write_deck(result, surface, to, path)
+    return _write_deck(result, arrays, to, path)
 
 
-def _write_deck(result: Result, surface: Surface, to: str, path: Path) -> list[str]:
+def _write_deck(result: Result, arrays: ResultArrays, to: str, path: Path) -> list[str]:
     if path.resolve() == result.design.part.mesh_path:
         raise InputError(f"{path}: is the part's own file; choose another name")
-    part = _part_of_file(result, surface)
+    part, values = arrays.chamber.part.file, arrays.elements
+    assert part is not None  # read_result_arrays refuses a result without it
     simulated, original = part.simulated, part.original
     own = (original or simulated).numbering.own
-    number = np.asarray(surface["element"]) if own else np.arange(1, surface.n_cells + 1)
-    fields = fields_of_elements(surface, number)
+    number = values["element"] if own else np.arange(1, len(values["element"]) + 1)
+    fields = fields_of_elements(values, number)
     remarks = []
     if own and original is not None:
-        fields = fields_of_remeshed_elements(surface, number, original, simulated)
+        fields = fields_of_remeshed_elements(values, number, original, simulated)
         remarks.append(
             "the target was simulated in triangles of target.element_mm: each element gets the "
             "mean over the triangles whose centres it contains, and no sums"
@@ -106,19 +106,6 @@ def _elements_left_out(fields: ElementFields) -> list[str]:
         for without, columns in names.items()
         if without
     ]
-
-
-def _part_of_file(result: Result, surface: Surface) -> PartOfFile:
-    """Return the part as it was simulated and as its file has it, from chamber.npz.
-
-    Raises InputError if it is not the part of `surface`, which was read from part.vtp.
-    """
-    file = load_chamber(result).part.file
-    if file is None or len(file.simulated.triangles) != surface.n_cells:
-        raise InputError(
-            f"{result.folder}: {CHAMBER_FILE} and {PART} are of different parts; simulate again"
-        )
-    return file
 
 
 def _origin(result: Result) -> list[str]:

@@ -14,7 +14,8 @@ from chamberopt.pictures.drawn_part import DrawnPart, colour_range
 from chamberopt.pictures.panels import choose_views, part_panels
 from chamberopt.pictures.picture_page import ColourBar, Row, write_page
 from chamberopt.pictures.subprocess_drawing import draw_in_subprocess
-from chamberopt.results.vtp_files import CHAMBER, COVERAGE, PART, read_surface, size_text
+from chamberopt.results.arrays_file import ARRAYS_FILE, read_result_arrays
+from chamberopt.results.vtp_files import size_text
 
 
 def draw_coverage(
@@ -23,7 +24,7 @@ def draw_coverage(
     """Draw the coverage of one result, or of several below one another on one colour scale.
 
     Args:
-        folders: results folders, each with coverage.vtp and chamber.vtp.
+        folders: results folders, each with arrays.npz.
         titles: a title for each result.
         picture: file to write, .png.
 
@@ -39,17 +40,17 @@ def render_coverage(job: dict[str, Any]) -> None:
 
     Each result is shown in its chamber, and its target from near.
     """
-    folders, titles = [Path(folder) for folder in job["folders"]], job["titles"]
-    chambers = [read_surface(folder / CHAMBER) for folder in folders]
+    results = [read_result_arrays(Path(one) / ARRAYS_FILE) for one in job["folders"]]
+    chambers = [one.cavity for one in results]
     parts = [
-        DrawnPart(read_surface(folder / COVERAGE), chamber=chamber)
-        for folder, chamber in zip(folders, chambers, strict=True)
+        DrawnPart(one.field, chamber=chamber)
+        for one, chamber in zip(results, chambers, strict=True)
     ]
     limits = colour_range(parts)
-    targets = [target_in_chamber(read_surface(folder / PART)) for folder in folders]
+    targets = [target_in_chamber(one.part) for one in results]
     views = choose_views(targets, chambers)
     rows = []
-    for part, chamber, title in zip(parts, chambers, titles, strict=True):
+    for part, chamber, title in zip(parts, chambers, job["titles"], strict=True):
 
         def add(plotter: Any, part: DrawnPart = part) -> None:
             add_part(plotter, part, limits)

@@ -21,7 +21,8 @@ from chamberopt.pictures.panels import NEAR_CAPTIONS
 from chamberopt.pictures.picture_page import ColourBar, Panel, Row, write_page
 from chamberopt.pictures.subprocess_drawing import draw_in_subprocess
 from chamberopt.pictures.view import View, aim_along
-from chamberopt.results.vtp_files import COVERAGE, MM, pyvista, read_surface
+from chamberopt.results.arrays_file import ARRAYS_FILE, read_result_arrays
+from chamberopt.results.vtp_files import MM, pyvista
 
 if TYPE_CHECKING:
     from matplotlib.colors import Colormap
@@ -48,7 +49,7 @@ def draw_dents(
     """Draw dents on the target of a result, with a bar of dent diameters and a scale in mm.
 
     Args:
-        result: results folder whose coverage.vtp holds the part.
+        result: results folder whose arrays.npz holds the part.
         dents: dents in order of time.
         title: written above the picture.
         picture: file to write, .png.
@@ -79,7 +80,7 @@ def render_dents(job: dict[str, Any]) -> None:
     shade = np.clip((diameter - limits[0]) / (limits[1] - limits[0]), 0.0, 1.0)
     rgb = (255.0 * colours(shade)[:, :3]).astype(np.uint8)
     discs = Discs(job["place"] * MM, -job["normal"], job["radius"] * MM, rgb)
-    part = DrawnPart(read_surface(Path(job["folder"]) / COVERAGE))
+    part = DrawnPart(read_result_arrays(Path(job["folder"]) / ARRAYS_FILE).field)
     panels = [
         Panel(render_side(part, discs, view, job["pixels"]), caption, is_cut=part.rest.n_cells > 0)
         for view, caption in zip(_views(part, job["view"]), NEAR_CAPTIONS, strict=False)

@@ -14,27 +14,33 @@ from chamberopt.pictures.charts.colours import DIFFERENCE_MAP
 from chamberopt.pictures.panels import near_panels
 from chamberopt.pictures.picture_page import ColourBar, Row, write_page
 from chamberopt.pictures.subprocess_drawing import draw_in_subprocess
-from chamberopt.results.vtp_files import Surface, read_surface, save_surface
+from chamberopt.results.arrays_file import ARRAYS_FILE, read_result_arrays
+from chamberopt.results.vtp_files import Surface, save_surface
 
 # Brown (less) over white to violet (more), readable for colour-blind readers, and not grey.
 PALE, NO_TARGET = "#e6e9ec", "#a9b0b7"
 
 
-def write_differences(
-    path: Path, field: Path, columns: Sequence[tuple[np.ndarray, np.ndarray]]
-) -> None:
-    """Write a part as .vtp with the coverage of each later candidate minus that of the first.
+Columns = Sequence[tuple[np.ndarray, np.ndarray]]
+"""For each later candidate the difference of coverage, -1..1, at the vertices of the target in
+their order, shape (v,), and marks of real differences, bool, shape (v,)."""
+
+
+def write_differences(path: Path, first: Path, columns: Columns) -> None:
+    """Write a part as .vtp with the coverage of each later candidate minus the first candidate's.
 
     Candidate k = 1, 2, ... has the columns difference_k [percentage points] and real_k (1 where
     the difference is more than noise) at the vertices. The triangles have the column target.
 
     Args:
         path: .vtp file to write.
-        field: the first candidate's coverage.vtp.
-        columns: for each later candidate the difference, -1..1, at the vertices of the target in
-            their order, shape (v,), and marks of real differences, bool, shape (v,).
+        first: the first candidate's results folder.
     """
-    surface = read_surface(field)
+    save_surface(path, _difference_surface(first, columns))
+
+
+def _difference_surface(first: Path, columns: Columns) -> Surface:
+    surface = read_result_arrays(first / ARRAYS_FILE).field
     target = np.asarray(surface["target"])
     used = np.unique(np.asarray(surface.regular_faces)[target > 0])
     normal = np.asarray(surface.point_data.active_normals)
@@ -45,21 +51,23 @@ def write_differences(
         for name, column in ((f"difference_{k}", 100.0 * value), (f"real_{k}", real)):
             surface.point_data[name] = np.zeros(surface.n_points, dtype=np.float32)
             surface.point_data[name][used] = column
-    save_surface(path, surface)
+    return surface
 
 
-def draw_difference(surface: str | Path, titles: Sequence[str], picture: str | Path) -> str | None:
+def draw_difference(
+    first: Path, columns: Columns, titles: Sequence[str], picture: str | Path
+) -> str | None:
     """Draw where later candidates cover more or less than the first, all on one colour scale.
 
     Args:
-        surface: .vtp file that write_differences wrote.
+        first: the first candidate's results folder.
         titles: a title for each later candidate.
         picture: file to write, .png.
 
     Returns:
         None, or one line that says why there is no picture.
     """
-    job = {"surface": str(surface), "titles": list(titles)}
+    job = {"first": first, "columns": columns, "titles": list(titles)}
     return draw_in_subprocess(render_difference, job, picture)
 
 
@@ -68,7 +76,7 @@ def render_difference(job: dict[str, Any]) -> None:
 
     The camera looks from where most of the target is visible.
     """
-    surface, titles = read_surface(Path(job["surface"])), job["titles"]
+    surface, titles = _difference_surface(job["first"], job["columns"]), job["titles"]
     limit = _scale_limit(surface, len(titles))
     on_target = np.asarray(surface["target"]) > 0
     target, rest = cells_of(surface, on_target), cells_of(surface, ~on_target)

@@ -102,7 +102,7 @@ class DrawnPart:
             return 100.0 * coverage_from_dent_density(times * self.target["dent_density"])
         if quantity.column not in self.target.point_data:
             raise InputError(
-                f"coverage.vtp has no {quantity.column}: an older result; simulate again"
+                f"arrays.npz has no {quantity.column}: an older result; simulate again"
             )
         scale = quantity.factor * (times if quantity.grows else 1.0)
         return scale * np.asarray(self.target[quantity.column])

@@ -17,7 +17,8 @@ from chamberopt.pictures.camera import Room, Vector, cells_of, fit_camera, targe
 from chamberopt.pictures.overlay import LINE_HEIGHT, wrap
 from chamberopt.pictures.panels import choose_views
 from chamberopt.pictures.subprocess_drawing import draw_in_subprocess, file_path
-from chamberopt.results.vtp_files import CHAMBER, MM, PART, pyvista, read_surface
+from chamberopt.results.arrays_file import ARRAYS_FILE, read_result_arrays
+from chamberopt.results.vtp_files import MM, pyvista
 
 if TYPE_CHECKING:
     from chamberopt.results.flight import FlightFrames
@@ -218,7 +219,8 @@ class _ReplayScene:
         self.width = job["size"][0] - 20
         self.recent = HIT_FRAMES * float(flight["time"][1] - flight["time"][0])
         light(plotter)
-        chamber, surface = read_surface(folder / CHAMBER), read_surface(folder / PART)
+        arrays = read_result_arrays(folder / ARRAYS_FILE)
+        chamber, surface = arrays.cavity, arrays.part
         self.sonotrodes, _ = add_chamber(plotter, chamber)
         on_target = np.asarray(surface["target"]) > 0
         self.part = [

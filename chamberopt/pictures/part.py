@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from chamberopt.common.files import private_folder
 from chamberopt.pictures.actors import FAULT, GREY, NO_RENDER, SONOTRODE, add_edges
 from chamberopt.pictures.camera import cells_of, near_directions, near_views, pushed_back, seen_area
 from chamberopt.pictures.charts.colours import BLUE, OUTSIDE
@@ -15,14 +14,7 @@ from chamberopt.pictures.panels import BORDER, SIZE, choose_views, near_panels, 
 from chamberopt.pictures.picture_page import Panel, Row, write_page
 from chamberopt.pictures.subprocess_drawing import draw_in_subprocess, picture_path
 from chamberopt.pictures.view import render_view
-from chamberopt.results.vtp_files import (
-    CHAMBER,
-    MM,
-    pyvista,
-    read_surface,
-    size_text,
-    write_chamber,
-)
+from chamberopt.results.vtp_files import MM, cavity_surface, pyvista, size_text
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
@@ -68,12 +60,8 @@ def draw_part(
     marked, missed = (none if chosen is None else chosen for chosen in (marked, missed))
     edges = np.zeros((0, 2, 3)) if edges is None else edges
     job = {"title": title, "corners": corners * MM, "marked": marked & ~missed, "missed": missed,
-           "edges": edges * MM}  # fmt: skip
-    with private_folder() as folder:
-        if chamber is not None:
-            write_chamber(Path(folder), chamber)
-            job["chamber"] = str(Path(folder) / CHAMBER)
-        return draw_in_subprocess(render_part, job, path, folder=folder)
+           "edges": edges * MM, "chamber": chamber}  # fmt: skip
+    return draw_in_subprocess(render_part, job, path)
 
 
 def render_part(job: dict[str, Any]) -> None:
@@ -84,7 +72,7 @@ def render_part(job: dict[str, Any]) -> None:
     part = pyvista().PolyData.from_regular_faces(
         corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3)
     )
-    chamber = read_surface(Path(job["chamber"])) if "chamber" in job else None
+    chamber = None if job["chamber"] is None else cavity_surface(job["chamber"])
     kinds = np.select([missed, marked], [MISSED, MARKED], PLAIN)
     shown = [(part, kinds)]
     if chamber is not None:  # surface inside the chamber is drawn over the part

@@ -18,7 +18,8 @@ from chamberopt.design.shapes import TAG_PART, TAG_WALL, is_sonotrode
 from chamberopt.pictures.charts.colours import FEW_DENTS, UNREACHED
 from chamberopt.pictures.drawn_part import DrawnPart, point_areas
 from chamberopt.pictures.quantities import QUANTITIES
-from chamberopt.results.load import Result, load_cavity, load_field, load_part
+from chamberopt.results.arrays_file import load_result_arrays
+from chamberopt.results.load import Result
 from chamberopt.results.vtp_files import Surface
 
 # A triangle takes about 80 bytes of the page. Up to this number the page stays below 60 MB.
@@ -54,10 +55,10 @@ def part_scene(result: Result, title: str, max_triangles: int = MAX_TRIANGLES) -
         max_triangles: largest number of triangles to draw. If the part has more, only its target
             is drawn. If the target has more, nothing is drawn.
     Raises:
-        InputError: a surface is missing, damaged or of another result.
+        InputError: the arrays are missing, damaged or of another result.
     """
-    own = load_part(result)
-    part = DrawnPart(load_field(result, own))
+    arrays = load_result_arrays(result)
+    part = DrawnPart(arrays.field)
     whole, target = part.whole, part.target
     reached = np.asarray(whole["reachable"]) > 0.5
     coverage = np.where(reached, whole["coverage"], 0.0) if result.resolves_places else None
@@ -78,7 +79,7 @@ def part_scene(result: Result, title: str, max_triangles: int = MAX_TRIANGLES) -
             "is drawn."
         )
         rest = None
-    chamber = load_cavity(result)
+    chamber = arrays.cavity
     eye = _eye(np.asarray(whole.face_normals) * np.asarray(whole["area"])[:, None])
     # The part's triangle around each point, and the values of each triangle.
     triangles, row = np.unique(target["triangle"], return_inverse=True)
@@ -100,13 +101,13 @@ def part_scene(result: Result, title: str, max_triangles: int = MAX_TRIANGLES) -
             "density": _packed(target["dent_density"]),  # gives the coverage at any time
         },
         "own": {
-            "coverage": _packed(100.0 * own["coverage"][triangles]),
-            "interval": _packed(100.0 * own["coverage_interval"][triangles]),
+            "coverage": _packed(100.0 * arrays.elements["coverage"][triangles]),
+            "interval": _packed(100.0 * arrays.elements["coverage_interval"][triangles]),
         },
         "triangle": _packed(of_point, "<i4"),
         "number": _packed(triangles, "<i4"),
-        "element": _packed(own["element"][triangles], "<i4"),
-        "impacts": _packed(own["impacts"][triangles], "<i4"),
+        "element": _packed(arrays.elements["element"][triangles], "<i4"),
+        "impacts": _packed(arrays.elements["impacts"][triangles], "<i4"),
         "surfaces": _surfaces(part, rest, chamber, eye),
         "edges": {"ends": _packed(_edges(chamber, np.asarray(chamber["tag"]))), "colour": EDGES},
         "view": _view(chamber, eye),

@@ -14,7 +14,7 @@ class Quantity:
     name: str
     label: str
     unit: str
-    column: str  # field in coverage.vtp and part.vtp
+    column: str  # field of a result, on its part and its mesh to draw
     factor: float = 1.0  # from the field to the shown unit
     colours: str = COVERAGE_MAP
     grows: bool = False  # true if it is proportional to the peening time

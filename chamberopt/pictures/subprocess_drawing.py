@@ -107,7 +107,6 @@ def draw_in_subprocess(
     picture: str | Path,
     max_seconds: float = MAX_SECONDS,
     count: Callable[[int], None] = lambda drawn: None,
-    folder: str = "",
 ) -> str | None:
     """Draw a picture in a child process.
 
@@ -117,7 +116,6 @@ def draw_in_subprocess(
         job: argument of `render`, to which "picture" is added, the file to write.
         max_seconds: time after which the child is killed.
         count: called with each number of frames.
-        folder: path of a folder that the child removes if this process ends first.
 
     Returns:
         None, or one line that says why there is no picture.
@@ -131,7 +129,7 @@ def draw_in_subprocess(
     job = {**job, "picture": str(picture)}
     try:
         quiet = subprocess.DEVNULL
-        with Child(max_seconds, folder, env=without_display(), stderr=quiet) as child:
+        with Child(max_seconds, env=without_display(), stderr=quiet) as child:
             child.ask(render, job)
             for drawn in iter(child.answer, None):
                 count(drawn)

@@ -16,7 +16,7 @@ from chamberopt.pictures.charts.figure_style import ignore_settings_here
 from chamberopt.pictures.part_drawing import LEGEND, RASTER, draw_chamber
 from chamberopt.pictures.section import face_size_mm
 from chamberopt.printers.report_page import PageFile, require_free_page
-from chamberopt.results.chamber_file import load_chamber
+from chamberopt.results.arrays_file import load_chamber
 from chamberopt.results.load import load_result
 
 if TYPE_CHECKING:

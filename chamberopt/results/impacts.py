@@ -22,7 +22,7 @@ from chamberopt.common.progress import Progress
 from chamberopt.coverage.dents import Dents, dents_on_part
 from chamberopt.coverage.field.surface_points import spread_points
 from chamberopt.coverage.part_impacts import HITS_FILE, load_matching_hits
-from chamberopt.results.load import load_part
+from chamberopt.results.arrays_file import load_result_arrays
 from chamberopt.results.rebuild import REMEDY, RebuiltChamber, RebuiltReplica, made_by
 from chamberopt.simulation.replicas import run_in_order, simulate_seed
 
@@ -175,8 +175,7 @@ def _replicas_ahead(result: Result) -> int:
 
     This is one per core, fewer if the impact logs would fill the memory.
     """
-    part = load_part(result)
-    impacts = float(part["impacts"].sum()) / result.record.replicas
+    impacts = float(load_result_arrays(result).elements["impacts"].sum()) / result.record.replicas
     return max(0, min(core_count(), int(MAX_IMPACTS_IN_MEMORY / max(impacts, 1.0)) - 1))
 
 
@@ -198,12 +197,12 @@ def _on_part(number: int, log: ImpactLog, chamber: Chamber) -> ReplicaImpacts:
 
 
 def _require_same_impacts(result: Result, triangle: np.ndarray, speed: np.ndarray) -> None:
-    part = load_part(result)
-    stored = load_matching_hits(result.path(HITS_FILE), np.asarray(part["impacts"])).hits
+    impacts = load_result_arrays(result).elements["impacts"]
+    stored = load_matching_hits(result.path(HITS_FILE), impacts).hits
     order = np.argsort(triangle, kind="stable")
     triangle, speed = triangle[order], speed[order]
-    count = np.bincount(triangle, minlength=part.n_cells)
-    wrong = count != part["impacts"]
+    count = np.bincount(triangle, minlength=len(impacts))
+    wrong = count != impacts
     if not wrong.any():
         wrong[triangle[speed != stored.speed]] = True
     if wrong.any():

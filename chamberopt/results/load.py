@@ -12,8 +12,6 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from chamberopt.common.errors import InputError
 from chamberopt.common.estimate import Estimate
 from chamberopt.common.files import RESULT, open_plain, require_plain_folder
@@ -22,23 +20,12 @@ from chamberopt.common.number_text import estimate_text, plain
 from chamberopt.coverage.metrics import find_metric
 from chamberopt.design.design import validate
 from chamberopt.design.load import Design
-from chamberopt.geometry.triangles import areas
 from chamberopt.results.records import (
     FORMAT,
     CandidateRecord,
     ResultRecord,
     StudyRecord,
     read_record,
-)
-from chamberopt.results.vtp_files import (
-    CHAMBER,
-    COVERAGE,
-    ELEMENT_COLUMNS,
-    FIELD_COLUMNS,
-    OF_ELEMENT,
-    PART,
-    Surface,
-    read_surface,
 )
 from chamberopt.search.study_folder import is_study_folder
 from chamberopt.search.trial_log import HISTORY, TIMINGS, read_trials
@@ -204,67 +191,6 @@ def file_sha256(path: Path) -> str:
         raise InputError(
             f"{path}: cannot be read: {error.strerror}; check its permissions"
         ) from None
-
-
-def load_part(result: Result) -> Surface:
-    """Read part.vtp of a result: the part's triangles with their values.
-
-    Raises InputError if the file is missing, damaged or from another result.
-    """
-    return read_part(result.path(PART))
-
-
-def load_field(result: Result, part: Surface) -> Surface:
-    """Read coverage.vtp of a result: a finer mesh of `part` with coverage at each vertex.
-
-    Raises InputError if the file is missing, damaged or from another result.
-    """
-    return read_field(result.path(COVERAGE), part)
-
-
-def load_cavity(result: Result) -> Surface:
-    """Read chamber.vtp of a result: the closed cavity.
-
-    Raises InputError if the file is missing, damaged or from another result.
-    """
-    return read_surface(result.path(CHAMBER), ("tag",))
-
-
-def read_part(path: Path) -> Surface:
-    """Read part.vtp: the part's triangles with their values.
-
-    Raises InputError if the file is damaged, for example if a triangle that is exposed to the shot
-    lacks its coverage.
-    """
-    part = read_surface(path, ELEMENT_COLUMNS)
-    exposed = np.asarray(part["exposed_area_mm2"])
-    if not np.isfinite(exposed).all() or np.isnan(part["coverage"][exposed > 0.0]).any():
-        raise InputError(f"{path}: damaged (an exposed triangle has no coverage); {RESTORE}")
-    if not (np.asarray(part["target"])[exposed > 0.0] > 0).any():
-        raise InputError(f"{path}: damaged (nothing of its target is exposed); {RESTORE}")
-    return part
-
-
-def read_field(path: Path, part: Surface) -> Surface:
-    """Read coverage.vtp: a finer mesh of the part with coverage at each vertex.
-
-    Raises InputError if it is damaged or does not belong to `part`, which was read from part.vtp.
-    """
-    field = read_surface(path, ("triangle", *OF_ELEMENT), FIELD_COLUMNS)
-    triangle = np.asarray(field["triangle"])
-    covers_all = np.array_equal(np.unique(triangle), np.arange(part.n_cells))
-    if not covers_all or (part["impacts"][triangle] != field["element_impacts"]).any():
-        raise InputError(f"{path}: of another result than the part.vtp beside it; simulate again")
-    points = field.point_data
-    reached = np.asarray(points["reachable"]) > 0.5
-    known = [points["coverage"], points["reachable"], points["resolved"]]
-    known += [points[name][reached] for name in ("dent_density", "coverage_interval")]
-    if points.active_normals is None or any(np.isnan(column).any() for column in known):
-        raise InputError(f"{path}: damaged (a place on it has no coverage); {RESTORE}")
-    target = np.asarray(field.regular_faces)[np.asarray(field["target"]) > 0]
-    if not areas(np.asarray(field.points, dtype=float), target).sum() > 0.0:
-        raise InputError(f"{path}: damaged (its target has no area); {RESTORE}")
-    return field
 
 
 def summary(evaluation: Evaluation | Result) -> str:

@@ -13,7 +13,7 @@ from chamberopt.chamber.replica_seed import replica_seed
 from chamberopt.chamber.scene import build_scene, chamber_mesh
 from chamberopt.common.errors import InputError
 from chamberopt.coverage.part_impacts import HITS_FILE, load_hits
-from chamberopt.results.chamber_file import load_chamber
+from chamberopt.results.arrays_file import load_chamber
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber

@@ -29,7 +29,7 @@ from chamberopt.common.estimate import Estimate
 from chamberopt.coverage.metrics import METRICS, find_metric, parse_objective
 from chamberopt.search.study.parameters import bound_at
 
-FORMAT = 7
+FORMAT = 8
 ROUNDING = 1e-9
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
 Positive = Annotated[float, Field(ge=0.0)]

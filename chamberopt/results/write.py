@@ -10,12 +10,11 @@ from typing import TYPE_CHECKING, Any
 from chamberopt.chamber.checks.fillets import facets_are_left
 from chamberopt.common.estimate import finite_or_none
 from chamberopt.common.files import RESULT, make_folder, write_text
-from chamberopt.common.npz_files import save_record
 from chamberopt.common.versions import versions
 from chamberopt.coverage.metrics import exposed_target
 from chamberopt.coverage.part_impacts import HITS_FILE, save_hits, sort_hits_by_triangle
 from chamberopt.design.load import Design, save_design, with_paths_from
-from chamberopt.results.chamber_file import CHAMBER_FILE
+from chamberopt.results.arrays_file import ResultArrays, save_result_arrays
 from chamberopt.results.load import START, content_sha256, file_sha256
 from chamberopt.results.records import (
     FORMAT,
@@ -82,7 +81,7 @@ def write_study(
 
     run_study has written design.toml, study.toml and history.jsonl. write_study adds best.toml,
     history.csv and, for two objectives, pareto.csv. It adds coverage.vtp, part.vtp, hits.npz,
-    chamber.npz, chamber.stl and chamber.vtp of the best design. The folder start/ is the results
+    arrays.npz, chamber.stl and chamber.vtp of the best design. The folder start/ is the results
     folder of the start, confirmed on the same seeds.
 
     Returns:
@@ -182,11 +181,12 @@ def _write_candidate(folder: Path, candidate: CandidateResult, **more: Any) -> C
     Return its record for result.json, with the further keys `more`.
     """
     design, chamber, evaluation = candidate.design, candidate.chamber, candidate.evaluation
-    write_coverage(folder, chamber, candidate.element_values, candidate.display)
+    arrays = ResultArrays(chamber, candidate.element_values, candidate.display)
+    save_result_arrays(folder, arrays)
+    write_coverage(folder, arrays.part, arrays.field)
     hits = sort_hits_by_triangle(evaluation.hits, len(chamber.part.triangles))
     save_hits(folder / HITS_FILE, hits)
     write_chamber(folder, chamber)
-    save_record(folder / CHAMBER_FILE, chamber)
     target = exposed_target(chamber)
     if design.zones:
         more["zones"] = _about_zones(design, chamber, evaluation)

@@ -90,7 +90,7 @@ class PartField:
         return np.where(self.reachable(places), coverage, np.nan)
 
     def display(self) -> DisplayField:
-        """Return the figures of `values` at the vertices of a mesh to draw.
+        """Return the figures of `values` at the vertices of a mesh to draw, in single precision.
 
         Dents on creases do not count in the coverage. They cover a band as narrow as a dent, and a
         drawing would smear it over whole triangles.
@@ -102,7 +102,9 @@ class PartField:
             part.vertices, part.triangles, part.corner_normals, part.target, self.field.drawn_face,
             gauge, self.coverage,
         )  # fmt: skip
-        return DisplayField(mesh, self.values(mesh.places, self._gauge_off_creases(mesh.places)))
+        values = self.values(mesh.places, self._gauge_off_creases(mesh.places))
+        fields = {name: one.astype(np.float32) for name, one in values.items()}
+        return DisplayField(replace(mesh, normal=mesh.normal.astype(np.float32)), fields)
 
     def _gauge_off_creases(self, places: Places) -> Gauge:
         return replace(self.field.gauge_round(places, self.field.radius), band=None)

@@ -14,8 +14,9 @@ from chamberopt.coverage.coverage_from_impacts import coverage_from_dent_density
 from chamberopt.coverage.part_impacts import HITS_FILE, HitsByTriangle, load_matching_hits
 from chamberopt.pictures.drawn_part import DrawnPart, colour_range
 from chamberopt.pictures.quantities import QUANTITIES
-from chamberopt.results.load import Result, read_field, read_part, summary, unchanged_file
-from chamberopt.results.vtp_files import CHAMBER, COVERAGE, PART, ZONE, read_surface
+from chamberopt.results.arrays_file import ARRAYS_FILE, read_result_arrays
+from chamberopt.results.load import Result, summary, unchanged_file
+from chamberopt.results.vtp_files import PART, ZONE
 from chamberopt.viewer.view_state import ViewState
 
 FULL_SCALE = (0.0, 100.0)  # % of coverage, fixed over time
@@ -67,9 +68,9 @@ class OpenedResult:
     def __init__(self, info: ResultInfo) -> None:
         self.info = info
         self.folder = Path(info.folder)
-        self.surface = read_part(self._path(PART))
-        self.chamber = read_surface(self._path(CHAMBER), ("tag",))
-        self.part = DrawnPart(read_field(self._path(COVERAGE), self.surface), chamber=self.chamber)
+        arrays = read_result_arrays(self._path(ARRAYS_FILE))
+        self.surface, self.chamber = arrays.part, arrays.cavity
+        self.part = DrawnPart(arrays.field, chamber=self.chamber)
 
     def _path(self, name: str) -> Path:
         return unchanged_file(self.folder, name, self.info.sha256)
@@ -96,7 +97,7 @@ class OpenedResult:
         if state.quantity not in self.quantities:
             remedy = _REMEDIES.get(state.quantity, "simulate again")
             raise InputError(
-                f"--quantity {state.quantity}: {self.folder / COVERAGE} does not have it; "
+                f"--quantity {state.quantity}: {self.folder / ARRAYS_FILE} does not have it; "
                 f"{remedy}, or choose one of {', '.join(self.quantities)}"
             )
         self.part.show(QUANTITIES[state.quantity], self.time_ratio(state))

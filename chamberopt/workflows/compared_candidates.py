@@ -15,7 +15,7 @@ from chamberopt.chamber.build import build_chamber
 from chamberopt.design.design import Design
 from chamberopt.design.load import load_design
 from chamberopt.peening.calibration_errors import evaluate_calibrated
-from chamberopt.results.chamber_file import load_chamber
+from chamberopt.results.arrays_file import load_chamber
 from chamberopt.results.compare.comparison import (
     labels,
     part_unit,
@@ -26,7 +26,7 @@ from chamberopt.results.compare.comparison import (
     require_same_triangles,
     require_several,
 )
-from chamberopt.results.load import Result, load_part, load_result
+from chamberopt.results.load import Result, load_result
 from chamberopt.simulation.evaluate import ReplicaPlan
 from chamberopt.workflows.save_run import save_simulation
 from chamberopt.workflows.simulate import Teller, resolve_effects
@@ -210,7 +210,7 @@ def _mesh(one: Candidate) -> tuple[str, str]:
 
 
 def _target(result: Result) -> np.ndarray:
-    return np.asarray(load_part(result)["target"]) > 0
+    return load_chamber(result).part.target
 
 
 def _seed_settings(result: Result) -> SeedSettings:

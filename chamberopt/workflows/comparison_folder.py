@@ -22,7 +22,6 @@ from chamberopt.results.compare.local_difference import (
     read_target_surface,
 )
 from chamberopt.results.load import summary
-from chamberopt.results.vtp_files import CHAMBER, COVERAGE
 from chamberopt.workflows.compared_candidates import read_candidates, simulate_missing
 from chamberopt.workflows.simulate import Teller
 
@@ -75,8 +74,6 @@ def write_comparison(folder: str | Path, comparison: Comparison) -> list[str]:
         raise InputError(
             f"{folder}: holds a comparison, and nothing is ever overwritten: choose another folder"
         )
-    for result in comparison.results:
-        result.path(CHAMBER)  # read for the picture at the end; the other surfaces are read next
     surfaces = [read_target_surface(result) for result in comparison.results]
     for result, one in zip(comparison.results[1:], surfaces[1:], strict=True):
         require_same_triangles(
@@ -110,12 +107,12 @@ def _draw_differences(
     Return why there is no image, or None.
     """
     first, *later = comparison.labels
-    columns = [(one.value, one.real) for one in local]
-    write_differences(folder / DIFFERENCE, comparison.results[0].folder / COVERAGE, columns)
+    start, columns = comparison.results[0].folder, [(one.value, one.real) for one in local]
+    write_differences(folder / DIFFERENCE, start, columns)
     titles = []
     for label, one in zip(later, local, strict=True):
         over = f"; averaged over {one.radius:.1f} mm" if one.radius else ""
         shares = f"more on {one.more:.0%}, less on {one.less:.0%} of the target{over}"
         shares = shares.replace("%", " %")
         titles.append(f"{label} minus {first}\n{shares}")
-    return draw_difference(folder / DIFFERENCE, titles, folder / "difference.png")
+    return draw_difference(start, columns, titles, folder / "difference.png")

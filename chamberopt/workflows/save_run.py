@@ -38,7 +38,7 @@ def save_simulation(
 ) -> list[str]:
     """Save a simulation in a new or empty folder.
 
-    Writes design.toml, coverage.vtp, part.vtp, hits.npz, chamber.npz, chamber.stl, chamber.vtp,
+    Writes design.toml, coverage.vtp, part.vtp, hits.npz, arrays.npz, chamber.stl, chamber.vtp,
     result.json and coverage.png.
 
     Args:

@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from chamberopt.chamber.build import build_chamber
+from chamberopt.results.arrays_file import ResultArrays, save_result_arrays
 from chamberopt.results.vtp_files import write_chamber, write_coverage
 from chamberopt.simulation.field_values import complete_result
 from chamberopt.viewer.opened_result import ResultInfo
@@ -22,7 +23,9 @@ def case(tmp_path_factory: pytest.TempPathFactory) -> tuple:
     chamber = build_chamber(DESIGN)
     evaluation = poisson_evaluation(DESIGN, chamber)
     found = complete_result(DESIGN, chamber, evaluation)
-    write_coverage(folder, chamber, found.element_values, found.display)
+    arrays = ResultArrays(chamber, found.element_values, found.display)
+    save_result_arrays(folder, arrays)
+    write_coverage(folder, arrays.part, arrays.field)
     write_chamber(folder, chamber)
     return folder, chamber, evaluation, found
 

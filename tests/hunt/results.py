@@ -6,14 +6,12 @@ refuses them is not the digest but what is known of a result's values.
 
 from __future__ import annotations
 
-import base64
 import csv
 import io
 import json
 import random
 import re
 import shutil
-import zlib
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -23,7 +21,6 @@ import numpy as np
 from chamberopt.common.errors import FORMULA
 from chamberopt.results.load import content_sha256
 from chamberopt.results.write import data_digests
-from tests.hunt.meshes import HUGE
 from tests.hunt.toml_files import odd_value
 
 LOOK = (
@@ -128,43 +125,12 @@ def _alter_npz(rng: random.Random, path: Path) -> None:
     path.write_bytes(packed.getvalue())
 
 
-def _alter_vtp(rng: random.Random, path: Path) -> None:
-    """Alter a number of a .vtp file's text, or of one of its arrays."""
-    text = path.read_text()
-    numbers = list(re.finditer(r'="(\d+)"', text))
-    arrays = list(re.finditer(r'type="(\w+)"[^>]*>\s*([A-Za-z0-9+/=]{20,})\s*<', text))
-    if rng.random() < 0.4:
-        found = rng.choice(numbers)
-        content = str(rng.choice(HUGE))
-        path.write_text(text[: found.start(1)] + content + text[found.end(1) :])
-        return
-    found = rng.choice(arrays)
-    kind = np.dtype(found[1].lower()) if rng.random() < 0.9 else np.dtype("u1")
-    count = int(np.frombuffer(base64.b64decode(found[2][:8])[:4], np.uint32)[0])
-    letters = 4 * -(-4 * (3 + count) // 3)
-    header = np.frombuffer(base64.b64decode(found[2][:letters]), np.uint32, 3 + count)
-    packed, parts, at = base64.b64decode(found[2][letters:]), [], 0
-    for length in header[3:].tolist():
-        parts.append(zlib.decompress(packed[at : at + length]))
-        at += length
-    block = _alter_array(rng, np.frombuffer(b"".join(parts), kind)).astype(kind).tobytes()
-    if rng.random() < 0.1:
-        block = bytes(100_000_000)
-    content = zlib.compress(block)
-    size = rng.choice((len(block), len(block), len(block), 2**32 - 1, 0))
-    words = np.array([1, size, size, len(content)], np.uint32).tobytes()
-    code = (base64.b64encode(words) + base64.b64encode(content)).decode()
-    path.write_text(text[: found.start(2)] + code + text[found.end(2) :])
-
-
 def _forge(rng: random.Random, folder: Path) -> None:
     """Alter values of a result, and all digests with them."""
-    files = sorted(path for path in folder.iterdir() if path.suffix in (".npz", ".vtp", ".jsonl"))
+    files = sorted(path for path in folder.iterdir() if path.suffix in (".npz", ".jsonl"))
     main = folder / "result.json"
     path = main if rng.random() < 0.4 or not files else rng.choice(files)
-    if path.suffix == ".vtp":
-        _alter_vtp(rng, path)
-    elif path.suffix == ".npz":
+    if path.suffix == ".npz":
         _alter_npz(rng, path)
     else:
         first, *rest = path.read_text().splitlines() if path != main else [path.read_text()]

@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from chamberopt.results.vtp_files import pyvista, save_surface
+from chamberopt.results.arrays_file import ARRAYS_FILE, read_result_arrays
+from tests.helpers.results.arrays import change_elements
 from tests.helpers.results.digests import accept_changes
 from tests.hunt.base import write_base
 from tests.hunt.command import Server, fault
@@ -35,35 +36,50 @@ def _values(**changed: Any) -> Callable[[Path], None]:
     return change
 
 
-def _count(name: str, count: int) -> Callable[[Path], None]:
-    def change(folder: Path) -> None:
-        path = folder / name
-        path.write_text(
-            re.sub(r'NumberOfPoints="\d+"', f'NumberOfPoints="{count}"', path.read_text())
-        )
-
-    return change
-
-
 def _column(name: str, value: Callable[[np.ndarray], Any]) -> Callable[[Path], None]:
     def change(folder: Path) -> None:
-        surface = pyvista().read(folder / "part.vtp")
-        surface.cell_data[name] = value(np.asarray(surface.cell_data[name]))
-        save_surface(folder / "part.vtp", surface)
+        column = read_result_arrays(folder / ARRAYS_FILE).elements[name]
+        change_elements(folder, **{name: value(column)})
 
     return change
+
+
+def _entries(change: Callable[[dict[str, np.ndarray]], Any]) -> Callable[[Path], None]:
+    """A change of the entries of arrays.npz, as numpy has them."""
+
+    def changed(folder: Path) -> None:
+        with np.load(folder / ARRAYS_FILE) as file:
+            entries = dict(file)
+        change(entries)
+        np.savez_compressed(folder / ARRAYS_FILE, **entries)
+
+    return changed
+
+
+def _truncated(folder: Path) -> None:
+    content = (folder / ARRAYS_FILE).read_bytes()
+    (folder / ARRAYS_FILE).write_bytes(content[: len(content) // 2])
 
 
 LOOK, REPLAY = ["report", "result"], ["replay", "result", "film.gif"]
 # What is altered, the command, and what it says.
 FORGED: dict[str, tuple[Callable[[Path], None], list[str], str]] = {
-    "a huge count in part.vtp": (_count("part.vtp", 8 * 10**12), LOOK, "NumberOfPoints"),
-    "a large count in part.vtp": (_count("part.vtp", 5 * 10**7), LOOK, "far too short"),
-    "a huge count in chamber.vtp": (_count("chamber.vtp", 8 * 10**12), LOOK, "NumberOfPoints"),
+    "half of the arrays": (_truncated, LOOK, r"arrays\.npz: damaged"),
+    "arrays that fill memory": (
+        _entries(lambda one: one.update(a0=np.zeros(2 * 10**8, np.uint8))),
+        LOOK,
+        "unpacks to",
+    ),
+    "objects for numbers": (
+        _entries(lambda one: one.update(a0=np.array([{}], dtype=object))),
+        LOOK,
+        "allow_pickle=False",
+    ),
+    "no vertices": (_entries(lambda one: one.pop("a0")), LOOK, r"arrays\.npz: damaged"),
     "three numbers for coverage": (
         _column("coverage", lambda one: np.stack([one] * 3, axis=1)),
         LOOK,
-        "coverage has 3 numbers for each place",
+        "coverage has the shape",
     ),
     "coverage that is none": (
         _column("coverage", lambda one: one * np.nan),
@@ -73,7 +89,7 @@ FORGED: dict[str, tuple[Callable[[Path], None], list[str], str]] = {
     "an area beyond all": (
         _column("exposed_area_mm2", lambda one: one + 1e300),
         LOOK,
-        "infinite or too large",
+        "exposed_area_mm2 has a number that is not from",
     ),
     "a table for a curve": (_values(coverage_against_time={"x": 1}), LOOK, "coverage_against_time"),
     "a row without time": (_values(coverage_against_time=[{}]), LOOK, "coverage_against_time.0"),

@@ -119,13 +119,11 @@ def _write_impacts(
     from chamberopt.export.impacts_table import require_writable, write_impacts
     from chamberopt.results.impacts import replica_count
     from chamberopt.results.rebuild import rebuild_chamber
-    from chamberopt.results.vtp_files import PART
 
     require_writable(files)
     recorded = result.record.replicas
     count = replica_count(result, replicas)
-    for name in (PART, HITS_FILE):  # the impacts are compared with these files at the end
-        result.path(name)
+    result.path(HITS_FILE)  # the impacts are compared with this file at the end
     ground = rebuild_chamber(result)
     with open_executor(workers, None) as executor:
         compile_with_message(result.design, ground.chamber, ground.cavity)

@@ -16,8 +16,7 @@ thinner (M. C. Rivara, Int. J. Numer. Methods Eng. 20 (1984) 745).
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import NamedTuple
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -35,7 +34,8 @@ Values = Callable[[Places], np.ndarray]
 """Coverage at some places, (p,); NaN where there is none."""
 
 
-class DisplayMesh(NamedTuple):
+@dataclass(frozen=True)
+class DisplayMesh:
     """A mesh whose vertices belong to one smooth face each. At creases vertices are repeated.
 
     Attributes:
@@ -123,8 +123,8 @@ def display_mesh(
         count = len(mesh.triangles) + int(split[of_side].sum())
         if not split.any() or count > max(MAX_TRIANGLES, len(triangles)):
             order = np.argsort(mesh.part_triangle, kind="stable")
-            return mesh._replace(
-                triangles=mesh.triangles[order], part_triangle=mesh.part_triangle[order]
+            return replace(
+                mesh, triangles=mesh.triangles[order], part_triangle=mesh.part_triangle[order]
             )
         point = np.concatenate([point, len(point) + _same_edge(point[edges[split]])])
         mesh = _divide(mesh, edges, of_side, split)

@@ -10,7 +10,9 @@ import numpy as np
 
 from chamberopt.coverage.part_impacts import HITS_FILE, Hits, load_matching_hits
 from chamberopt.geometry.triangles import areas
-from chamberopt.results.load import Result, load_field, load_part
+from chamberopt.results.arrays_file import load_result_arrays
+from chamberopt.results.load import Result
+from chamberopt.results.vtp_files import MM
 
 # The target of a result as its folder stores it: the field and the impacts.
 
@@ -91,28 +93,27 @@ def read_target_surface(result: Result) -> TargetSurface:
 
     Raises InputError if files are missing or damaged.
     """
-    part = load_part(result)
-    field = load_field(result, part)
-    triangles = np.asarray(field.regular_faces)[np.asarray(field["target"]) > 0]
+    arrays = load_result_arrays(result)
+    part, mesh, field = arrays.chamber.part, arrays.display.mesh, arrays.display.fields
+    triangles = mesh.triangles[part.target[mesh.part_triangle]]
     used, corner = np.unique(triangles, return_inverse=True)
-    points = np.asarray(field.points, dtype=float)
+    points = mesh.vertices * MM
     area = np.repeat(areas(points, triangles) / 3.0, 3)
     share = np.bincount(corner.ravel(), area, len(used)) / area.sum()
-    reached = np.asarray(field["reachable"])[used] > 0.5
-    target = np.asarray(part["target"]) > 0
-    hits = load_matching_hits(result.path(HITS_FILE), np.asarray(part["impacts"]))
+    reached = field["reachable"][used] > 0.5
+    hits = load_matching_hits(result.path(HITS_FILE), arrays.elements["impacts"])
     return TargetSurface(
-        corners=np.asarray(part.points, dtype=float)[np.asarray(part.regular_faces)],
-        target=target,
+        corners=(part.vertices * MM)[part.triangles],
+        target=part.target,
         place=points[used],
-        normal=np.asarray(field.point_data.active_normals, dtype=float)[used],
+        normal=mesh.normal[used].astype(float),
         area=share,
         coverage=np.where(reached, field["coverage"][used], 0.0).astype(float),
         interval=np.where(reached, field["coverage_interval"][used], 0.0).astype(float),
-        resolved=~reached | (np.asarray(field["resolved"])[used] > 0.5),
+        resolved=~reached | (field["resolved"][used] > 0.5),
         window_radius=math.sqrt(result.design.process.accuracy.gauge_mm2 / math.pi),
         dents=result.record.field.dents_in_median_window,
-        hits=hits.on(target & (np.asarray(part["exposed_area_mm2"]) > 0.0)),
+        hits=hits.on(part.target & (arrays.chamber.exposed_area > 0.0)),
     )
 
 

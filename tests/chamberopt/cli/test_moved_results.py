@@ -188,14 +188,7 @@ def lengthened(path: Path) -> None:
 
 
 # Each data file, and commands that use it, by their places in `commands`.
-USERS = {
-    "part.vtp": (0, 1, 2, 3, 4, 8, 9, 10, 11),
-    "coverage.vtp": (0, 8, 9, 10, 11),
-    "chamber.vtp": (0, 5, 6, 7, 8, 9, 10, 11),
-    "chamber.npz": (1, 3, 4, 10, 11),
-    "hits.npz": (1, 9, 10, 11),
-    "design.toml": (0,),
-}
+USERS = {"arrays.npz": tuple(range(12)), "hits.npz": (1, 9, 10, 11), "design.toml": (0,)}
 
 
 @pytest.mark.parametrize(("name", "used_by"), USERS.items())

@@ -34,7 +34,7 @@ from chamberopt.export.formats import FrameName
 from chamberopt.export.impacts_table import ROWS_AT_ONCE, write_impacts
 from chamberopt.results.load import load_result
 from chamberopt.results.rebuild import rebuild_chamber
-from chamberopt.results.vtp_files import read_surface
+from chamberopt.results.vtp_files import pyvista
 from chamberopt.search.study import Study
 from chamberopt.simulation.evaluate import evaluate
 from chamberopt.workflows.save_run import save_simulation, save_study
@@ -122,7 +122,7 @@ def columns(table: dict[str, np.ndarray], *names: str) -> np.ndarray:
 
 
 def require_result_again(folder: Path, table: dict[str, np.ndarray]) -> None:
-    part, hits = read_surface(folder / "part.vtp"), load_hits(folder / "hits.npz").hits
+    part, hits = pyvista().read(folder / "part.vtp"), load_hits(folder / "hits.npz").hits
     on_each = np.bincount(table["triangle"], minlength=part.n_cells)
     np.testing.assert_array_equal(on_each, part["impacts"])
     dented = table["triangle"][table["dent_diameter_um"] > 0.0]
@@ -160,7 +160,7 @@ def test_places_and_velocities_are_those_of_the_parts_file(
 
 
 def test_in_the_chambers_frame_they_lie_on_part_vtp(simulated: Path, tmp_path: Path) -> None:
-    surface = read_surface(simulated / "part.vtp")
+    surface = pyvista().read(simulated / "part.vtp")
     corners = np.asarray(surface.points)[surface.regular_faces]
     table = table_of(simulated, tmp_path / "i.parquet", "chamber")
     at = columns(table, "x_mm", "y_mm", "z_mm")

@@ -4,6 +4,7 @@ They are read back by libraries of other programs or by a reader in this file.
 """
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import h5py
@@ -18,8 +19,9 @@ from chamberopt.design.load import Design, load_design
 from chamberopt.export.element_fields import COLUMNS
 from chamberopt.export.fields import write_fields
 from chamberopt.geometry.meshes.part_mesh import read_part
+from chamberopt.results.arrays_file import ARRAYS_FILE, read_result_arrays
 from chamberopt.workflows.save_run import save_simulation
-from tests.helpers.results.digests import accept_changes
+from tests.helpers.results.arrays import change_arrays, change_elements
 from tests.helpers.synthetic import plate_design, poisson_evaluation
 
 SIDES = (20.0, 20.0, 8.0)
@@ -114,12 +116,15 @@ def simulated(mesh: Path, **target: float) -> tuple[Path, Chamber]:
     chamber = build_chamber(design)
     folder = mesh.parent / "result"
     save_simulation(folder, design, chamber, poisson_evaluation(design, chamber, per_mm2=1.0))
-    surface = pyvista.read(folder / "part.vtp")
-    hit, lots = surface["dents"] > 0, np.random.default_rng(3)
-    for name in ("mean_normal_speed", "p90_normal_speed", "mean_angle_deg", "mean_dent_um"):
-        surface[name] = np.where(hit, lots.uniform(1.0, 9.0, surface.n_cells), np.nan)
-    surface.save(folder / "part.vtp")
-    accept_changes(folder)
+    hit = read_result_arrays(folder / ARRAYS_FILE).elements["dents"] > 0
+    names, lots = (
+        "mean_normal_speed p90_normal_speed mean_angle_deg mean_dent_um",
+        np.random.default_rng(3),
+    )
+    columns = {
+        name: np.where(hit, lots.uniform(1.0, 9.0, len(hit)), np.nan) for name in names.split()
+    }
+    change_elements(folder, **columns)
     return folder, chamber
 
 
@@ -165,8 +170,8 @@ def pressures(text: str) -> dict[str, dict[int, float]]:
 
 
 def means_by_hand(folder: Path) -> dict[str, dict[int, float]]:
-    """Some columns of each element from part.vtp, one by one."""
-    surface = pyvista.read(folder / "part.vtp")
+    """Some columns of each element from its triangles, one by one."""
+    surface = read_result_arrays(folder / ARRAYS_FILE).part
     names = ("COVERAGE", "MEAN_NORMAL_SPEED", "MEAN_DENT_UM", "DENTS")
     found: dict[str, dict[int, float]] = {name: {} for name in names}
     for number in np.unique(surface["element"]):
@@ -286,7 +291,10 @@ def test_a_part_without_element_numbers_is_written_along(
         back.vertices[back.triangles], part.vertices[part.triangles], rtol=1e-11, atol=1e-15
     )
     assert back.elements.tolist() == list(range(1, len(part.triangles) + 1))
-    text, surface = ((tmp_path / f"fields.{suffix}").read_text(), pyvista.read(folder / "part.vtp"))
+    text, surface = (
+        (tmp_path / f"fields.{suffix}").read_text(),
+        read_result_arrays(folder / ARRAYS_FILE).part,
+    )
     found = {
         int(k): v
         for k, v in (distributions if to == "abaqus" else pressures)(text)["COVERAGE"].items()
@@ -305,14 +313,13 @@ def test_where_the_target_was_meshed_anew_elements_get_what_lies_on_them(
     """
     numbers = nastran_plate(tmp_path / "plate.bdf")
     folder, _ = simulated(tmp_path / "plate.bdf", element_mm=element_mm)
-    surface = pyvista.read(folder / "part.vtp")
+    surface = read_result_arrays(folder / ARRAYS_FILE).part
     x, y = surface.cell_centers().points[:, :2].T - [[surface.bounds[0]], [surface.bounds[2]]]
     row, column = ((TOP * at / SIDES[0]).astype(int) for at in (y, x))
     treated = surface["target"] > 0
     np.testing.assert_array_equal(surface["element"][treated], numbers[TOP * row + column][treated])
-    surface["coverage"] = np.where(surface["exposed_area_mm2"] > 0, x / SIDES[0], np.nan)
-    surface.save(folder / "part.vtp")
-    accept_changes(folder)
+    coverage = np.where(surface["exposed_area_mm2"] > 0, x / SIDES[0], np.nan)
+    change_elements(folder, coverage=coverage)
 
     remarks = write_fields(folder, tmp_path / "fields.bdf", "nastran")
 
@@ -332,7 +339,7 @@ def test_where_the_target_was_meshed_anew_elements_get_what_lies_on_them(
 def test_vtkhdf_and_vtp_hold_every_field(tmp_path: Path) -> None:
     stl_plate(tmp_path / "plate.stl")
     folder, _ = simulated(tmp_path / "plate.stl")
-    given = pyvista.read(folder / "part.vtp")
+    given = read_result_arrays(folder / ARRAYS_FILE).part
 
     for to in ("vtp", "vtkhdf"):
         assert write_fields(folder, tmp_path / f"fields.{to}", to) == []
@@ -352,7 +359,7 @@ def test_vtkhdf_and_vtp_hold_every_field(tmp_path: Path) -> None:
 def test_every_column_of_a_result_is_handed_on(tmp_path: Path) -> None:
     stl_plate(tmp_path / "plate.stl")
     folder, _ = simulated(tmp_path / "plate.stl")
-    surface = pyvista.read(folder / "part.vtp")
+    surface = read_result_arrays(folder / ARRAYS_FILE).part
     assert set(surface.cell_data) - {"element"} <= set(COLUMNS)
 
 
@@ -376,12 +383,15 @@ def test_what_cannot_be_handed_on_is_said(tmp_path: Path) -> None:
     for to in ("nastran", "vtp"):
         write_fields(folder, tmp_path / f"a.{to}", to)
 
-    surface = pyvista.read(folder / "part.vtp")
-    surface.cell_data.remove("element")
-    surface.save(folder / "part.vtp")
-    accept_changes(folder)
+    change_arrays(
+        folder,
+        lambda one: replace(
+            one, elements={k: v for k, v in one.elements.items() if k != "element"}
+        ),
+    )
     for to in ("vtp", "vtkhdf", "abaqus", "nastran"):
-        with pytest.raises(InputError, match=r"part\.vtp: has no element, .*; simulate again"):
+        said = r"arrays\.npz: damaged \(without elements\.element\); .*simulate again"
+        with pytest.raises(InputError, match=said):
             write_fields(folder, tmp_path / f"b.{to}", to)
 
 

@@ -21,8 +21,8 @@ from chamberopt.common.executor import SerialExecutor
 from chamberopt.coverage.part_impacts import Hits
 from chamberopt.design.load import Design, load_design, save_design
 from chamberopt.peening.calibration_errors import evaluate_calibrated
+from chamberopt.results.arrays_file import load_result_arrays
 from chamberopt.results.load import load_result
-from chamberopt.results.vtp_files import read_arrays
 from chamberopt.simulation import variations
 from chamberopt.simulation.evaluation import Evaluation
 from chamberopt.workflows import save_run
@@ -117,8 +117,8 @@ def test_a_result_of_a_calibrated_design_is_whole(tmp_path: Path) -> None:
     assert not [name for name in plain.metrics if name.startswith("almen")]
     slower = plain.metrics["saturation_time_s"].value / result.metrics["saturation_time_s"].value
     assert slower == pytest.approx(math.exp(0.3))
-    part = read_arrays(tmp_path / "result" / "part.vtp").cells
-    assert np.nanmax(part["almen_intensity_mmA"]) > 0.0
+    values = load_result_arrays(result).elements
+    assert np.nanmax(values["almen_intensity_mmA"]) > 0.0
 
 
 def test_a_harder_part_has_smaller_dents_without_a_run(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -10,7 +10,6 @@ from scipy.ndimage import binary_dilation
 from chamberopt.chamber.build import Chamber, build_chamber
 from chamberopt.cli import main
 from chamberopt.coverage.dents import Dents
-from chamberopt.coverage.field.display_mesh import DisplayField, DisplayMesh
 from chamberopt.design.load import load_design
 from chamberopt.geometry.triangles import area_vectors
 from chamberopt.pictures import picture_page
@@ -18,10 +17,11 @@ from chamberopt.pictures.camera import flat_normal
 from chamberopt.pictures.dents import dent_colours
 from chamberopt.pictures.drawn_part import DrawnPart
 from chamberopt.pictures.subprocess_drawing import missing_opengl
+from chamberopt.results.arrays_file import ARRAYS_FILE, read_result_arrays, save_result_arrays
 from chamberopt.results.impacts import dented_share, simulate_dents
 from chamberopt.results.load import Result
 from chamberopt.results.rebuild import rebuild_replica
-from chamberopt.results.vtp_files import FIELD_COLUMNS, read_surface, write_coverage
+from tests.helpers.results.arrays import plain_arrays
 from tests.helpers.results.dent_sides import dent_sides
 from tests.helpers.results.short_plate import plate_result
 from tests.helpers.results.sphere_in_sphere import ball_result
@@ -42,23 +42,9 @@ def plate() -> Chamber:
     return build_chamber(plate_design())
 
 
-def coverage_file(folder: Path, chamber: Chamber) -> Path:
-    """A coverage.vtp with the columns that a dent map needs."""
-    part = chamber.part
-    count, points = len(part.triangles), len(part.vertices)
-    none, nowhere = np.zeros(count), np.zeros(points)
-    values = dict.fromkeys(("coverage", "coverage_interval"), none)
-    values |= {
-        "impacts": none.astype(int),
-        "target": part.target.astype(np.uint8),
-        "element": part.elements,
-    }
-    upwards = np.tile([0.0, 0.0, 1.0], (points, 1))
-    mesh = DisplayMesh(part.vertices, part.triangles, upwards, nowhere, np.arange(count))
-    write_coverage(
-        folder, chamber, values, DisplayField(mesh, dict.fromkeys(FIELD_COLUMNS, nowhere))
-    )
-    return folder / "coverage.vtp"
+def arrays_file(folder: Path, chamber: Chamber) -> Path:
+    save_result_arrays(folder, plain_arrays(chamber))
+    return folder / ARRAYS_FILE
 
 
 def dents_at(places: list[tuple[float, float, float]], radius: float) -> Dents:
@@ -103,7 +89,7 @@ def target_pixels(image: np.ndarray) -> np.ndarray:
 @needs_opengl
 def test_one_dent_is_a_disc_of_its_diameter_at_its_place(plate: Chamber, tmp_path: Path) -> None:
     dents = dents_at([(1e-3, 2e-3, plate.height)], 0.4e-3)
-    file, area = coverage_file(tmp_path, plate), np.pi * 0.4**2
+    file, area = arrays_file(tmp_path, plate), np.pi * 0.4**2
     (flat, pixel), (slanted, wide) = dent_sides(file, tmp_path, dents, [BELOW, SLANTED], 1000)
     white = white_share(flat)
     assert white.sum() * pixel**2 == pytest.approx(area, rel=0.01)
@@ -124,7 +110,7 @@ def test_one_dent_is_a_disc_of_its_diameter_at_its_place(plate: Chamber, tmp_pat
 @pytest.mark.long
 @needs_opengl
 def test_a_rim_parts_large_dents_and_small_ones_have_none(plate: Chamber, tmp_path: Path) -> None:
-    file, rims = coverage_file(tmp_path, plate), []
+    file, rims = arrays_file(tmp_path, plate), []
     for radius in (0.4e-3, 0.1e-3):
         dents = dents_at([(0.0, 0.0, plate.height)], radius)
         ((image, _),) = dent_sides(file, tmp_path, dents, [BELOW], 1000, plain=False)
@@ -139,7 +125,7 @@ def test_a_rim_parts_large_dents_and_small_ones_have_none(plate: Chamber, tmp_pa
 @needs_opengl
 def test_the_later_dent_lies_on_top(plate: Chamber, tmp_path: Path) -> None:
     places = [(0.0, 0.0, plate.height), (0.3e-3, 0.0, plate.height)]
-    file, colours = coverage_file(tmp_path, plate), np.array([[255, 0, 0], [0, 255, 0]], np.uint8)
+    file, colours = arrays_file(tmp_path, plate), np.array([[255, 0, 0], [0, 255, 0]], np.uint8)
     images = []
     for order in ([0, 1], [1, 0]):
         dents = dents_at([places[k] for k in order], 0.3e-3)
@@ -158,7 +144,7 @@ def test_the_later_dent_lies_on_top(plate: Chamber, tmp_path: Path) -> None:
 def test_dents_on_the_far_side_and_behind_the_part_are_hidden(
     plate: Chamber, tmp_path: Path
 ) -> None:
-    file = coverage_file(tmp_path, plate)
+    file = arrays_file(tmp_path, plate)
     dents = dents_at([(0.0, 0.0, plate.height), (2e-3, 1e-3, plate.height)], 0.4e-3)
     (below, _), (above, _) = dent_sides(file, tmp_path, dents, [BELOW, ABOVE], 600)
     (bare_below, _), (bare_above, _) = dent_sides(
@@ -185,7 +171,7 @@ def test_the_share_of_colour_is_what_coverage_says(
 ) -> None:
     """Of the whole target, against sample points: flat, and with round teeth."""
     chamber = build_chamber(load_design(DESIGNS / f"{name}.toml"))
-    dents, file = random_dents(chamber, count, radius), coverage_file(tmp_path, chamber)
+    dents, file = random_dents(chamber, count, radius), arrays_file(tmp_path, chamber)
     view = BELOW if name == "plate" else (1.0, -1.4, -0.5)
     ((image, pixel),) = dent_sides(file, tmp_path, dents, [view], 1500)
     ((bare, _),) = dent_sides(file, tmp_path, dents_at([], 1.0), [view], 1500)
@@ -207,7 +193,7 @@ def test_the_share_of_colour_is_what_coverage_says(
 @needs_opengl
 def test_a_ball_is_drawn_round_and_without_cracks(tmp_path: Path) -> None:
     ball_result(tmp_path / "ball")
-    file = tmp_path / "ball" / "coverage.vtp"
+    file = tmp_path / "ball" / ARRAYS_FILE
     ((image, pixel),) = dent_sides(file, tmp_path, dents_at([], 1.0), [(-1.0, -0.5, 0.8)], 300)
     part = image.min(axis=2) < 240.0
     assert part.sum() * pixel**2 == pytest.approx(np.pi * 10.0**2, rel=0.02)
@@ -217,17 +203,17 @@ def test_a_ball_is_drawn_round_and_without_cracks(tmp_path: Path) -> None:
 @needs_opengl
 def test_no_dents_leave_the_target_black(plate: Chamber, tmp_path: Path) -> None:
     none = dents_at([], 1.0)
-    ((image, pixel),) = dent_sides(coverage_file(tmp_path, plate), tmp_path, none, [BELOW], 300)
+    ((image, pixel),) = dent_sides(arrays_file(tmp_path, plate), tmp_path, none, [BELOW], 300)
     area = plate.exposed_area[plate.part.target].sum() * 1e6
     assert target_pixels(image).sum() * pixel**2 == pytest.approx(area, rel=0.03)
     assert dented_share(none, plate) == 0.0
 
 
 def test_only_a_flat_target_is_seen_face_on(plate: Chamber, tmp_path: Path) -> None:
-    flat = DrawnPart(read_surface(coverage_file(tmp_path, plate)))
+    flat = DrawnPart(read_result_arrays(arrays_file(tmp_path, plate)).field)
     np.testing.assert_allclose(flat_normal(flat.whole), BELOW, atol=1e-6)
     gear = build_chamber(load_design(DESIGNS / "gear.toml"))
-    teeth = DrawnPart(read_surface(coverage_file(tmp_path, gear))).whole
+    teeth = DrawnPart(read_result_arrays(arrays_file(tmp_path, gear)).field).whole
     assert flat_normal(teeth) is None
 
 

@@ -14,7 +14,7 @@ from matplotlib.image import imread
 
 from chamberopt.cli import main
 from chamberopt.pictures.difference import draw_difference, write_differences
-from chamberopt.results.vtp_files import read_surface
+from chamberopt.results.arrays_file import read_result_arrays
 from tests.helpers.opengl import needs_opengl
 from tests.helpers.results.awkward_targets import TARGETS, parts
 
@@ -109,13 +109,13 @@ def test_every_kind_of_picture_shows_the_target(tmp_path: Path, name: str) -> No
 
 @needs_opengl
 def test_differences_are_drawn(case: tuple, tmp_path: Path) -> None:
-    field = case[0] / "coverage.vtp"
-    surface = read_surface(field)
+    surface = read_result_arrays(case[0] / "arrays.npz").field
     used = np.unique(np.asarray(surface.regular_faces)[np.asarray(surface["target"]) > 0])
     value = np.linspace(-0.2, 0.2, len(used))
-    write_differences(tmp_path / "difference.vtp", field, [(value, np.abs(value) > 0.05)])
+    columns = [(value, np.abs(value) > 0.05)]
+    write_differences(tmp_path / "difference.vtp", case[0], columns)
     picture = tmp_path / "difference.png"
-    assert draw_difference(tmp_path / "difference.vtp", ["two - one"], picture) is None
+    assert draw_difference(case[0], columns, ["two - one"], picture) is None
     assert colourful(picture) > 0.01
 
 

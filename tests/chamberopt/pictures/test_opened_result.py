@@ -74,12 +74,10 @@ def test_files_of_another_result_are_noticed(tmp_path: Path, ball: ResultInfo) -
     (folder / "hits.npz").unlink()
     with pytest.raises(InputError, match=r"hits\.npz: not there"):
         _ = OpenedResult(ball).hits
-    for name in ("chamber.vtp", "coverage.vtp", "part.vtp"):
-        own = (folder / name).read_bytes()
-        (folder / name).write_bytes(own + b" ")
-        with pytest.raises(InputError, match=rf"{name}: not the file .*: its sha256 is"):
-            OpenedResult(ball)
-        (folder / name).write_bytes(own)
+    with (folder / "arrays.npz").open("ab") as file:
+        file.write(b" ")
+    with pytest.raises(InputError, match=r"arrays\.npz: not the file .*: its sha256 is"):
+        OpenedResult(ball)
 
 
 def test_what_a_file_lacks_is_said(ball: ResultInfo) -> None:

@@ -103,7 +103,7 @@ def test_screenshot_without_a_display(
     monkeypatch.delenv("DISPLAY", raising=False)
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
     subject, look = (
-        ResultInfo(str(case[0]), "a plate", 5.0, 25.0, {"part.vtp": "0"}),
+        ResultInfo(str(case[0]), "a plate", 5.0, 25.0, {"arrays.npz": "0"}),
         ViewState("speed", below=90.0),
     )
     inspect([subject], look, tmp_path / "shot.png")

@@ -18,8 +18,8 @@ from chamberopt.documents.wording import with_interval
 from chamberopt.pictures.drawn_part import DrawnPart
 from chamberopt.pictures.part3d import part_scene
 from chamberopt.printers.report_page import write_part_page, write_report
+from chamberopt.results.arrays_file import load_result_arrays, read_result_arrays
 from chamberopt.results.load import load_result
-from chamberopt.results.vtp_files import read_surface
 from tests.helpers.results.digests import replace_result
 from tests.helpers.results.report_folders import simulated, studied
 
@@ -200,8 +200,8 @@ def test_markup_in_names_and_notes_stays_text(simulation: Path, tmp_path: Path) 
 
 
 def test_the_page_carries_the_columns_of_the_target(simulation: Path, tmp_path: Path) -> None:
-    part = DrawnPart(read_surface(simulation / "coverage.vtp")).target
-    own = read_surface(simulation / "part.vtp")
+    arrays = read_result_arrays(simulation / "arrays.npz")
+    part, own = DrawnPart(arrays.field).target, arrays.elements
     carried = Page(write_report(simulation, tmp_path / "page.html")[0]).parts()
     (scene,) = carried["scenes"]
     for name, column, factor in (
@@ -285,8 +285,8 @@ def test_pilot_estimates_of_each_effect_are_shown(simulation: Path, tmp_path: Pa
 
 
 def test_a_part_too_large_for_a_page_is_reduced_with_a_remark(simulation: Path) -> None:
-    result, surface = load_result(simulation), read_surface(simulation / "coverage.vtp")
-    target = int((surface["target"] > 0).sum())
+    result = load_result(simulation)
+    target = int((load_result_arrays(result).field["target"] > 0).sum())
     less = part_scene(result, "", max_triangles=target)
     assert any("only its target is drawn" in remark for remark in less.remarks)
     assert "rest" not in less.data["surfaces"]
@@ -295,11 +295,11 @@ def test_a_part_too_large_for_a_page_is_reduced_with_a_remark(simulation: Path) 
     assert any("chamberopt inspect shows it" in remark for remark in none.remarks)
 
 
-def test_a_surface_of_another_result_is_refused(study: Path, tmp_path: Path) -> None:
+def test_arrays_of_another_result_is_refused(study: Path, tmp_path: Path) -> None:
     mixed = tmp_path / "mixed"
     shutil.copytree(study, mixed)
-    shutil.copy(study / "start" / "coverage.vtp", mixed)
-    with pytest.raises(InputError, match=r"coverage\.vtp: not the file that was written"):
+    shutil.copy(study / "start" / "arrays.npz", mixed)
+    with pytest.raises(InputError, match=r"arrays\.npz: not the file that was written"):
         write_report(mixed)
 
 

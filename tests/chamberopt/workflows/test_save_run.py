@@ -12,9 +12,9 @@ from chamberopt.common.errors import InputError
 from chamberopt.common.executor import SerialExecutor
 from chamberopt.design.load import load_design
 from chamberopt.documents.report import report
-from chamberopt.results.chamber_file import load_chamber
+from chamberopt.results.arrays_file import load_result_arrays
 from chamberopt.results.compare.comparison import compare
-from chamberopt.results.load import load_part, load_result, summary
+from chamberopt.results.load import load_result, summary
 from chamberopt.search.study import Study
 from chamberopt.viewer.opened_result import OpenedResult, result_info
 from chamberopt.viewer.view_state import ViewState
@@ -52,8 +52,9 @@ def test_zones_read_back_and_are_shown_from_the_folder_alone(tmp_path: Path) -> 
     assert found.name == "left"
     assert 0.4 < found.reachable_share < 0.6  # of what is a lid too, outside the chamber
     assert found.limits[0].standing == "not met"
-    assert load_chamber(result).part.zones["left"].sum() == found.triangles
-    part = load_part(result)
+    arrays = load_result_arrays(result)
+    assert arrays.chamber.part.zones["left"].sum() == found.triangles
+    part = arrays.elements
     assert part["zone"].sum() == part["zone_left"].sum() == found.triangles
     document = report(load_result(moved))
     tables = {one.title: one.content for one in document.sections}
@@ -82,7 +83,7 @@ def test_simulation_reads_back(tmp_path: Path) -> None:
         "coverage.vtp",
         "part.vtp",
         "hits.npz",
-        "chamber.npz",
+        "arrays.npz",
         "chamber.stl",
         "chamber.vtp",
     }
@@ -136,7 +137,7 @@ def test_a_study_leaves_everything_and_its_best_design_can_be_used(tmp_path: Pat
     assert names == {
         "design.toml", "study.toml", "history.jsonl", "history.csv", "best.toml", "result.json",
         "coverage.vtp", "part.vtp", "chamber.stl", "chamber.vtp", "convergence.png", "slices.png",
-        "chamber.npz", "start", "inputs.json", "timings.jsonl", "confirm", "hits.npz",
+        "arrays.npz", "start", "inputs.json", "timings.jsonl", "confirm", "hits.npz",
     }  # fmt: skip
     result = load_result(folder)
     assert result.record.kind == "study"

@@ -14,11 +14,11 @@ from chamberopt.pictures import dents as dent_map
 from chamberopt.pictures.actors import Discs
 from chamberopt.pictures.drawn_part import DrawnPart
 from chamberopt.pictures.subprocess_drawing import without_display
-from chamberopt.results.vtp_files import read_surface
+from chamberopt.results.arrays_file import read_result_arrays
 
 
 def dent_sides(
-    coverage: Path,
+    arrays: Path,
     scratch: Path,
     dents: Dents,
     views: list[tuple[float, float, float]],
@@ -28,7 +28,7 @@ def dent_sides(
 ) -> list[tuple[np.ndarray, float]]:
     """Image (rows, columns, 3), 0..255, and pixel size [mm] of the target from each view.
 
-    coverage: a coverage.vtp; colours: of the dents, uint8 (k, 3), white if left out.
+    arrays: an arrays.npz; colours: of the dents, uint8 (k, 3), white if left out.
     plain: in these very colours, without light, shade and rims.
     """
     if colours is None:
@@ -37,7 +37,7 @@ def dent_sides(
         scratch / "dents.npz", place=1e3 * dents.place, normal=-dents.normal,
         radius=1e3 * dents.radius, colour=colours, views=views, pixels=pixels, plain=plain,
     )  # fmt: skip
-    command = [sys.executable, "-m", __name__, str(coverage), str(scratch)]
+    command = [sys.executable, "-m", __name__, str(arrays), str(scratch)]
     subprocess.run(command, check=True, env=without_display(), cwd=Path(__file__).parents[3])
     with np.load(scratch / "sides.npz") as sides:
         return [
@@ -47,7 +47,7 @@ def dent_sides(
 
 
 if __name__ == "__main__":
-    part, folder = DrawnPart(read_surface(Path(sys.argv[1]))), Path(sys.argv[2])
+    part, folder = DrawnPart(read_result_arrays(Path(sys.argv[1])).field), Path(sys.argv[2])
     found = {}
     with np.load(folder / "dents.npz") as given:
         discs = Discs(*(given[name] for name in Discs._fields))

@@ -4,16 +4,20 @@ import json
 import sys
 from dataclasses import asdict, replace
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import trimesh
 
+from chamberopt.chamber.build import Chamber
+from chamberopt.chamber.part import Part, PartOfFile
 from chamberopt.coverage.field.display_mesh import DisplayField, DisplayMesh
 from chamberopt.coverage.part_impacts import Hits, save_hits, sort_hits_by_triangle
+from chamberopt.geometry.meshes.part_mesh import PartMesh
+from chamberopt.geometry.meshes.raw_mesh import ElementNumbers
 from chamberopt.pictures.quantities import QUANTITIES
-from chamberopt.results.vtp_files import pyvista, write_chamber, write_coverage
+from chamberopt.results.arrays_file import ResultArrays, save_result_arrays
+from chamberopt.results.vtp_files import pyvista
 from chamberopt.results.write import data_digests
 from chamberopt.viewer.opened_result import ResultInfo
 from chamberopt.viewer.view_state import ViewState
@@ -35,18 +39,11 @@ def ball_result(folder: Path, moved: float = 0.0, lost: int = 0) -> ResultInfo:
         trimesh.creation.icosphere(subdivisions=3, radius=radius) for radius in (0.01, 0.02)
     )
     kept = np.arange(len(ball.faces)) % lost != 0 if lost else np.ones(len(ball.faces), dtype=bool)
-    faces, middle = np.asarray(ball.faces)[kept], ball.triangles_center[kept]
+    faces, middle = np.asarray(ball.faces, np.int32)[kept], ball.triangles_center[kept]
     count = len(faces)
-    tags = np.where(room.triangles_center[:, 2] < -0.015, 1, 2).astype(np.uint8)
     vertices = ball.vertices + np.array([moved * 1e-3, 0.0, 0.0])
-    chamber: Any = SimpleNamespace(
-        part=SimpleNamespace(vertices=vertices, triangles=faces),
-        vertices=np.asarray(room.vertices),
-        triangles=np.asarray(room.faces),
-        tags=tags,
-        source=tags,
-        fitting=None,
-    )
+    target = middle[:, 0] < 0.008
+    chamber = _chamber(room, vertices, faces, target)
     impacts = np.arange(count) % 5
     hits = Hits(
         np.repeat(np.arange(count), impacts),
@@ -56,22 +53,20 @@ def ball_result(folder: Path, moved: float = 0.0, lost: int = 0) -> ResultInfo:
     hits = replace(
         hits, speed=np.concatenate([np.arange(1, n + 1) for n in impacts]).astype(np.float32)
     )
-    target = middle[:, 0] < 0.008
     values = {
         **_fields(middle[:, 2]),
         "impacts": impacts,
         "dents": np.full(count, 20),
-        "exposed_area_mm2": np.ones(count),
+        "exposed_area_mm2": 1e6 * chamber.exposed_area,
         "target": target.astype(np.uint8),
-        "element": np.arange(count) + 1000,
+        "element": chamber.part.elements,
         "mean_normal_speed": np.where(impacts > 0, (1.0 + impacts) / 2.0, np.nan),
     }
     fields = _fields(ball.vertices[:, 2])
     mesh = DisplayMesh(
-        vertices, faces, ball.vertices / 0.01, np.zeros(len(vertices)), np.arange(count)
+        vertices, faces, ball.vertices / 0.01, np.zeros(len(vertices), int), np.arange(count)
     )
-    write_coverage(folder, chamber, values, DisplayField(mesh, fields))
-    write_chamber(folder, chamber)
+    save_result_arrays(folder, ResultArrays(chamber, values, DisplayField(mesh, fields)))
     save_hits(folder / "hits.npz", sort_hits_by_triangle([hits], count))
     return ResultInfo(
         folder=str(folder),
@@ -79,6 +74,27 @@ def ball_result(folder: Path, moved: float = 0.0, lost: int = 0) -> ResultInfo:
         treatment_s=TREATMENT,
         longest_s=50.0,
         sha256=data_digests(folder),
+    )
+
+
+def _chamber(
+    room: trimesh.Trimesh, vertices: np.ndarray, faces: np.ndarray, target: np.ndarray
+) -> Chamber:
+    """The room round the ball with the lowest part of its wall as the sonotrode."""
+    count, area = len(faces), np.full(len(faces), 1e-6)
+    numbers = ElementNumbers(np.arange(count) + 1000, np.zeros(count, np.int8))
+    mesh = PartMesh(vertices, faces, numbers, (), "")
+    file = PartOfFile(mesh, None, np.eye(3), np.zeros(3))
+    wall = np.where(room.triangles_center[:, 2] < -0.015, 1, 2).astype(np.uint8)
+    return Chamber(
+        vertices=np.concatenate([room.vertices, vertices]),
+        triangles=np.concatenate([room.faces, faces[:, ::-1] + len(room.vertices)]).astype("i4"),
+        tags=np.concatenate([wall, np.zeros(count, np.uint8)]),
+        source=np.concatenate([np.full(len(wall), -1), np.arange(count)]),
+        volume=room.volume,
+        part=Part(vertices, faces, area, target, "ball", unit="m", file=file),
+        exposed_area=area,
+        notes=(),
     )
 
 

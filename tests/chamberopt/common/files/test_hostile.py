@@ -113,7 +113,7 @@ CASES: dict[str, tuple[Change, str, int]] = {
     "of times that were cut off": (torn("begun/timings.jsonl"), RESUME, 0),
     "of a design of a study": (hard_link("begun/best.toml"), RESUME, 0),
     "a pipe for a result": (pipe("given/result.json"), "report given", 2),
-    "a pipe for a part": (pipe("given/part.vtp"), "report given", 2),
+    "a pipe for arrays": (pipe("given/arrays.npz"), "report given", 2),
     "a pipe for a page": (pipe("given/report.html"), "report given", 2),
     "a pipe for a lock": (pipe("given/.lock-report.html"), "report given", 2),
     "a pipe for a lock of a study": (pipe("begun/.lock"), RESUME, 2),

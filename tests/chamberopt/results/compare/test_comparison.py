@@ -18,13 +18,14 @@ from chamberopt.coverage.compression import ERROR
 from chamberopt.coverage.metrics import NEVER, find_metric
 from chamberopt.design.load import load_design
 from chamberopt.documents.comparison import comparison_text
+from chamberopt.results.arrays_file import ResultArrays
 from chamberopt.results.command_records import difference_record
 from chamberopt.results.compare.comparison import compare
 from chamberopt.results.compare.difference import MAX_TIME_RATIO, confidence_of_each, difference
-from chamberopt.results.vtp_files import read_surface
 from chamberopt.workflows import comparison_folder
 from chamberopt.workflows.comparison_folder import write_comparison
 from chamberopt.workflows.save_run import save_simulation
+from tests.helpers.results.arrays import change_arrays
 from tests.helpers.results.digests import accept_changes
 from tests.helpers.synthetic import DESIGNS, machine_values, plate_design, poisson_evaluation
 
@@ -219,18 +220,24 @@ def test_single_impacts_of_another_result_are_refused(tmp_path: Path) -> None:
     accept_changes(tmp_path / "b")
     both = compare([tmp_path / "a", tmp_path / "b"])
     with pytest.raises(
-        InputError, match=r"hits\.npz: its impacts are not those of the part\.vtp beside it"
+        InputError, match=r"hits\.npz: its impacts are not those of the arrays\.npz beside it"
     ):
         write_comparison(tmp_path / "out", both)
     assert not (tmp_path / "out").exists()
 
 
+def _with_less_target(arrays: ResultArrays) -> ResultArrays:
+    part = arrays.chamber.part
+    target = part.target.copy()
+    target[np.flatnonzero(target)[:3]] = False
+    chamber = replace(arrays.chamber, part=replace(part, target=target))
+    elements = {**arrays.elements, "target": target.astype(np.uint8)}
+    return replace(arrays, chamber=chamber, elements=elements)
+
+
 def test_targets_of_other_triangles_are_refused(tmp_path: Path) -> None:
     both = compare([left(tmp_path / "a", 20), left(tmp_path / "b", 30)])
-    surface = read_surface(tmp_path / "b" / "part.vtp")
-    surface["target"][np.flatnonzero(surface["target"])[:3]] = 0
-    surface.save(tmp_path / "b" / "part.vtp")
-    accept_changes(tmp_path / "b")
+    change_arrays(tmp_path / "b", _with_less_target)
     both = compare([tmp_path / "a", tmp_path / "b"])
     with pytest.raises(InputError, match="its target of 333 triangles is not that of"):
         write_comparison(tmp_path / "out", both)

@@ -21,7 +21,7 @@ from chamberopt.results.compare.local_difference import (
     read_target_surface,
 )
 from chamberopt.results.load import load_result
-from chamberopt.results.vtp_files import read_surface
+from chamberopt.results.vtp_files import pyvista
 from chamberopt.workflows.save_run import save_simulation
 from tests.helpers.synthetic import evaluation_of, plate_design, random_dents
 
@@ -130,11 +130,12 @@ def test_the_picture_is_violet_where_more_orange_where_less_and_pale_between(
     shares = []
     for name, real in (("all", np.ones(len(right), dtype=bool)), ("right", right)):
         vtp = tmp_path / f"{name}.vtp"
-        write_differences(vtp, tmp_path / "a" / "coverage.vtp", [(value, real)])
-        written = read_surface(vtp)
+        write_differences(vtp, tmp_path / "a", [(value, real)])
+        written = pyvista().read(vtp)
         on_target = np.unique(written.regular_faces[written["target"] > 0])
         assert written["difference_1"][on_target] == pytest.approx(100.0 * value)
-        assert draw_difference(vtp, ["b less a"], tmp_path / f"{name}.png") is None
+        picture = tmp_path / f"{name}.png"
+        assert draw_difference(tmp_path / "a", [(value, real)], ["b less a"], picture) is None
         image = imread(tmp_path / f"{name}.png")[..., :3]
         view = image[:-110, :-150]  # without the axes and the colour bar, which has all colours
         violet, orange = (view[..., i] - view[..., j] > 16 / 255 for i, j in ((2, 1), (0, 2)))
