@@ -29,7 +29,6 @@ from chamberopt.geometry.smoothing.rounds import find_edges, is_hard
 from chamberopt.geometry.smoothing.smooth import Surfaces, divide_rounds, find_surfaces, moves
 from chamberopt.geometry.solids import simplify_planes
 from chamberopt.geometry.triangles import angles_between, areas, tetrahedron_volumes, unit_normals
-from sim_core import user_cache
 
 if TYPE_CHECKING:
     from chamberopt.geometry.smoothing.divide import Surface
@@ -63,6 +62,8 @@ def kept(
         key: name of the record, such as a digest of all on which it depends.
         make: called to make the record.
     """
+    from sim_core import user_cache
+
     cache = user_cache()
     if cache is None:
         return make()
