@@ -23,7 +23,7 @@ ORDER = {
     "healing+elements+step_tessellation abaqus+gmsh+nastran+obj+ply+step+stl+threemf+vtk formats "
     "part_mesh",
     "chamberopt/design": (
-        "table_base materials shapes effects+part+process+shot+sonotrode "
+        "shape_surface+table_base materials shapes effects+part+process+shot+sonotrode "
         "almen_strip+calibration+tolerances+zones design load"
     ),
     "chamberopt/chamber": (
@@ -33,7 +33,7 @@ ORDER = {
     "chamberopt/coverage": "dents part_impacts+metrics field coverage_from_impacts "
     "percentile coverage_intervals strength strength_intervals compression",
     "chamberopt/simulation": "resting_balls replicas evaluation estimates evaluate "
-    "time_curve field_values variations effect_pilot error_law convergence recommendation",
+    "time_curve field_values variations advice effect_pilot error_law convergence recommendation",
     "chamberopt/peening": "strip+calibration_errors kirk_fit+strip_holder responses tolerances "
     "measured probes virtual_strip posterior setups calibrate next_measurement",
     "chamberopt/search": "study+optimiser trial_log study_folder "

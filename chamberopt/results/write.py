@@ -61,7 +61,7 @@ if TYPE_CHECKING:
     from chamberopt.search.run_sweep import SweepResult
     from chamberopt.search.sensitivity import Sensitivity
     from chamberopt.search.trial_log import Trial
-    from chamberopt.simulation.effect_pilot import Advice
+    from chamberopt.simulation.advice import Advice
     from chamberopt.simulation.evaluation import Evaluation
 
 

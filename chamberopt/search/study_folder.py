@@ -31,7 +31,7 @@ from chamberopt.coverage.metrics import metric_names
 from chamberopt.design.design import Design
 from chamberopt.search.study.parameters import ParameterSpace
 from chamberopt.search.trial_log import DAMAGED, HISTORY, TIMINGS, JsonLines, Trial, read_seconds
-from chamberopt.simulation.effect_pilot import Advice
+from chamberopt.simulation.advice import Advice
 from chamberopt.simulation.evaluation import Evaluation, load_evaluation, save_evaluation
 
 if TYPE_CHECKING:

@@ -24,6 +24,7 @@ from chamberopt.chamber.scene import balls_can_rest, chamber_mesh
 from chamberopt.common.estimate import Estimate, estimate
 from chamberopt.coverage.coverage_from_impacts import coverage_from_dent_density
 from chamberopt.coverage.metrics import exposed_target
+from chamberopt.simulation.advice import Advice, verdict_on
 from chamberopt.simulation.evaluate import require_figures
 from chamberopt.simulation.replicas import ReplicaSetting, simulate_replicas
 from chamberopt.simulation.variations import RunsProgress
@@ -60,57 +61,6 @@ SWITCHED = {
     "drag": (True, False),
     "rest": (True, False),
 }
-
-
-@dataclass(frozen=True)
-class Advice:
-    """The changes by one physical effect, such as gravity, and the advice that follows."""
-
-    effect: str
-    on: bool  # whether the design has it on
-    reason: str  # its importance by a dimensionless group
-    # Change of each figure in MEASURED when the effect is switched on, with its 95 % interval. A
-    # speed changes by a share of itself, a coverage by a difference.
-    changes: dict[str, Estimate]
-    accuracy: float  # changes below do not matter
-
-    @property
-    def verdict(self) -> str:
-        return _verdict(self.changes, self.accuracy)
-
-    @property
-    def largest_change(self) -> float:
-        return max(abs(change.value) for change in self.changes.values())
-
-    def __str__(self) -> str:
-        """Return the advice as a sentence for the user."""
-        name, largest = max(self.changes.items(), key=lambda item: abs(item[1].value))
-        change = f"{100 * largest.value:+.2g} ± {100 * largest.half_width:.1g} %"
-        at = f"at {100 * self.accuracy:g} %"
-        advice = {
-            ("matters", True): "needed",
-            ("matters", False): "switch it on",
-            ("makes no difference", True): f"off is safe {at}",
-            ("makes no difference", False): f"off is safe {at}",
-            ("undecided", True): f"not decided {at}: keep it",
-            ("undecided", False): f"not decided {at}: on is the safe side",
-        }[self.verdict, self.on]
-        state = "on" if self.on else "off"
-        return (
-            f"{self.effect} is {state}: {advice} "
-            f"({self.reason}; pilot runs: it changes the {name} by {change})"
-        )
-
-
-def _verdict(changes: Mapping[str, Estimate], accuracy: float) -> str:
-    """Return whether changes matter at an accuracy: "matters", "makes no difference" or
-    "undecided".
-    """
-    if all(abs(one.value) + one.half_width <= accuracy for one in changes.values()):
-        return "makes no difference"
-    if any(abs(one.value) - one.half_width > accuracy for one in changes.values()):
-        return "matters"
-    return "undecided"
 
 
 def advise(
@@ -161,7 +111,7 @@ def with_effects_resolved(
     off = [one.effect for one in advice if one.verdict == "makes no difference"]
     while len(off) > 1:
         without = pilot.measure(dict.fromkeys(off, False))
-        if _verdict(_changes(pilot.unchanged, without), ACCURACY) != "matters":
+        if verdict_on(_changes(pilot.unchanged, without), ACCURACY) != "matters":
             break
         off = off[1:]
     return _switched(complete, dict.fromkeys(off, False)), advice

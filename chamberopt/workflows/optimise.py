@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from chamberopt.search.run_study import StudyResult
     from chamberopt.search.study import Study
     from chamberopt.search.study_folder import StudyFolder
-    from chamberopt.simulation.effect_pilot import Advice
+    from chamberopt.simulation.advice import Advice
 
 
 @dataclass(frozen=True)

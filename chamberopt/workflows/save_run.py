@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from chamberopt.search.candidate import ConfirmedCandidate
     from chamberopt.search.run_study import StudyResult
     from chamberopt.search.run_sweep import SweepResult
-    from chamberopt.simulation.effect_pilot import Advice
+    from chamberopt.simulation.advice import Advice
     from chamberopt.simulation.evaluation import Evaluation
 
 

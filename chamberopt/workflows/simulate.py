@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from chamberopt.common.progress import Progress
     from chamberopt.design.load import Design
     from chamberopt.peening.tolerances import ToleranceResult
-    from chamberopt.simulation.effect_pilot import Advice
+    from chamberopt.simulation.advice import Advice
     from chamberopt.simulation.evaluation import Evaluation
     from sim_core import AnalyticCavity
 

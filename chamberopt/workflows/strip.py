@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from chamberopt.design.almen_strip import StripType
     from chamberopt.design.load import Design
     from chamberopt.peening.virtual_strip import VirtualStrip
-    from chamberopt.simulation.effect_pilot import Advice
+    from chamberopt.simulation.advice import Advice
 
 
 class StripPlace(NamedTuple):

@@ -24,7 +24,7 @@ from chamberopt.results.load import load_result
 from chamberopt.search.study import Objective, Study
 from chamberopt.search.study.parameters import Varied
 from chamberopt.search.study_folder import StudyFolder, open_study_folder
-from chamberopt.simulation.effect_pilot import Advice
+from chamberopt.simulation.advice import Advice
 from chamberopt.simulation.evaluation import Evaluation, load_evaluation, save_evaluation
 from tests.helpers.results.resumable_study import GEAR, calls, history, logged, run, study
 from tests.helpers.synthetic import DESIGNS, plate_design, poisson_evaluation

@@ -22,7 +22,8 @@ from chamberopt.design.design import validate
 from chamberopt.design.load import Design
 from chamberopt.results.write import advice_record
 from chamberopt.simulation import effect_pilot
-from chamberopt.simulation.effect_pilot import MEASURED, Advice, advise, with_effects_resolved
+from chamberopt.simulation.advice import Advice
+from chamberopt.simulation.effect_pilot import MEASURED, advise, with_effects_resolved
 from chamberopt.simulation.replicas import ReplicaSetting
 from tests.helpers.synthetic import dents_at, plate_design
 
