@@ -17,7 +17,6 @@ import numpy as np
 
 from chamberopt.common import toml_errors
 from chamberopt.common.errors import InputError
-from chamberopt.design.calibration import why_no_intensity
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
@@ -83,7 +82,7 @@ def _impacts_per_mm2_s(impacts: TargetImpacts, design: Design) -> float:
 
 
 def _why_no_intensity(design: Design) -> str:
-    return why_no_intensity(design.calibration)
+    return design.why_no_intensity
 
 
 def _shot_count(impacts: TargetImpacts, design: Design) -> float:

@@ -22,6 +22,7 @@ from chamberopt.common.toml_fields import Several, from_file, list_field
 from chamberopt.design.calibration import (
     CalibrationField,
     calibration_problems,
+    why_no_intensity,
     with_measured_values,
 )
 from chamberopt.design.effects import Effects
@@ -226,6 +227,11 @@ class Design(FileTable):
         """
         fields = SHAPES[shape].model_fields.items()
         return {f"chamber.{key}": field.annotation is int for key, field in fields}
+
+    @property
+    def why_no_intensity(self) -> str:
+        """The reason why the design has no Almen intensity; an empty text if it has one."""
+        return why_no_intensity(self.calibration)
 
     def why_fixed(self, name: str) -> str:
         """Return why a study cannot vary the number at a dotted name; an empty text if it can."""

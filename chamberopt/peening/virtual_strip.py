@@ -22,7 +22,7 @@ from chamberopt.common.errors import InputError
 from chamberopt.common.estimate import FIRST_OF_CALIBRATION
 from chamberopt.common.number_text import plain
 from chamberopt.design.almen_strip import OVER_A, USED_FOR
-from chamberopt.design.calibration import TIME_ERROR, calibrated_strip, why_no_intensity
+from chamberopt.design.calibration import TIME_ERROR, calibrated_strip
 from chamberopt.peening.calibration_errors import moved_designs, slope
 from chamberopt.peening.kirk_fit import MULTIPLES, KirkFit, heights, kirk_fits, strip_saturation
 from chamberopt.peening.probes import impacts_of
@@ -189,7 +189,7 @@ def peen_strip(
     intensity, time, *rest = _as_measured(setting, dents, found, slopes, [*at, *drawn_at])
     points, drawn = rest[: len(at)], rest[len(at) :]
     slower = time.value / first.time.value
-    why_not = why_no_intensity(design.calibration)
+    why_not = design.why_no_intensity
     return VirtualStrip(
         setting=setting,
         unit=_unit(setting),
