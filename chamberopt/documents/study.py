@@ -36,7 +36,7 @@ from chamberopt.pictures.charts.study import (
     convergence_figure,
     influence_figure,
 )
-from chamberopt.search.ask_and_tell import POINTS_PER_PARAMETER
+from chamberopt.search.optimiser.search_model import POINTS_PER_PARAMETER
 from chamberopt.search.sensitivity import Slice
 from chamberopt.search.study_folder import STUDY
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from chamberopt.common.errors import InputError
 from chamberopt.common.estimate import Estimate
-from chamberopt.common.files import RESULT, open_plain, require_plain_folder
+from chamberopt.common.files import INPUTS, RESULT, open_plain, require_plain_folder
 from chamberopt.common.limits import MAX_RESULT_BYTES, parse_json, read_limited
 from chamberopt.common.number_text import estimate_text, plain
 from chamberopt.coverage.metrics import find_metric
@@ -27,7 +27,6 @@ from chamberopt.results.records import (
     StudyRecord,
     read_record,
 )
-from chamberopt.search.study_folder import is_study_folder
 from chamberopt.search.trial_log import HISTORY, TIMINGS, read_trials
 
 if TYPE_CHECKING:
@@ -119,7 +118,7 @@ def load_result(path: str | Path) -> Result:
     file = path if path.name == RESULT else path / RESULT
     folder = file.parent
     if not file.is_file():
-        if is_study_folder(folder) or (folder / HISTORY).is_file():
+        if any((folder / name).is_file() for name in (INPUTS, HISTORY)):
             raise InputError(
                 f"{folder}: this study or sweep has not finished, {RESULT} is missing; continue it "
                 "with the command that began it, such as: "

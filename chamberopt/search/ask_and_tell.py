@@ -36,7 +36,7 @@ from chamberopt.search.observe import FIRST_OBJECTIVE, observe
 from chamberopt.search.optimiser.acquisition import recommend_points
 from chamberopt.search.optimiser.point_search import PARETO_PHASES, PointSearch
 from chamberopt.search.optimiser.scalarisation import draw_weights
-from chamberopt.search.optimiser.search_model import Observations, SearchModel
+from chamberopt.search.optimiser.search_model import POINTS_PER_PARAMETER, Observations, SearchModel
 from chamberopt.search.study.constraints import NOT_KNOWN, assess_feasibility
 from chamberopt.search.study.parameters import ParameterSpace
 from chamberopt.search.trial_log import HISTORY, Trial
@@ -48,8 +48,6 @@ if TYPE_CHECKING:
 
 # Candidates nearer to each other than this share of the bounds count as one in the confirmation.
 MIN_DISTANCE = 0.02
-# With fewer points for each parameter the length scales of a model are not determined.
-POINTS_PER_PARAMETER = 4
 
 Answer = Evaluation | Mapping[str, Estimate | float] | InputError | str
 """The evaluation of a simulation, measured figures by their names, or why there are none."""

@@ -18,6 +18,8 @@ from chamberopt.search.optimiser.gaussian_process import GaussianProcess
 MAX_DEPTH = 3.0
 # Of 1 where a candidate could be simulated and 0 where it could not.
 LEAST_SIMULATED = 0.5
+# With fewer points for each parameter the length scales of a model are not determined.
+POINTS_PER_PARAMETER = 4
 
 
 @dataclass(frozen=True)
