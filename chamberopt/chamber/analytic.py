@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from chamberopt.common.errors import InputError
-from chamberopt.design.shapes import TAG_PART, TAG_SONOTRODE, TAG_WALL
+from chamberopt.design.shape_surface import TAG_PART, TAG_SONOTRODE, TAG_WALL
 from chamberopt.design.shapes.straight import Cylinder
 from chamberopt.geometry.triangles import area_vectors, tetrahedron_volumes
 

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from chamberopt.common.errors import InputError
-from chamberopt.design.shapes import (
+from chamberopt.design.shape_surface import (
     TAG_PART,
     TAG_SONOTRODE,
     TAG_WALL,

@@ -27,7 +27,12 @@ from chamberopt.chamber.bores_and_deflectors import (
 from chamberopt.chamber.part import Part, posed_part
 from chamberopt.chamber.reach import find_reach, reached_part_share
 from chamberopt.common.errors import InputError
-from chamberopt.design.shapes import TAG_PART, TAG_SONOTRODE, further_sonotrode_tag, is_sonotrode
+from chamberopt.design.shape_surface import (
+    TAG_PART,
+    TAG_SONOTRODE,
+    further_sonotrode_tag,
+    is_sonotrode,
+)
 from chamberopt.geometry.meshes.surface_error import SurfaceError, format_box, format_point
 from chamberopt.geometry.slivers import MIN_HEIGHT, remove_slivers
 from chamberopt.geometry.solids import (
@@ -48,7 +53,7 @@ from chamberopt.geometry.triangles import (
 
 if TYPE_CHECKING:
     from chamberopt.design.load import Design
-    from chamberopt.design.shapes.surface import ShapeSurface
+    from chamberopt.design.shape_surface import ShapeSurface
 
 # Rotation of a triangle by rounding [rad] that is worth a note. The facets of a round wall turn a
 # ball's path a hundred times as much.

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from chamberopt.chamber.largest_ball import TouchPoints, find_touch_points
-from chamberopt.design.shapes import TAG_PART, TAG_SONOTRODE
+from chamberopt.design.shape_surface import TAG_PART, TAG_SONOTRODE
 from chamberopt.geometry.triangles import area_vectors, areas, connected_pieces, unit_normals
 
 if TYPE_CHECKING:

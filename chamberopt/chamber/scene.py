@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from chamberopt.common.errors import InputError
-from chamberopt.design.shapes import TAG_PART, TAG_SONOTRODE, further_sonotrode_tag
+from chamberopt.design.shape_surface import TAG_PART, TAG_SONOTRODE, further_sonotrode_tag
 
 # A prediction compares a ball with every other ball. It takes about 40 µs for 20,000 balls, and
 # every ball needs about a thousand predictions a simulated second.

@@ -16,7 +16,7 @@ import numpy as np
 
 from chamberopt.chamber.bores_and_deflectors import fitting_names
 from chamberopt.common.files import make_output_folder, new_file
-from chamberopt.design.shapes import TAG_PART, TAG_SONOTRODE, TAG_WALL, further_sonotrode_tag
+from chamberopt.design.shape_surface import TAG_PART, TAG_SONOTRODE, TAG_WALL, further_sonotrode_tag
 from chamberopt.results.arrays_file import load_chamber
 from chamberopt.results.load import load_result
 from chamberopt.results.vtp_files import MM, write_stl

@@ -21,7 +21,7 @@ from chamberopt.chamber.part import preview_part
 from chamberopt.chamber.reach import reached_part_share
 from chamberopt.chamber.scene import chamber_mesh
 from chamberopt.design.design import Design
-from chamberopt.design.shapes import TAG_PART, is_sonotrode
+from chamberopt.design.shape_surface import TAG_PART, is_sonotrode
 from chamberopt.geometry.triangles import areas, sharp_edges
 
 # Kinds of the part's triangles, by which scene.js colours them.

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from chamberopt.design.shapes import TAG_WALL, is_sonotrode
+from chamberopt.design.shape_surface import TAG_WALL, is_sonotrode
 from chamberopt.pictures.charts.colours import FEW_DENTS, OUTSIDE, UNREACHED, zone_colour
 from chamberopt.pictures.drawn_part import DrawnPart
 from chamberopt.results.vtp_files import Surface, pyvista

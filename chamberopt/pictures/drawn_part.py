@@ -8,7 +8,7 @@ import numpy as np
 
 from chamberopt.common.errors import InputError
 from chamberopt.coverage.coverage_from_impacts import coverage_from_dent_density
-from chamberopt.design.shapes import TAG_PART
+from chamberopt.design.shape_surface import TAG_PART
 from chamberopt.geometry.triangles import area_vectors
 from chamberopt.pictures.quantities import QUANTITIES, Quantity
 from chamberopt.results.vtp_files import ZONE, Surface, pyvista

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from chamberopt.design.shapes import TAG_PART, is_sonotrode
+from chamberopt.design.shape_surface import TAG_PART, is_sonotrode
 from chamberopt.pictures.actors import add_chamber
 from chamberopt.pictures.camera import (
     cells_of,

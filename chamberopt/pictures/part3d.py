@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from chamberopt.design.shapes import TAG_PART, TAG_WALL, is_sonotrode
+from chamberopt.design.shape_surface import TAG_PART, TAG_WALL, is_sonotrode
 from chamberopt.pictures.charts.colours import FEW_DENTS, UNREACHED
 from chamberopt.pictures.drawn_part import DrawnPart, point_areas
 from chamberopt.pictures.quantities import QUANTITIES

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from chamberopt.common.number_text import typeset_plain as plain
-from chamberopt.design.shapes import TAG_PART, TAG_SONOTRODE, TAG_WALL
+from chamberopt.design.shape_surface import TAG_PART, TAG_SONOTRODE, TAG_WALL
 from chamberopt.geometry.triangles import border_edges
 from chamberopt.pictures.charts.colours import BLACK, BLUE, DARK_GREY, ORANGE
 from chamberopt.pictures.section import SAME, cut, face_size_mm, inside

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from chamberopt.design.shapes import TAG_SONOTRODE
+from chamberopt.design.shape_surface import TAG_SONOTRODE
 from chamberopt.geometry.triangles import border_edges
 
 if TYPE_CHECKING:

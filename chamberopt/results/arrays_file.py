@@ -20,7 +20,7 @@ from chamberopt.common.errors import InputError
 from chamberopt.common.limits import MAX_NUMBER
 from chamberopt.common.npz_files import is_of_type, load_record, save_record
 from chamberopt.coverage.field.display_mesh import DisplayField, DisplayMesh
-from chamberopt.design.shapes import TAG_PART, TAG_SONOTRODE
+from chamberopt.design.shape_surface import TAG_PART, TAG_SONOTRODE
 from chamberopt.geometry.meshes.part_mesh import PartMesh
 from chamberopt.geometry.meshes.raw_mesh import ElementNumbers
 from chamberopt.geometry.meshes.units import METRES_PER

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from chamberopt.chamber.checks.place_names import around, surface_names
-from chamberopt.design.shapes import TAG_PART
+from chamberopt.design.shape_surface import TAG_PART
 from chamberopt.geometry.triangles import closest_on_each, connected_pieces
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from chamberopt.common.errors import InputError
-from chamberopt.design.shapes import is_sonotrode
+from chamberopt.design.shape_surface import is_sonotrode
 from chamberopt.geometry.triangles import unit_normals
 from chamberopt.pictures import overlay
 from chamberopt.pictures.actors import (

@@ -21,7 +21,7 @@ from chamberopt.chamber.part import turning_axis
 from chamberopt.chamber.reach import Reach, find_reach, reached_part_share
 from chamberopt.chamber.replica_seed import replica_seed
 from chamberopt.chamber.scene import build_scene, chamber_mesh, require_ball_count, require_turnable
-from chamberopt.design.shapes import TAG_PART, TAG_SONOTRODE, TAG_WALL, is_sonotrode
+from chamberopt.design.shape_surface import TAG_PART, TAG_SONOTRODE, TAG_WALL, is_sonotrode
 from chamberopt.design.tolerances import require_tolerances, tolerance_box
 from chamberopt.geometry.triangles import areas, edge_keys, sides_of, tetrahedron_volumes
 

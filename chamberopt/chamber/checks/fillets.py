@@ -16,7 +16,7 @@ from chamberopt.chamber.checks.gaps import MAX_COSINE
 from chamberopt.chamber.checks.place_names import one_of
 from chamberopt.chamber.largest_ball import largest_balls
 from chamberopt.chamber.reach import TOLERATED_OVERLAP
-from chamberopt.design.shapes import TAG_PART
+from chamberopt.design.shape_surface import TAG_PART
 from chamberopt.geometry.triangles import area_vectors, edge_keys, sides_of
 
 if TYPE_CHECKING:

@@ -21,7 +21,7 @@ from chamberopt.chamber.checks.place_names import (
 )
 from chamberopt.chamber.largest_ball import TouchPoints
 from chamberopt.chamber.reach import TOLERATED_OVERLAP
-from chamberopt.design.shapes import TAG_PART, TAG_SONOTRODE, TAG_WALL
+from chamberopt.design.shape_surface import TAG_PART, TAG_SONOTRODE, TAG_WALL
 from chamberopt.geometry.triangles import area_vectors, connected_pieces, sides_of
 
 if TYPE_CHECKING:

@@ -34,7 +34,7 @@ from chamberopt.common.progress import step
 from chamberopt.common.toml_fields import MAX_COORDINATE_MM, allowed_range
 from chamberopt.design.design import Design, validate
 from chamberopt.design.materials import alloy, ball, balls
-from chamberopt.design.shapes import TAG_SONOTRODE
+from chamberopt.design.shape_surface import TAG_SONOTRODE
 from chamberopt.design.shapes.base import ParametricChamber
 from chamberopt.design.shot import ShotTable
 from chamberopt.geometry.meshes.part_mesh import PartMesh, read_part

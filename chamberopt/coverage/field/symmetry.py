@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from chamberopt.design.shapes import TAG_PART
+from chamberopt.design.shape_surface import TAG_PART
 from chamberopt.geometry.triangles import areas
 
 if TYPE_CHECKING:

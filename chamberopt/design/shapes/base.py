@@ -18,14 +18,13 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from chamberopt.common.toml_errors import CrossCheckError, Problem
 from chamberopt.common.toml_fields import Several, from_file, list_field, quantity
+from chamberopt.design.shape_surface import ShapeSurface, lofted
 from chamberopt.design.shapes import outlines
 from chamberopt.design.shapes.cad_setup import Setup
 from chamberopt.design.shapes.hole_and_deflector_tables import Deflector, Hole
-from chamberopt.design.shapes.surface import (
+from chamberopt.design.shapes.outlines import (
     MIN_LENGTH,
     MIN_LENGTH_MM,
-    ShapeSurface,
-    lofted,
     refuse_above,
     refuse_meeting_walls,
 )

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from chamberopt.common.errors import InputError
-from chamberopt.design.shapes.surface import TAG_PART, TAG_SONOTRODE, TAG_WALL, ShapeSurface
+from chamberopt.design.shape_surface import TAG_PART, TAG_SONOTRODE, TAG_WALL, ShapeSurface
 from chamberopt.geometry.meshes.part_mesh import (
     PartMesh,
     TriangleSoup,

@@ -17,15 +17,9 @@ from pydantic import Field, model_validator
 from chamberopt.common.errors import InputError
 from chamberopt.common.toml_errors import Problem
 from chamberopt.common.toml_fields import quantity
+from chamberopt.design.shape_surface import TAG_SONOTRODE, TAG_WALL, ShapeSurface
 from chamberopt.design.shapes.base import ParametricChamber
-from chamberopt.design.shapes.outlines import corner_arcs
-from chamberopt.design.shapes.surface import (
-    MIN_LENGTH,
-    TAG_SONOTRODE,
-    TAG_WALL,
-    ShapeSurface,
-    refuse_meeting_walls,
-)
+from chamberopt.design.shapes.outlines import MIN_LENGTH, corner_arcs, refuse_meeting_walls
 from chamberopt.design.table_base import SI
 from chamberopt.geometry.solids import Outline, extrude, plan_outline
 

@@ -17,8 +17,8 @@ from pydantic import ConfigDict, ValidationError, model_validator
 from chamberopt.common import toml_errors
 from chamberopt.common.errors import InputError
 from chamberopt.common.limits import MAX_TEXT_BYTES, read_limited
+from chamberopt.design.shape_surface import TAG_SONOTRODE, TAG_WALL, ShapeSurface
 from chamberopt.design.shapes.base import ChamberTable
-from chamberopt.design.shapes.surface import TAG_SONOTRODE, TAG_WALL, ShapeSurface
 from chamberopt.design.table_base import STRICT
 from chamberopt.geometry.meshes.self_intersection import refuse_self_intersection
 from chamberopt.geometry.meshes.surface_error import SurfaceError, format_point

@@ -19,9 +19,9 @@ from pydantic import Field
 
 from chamberopt.common.errors import InputError
 from chamberopt.common.toml_fields import File, Names, quantity
+from chamberopt.design.shape_surface import TAG_SONOTRODE, TAG_WALL, ShapeSurface
 from chamberopt.design.shapes.base import ChamberTable
 from chamberopt.design.shapes.cad_setup import Setup, read_setup
-from chamberopt.design.shapes.surface import TAG_SONOTRODE, TAG_WALL, ShapeSurface
 from chamberopt.geometry.meshes.units import Unit
 from chamberopt.geometry.solids import (
     SolidSurface,

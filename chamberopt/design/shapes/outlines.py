@@ -9,9 +9,49 @@ A profile is a line of points (r, z) [m], shape (n, 2), from the sonotrode's edg
     _:_______|   floor: from the axis to the first point, at z = 0
 """
 
+import math
+from collections.abc import Iterable
+
 import numpy as np
 
-from chamberopt.design.shapes.surface import MIN_LENGTH, ShapeSurface, lofted
+from chamberopt.common.toml_errors import CrossCheckError, Problem
+from chamberopt.design.shape_surface import ShapeSurface, lofted
+
+# Smallest lengths of a cavity, and errors that name the largest value that still makes a cavity.
+
+# Shorter sides and smaller radii count as 0 [m]: a fiftieth of usual shot, far above the grid that
+# solids are rounded to.
+MIN_LENGTH = 5e-5
+MIN_LENGTH_MM = 1e3 * MIN_LENGTH
+
+
+def refuse_above(key: str, given: float, limit: float, why: str) -> None:
+    """Raise CrossCheckError if the value of a key [mm or degrees] is larger than a limit.
+
+    The signs of both are ignored.
+
+    Args:
+        why: what is wrong with a larger value, for the message.
+    """
+    if abs(given) > abs(limit):
+        fits = math.trunc(limit * 1e3) / 1e3  # rounded towards 0, so that this value does fit
+        text = f"given {given:g}, {why}; {fits:.7g} is the furthest that fits"
+        raise CrossCheckError([Problem(key, text)])
+
+
+def refuse_meeting_walls(slope: float, limits: Iterable[float], inclination_deg: float) -> None:
+    """Raise CrossCheckError if walls lean in so far that they meet below the ceiling.
+
+    Args:
+        slope: tangent of the walls' outward inclination.
+        limits: least slope with which each wall does not meet another.
+        inclination_deg: the given inclination, for the message.
+    """
+    least = max(limits, default=-math.inf)
+    if slope < least:
+        why, limit_deg = "with which walls meet below the ceiling", math.degrees(math.atan(least))
+        refuse_above("inclination_deg", inclination_deg, limit_deg, why)
+
 
 # Convex outlines in plan: move their sides, round their corners.
 #

@@ -15,8 +15,7 @@ from pydantic import Field, field_validator
 from chamberopt.common.toml_errors import CrossCheckError, Problem
 from chamberopt.common.toml_fields import Pair, Several, list_field
 from chamberopt.design.shapes.base import RoundChamber
-from chamberopt.design.shapes.outlines import find_contact
-from chamberopt.design.shapes.surface import MIN_LENGTH, MIN_LENGTH_MM
+from chamberopt.design.shapes.outlines import MIN_LENGTH, MIN_LENGTH_MM, find_contact
 
 
 class Revolve(RoundChamber):

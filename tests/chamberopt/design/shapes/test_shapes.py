@@ -17,9 +17,9 @@ from shapely import affinity
 from chamberopt.chamber.build import build_chamber
 from chamberopt.common.errors import InputError
 from chamberopt.design.load import Design, load_design
+from chamberopt.design.shape_surface import ShapeSurface
 from chamberopt.design.shapes import SHAPES, TAG_SONOTRODE, TAG_WALL
 from chamberopt.design.shapes.custom import find_fault
-from chamberopt.design.shapes.surface import ShapeSurface
 from chamberopt.geometry.triangles import areas
 from chamberopt.simulation.convergence import FACETS, numerical_parameters
 
