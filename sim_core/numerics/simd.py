@@ -6,7 +6,7 @@ bit. Each filter has a numpy version that replaces it when numba's JIT is off.
 """
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
@@ -14,6 +14,9 @@ import numba
 import numpy as np
 from llvmlite import ir
 from numba.core import cgutils, types
+from numba.core.base import BaseContext
+from numba.core.typing.context import BaseContext as TypingContext
+from numba.core.typing.templates import Signature
 from numba.extending import intrinsic
 
 BOXES = 8  # children of a tree node
@@ -23,38 +26,42 @@ LANES = 2 * WIDTH  # balls compared before one branch on the result
 _F32 = ir.FloatType()
 _I32 = ir.IntType(32)
 
+# Writer of a function's machine code, and the function's signature with such a writer.
+_Writer = Callable[[BaseContext, ir.IRBuilder, Signature, Sequence[ir.Value]], ir.Value]
+_Function = tuple[Signature, _Writer]
+
 
 class _Vectors:
     """Writer of machine code that works on ``width`` float32 numbers, the lanes, at once."""
 
-    def __init__(self, builder: Any, width: int) -> None:
+    def __init__(self, builder: ir.IRBuilder, width: int) -> None:
         self.builder = builder
         self.width = width
         self.type = ir.VectorType(_F32, width)
 
-    def spread(self, scalar: Any) -> Any:
+    def spread(self, scalar: ir.Value) -> ir.Value:
         """Return a vector with the scalar in every lane."""
         one = self.builder.insert_element(ir.Constant(self.type, ir.Undefined), scalar, _I32(0))
         mask = ir.Constant(ir.VectorType(_I32, self.width), [0] * self.width)
         return self.builder.shuffle_vector(one, ir.Constant(self.type, ir.Undefined), mask)
 
-    def load(self, data: Any, index: Any) -> Any:
+    def load(self, data: ir.Value, index: ir.Value) -> ir.Value:
         """Return ``width`` consecutive numbers, read from data[index] on."""
         address = self.builder.bitcast(self.builder.gep(data, [index]), self.type.as_pointer())
         return self.builder.load(address, align=4)
 
-    def store(self, vector: Any, data: Any, index: Any) -> None:
+    def store(self, vector: ir.Value, data: ir.Value, index: ir.Value) -> None:
         """Write ``width`` consecutive numbers to data[index] and after."""
         address = self.builder.bitcast(self.builder.gep(data, [index]), self.type.as_pointer())
         self.builder.store(vector, address, align=4)
 
-    def smaller(self, a: Any, b: Any) -> Any:
+    def smaller(self, a: ir.Value, b: ir.Value) -> ir.Value:
         return self.builder.select(self.builder.fcmp_ordered("<", a, b), a, b)
 
-    def larger(self, a: Any, b: Any) -> Any:
+    def larger(self, a: ir.Value, b: ir.Value) -> ir.Value:
         return self.builder.select(self.builder.fcmp_ordered(">", a, b), a, b)
 
-    def fused(self, a: Any, b: Any, c: Any) -> Any:
+    def fused(self, a: ir.Value, b: ir.Value, c: ir.Value) -> ir.Value:
         """Return a b + c, rounded only once, which is allowed in a filter."""
         kind = ir.FunctionType(self.type, [self.type] * 3)
         function = cgutils.get_or_insert_function(
@@ -62,7 +69,7 @@ class _Vectors:
         )
         return self.builder.call(function, [a, b, c])
 
-    def rounded(self, a: Any) -> Any:
+    def rounded(self, a: ir.Value) -> ir.Value:
         """Return a rounded to whole numbers."""
         kind = ir.FunctionType(self.type, [self.type])
         function = cgutils.get_or_insert_function(
@@ -70,27 +77,36 @@ class _Vectors:
         )
         return self.builder.call(function, [a])
 
-    def sum(self, total: Any | None, a: Any, b: Any) -> Any:
+    def sum(self, total: ir.Value | None, a: ir.Value, b: ir.Value) -> ir.Value:
         """Return total + a b, or a b if the total is None."""
         return self.builder.fmul(a, b) if total is None else self.fused(a, b, total)
 
-    def mask(self, condition: Any) -> Any:
+    def mask(self, condition: ir.Value) -> ir.Value:
         """Return a condition, true or false in each lane, as the bits of an int64."""
         bits = self.builder.bitcast(condition, ir.IntType(self.width))
         return self.builder.zext(bits, ir.IntType(64))
 
 
-def _data_of(context: Any, builder: Any, array_type: Any, array: Any) -> Any:
+def _data_of(
+    context: BaseContext, builder: ir.IRBuilder, array_type: types.Array, array: ir.Value
+) -> ir.Value:
     return context.make_array(array_type)(context, builder, array).data
 
 
 @intrinsic
 def _boxes_hit(
-    typing_context: Any, bounds: Any, node: Any, ray: Any, longest: Any, enter: Any
-) -> Any:
+    typing_context: TypingContext,
+    bounds: types.Type,
+    node: types.Type,
+    ray: types.Type,
+    longest: types.Type,
+    enter: types.Type,
+) -> _Function:
     signature = types.int64(bounds, types.int64, ray, types.float32, enter)
 
-    def codegen(context: Any, builder: Any, _: Any, arguments: Any) -> Any:
+    def codegen(
+        context: BaseContext, builder: ir.IRBuilder, _: Signature, arguments: Sequence[ir.Value]
+    ) -> ir.Value:
         bounds_type, _, ray_type, _, enter_type = signature.args
         bounds, node, ray, longest, enter = arguments
         v = _Vectors(builder, BOXES)
@@ -101,7 +117,7 @@ def _boxes_hit(
         far = v.spread(longest)
         for axis in range(3):
 
-            def number(k: int, axis: int = axis) -> Any:
+            def number(k: int, axis: int = axis) -> ir.Value:
                 return v.spread(
                     builder.load(builder.gep(rays, [ir.Constant(node.type, 3 * k + axis)]))
                 )
@@ -119,7 +135,9 @@ def _boxes_hit(
     return signature, codegen
 
 
-def _boxes_hit_numpy(bounds: Any, node: int, ray: Any, longest: Any, enter: Any) -> int:
+def _boxes_hit_numpy(
+    bounds: np.ndarray, node: int, ray: np.ndarray, longest: np.float32, enter: np.ndarray
+) -> int:
     box = bounds[node]
     with np.errstate(over="ignore", invalid="ignore"):
         one = (box[0:3] - ray[0:3, None]) * ray[6:9, None]
@@ -131,8 +149,8 @@ def _boxes_hit_numpy(bounds: Any, node: int, ray: Any, longest: Any, enter: Any)
 
 
 def _near_filter(
-    lanes: Any, probe: Any, limited: bool, periodic: bool = False
-) -> tuple[Any, Callable[[Any, Any, Any, Any], Any]]:
+    lanes: types.Type, probe: types.Type, limited: bool, periodic: bool = False
+) -> _Function:
     """Return the signature and the code generator of a filter of pairs of balls that may meet.
 
     limited: True to leave out pairs that cannot meet before the end of the search.
@@ -140,7 +158,9 @@ def _near_filter(
     """
     signature = types.int64(lanes, types.int64, probe)
 
-    def codegen(context: Any, builder: Any, _: Any, arguments: Any) -> Any:
+    def codegen(
+        context: BaseContext, builder: ir.IRBuilder, _: Signature, arguments: Sequence[ir.Value]
+    ) -> ir.Value:
         lanes_type, _, probe_type = signature.args
         lanes, first, probe = arguments
         v = _Vectors(builder, WIDTH)
@@ -152,10 +172,10 @@ def _near_filter(
         width = shape[1]
         constant = width.type
 
-        def number(k: int) -> Any:
+        def number(k: int) -> ir.Value:
             return v.spread(builder.load(builder.gep(probes, [ir.Constant(constant, k)])))
 
-        def near_of(start: Any) -> Any:
+        def near_of(start: ir.Value) -> ir.Value:
             square = closing = speed = None
             for axis in range(3):
                 place, velocity = (
@@ -200,27 +220,35 @@ def _near_filter(
 
 
 @intrinsic
-def _balls_near(typing_context: Any, lanes: Any, first: Any, probe: Any) -> Any:
+def _balls_near(
+    typing_context: TypingContext, lanes: types.Type, first: types.Type, probe: types.Type
+) -> _Function:
     return _near_filter(lanes, probe, limited=False)
 
 
 @intrinsic
-def _balls_near_until(typing_context: Any, lanes: Any, first: Any, probe: Any) -> Any:
+def _balls_near_until(
+    typing_context: TypingContext, lanes: types.Type, first: types.Type, probe: types.Type
+) -> _Function:
     return _near_filter(lanes, probe, limited=True)
 
 
 @intrinsic
-def _images_near(typing_context: Any, lanes: Any, first: Any, probe: Any) -> Any:
+def _images_near(
+    typing_context: TypingContext, lanes: types.Type, first: types.Type, probe: types.Type
+) -> _Function:
     return _near_filter(lanes, probe, limited=False, periodic=True)
 
 
 @intrinsic
-def _images_near_until(typing_context: Any, lanes: Any, first: Any, probe: Any) -> Any:
+def _images_near_until(
+    typing_context: TypingContext, lanes: types.Type, first: types.Type, probe: types.Type
+) -> _Function:
     return _near_filter(lanes, probe, limited=True, periodic=True)
 
 
 def _balls_near_numpy(
-    lanes: Any, first: int, probe: Any, limited: bool = False, periodic: bool = False
+    lanes: np.ndarray, first: int, probe: np.ndarray, limited: bool = False, periodic: bool = False
 ) -> int:
     block = lanes[:, first : first + LANES]
     with np.errstate(over="ignore", invalid="ignore"):
@@ -242,10 +270,12 @@ def _balls_near_numpy(
 
 
 @intrinsic
-def _lowest_bit(typing_context: Any, bits: Any) -> Any:
+def _lowest_bit(typing_context: TypingContext, bits: types.Type) -> _Function:
     signature = types.int64(types.int64)
 
-    def codegen(context: Any, builder: Any, _: Any, arguments: Any) -> Any:
+    def codegen(
+        context: BaseContext, builder: ir.IRBuilder, _: Signature, arguments: Sequence[ir.Value]
+    ) -> ir.Value:
         return builder.cttz(arguments[0], ir.Constant(ir.IntType(1), 1))
 
     return signature, codegen
@@ -256,10 +286,12 @@ def _lowest_bit_numpy(bits: int) -> int:
 
 
 @intrinsic
-def _ticks(typing_context: Any) -> Any:
+def _ticks(typing_context: TypingContext) -> _Function:
     signature = types.int64()
 
-    def codegen(context: Any, builder: Any, _: Any, arguments: Any) -> Any:
+    def codegen(
+        context: BaseContext, builder: ir.IRBuilder, _: Signature, arguments: Sequence[ir.Value]
+    ) -> ir.Value:
         kind = ir.FunctionType(ir.IntType(64), [])
         return builder.call(
             cgutils.get_or_insert_function(builder.module, kind, "llvm.readcyclecounter"), []
