@@ -6,9 +6,9 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Literal
 
 from chamberopt.chamber.checks.calibration import misfit_texts
-from chamberopt.common.estimate import Estimate
 from chamberopt.coverage.coverage_intervals import NOT_RESOLVED
 from chamberopt.coverage.metrics import OBJECTIVES
+from chamberopt.documents.coverage import change
 from chamberopt.documents.document import AnswerLine
 from chamberopt.documents.wording import Label, metric_label, objective_label, plain
 from chamberopt.documents.zones import zone_lines
@@ -18,14 +18,14 @@ if TYPE_CHECKING:
     from chamberopt.results.load import Result
 
 
-def answer(result: Result, start: Result | None, gain: Estimate | None) -> str:
+def answer(result: Result, start: Result | None) -> str:
     """Return the answer of a result in one sentence, with its uncertainty.
 
     Study: the objective of start and best, and whether the change is more than noise.
     Simulation: the coverage.
     """
     label = objective_label(result.objective_name)
-    if start is None or gain is None:
+    if start is None:
         mean = metric_label("mean_coverage")
         treatment_time = result.design.process.treatment_time
         if result.metrics["mean_coverage"].in_words == NOT_RESOLVED:
@@ -53,16 +53,17 @@ def answer(result: Result, start: Result | None, gain: Estimate | None) -> str:
             "the start."
         )
     values = f"from {before} at the start to {after}"
-    change = label.format(gain, sign=True)
+    gain = change(result.objective, start.objective, result, start)
+    gained = label.format(gain, sign=True)
     intervals = "(95 % intervals, both simulated again with fresh seeds)"
     if gain.low > 0.0:
         return (
-            f"The best chamber found changes the {named} {values}: a change of {change} "
+            f"The best chamber found changes the {named} {values}: a change of {gained} "
             f"{intervals}, which is more than noise."
         )
     return (
         f"No chamber was found that is certainly better: the {named} goes {values}, but the "
-        f"change of {change} is within the noise {intervals}."
+        f"change of {gained} is within the noise {intervals}."
     )
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from chamberopt.common.files import read_file
 from chamberopt.common.number_text import estimate_text, typeset
 from chamberopt.documents.answer import answer, answer_lines
-from chamberopt.documents.coverage import change, coverage_section, figures, tiles
+from chamberopt.documents.coverage import coverage_section, figures, tiles
 from chamberopt.documents.document import (
     Beside,
     Block,
@@ -83,8 +83,7 @@ def report(result: Result) -> Document:
     if start is not None:
         scenes = {START: part_scene(start, START, max_triangles=0), **scenes}
     shown = figures(result, start)
-    gain = None if start is None else change(result.objective, start.objective, result, start)
-    said, lines = answer(result, start, gain), answer_lines(result)
+    said, lines = answer(result, start), answer_lines(result)
     label = objective_label(result.objective_name)
     sections = (
         question_section(result),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sized
-from dataclasses import dataclass
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +13,8 @@ from chamberopt.common.number_text import estimate_text
 from chamberopt.design.calibration import why_no_intensity
 from chamberopt.design.tolerances import tolerance_box
 from chamberopt.documents.answer import answer, answer_lines
-from chamberopt.documents.coverage import change, figures
+from chamberopt.documents.coverage import figures
+from chamberopt.documents.document import Block, Document, Section, Sentence, Table
 from chamberopt.documents.report import limits_of_intervals, notes_of, seed_text
 from chamberopt.documents.tolerances import tolerated_figures
 from chamberopt.documents.wording import metric_label, per_cent, plain
@@ -96,63 +96,29 @@ KINDS = ("arc heights", "coverage", "dent diameters", "ball drops", "amplitude",
 Row = tuple[str, str]  # a name and its value, or "" and a sentence
 
 
-@dataclass(frozen=True)
-class Block:
-    """A part of the process sheet: a title with rows of names and values below it."""
-
-    title: str
-    rows: tuple[Row, ...]
-
-
-@dataclass(frozen=True)
-class Check:
-    """A quantity to measure before production, and its expected value."""
-
-    what: str
-    expected: str
-
-
-@dataclass(frozen=True)
-class Sheet:
-    """The content of a process sheet.
-
-    name: name of the part and the result.
-    kind: kind of the result, with its date.
-    answer: the result in one sentence, as in the report.
-    blocks: settings and expected figures.
-    measure_first: quantities to measure before production.
-    calibration: sentence on the measurements that the machine was calibrated by.
-    """
-
-    name: str
-    kind: str
-    answer: str
-    blocks: list[Block]
-    measure_first: list[Check]
-    calibration: str
-
-
-def process_sheet(result: Result, face_mm: tuple[float, ...]) -> Sheet:
-    """Return the content of the process sheet of a result.
+def process_sheet(result: Result, face_mm: tuple[float, ...]) -> Document:
+    """Return the process sheet of a result as a document.
 
     Args:
         face_mm: size of the sonotrode's face [mm].
     """
     record = result.record
     start = load_start(result) if result.study else None
-    gain = None if start is None else change(result.objective, start.objective, result, start)
-    return Sheet(
+    checks, calibrated = first_checks(result), calibrated_to(result)
+    content: list[Block] = [*setting_tables(result, face_mm), checks, *calibrated]
+    return Document(
         f"{result.design.part.mesh_path.name}: {result.folder.resolve().name}",
         f"{SHEETS_OF[record.kind]}; simulated {record.created[:10]}",
-        answer(result, start, gain),
-        setting_blocks(result, face_mm),
-        first_checks(result),
-        calibrated_to(result),
+        answer(result, start),
+        (),
+        [Section("Process sheet", content)],
     )
 
 
-def setting_blocks(result: Result, face_mm: tuple[float, ...]) -> list[Block]:
-    """Return blocks on the chamber and its settings, expected figures and allowed tolerances.
+def setting_tables(result: Result, face_mm: tuple[float, ...]) -> list[Table]:
+    """Return tables on the chamber and its settings, expected figures and allowed tolerances.
+
+    A row without a name holds a sentence.
 
     Args:
         face_mm: size of the sonotrode's face [mm].
@@ -169,7 +135,8 @@ def setting_blocks(result: Result, face_mm: tuple[float, ...]) -> list[Block]:
         ("Not in these figures", (("", text) for text in cautions(result))),
         ("Warnings", _warnings(result)),
     )
-    return [Block(title, tuple(rows)) for title, rows in ((t, [*r]) for t, r in found) if rows]
+    tables = [Table(title, (), [*rows], numbers=False) for title, rows in found]
+    return [one for one in tables if one.rows]
 
 
 def _part(result: Result) -> Iterator[Row]:
@@ -349,8 +316,13 @@ def _identity(result: Result) -> Iterator[Row]:
     yield "result, sha256", record.sha256
 
 
-def first_checks(result: Result) -> list[Check]:
+def first_checks(result: Result) -> Table:
     """Return the quantities to measure before production, each with its expected value."""
+    rows = [(what, expected, "") for what, expected in _checks(result)]
+    return Table("", ("Measure first", "expected", "measured"), rows, numbers=False)
+
+
+def _checks(result: Result) -> Iterator[Row]:
     design, calibration = result.design, result.design.calibration
     wanted = 2.0 * design.sonotrode.zero_to_peak_um
     expected = f"{plain(wanted)} µm peak to valley"
@@ -358,41 +330,38 @@ def first_checks(result: Result) -> list[Check]:
         factor, sd = calibration.factor("amplitude"), 1.96 * calibration.log_sd("amplitude")
         low, middle, high = (plain(wanted * factor * np.exp(x), 3) for x in (-sd, 0.0, sd))
         expected = f"{middle} ({low} to {high}) µm peak to valley where {plain(wanted)} is set"
-    found = [Check("amplitude of the face, by laser or accelerometer", expected)]
+    yield "amplitude of the face, by laser or accelerometer", expected
     if calibration is None:
         laws = {name: getattr(design.materials, name) for name in ("sonotrode", "wall", "part")}
         what = f"ball drop: one ball at {plain(DROP_SPEED)} m/s, speed after over speed before"
-        found.append(Check(what, ", ".join(f"{k} {_restitution(x)}" for k, x in laws.items())))
+        yield what, ", ".join(f"{k} {_restitution(x)}" for k, x in laws.items())
     row = _half_covered(result.record.coverage_against_time)
     # If the mean coverage at the end is not resolved, its curve is not reliable either.
     if row and result.metrics["mean_coverage"].has_number:
         share = Estimate(row.mean_coverage, row.half_width)
         what = f"mean coverage of the target after {plain(row.time_s, 3)} s"
-        found.append(Check(what, estimate_text(share, 100.0, "%")))
+        yield what, estimate_text(share, 100.0, "%")
     intensity = result.metrics.get("almen_intensity")
     if intensity is None:
-        strip = "not known before: calibrates to mmA"
-        found.append(Check("A strips at 4 or 5 times, for chamberopt calibrate", strip))
+        strips = "A strips at 4 or 5 times, for chamberopt calibrate"
+        yield strips, "not known before: calibrates to mmA"
     else:
         text = metric_label("almen_intensity").format(intensity)
-        found.append(Check("intensity by A strips at the target", text))
-    found.append(
-        Check("mass of the shot, before and after", f"{plain(_weighed_g(result))} g before")
-    )
-    return found
+        yield "intensity by A strips at the target", text
+    yield "mass of the shot, before and after", f"{plain(_weighed_g(result))} g before"
 
 
-def calibrated_to(result: Result) -> str:
-    """Return a sentence on the measurements that the machine was calibrated by.
+def calibrated_to(result: Result) -> Iterator[Sentence]:
+    """Yield a sentence on the measurements that the machine was calibrated by.
 
-    It also names the missing kinds of measurement. It is empty without a calibration.
+    It also names the missing kinds of measurement.
     """
-    if result.design.calibration is None:
-        return ""
-    kinds = {misfit.kind for misfit in result.design.calibration.misfits}
+    calibration = result.design.calibration
+    kinds = {misfit.kind for misfit in calibration.misfits} if calibration else set()
     have, lacking = ([kind for kind in KINDS if (kind in kinds) is one] for one in (True, False))
     more = f" What it has not, and would make it surer: {', '.join(lacking)}." if lacking else ""
-    return f"The machine is calibrated by: {', '.join(have)}.{more}" if have else ""
+    if have:
+        yield Sentence(f"The machine is calibrated by: {', '.join(have)}.{more}")
 
 
 def _restitution(law: Any) -> str:

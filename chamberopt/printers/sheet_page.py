@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from chamberopt.common.files import claim_file, write_bytes
-from chamberopt.documents.sheet import Block, Sheet, process_sheet
+from chamberopt.documents.document import Block, Document, Sentence, Table
+from chamberopt.documents.sheet import process_sheet
 from chamberopt.pictures.charts.colours import BLACK, DARK_GREY, GREY
 from chamberopt.pictures.charts.figure_style import ignore_settings_here
 from chamberopt.pictures.part_drawing import LEGEND, RASTER, draw_chamber
@@ -26,8 +27,17 @@ if TYPE_CHECKING:
 
     from chamberopt.chamber.build import Chamber
 
-# Text on a page: lines of limited width, and blocks of names and values in two columns.
-
+SHEET = "process_sheet.pdf"
+CREATOR = "chamberopt process sheet"  # marks a sheet, so that a newer sheet may replace it
+SHEET_FILE = PageFile("process sheet", (".pdf",), lambda content: CREATOR.encode() in content)
+WIDTH, HEIGHT, MARGIN, GAP = 210.0, 297.0, 12.0, 6.0  # mm
+INNER = WIDTH - 2.0 * MARGIN
+SIZES = (8.0, 7.5, 7.0, 6.5, 6.0, 5.5, 5.0)  # pt of the text; the largest size that fits is used
+# Height of the drawing with its caption [mm]: the least for each pt of the text, and the most.
+DRAWING_PER_PT, MOST_DRAWING = 13.0, 125.0
+CAPTION, SIGNATURES = 7.0, 14.0  # mm
+SIGNED = ("Set up by", "Date", "Checked by", "Date")
+COLUMNS = (88.0, 62.0, 36.0)  # mm, of a table with a head
 MM_PER_PT = 25.4 / 72.0
 LEADING = 1.25  # height of a line over the size of its letters
 NAMES = 0.52  # share of a column's width that names may take at most
@@ -68,15 +78,17 @@ class Writer:
                 )
         return top - len(lines) * self.line
 
-    def block(self, block: Block, x: float, top: float, width: float) -> float:
-        """Write a title with its rows and return the height of their bottom on the page [mm]."""
-        y = self.write(block.title, x, top, width, bold=True) - 0.1 * self.line
-        if self.axes is not None:
-            self.axes.plot([x, x + width], [y, y], color=GREY, lw=0.5)
+    def values(self, table: Table, x: float, top: float, width: float) -> float:
+        """Write a table of names and values and return the height of its bottom on the page [mm].
+
+        A value without a name takes the whole width.
+        """
+        y = self.write(table.caption, x, top, width, bold=True) - 0.1 * self.line
+        self.rule(x, y, width)
         y -= 0.25 * self.line
-        longest = max(text_width(name, self.size) for name, _ in block.rows)
+        longest = max(text_width(name, self.size) for name, _ in table.rows)
         names = min(NAMES * width, longest + 2.0)
-        for name, value in block.rows:
+        for name, value in table.rows:
             if name:
                 low = self.write(name, x, y, names - 1.5, grey=True)
                 y = min(low, self.write(value, x + names, y, width - names))
@@ -84,23 +96,38 @@ class Writer:
                 y = self.write(value, x, y - 0.15 * self.line, width)
         return y
 
-    def columns(
-        self, blocks: Sequence[Block], x: float, top: float, sizes: tuple[float, float]
-    ) -> float:
-        """Write blocks in two columns of similar length and return the bottom of the longer column.
+    def columns(self, tables: Sequence[Table], top: float) -> float:
+        """Write tables of names and values in two columns of similar length.
 
-        Args:
-            sizes: width of a column and gap between the columns [mm].
+        Returns:
+            Height of the bottom of the longer column [mm].
         """
-        width, gap = sizes
-        measure = Writer(None, self.size)
-        heights = [0.8 * self.line - measure.block(one, 0.0, 0.0, width) for one in blocks]
-        split = min(range(len(blocks) + 1), key=lambda k: max(sum(heights[:k]), sum(heights[k:])))
-        for column, chosen in enumerate((blocks[:split], blocks[split:])):
+        width, measure = 0.5 * (INNER - GAP), Writer(None, self.size)
+        heights = [0.8 * self.line - measure.values(one, 0.0, 0.0, width) for one in tables]
+        split = min(range(len(tables) + 1), key=lambda k: max(sum(heights[:k]), sum(heights[k:])))
+        for column, chosen in enumerate((tables[:split], tables[split:])):
             y = top
             for one in chosen:
-                y = self.block(one, x + column * (width + gap), y, width) - 0.8 * self.line
+                y = self.values(one, MARGIN + column * (width + GAP), y, width) - 0.8 * self.line
         return top - max(sum(heights[:split]), sum(heights[split:]))
+
+    def table(self, table: Table, top: float) -> float:
+        """Write a table with a head over the whole page and return its bottom [mm]."""
+        y = top
+        for number, row in enumerate([table.head, *table.rows]):
+            x, ends = MARGIN, []
+            for text, width in zip(row, COLUMNS, strict=True):
+                ends.append(self.write(text, x, y, width - 2.0, bold=number == 0))
+                x += width
+            y = min(ends) - 0.35 * self.line
+            self.rule(MARGIN, y, INNER)
+            y -= 0.35 * self.line
+        return y
+
+    def rule(self, x: float, y: float, width: float) -> None:
+        """Draw a thin horizontal line."""
+        if self.axes is not None:
+            self.axes.plot([x, x + width], [y, y], color=GREY, lw=0.4)
 
 
 def broken(text: str, width: float, size: float, bold: bool = False) -> list[str]:
@@ -166,27 +193,14 @@ def _font(bold: bool) -> FontProperties:
     return FontProperties(size=1.0, weight="bold" if bold else "normal")
 
 
-SHEET = "process_sheet.pdf"
-CREATOR = "chamberopt process sheet"  # marks a sheet, so that a newer sheet may replace it
-SHEET_FILE = PageFile("process sheet", (".pdf",), lambda content: CREATOR.encode() in content)
-WIDTH, HEIGHT, MARGIN, GAP = 210.0, 297.0, 12.0, 6.0  # mm
-INNER = WIDTH - 2.0 * MARGIN
-SIZES = (8.0, 7.5, 7.0, 6.5, 6.0, 5.5, 5.0)  # pt of the text; the largest size that fits is used
-# Height of the drawing with its caption [mm]: the least for each pt of the text, and the most.
-DRAWING_PER_PT, MOST_DRAWING = 13.0, 125.0
-CAPTION, SIGNATURES = 7.0, 14.0  # mm
-SIGNED = ("Set up by", "Date", "Checked by", "Date")
-EXPECTED, MEASURED = 88.0, 150.0  # mm from the margin; columns of the table "Measure first"
-
-
-def write_sheet(result: str | Path, path: str | Path | None = None) -> tuple[Path, Sheet]:
+def write_sheet(result: str | Path, path: str | Path | None = None) -> tuple[Path, Document]:
     """Write the process sheet of a results folder.
 
     Args:
         path: path of the page, by default RESULT/process_sheet.pdf.
 
     Returns:
-        Path of the page, and its content.
+        Path of the page, and the document on it.
 
     Raises:
         InputError: the folder is no finished result, or the path holds anything but a sheet.
@@ -200,11 +214,10 @@ def write_sheet(result: str | Path, path: str | Path | None = None) -> tuple[Pat
     return path, sheet
 
 
-def draw_sheet(sheet: Sheet, chamber: Chamber) -> Figure:
-    """Return the process sheet as a figure.
+def draw_sheet(sheet: Document, chamber: Chamber) -> Figure:
+    """Return a document of one section on one page, as a figure.
 
-    It has the heading, a drawing of the chamber, blocks in two columns, the quantities to measure
-    first, and lines for signatures.
+    It has the heading, a drawing of the chamber, the content, and lines for signatures.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -214,47 +227,46 @@ def draw_sheet(sheet: Sheet, chamber: Chamber) -> Figure:
     FigureCanvasAgg(figure)
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0), xlim=(0.0, WIDTH), ylim=(0.0, HEIGHT))
     axes.axis("off")
-    top, foot = _heading(axes, sheet), MARGIN + SIGNATURES
+    (section,) = sheet.sections
+    top, foot = _heading(axes, section.title, sheet), MARGIN + SIGNATURES
     for size in SIZES:
-        room = top - foot + _text(Writer(None, size), sheet, 0.0)
+        room = top - foot + _content(Writer(None, size), section.content, 0.0)
         if room >= DRAWING_PER_PT * size:
             break
     tall = min(MOST_DRAWING, room) - CAPTION
     scale = draw_chamber(axes, chamber, MARGIN, top, (INNER, tall))
     caption = f"Section A–A and plan, scale {scale}, {LEGEND}"
     Writer(axes, 6.0).write(caption, MARGIN, top - tall, INNER, grey=True)
-    _text(Writer(axes, size), sheet, top - tall - CAPTION)
+    _content(Writer(axes, size), section.content, top - tall - CAPTION)
     _signatures(axes)
     return figure
 
 
-def _heading(axes: Axes, sheet: Sheet) -> float:
+def _heading(axes: Axes, title: str, sheet: Document) -> float:
     """Write title, name and answer of the sheet. Return the height of their bottom [mm]."""
-    y = Writer(axes, 15.0).write("Process sheet", MARGIN, HEIGHT - MARGIN, 60.0, bold=True)
+    y = Writer(axes, 15.0).write(title, MARGIN, HEIGHT - MARGIN, 60.0, bold=True)
     beside, width = MARGIN + 62.0, INNER - 62.0
     name = Writer(axes, 9.0).write(sheet.name, beside, HEIGHT - MARGIN, width, bold=True)
-    y = min(y, Writer(axes, 7.0).write(sheet.kind, beside, name, width, grey=True)) - 1.5
+    y = min(y, Writer(axes, 7.0).write(sheet.subtitle, beside, name, width, grey=True)) - 1.5
     y = Writer(axes, 8.0).write(sheet.answer, MARGIN, y, INNER) - 1.5
     axes.plot([MARGIN, WIDTH - MARGIN], [y, y], color=BLACK, lw=0.8)
     return y
 
 
-def _text(write: Writer, sheet: Sheet, top: float) -> float:
-    """Write the blocks and the table "Measure first". Return the height of their bottom [mm]."""
-    column = 0.5 * (INNER - GAP)
-    y = write.columns(sheet.blocks, MARGIN, top, (column, GAP)) - 0.3 * write.line
-    head = ("Measure first", "expected", "measured")
-    places, widths = (0.0, EXPECTED, MEASURED), (EXPECTED - 2.0, MEASURED - EXPECTED - 2.0, 36.0)
-    for number, row in enumerate([head, *((c.what, c.expected, "") for c in sheet.measure_first)]):
-        ends = [
-            write.write(text, MARGIN + place, y, width, bold=number == 0)
-            for text, place, width in zip(row, places, widths, strict=True)
-        ]
-        y = min(ends) - 0.35 * write.line
-        if write.axes is not None:
-            write.axes.plot([MARGIN, WIDTH - MARGIN], [y, y], color=GREY, lw=0.4)
-        y -= 0.35 * write.line
-    return write.write(sheet.calibration, MARGIN, y, INNER) if sheet.calibration else y
+def _content(write: Writer, content: Sequence[Block], top: float) -> float:
+    """Write tables of names and values in two columns, and below them all else.
+
+    Returns:
+        Height of the bottom of the content [mm].
+    """
+    tables = [one for one in content if isinstance(one, Table)]
+    y = write.columns([one for one in tables if not one.head], top) - 0.3 * write.line
+    for one in content:
+        if isinstance(one, Table) and one.head:
+            y = write.table(one, y)
+        elif isinstance(one, Sentence):
+            y = write.write(one.text, MARGIN, y, INNER)
+    return y
 
 
 def _signatures(axes: Axes) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
@@ -53,11 +52,12 @@ def report(result: Path, /, *, sheet: bool = False, json: Json = False, out: Pag
 
 def _write_sheet(result: Path, json: bool, out: Path | None) -> None:
     from chamberopt.common.progress import step
+    from chamberopt.printers.json_values import json_values
     from chamberopt.printers.sheet_page import write_sheet
 
     with step("writing the sheet"):
         path, printed = write_sheet(result, out)
     if json:
-        print_json({**asdict(printed), "sheet": str(path)})
+        print_json({**json_values(printed), "sheet": str(path)})
         return
     show([printed.answer, f"process sheet in {path}"])

@@ -155,7 +155,7 @@ def test_what_is_not_resolved_is_not_in_the_answer_as_a_number() -> None:
         design=SimpleNamespace(process=SimpleNamespace(treatment_time=120.0)),
         study=a_study(),
     )
-    assert answer(result, None, None) == (
+    assert answer(result, None) == (
         "Too few dents were simulated to tell how much of the target is covered after 120 s."
     )
-    assert answer(result, result, unknown).startswith("Too few dents were simulated to tell wheth")
+    assert answer(result, result).startswith("Too few dents were simulated to tell wheth")

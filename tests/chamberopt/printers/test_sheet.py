@@ -16,7 +16,8 @@ from chamberopt.cli import main
 from chamberopt.common.errors import InputError
 from chamberopt.common.estimate import Estimate
 from chamberopt.documents.coverage import figures
-from chamberopt.documents.sheet import Block, Check, Sheet, first_checks, setting_blocks
+from chamberopt.documents.document import Document, Section, Sentence, Table
+from chamberopt.documents.sheet import first_checks, setting_tables
 from chamberopt.documents.wording import metric_label
 from chamberopt.pictures.section import cut, face_size_mm, inside
 from chamberopt.printers.sheet_page import (
@@ -52,9 +53,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def rows_of(result: Result) -> dict[str, dict[str, str]]:
     """What the sheet says: value by name by title; sentences under ""."""
     found: dict[str, dict[str, str]] = {}
-    for block in setting_blocks(result, (50.0,)):
-        rows = found[block.title] = {}
-        for name, value in block.rows:
+    for table in setting_tables(result, (50.0,)):
+        rows = found[table.caption] = {}
+        for name, value in table.rows:
             rows[name] = f"{rows[name]} {value}" if name in rows else value
     return found
 
@@ -79,7 +80,8 @@ def test_its_figures_are_those_of_the_report(folder: Path) -> None:
 
 
 def test_what_to_measure_first_without_a_calibration(folder: Path) -> None:
-    checks = {check.what.split()[0]: check.expected for check in first_checks(load_result(folder))}
+    rows = first_checks(load_result(folder)).rows
+    checks = {what.split()[0]: expected for what, expected, _ in rows}
     assert checks["amplitude"] == "50 µm peak to valley"
     assert checks["ball"].startswith("sonotrode 0.7")
     assert checks["A"].startswith("not known before")  # no strips, no intensity
@@ -88,7 +90,7 @@ def test_what_to_measure_first_without_a_calibration(folder: Path) -> None:
     assert float(checks["mean"].split()[0]) == pytest.approx(100.0 * nearest, abs=0.5)
     few = load_result(folder)
     few.metrics["mean_coverage"] = Estimate(0.5, math.inf, in_words="not resolved")
-    names = {check.what.split()[0] for check in first_checks(few)}
+    names = {what.split()[0] for what, *_ in first_checks(few).rows}
     assert names == checks.keys() - {"mean"}  # nothing to compare a measurement with
 
 
@@ -133,7 +135,7 @@ def test_a_calibrated_mix_with_zones_and_tolerances(folder: Path) -> None:
     assert zones.endswith("2 more zones in the report.")
     assert rows["Peening, and what to expect"]["mean Almen intensity"] == "0.200 ± 0.010 mmA"
     assert "mean peening strength" not in rows["Peening, and what to expect"]
-    checks = [check.expected for check in first_checks(result)]
+    checks = [expected for _, expected, _ in first_checks(result).rows]
     assert checks[0] == "50 (45.3 to 55.1) µm peak to valley where 50 is set"
     assert "0.200 ± 0.010 mmA" in checks
     ends = dict.fromkeys(("nominal", "q05", "q95", "lowest", "highest"), intensity)
@@ -147,7 +149,7 @@ def test_a_calibrated_mix_with_zones_and_tolerances(folder: Path) -> None:
     assert held[label] == "5 % below 0.200 ± 0.010; 5 % above 0.200 ± 0.010"
 
 
-def boxes_of(sheet: Sheet, chamber: object) -> list[tuple[str, np.ndarray]]:
+def boxes_of(sheet: Document, chamber: object) -> list[tuple[str, np.ndarray]]:
     """Each text of a drawn sheet, with its box in pixels."""
     figure = draw_sheet(sheet, chamber)
     figure.set_dpi(72.0)
@@ -159,16 +161,17 @@ def boxes_of(sheet: Sheet, chamber: object) -> list[tuple[str, np.ndarray]]:
 @pytest.mark.parametrize("much", [False, True])
 def test_nothing_overlaps_or_is_cut_off(folder: Path, much: bool) -> None:
     result = load_result(folder)
-    blocks = setting_blocks(result, (50.0,))
-    sheet = Sheet("a name", "kind", "An answer.", blocks, first_checks(result), "")
+    content = [*setting_tables(result, (50.0,)), first_checks(result)]
+    name, answer = "a name", "An answer."
     if much:
+        name, answer = 30 * "name ", 40 * "answer "
         long = "words and_a_name_without_an_end_" + 60 * "x" + 40 * " more words"
-        rows = tuple((f"name {k} " + 20 * "y", long) for k in range(3))
-        sheet = Sheet(
-            30 * "name ", "kind", 40 * "answer ",
-            [*blocks, *(Block(f"block {k}", rows) for k in range(2))],
-            [Check(long, long)] * 5, long,
-        )  # fmt: skip
+        rows = [(f"name {k} " + 20 * "y", long) for k in range(3)]
+        content = [
+            *content[:-1], *(Table(f"block {k}", (), rows) for k in range(2)),
+            Table("", content[-1].head, [(long, long, "")] * 5), Sentence(long),
+        ]  # fmt: skip
+    sheet = Document(name, "kind", answer, (), [Section("Process sheet", content)])
     boxes = boxes_of(sheet, build_chamber(plate_design()))
     for text, (x0, y0, x1, y1) in boxes:
         assert x0 > 0.0, text
