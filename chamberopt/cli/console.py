@@ -17,6 +17,7 @@ from chamberopt.common.errors import visible
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
     from chamberopt.design.load import Design
+    from chamberopt.documents.document import Table
 
 T = TypeVar("T")
 RESULTS = Path("results")  # parent folder of results without --out
@@ -63,12 +64,14 @@ def claimed_folder(
                 return
 
 
-def show(lines: Iterable[str], to: TextIO | None = None) -> None:
-    """Print lines to stdout, or to `to`, and make control characters visible.
+def show(content: Iterable[Table | str], to: TextIO | None = None) -> None:
+    """Print tables and sentences to stdout, or to `to`, and make control characters visible.
 
     Names of files, keys and groups may hold control characters, which a terminal would obey.
     """
-    print(visible("\n".join(lines)), file=to or sys.stdout, flush=True)
+    from chamberopt.printers import terminal
+
+    print(visible(terminal.text(content)), file=to or sys.stdout, flush=True)
 
 
 def print_remarks(remarks: Iterable[str]) -> None:
@@ -108,16 +111,16 @@ def _json_value(value: Any) -> Any:
 
 
 def print_result(
-    lines: Sequence[str], folder: Path, as_json: bool, file: str = "result.json"
+    content: Sequence[Table | str], folder: Path, as_json: bool, file: str = "result.json"
 ) -> None:
-    """Print the folder and its result on stdout, as lines or as the content of a JSON file."""
+    """Print a result and its folder on stdout, as text or as the content of a JSON file."""
     if as_json:
         from chamberopt.common.limits import MAX_RESULT_BYTES, read_limited
 
         values = json.loads(read_limited(folder / file, MAX_RESULT_BYTES, "file of a result"))
         print_json({**values, "folder": str(folder)})
     else:
-        show([*lines, f"results in {folder}"])
+        show([*content, f"results in {folder}"])
 
 
 def print_finished(folder: Path, what: str, lines: Sequence[str], as_json: bool) -> None:

@@ -1,20 +1,20 @@
-"""Text about a comparison: design values that differ, figures, and whether they differ really."""
+"""Tables of a comparison: design values that differ, figures, and whether they differ really."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 from chamberopt.common.estimate import CONFIDENCE, Estimate
 from chamberopt.common.number_text import estimate_text
+from chamberopt.documents.document import Table
 from chamberopt.results.compare.comparison import Comparison
 from chamberopt.results.compare.difference import MAX_TIME_RATIO, Difference
 
 HEADER = ("difference", "real", "to know: simulate")
 
 
-def comparison_text(comparison: Comparison) -> str:
-    """Return the comparison as text: design values that differ, figures and differences.
+def comparison_lines(comparison: Comparison) -> list[Table | str]:
+    """Return design values that differ, figures and differences, with their legend.
 
     Two candidates share a single table. For more, a table of differences follows the figures.
     """
@@ -35,14 +35,14 @@ def comparison_text(comparison: Comparison) -> str:
     if len(later) == 1:
         heads = [f"{later[0]} - {first}", *HEADER[1:]]
         rows += [[name, *cells, *gaps[name][0]] for name, cells in figures.items()]
-        blocks = [_aligned([["", *comparison.labels, *heads], *rows])]
+        tables = [Table("", ["", *comparison.labels, *heads], rows, numbers=False)]
     else:
         rows += [[name, *cells] for name, cells in figures.items()]
-        blocks = [_aligned([["", *comparison.labels], *rows])]
+        tables = [Table("", ["", *comparison.labels], rows, numbers=False)]
         for k, label in enumerate(later):
-            table = [[f"{label} - {first}", *HEADER], *([name, *gaps[name][k]] for name in figures)]
-            blocks.append(_aligned(table))
-    return "\n\n".join(["\n".join(block) for block in blocks] + ["\n".join(_legend(comparison))])
+            rows = [[name, *gaps[name][k]] for name in figures]
+            tables.append(Table("", [f"{label} - {first}", *HEADER], rows, numbers=False))
+    return [*(one for table in tables for one in (table, "")), *_legend(comparison)]
 
 
 def _legend(comparison: Comparison) -> list[str]:
@@ -103,14 +103,3 @@ def _times(times: float) -> str:
 
 def _shown(value: object) -> str:
     return "-" if value is None else f"{value:g}" if isinstance(value, float) else str(value)
-
-
-def _aligned(rows: Sequence[Sequence[str]]) -> list[str]:
-    """Return the rows as lines of text with aligned columns. The first row is the header."""
-    count = max(map(len, rows))
-    whole = [[*row, *[""] * (count - len(row))] for row in rows]
-    widths = [max(len(row[i]) for row in whole) for i in range(count)]
-    return [
-        "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
-        for row in whole
-    ]

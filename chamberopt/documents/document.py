@@ -44,6 +44,11 @@ class Table:
     numbers: bool = True
 
 
+def values(caption: str, rows: Mapping[str, str]) -> Table:
+    """Return a table of names and values."""
+    return Table(caption, (), [*rows.items()], numbers=False)
+
+
 @dataclass(frozen=True)
 class Chart:
     """A chart with its caption.

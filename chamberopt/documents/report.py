@@ -22,6 +22,7 @@ from chamberopt.documents.document import (
     Sentence,
     Table,
     TextFile,
+    values,
 )
 from chamberopt.documents.study import (
     front_section,
@@ -133,13 +134,10 @@ def _subtitle(result: Result) -> str:
 
 
 def _accuracy_and_cost(result: Result, trials: Sequence[Mapping[str, Any]]) -> Section:
-    accuracy = Table("How accurate it is", (), [*_accuracy(result).items()], numbers=False)
-    cost: list[Block] = [
-        Table("What the answer cost", (), [*_cost_of_answer(result).items()], numbers=False)
-    ]
+    accuracy = values("How accurate it is", _accuracy(result))
+    cost = [values("What the answer cost", _cost_of_answer(result))]
     if result.study:
-        rows = [*_cost_of_study(result.study, trials).items()]
-        cost.append(Table("Evaluations of the study", (), rows, numbers=False))
+        cost.append(values("Evaluations of the study", _cost_of_study(result.study, trials)))
     return Section("Accuracy and cost", [Beside([[accuracy], cost])])
 
 
@@ -203,8 +201,8 @@ def _count(number: float) -> str:
 def _effects(result: Result) -> Section:
     """Return the section on optional physical effects: their settings and pilot estimates."""
     effects = result.design.effects.model_dump(mode="json", exclude={"auto"})
-    switched = [(name, _effect_text(name, value)) for name, value in effects.items()]
-    in_result = Table("In this result", (), switched, numbers=False)
+    switched = {name: _effect_text(name, value) for name, value in effects.items()}
+    in_result = values("In this result", switched)
     if pilot := result.record.effects:
         return Section("Physical effects", [in_result, *_advice(pilot)])
     text = (
@@ -257,17 +255,17 @@ def _design(result: Result, start: Result | None) -> Section:
 
     It has the changes from the start, every value by dotted name, and the design file.
     """
-    values = _design_values(result)
-    before = _design_values(start) if start else values
+    after = _design_values(result)
+    before = _design_values(start) if start else after
     changed = [
         (name, before.get(name, _text(None)), value)
-        for name, value in values.items()
+        for name, value in after.items()
         if before.get(name, _text(None)) != value
     ]
     content: list[Block] = []
     if changed:
         content.append(Table("What differs from the start", ("", "start", "best"), changed))
-    every = Table("", ("", "value"), [*values.items()], numbers=False)
+    every = Table("", ("", "value"), [*after.items()], numbers=False)
     name = "best.toml" if result.study else "design.toml"
     file = TextFile(name, read_file(result.path(name)).decode())
     content += [
@@ -282,9 +280,9 @@ def _design_values(result: Result) -> dict[str, str]:
 
     The folder of the mesh is private to the machine, so only the file's name is shown.
     """
-    values = dict(_flatten(result.record.design))
-    values["part.mesh"] = result.design.part.mesh_path.name
-    return {name: _text(value) for name, value in values.items()}
+    design = dict(_flatten(result.record.design))
+    design["part.mesh"] = result.design.part.mesh_path.name
+    return {name: _text(value) for name, value in design.items()}
 
 
 def _flatten(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
@@ -311,7 +309,7 @@ def _made_with(result: Result) -> Section:
         "seed": seed_text(result),
         **result.record.versions,
     }
-    return Section("Made with", [Table("", (), [*rows.items()], numbers=False)])
+    return Section("Made with", [values("", rows)])
 
 
 def seed_text(result: Result) -> str:

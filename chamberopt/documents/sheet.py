@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sized
+from collections.abc import Iterator, Sequence
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any
 
@@ -16,8 +16,9 @@ from chamberopt.documents.answer import answer, answer_lines
 from chamberopt.documents.coverage import figures
 from chamberopt.documents.document import Block, Document, Section, Sentence, Table
 from chamberopt.documents.report import limits_of_intervals, notes_of, seed_text
+from chamberopt.documents.study import exposed_target
 from chamberopt.documents.tolerances import tolerated_figures
-from chamberopt.documents.wording import metric_label, per_cent, plain
+from chamberopt.documents.wording import metric_label, plain
 from chamberopt.results.load import load_start
 
 if TYPE_CHECKING:
@@ -73,7 +74,7 @@ def _time(result: Result) -> Iterator[str]:
 MOST_ROWS = 4  # rows of zones, tolerances or sizes of shot; the report has all rows
 MOST_KEYS = 8  # numbers of the chamber
 MOST_WARNINGS = 2
-UNITS = {"_mm": "mm", "_deg": "degrees", "_um": "µm"}
+UNITS = {"mm": "mm", "deg": "degrees", "um": "µm"}
 EXPECTED = (
     "mean_coverage",
     "p05_coverage",
@@ -164,9 +165,8 @@ def _part(result: Result) -> Iterator[Row]:
         axis = ", ".join(plain(one) for one in turn.axis)
         speed = swing if turn.rpm is None else f"{plain(turn.rpm)} turns a minute"
         yield "turns", f"{speed} about the file's axis ({axis})"
-    share = per_cent(result.record.field.reachable_share)
-    if area := result.record.chamber.target_exposed_area_mm2:
-        yield "target", f"{plain(area)} mm² in the chamber; the shot can reach {share} of it"
+    if area := exposed_target(result):
+        yield "target", area
 
 
 def _chamber(result: Result) -> Iterator[Row]:
@@ -176,8 +176,7 @@ def _chamber(result: Result) -> Iterator[Row]:
         table.pop(key, None)
     counted = {key: table.pop(key, ()) for key in ("holes", "deflectors")}
     rows = [_key_row(key, value) for key, value in table.items() if value not in (0, 0.0, [])]
-    yield from rows[:MOST_KEYS]
-    yield from _more(rows, MOST_KEYS, "more numbers")
+    yield from _first(rows, "numbers", MOST_KEYS)
     for what, several in counted.items():
         if several:
             yield what, f"{len(several)}: see the report"
@@ -187,8 +186,9 @@ def _chamber(result: Result) -> Iterator[Row]:
 
 def _key_row(key: str, value: Any) -> Row:
     """Return the name and the text of a chamber's value. The unit moves from name to text."""
-    unit = next((unit for end, unit in UNITS.items() if key.endswith(end)), "")
-    name = key.removesuffix(next(end for end in UNITS if UNITS[end] == unit)) if unit else key
+    start, _, end = key.rpartition("_")
+    unit = UNITS.get(end, "")
+    name = start if unit else key
     if isinstance(value, bool):
         text = "yes" if value else "no"
     elif isinstance(value, int | float):
@@ -210,10 +210,12 @@ def _sonotrode(result: Result, face_mm: tuple[float, ...]) -> Iterator[Row]:
     if design.calibration is not None:
         factor = plain(design.calibration.factor("amplitude"), 3)
         yield "calibrated to", f"{factor} times the amplitude that is set"
-    for one in design.sonotrodes[:MOST_ROWS]:
-        place = ", ".join(plain(x) for x in one.at_mm)
-        yield f"further, Ø {plain(one.diameter_mm)} mm", f"at ({place}) mm: {_amplitude(one)}"
-    yield from _more(design.sonotrodes, MOST_ROWS, "more sonotrodes")
+    others = []
+    for one in design.sonotrodes:
+        place = ", ".join(map(plain, one.at_mm))
+        name = f"further, Ø {plain(one.diameter_mm)} mm"
+        others.append((name, f"at ({place}) mm: {_amplitude(one)}"))
+    yield from _first(others, "sonotrodes")
 
 
 def _amplitude(face: VibratingFace) -> str:
@@ -224,12 +226,12 @@ def _amplitude(face: VibratingFace) -> str:
 def _shot(result: Result) -> Iterator[Row]:
     shot = result.design.shot
     yield "material", f"{shot.material or 'not named'}, {plain(shot.density)} kg/m³"
-    several = len(shot.sizes) > 1
-    for diameter, count in shot.sizes[:MOST_ROWS]:
+    several, sizes = len(shot.sizes) > 1, []
+    for diameter, count in shot.sizes:
         mass = 1e3 * shot.density * np.pi / 6.0 * diameter**3 * count
         text = f"{count:,} of Ø {plain(1e3 * diameter)} mm"
-        yield "balls", f"{text}, {plain(mass, 3)} g" if several else text
-    yield from _more(shot.sizes, MOST_ROWS, "more sizes")
+        sizes.append(("balls", f"{text}, {plain(mass, 3)} g" if several else text))
+    yield from _first(sizes, "sizes")
     yield "mass of these balls", f"{plain(_weighed_g(result))} g (asked: {plain(shot.mass_g)} g)"
 
 
@@ -264,9 +266,7 @@ def _zones(result: Result) -> Iterator[Row]:
     """Yield a sentence for each zone. Zones with limits that are not met come first."""
     lines = [one for one in answer_lines(result) if one.about == "zone"]
     lines.sort(key=lambda line: not line.warns)
-    for one in lines[:MOST_ROWS]:
-        yield "", one.text
-    yield from _more(lines, MOST_ROWS, "more zones")
+    yield from _first([("", one.text) for one in lines], "zones")
 
 
 def _tolerances(result: Result) -> Iterator[Row]:
@@ -275,9 +275,11 @@ def _tolerances(result: Result) -> Iterator[Row]:
     If the result simulated the tolerances, rows say what they cost.
     """
     box = tolerance_box(result.design)
-    for name, (low, high) in [*box.items()][:MOST_ROWS]:
-        yield name, f"{plain(low)} to {plain(high)}, as designed {plain(result.design.value(name))}"
-    yield from _more(box, MOST_ROWS, "more tolerances")
+    ranges = [
+        (name, f"{plain(low)} to {plain(high)}, as designed {plain(result.design.value(name))}")
+        for name, (low, high) in box.items()
+    ]
+    yield from _first(ranges, "tolerances")
     found = result.record.tolerances
     if not box:
         yield "", "The design has no [tolerances]: how far its numbers may be off is not known."
@@ -298,9 +300,7 @@ def _warnings(result: Result) -> Iterator[Row]:
         yield "", "The design was not checked: chamberopt check lists its warnings."
     elif not warnings:
         yield "", "There are none."
-    for text in (warnings or ())[:MOST_WARNINGS]:
-        yield "", text
-    yield from _more(warnings or (), MOST_WARNINGS, "more warnings")
+    yield from _first([("", text) for text in warnings or ()], "warnings", MOST_WARNINGS)
     if notes_of(result):
         yield "", f"Notes in the report: {len(notes_of(result))}."
 
@@ -378,7 +378,8 @@ def _half_covered(rows: list[CoverageAtTime]) -> CoverageAtTime | None:
     return min(rows, key=lambda row: abs(row.mean_coverage - 0.5), default=None)
 
 
-def _more(several: Sized, most: int, what: str) -> Iterator[Row]:
-    if len(several) > most:
-        more = len(several) - most
-        yield "", f"{more} {what if more > 1 else what.removesuffix('s')} in the report."
+def _first(rows: Sequence[Row], what: str, most: int = MOST_ROWS) -> Iterator[Row]:
+    """Yield the first rows, and a sentence with the number of the others if there are any."""
+    yield from rows[:most]
+    if (more := len(rows) - most) > 0:
+        yield "", f"{more} more {what if more > 1 else what.removesuffix('s')} in the report."

@@ -53,10 +53,8 @@ def question_section(result: Result) -> Section:
     A simulation asks for the coverage in one chamber, a study for the best chamber.
     """
     design, study = result.design, result.study
-    part, reach = design.part.mesh_path.name, ""
-    if area := result.record.chamber.target_exposed_area_mm2:
-        share = per_cent(result.record.field.reachable_share)
-        reach = f" ({plain(area)} mm² in the chamber; the shot can reach {share} of it)"
+    part, area = design.part.mesh_path.name, exposed_target(result)
+    reach = f" ({area})" if area else ""
     peening = (
         f"for {plain(design.process.treatment_time)} s in a chamber of shape "
         f"“{design.chamber.shape}”"
@@ -84,6 +82,13 @@ def question_section(result: Result) -> Section:
     ]
     table = Table("What was varied", ("parameter", "bounds", "start", "best"), varied)
     return Section("The question", [Beside([[Sentence(text), Sentence(limits)], [table]])])
+
+
+def exposed_target(result: Result) -> str:
+    """Return the area and the reachable share of a target, or "" for a target outside."""
+    area = result.record.chamber.target_exposed_area_mm2
+    share = per_cent(result.record.field.reachable_share)
+    return f"{plain(area)} mm² in the chamber; the shot can reach {share} of it" if area else ""
 
 
 def _constraints(result: Result) -> list[str]:

@@ -15,12 +15,13 @@ from chamberopt.common.errors import InputError
 from chamberopt.common.files import check_new_file, is_new_or_empty, remove_file, write_text
 from chamberopt.common.toml_fields import read_toml
 from chamberopt.design.load import is_study
-from chamberopt.documents.comparison import comparison_text
+from chamberopt.documents.comparison import comparison_lines
 from chamberopt.page.answers import part_answer, shape_answer
 from chamberopt.page.checker import Checker
 from chamberopt.page.edited_file import EditedFile, custom_shape, design_fields
 from chamberopt.page.picking import Picker
 from chamberopt.page.started_commands import StartedCommand
+from chamberopt.printers import terminal
 from chamberopt.printers.report_page import REPORT, parts_content
 from chamberopt.printers.sheet_page import SHEET
 from chamberopt.results.compare.comparison import compare
@@ -59,7 +60,8 @@ def shown(folders: Sequence[Path]) -> dict[str, Any]:
         InputError: a folder has no usable result, or the results cannot be compared.
     """
     html, content = parts_content(folders)
-    text = comparison_text(compare(folders)) if len(folders) > 1 else ""
+    several = len(folders) > 1
+    text = terminal.text(comparison_lines(compare(folders))) if several else ""
     return {"content": content, "html": html, "comparison": text}
 
 

@@ -9,10 +9,11 @@ from pathlib import Path
 
 from chamberopt.common.errors import InputError
 from chamberopt.common.files import make_folder, write_text
-from chamberopt.documents.comparison import comparison_text
+from chamberopt.documents.comparison import comparison_lines
 from chamberopt.pictures.comparison import draw_distributions
 from chamberopt.pictures.coverage import draw_coverage
 from chamberopt.pictures.difference import draw_difference, write_differences
+from chamberopt.printers import terminal
 from chamberopt.results.command_records import comparison_record, write_record
 from chamberopt.results.compare.comparison import Comparison, comparison_of, require_same_triangles
 from chamberopt.results.compare.distributions import distributions
@@ -80,7 +81,7 @@ def write_comparison(folder: str | Path, comparison: Comparison) -> list[str]:
             result.folder, one.target, comparison.results[0].folder, surfaces[0].target
         )
     make_folder(folder)
-    write_text(folder / "compare.txt", comparison_text(comparison) + "\n")
+    write_text(folder / "compare.txt", terminal.text(comparison_lines(comparison)) + "\n")
     spread = distributions(surfaces)
     draw_distributions(folder / "distributions.png", comparison, spread)
     remarks = [comparison_picture(folder / "compare.png", comparison)]

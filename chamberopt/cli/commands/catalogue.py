@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from chamberopt.cli.console import print_json, show
 from chamberopt.cli.options import Json, app
+from chamberopt.documents.document import Table
 
 if TYPE_CHECKING:
     from chamberopt.design.materials.catalogue import Alloy, Ball
@@ -34,12 +35,12 @@ def materials(name: str | None = None, /, *, json: Json = False) -> None:
         rows = [one.model_dump() | {"C0": DEFAULT_C0, "v0_m_s": speeds[one.name]} for one in listed]
         print_json({"alloys": rows})
         return
-    table = [["", *UNITS.values(), *(f"v0 {ball.also[0]}" for ball in hard)]]
+    head, lines = ["", *UNITS.values(), *(f"v0 {ball.also[0]}" for ball in hard)], []
     for one in listed:
         numbers = [getattr(one, key) for key in UNITS]
-        table.append([one.name, *map(_text, (*numbers, *speeds[one.name].values()))])
+        lines.append([one.name, *map(_text, (*numbers, *speeds[one.name].values()))])
     show([
-        *_columns(table),
+        Table("", head, lines),
         "",
         f"v0 [m/s] of these balls: e = C0 for v < v0, C0 (v / v0)^(-1/4) above, C0 = {DEFAULT_C0};",
         "by Johnson's formula from E, HB and the ball's density: to calibrate (docs/physics.md)",
@@ -68,16 +69,16 @@ def shot(name: str | None = None, /, *, json: Json = False) -> None:
         print_json({"balls": rows, "grades": [one.model_dump() for one in grades()]})
         return
     keys = list(UNITS)[:4]
-    table = [["", *(UNITS[key] for key in keys), "v0 m/s", "grades"]]
+    head, table = ["", *(UNITS[key] for key in keys), "v0 m/s", "grades"], []
     for one in listed:
         numbers = (*(getattr(one, key) for key in keys), speeds[one.name])
         table.append([one.name, *map(_text, numbers), " ".join(one.grades)])
-    lines = [*_columns(table), "", "v0: of two such balls. Diameters [mm] in which they are sold:"]
+    lines = ["", "v0: of two such balls. Diameters [mm] in which they are sold:"]
     for one in listed:
         lines += _wrapped(f"{one.name}: {', '.join(map(_text, one.sizes_mm))}")
-    limits = [["ISO 3290-1, µm", "one ball", "form", "lot"]]
-    limits += [[one.name, *map(_text, (one.ball_um, one.form_um, one.lot_um))] for one in grades()]
-    show([*lines, "", *_columns(limits), "", *_sources(listed)])
+    limits = [[one.name, *map(_text, (one.ball_um, one.form_um, one.lot_um))] for one in grades()]
+    tolerances = Table("", ("ISO 3290-1, µm", "one ball", "form", "lot"), limits)
+    show([Table("", head, table), *lines, "", tolerances, "", *_sources(listed)])
 
 
 def _sources(listed: Sequence[Alloy | Ball]) -> list[str]:
@@ -94,14 +95,3 @@ def _wrapped(text: str) -> list[str]:
 
 def _text(number: float | None) -> str:
     return "-" if number is None else f"{number:g}"
-
-
-def _columns(rows: Sequence[Sequence[str]]) -> list[str]:
-    """Return rows of cells as lines of text in aligned columns.
-
-    The first column is aligned to the left, the others to the right.
-    """
-    first, *others = (max(map(len, column)) for column in zip(*rows, strict=True))
-    return [
-        "  ".join([row[0].ljust(first), *map(str.rjust, row[1:], others)]).rstrip() for row in rows
-    ]

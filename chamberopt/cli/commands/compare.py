@@ -31,7 +31,7 @@ def compare(
     """
     from chamberopt.cli.teller import TerminalTeller
     from chamberopt.common.executor import open_executor
-    from chamberopt.documents.comparison import comparison_text
+    from chamberopt.documents.comparison import comparison_lines
     from chamberopt.workflows.comparison_folder import COMPARE, compare_candidates
 
     workers_of = partial(open_executor, workers, cluster)
@@ -40,4 +40,4 @@ def compare(
             candidates, folder, workers_of, TerminalTeller(), treatment_time_s
         )
         print_remarks(remarks)
-    print_result([comparison_text(comparison)], folder, json, COMPARE)
+    print_result(comparison_lines(comparison), folder, json, COMPARE)

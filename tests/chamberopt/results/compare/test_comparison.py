@@ -17,10 +17,11 @@ from chamberopt.common.estimate import Estimate, estimate
 from chamberopt.coverage.compression import ERROR
 from chamberopt.coverage.metrics import NEVER, find_metric
 from chamberopt.design.load import load_design
-from chamberopt.documents.comparison import comparison_text
+from chamberopt.documents.comparison import comparison_lines
+from chamberopt.printers import terminal
 from chamberopt.results.arrays_file import ResultArrays
 from chamberopt.results.command_records import difference_record
-from chamberopt.results.compare.comparison import compare
+from chamberopt.results.compare.comparison import Comparison, compare
 from chamberopt.results.compare.difference import MAX_TIME_RATIO, confidence_of_each, difference
 from chamberopt.workflows import comparison_folder
 from chamberopt.workflows.comparison_folder import write_comparison
@@ -31,6 +32,10 @@ from tests.helpers.synthetic import DESIGNS, machine_values, plate_design, poiss
 
 PLATE = plate_design()
 CHAMBER = build_chamber(PLATE)
+
+
+def comparison_text(comparison: Comparison) -> str:
+    return terminal.text(comparison_lines(comparison))
 
 
 @pytest.fixture(autouse=True)
