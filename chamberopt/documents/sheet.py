@@ -24,7 +24,6 @@ from chamberopt.results.load import load_start
 if TYPE_CHECKING:
     from chamberopt.design.sonotrode import VibratingFace
     from chamberopt.results.load import Result
-    from chamberopt.results.records import CoverageAtTime
 
 # Cautions about the figures of a process sheet, in words for a workshop, shown before its warnings.
 
@@ -246,13 +245,10 @@ def _expected(result: Result) -> Iterator[Row]:
     Without a calibration, a row says why there is no intensity in mmA.
     """
     yield "peening time", f"{plain(result.design.process.treatment_time)} s"
-    objective, *others = figures(result, None)
-    calibration = result.design.calibration
-    has_intensity = calibration is not None and calibration.has_strips
-    for row in (objective, *others):
-        if row is objective or row.name in EXPECTED:
-            if row.name == "strength_um" and has_intensity:
-                continue
+    calibration, shown = result.design.calibration, figures(result, None)
+    hidden = "strength_um" if calibration and calibration.has_strips else ""
+    for row in shown:
+        if (row is shown[0] or row.name in EXPECTED) and row.name != hidden:
             yield row.label.text, row.label.format(row.result)
     if reason := why_no_intensity(calibration):
         yield "", f"{reason[0].upper()}{reason[1:]}."
@@ -335,7 +331,9 @@ def _checks(result: Result) -> Iterator[Row]:
         laws = {name: getattr(design.materials, name) for name in ("sonotrode", "wall", "part")}
         what = f"ball drop: one ball at {plain(DROP_SPEED)} m/s, speed after over speed before"
         yield what, ", ".join(f"{k} {_restitution(x)}" for k, x in laws.items())
-    row = _half_covered(result.record.coverage_against_time)
+    curve = result.record.coverage_against_time
+    # Measuring tells most near a mean coverage of 0.5.
+    row = min(curve, key=lambda row: abs(row.mean_coverage - 0.5), default=None)
     # If the mean coverage at the end is not resolved, its curve is not reliable either.
     if row and result.metrics["mean_coverage"].has_number:
         share = Estimate(row.mean_coverage, row.half_width)
@@ -368,14 +366,6 @@ def _restitution(law: Any) -> str:
     from sim_core import restitution_at
 
     return plain(float(restitution_at(np.array(DROP_SPEED), law.restitution)), 2)
-
-
-def _half_covered(rows: list[CoverageAtTime]) -> CoverageAtTime | None:
-    """Return the row with a mean coverage nearest to 0.5, where measuring tells most.
-
-    None if there are no rows.
-    """
-    return min(rows, key=lambda row: abs(row.mean_coverage - 0.5), default=None)
 
 
 def _first(rows: Sequence[Row], what: str, most: int = MOST_ROWS) -> Iterator[Row]:

@@ -70,17 +70,13 @@ def write_report(result: str | Path, path: str | Path | None = None) -> tuple[Pa
     path = require_free_page(loaded.folder / REPORT if path is None else path)
     with claim_file(path):
         document = report(loaded)
-        _write_document(path, document)
+        body = (
+            f"<header><h1>{html.text(document.name)}</h1>"
+            f"{html.paragraph(document.subtitle, 'soft')}</header>"
+            f"{''.join(html.section(one, viewer) for one in document.sections)}"
+        )
+        write_page(path, f"{document.name}: report", body, document.scenes)
     return path, document
-
-
-def _write_document(path: Path, document: Document) -> None:
-    head = (
-        f"<header><h1>{html.text(document.name)}</h1>"
-        f"{html.paragraph(document.subtitle, 'soft')}</header>"
-    )
-    body = "".join(html.section(one, viewer) for one in document.sections)
-    write_page(path, f"{document.name}: report", head + body, document.scenes)
 
 
 def write_part_page(results: Sequence[Path], path: Path) -> list[str]:
@@ -94,16 +90,13 @@ def write_part_page(results: Sequence[Path], path: Path) -> list[str]:
             holds anything but a page of this program.
     """
     with claim_file(require_free_page(path)):
-        return _write_part_page([load_result(one) for one in results], path)
-
-
-def _write_part_page(loaded: Sequence[Result], path: Path) -> list[str]:
-    names, scenes = _scenes(loaded)
-    summaries = [f"{name}: {summary(one)}" for name, one in zip(names, loaded, strict=True)]
-    title = ", ".join(names)
-    parts = Section("Part in its chamber", [Items(summaries), PartView(scenes)])
-    content = html.section(parts, viewer)
-    write_page(path, title, f"<header><h1>{html.text(title)}</h1></header>{content}", scenes)
+        loaded = [load_result(one) for one in results]
+        names, scenes = _scenes(loaded)
+        summaries = [f"{name}: {summary(one)}" for name, one in zip(names, loaded, strict=True)]
+        title = ", ".join(names)
+        parts = Section("Part in its chamber", [Items(summaries), PartView(scenes)])
+        content = html.section(parts, viewer)
+        write_page(path, title, f"<header><h1>{html.text(title)}</h1></header>{content}", scenes)
     return [remark for scene in scenes for remark in scene.remarks]
 
 

@@ -124,10 +124,10 @@ class Writer:
             y -= 0.35 * self.line
         return y
 
-    def rule(self, x: float, y: float, width: float) -> None:
+    def rule(self, x: float, y: float, width: float, colour: str = GREY) -> None:
         """Draw a thin horizontal line."""
         if self.axes is not None:
-            self.axes.plot([x, x + width], [y, y], color=GREY, lw=0.4)
+            self.axes.plot([x, x + width], [y, y], color=colour, lw=0.5)
 
 
 def broken(text: str, width: float, size: float, bold: bool = False) -> list[str]:
@@ -249,7 +249,7 @@ def _heading(axes: Axes, title: str, sheet: Document) -> float:
     name = Writer(axes, 9.0).write(sheet.name, beside, HEIGHT - MARGIN, width, bold=True)
     y = min(y, Writer(axes, 7.0).write(sheet.subtitle, beside, name, width, grey=True)) - 1.5
     y = Writer(axes, 8.0).write(sheet.answer, MARGIN, y, INNER) - 1.5
-    axes.plot([MARGIN, WIDTH - MARGIN], [y, y], color=BLACK, lw=0.8)
+    Writer(axes, 8.0).rule(MARGIN, y, INNER, BLACK)
     return y
 
 
@@ -271,11 +271,11 @@ def _content(write: Writer, content: Sequence[Block], top: float) -> float:
 
 def _signatures(axes: Axes) -> None:
     """Draw lines for signatures at the foot of the page."""
-    width = (INNER - 3.0 * GAP) / len(SIGNED)
+    width, write = (INNER - 3.0 * GAP) / len(SIGNED), Writer(axes, 7.0)
     for number, what in enumerate(SIGNED):
         x = MARGIN + number * (width + GAP)
-        axes.plot([x, x + width], [MARGIN + 3.5] * 2, color=BLACK, lw=0.6)
-        Writer(axes, 7.0).write(what, x, MARGIN + 3.0, width, grey=True)
+        write.rule(x, MARGIN + 3.5, width, BLACK)
+        write.write(what, x, MARGIN + 3.0, width, grey=True)
 
 
 def _save(path: Path, figure: Figure, title: str) -> None:

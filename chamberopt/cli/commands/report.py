@@ -32,32 +32,18 @@ def report(result: Path, /, *, sheet: bool = False, json: Json = False, out: Pag
         Write a process sheet instead: one A4 page (.pdf) to print, with drawing, settings, what to
         expect and what to measure first.
     """
-    if sheet:
-        _write_sheet(result, json, out)
-        return
     from chamberopt.common.progress import step
     from chamberopt.printers.json_values import json_values
     from chamberopt.printers.report_page import write_report
-
-    with step("writing the page"):
-        path, document = write_report(result, out)
-    if json:
-        print_json({**json_values(document), "report": str(path)})
-        return
-    size = f"{path.stat().st_size / 1e6:.1f} MB"
-    lines = [one.text for one in document.answer_lines]
-    remarks = [remark for scene in document.scenes for remark in scene.remarks]
-    show([document.answer, *lines, *remarks, f"report in {path}, {size}"])
-
-
-def _write_sheet(result: Path, json: bool, out: Path | None) -> None:
-    from chamberopt.common.progress import step
-    from chamberopt.printers.json_values import json_values
     from chamberopt.printers.sheet_page import write_sheet
 
-    with step("writing the sheet"):
-        path, printed = write_sheet(result, out)
+    with step(f"writing the {'sheet' if sheet else 'page'}"):
+        path, document = (write_sheet if sheet else write_report)(result, out)
     if json:
-        print_json({**json_values(printed), "sheet": str(path)})
+        print_json({**json_values(document), "sheet" if sheet else "report": str(path)})
         return
-    show([printed.answer, f"process sheet in {path}"])
+    size = f"{path.stat().st_size / 1e6:.1f} MB"
+    written = f"process sheet in {path}" if sheet else f"report in {path}, {size}"
+    lines = [one.text for one in document.answer_lines]
+    remarks = [remark for scene in document.scenes for remark in scene.remarks]
+    show([document.answer, *lines, *remarks, written])
