@@ -30,7 +30,7 @@ McNamara, Granular Matter 1 (1998) 113, with a speed in place of a time.
 
 import math
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -130,7 +130,7 @@ def checked_restitution(restitution: Restitution, tags: int) -> RestitutionState
     return RestitutionState(np.array(filled_up), elastic_below)
 
 
-def _points(name: str, law: Any) -> np.ndarray:
+def _points(name: str, law: object) -> np.ndarray:
     """Return the points of a law of restitution, as an array (n, 3).
 
     A row has speed [m/s], coefficient of restitution, and exponent of the fall above the last

@@ -12,7 +12,6 @@ from contextlib import contextmanager, suppress
 from functools import cache
 from hashlib import sha256
 from pathlib import Path
-from typing import Any
 
 from numba.core.caching import (
     CompileResultCacheImpl,
@@ -43,10 +42,10 @@ class _CheckedFiles(IndexDataCacheFile):
         with super()._open_for_write(filepath) as file:
             file.write(content.getvalue() + sha256(content.getvalue()).digest())
 
-    def _load_index(self) -> dict[Any, str]:
+    def _load_index(self) -> dict[object, str]:
         return super()._load_index() if _is_whole(Path(self._index_path)) else {}
 
-    def _load_data(self, name: str) -> Any:
+    def _load_data(self, name: str) -> object:
         path = self._data_path(name)
         if not _is_whole(Path(path)):
             raise FileNotFoundError(path)  # numba compiles anew
@@ -58,11 +57,11 @@ class CheckedCache(FunctionCache):
 
     _impl_class = _InChosenFolder
 
-    def __init__(self, function: Any) -> None:
+    def __init__(self, function: object) -> None:
         super().__init__(function)
         self._cache_file.__class__ = _CheckedFiles
 
-    def save_overload(self, sig: Any, data: Any) -> None:
+    def save_overload(self, sig: object, data: object) -> None:
         with suppress(OSError):  # such as a full disk: every process compiles for itself
             super().save_overload(sig, data)
 

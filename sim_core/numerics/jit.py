@@ -112,7 +112,7 @@ class Step(CPUDispatcher):
         return self.entry(*arguments)
 
 
-def _compiled(function: Callable[..., Any], inline: bool, from_python: bool = False) -> Any:
+def _compiled(function: F, inline: bool, from_python: bool = False) -> F:
     # numba reads the folder when the decorator runs. Other packages keep their own folder. The file
     # names do not tell functions with wrappers from functions without wrappers.
     options = {"nogil": True, "error_model": "numpy", "fastmath": False, "_nrt": False}
@@ -129,17 +129,17 @@ def _compiled(function: Callable[..., Any], inline: bool, from_python: bool = Fa
             _settings.CACHE_DIR = before
     if not from_python and not _settings.DISABLE_JIT:
         compiled.__class__ = Step
-    return compiled
+    return cast(F, compiled)
 
 
 class _Counter(event.Listener):
     def __init__(self, count: Callable[[int], None]) -> None:
         self.compiled, self.count = 0, count
 
-    def on_start(self, event: Any) -> None:
+    def on_start(self, event: object) -> None:
         pass
 
-    def on_end(self, event: Any) -> None:
+    def on_end(self, event: object) -> None:
         self.compiled += 1
         self.count(self.compiled)
 
@@ -159,7 +159,7 @@ def jit(function: F) -> F:
     is atomic and took half of the event loop's time. All arrays of the loop are made before it
     starts.
     """
-    return cast(F, _compiled(function, inline=False))
+    return _compiled(function, inline=False)
 
 
 def inlined(function: F) -> F:
@@ -168,4 +168,4 @@ def inlined(function: F) -> F:
     A call passes every array as seven words or more, a hundred for a step, which took a fifth of
     the loop's time.
     """
-    return cast(F, _compiled(function, inline=True))
+    return _compiled(function, inline=True)
