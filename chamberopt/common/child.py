@@ -94,7 +94,7 @@ class Child:
         """Process number (PID) of the child; None after its end."""
         return self._process.pid if self._process.poll() is None else None
 
-    def ask(self, function: Callable[..., Any], *arguments: Any) -> None:
+    def ask(self, function: Callable[..., object], *arguments: Any) -> None:
         """Send a job: a function that the child can import, and the function's arguments.
 
         The job has one answer, the function's value. A generator has an answer for each value that

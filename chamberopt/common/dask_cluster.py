@@ -13,12 +13,15 @@ import socket
 from collections.abc import Callable
 from concurrent.futures import CancelledError, Executor, Future
 from pathlib import Path
-from typing import Any
+from typing import Any, ParamSpec, TypeVar
 from urllib.parse import urlsplit
 
 from chamberopt.common.errors import ClusterLostError, InputError, WorkerLostError
 from chamberopt.common.limits import MAX_TEXT_BYTES, read_limited
 from chamberopt.common.versions import simulation_versions
+
+P = ParamSpec("P")
+T = TypeVar("T")
 
 TIMEOUT_S = 4.0  # wait for the scheduler to answer, and again for it to accept a client
 WORKER_TIMEOUT_S = 20.0  # wait for its first worker
@@ -70,21 +73,21 @@ class DaskExecutor(Executor):
             raise
         self._executor = self._client.get_executor(pure=False)
 
-    def share(self, value: Any) -> Any:
+    def share(self, value: object) -> object:
         # The value is sent as a task's result and not as scattered data, because the scheduler can
         # compute a result again if the workers that hold it die.
         pickled = pickle.dumps(value, pickle.HIGHEST_PROTOCOL)
         return self._client.submit(pickle.loads, pickled, pure=False)
 
-    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+    def submit(self, fn: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> Future[T]:
         """Queue a call of `fn`, and return its future.
 
         The future raises ClusterLostError or WorkerLostError in place of Dask's own errors.
         """
         dask_future = self._executor.submit(fn, *args, **kwargs)
-        future: Future[Any] = Future()
+        future: Future[T] = Future()
 
-        def copy_outcome(_: Future[Any]) -> None:
+        def copy_outcome(_: Future[object]) -> None:
             if future.set_running_or_notify_cancel():  # a future that runs cannot be cancelled
                 _copy_outcome(dask_future, future)
 
@@ -168,7 +171,7 @@ async def _kind_of_server(address: str) -> str:
         return str((await server.identity())["type"])
 
 
-def _copy_outcome(dask_future: Future[Any], future: Future[Any]) -> None:
+def _copy_outcome(dask_future: Future[T], future: Future[T]) -> None:
     """Copy the result or error of Dask's finished future to `future`.
 
     Dask's errors for a cancelled task and a killed worker become ClusterLostError and

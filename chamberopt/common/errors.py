@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from concurrent.futures import BrokenExecutor
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from pydantic import ValidationError
@@ -48,7 +48,7 @@ def one_line(text: str) -> str:
     return visible(text).replace("\n", "\\n")
 
 
-def spreadsheet_cell(value: Any) -> Any:
+def spreadsheet_cell(value: object) -> object:
     """Return a value as it is written to a .csv file.
 
     A text that a spreadsheet would take for a formula gets an apostrophe in front. A carriage

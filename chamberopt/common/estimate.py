@@ -88,7 +88,7 @@ class Estimate:
         }
         return interval | ({"in_words": self.in_words} if self.in_words else {})
 
-    def to_json(self) -> dict[str, Any]:
+    def to_json(self) -> dict[str, object]:
         """Return the whole estimate as JSON values, with pseudo-values for later comparisons."""
         return {**self.interval_json(), "pseudovalues": list(self.pseudovalues),
                 "bias": finite_or_none(self.bias), "shared": list(self.shared)}  # fmt: skip

@@ -7,9 +7,12 @@ common, such as a chamber, once to each worker and not with every task.
 import os
 from collections.abc import Callable
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
-from typing import Any, Literal
+from typing import Any, Literal, ParamSpec, TypeVar
 
 from chamberopt.common.errors import InputError
+
+P = ParamSpec("P")
+T = TypeVar("T")
 
 WorkerKind = Literal["threads", "processes"]
 
@@ -74,13 +77,14 @@ def open_executor(
     return DaskExecutor(cluster)
 
 
-def share(executor: Executor, value: Any) -> Any:
+def share(executor: Executor, value: T) -> T:
     """Return what to pass to many tasks in place of a large value that they all need.
 
     The tasks receive the value itself. It is sent once to each worker and not with every task.
     """
     share_with_workers = getattr(executor, "share", None)
-    return value if share_with_workers is None else share_with_workers(value)
+    shared: T = value if share_with_workers is None else share_with_workers(value)
+    return shared
 
 
 class ThreadExecutor(ThreadPoolExecutor):
@@ -100,8 +104,8 @@ class SerialExecutor(Executor):
     It serves cluster workers, tests, debuggers and profilers.
     """
 
-    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
-        future: Future[Any] = Future()
+    def submit(self, fn: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> Future[T]:
+        future: Future[T] = Future()
         try:
             future.set_result(fn(*args, **kwargs))
         except Exception as error:

@@ -6,7 +6,6 @@ import json
 import math
 import os
 from pathlib import Path
-from typing import Any
 
 from chamberopt.common.errors import InputError, UnreadableError
 from chamberopt.common.files import open_plain
@@ -119,7 +118,7 @@ def require_few(path: Path, count: int, what: str, most: int = MAX_ELEMENTS) -> 
         raise InputError(f"{path}: {text}")
 
 
-def parse_json(content: bytes | str) -> Any:
+def parse_json(content: bytes | str) -> object:
     """Return the value of a JSON text from a result folder.
 
     Raises ValueError for a text that is not JSON, and for numbers that Python would read although
@@ -132,7 +131,7 @@ def parse_json(content: bytes | str) -> Any:
     return value
 
 
-def require_text(content: bytes | str, value: Any) -> None:
+def require_text(content: bytes | str, value: object) -> None:
     """Raise ValueError if a text in a JSON value has half a character, which no file can hold.
 
     Such halves are escapes, for example \\ud800 without its second half.

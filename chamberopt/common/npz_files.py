@@ -94,7 +94,7 @@ def load_record(path: Path, kind: type[Record], others: Sequence[type], remedy: 
     return record
 
 
-def is_of_type(value: Any, hint: Any) -> bool:
+def is_of_type(value: object, hint: object) -> bool:
     """Return True if a value from a file, with all its content, has the types of `hint`.
 
     A whole number may stand for a float. True and false are no numbers.
@@ -120,7 +120,7 @@ def _unreadable(path: Path, error: BaseException, remedy: str) -> InputError:
     return InputError(f"{path}: {why}; {remedy}")
 
 
-def _to_tree(value: Any, arrays: dict[str, np.ndarray]) -> Any:
+def _to_tree(value: object, arrays: dict[str, np.ndarray]) -> object:
     """Return the value as plain JSON values. Arrays in it are put into `arrays` under new names."""
     if isinstance(value, np.ndarray):
         name = f"a{len(arrays)}"
@@ -136,7 +136,7 @@ def _to_tree(value: Any, arrays: dict[str, np.ndarray]) -> Any:
     return value.item() if isinstance(value, np.generic) else value
 
 
-def _from_tree(tree: Any, arrays: dict[str, np.ndarray], classes: dict[str, type]) -> Any:
+def _from_tree(tree: object, arrays: dict[str, np.ndarray], classes: dict[str, type]) -> object:
     if isinstance(tree, list):
         return tuple(_from_tree(one, arrays, classes) for one in tree)
     if not isinstance(tree, dict):

@@ -17,12 +17,15 @@ from contextlib import ExitStack, suppress
 from functools import cached_property, lru_cache
 from itertools import count
 from pathlib import Path
-from typing import Any
+from typing import Any, ParamSpec, TypeVar
 
 from chamberopt.common.child import Child, ChildLostError
 from chamberopt.common.errors import WorkerLostError
 from chamberopt.common.files import private_folder, read_file, remove_file, write_bytes
 from chamberopt.common.memory import MEMORY
+
+P = ParamSpec("P")
+T = TypeVar("T")
 
 # A process may die by chance, for example when another program takes all memory. If two processes
 # die of the same task, the task is the cause.
@@ -37,17 +40,17 @@ class SharedFile:
     the file only the first time.
     """
 
-    def __init__(self, value: Any, path: Path) -> None:
+    def __init__(self, value: object, path: Path) -> None:
         self.path = path
         write_bytes(path, pickle.dumps(value, pickle.HIGHEST_PROTOCOL))
         weakref.finalize(self, _remove, path)
 
-    def __reduce__(self) -> tuple[Callable[[Path], Any], tuple[Path]]:
+    def __reduce__(self) -> tuple[Callable[[Path], object], tuple[Path]]:
         return _load, (self.path,)
 
 
 @lru_cache(maxsize=MAX_SHARED)
-def _load(path: Path) -> Any:
+def _load(path: Path) -> object:
     return pickle.loads(read_file(path))
 
 
@@ -74,14 +77,14 @@ class ProcessExecutor(Executor):
     def _folder(self) -> str:
         return self._resources.enter_context(private_folder())
 
-    def share(self, value: Any) -> SharedFile:
+    def share(self, value: object) -> SharedFile:
         """Write a value that many tasks need to a file, and return a stand-in to pass to the tasks.
 
         The file is removed with the stand-in, and at the latest with the executor.
         """
         return SharedFile(value, Path(self._folder, f"{next(self._numbers)}.pickle"))
 
-    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+    def submit(self, fn: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> Future[T]:
         return self._feeders.submit(self._run, fn, args, kwargs)
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
@@ -104,7 +107,7 @@ class ProcessExecutor(Executor):
         """Process numbers (PIDs) of the living worker processes."""
         return [pid for worker in self._workers if (pid := worker.pid) is not None]
 
-    def _run(self, fn: Callable[..., Any], args: tuple[Any, ...], kwargs: dict[str, Any]) -> Any:
+    def _run(self, fn: Callable[..., T], args: tuple[object, ...], kwargs: dict[str, object]) -> T:
         """Return the value of a task, run in the worker process of this thread.
 
         Raises the exception of the task, or WorkerLostError if the process dies at each attempt.
@@ -115,7 +118,8 @@ class ProcessExecutor(Executor):
             try:
                 worker = self._worker()
                 worker.ask(_do, self._count, fn, args, kwargs)
-                return worker.answer()
+                answer: T = worker.answer()
+                return answer
             except ChildLostError as lost:
                 self._of_thread.worker, status = None, lost.status
         if self._ended:
@@ -138,7 +142,7 @@ class ProcessExecutor(Executor):
         self._resources.close()
 
 
-def _do(count: int, fn: Callable[..., Any], args: tuple[Any, ...], kwargs: dict[str, Any]) -> Any:
+def _do(count: int, fn: Callable[..., T], args: tuple[object, ...], kwargs: dict[str, object]) -> T:
     """Do a task in a worker process, and return its value.
 
     Args:

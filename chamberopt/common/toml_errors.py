@@ -311,7 +311,7 @@ def _find_field(
     return model, field
 
 
-def _format_value(value: Any) -> str:
+def _format_value(value: object) -> str:
     return _shortened(str(value).lower() if isinstance(value, bool) else repr(value))
 
 

@@ -49,11 +49,11 @@ def _existing(mesh: str, info: ValidationInfo) -> str:
     return str(path)
 
 
-def _as_tuple(names: Any) -> Any:
+def _as_tuple(names: object) -> object:
     return (names,) if isinstance(names, str) else names
 
 
-def _form(form: str) -> Any:
+def _form(form: str) -> object:
     return Field(json_schema_extra={"form": form})
 
 

@@ -7,7 +7,7 @@ from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor, Future
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 from chamberopt.chamber.analytic import impacts_on_chamber
 from chamberopt.chamber.part import turning_axis
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from chamberopt.design.load import Design
     from sim_core import AnalyticCavity, SimulationResult, TriangleMesh
 
+S = TypeVar("S")
 T = TypeVar("T")
 
 # Replicas that are added until an interval is narrow enough leave it too narrow by chance. If that
@@ -78,8 +79,8 @@ def simulate_replicas(
 
 
 def run_in_order(
-    task: Callable[[Any, int], T],
-    setting: Any,
+    task: Callable[[S, int], T],
+    setting: S,
     seed: int,
     executor: Executor,
     stream: str,

@@ -12,7 +12,7 @@ import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import BinaryIO
 
 from chamberopt.common.errors import InputError, spreadsheet_cell
 from chamberopt.common.files.opened import OpenFolder, require_plain, require_plain_folder
@@ -217,7 +217,7 @@ def private_folder() -> AbstractContextManager[str]:
     return tempfile.TemporaryDirectory(prefix="chamberopt-")
 
 
-def csv_text(rows: Sequence[Mapping[str, Any]]) -> str:
+def csv_text(rows: Sequence[Mapping[str, object]]) -> str:
     """Return a table as CSV text, with a header.
 
     Its columns are all names that occur in any row. Values that a row lacks stay empty.
