@@ -195,7 +195,7 @@ def why_no_intensity(calibration: Calibration | None) -> str:
     return "" if calibration.has_strips else NO_STRIPS
 
 
-def _read(given: Any, info: ValidationInfo) -> Any:
+def _read(given: object, info: ValidationInfo) -> object:
     """Return the calibration in a file if a path is given, else the given value unchanged."""
     if not isinstance(given, str):
         return given

@@ -77,14 +77,17 @@ class Design(FileTable):
     @pydantic.model_validator(mode="wrap")
     @classmethod
     def _use_class_of_its_shape(
-        cls, data: Any, handler: pydantic.ModelWrapValidatorHandler["Design"], info: ValidationInfo
+        cls,
+        data: object,
+        handler: pydantic.ModelWrapValidatorHandler["Design"],
+        info: ValidationInfo,
     ) -> "Design":
         """Validate with the subclass whose chamber table has the keys of the design's shape."""
         if cls is not Design or not isinstance(data, Mapping):
             return handler(data)
         return design_class(data, info.context).model_validate(data, context=info.context)
 
-    def __reduce__(self) -> tuple[Any, ...]:
+    def __reduce__(self) -> tuple[object, ...]:
         """Pickle the values. A worker process creates the class of a shape's designs itself."""
         return _unpickled, (self.model_dump(), self.is_recorded, self.chamber.sha256)
 
@@ -104,7 +107,7 @@ class Design(FileTable):
 
     @pydantic.model_validator(mode="before")
     @classmethod
-    def _name_the_setup_file_once(cls, data: Any) -> Any:
+    def _name_the_setup_file_once(cls, data: Any) -> object:
         """Copy mesh and unit of [part] to a chamber that is drawn in the same file."""
         part, chamber = (_table(data, name) for name in ("part", "chamber"))
         if part is None or chamber is None or chamber.get("shape") != IMPORTED:
@@ -114,7 +117,7 @@ class Design(FileTable):
 
     @pydantic.model_validator(mode="before")
     @classmethod
-    def _look_up_metals(cls, data: Any) -> Any:
+    def _look_up_metals(cls, data: Any) -> object:
         """Replace names of metals by the catalogue's numbers, so that results hold the numbers."""
         if (materials := _table(data, "materials")) is None:
             return data
@@ -124,7 +127,7 @@ class Design(FileTable):
 
     @pydantic.field_validator("effects", mode="before")
     @classmethod
-    def _accept_auto(cls, effects: Any) -> Any:
+    def _accept_auto(cls, effects: object) -> object:
         if isinstance(effects, (str, int, float, list)) and effects != "auto":
             allowed = '"auto", or a table, e.g. { gravity = true, drag = true }'
             raise CrossCheckError([Problem("", f"given {effects!r}; allowed: {allowed}")])
@@ -298,7 +301,7 @@ class Design(FileTable):
         return validate(Design, data, recorded=self.is_recorded)
 
 
-def _unpickled(data: dict[str, Any], recorded: bool, sha256: str) -> Design:
+def _unpickled(data: dict[str, object], recorded: bool, sha256: str) -> Design:
     """Return a design from its pickled values, in a worker process.
 
     Raises InputError if the Python file of its own shape has other contents on this machine.
@@ -359,7 +362,7 @@ class AnyShape(ChamberTable):
 
     @pydantic.field_validator("shape", mode="before")
     @classmethod
-    def _load_custom_shape(cls, shape: Any, info: ValidationInfo) -> Any:
+    def _load_custom_shape(cls, shape: Any, info: ValidationInfo) -> object:
         if is_custom(shape):
             try:
                 load_custom_shape(from_file(shape, info.context))
@@ -368,7 +371,9 @@ class AnyShape(ChamberTable):
         return shape
 
 
-def design_class(data: Mapping[str, Any], context: Mapping[str, Any] | None = None) -> type[Design]:
+def design_class(
+    data: Mapping[str, object], context: Mapping[str, object] | None = None
+) -> type[Design]:
     """Return the subclass of Design whose chamber table has the keys of the shape in `data`.
 
     Args:
@@ -387,7 +392,7 @@ def design_class(data: Mapping[str, Any], context: Mapping[str, Any] | None = No
         return _designs_with(AnyShape)
 
 
-def _table(data: Any, name: str) -> Mapping[str, Any] | None:
+def _table(data: object, name: str) -> Mapping[str, object] | None:
     table = data.get(name) if isinstance(data, Mapping) else None
     return table if isinstance(table, Mapping) else None
 
@@ -403,7 +408,7 @@ Model = TypeVar("Model", bound=BaseModel)
 
 def validate(
     model: type[Model],
-    data: Mapping[str, Any],
+    data: Mapping[str, object],
     path: Path | None = None,
     source: str = "",
     recorded: bool = False,

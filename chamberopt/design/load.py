@@ -58,12 +58,12 @@ def _relative(path: str, folder: Path) -> str:
         return Path(path).as_posix()
 
 
-def is_study(data: Mapping[str, Any]) -> bool:
+def is_study(data: Mapping[str, object]) -> bool:
     """True if these values are those of a study file rather than of a design file."""
     return isinstance(data.get("design"), str) or not {"vary", "optimizer"}.isdisjoint(data)
 
 
-def _without_none(value: Any) -> Any:
+def _without_none(value: object) -> object:
     """Return a copy of the values without keys that are None or hold an empty list."""
     if isinstance(value, Mapping):
         return {k: _without_none(v) for k, v in value.items() if v is not None and v != ()}

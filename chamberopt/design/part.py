@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 from pydantic import BeforeValidator, Field
@@ -153,7 +153,7 @@ class SmoothingTable(FileTable):
         return Rule(triangles, self.off, turn, 1e-3 * self.narrow_mm, tolerance)
 
 
-def _accept_off(smoothing: Any) -> Any:
+def _accept_off(smoothing: object) -> object:
     if isinstance(smoothing, (str, int, float, list)) and smoothing != "off":
         allowed = '"off", or a table, e.g. { limit_deg = 4 }'
         raise CrossCheckError([Problem("", f"given {smoothing!r}; allowed: {allowed}")])

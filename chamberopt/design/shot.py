@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterator
-from typing import Any, Literal
+from typing import Literal
 
 from pydantic import Field, field_validator
 
@@ -40,7 +40,7 @@ class ShotTable(FileTable):
 
     @field_validator("material", mode="before")
     @classmethod
-    def _use_its_first_name(cls, given: Any) -> Any:
+    def _use_its_first_name(cls, given: object) -> object:
         found = find(given, balls())
         return given if found is None else found.name
 

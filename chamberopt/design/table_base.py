@@ -1,7 +1,7 @@
 """Base class of every table of a design or study file, and descriptors of values in SI units."""
 
 from collections.abc import Iterable
-from typing import Any, ClassVar, Self
+from typing import ClassVar, Self
 
 from pydantic import BaseModel, ConfigDict, model_validator
 
@@ -15,7 +15,7 @@ class SI:
     def __init__(self, key: str, factor: float, meaning: str) -> None:
         self._key, self._factor, self.__doc__ = key, factor, meaning
 
-    def __get__(self, table: Any, owner: Any = None) -> float:
+    def __get__(self, table: object, owner: object = None) -> float:
         return self if table is None else getattr(table, self._key) * self._factor  # type: ignore[return-value]
 
 
@@ -25,7 +25,7 @@ class Metres:
     def __init__(self, key: str, meaning: str) -> None:
         self._key, self.__doc__ = key, meaning
 
-    def __get__(self, table: Any, owner: Any = None) -> tuple[float, float, float]:
+    def __get__(self, table: object, owner: object = None) -> tuple[float, float, float]:
         return self if table is None else metres(getattr(table, self._key))  # type: ignore[return-value]
 
 

@@ -27,7 +27,7 @@ TWINS = {"amplitude_um": ("amplitude_pv_um", 2.0), "amplitude_pv_um": ("amplitud
 FORM = 'a number, a share such as "2 %", or [low, high] of these, such as ["-10 %", "0 %"]'
 
 
-def _deviation(side: Any) -> tuple[float, bool]:
+def _deviation(side: object) -> tuple[float, bool]:
     """Return a deviation as a number, and True if it was given in per cent, such as "-10 %".
 
     Raises ValueError if it is neither a number nor a percentage.
@@ -39,7 +39,7 @@ def _deviation(side: Any) -> tuple[float, bool]:
     return float(side), False
 
 
-def _checked(given: Any) -> Any:
+def _checked(given: Any) -> object:
     """Return a tolerance as its file gives it, after a check that it is one.
 
     A tolerance is one deviation for both sides, or a pair of a lower and an upper deviation.
@@ -74,7 +74,7 @@ class ToleratedDesign(Protocol):
     def tolerances(self) -> dict[str, Tolerance] | None: ...
     def value(self, name: str) -> float: ...
     def why_fixed(self, name: str) -> str: ...
-    def changed(self, values: Mapping[str, Any]) -> object: ...
+    def changed(self, values: Mapping[str, object]) -> object: ...
 
 
 def tolerance_box(design: ToleratedDesign) -> dict[str, tuple[float, float]]:

@@ -28,7 +28,7 @@ NOT_NAMED = (
 )
 
 
-def with_numbers(materials: Mapping[str, Any], material: object) -> dict[str, Any]:
+def with_numbers(materials: Mapping[str, object], material: object) -> dict[str, object]:
     """Return the tables of [materials] with numbers in place of names of metals.
 
     Given numbers stay. A v0 that was computed for another ball, hardness or C0 is computed again. A
@@ -59,7 +59,7 @@ def name_problems(materials: object) -> Iterator[Problem]:
                 yield Problem(f"{name}.alloy", f"given {alloy!r}: {unknown(alloy, alloys())}")
 
 
-def _surface(name: str, given: Any, ball: Ball | None) -> Any:
+def _surface(name: str, given: object, ball: Ball | None) -> object:
     """Return the table of a surface with the numbers of the alloy that it names.
 
     Return the given value unchanged if it names no known alloy.
@@ -81,7 +81,7 @@ def _surface(name: str, given: Any, ball: Ball | None) -> Any:
     return _with_v0(table, ball, alloy, table.get("hardness_HB", 0.0))
 
 
-def _pair(given: Any, ball: Ball | None) -> Any:
+def _pair(given: object, ball: Ball | None) -> object:
     """Return the table of impacts of ball on ball, computed for this material of the balls.
 
     Return the given value unchanged if it has a restitution law of its own.

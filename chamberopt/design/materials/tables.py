@@ -196,7 +196,7 @@ class Materials(FileTable):
 
     @model_validator(mode="before")
     @classmethod
-    def _know_all_names(cls, data: Any) -> Any:
+    def _know_all_names(cls, data: object) -> object:
         if problems := list(name_problems(data)):
             raise CrossCheckError(problems)
         return data

@@ -177,7 +177,7 @@ def _with_checks(path: Path, shape: type[ChamberTable], digest: str) -> type[Cha
     """
 
     def check(name: str) -> Callable[..., Any]:
-        def method(self: ChamberTable, *arguments: Any) -> Any:
+        def method(self: ChamberTable, *arguments: Any) -> object:
             with _errors_of_the_file(path, f"{name}() failed"):
                 given = getattr(shape, name)(self, *arguments)
             wanted, is_right = OPTIONAL_METHODS.get(name, ("", lambda _: True))
@@ -203,7 +203,9 @@ def _with_checks(path: Path, shape: type[ChamberTable], digest: str) -> type[Cha
             raise InputError(f"chamber.shape: {path}: surface() of {shape.__name__} {fault}")
         return with_array_types(cavity)
 
-    def run_validators(cls: type[ChamberTable], values: Any, validate: Callable[[Any], Any]) -> Any:
+    def run_validators(
+        cls: type[ChamberTable], values: object, validate: Callable[[object], object]
+    ) -> object:
         """Run the checks of values in the user's shape. If their code fails, raise InputError."""
         with _errors_of_the_file(path, "its checks failed"):
             return validate(values)

@@ -79,7 +79,9 @@ def _too_long(seconds: float, content: bytes) -> str:
     )
 
 
-def _read_limited(seconds: float, read: Callable[..., Any], given: Path, *arguments: Any) -> Any:
+def _read_limited(
+    seconds: float, read: Callable[..., object], given: Path, *arguments: Any
+) -> object:
     """Limit the memory and computing time of this child process, and return what `read` returns."""
     limit_memory()
     limit_cpu_time(seconds)

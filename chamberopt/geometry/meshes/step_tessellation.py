@@ -17,12 +17,16 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, NamedTuple
+from types import ModuleType
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from chamberopt.common.errors import InputError
 from chamberopt.geometry.meshes.native_reader import allow_more
+
+if TYPE_CHECKING:
+    import gmsh
 
 # Grids lie on curved faces with four sides. They are fine across a fillet or a tooth and coarse
 # along it.
@@ -41,7 +45,7 @@ MOST_TIMES_MORE = 3.0
 Grid = tuple[tuple[int, int, int], tuple[int, int, int]]
 
 
-def lay_grids(model: Any, faces: list[int], side_at: Callable[[float], float]) -> None:
+def lay_grids(model: type[gmsh.model], faces: list[int], side_at: Callable[[float], float]) -> None:
     """Make Gmsh lay grids on curved faces with four sides. Other faces get its usual triangles.
 
     Args:
@@ -65,7 +69,9 @@ def lay_grids(model: Any, faces: list[int], side_at: Callable[[float], float]) -
         model.mesh.setTransfiniteSurface(face, "AlternateLeft")
 
 
-def _find_grid(model: Any, face: int, side_at: Callable[[float], float]) -> Grid | None:
+def _find_grid(
+    model: type[gmsh.model], face: int, side_at: Callable[[float], float]
+) -> Grid | None:
     """Return the grid that fits a face, or None if none does.
 
     For each of the two directions, a grid has the two edges at its ends and a number of rows. A
@@ -183,7 +189,7 @@ def tessellate(source: Path, chord: float, angle: float, side: float) -> dict[st
         raise InputError(f"cannot be meshed ({why}); {REMEDY}") from None
 
 
-def _mesh(gmsh: Any, source: str, how: Tessellation) -> dict[str, np.ndarray]:
+def _mesh(gmsh: ModuleType, source: str, how: Tessellation) -> dict[str, np.ndarray]:
     for option, value in {
         "General.Verbosity": 0,
         "General.NumThreads": 1,
@@ -236,7 +242,7 @@ def _mesh(gmsh: Any, source: str, how: Tessellation) -> dict[str, np.ndarray]:
     }
 
 
-def _normals(model: Any, face: int, nodes: np.ndarray) -> np.ndarray:
+def _normals(model: type[gmsh.model], face: int, nodes: np.ndarray) -> np.ndarray:
     """Return the normals (m, 3, 3) of a face at the corners of its triangles, up to their sign.
 
     Args:
@@ -253,7 +259,7 @@ def _normals(model: Any, face: int, nodes: np.ndarray) -> np.ndarray:
 class _TriangleCount:
     """Estimate of the number of triangles that a meshed model will have, by their fineness."""
 
-    def __init__(self, model: Any, faces: list[int]) -> None:
+    def __init__(self, model: type[gmsh.model], faces: list[int]) -> None:
         self._areas = np.array([model.occ.getMass(2, face) for face in faces])
         self._radii = [_radii(model, face) for face in faces]
 
@@ -275,7 +281,7 @@ class _TriangleCount:
         return f"{text} are made; give part.tessellation.{name}_mm = {value:.2g} or more"
 
 
-def _radii(model: Any, face: int) -> list[float]:
+def _radii(model: type[gmsh.model], face: int) -> list[float]:
     """Return the radii of curvature of a face, at points all over it."""
     low, high = map(np.array, model.getParametrizationBounds(2, face))
     shares = (np.arange(SAMPLES) + 0.5) / SAMPLES
@@ -284,7 +290,7 @@ def _radii(model: Any, face: int) -> list[float]:
     return [1.0 / max(abs(one), 1e-9) for one in bent]
 
 
-def _middle(model: Any, face: int) -> np.ndarray:
+def _middle(model: type[gmsh.model], face: int) -> np.ndarray:
     """Return the mean of a face's corners, (3,); nan if the face has none."""
     corners = [tag for dim, tag in model.getBoundary([(2, face)], recursive=True) if dim == 0]
     places = [model.getValue(0, tag, []) for tag in corners]

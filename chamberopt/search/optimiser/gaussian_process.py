@@ -36,12 +36,18 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
+from contextlib import AbstractContextManager
 from functools import cache
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from chamberopt.search.optimiser.domain import Axis, Domain
+
+if TYPE_CHECKING:
+    from sklearn.gaussian_process import GaussianProcessRegressor
+    from sklearn.gaussian_process.kernels import Kernel
+    from threadpoolctl import ThreadpoolController
 
 # The cost of a fit grows with the cube of the number of points: 0.05 s at 80, 1 s at 300.
 MAX_POINTS = 300
@@ -162,7 +168,9 @@ def moderate_variances(spreads: np.ndarray, replicas: np.ndarray) -> np.ndarray:
     return np.asarray(moderated / replicas)
 
 
-def _fit(points: np.ndarray, values: np.ndarray, noise: np.ndarray, length_factor: float) -> Any:
+def _fit(
+    points: np.ndarray, values: np.ndarray, noise: np.ndarray, length_factor: float
+) -> GaussianProcessRegressor:
     """Fit scikit-learn's Gaussian process to scores, and return it.
 
     Args:
@@ -208,7 +216,9 @@ def _fit(points: np.ndarray, values: np.ndarray, noise: np.ndarray, length_facto
     return _fit_with(kernel.clone_with_theta(logs), points, values, noise)
 
 
-def _fit_with(kernel: Any, points: np.ndarray, values: np.ndarray, noise: np.ndarray) -> Any:
+def _fit_with(
+    kernel: Kernel, points: np.ndarray, values: np.ndarray, noise: np.ndarray
+) -> GaussianProcessRegressor:
     """Return scikit-learn's Gaussian process for scores, with hyperparameters that are known.
 
     Args:
@@ -220,16 +230,17 @@ def _fit_with(kernel: Any, points: np.ndarray, values: np.ndarray, noise: np.nda
     return GaussianProcessRegressor(kernel, alpha=alpha, optimizer=None).fit(points, values)
 
 
-def one_thread() -> Any:
+def one_thread() -> AbstractContextManager[object]:
     """Return a context manager within which linear algebra runs on one thread.
 
     The results are then the same on any number of cores, and for such small arrays it is faster.
     """
-    return _threads().limit(limits=1)
+    limited: AbstractContextManager[object] = _threads().limit(limits=1)
+    return limited
 
 
 @cache
-def _threads() -> Any:
+def _threads() -> ThreadpoolController:
     import scipy.linalg  # noqa: F401  its libraries can only be limited once they are loaded
     from threadpoolctl import ThreadpoolController
 

@@ -5,11 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Generator
 from queue import SimpleQueue
 from threading import Thread
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from chamberopt.common.errors import InputError
+
+if TYPE_CHECKING:
+    import nlopt
 
 LOCAL = "LN_BOBYQA"
 
@@ -123,7 +126,7 @@ def run_nlopt(
         raise errors[0]
 
 
-def _make_optimizer(algorithm: str, count: int, step: float, tolerance: float) -> Any:
+def _make_optimizer(algorithm: str, count: int, step: float, tolerance: float) -> nlopt.opt:
     import nlopt
 
     # An MLSL algorithm accepts a local optimiser only under its name with G_.
