@@ -92,11 +92,11 @@ def print_warnings(design: Design, chamber: Chamber, which: str = "") -> list[st
     return found
 
 
-def print_json(values: Mapping[str, Any]) -> None:
+def print_json(values: Mapping[str, object]) -> None:
     print(json.dumps(values, indent=2, default=_json_value))
 
 
-def _json_value(value: Any) -> Any:
+def _json_value(value: object) -> object:
     """Return an estimate or a record as JSON values. Raise TypeError for other types."""
     from chamberopt.common.estimate import Estimate
     from chamberopt.results.records import Table

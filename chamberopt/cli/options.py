@@ -3,12 +3,12 @@
 from collections.abc import Sequence
 from importlib.metadata import version
 from pathlib import Path
-from typing import Annotated, Any, get_args
+from typing import Annotated, get_args
 
 from cyclopts import App, CoercionError, Parameter, Token, convert
 
 
-def _convert(kind: Any, tokens: Sequence[Token]) -> Any:
+def _convert(kind: object, tokens: Sequence[Token]) -> object:
     """Return the value of an option, converted from its text.
 
     Raises CoercionError for a whole number such as 1.5, which cyclopts would round.

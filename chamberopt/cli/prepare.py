@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from chamberopt.cli.console import print_remarks
 
@@ -46,7 +46,7 @@ def compile_with_message(
         print_remarks(["compiled code cannot be kept: set NUMBA_CACHE_DIR to a folder of your own"])
 
 
-def advise_effects(design: Design, chamber: Chamber) -> list[dict[str, Any]]:
+def advise_effects(design: Design, chamber: Chamber) -> list[dict[str, object]]:
     """Find by pilot runs which optional physical effects matter for a design.
 
     Return the advice on each effect as JSON values.

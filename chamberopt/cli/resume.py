@@ -7,7 +7,7 @@ import shlex
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from chamberopt.common.errors import InputError
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from chamberopt.search.study_folder import StudyFolder
 
 
-def resume_command(study: Path, folder: Path, plan: Mapping[str, Any] | None = None) -> str:
+def resume_command(study: Path, folder: Path, plan: Mapping[str, object] | None = None) -> str:
     """Return the command that resumes a run in `folder`, quoted for a shell.
 
     It is a sweep if `plan` gives its method, count and seed. Without a plan it is a study.

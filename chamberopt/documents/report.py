@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from datetime import UTC, datetime
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from chamberopt.common.files import read_file
 from chamberopt.common.number_text import estimate_text, typeset
@@ -133,7 +133,7 @@ def _subtitle(result: Result) -> str:
     )
 
 
-def _accuracy_and_cost(result: Result, trials: Sequence[Mapping[str, Any]]) -> Section:
+def _accuracy_and_cost(result: Result, trials: Sequence[Mapping[str, object]]) -> Section:
     accuracy = values("How accurate it is", _accuracy(result))
     cost = [values("What the answer cost", _cost_of_answer(result))]
     if result.study:
@@ -182,7 +182,7 @@ def _cost_of_answer(result: Result) -> dict[str, str]:
     }
 
 
-def _cost_of_study(study: StudyRecord, trials: Sequence[Mapping[str, Any]]) -> dict[str, str]:
+def _cost_of_study(study: StudyRecord, trials: Sequence[Mapping[str, object]]) -> dict[str, str]:
     """Return rows with the numbers of the study's evaluations, and the run time of all."""
     return {
         "in the search": _count(study.evaluations),
@@ -230,7 +230,7 @@ def _advice(pilot: Sequence[AdviceRecord]) -> Iterator[Block]:
     yield Items([one.said for one in pilot])
 
 
-def _effect_text(name: str, value: Any) -> str:
+def _effect_text(name: str, value: object) -> str:
     if isinstance(value, Mapping):
         return ", ".join(f"{key} = {_text(one)}" for key, one in value.items() if one is not None)
     if name == "rest" and value is None:
@@ -285,7 +285,7 @@ def _design_values(result: Result) -> dict[str, str]:
     return {name: _text(value) for name, value in design.items()}
 
 
-def _flatten(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+def _flatten(table: Mapping[str, object], prefix: str = "") -> Iterator[tuple[str, object]]:
     for name, value in table.items():
         if isinstance(value, Mapping):
             yield from _flatten(value, f"{prefix}{name}.")
@@ -293,7 +293,7 @@ def _flatten(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, 
             yield prefix + name, value
 
 
-def _text(value: Any) -> str:
+def _text(value: object) -> str:
     if value is None:
         return "–"
     if isinstance(value, str):

@@ -9,7 +9,6 @@ import base64
 import html
 import json
 from collections.abc import Callable, Iterable, Sequence
-from typing import Any
 
 from chamberopt.documents.document import (
     Beside,
@@ -124,7 +123,7 @@ def _chart(printed: Chart) -> str:
     return f"<figure>{place}</div><figcaption>{caption}</figcaption></figure>"
 
 
-def embedded_json(value: Any, name: str) -> str:
+def embedded_json(value: object, name: str) -> str:
     """Return a script element with the id `name` that holds a value as JSON.
 
     No text in the value can end the element.

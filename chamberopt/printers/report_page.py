@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
 
 from chamberopt.common.errors import InputError
 from chamberopt.common.files import claim_file, read_file, require_place, write_text
@@ -100,7 +99,7 @@ def write_part_page(results: Sequence[Path], path: Path) -> list[str]:
     return [remark for scene in scenes for remark in scene.remarks]
 
 
-def parts_content(results: Sequence[Path]) -> tuple[str, dict[str, Any]]:
+def parts_content(results: Sequence[Path]) -> tuple[str, dict[str, object]]:
     """Return the HTML of the parts of results in 3D, and the data that part.js draws there.
 
     Raises:
@@ -223,7 +222,7 @@ def write_page(path: Path, title: str, body: str, scenes: Sequence[PartScene]) -
     write_text(path, page)
 
 
-def _content(drawn: Sequence[dict[str, Any]]) -> dict[str, Any]:
+def _content(drawn: Sequence[dict[str, object]]) -> dict[str, object]:
     """Return the data for part.js: parts in 3D, the quantities they show, and their colours."""
     quantities = quantities_in_all(drawn)
     scales = {name: hex_colours(name) for name in {one["colours"] for one in quantities}}

@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from chamberopt.common.errors import InputError
 from chamberopt.common.estimate import Estimate
@@ -146,7 +146,7 @@ def load_start(study: Result) -> Result:
         return load_result(require_plain_folder(study.folder / START, RESTORE))
 
 
-def load_trials(folder: Path) -> list[dict[str, Any]]:
+def load_trials(folder: Path) -> list[dict[str, object]]:
     """Return the rows of the trial log of a study or sweep, which need not be finished.
 
     Raises:
@@ -232,7 +232,7 @@ def _read_record(file: Path) -> ResultRecord:
     return read_record(data)
 
 
-def _of_another_format(file: Path, data: dict[str, Any]) -> InputError:
+def _of_another_format(file: Path, data: dict[str, object]) -> InputError:
     found, versions = data["format"], data.get("versions")
     versions = versions if isinstance(versions, dict) else {}
     made_by = versions.get("chamberopt", "an unknown version")
@@ -244,7 +244,7 @@ def _of_another_format(file: Path, data: dict[str, Any]) -> InputError:
     )
 
 
-def content_sha256(data: Mapping[str, Any]) -> str:
+def content_sha256(data: Mapping[str, object]) -> str:
     """Return the sha256 digest of the content of a result.json, without its key sha256.
 
     The order of the keys does not matter.

@@ -51,7 +51,7 @@ class Table(BaseModel):
 
     model_config = ConfigDict(strict=True, allow_inf_nan=False)
 
-    def as_json(self) -> dict[str, Any]:
+    def as_json(self) -> dict[str, object]:
         """Return the table as JSON values, without the keys that its writer did not set."""
         return self.model_dump(mode="json", exclude_unset=True)
 
@@ -86,7 +86,7 @@ class _EstimateValues(_KnownValues):
         return Estimate.from_json(self.model_dump())
 
 
-def _estimate(value: Any, read: Callable[[Any], _IntervalValues]) -> Estimate:
+def _estimate(value: object, read: Callable[[object], _IntervalValues]) -> Estimate:
     return value if isinstance(value, Estimate) else read(value).estimate()
 
 
@@ -103,7 +103,7 @@ else:  # an estimate is stored with fewer or more of its numbers, as readers nee
     Ends = Bounds | Texts  # bounds of a number, or the allowed texts
 
 
-def _with_units(metrics: dict[str, Estimate]) -> dict[str, dict[str, Any]]:
+def _with_units(metrics: dict[str, Estimate]) -> dict[str, dict[str, object]]:
     """Return metrics as JSON values, each with its unit."""
 
     def unit(name: str) -> str:
@@ -121,7 +121,7 @@ class Objective(Table):
 
     @model_validator(mode="before")
     @classmethod
-    def _of_one_table(cls, data: Any) -> Any:
+    def _of_one_table(cls, data: object) -> object:
         if isinstance(data, dict) and "estimate" not in data:
             return {"name": data.get("name"), "estimate": data}
         return data
@@ -135,7 +135,7 @@ class Objective(Table):
         return self
 
     @model_serializer
-    def _as_one_table(self) -> dict[str, Any]:
+    def _as_one_table(self) -> dict[str, object]:
         return {"name": self.name, **self.estimate.to_json(), "unit": ""}
 
 
@@ -487,7 +487,7 @@ class CandidateRecord(ResultRecord):
         return self
 
 
-def read_record(data: dict[str, Any]) -> ResultRecord:
+def read_record(data: dict[str, object]) -> ResultRecord:
     """Return the checked content of a result.json. Raise ValueError that names a wrong key."""
     model = ResultRecord if data.get("kind") == "sweep" else CandidateRecord
     try:

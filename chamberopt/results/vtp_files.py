@@ -10,6 +10,7 @@ chamber.vtp: the closed cavity.
 from __future__ import annotations
 
 from pathlib import Path
+from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -37,7 +38,7 @@ Surface = Any
 """A pyvista.PolyData. It is Any, because pyvista's annotations do not fit numpy's."""
 
 
-def pyvista() -> Any:
+def pyvista() -> ModuleType:
     """Import pyvista and return the module.
 
     It is imported only when it is used, because this takes half a second.

@@ -12,7 +12,7 @@ from concurrent.futures import Executor, Future
 from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -48,7 +48,7 @@ class SweepPlan:
     points: np.ndarray  # in the unit cube, shape (n, d)
     seed: int | None  # of the points; None for a grid
 
-    def as_json(self) -> dict[str, Any]:
+    def as_json(self) -> dict[str, object]:
         """Return the plan without its points, which follow from it, as plain JSON values."""
         return {"method": self.method, "count": self.count, "seed": self.seed}
 

@@ -127,7 +127,7 @@ FORMAT = 1
 MAX_DIFFERENCES = 12  # in one message
 
 
-def study_inputs(study: Study, plan: Mapping[str, Any] | None = None) -> dict[str, Any]:
+def study_inputs(study: Study, plan: Mapping[str, object] | None = None) -> dict[str, object]:
     """Return everything that the trials of a study depend on, as plain JSON values.
 
     A file that the design names, such as the part's mesh, is stored as its name and the sha256 of
@@ -144,7 +144,9 @@ def study_inputs(study: Study, plan: Mapping[str, Any] | None = None) -> dict[st
     return plain
 
 
-def require_same_inputs(folder: Path, before: Mapping[str, Any], now: Mapping[str, Any]) -> None:
+def require_same_inputs(
+    folder: Path, before: Mapping[str, object], now: Mapping[str, object]
+) -> None:
     """Raise InputError if the study in the folder was begun with other inputs."""
     title = f"{folder}: the study in this folder began otherwise:"
     remedy = "to resume it, restore these inputs; to run the new study, give another folder (--out)"
@@ -160,7 +162,7 @@ def require_same_files(design: Design, before: Mapping[str, Any], folder: Path) 
 
 
 def _require_same(
-    before: Mapping[str, Any], now: Mapping[str, Any], title: str, remedy: str
+    before: Mapping[str, object], now: Mapping[str, object], title: str, remedy: str
 ) -> None:
     """Raise InputError if two tables differ, with a list of the differences.
 
@@ -183,7 +185,7 @@ def _require_same(
         raise InputError("\n  ".join([title, *changed]) + f"\n{remedy}")
 
 
-def _with_digests(value: Any) -> Any:
+def _with_digests(value: object) -> Any:
     """Return a JSON value with each path of a file replaced by the file's name and sha256."""
     if isinstance(value, dict):
         return {name: _with_digests(item) for name, item in value.items()}
@@ -196,7 +198,7 @@ def _with_digests(value: Any) -> Any:
     return value
 
 
-def _flatten(value: Any, prefix: str = "") -> dict[str, Any]:
+def _flatten(value: object, prefix: str = "") -> dict[str, object]:
     """Return the values of nested tables by dotted name, such as "shot.mass_g".
 
     Args:
@@ -210,7 +212,7 @@ def _flatten(value: Any, prefix: str = "") -> dict[str, Any]:
     return flat
 
 
-def _format(flat: Mapping[str, Any], name: str) -> str:
+def _format(flat: Mapping[str, object], name: str) -> str:
     value = json.dumps(flat[name], ensure_ascii=False) if name in flat else "absent"
     return value if len(value) <= 80 else value[:77] + "..."
 
@@ -223,7 +225,7 @@ CONFIRMED = "confirm"
 
 @contextmanager
 def open_study_folder(
-    study: Study, folder: str | Path, plan: Mapping[str, Any] | None = None
+    study: Study, folder: str | Path, plan: Mapping[str, object] | None = None
 ) -> Iterator[StudyFolder]:
     """Open the folder of a study, and keep other processes from writing to it meanwhile.
 
@@ -258,7 +260,7 @@ class StudyFolder:
     `recorded` are the trials that it held when it was opened by `open_study_folder`.
     """
 
-    def __init__(self, study: Study, path: Path, plan: Mapping[str, Any] | None = None) -> None:
+    def __init__(self, study: Study, path: Path, plan: Mapping[str, object] | None = None) -> None:
         self.path, self.study, self._inputs = path, study, study_inputs(study, plan)
         self._history = JsonLines(path / HISTORY)
         self._timings = JsonLines(path / TIMINGS, survives_power_cut=False)
@@ -373,7 +375,7 @@ class StudyFolder:
         return self.path / CONFIRMED / f"{number:03d}.npz"
 
 
-def _read_json(path: Path) -> dict[str, Any]:
+def _read_json(path: Path) -> dict[str, object]:
     try:
         data = json.loads(read_limited(path, MAX_RESULT_BYTES, "file of a study"))
         if not isinstance(data, dict):

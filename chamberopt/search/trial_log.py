@@ -43,7 +43,7 @@ class Trial:
         """The first objective; None when the evaluation failed."""
         return self.goals[0] if self.goals else None
 
-    def row(self) -> dict[str, Any]:
+    def row(self) -> dict[str, object]:
         """Return the trial as a row of plain JSON values, which reads back to the same bits."""
         objective = self.objective
         interval = (objective or Estimate(math.nan, math.nan)).interval_json()
@@ -104,12 +104,12 @@ class JsonLines:
     def __init__(self, path: Path, survives_power_cut: bool = True) -> None:
         self.path, self._survives_power_cut = path, survives_power_cut
 
-    def append(self, row: Mapping[str, Any]) -> None:
+    def append(self, row: Mapping[str, object]) -> None:
         """Write a row; if OSError is raised, e.g. by a full disk, the file is unchanged."""
         line = (json.dumps(row, allow_nan=False) + "\n").encode()
         append_bytes(self.path, line, self._survives_power_cut)
 
-    def rows(self) -> list[dict[str, Any]]:
+    def rows(self) -> list[dict[str, object]]:
         """Return all rows in order, without a last line that a crash cut off.
 
         Raises InputError if a row is damaged.
@@ -130,7 +130,7 @@ class JsonLines:
         text = "damaged row; restore the file or run the study in a new folder"
         return InputError(f"{self.path}:{line}: {text}")
 
-    def _read(self) -> tuple[list[dict[str, Any]], bytes, bytes]:
+    def _read(self) -> tuple[list[dict[str, object]], bytes, bytes]:
         """Return the rows, the bytes of their lines, and those of a last line that was cut off."""
         try:
             content = read_file(self.path)
@@ -152,7 +152,7 @@ class JsonLines:
         return rows, content.removesuffix(incomplete), incomplete
 
 
-def read_trials(folder: Path) -> list[dict[str, Any]]:
+def read_trials(folder: Path) -> list[dict[str, object]]:
     """Return all rows of a study's trial log in order, each with the seconds of its evaluation.
 
     The seconds are None where they are unknown.
@@ -201,7 +201,7 @@ def trials_as_csv(rows: list[dict[str, Any]]) -> str:
     return csv_text(lines)
 
 
-def _cells(interval: Mapping[str, Any]) -> tuple[Any, Any]:
+def _cells(interval: Mapping[str, object]) -> tuple[object, object]:
     """Return the two cells of a figure in a table: its value and half-width.
 
     If words such as "never" stand for the figure, return these words and None.

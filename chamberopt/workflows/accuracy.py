@@ -84,7 +84,7 @@ def _recommendation(advice: Recommendation) -> RecommendationRecord:
     return RecommendationRecord(**values)
 
 
-def rows(study: ConvergenceStudy) -> list[dict[str, Any]]:
+def rows(study: ConvergenceStudy) -> list[dict[str, object]]:
     """Return the rows of accuracy.csv: one for each run, and one for each number of replicas.
 
     A value is None where its column does not apply.

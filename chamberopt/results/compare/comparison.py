@@ -216,7 +216,7 @@ def _difference(name: str, first: Result, other: Result, confidence: float) -> D
     return replace(found, replicas=math.ceil(found.time_ratio * other.record.replicas))
 
 
-def _metal(design: Design) -> tuple[Any, ...]:
+def _metal(design: Design) -> tuple[object, ...]:
     """Return a key that is equal for results with the same part material, ball density and sizes.
 
     Such results share the error of the dent size, so it cancels in their difference.
@@ -234,7 +234,7 @@ def labels(paths: Sequence[Path]) -> tuple[str, ...]:
     return tuple(f"{path.name} ({i})" for i, path in enumerate(resolved, start=1))
 
 
-def _differing_values(results: Sequence[Result]) -> dict[str, tuple[Any, ...]]:
+def _differing_values(results: Sequence[Result]) -> dict[str, tuple[object, ...]]:
     """Return the design values that differ between the results, by dotted name.
 
     A value that a result lacks is None.
@@ -260,7 +260,8 @@ def _design_values(result: Result) -> dict[str, Any]:
     for name in STOPPING_RULES:
         values.pop(name, None)
     if is_custom(values["chamber.shape"]):
-        values["chamber.shape"] = Path(values["chamber.shape"]).name  # its content is shape_sha256
+        # shape_sha256 is for the content
+        values["chamber.shape"] = Path(str(values["chamber.shape"])).name
     return {
         **values,
         REPLICAS: result.record.replicas,
@@ -269,7 +270,7 @@ def _design_values(result: Result) -> dict[str, Any]:
     }
 
 
-def _flattened(table: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+def _flattened(table: Mapping[str, object], prefix: str = "") -> dict[str, object]:
     """Return nested tables and lists of tables as a single table with dotted names."""
     flat: dict[str, Any] = {}
     for name, value in table.items():

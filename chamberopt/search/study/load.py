@@ -39,7 +39,7 @@ def load(path: str | Path) -> Design | Study:
     return _study(path, source, data) if is_study(data) else validate(Design, data, path, source)
 
 
-def _study(path: Path, source: str, data: dict[str, Any]) -> Study:
+def _study(path: Path, source: str, data: dict[str, object]) -> Study:
     named = data.get("design")
     if not isinstance(named, str):
         given = "missing" if named is None else f"given {named!r}"
@@ -75,7 +75,7 @@ def _with_dotted_names(data: dict[str, Any]) -> dict[str, Any]:
     return data
 
 
-def _other_problems(data: Mapping[str, Any], path: Path, source: str) -> list[str]:
+def _other_problems(data: Mapping[str, object], path: Path, source: str) -> list[str]:
     """Return the problems of a study file beside its design, which cannot be loaded, as texts."""
     try:
         Study.model_validate({**data, "design": None}, context={"folder": path.parent})
@@ -109,9 +109,9 @@ def _flatten(
     return flat
 
 
-def _limits(table: Mapping[str, Any]) -> bool:
+def _limits(table: Mapping[str, object]) -> bool:
     return not table or not all(isinstance(one, Mapping) for one in table.values())
 
 
-def _varies(table: Mapping[str, Any]) -> bool:
+def _varies(table: Mapping[str, object]) -> bool:
     return bool(Varied.model_fields.keys() & table.keys())

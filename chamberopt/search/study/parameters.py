@@ -72,7 +72,7 @@ class Varied(FileTable):
         return 0.0 < step <= width * (1.0 + NEAR) and width < MAX_LEVELS * step
 
     @model_serializer
-    def _as_written(self) -> Any:
+    def _as_written(self) -> object:
         """Return the shortest form in which a study file can state these values."""
         if self.choose:
             return {"choose": list(self.choose)}
@@ -132,7 +132,7 @@ class Varied(FileTable):
         return tuple(float(f"{low + k * step:.12g}") for k in range(count))
 
 
-def _from_list(given: Any) -> Any:
+def _from_list(given: object) -> object:
     """Return a list [low, high] of a study file as a table; all else stays as it is."""
     if isinstance(given, (list, tuple)) and len(given) == 2:
         return {"low": given[0], "high": given[1]}

@@ -35,7 +35,7 @@ from chamberopt.search.study.parameters import (
 )
 
 
-def _refuse_old_name(name: Any) -> Any:
+def _refuse_old_name(name: object) -> object:
     if isinstance(name, str) and name in RENAMED_OBJECTIVES:
         raise CrossCheckError([Problem("", renamed_objective(name))])
     return name
@@ -212,7 +212,7 @@ class Study(FileTable):
 
     @model_validator(mode="before")
     @classmethod
-    def _look_up_sizes(cls, data: Any) -> Any:
+    def _look_up_sizes(cls, data: object) -> object:
         """Replace "catalogue" in [vary] by the ball sizes that are sold.
 
         So the study stays the same when the catalogue changes.
@@ -225,7 +225,7 @@ class Study(FileTable):
 
     @model_validator(mode="before")
     @classmethod
-    def _read_begin_with(cls, data: Any, info: ValidationInfo) -> Any:
+    def _read_begin_with(cls, data: Any, info: ValidationInfo) -> object:
         """Replace the design files in `begin_with` by their values of what varies.
 
         So the study is complete without these files.
