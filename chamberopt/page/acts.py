@@ -32,7 +32,7 @@ RESULT = "result.json"
 DEEPEST = 4  # levels of folders below the design's folder that are searched for results
 
 
-def list_results(folder: Path) -> list[dict[str, Any]]:
+def list_results(folder: Path) -> list[dict[str, object]]:
     """List the results below a folder, the newest first, each with its figures in one line."""
     found = []
     for depth in range(1, DEEPEST + 1):
@@ -53,7 +53,7 @@ def list_results(folder: Path) -> list[dict[str, Any]]:
     return rows
 
 
-def shown(folders: Sequence[Path]) -> dict[str, Any]:
+def shown(folders: Sequence[Path]) -> dict[str, object]:
     """Return the 3D view of results side by side, and the text of their comparison.
 
     Raises:
@@ -94,11 +94,11 @@ class Acts:
         if self._command is not None:
             self._command.end()
 
-    def read(self, _: Any) -> dict[str, Any]:
+    def read(self, _: object) -> dict[str, object]:
         """Return the design file as it is now, for a page that is opened or reloaded."""
         return self._as_read(self._read())
 
-    def part(self, asked: Any) -> bytes:
+    def part(self, asked: object) -> bytes:
         return part_answer(self._file(asked).design)
 
     def shape(self, asked: Any) -> bytes:
@@ -113,7 +113,7 @@ class Acts:
     def reach(self, asked: Any) -> bytes:
         return self._checker.reach(int(asked["number"]))
 
-    def pick(self, asked: Any) -> dict[str, Any]:
+    def pick(self, asked: Any) -> dict[str, object]:
         design = self._file(asked).with_changes(asked["changes"])
         triangle, crease = int(asked["triangle"]), float(asked["crease_deg"])
         if not 0.1 <= crease <= 180.0:
@@ -125,7 +125,7 @@ class Acts:
             return {"faces": [self._picker.face(design, triangle, crease, alike)]}
         return self._picker.with_face(design, asked["table"], triangle, crease, alike, add)
 
-    def save(self, asked: Any) -> dict[str, Any]:
+    def save(self, asked: Any) -> dict[str, object]:
         self._file(asked).save(asked["changes"])
         return self.read(None)
 
@@ -146,7 +146,7 @@ class Acts:
             raise InputError("this page has read an older file: reload it")
         return file
 
-    def _as_read(self, file: EditedFile) -> dict[str, Any]:
+    def _as_read(self, file: EditedFile) -> dict[str, object]:
         design = file.design
         surfaces = {"part.target": "target"}
         surfaces |= {f"zones.{k}.target": f"zone {z.name}" for k, z in enumerate(design.zones)}
@@ -161,7 +161,7 @@ class Acts:
             "files": _files_beside(file.path),
         }
 
-    def study(self, asked: Any) -> dict[str, Any]:
+    def study(self, asked: Any) -> dict[str, object]:
         """Write a study file beside the design, and remove it again if it is no valid study."""
         name, evaluations = str(asked["name"]), float(asked["evaluations"])
         if not STUDY_NAME.fullmatch(name):
@@ -181,7 +181,7 @@ class Acts:
             raise
         return {"study": path.name}
 
-    def start(self, asked: Any) -> dict[str, Any]:
+    def start(self, asked: Any) -> dict[str, object]:
         """Start a command of the command line.
 
         It works on the saved design, on a study beside it or on a result below its folder.
@@ -215,18 +215,18 @@ class Acts:
                 "the command line, or begin again with --trust-shape"
             )
 
-    def status(self, _: Any) -> dict[str, Any]:
+    def status(self, _: object) -> dict[str, object]:
         return self._command.status() if self._command else {}
 
-    def stop(self, _: Any) -> dict[str, Any]:
+    def stop(self, _: object) -> dict[str, object]:
         if self._command:
             self._command.stop()
         return self.status(None)
 
-    def results(self, _: Any) -> list[dict[str, Any]]:
+    def results(self, _: object) -> list[dict[str, object]]:
         return list_results(self._path.parent)
 
-    def shown(self, asked: Any) -> dict[str, Any]:
+    def shown(self, asked: Any) -> dict[str, object]:
         return shown([self.inside(str(one)) for one in asked["folders"][:2]])
 
     def inside(self, name: str) -> Path:

@@ -114,7 +114,7 @@ def _surface(
     }
 
 
-def packed(head: Mapping[str, Any], **arrays: np.ndarray) -> bytes:
+def packed(head: Mapping[str, object], **arrays: np.ndarray) -> bytes:
     """Return an answer to the page as bytes.
 
     They are the length of the head (4 bytes), the head as JSON, and the arrays.

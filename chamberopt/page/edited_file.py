@@ -184,7 +184,7 @@ class EditedFile:
         return value
 
 
-def custom_shape(data: Mapping[str, Any]) -> str:
+def custom_shape(data: Mapping[str, object]) -> str:
     """Return the Python file that a design names as its chamber's shape, or "" for other shapes.
 
     `data` is the content of the design file.
@@ -194,7 +194,7 @@ def custom_shape(data: Mapping[str, Any]) -> str:
     return str(shape) if is_custom(shape) else ""
 
 
-def _inline(value: Any) -> Any:
+def _inline(value: object) -> object:
     """Return a value for a TOML file with each table on one line.
 
     A value without tables is returned as it is.
@@ -213,7 +213,7 @@ def _inline(value: Any) -> Any:
     return rows.multiline(len(value) > 1)
 
 
-def _table(value: dict[str, Any]) -> Any:
+def _table(value: dict[str, object]) -> object:
     import tomlkit
 
     table = tomlkit.table()
@@ -228,7 +228,7 @@ def _table(value: dict[str, Any]) -> Any:
 NOT_SHOWN = ("calibration.", "part.target.", "zones.", "tolerances.", "part.tessellation.")
 
 
-def design_fields(file: EditedFile) -> list[dict[str, Any]]:
+def design_fields(file: EditedFile) -> list[dict[str, object]]:
     """Return what the page shows of every number and choice of a design, in the file's order.
 
     Each row has the name, value, unit, allowed range and explanation.
@@ -275,7 +275,7 @@ def _choices(design: Design) -> dict[str, tuple[str, ...]]:
     return {name: texts for name, texts in found if name not in ("chamber.unit", "chamber.shape")}
 
 
-def _value(design: Design, name: str) -> Any:
+def _value(design: Design, name: str) -> object:
     """Return the number of the design with this dotted name, or None if it is not set."""
     value: Any = design
     for step in name.split("."):

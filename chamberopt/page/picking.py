@@ -28,7 +28,7 @@ class Picker:
 
     def with_face(
         self, design: Design, table: str, triangle: int, crease_deg: float, alike: bool, add: bool
-    ) -> dict[str, Any]:
+    ) -> dict[str, object]:
         """Return changes of a design that add the face of a triangle to a target, or remove it.
 
         A target that is chosen in another way becomes the list of its faces.
@@ -84,7 +84,7 @@ class Picker:
         faces = self._faces(preview_part(design).mesh, crease_deg)
         return _row(faces, _face_of(faces, triangle), crease_deg, alike)
 
-    def face_down(self, design: Design, triangle: int, crease_deg: float) -> dict[str, Any]:
+    def face_down(self, design: Design, triangle: int, crease_deg: float) -> dict[str, object]:
         """Return changes of a design that turn the face of a triangle towards the sonotrode."""
         faces = self._faces(preview_part(design).mesh, crease_deg)
         normal = faces.normal(_face_of(faces, triangle))

@@ -42,7 +42,7 @@ class StartedCommand:
         self._reader = Thread(target=self._read, daemon=True)
         self._reader.start()
 
-    def status(self) -> dict[str, Any]:
+    def status(self) -> dict[str, object]:
         """Return what the page shows of the command: its printed lines and the progress of steps.
 
         `exit` is its exit status, or None while it runs.

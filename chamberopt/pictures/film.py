@@ -307,7 +307,7 @@ class _ReplayScene:
             self.plotter.add_actor(actor, name="dents", reset_camera=False, render=False)
         return len(recent)
 
-    def _replace(self, name: str, mesh: Any, **style: Any) -> None:
+    def _replace(self, name: str, mesh: object, **style: Any) -> None:
         if mesh is None:
             self.plotter.remove_actor(name, render=False)
         else:

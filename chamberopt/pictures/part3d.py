@@ -127,7 +127,7 @@ def quantities_in_all(scenes: Sequence[dict[str, Any]]) -> list[dict[str, str]]:
 
 def _surfaces(
     part: DrawnPart, rest: Surface | None, chamber: Surface, eye: np.ndarray
-) -> dict[str, dict[str, Any]]:
+) -> dict[str, dict[str, object]]:
     """Return the surfaces that view3d.js draws, by name.
 
     part: target with enough dents; few: target with too few dents; unreached: target that no ball

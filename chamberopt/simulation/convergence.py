@@ -51,7 +51,7 @@ POINTS, GAUGE = "process.accuracy.points", "process.accuracy.gauge_mm2"
 REFERENCE, DESIGNED = "reference", "as designed"
 
 
-def numerical_parameters(design: Design) -> dict[str, tuple[Any, ...]]:
+def numerical_parameters(design: Design) -> dict[str, tuple[object, ...]]:
     """Return the settings to try of each numerical parameter, by its dotted name.
 
     The last setting is the reference's.
@@ -84,7 +84,7 @@ def _falling(value: float, factor: float) -> list[float]:
     return sorted({min(1e3, factor * value), value, max(0.1, value / factor)}, reverse=True)
 
 
-def study_designs(design: Design) -> tuple[dict[str, Any], dict[tuple[str, str], Design]]:
+def study_designs(design: Design) -> tuple[dict[str, object], dict[tuple[str, str], Design]]:
     """Return the reference's settings by parameter, and the designs to simulate by parameter and
     setting.
 
@@ -99,7 +99,7 @@ def study_designs(design: Design) -> tuple[dict[str, Any], dict[tuple[str, str],
     return settings, {(REFERENCE, ""): reference, **others, (DESIGNED, ""): design}
 
 
-def setting_text(value: Any) -> str:
+def setting_text(value: object) -> str:
     """Return the text of a setting as in a design file, without quotes."""
     return f"{value:g}" if isinstance(value, int | float) else str(value)
 

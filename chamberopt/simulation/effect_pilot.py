@@ -186,7 +186,7 @@ def _is_on(effect: str, design: Design, chamber: Chamber) -> bool:
     return bool(getattr(design.effects, effect))
 
 
-def groups(design: Design, chamber: Chamber) -> list[dict[str, Any]]:
+def groups(design: Design, chamber: Chamber) -> list[dict[str, object]]:
     """Return a table of the effects that can be switched: the name of each, whether it is on, and a
     sentence on its importance.
 

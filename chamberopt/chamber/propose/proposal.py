@@ -406,7 +406,7 @@ def _checked(
     return Proposal(design, tables, reasons, bounds, tuple(known), mesh, chamber, reach, found)
 
 
-def _nested(tables: Tables) -> dict[str, Any]:
+def _nested(tables: Tables) -> dict[str, object]:
     """Return tables with dotted names, such as "part.target", as tables inside each other."""
     nested: dict[str, Any] = {}
     for name, values in tables.items():

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from matplotlib.colors import Colormap
@@ -31,7 +31,7 @@ def zone_colour(index: int) -> str:
     return (SKY, PURPLE, GREEN, BLUE, BLACK)[index % 5]  # unlike the sonotrode's colour
 
 
-def line_style(index: int) -> dict[str, Any]:
+def line_style(index: int) -> dict[str, object]:
     """Return the colour and line style of the compared result with this index."""
     return {"color": _COLOURS[index % len(_COLOURS)], "ls": _LINES[index % len(_LINES)]}
 
