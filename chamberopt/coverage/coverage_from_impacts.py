@@ -28,8 +28,8 @@ from chamberopt.common.memory import MEMORY
 from chamberopt.coverage.field.crease_bands import on_lines
 
 if TYPE_CHECKING:
+    from chamberopt.coverage.field.smooth_faces import Places
     from chamberopt.coverage.field.target_field import Gauge, TargetField
-    from chamberopt.coverage.field.windows import Places
     from chamberopt.coverage.part_impacts import Hits
 
 T = TypeVar("T")

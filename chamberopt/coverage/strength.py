@@ -28,7 +28,8 @@ import numpy as np
 from chamberopt.coverage.dents import dent_diameter
 
 if TYPE_CHECKING:
-    from chamberopt.coverage.field.windows import Places, Windows
+    from chamberopt.coverage.field.smooth_faces import Places
+    from chamberopt.coverage.field.windows import Windows
     from chamberopt.coverage.part_impacts import Hits
     from chamberopt.design.materials import PartMaterial
 

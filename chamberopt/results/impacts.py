@@ -153,7 +153,8 @@ def dented_share(dents: Dents, chamber: Chamber) -> float:
 
     A dent covers only surface that faces it.
     """
-    from chamberopt.coverage.field.windows import Places, Windows
+    from chamberopt.coverage.field.smooth_faces import Places
+    from chamberopt.coverage.field.windows import Windows
 
     if not len(dents):
         return 0.0

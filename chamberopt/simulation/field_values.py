@@ -41,7 +41,7 @@ from sim_core import TriangleMesh, closest_points
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
     from chamberopt.coverage.field.display_mesh import DisplayField
-    from chamberopt.coverage.field.windows import Places
+    from chamberopt.coverage.field.smooth_faces import Places
     from chamberopt.design.load import Design
     from chamberopt.simulation.evaluation import Evaluation
 
@@ -170,7 +170,7 @@ class PartField:
             zone: number of the last zone with the triangle, from 1, or 0; zone_NAME: whether the
                 zone NAME has the triangle. Both only where there are zones.
         """
-        from chamberopt.coverage.field.windows import Places
+        from chamberopt.coverage.field.smooth_faces import Places
 
         part, exposed = self._chamber.part, self._chamber.exposed_area > 0.0
         count = len(part.triangles)

@@ -10,8 +10,8 @@ from chamberopt.coverage.field.surface_points import ball_fits
 from chamberopt.geometry.triangles import count_up
 
 if TYPE_CHECKING:
-    from chamberopt.coverage.field.smooth_faces import Creases
-    from chamberopt.coverage.field.windows import Places, Windows
+    from chamberopt.coverage.field.smooth_faces import Creases, Places
+    from chamberopt.coverage.field.windows import Windows
     from sim_core import TriangleMesh
 
 # Length of a window along a crease, in radii of a window. A dent takes a larger share of a line
@@ -61,7 +61,7 @@ def on_lines(creases: Creases, place: np.ndarray, edge: np.ndarray) -> tuple[Pla
     for each. `place` (k, 3) [m] and `edge` (k,) give the points. The second result is the row of
     each place in them.
     """
-    from chamberopt.coverage.field.windows import Places
+    from chamberopt.coverage.field.smooth_faces import Places
 
     division, row = np.nonzero(creases.line[:, edge] >= 0)
     line = creases.line[division, edge[row]]
@@ -93,7 +93,8 @@ def find_band(
     """
     from scipy.spatial import cKDTree
 
-    from chamberopt.coverage.field.windows import Places, Windows
+    from chamberopt.coverage.field.smooth_faces import Places
+    from chamberopt.coverage.field.windows import Windows
 
     points = windows.points
     if not len(pieces.edge) or not len(points.place):

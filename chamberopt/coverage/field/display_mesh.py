@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from chamberopt.coverage.field.windows import Places
+from chamberopt.coverage.field.smooth_faces import Places
 from chamberopt.geometry.triangles import areas, sides_of, unit_vectors
 
 MIN_EDGE, MAX_EDGE = 0.5, 4.0  # diameters of the gauge

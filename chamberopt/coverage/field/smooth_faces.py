@@ -33,6 +33,23 @@ OFFSETS = RANGE * (2.0 * (np.arange(DIVISIONS) + 0.5) / DIVISIONS - 1.0)  # degr
 GOLDEN = 0.5 * (5.0**0.5 - 1.0)  # steps of this share of a range spread evenly over it
 
 
+class Places(NamedTuple):
+    """Points on a surface, with the normal and the smooth face there.
+
+    Attributes:
+        place: [m], shape (p, 3).
+        normal: unit vectors out of the part, shape (p, 3); zero on lines.
+        face: smooth face, or line, under each place, shape (p,).
+    """
+
+    place: np.ndarray
+    normal: np.ndarray
+    face: np.ndarray
+
+    def select(self, rows: np.ndarray | slice) -> Places:
+        return Places(*(column[rows] for column in self))
+
+
 class Faces(NamedTuple):
     """Smooth faces of a part, by each of several divisions of the part into faces.
 

@@ -33,8 +33,9 @@ from chamberopt.geometry.triangles import areas, unit_normals
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
+    from chamberopt.coverage.field.smooth_faces import Places
     from chamberopt.coverage.field.window_areas import SurfacePieces
-    from chamberopt.coverage.field.windows import Places, Windows
+    from chamberopt.coverage.field.windows import Windows
     from chamberopt.coverage.part_impacts import Hits
     from sim_core import TriangleMesh
 
@@ -202,7 +203,7 @@ class TargetField:
     def _points_in_sector(self, points: Places) -> Places:
         if self.symmetry is None:
             return points
-        from chamberopt.coverage.field.windows import Places
+        from chamberopt.coverage.field.smooth_faces import Places
 
         _, turn = self.symmetry.into_sector(points.place)
         place, normal = (self.symmetry.turned(one, turn) for one in (points.place, points.normal))
@@ -227,7 +228,7 @@ class TargetField:
 
     def places_of(self, hits: Hits, rows: np.ndarray) -> Places:
         """Return positions, normals and smooth faces of the impacts in the given rows."""
-        from chamberopt.coverage.field.windows import Places
+        from chamberopt.coverage.field.smooth_faces import Places
 
         triangle = hits.triangle[rows]
         return Places(hits.place[rows].astype(float), self.normals[triangle], self.face[triangle])
@@ -344,7 +345,7 @@ def _touched(
     """Return the points that a ball can touch, and marks of them among all points that were tried.
     The points are spread over the part's triangles by their `area` (m,).
     """
-    from chamberopt.coverage.field.windows import Places
+    from chamberopt.coverage.field.smooth_faces import Places
 
     part = chamber.part
     spread = spread_points(part.vertices, part.triangles, area, POINTS_PER_CHOSEN * setting.points)

@@ -23,8 +23,9 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from chamberopt.coverage.field.smooth_faces import Places
 from chamberopt.coverage.field.surface_points import ball_fits, within_each
-from chamberopt.coverage.field.windows import Places, Windows
+from chamberopt.coverage.field.windows import Windows
 from chamberopt.geometry.triangles import unit_normals, unit_vectors
 from sim_core import jit
 

@@ -24,28 +24,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from chamberopt.coverage.field.smooth_faces import Places
 from sim_core import jit
 
 MAX_CELLS = 4e6  # cells of the grid in which the points near a contact are found
 CELLS = 3  # cells across a window; 2 to 6 cells took the same time
 PAIRS_AT_ONCE = 500_000  # bounds memory, and fits in the processor's cache
-
-
-class Places(NamedTuple):
-    """Points on a surface, with the normal and the smooth face there.
-
-    Attributes:
-        place: [m], shape (p, 3).
-        normal: unit vectors out of the part, shape (p, 3); zero on lines.
-        face: smooth face, or line, under each place, shape (p,).
-    """
-
-    place: np.ndarray
-    normal: np.ndarray
-    face: np.ndarray
-
-    def select(self, rows: np.ndarray | slice) -> Places:
-        return Places(*(column[rows] for column in self))
 
 
 class Windows:

@@ -23,9 +23,10 @@ from chamberopt.coverage.coverage_intervals import (
     products_without_each,
     root_of_variance,
 )
+from chamberopt.coverage.field.smooth_faces import Places
 from chamberopt.coverage.field.surface_points import Reach
 from chamberopt.coverage.field.target_field import Gauge
-from chamberopt.coverage.field.windows import Places, Windows
+from chamberopt.coverage.field.windows import Windows
 from chamberopt.coverage.metrics import NEVER
 from chamberopt.coverage.percentile import (
     P05_COVERAGE,

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from chamberopt.coverage.field.windows import Places, Windows
+from chamberopt.coverage.field.smooth_faces import Places
+from chamberopt.coverage.field.windows import Windows
 from chamberopt.coverage.part_impacts import Hits
 from chamberopt.coverage.strength import (
     LEVELS,

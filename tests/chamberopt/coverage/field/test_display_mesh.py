@@ -8,8 +8,7 @@ from trimesh.creation import box
 
 from chamberopt.coverage.field import display_mesh
 from chamberopt.coverage.field.display_mesh import DisplayMesh
-from chamberopt.coverage.field.smooth_faces import find_faces
-from chamberopt.coverage.field.windows import Places
+from chamberopt.coverage.field.smooth_faces import Places, find_faces
 from chamberopt.geometry.triangles import areas
 
 SIDE = 0.02  # m, of a cube

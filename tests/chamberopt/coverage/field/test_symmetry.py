@@ -95,7 +95,7 @@ def test_dents_are_as_dense_and_their_windows_have_as_many_times_more() -> None:
 
 def test_a_pattern_that_has_the_symmetry_stays_as_it_is() -> None:
     """More dents in the middle of each side: the values at places do not move."""
-    from chamberopt.coverage.field.windows import Places
+    from chamberopt.coverage.field.smooth_faces import Places
 
     chamber, design = cube(), plate_design()
     middle = chamber.part.vertices[chamber.part.triangles].mean(axis=1)

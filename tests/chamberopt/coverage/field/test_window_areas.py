@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import trimesh
 
+from chamberopt.coverage.field.smooth_faces import Places
 from chamberopt.coverage.field.surface_points import spread_points
 from chamberopt.coverage.field.window_areas import (
     SurfacePieces,
@@ -11,7 +12,7 @@ from chamberopt.coverage.field.window_areas import (
     surface_pieces,
     window_areas,
 )
-from chamberopt.coverage.field.windows import Places, Windows
+from chamberopt.coverage.field.windows import Windows
 from chamberopt.geometry.triangles import areas, unit_normals
 from sim_core import TriangleMesh
 
