@@ -1,1 +1,1 @@
-"""Tools that all packages use: errors, TOML fields, files, progress, estimates and workers."""
+"""Tools that all packages use: errors, TOML files, output files, progress, estimates, workers."""

@@ -42,7 +42,7 @@ def start_python(code: str, *arguments: str, **options: Any) -> subprocess.Popen
     """Start a Python process with pipes at its standard input and output.
 
     Args:
-        code: Python code, which must end the child when the standard input closes; `signal` and
+        code: Python code, which must end the process when its standard input closes; `signal` and
             `sys` are imported before.
         arguments: sys.argv[1:] of the child.
         options: further arguments of subprocess.Popen.
@@ -67,7 +67,10 @@ class ChildLostError(Exception):
 
 
 class Child:
-    """Child process that does one job after another. The end of its `with` block kills it."""
+    """Child process that does one job (a function call) after another, for use in a `with` block.
+
+    The end of the block kills the child.
+    """
 
     def __init__(self, seconds: float = math.inf, folder: str = "", **options: Any) -> None:
         """Start the child process.
@@ -185,8 +188,9 @@ def _end_with_parent(receive: Callable[[], object], last_act: Callable[[], None]
     """Wait in a thread for the end of the parent, then call `last_act` and end this process.
 
     Args:
-        receive: called again and again to read from the parent's pipe. At the end of the pipe it
-            returns a false value or raises an error of CLOSED.
+        receive: function that reads from the parent's pipe, called again and again. At the end of
+            the pipe it returns a false value or raises an error of CLOSED.
+        last_act: function without arguments.
     """
 
     def watch() -> None:
@@ -200,7 +204,7 @@ def _end_with_parent(receive: Callable[[], object], last_act: Callable[[], None]
 
 
 def _answers(job: bytes) -> Iterator[bytes]:
-    """Do a pickled job, and yield the pickle of (True, answer) for each of its answers.
+    """Do a pickled job, a function call, and yield the pickle of (True, answer) for each answer.
 
     If the job raises an exception, the last item is the pickle of (False, exception).
     """

@@ -45,8 +45,8 @@ class DaskExecutor(Executor):
             timeout: longest wait for a worker [s]; None for WORKER_TIMEOUT_S.
 
         Raises:
-            InputError: if Dask is not installed, no scheduler answers, it has no workers, or its
-                workers run another program.
+            InputError: if Dask is not installed, no scheduler answers, the scheduler has no
+                workers, or its workers run another version of this program.
         """
         try:
             import distributed
@@ -161,7 +161,7 @@ def _require_scheduler(address: str) -> None:
 
 
 async def _kind_of_server(address: str) -> str:
-    """Ask a Dask server for its kind: Scheduler, Worker or Nanny."""
+    """Ask a Dask server for its kind, "Scheduler", "Worker" or "Nanny", and return it."""
     import distributed.core
     import distributed.security
 

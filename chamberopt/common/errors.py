@@ -23,7 +23,7 @@ class InputError(Exception):
 
 
 class UnreadableError(InputError):
-    """Error for a file that cannot be read now, although the design that names it is right."""
+    """Error for a file that cannot be read now, although the design may name it rightly."""
 
 
 class OutputTakenError(InputError):
@@ -52,8 +52,8 @@ def spreadsheet_cell(value: object) -> object:
     """Return a value as it is written to a .csv file.
 
     A text that a spreadsheet would take for a formula gets an apostrophe in front. A carriage
-    return becomes a line feed: the csv module leaves it without quotes, and a spreadsheet begins a
-    row after it.
+    return becomes a line feed, because the csv module does not quote a carriage return, and a
+    spreadsheet would begin a new row there.
 
     Source: OWASP, "CSV Injection".
     """

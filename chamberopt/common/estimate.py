@@ -5,7 +5,7 @@ n       number of replicas
 y_j     pseudo-value of replica j; their mean is the estimate     (pseudovalues, (n,))
 s       standard deviation of the pseudo-values
 t       quantile of Student's distribution                        (student_quantile)
-u_k     signed standard error by a cause that replicas do not show and that is common to the
+u_k     signed standard error by cause k, which replicas do not show and which is common to all
         estimates of one part, such as the choice of points       (shared)
 z       quantile of the normal distribution                      (normal_quantile)
 half-width = sqrt((t s)² / n + z² sum of u_k²) + bias
@@ -63,7 +63,7 @@ class Estimate:
 
     @property
     def has_number(self) -> bool:
-        """True if the value is a number that can be compared, also if words replace it in texts."""
+        """True if the value is a number that can be compared, even if words replace it in texts."""
         return not self.in_words or 0.0 < self.half_width < math.inf
 
     @property
@@ -130,7 +130,7 @@ class Estimate:
         )
 
     def with_shared(self, first: int, errors: Sequence[float]) -> Estimate:
-        """Return the estimate with more shared errors, and its interval wider by them.
+        """Return the estimate with further errors of shared causes, and with a wider interval.
 
         Args:
             first: position of the first new error in `shared`.
@@ -146,10 +146,10 @@ class Estimate:
         return replace(self, shared=shared, half_width=self.half_width - scatter + wider)
 
     def of_another_metal(self) -> Estimate:
-        """Return the estimate as one of another metal than the estimates it is compared with.
+        """Return the estimate, marked as of another metal than the estimates it is compared with.
 
-        Its error by the metal moves to another position of `shared`, so that it does not cancel
-        in differences.
+        The error by the part's metal moves to another position of `shared`, so that it does not
+        cancel in differences.
         """
         if len(self.shared) <= OF_METAL:
             return self
@@ -168,7 +168,7 @@ class Estimate:
 def finite_or_none(number: float) -> float | None:
     """Return the number, or None for NaN and infinity, because JSON has neither.
 
-    The half-width of a single replica is infinite, for example, and so is the bias without a dent.
+    For example, the half-width from a single replica is infinite.
     """
     return number if math.isfinite(number) else None
 
@@ -206,7 +206,8 @@ def estimate(
 def jackknife(values: np.ndarray) -> np.ndarray:
     """Return jackknife pseudo-values, one for each batch, (g,).
 
-    They are shifted so that their mean is the value of all batches: its bias is not corrected.
+    The pseudo-values are shifted so that their mean is the value of all batches. The usual
+    correction of its bias is thus left out.
 
     Args:
         values: the value of all g batches, then the values with one batch left out, (g + 1,).
@@ -219,7 +220,7 @@ def jackknife(values: np.ndarray) -> np.ndarray:
 
 
 def shared_half_width(shared: Sequence[float], confidence: float = CONFIDENCE) -> float:
-    """Return the half-width of a confidence interval by the shared errors alone.
+    """Return the half-width of a confidence interval that holds the shared errors alone.
 
     Args:
         shared: signed standard errors by causes that replicas do not show.
@@ -265,8 +266,9 @@ def paired_difference(
 ) -> Estimate:
     """Return the difference after - before, from the differences of replicas with equal seeds.
 
-    A peening chamber is chaotic, so that equal seeds hardly correlate. If they do, the interval is
-    still right. Estimates with different numbers of replicas are taken as independent.
+    A peening chamber is chaotic, so that replicas with equal seeds hardly correlate. If they do,
+    the interval is still right. Estimates with different numbers of replicas are taken as
+    independent.
     """
     if not after.pseudovalues or len(after.pseudovalues) != len(before.pseudovalues):
         return independent_difference(after, before, confidence)
@@ -301,8 +303,8 @@ def welch_half_width(
 
     Args:
         after, before: the two samples.
-        times: factor on the numbers of values, to tell the interval of larger samples that scatter
-            as these do.
+        times: factor on the numbers of values, to get the interval of larger samples with the same
+            scatter.
 
     Source: B. L. Welch, "The generalization of 'Student's' problem when several different
     population variances are involved", Biometrika 34 (1947) 28.

@@ -30,10 +30,11 @@ def core_count() -> int:
 
 
 def local_executor(workers: int | None = None, kind: WorkerKind = "threads") -> Executor:
-    """Make workers on this machine, for use in a `with` block.
+    """Make workers on this computer, for use in a `with` block.
 
-    Threads share the chamber and start at once, and the simulator releases Python's lock. Processes
-    also run code in parallel that needs the lock.
+    Threads share the memory with the chamber and start at once. The simulator releases Python's
+    global lock, so that threads run it in parallel. Processes also run other Python code in
+    parallel.
 
     Args:
         workers: number of workers; None for one per core.
@@ -55,13 +56,14 @@ def local_executor(workers: int | None = None, kind: WorkerKind = "threads") -> 
 def open_executor(
     workers: int | None, cluster: str | None, kind: WorkerKind | None = None
 ) -> Executor:
-    """Make workers on this machine, or connect to the workers of a cluster.
+    """Make workers on this computer, or connect to the workers of a cluster.
 
     Args:
-        workers: --workers, None if it is not given.
-        cluster: --cluster, None if it is not given.
-        kind: of workers on this machine; None for threads if there are at most MAX_THREADS
-            workers, and for processes if there are more.
+        workers: number of workers, from the option --workers; None if it is not given.
+        cluster: address or scheduler file of a cluster, from the option --cluster; None if it is
+            not given.
+        kind: kind of workers on this computer. None: threads up to MAX_THREADS workers, processes
+            for more.
 
     Raises:
         InputError: both options are given, or an option cannot be used.
@@ -90,7 +92,8 @@ def share(executor: Executor, value: T) -> T:
 class ThreadExecutor(ThreadPoolExecutor):
     """Executor with worker threads. An exception in its `with` block cancels the waiting tasks.
 
-    Ctrl-C leaves the block at once: the command line then ends the process, and the tasks with it.
+    Ctrl-C leaves the block at once. The command line then ends the process, and so the running
+    tasks.
     """
 
     def __exit__(self, *error: Any) -> None:
@@ -101,7 +104,7 @@ class ThreadExecutor(ThreadPoolExecutor):
 class SerialExecutor(Executor):
     """Executor that runs each task at once in the calling thread.
 
-    It serves cluster workers, tests, debuggers and profilers.
+    Cluster workers, tests, debuggers and profilers use it.
     """
 
     def submit(self, fn: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> Future[T]:

@@ -1,4 +1,4 @@
-"""Check that data from files keep within limits of size, before memory is taken for them."""
+"""Check that data from files are not too large, before memory is taken for them."""
 
 from __future__ import annotations
 
@@ -34,9 +34,9 @@ def read_limited(path: Path, most: int, what: str, follow: bool = False) -> byte
         what: kind of the file in messages, such as "mesh file".
         follow: True to follow links, which users may have among their own files.
     Raises:
-        FileNotFoundError: for the caller to explain.
+        FileNotFoundError: if it is missing, which the caller must explain.
         InputError: if it is no plain file, such as a link or a pipe, or is too large.
-        UnreadableError: if the system does not read it.
+        UnreadableError: if the operating system cannot read it.
     """
     try:
         with open_plain(path, follow) as file:
@@ -58,7 +58,7 @@ def read_limited(path: Path, most: int, what: str, follow: bool = False) -> byte
 
 
 def limit_memory() -> None:
-    """Refuse this process more memory than MAX_READER_BYTES, if the system has such a limit."""
+    """Limit the memory of this process to MAX_READER_BYTES, if the operating system can do so."""
     try:
         import resource
     except ImportError:  # Windows
@@ -84,7 +84,7 @@ def limit_cpu_time(seconds: float) -> None:
 
 
 def raise_cpu_time(seconds: float) -> None:
-    """Add `seconds` to the CPU time that this process may use, if that time is limited."""
+    """Add `seconds` to the CPU time that this process may use, if its CPU time is limited."""
     try:
         import resource
     except ImportError:

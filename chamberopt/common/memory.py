@@ -1,4 +1,4 @@
-"""Tell how much memory is free, and keep a budget for arrays that can be computed again."""
+"""Tell how much memory is free, and keep account of arrays that are only kept for speed."""
 
 from __future__ import annotations
 
@@ -25,15 +25,16 @@ FILES = {
 def free_memory() -> float:
     """Return the bytes of memory that this process can still take.
 
-    Limits of a container or a batch job count. Infinite if the machine does not tell.
+    Limits of a container or a batch job count. The result is infinite if the computer does not
+    tell.
     """
     return min(_free_of_machine(), *_free_of_groups(), math.inf)
 
 
 def _free_of_machine() -> float:
-    """Return the free memory of the machine in bytes.
+    """Return the free memory of the computer in bytes.
 
-    On macOS this is the whole memory, and on Windows infinity, because they do not tell.
+    It is the whole memory on macOS, and infinity on Windows, because these systems do not tell.
     """
     with suppress(OSError, LookupError, ValueError):
         for line in Path("/proc/meminfo").read_text().splitlines():
@@ -61,7 +62,8 @@ def _free_of_groups() -> Iterator[float]:
 def _free_of_group(group: Path, limit: str, used: str) -> float:
     """Return the bytes left of the memory limit of one Linux control group.
 
-    Cached files that the kernel can drop count as free. Infinite if the group has no limit.
+    Cached files that the kernel can drop count as free. The result is infinite if the group has no
+    limit.
 
     Args:
         group: folder of the group.
@@ -76,10 +78,10 @@ def _free_of_group(group: Path, limit: str, used: str) -> float:
 
 
 class MemoryBudget:
-    """Account of the bytes that this process may spend on arrays that could be computed again.
+    """Account of the bytes that this process may spend on arrays that are only kept for speed.
 
-    The budget is a share of the free memory when the first array is kept. The worker processes of
-    one command divide it among them.
+    The budget is a share of the memory that is free when the first array is kept. The worker
+    processes of one command divide the budget among them.
     """
 
     def __init__(self) -> None:

@@ -1,8 +1,8 @@
 """Write and read arrays, and dataclasses that hold arrays (records), in .npz files.
 
-The files hold plain data and never pickles. A record's file has one more entry, `tree`: JSON of
-all content except arrays. In it {"array": name} stands for an array and {"is": class, "of":
-fields} for a dataclass. Sequences come back as tuples. Everything else comes back exactly.
+The files hold plain data and never pickles. The file of a record has one more entry, `tree`: JSON
+of all content except arrays. In `tree`, {"array": name} stands for an array and {"is": class, "of":
+fields} for a dataclass. Sequences are read back as tuples, and all else exactly as it was written.
 """
 
 from __future__ import annotations
@@ -74,7 +74,7 @@ def load_record(path: Path, kind: type[Record], others: Sequence[type], remedy: 
 
     Args:
         kind: class of the record.
-        others: classes of the objects in the record. No other class is made.
+        others: classes of the objects in the record. No object of another class is made.
         remedy: end of the message on a file that cannot be used.
 
     Raises:
@@ -121,7 +121,7 @@ def _unreadable(path: Path, error: BaseException, remedy: str) -> InputError:
 
 
 def _to_tree(value: object, arrays: dict[str, np.ndarray]) -> object:
-    """Return the value as plain JSON values. Arrays in it are put into `arrays` under new names."""
+    """Return the value as plain JSON values, and put arrays in it into `arrays` under new names."""
     if isinstance(value, np.ndarray):
         name = f"a{len(arrays)}"
         arrays[name] = value

@@ -31,7 +31,7 @@ def estimate_text(
 
 
 def share_in_words(share: Estimate) -> str:
-    """Return words such as "more than 99.9 %" for a share that is nearly 1, and "" for others.
+    """Return words such as "more than 99.9 %" for a share that is nearly 1, "" for other shares.
 
     The words have as many nines as the interval of the share allows.
     """
@@ -45,7 +45,7 @@ def share_in_words(share: Estimate) -> str:
 def plain(value: float | str, digits: int = 4) -> str:
     """Return a number as text with `digits` significant digits.
 
-    Only sizes below 1e-4 and from 1e9 on have an exponent. A text is returned as it is.
+    Numbers below 1e-4 and from 1e9 on in size have an exponent. A text is returned as it is.
     """
     if isinstance(value, str):
         return value
@@ -97,9 +97,9 @@ def typeset_plain(value: float | str, digits: int = 4) -> str:
 
 
 def typeset(text: str) -> str:
-    """Return a text with its numbers as print has them.
+    """Return a text with its numbers as in a printed book.
 
-    They have gaps between thousands from 10 000 on, and a minus sign as long as a plus.
+    Numbers from 10 000 on have gaps between thousands, and the minus sign is as long as a plus.
     """
 
     def grouped(number: re.Match[str]) -> str:

@@ -1,8 +1,8 @@
-"""Run tasks in worker processes on this machine.
+"""Run tasks in worker processes on this computer.
 
-Python code runs in parallel in them, and a task that crashes its process fails alone. The process
-pool of concurrent.futures breaks as a whole when one process dies, and does not tell which task
-crashed. Here each worker process has a thread that hands it one task at a time.
+Python code runs in parallel in the processes, and a task that crashes its process fails alone. The
+process pool of concurrent.futures breaks as a whole when one process dies, and does not tell which
+task crashed. Here each worker process has a thread that gives it one task at a time.
 """
 
 from __future__ import annotations
@@ -36,8 +36,8 @@ MAX_SHARED = 4  # shared values that a worker keeps, one for each candidate in p
 class SharedFile:
     """Stand-in for a large value, which is written to a file once.
 
-    Its pickle holds only the path of the file. A worker that unpickles it gets the value, and reads
-    the file only the first time.
+    The pickle of the stand-in holds only the path of the file. A worker that unpickles it gets the
+    large value, and reads the file only the first time.
     """
 
     def __init__(self, value: object, path: Path) -> None:
@@ -62,8 +62,8 @@ def _remove(path: Path) -> None:
 class ProcessExecutor(Executor):
     """Executor with worker processes, each started by its first task.
 
-    A task whose process dies runs once more, in a new process. If that dies too, the task raises
-    WorkerLostError. An exception that leaves the `with` block ends the processes at once.
+    A task whose process dies runs once more, in a new process. If this process dies too, the task
+    raises WorkerLostError. An exception that leaves the `with` block ends the processes at once.
     """
 
     def __init__(self, workers: int) -> None:
@@ -80,7 +80,7 @@ class ProcessExecutor(Executor):
     def share(self, value: object) -> SharedFile:
         """Write a value that many tasks need to a file, and return a stand-in to pass to the tasks.
 
-        The file is removed with the stand-in, and at the latest with the executor.
+        The file is removed when the stand-in is freed, at the latest when the executor ends.
         """
         return SharedFile(value, Path(self._folder, f"{next(self._numbers)}.pickle"))
 

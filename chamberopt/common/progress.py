@@ -1,4 +1,4 @@
-"""Show on stderr how far a command is: its named steps with counts, best value and time left.
+"""Show on stderr how far a command has come: its named steps with counts and time left.
 
 After `write_json_lines` each step writes lines of JSON, for a program to read: {"step": name,
 "done": 3, "total": 20, "best": 0.81}, and at its end {"step": name, "ended": true}.
@@ -44,8 +44,8 @@ def step(
     `total` is the number of items to do, if it is known at the beginning.
 
     On a terminal the step has a line on stderr (or `stream`) from its beginning to its end, below
-    the line of the step around it. Logs and pipes stay clean: a long step writes a plain line to
-    them now and then.
+    the line of the step in whose `with` block it runs. To a log or a pipe, a long step writes a
+    plain line now and then.
     """
     stream = stream or sys.stderr
     if _json_lines:
@@ -78,7 +78,7 @@ def _update(display: Display, row: Any, done: int, total: int, best: float | Non
 
 @contextmanager
 def _display(stream: TextIO) -> Iterator[Display]:
-    """Yield the terminal's progress display. The outermost step opens it, inner steps share it."""
+    """Yield the terminal's progress display; the outermost step opens it, inner steps share it."""
     if _displays:
         yield _displays[0]
         return

@@ -1,8 +1,7 @@
 """Write error messages for TOML files: file, line, field, given value and allowed values.
 
 All problems of a file are reported at once, the first MOST_PROBLEMS problems in words. Messages are
-made from the pydantic models of the files. A field's bounds, unit and description are stated once,
-in its model.
+made from the pydantic models of the files, which state the bounds, unit and description of a field.
 """
 
 import difflib
@@ -36,17 +35,14 @@ MAX_VALUE_TEXT = 60  # characters of a given value that a message repeats
 
 @dataclass(frozen=True)
 class Problem:
-    """Wrong field of a TOML file, which the user must correct."""
+    """A wrong field of a TOML file, which the user must correct, and a text on what is wrong."""
 
     field: str  # dotted name; "" for the whole file
     text: str  # sentence with the value given and the remedy
 
 
 class CrossCheckError(ValueError):
-    """Error of pydantic validators for values that are wrong although each is in its range.
-
-    For example, they contradict each other.
-    """
+    """Error of pydantic validators for values within their ranges that do not fit together."""
 
     def __init__(self, problems: Iterable[Problem]) -> None:
         self.problems = tuple(problems)
@@ -65,8 +61,8 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
 
     A hint with a similar name also lists all names if they are few.
 
-    A dotted name with a known table is compared only within this table, because no other table has
-    the same keys.
+    If a dotted name begins with a known table, only names in this table are compared, because no
+    other table has the same keys.
     """
     words, table = list(known), name.rpartition(".")[0]
     words = [one for one in words if table and one.rpartition(".")[0] == table] or words
@@ -103,7 +99,7 @@ def format_problems(problems: Iterable[Problem], path: Path | None = None, sourc
 def explain_validation_error(error: ValidationError, model: type[BaseModel]) -> list[Problem]:
     """Return pydantic's errors as problems of named fields of the file.
 
-    Texts take time to make: problems beyond MOST_PROBLEMS, which are only counted, have none.
+    Problems beyond MOST_PROBLEMS, which are only counted, have no texts, because texts take time.
 
     Args:
         model: pydantic model of the whole file.
@@ -155,8 +151,8 @@ def numeric_fields(
 ) -> Iterator[tuple[str, FieldInfo]]:
     """Yield the dotted name and the pydantic field of every number in a table of a TOML file.
 
-    Numbers in lists have names such as part.offset_mm.0. For a model class these are the numbers
-    that its tables can hold, without lists of tables. For an instance they include such lists.
+    Numbers in lists have names such as part.offset_mm.0. A model class gives the numbers that its
+    tables can hold, but not the numbers in lists of tables. An instance gives these numbers too.
 
     Args:
         prefix: beginning of all names.
@@ -198,8 +194,7 @@ def text_choices(table: BaseModel, prefix: str) -> Iterator[tuple[str, tuple[str
 def key_lines(source: str) -> dict[str, int]:
     """Return the line number of every table header and key in a TOML text, by dotted name.
 
-    A simple scan is enough to point a person at the place. It does not find the keys of inline
-    tables.
+    A simple scan is enough to lead a person to a line. It does not find the keys of inline tables.
     """
     lines: dict[str, int] = {}
     rows: Counter[str] = Counter()
@@ -275,7 +270,7 @@ def _bare(annotation: Any) -> Any:
 def _table_of(field: FieldInfo, of_rows: bool = False) -> type[BaseModel] | None:
     """Return the pydantic model of a field that is a table, or None for other fields.
 
-    With `of_rows`, return the model of the rows of a field that is a list of tables.
+    With `of_rows`, a field that is a list of tables gives the model of these tables.
     """
     types = (*_alternatives(field.annotation), *map(_bare, get_args(field.annotation)[1:]))
     if of_rows:
@@ -362,13 +357,13 @@ def _explain(detail: ErrorDetails, model: type[BaseModel]) -> Problem:
 
 
 def _explain_unknown_key(key: str, table: type[BaseModel], model: type[BaseModel]) -> str:
-    """Return a hint for an unknown key: its new name, a similar key, its place or allowed keys.
+    """Return a hint for an unknown key: its new name, a similar key, its table or the allowed keys.
 
     Args:
         table: model of the table that holds the key.
         model: model of the whole file.
 
-    A model lists former names of its keys in RENAMED, and the fate of removed keys in REMOVED.
+    A model lists former names of its keys in RENAMED, and what became of removed keys in REMOVED.
     """
     renamed, removed = getattr(table, "RENAMED", {}), getattr(table, "REMOVED", {})
     if key in renamed:

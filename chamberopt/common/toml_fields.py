@@ -81,7 +81,7 @@ def quantity(low: float, high: float, unit: str, what: str, default: Any = ...) 
     """Return a pydantic field for a number from `low` to `high`.
 
     Args:
-        unit, what: unit and meaning of the number in error messages.
+        unit, what: unit and meaning of the number, for error messages.
         default: value if the file leaves the number out; without it the number is required.
     """
     return Field(default, ge=low, le=high, description=what, json_schema_extra={"unit": unit})
@@ -101,8 +101,8 @@ def list_field(form: str, what: str, default: Any = ...) -> Any:
     """Return a pydantic field for a list.
 
     Args:
-        form: form of the list in error messages, such as "three numbers [x, y, z] in mm".
-        what: meaning of the list in error messages.
+        form: form of the list, for error messages, such as "three numbers [x, y, z] in mm".
+        what: meaning of the list, for error messages.
         default: value if the file leaves the list out; without it the list is required.
     """
     return Field(default, description=what, json_schema_extra={"form": form})
@@ -140,7 +140,7 @@ def read_toml(
 
     Args:
         kind: kind of the file in messages, such as "design".
-        remedy: end of the message on a file that is empty or no such file.
+        remedy: end of the message on a file that is empty or no file of this kind.
 
     Raises:
         InputError: if the file is missing, too large or not TOML.

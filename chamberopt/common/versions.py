@@ -33,7 +33,7 @@ def versions() -> dict[str, str]:
 
 
 def program_versions() -> dict[str, str]:
-    """Return the versions of all that a study's figures depend on, except the machine.
+    """Return the versions of all on which a study's figures depend, except the computer.
 
     A study can only be resumed where all these versions are the same.
     """
@@ -44,7 +44,7 @@ def program_versions() -> dict[str, str]:
 def simulation_versions() -> dict[str, str]:
     """Return the versions and compiler settings on which the figures of a replica depend.
 
-    Two machines where they are equal simulate alike.
+    Two computers with equal versions and settings simulate alike.
     """
     settings = {name: os.environ.get(name, "not set") for name in COMPILER_SETTINGS}
     python = ".".join(platform.python_version_tuple()[:2])

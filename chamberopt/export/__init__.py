@@ -1,4 +1,1 @@
-"""Write files for other programs.
-
-They hold impacts, values on the part's mesh, the chamber, or the table of a study.
-"""
+"""Write files for other programs: impacts, values on the part's mesh, the chamber, study tables."""

@@ -32,9 +32,9 @@ class NamedSurfaces(NamedTuple):
     """The mesh of a cavity, and which of its triangles belong to which named surface.
 
     Args:
-        vertices: [mm], shape (n, 3).
+        vertices: vertices of the mesh [mm], shape (n, 3).
         triangles: a closed mesh with normals out of the cavity, shape (k, 3).
-        surfaces: by name, marks of the surface's triangles, shape (k,) bool.
+        surfaces: marks of the triangles of each surface, shape (k,) bool, by name of the surface.
     """
 
     vertices: np.ndarray
@@ -61,7 +61,7 @@ def read_cavity(folder: Path) -> NamedSurfaces:
 
 
 def write_cavity(folder: Path, file: Path) -> None:
-    """Write the whole cavity of a results folder as a binary STL file."""
+    """Write the whole cavity of a chamber, from a results folder, as a binary STL file."""
     cavity = read_cavity(folder)
     write_stl(file, cavity.vertices, cavity.triangles)
 

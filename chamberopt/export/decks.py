@@ -1,9 +1,9 @@
 """Write the values of a part's elements as input decks of Abaqus and Nastran.
 
-Abaqus gets *DISTRIBUTION on elements, with one RATIO for each element. Nastran gets pressures on
-shells, PLOAD4 in the large field format, with a load set for each quantity. P1 alone is a pressure
-over the whole element, for shells of first and second order. On a solid the entry needs the grids
-of the loaded face, which are not stored.
+A deck for Abaqus has a *DISTRIBUTION on elements, with a RATIO for each element. A deck for Nastran
+has pressures on shells, PLOAD4 in the large field format, with a load set for each quantity. The
+field P1 alone is a pressure over the whole element, for shells of first and second order. On a
+solid PLOAD4 needs the nodes of the loaded face, which are not stored.
 
 Source: Abaqus Keywords Reference Guide, *DISTRIBUTION (levels: part, instance, assembly, model; its
 first line is the default), *DISTRIBUTION TABLE (level: model) and *ELSET (levels: part, instance,
@@ -29,8 +29,9 @@ NUMBERS_PER_LINE = 16  # limit of Abaqus for the data lines of *ELSET
 def abaqus_deck(header: list[str], mesh: PartMesh, fields: ElementFields) -> dict[str, str]:
     """Return the Abaqus deck of element values: the text of each file by the suffix of its name.
 
-    There is one file, "", unless the part's deck has an instance. Then the element sets are in a
-    second file, "_sets", because distributions belong to the model and sets to the assembly.
+    The suffix is "" if there is one file. If the part's deck has an instance, a second file with
+    the suffix "_sets" holds the element sets, because distributions belong to the model and sets to
+    the assembly.
     """
     instance = mesh.numbering.instance
     head = "".join(f"** {line}\n" for line in header)
@@ -71,7 +72,7 @@ def _abaqus_mesh(mesh: PartMesh) -> list[str]:
 def _sets(fields: ElementFields, instance: str) -> list[str]:
     """Return Abaqus lines that put elements into a set for each band of coverage.
 
-    Empty bands are left out. `instance` is added to the keyword *Elset.
+    Bands without elements are left out. `instance` is text to add to the keyword *Elset.
     """
     lines = []
     coverage = fields.columns["coverage"]

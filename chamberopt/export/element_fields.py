@@ -44,7 +44,11 @@ ZONE_COLUMN = "zone_"  # start of the name of each zone's column
 
 
 def combination_of(column: str) -> tuple[str, str]:
-    """Return what a column of part.vtp means, and how its values combine over triangles."""
+    """Return what a column of part.vtp means, and how to combine its values over triangles.
+
+    The second text is "sum", "any" (1 if a triangle has it), or the weight of a mean: "area",
+    "impacts" or "dents".
+    """
     if column.startswith(ZONE_COLUMN):
         return f"1: in the zone {column.removeprefix(ZONE_COLUMN)}", "any"
     return COLUMNS[column]
@@ -120,9 +124,9 @@ def _combined(
     """Return values for each element, combined from its triangles.
 
     Args:
-        cells: rows of the triangles, (k,).
-        number: element of each triangle, (k,).
-        share: share of each triangle that counts, (k,).
+        cells: numbers of the triangles in `surface`, (k,).
+        number: element to whose values each of these triangles contributes, (k,).
+        share: share of each of these triangles that contributes, (k,).
         names: columns to combine.
     """
     numbers, element = np.unique(number, return_inverse=True)

@@ -29,7 +29,7 @@ FIELD_FORMATS = ("vtp", "vtkhdf", *DECKS)
 
 
 def write_fields(folder: str | Path, path: str | Path, to: str) -> list[str]:
-    """Write the values on the part of a result to a file, and return remarks for the user.
+    """Write values on a result's part, such as coverage, to a file; return remarks for the user.
 
     Args:
         folder: the results folder.
@@ -95,7 +95,7 @@ def _write_deck(result: Result, arrays: ResultArrays, to: str, path: Path) -> li
 def _elements_left_out(fields: ElementFields) -> list[str]:
     """Return remarks on elements that have no value.
 
-    Columns that lack the same number of elements share a remark.
+    Columns that lack values for the same number of elements share a remark.
     """
     names: dict[int, list[str]] = {}
     for name, values in fields.columns.items():

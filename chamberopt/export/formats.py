@@ -18,9 +18,9 @@ class ExportFormat:
     """A format that `chamberopt export` can write, and the function that writes it.
 
     Args:
-        file: name of the file in a folder of exports; a name without an ending is a folder.
+        file: name of the written file; a name without an ending is a folder.
         summary: a line for --help.
-        endings: allowed endings of the user's own file name.
+        endings: endings that a file name chosen by the user may have.
         writer: "module.function" in this package, called with (results folder, file, *arguments).
             It returns remarks or None. Its module is imported when it is needed. None for impacts,
             which are simulated again, once for all formats of impacts.
@@ -111,7 +111,7 @@ def formats_by_name(names: Sequence[str]) -> dict[str, ExportFormat]:
     """Return the formats with these names, each format once.
 
     Raises:
-        InputError: a name is unknown, or there is none.
+        InputError: a name is unknown, or no name is given.
     """
     if not names:
         raise InputError(
@@ -131,8 +131,8 @@ def is_file(out: Path, formats: dict[str, ExportFormat]) -> bool:
     """Return True if the option --out names a file, False if it names a folder.
 
     Raises:
-        InputError: it names a file, but several formats are to be written, or its ending belongs
-            to another format.
+        InputError: the option names a file, but several formats are to be written, or the file's
+            ending belongs to another format.
     """
     if not _has_ending(out, [ending for one in FORMATS.values() for ending in one.endings]):
         return False

@@ -27,8 +27,8 @@ class Frame:
     Args:
         name: "part", the frame of the part's file, or "chamber".
         unit: unit of lengths.
-        rotation: first step to the chamber's frame, shape (3, 3).
-        shift: second step [m], shape (3,).
+        rotation: matrix that turns vectors of this frame to the chamber's frame, shape (3, 3).
+        shift: shift to the chamber's frame after the rotation [m], shape (3,).
     """
 
     name: FrameName
@@ -48,9 +48,10 @@ class Frame:
 
 
 def frame_of(name: FrameName, part: Part) -> Frame:
-    """Return the frame "part" or "chamber".
+    """Return the frame for exported positions with the name "part" or "chamber".
 
-    Lengths are in the unit of the part's file, or in mm in the chamber's frame.
+    Lengths in the frame of the part are in the unit of the part's file, in the chamber's frame in
+    mm.
     """
     if name == "chamber" or part.file is None:
         return Frame(name, "mm", np.eye(3), np.zeros(3))

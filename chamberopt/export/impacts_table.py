@@ -42,12 +42,12 @@ class ImpactRows(NamedTuple):
 
     Args:
         replica: number of the replica.
-        log: impacts of the piece, (n,) each.
-        triangle: part triangle of the impact, shape (n,).
+        log: the n impacts as the simulator recorded them.
+        triangle: triangle of the part that each impact hit, shape (n,).
         position: contact point in the frame of the table, shape (n, 3). It is the surface point
             nearest to the centre of the ball.
         velocity: velocity before the impact [m/s], in the frame of the table, shape (n, 3). On a
-            turning part position and velocity are relative to the part as its mesh stands.
+            turning part, both are in the frame of the part's mesh, which turns with the part.
         dent: diameter of the dent [m], shape (n,).
         ball: diameter of the ball [m], shape (n,).
         element: element of the part's file at the contact point, shape (n,).
@@ -67,9 +67,9 @@ class Column(NamedTuple):
     """A column of the table of impacts, and how it is computed.
 
     Args:
-        name: ends with the unit.
-        dtype: type in the file.
-        text: printf format in a .csv file.
+        name: name of the column, which ends with the unit.
+        dtype: type of the values in the file.
+        text: printf format of the values in a .csv file.
         meaning: a sentence for the file's own description.
         values: function that computes the column, shape (n,).
     """
@@ -82,7 +82,7 @@ class Column(NamedTuple):
 
 
 def columns_of(frame: Frame) -> tuple[Column, ...]:
-    """Return the columns of the table in their order. A new column is a line in this function."""
+    """Return the columns of the table of impacts in order; add new columns here."""
     unit = frame.unit
     return (
         Column(
@@ -142,7 +142,7 @@ def columns_of(frame: Frame) -> tuple[Column, ...]:
 def impact_rows(
     impacts: ReplicaImpacts, chamber: Chamber, design: Design, frame: Frame
 ) -> Iterator[ImpactRows]:
-    """Yield the impacts of a replica in pieces of at most ROWS_AT_ONCE rows."""
+    """Yield the impacts of a replica in pieces of at most ROWS_AT_ONCE impacts."""
     ball = np.asarray(design.shot.diameters, dtype=float)
     dents = dent_diameters(impacts.log, design)
     for begin in range(0, len(impacts.log), ROWS_AT_ONCE):
@@ -174,7 +174,7 @@ def write_impacts(
     files: Sequence[Path], result: Result, rebuilt: RebuiltChamber, executor: Executor, *,
     frame: FrameName = "part", replicas: int | None = None, progress: Progress | None = None,
 ) -> int:  # fmt: skip
-    """Simulate a result again and write its impacts into each file, in the format of its ending.
+    """Simulate a result again, and write its impacts into files in the formats of their endings.
 
     The table has one row for each impact, replica after replica, in order of time. `columns_of`
     lists its columns. Files appear complete or not at all.
@@ -183,7 +183,7 @@ def write_impacts(
         The number of impacts.
 
     Raises:
-        InputError: the replicas do not give the result's own figures, or pyarrow is missing.
+        InputError: the new replicas differ from the replicas of the result, or pyarrow is missing.
     """
     design, chamber = result.design, rebuilt.chamber
     axes = frame_of(frame, chamber.part)
@@ -204,8 +204,8 @@ def write_impacts(
 def require_writable(files: Sequence[Path]) -> None:
     """Raise InputError if a table cannot be written.
 
-    This is so if pyarrow is missing for a .parquet file, or if the JSON file that describes a .csv
-    file exists already.
+    The reasons are that pyarrow is missing for a .parquet file, or that the JSON file that
+    describes a .csv file exists already.
     """
     for file in files:
         if _is_parquet(file):
@@ -227,7 +227,7 @@ def _pyarrow() -> Any:
 def _metadata(
     result: Result, rebuilt: RebuiltChamber, frame: Frame, columns: Sequence[Column], replicas: int
 ) -> dict[str, object]:
-    """Return a description of the table: origin, frame, unit and columns of its rows."""
+    """Return a description of the table of impacts: origin, frame, unit of length, columns."""
     design = result.design
     return {
         "result": result.folder.resolve().name,
@@ -314,5 +314,5 @@ def _csv(file: Path, columns: Sequence[Column], metadata: dict[str, object]) -> 
 
 
 def beside(file: Path) -> Path:
-    """Return the path of the JSON file that describes a .csv file."""
+    """Return the path of the JSON file that describes a .csv file and lies beside it."""
     return file.with_name(file.name + METADATA_ENDING)

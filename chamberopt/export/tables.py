@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def write_study_table(folder: Path, file: Path) -> None:
-    """Write the evaluations of a study or sweep, as many as there are so far, as .csv.
+    """Write the evaluations that a study or sweep has so far as .csv.
 
     The column NAME_pm is the 95 % half-width of the column NAME.
 
@@ -26,7 +26,9 @@ def write_study_table(folder: Path, file: Path) -> None:
 
 
 def write_tolerance_table(folder: Path, file: Path) -> None:
-    """Write the effects of tolerances as .csv: a row for each figure and toleranced number.
+    """Write the effects of tolerances as .csv.
+
+    There is a row for each figure, such as mean coverage, and each toleranced number of the design.
 
     Raises InputError for a result without tolerances.
     """

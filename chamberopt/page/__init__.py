@@ -1,4 +1,4 @@
-"""Serve a page in the browser that edits a design and shows its part, runs and results.
+"""Serve a page in the browser that edits a design, starts simulations and shows results.
 
-It keeps nothing of its own: each thing done on it is a file that the commands accept.
+The page keeps no data of its own: all that is made on it is a file that the commands accept.
 """

@@ -1,4 +1,4 @@
-"""Answer the requests of the page that edits one design."""
+"""Answer the requests of the web page on which a user edits a design."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ DEEPEST = 4  # levels of folders below the design's folder that are searched for
 
 
 def list_results(folder: Path) -> list[dict[str, object]]:
-    """List the results below a folder, the newest first, each with its figures in one line."""
+    """List all results below a folder, the newest first, each with its figures in a line."""
     found = []
     for depth in range(1, DEEPEST + 1):
         found += list(folder.glob("/".join(["*"] * depth + [RESULT])))
@@ -78,7 +78,7 @@ class Acts:
 
     Args:
         path: the design file.
-        trusted: whether designs may have a Python file as their shape, which is run.
+        trusted: whether the chamber's shape in a design may be a Python file, which is then run.
     """
 
     def __init__(self, path: Path, trusted: bool) -> None:
@@ -137,7 +137,7 @@ class Acts:
         return file
 
     def _file(self, asked: Any) -> EditedFile:
-        """Return the design file as the asking page has read it.
+        """Return the design file in the version that the requesting page has read.
 
         Raises InputError if the page has to be reloaded.
         """
@@ -184,7 +184,7 @@ class Acts:
     def start(self, asked: Any) -> dict[str, object]:
         """Start a command of the command line.
 
-        It works on the saved design, on a study beside it or on a result below its folder.
+        The command works on the saved design, on a study beside it or on a result below its folder.
         """
         command, what = str(asked["command"]), self.inside(str(asked["of"]))
         if command not in COMMANDS:
@@ -204,7 +204,7 @@ class Acts:
             return self._command.status()
 
     def _refuse_shape(self, file: Path) -> None:
-        """Raise InputError if a design, or a study's design, has a shape that is not trusted."""
+        """Raise InputError if a design or study would run a Python file that is not trusted."""
         data = read_toml(file, "design")[1]
         if is_study(data) and isinstance(data.get("design"), str):
             data = read_toml(file.parent / data["design"], "design")[1]
@@ -240,14 +240,14 @@ class Acts:
         return path
 
     def _free_folder(self, name: str) -> str:
-        """Return the first folder of results/NAME, results/NAME-2, ... that is new or empty."""
+        """Return the first new or empty folder of results/NAME, results/NAME-2 and so on."""
         folders = (Path("results", f"{name}-{k}" if k > 1 else name) for k in count(1))
         self.inside("results")  # the folder may be a link to elsewhere
         return next(one for one in folders if is_new_or_empty(self._path.parent / one)).as_posix()
 
 
 def _files_beside(design: Path) -> list[dict[str, str]]:
-    """Return name and kind of each readable design and study in a design's folder.
+    """Return name and kind of each readable design or study file in a design's folder.
 
     The design itself comes first.
     """

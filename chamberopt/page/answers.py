@@ -31,7 +31,7 @@ KINDS = {"f": "<f4", "i": "<u4", "u": "<u4", "b": "u1"}
 
 
 def part_answer(design: Design) -> bytes:
-    """Return the part as its file has it [mm], and the names in the file with their areas [mm²]."""
+    """Return the part as its file has it [mm], and the file's named surfaces with areas."""
     mesh = preview_part(design).mesh
     size = areas(mesh.vertices, mesh.triangles)
     names = [
@@ -94,7 +94,7 @@ def check_answers(design: Design) -> Iterator[bytes]:
 
 
 def _state(target: np.ndarray, zones: dict[str, np.ndarray]) -> np.ndarray:
-    """Return for each triangle of the part whether it is REST, TARGET or ZONE, shape (m,)."""
+    """Return for each triangle of the part where it is: in a ZONE, TARGET or REST, (m,)."""
     state = np.where(target, TARGET, REST).astype(np.uint8)
     for zone in zones.values():
         state[zone] = ZONE
@@ -115,10 +115,10 @@ def _surface(
 
 
 def packed(head: Mapping[str, object], **arrays: np.ndarray) -> bytes:
-    """Return an answer to the page as bytes.
+    """Return an answer to the page as bytes, with texts and numbers (`head`) and arrays.
 
-    They are the length of the head (4 bytes), the head as JSON, and the arrays.
-    The head also gives each array's kind and length. Each array begins at a multiple of 4 bytes.
+    The bytes are the length of the head (4 bytes), the head as JSON, and the arrays. The head also
+    tells each array's kind and length. Each array begins at a multiple of 4 bytes.
     """
     blocks = []
     for values in arrays.values():

@@ -1,6 +1,6 @@
-"""Check designs in child processes, so that the server answers meanwhile.
+"""Check designs in child processes, so that the page's server answers meanwhile.
 
-A newer question ends the check of an older one.
+A newer question ends the check of an older question.
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ class SupersededError(Exception):
 
 
 class Checker:
-    """Answer questions on the texts of one design: first its cavity, then the reach of its shot.
+    """Answers questions on versions of a design: first its cavity, then the reach of its shot.
 
-    A question ends the child that still works at the reach of an older question. A spare child,
-    which has read the part already, takes the place of the ended child.
+    A new question ends the child process that still computes the reach for an older question. A
+    spare child, which has read the part already, takes its place.
     """
 
     def __init__(self, path: Path, text: str) -> None:
@@ -57,7 +57,7 @@ class Checker:
             return mine, self._answer(self._now, mine)
 
     def reach(self, number: int) -> bytes:
-        """Return which surface the shot can reach in the cavity of the question with this number.
+        """Return which surface the shot can reach, for the design of the question with this number.
 
         Raises:
             InputError, SceneError: the reach cannot be computed.

@@ -33,11 +33,11 @@ PICKED = re.compile(
 
 
 class EditedFile:
-    """The text of a design file as one page has read it, with the changes that the page may make.
+    """The text of a design file as a page in the browser has read it, and methods to change it.
 
     Args:
         path: the design file.
-        trusted: whether the design's shape may be a Python file, which is run.
+        trusted: whether the chamber's shape in the design may be a Python file, which is then run.
 
     Raises:
         InputError: the file is a link or no valid design, or its shape is not trusted.
@@ -66,7 +66,7 @@ class EditedFile:
         return hashlib.sha256(self.text.encode()).hexdigest()
 
     def with_changes(self, changes: Changes) -> Design:
-        """Return the design with changes of its values by dotted name.
+        """Return the design with some values changed; `changes` has new values by dotted name.
 
         Raises InputError, which names every problem, if the changed design is not valid.
         """
@@ -74,9 +74,9 @@ class EditedFile:
         return validate(Design, tomllib.loads(text), self.path, text)
 
     def changed_text(self, changes: Changes) -> str:
-        """Return the text of the file with changes of its values by dotted name.
+        """Return the text of the file with some values changed.
 
-        Comments, order and other lines stay.
+        Comments, order and other lines stay. `changes` has new values by dotted name.
 
         Raises:
             InputError: the page may not change a key, or the key stands in the file in a form that
@@ -99,7 +99,7 @@ class EditedFile:
         return tomlkit.dumps(document) if changes else self.text
 
     def save(self, changes: Changes) -> None:
-        """Write the file with changes of its values by dotted name.
+        """Write the file with some values changed; `changes` has new values by dotted name.
 
         Raises:
             InputError: the file has changed since it was read, is read-only, or would be no valid
@@ -114,7 +114,7 @@ class EditedFile:
             write_bytes(self.path, text.encode(), self._look_at_replaced)
 
     def _look_at_replaced(self, path: Path) -> None:
-        """Raise InputError unless the replaced file still holds the text that was read."""
+        """Raise InputError unless the file to be replaced still holds the text that was read."""
         time.sleep(LATE_WRITE_S)  # an editor that opened the file before may write to it now
         self._require_unchanged(path)
 
@@ -143,7 +143,7 @@ class EditedFile:
         return False
 
     def _change(self, document: Any, name: str, value: Any) -> None:
-        """Set or remove one key in the parsed file, and make missing tables and lists around it."""
+        """Set or remove a key in the parsed TOML file, and make the missing tables around it."""
         import tomlkit
 
         steps, table = name.split("."), document
@@ -177,7 +177,11 @@ class EditedFile:
             table.append(_table(value))
 
     def _present(self, steps: list[str]) -> Any:
-        """Return the value of the design whose dotted name has these steps."""
+        """Return a value of the design.
+
+        Args:
+            steps: its dotted name, split at the dots.
+        """
         value: Any = self.design
         for step in steps:
             value = getattr(value, step)
@@ -195,7 +199,7 @@ def custom_shape(data: Mapping[str, object]) -> str:
 
 
 def _inline(value: object) -> object:
-    """Return a value for a TOML file with each table on one line.
+    """Return a value so that a TOML file has each table in it on one line.
 
     A value without tables is returned as it is.
     """
@@ -229,7 +233,7 @@ NOT_SHOWN = ("calibration.", "part.target.", "zones.", "tolerances.", "part.tess
 
 
 def design_fields(file: EditedFile) -> list[dict[str, object]]:
-    """Return what the page shows of every number and choice of a design, in the file's order.
+    """Return what the page shows of each number and choice in a design, in the order of the file.
 
     Each row has the name, value, unit, allowed range and explanation.
     """

@@ -21,7 +21,10 @@ Row = dict[str, Any]  # an item of `faces` in a target's table
 
 
 class Picker:
-    """Turn clicks into changes of a design. The part's faces are found once per crease angle."""
+    """Turns clicks on the part into changes of a design.
+
+    The part's faces, which meet at sharp edges, are found once for each crease angle.
+    """
 
     def __init__(self) -> None:
         self._known: dict[tuple[int, float], tuple[PartMesh, Faces]] = {}
@@ -31,17 +34,19 @@ class Picker:
     ) -> dict[str, object]:
         """Return changes of a design that add the face of a triangle to a target, or remove it.
 
-        A target that is chosen in another way becomes the list of its faces.
+        A target that the design chooses in another way, such as by a box, becomes a list of faces.
 
         Args:
             table: dotted name of the target, e.g. part.target.
             triangle: number of the triangle in the part's file.
-            crease_deg: angle at which faces meet [degrees].
-            alike: whether all congruent faces come or go too.
+            crease_deg: angle between neighbouring triangles from which on they belong to two faces
+                [degrees].
+            alike: whether all congruent faces are added or removed too.
             add: whether the face is added.
 
         Raises:
-            InputError: the target would stay as it is or be empty, or its border follows no faces.
+            InputError: the target would stay as it is or be empty, or its border does not run along
+                faces.
         """
         preview = preview_part(design)
         mesh, faces = preview.mesh, self._faces(preview.mesh, crease_deg)
@@ -80,12 +85,18 @@ class Picker:
         return {f"{table}.faces": rows, **{f"{table}.{key}": None for key in ways}}
 
     def face(self, design: Design, triangle: int, crease_deg: float, alike: bool) -> Row:
-        """Return the face of a triangle as a design file names it in a list `faces`."""
+        """Return the face to which a triangle belongs, as an item of a design's list `faces`."""
         faces = self._faces(preview_part(design).mesh, crease_deg)
         return _row(faces, _face_of(faces, triangle), crease_deg, alike)
 
     def face_down(self, design: Design, triangle: int, crease_deg: float) -> dict[str, object]:
-        """Return changes of a design that turn the face of a triangle towards the sonotrode."""
+        """Return changes of a design that turn a face of the part towards the sonotrode.
+
+        Args:
+            triangle: number of a triangle of the face.
+            crease_deg: angle between neighbouring triangles from which on they belong to two faces
+                [degrees].
+        """
         faces = self._faces(preview_part(design).mesh, crease_deg)
         normal = faces.normal(_face_of(faces, triangle))
         if not normal.any():

@@ -1,4 +1,4 @@
-"""Serve the page that edits a design, to the one person who started the server."""
+"""Serve the web page that edits a design, but only to the person who started the server."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ HEADERS = {
 
 
 class OnePerson:
-    """Refuse every request that does not come from the person who started the server."""
+    """Wraps the server's application, and refuses requests of all but the person who started it."""
 
     def __init__(self, app: ASGIApp, port: int) -> None:
         self._app, self._cookie = app, f"chamberopt-{port}"
@@ -87,10 +87,10 @@ class OnePerson:
         await self._app(scope, receive, send_with_headers)
 
     def _refusal(self, request: Request) -> Response | None:
-        """Return None if a request may be served.
+        """Return None if a request may be served, otherwise the response to give instead.
 
-        Otherwise return a refusal, or, for a request with the right token, an answer that sets the
-        cookie of later requests.
+        The response is a refusal. If the request opens the page with the secret token in its
+        address, the response sets the cookie that later requests carry.
         """
         if request.headers.get("host") not in self._hosts:
             return _refused("this server is for this machine only")
@@ -145,9 +145,9 @@ TOO_LONG = f"this question has more than {1e-6 * MOST_BYTES:g} MB; ask for less 
 
 
 def make_app(acts: Acts, port: int) -> OnePerson:
-    """Return the server's application.
+    """Return the server's web application.
 
-    It has an address for each request that `acts` answers, for the page and for the page's files.
+    It has addresses for each request that `acts` answers, for the page, and for the page's files.
     """
 
     def route(name: str, method: str) -> Route:
@@ -198,7 +198,7 @@ def make_app(acts: Acts, port: int) -> OnePerson:
 
 
 async def _body(request: Request) -> bytes | None:
-    """Return the body of a request, or None if it is too long or announces such a length."""
+    """Return the body of a request, or None if it is, or says that it is, too long."""
     if int(request.headers.get("content-length", 0)) > MOST_BYTES:
         return None
     body = bytearray()
@@ -215,7 +215,7 @@ def serve(path: Path, port: int, trusted: bool, tell: Callable[[str], None]) -> 
     Args:
         path: the design file.
         port: number of the port; 0 for any free port.
-        trusted: whether designs may have a Python file as their shape.
+        trusted: whether the chamber's shape in a design may be a Python file, which is then run.
         tell: called with the page's address when the server answers there.
 
     Raises:

@@ -43,9 +43,9 @@ class StartedCommand:
         self._reader.start()
 
     def status(self) -> dict[str, object]:
-        """Return what the page shows of the command: its printed lines and the progress of steps.
+        """Return what the page shows of the command: printed lines and progress of its steps.
 
-        `exit` is its exit status, or None while it runs.
+        The value `exit` is the exit status of the command, or None while it runs.
         """
         code = self._process.poll()
         if code is not None:
@@ -91,7 +91,7 @@ class StartedCommand:
 
 
 def _step(line: str) -> dict[str, Any] | None:
-    """Return the progress of a step that a printed line of JSON tells, or None for other lines."""
+    """Return the progress that a command prints as a line of JSON, or None for other lines."""
     if not line.startswith('{"step"'):
         return None
     try:

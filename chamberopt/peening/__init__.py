@@ -1,1 +1,1 @@
-"""Strips, calibration and tolerances: a simulated design in the terms of a peening shop."""
+"""Virtual Almen strips, calibration of a machine, and tolerances of a design's figures."""

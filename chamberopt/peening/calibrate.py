@@ -1,9 +1,12 @@
-"""Calibrate a machine: simulate its measurements until the most probable values stay.
+"""Calibrate a machine: find the parameters with which simulations give what was measured on it.
 
-A round simulates every set-up at a centre, and at one step to each side along each parameter that
-takes a simulation. A quadratic surface through all runs so far stands in for the simulator. The
-most probable values by this surface are the centre of the next round, and the last surface gives
-their covariance. Measurements that take no simulation (drops, amplitude) set the first centre.
+The machine's parameters are amplitude, restitution, friction and others. A set-up is a chamber in
+which something was measured. A figure is a number that is measured and simulated, such as an arc
+height. A round simulates every set-up at a centre, a point in the space of the parameters, and at
+one step to each side along each parameter. A quadratic surface through all runs so far stands in
+for the simulator. The most probable values by this surface are the centre of the next round, and
+the last surface gives their covariance. Some parameters take no simulation, because a formula gives
+what they change. Measurements that formulas predict (ball drops, amplitude) set the first centre.
 """
 
 from __future__ import annotations
@@ -77,7 +80,8 @@ class Calibrated:
 
     figures: functions that predict the design's figures (Almen intensity, coverage rate, ...) from
         the parameters of the machine, by name of the figure.
-    moved: distance of the last round's centre from the result, in standard deviations.
+    moved: distance of the result from the parameters round which the last simulations were made,
+        in standard deviations.
     """
 
     design: Design
@@ -109,7 +113,7 @@ def prepare(measured: Measured, designs: Mapping[str, Design], folder: Path) -> 
     """Return what a calibration has to simulate to explain the measurements.
 
     Args:
-        designs: designs that the measurements name, by path.
+        designs: the designs that the file of measurements names, by path.
         folder: folder into which the meshes of strips in the lid of a chamber are written.
 
     Raises:
@@ -171,7 +175,7 @@ def _single(kind: str, label: str, at: float, value: float, sd: float, model: Mo
 def _arcs(strip: MeasuredStrip, setup: Setup) -> Data:
     """Return the measured arc heights of a strip, with the function that predicts them.
 
-    With them comes a function that predicts the arc heights at further times, for a picture.
+    The result also holds a function that predicts arc heights at further times, for a picture.
     """
     times = np.array(strip.time_s)
     drawn = np.geomspace(0.5 * times[0], 1.5 * times[-1], DRAWN_TIMES)
@@ -216,7 +220,7 @@ def prior_of(measured: Measured, simulated: tuple[Parameter, ...]) -> Prior:
     """Return what is known before measuring about each parameter that the measurements concern.
 
     Args:
-        simulated: parameters that take a simulation.
+        simulated: parameters whose effect only a simulation tells.
     """
     names = [
         name
@@ -241,7 +245,7 @@ def calibrate(
     progress: Progress | None = None,
     simulator: Simulator = simulate_setup,
 ) -> Calibrated:
-    """Find the parameters of a machine.
+    """Find the parameters of a machine, such as its real amplitude, from its measurements.
 
     Args:
         designs: designs by path, as `load_measured` gives them.
@@ -251,8 +255,8 @@ def calibrate(
             returns its impacts.
 
     Raises:
-        InputError: hardly anything that was measured is hit in the simulation.
-        sim_core.SimulationError: a run must stop.
+        InputError: the simulated balls hardly hit a surface on which something was measured.
+        sim_core.SimulationError: a simulation must stop.
     """
     setups, data, figures = prepared
     simulated = setups[0].simulated
@@ -289,21 +293,21 @@ def calibrate(
 
 
 def _places(centre: np.ndarray, steps: np.ndarray) -> list[np.ndarray]:
-    """Return the points (k,) to simulate: the centre, and one step to each side by each parameter.
+    """Return the points (k,) at which to simulate: the centre, and two neighbours per parameter.
 
     Args:
-        centre: logarithms of the parameters that take a simulation, (k,).
-        steps: step of each of these, (k,).
+        centre: logarithms of the k parameters whose effect only a simulation tells, (k,).
+        steps: distance of the neighbours from the centre along each parameter, (k,).
     """
     sides = [sign * row for row in np.diag(steps) for sign in (-1.0, 1.0)]
     return [centre, *(centre + side for side in sides)]
 
 
 def _centre_at(setups: list[Setup], middle: np.ndarray) -> None:
-    """Fit the polynomials of all simulated figures round a point.
+    """Fit the polynomials that predict all simulated figures, expanded about a point.
 
     Args:
-        middle: logarithms of the parameters that take a simulation, (k,).
+        middle: logarithms at this point of the parameters that are simulated, (k,).
     """
     for setup in setups:
         for _, model in setup.models:
@@ -316,7 +320,7 @@ def _bounds(
     """Return the least and the largest values (p,) that the logarithms of all parameters may have.
 
     Args:
-        at: positions of the parameters that take a simulation; the others have no bounds.
+        at: positions of the simulated parameters among all p; the other parameters have no bounds.
         middle: middle of the bounds of the parameters at these positions, (k,).
         reach: distance of these bounds from the middle, (k,).
     """
@@ -328,11 +332,12 @@ def _bounds(
 def _moved(known: Posterior, at: list[int], centre: np.ndarray) -> float:
     """Return by how many standard deviations the result differs from the centre of a round.
 
-    The parameter that differs most counts.
+    Only the parameter that differs most counts.
 
     Args:
-        at: positions of the parameters that take a simulation.
-        centre: logarithms of these parameters at the centre of the round, (k,).
+        known: the result, the most probable parameters with their covariance.
+        at: positions of the simulated parameters among all.
+        centre: logarithms of the simulated parameters at the centre of the round, (k,).
     """
     sds = np.sqrt(np.diag(known.covariance))[at]
     return float((np.abs(known.mean[at] - centre) / sds).max())

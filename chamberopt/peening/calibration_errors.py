@@ -2,17 +2,19 @@
 
 Notation
     p   logarithm of a calibrated parameter, see design/calibration.py
-    h   step of p in a run on the same replicas and seeds          (Moved.step)
+    h   step of p in a second simulation with the same seeds       (Moved.step)
     g   slope of a figure by p, (figure moved - figure) / h
     L   factor of the covariance of all p
 
-Amplitude, restitution, yield speed and friction take a run each. Hardness changes the dents of the
-nominal impacts, d ~ B^(-1/4). K and beta are factors on figures. The standard errors L'g have the
-same causes in the same order for all designs with this calibration, so that errors that two designs
-have in common cancel in the difference of these designs.
+Amplitude, restitution, yield speed and friction take a simulation each, with the parameter changed.
+Hardness B changes the diameter d of the dents of the same impacts, d ~ B^(-1/4). K and beta are
+factors on figures. The standard errors of a figure are L'g. They have the same causes in the same
+order for all designs with this calibration, so that errors that two designs have in common cancel
+in the difference of these designs.
 
-Chaos makes paired runs differ by noise. A long step drowns the noise, at the price of curvature. A
-step is five standard deviations, but at most MAX_STEP. The noise that is left widens intervals.
+Chaos makes two simulations with the same seeds differ by noise. A long step drowns the noise, but
+the figure's curvature then falsifies the slope. A step is five standard deviations, but at most
+MAX_STEP. The noise that is left widens intervals.
 """
 
 from __future__ import annotations
@@ -67,7 +69,7 @@ def evaluate_calibrated(
 ) -> Evaluation:
     """Simulate a design, and widen the intervals of its figures by the errors of its calibration.
 
-    The arguments are those of `evaluate` in simulation/evaluate.py.
+    `evaluate` in simulation/evaluate.py has the same arguments.
     """
     of_all = RunsProgress(progress, 1 + len(moved_designs(design)))
     known = known or ReplicaSet()
@@ -75,10 +77,10 @@ def evaluate_calibrated(
 
 
 def with_open_errors(runs: Variations) -> Evaluation:
-    """Return the evaluation of the design itself, with intervals that hold calibration errors.
+    """Return a design's evaluation, with intervals widened by the errors of its calibration.
 
     Args:
-        runs: simulates the design, and changed copies of it on the same seeds.
+        runs: simulates the design, and changed copies of it with the same seeds.
     """
     found, calibration = runs.nominal, runs.design.calibration
     if calibration is None:
@@ -110,9 +112,9 @@ def with_open_errors(runs: Variations) -> Evaluation:
 
 
 def moved_designs(design: Design, names: Sequence[Parameter] = SIMULATED) -> list[Moved]:
-    """Return a copy of the design for each calibrated parameter, with this one moved by a step.
+    """Return copies of the design, in each of which a step moves another calibrated parameter.
 
-    Parameters that are known exactly are left out, and friction where the design has none.
+    Parameters that are known exactly are left out. So is friction if the design has no friction.
 
     Args:
         names: parameters to move.
@@ -134,12 +136,12 @@ def moved_designs(design: Design, names: Sequence[Parameter] = SIMULATED) -> lis
 
 
 def slope(one: Estimate, two: Estimate, step: float) -> float:
-    """Return the slope of a figure by a parameter's logarithm; 0 where a run gives no number.
+    """Return the slope of a figure by a parameter's logarithm; 0 if the figure is no finite number.
 
     Args:
-        one: the figure.
-        two: the figure in a run in which the parameter is moved.
-        step: step of the parameter's logarithm between both runs.
+        one: the figure of the design.
+        two: the figure simulated with the parameter moved.
+        step: difference of the parameter's logarithm between both simulations.
     """
     known = all(math.isfinite(e.value) and e.has_number for e in (one, two))
     return (two.value - one.value) / step if known else 0.0
@@ -148,20 +150,21 @@ def slope(one: Estimate, two: Estimate, step: float) -> float:
 def _figures(found: Evaluation) -> dict[str, Estimate]:
     """Return all metrics of an evaluation by name.
 
-    The metrics of its wide coverage windows have the prefix WIDE before their name.
+    Metrics of coverage in wide windows, discs of twice the usual radius, have the prefix WIDE.
     """
     return found.metrics | {WIDE + name: one for name, one in found.metrics_of_wide.items()}
 
 
 def _with_other_dents(replicas: list[Replica], factor: float) -> list[Replica]:
-    """Return copies of the replicas in which the part's dents are wider by a factor."""
+    """Return copies of the replicas, with the part's dents wider by a factor."""
     return [replace(one, hits=replace(one.hits, dent=one.hits.dent * factor)) for one in replicas]
 
 
 def _factors(name: str, one: Estimate) -> dict[Parameter, float]:
     """Return the slopes of a figure by the logarithms of K and beta.
 
-    K is a factor on Almen intensities, and 1 / beta on saturation times; all else has no slope.
+    Almen intensities are proportional to K, and saturation times to 1 / beta. Other figures depend
+    on neither, and have no slope.
     """
     figure = name.rpartition(".")[2]
     if figure.startswith("almen_intensity"):
@@ -172,6 +175,6 @@ def _factors(name: str, one: Estimate) -> dict[Parameter, float]:
 def _of_model(name: str, one: Estimate) -> float:
     """Return the standard error that the simplifications of the model cause in a figure.
 
-    Only saturation times have one; it is 0 for all other figures.
+    It is 0 for all figures but saturation times.
     """
     return TIME_ERROR * one.value if name.rpartition(".")[2] == "saturation_time_s" else 0.0

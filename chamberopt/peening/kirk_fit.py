@@ -1,4 +1,4 @@
-"""The fits that a shop puts through measured arc heights.
+"""Fit saturation curves to measured arc heights, as peening shops do.
 
 Notation
     h  arc height after the peening time t
@@ -104,7 +104,7 @@ class StripSaturation(NamedTuple):
 
 
 def strip_saturation(dents: StripDents) -> StripSaturation:
-    """Return the saturation time T of a strip, and its arc strength then, with intervals.
+    """Return the saturation time T of a strip, and its arc strength at this time, with intervals.
 
     T is the longest time after which twice the time gives exactly a tenth more arc strength.
     """
@@ -123,7 +123,7 @@ def heights(dents: StripDents, times: Iterable[float]) -> list[Estimate]:
 
 
 def corrected(dents: StripDents, figures: Callable[[StripCurve], np.ndarray]) -> list[Estimate]:
-    """Return figures of a strip with intervals, corrected for cells that have few dents.
+    """Return figures of a strip with intervals, corrected for the few dents in each of its cells.
 
     Args:
         figures: function that works out the figures (n,) from a saturation curve.

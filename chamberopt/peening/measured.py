@@ -37,7 +37,7 @@ Surface = Literal["shot", "wall", "sonotrode", "part"]
 
 
 class Peened(FileTable):
-    """Something that was peened in the chamber of a design, at an amplitude of its own or not."""
+    """A strip, coupon or part that was peened: in which design, and at which amplitude."""
 
     design: File | None = Field(default=None, description="instead of the one above all")
     amplitude_um: float | None = quantity(0.1, 500, "µm", "zero-to-peak, as set", None)
@@ -49,12 +49,12 @@ class Peened(FileTable):
 
     @property
     def zero_to_peak_um(self) -> float | None:
-        """Zero-to-peak amplitude as set [µm]; None if no amplitude is given but the design's."""
+        """Zero-to-peak amplitude of this measurement [µm]; None for the amplitude of the design."""
         return 0.5 * self.amplitude_pv_um if self.amplitude_pv_um else self.amplitude_um
 
 
 class MeasuredStrip(Peened):
-    """Arc heights of Almen strips in the lid of the chamber, a strip for each peening time."""
+    """Arc heights of Almen strips, each peened in the lid of the chamber for another time."""
 
     type: StripType = Field(default="A", description="of the strip")
     time_s: Several[float] = list_field("a list of times in s", "at least two, each once")
@@ -96,7 +96,7 @@ class MeasuredStrip(Peened):
 
     @property
     def size(self) -> StripSize:
-        """The size of the strip: that of a standard strip unless the file gives one."""
+        """Size of the strip; the standard size unless the file gives another size."""
         if self.disc_mm is not None:
             return StripSize(1e-3 * self.disc_mm, 1e-3 * self.disc_mm, is_disc=True)
         if self.size_mm is None:
@@ -127,7 +127,7 @@ class MeasuredDents(FileTable):
 
 
 class CouponMaterial(FileTable):
-    """The metal of a coupon that is of another metal than the part."""
+    """The metal of a coupon, where it is not the metal of the part."""
 
     hardness_HB: float | None = quantity(5, 1000, "HB", "Brinell hardness", None)  # noqa: N815
     C0: float | None = quantity(0.05, 1, "", "restitution below v0", None)
@@ -135,7 +135,7 @@ class CouponMaterial(FileTable):
 
 
 class MeasuredCoupon(Peened):
-    """A coupon, which takes the place of the part of its design."""
+    """A coupon, a test piece that is peened in place of the part of a design."""
 
     material: CouponMaterial | None = Field(default=None, description="if not that of the part")
     coverage: Several[MeasuredCoverage] = list_field(
@@ -151,7 +151,7 @@ class MeasuredCoupon(Peened):
 
 
 class MeasuredDrop(FileTable):
-    """One ball that falls on a surface and bounces."""
+    """A ball that was dropped on a surface, and the share of its speed that it kept."""
 
     design: File | None = Field(default=None, description="instead of the one above all")
     surface: Surface = Field(description="what it fell on")
@@ -168,7 +168,7 @@ class MeasuredImpacts(Peened):
 
 
 class MeasuredAmplitude(FileTable):
-    """Amplitude of the sonotrode, by laser or accelerometer."""
+    """The amplitude of the sonotrode, measured by laser or accelerometer."""
 
     set_pv_um: float = quantity(0.2, 1000, "µm", "as set, peak to valley")
     measured_pv_um: float = quantity(0.2, 1000, "µm", "as measured, peak to valley")
@@ -176,14 +176,14 @@ class MeasuredAmplitude(FileTable):
 
 
 class PriorTable(FileTable):
-    """The knowledge of a parameter before measuring."""
+    """What is known of a parameter before measuring: its usual value and standard deviation."""
 
     sd_log: float = quantity(1e-4, 5, "", "standard deviation of its natural logarithm")
     mean: float | None = quantity(1e-4, 1e4, "", "median, absent: the usual one", None)
 
 
 class Priors(FileTable):
-    """Priors that replace the usual ones."""
+    """What is known of parameters before measuring, in place of the program's priors."""
 
     amplitude: PriorTable | None = Field(default=None, description="factor on the amplitude")
     C0: PriorTable | None = Field(default=None, description="factor on restitutions")
@@ -262,7 +262,7 @@ def load_measured(path: Path) -> tuple[Measured, dict[str, Design]]:
 
 
 def _designs(found: Measured) -> Iterator[tuple[str, str]]:
-    """Return the name of each field of the file that names a design, and the design's path."""
+    """Yield each field of the file that names a design: the field's name and the design's path."""
     yield "design", found.design
     for kind in ("strip", "coupon", "drop", "impacts"):
         for number, entry in enumerate(getattr(found, kind)):
@@ -273,7 +273,8 @@ def _designs(found: Measured) -> Iterator[tuple[str, str]]:
 def _usable(design: Design) -> Design:
     """Return the design without its calibration.
 
-    Raises InputError if its effects are "auto", because a calibration needs effects that stay.
+    Raises InputError if the design leaves the choice of its physical effects to a pilot run
+    ("auto"). A calibration needs the same effects in all simulations.
     """
     if design.effects.auto:
         text = 'effects: given "auto"; a calibration needs effects that stay: name them, as '
@@ -282,7 +283,7 @@ def _usable(design: Design) -> Design:
 
 
 def falls(arcs: np.ndarray, sd: float) -> list[tuple[int, float]]:
-    """Return which arc heights are below an earlier one, and by how many standard deviations.
+    """Return which arc heights are below an earlier arc height, and how certainly.
 
     Args:
         arcs: arc heights in the order of their peening times, (n,).
@@ -326,9 +327,10 @@ def with_material(design: Design, material: CouponMaterial | None) -> Design:
 
 
 def dent_errors(dents: MeasuredDents) -> np.ndarray:
-    """Return the covariance (2, 2) of the logarithms of a coupon's mean dent and 90th percentile.
+    """Return the covariance of the errors of measured dents on a coupon, (2, 2).
 
-    Where no percentile was measured, it has the shape (1, 1), for the mean alone.
+    It is for the logarithms of mean and 90th percentile of the dent diameters. Its shape is (1, 1),
+    for the mean alone, where no percentile was measured.
     """
     reading = (1e-2 * dents.sd_percent) ** 2 * np.eye(2)
     size = 1 if dents.p90 is None else 2

@@ -1,4 +1,4 @@
-"""Predicted figures of a calibrated design, and the measurement that would tell most about them."""
+"""Predict figures of a calibrated design, and name the measurement that would improve each most."""
 
 from __future__ import annotations
 
@@ -29,13 +29,14 @@ GAIN = 0.9  # share of a standard deviation that a measurement must get below to
 
 
 class Candidate(NamedTuple):
-    """A measurement that could be made next.
+    """A measurement of the machine that could be made next.
 
     Attributes:
         name: the measurement in words.
-        slopes: slopes of the logarithms of its figures by those of the parameters, (n, p).
-        errors: covariance of the logarithms of its figures, (n, n), enlarged as that of the
-            measurements of its kind whose scatter the model does not explain.
+        slopes: slopes of the logarithms of the measured figures by the logarithms of the machine's
+            parameters, (n, p).
+        errors: covariance of the errors of these logarithms, (n, n). It is enlarged by the factor
+            by which past measurements of this kind scattered more than their errors explain.
     """
 
     name: str
@@ -50,8 +51,9 @@ class Prediction:
     Attributes:
         name, words: key of the figure, and its name in words.
         value: predicted value.
-        sd_before, sd: standard deviations of its logarithm, before measuring and now.
-        noise: standard deviation of its logarithm by the noise of simulations.
+        sd_before, sd: standard deviations of the value's logarithm, before all measurements and
+            now.
+        noise: standard deviation of the value's logarithm by the noise of simulations.
         next_name, next_sd: the measurement that would leave the least standard deviation, and this
             deviation; the name is "" where no measurement helps.
     """
@@ -69,8 +71,8 @@ class Prediction:
 def predict(found: Calibrated) -> list[Prediction]:
     """Predict the figures of the design that was calibrated, each with its best next measurement.
 
-    The figures are Almen intensity, saturation time and coverage rate; only the last one where no
-    strip was measured.
+    The figures are Almen intensity, saturation time and coverage rate. Only the coverage rate is
+    predicted if no strip was measured.
     """
     posterior, candidates = found.posterior, _candidates(found)
     before = np.diag(posterior.prior.sd**2)

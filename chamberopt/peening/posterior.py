@@ -1,4 +1,4 @@
-"""The parameters by the measurements: the most probable values and their covariance.
+"""Find a machine's most probable parameters from its measurements, and their covariance.
 
 Notation
     theta   natural logarithms of the parameters, (p,)
@@ -13,12 +13,13 @@ C = (J' (R + N)^-1 J + P^-1)^-1, Laplace's approximation. A figure g of theta th
 deviation sqrt(g' C g), and a further measurement with J+ and R+ leaves
 C - C J+' (J+ C J+' + R+)^-1 J+ C, whatever it gives.
 
-Where the model does not explain the figures of a kind, neither these figures nor the model can be
-trusted to their errors. The errors are then multiplied by sqrt(chi² / nu) (R. T. Birge, Phys. Rev.
-40 (1932) 207), and all is fitted again, until chance allows chi² of every kind. nu is the number of
-the kind's values less the trace of (R + N)^-1 J C J', which the fit has taken, and at least 1.
-Parameters that explain all may still be far from the priors. The least sum above has as many
-degrees of freedom as y has values. Where the sum is too large, C is multiplied by their ratio.
+Where the model does not explain the figures of a kind of measurement, the stated errors of these
+figures, or of the model, are too small. The errors are then multiplied by sqrt(chi² / nu) (R. T.
+Birge, Phys. Rev. 40 (1932) 207), and all is fitted again, until chance allows chi² of every kind.
+nu is the number of the kind's values less the trace of (R + N)^-1 J C J', which the fit has taken,
+and at least 1. Parameters that explain all may still be far from the priors. The least sum above
+has as many degrees of freedom as y has values. Where the sum is too large, C is multiplied by their
+ratio.
 """
 
 from __future__ import annotations
@@ -52,12 +53,14 @@ CUBIC = 0.1  # standard deviation of the coefficient of a cubic term
 
 
 class Surface(NamedTuple):
-    """A quadratic polynomial through the figures of runs, as weights of these runs at a point.
+    """A quadratic polynomial in k parameters, fitted to the values of a figure in r simulations.
+
+    Its value at a point is a sum of the runs' values, each with a weight that depends on the point.
 
     Attributes:
-        centre: logarithms of the parameters at its centre, (k,).
-        matrix: coefficients of the polynomial for a figure of 1 in each run, (q, r).
-        spread: covariance of the coefficients over the variance of a run's figure, (q, q).
+        centre: logarithms of the parameters about which the polynomial is expanded, (k,).
+        matrix: gives the q coefficients when multiplied by the runs' values, (q, r).
+        spread: covariance of the coefficients over the variance of a run's value, (q, q).
     """
 
     centre: np.ndarray
@@ -65,8 +68,7 @@ class Surface(NamedTuple):
     spread: np.ndarray
 
     def weights(self, place: np.ndarray) -> np.ndarray:
-        """Return the weight of each run, (r,). The polynomial at a point is the weighted sum of the
-        runs' figures.
+        """Return the weights (r,) of the runs' values in the polynomial's value at a point.
 
         Args:
             place: logarithms of the parameters at the point, (k,).
@@ -74,7 +76,7 @@ class Surface(NamedTuple):
         return np.asarray(_terms(place - self.centre)[0] @ self.matrix)
 
     def noise(self, place: np.ndarray) -> float:
-        """Return the variance of a figure at a point, as a multiple of that of a single run.
+        """Return the polynomial's variance at a point over the variance of a single run's value.
 
         Args:
             place: logarithms of the parameters at the point, (k,).
@@ -84,7 +86,7 @@ class Surface(NamedTuple):
 
 
 def fit_surface(places: np.ndarray, centre: np.ndarray, noise: float) -> Surface:
-    """Fit a quadratic polynomial to runs, and return it.
+    """Fit a quadratic polynomial in the parameters to simulation runs, and return it.
 
     Args:
         places: logarithms of the parameters of each run, (r, k).
@@ -102,7 +104,7 @@ def fit_surface(places: np.ndarray, centre: np.ndarray, noise: float) -> Surface
 
 
 def _terms(x: np.ndarray) -> np.ndarray:
-    """Return the terms of a quadratic polynomial (1, x_i, x_i x_j) for each row of x, (r, q)."""
+    """Return the terms (1, x_i, x_i x_j) of a quadratic polynomial at each point x, (r, q)."""
     x = np.atleast_2d(x)
     pairs = combinations_with_replacement(range(x.shape[1]), 2)
     return np.column_stack([np.ones(len(x)), x, *(x[:, i] * x[:, j] for i, j in pairs)])
@@ -144,14 +146,14 @@ Model = Callable[[Mapping[Parameter, float]], Figures]
 
 
 class SimulatedModel:
-    """A function that predicts the figures of one measurement from the runs of one set-up.
+    """A function that predicts the figures of a measurement from simulation runs of its set-up.
 
-    Called with the logarithms of all parameters by name, it returns the logarithms of the figures
-    and their noise.
+    Its argument is the logarithms of all parameters by name. It returns the logarithms of the
+    figures and their noise.
 
     Args:
         probe: reads the figures off the impacts of a run.
-        simulated: names of the parameters that take a simulation.
+        simulated: names of the parameters that differ from run to run.
     """
 
     def __init__(self, probe: Probe, simulated: Sequence[Parameter]) -> None:
@@ -163,20 +165,20 @@ class SimulatedModel:
         self._noise = np.zeros((0, 0))
 
     def add(self, place: np.ndarray, reading: Reading) -> None:
-        """Add a run to those from which the figures are predicted.
+        """Add a simulation run to the runs from which the figures are predicted.
 
         Args:
-            place: logarithms in the run of the parameters that take a simulation, (k,).
+            place: logarithms of the simulated parameters in this run, (k,).
             reading: figures of the run.
         """
         self._places.append(place)
         self._readings.append(reading)
 
     def centre_at(self, centre: np.ndarray) -> None:
-        """Fit the quadratic polynomial of the figures round a point.
+        """Fit the quadratic polynomial that predicts the figures, expanded about a point.
 
         Args:
-            centre: logarithms there of the parameters that take a simulation, (k,).
+            centre: logarithms of the simulated parameters at this point, (k,).
         """
         self._noise = np.mean([one.noise for one in self._readings], axis=0)
         sd = float(np.sqrt(np.diag(self._noise).mean()))
@@ -200,13 +202,14 @@ class Data:
     """Measured figures of one kind, with their errors and the function that predicts them.
 
     Args:
-        kind: such as "arc heights", in words that a message can use.
-        label: name among several data of this kind.
+        kind: kind of measurement in words for messages, such as "arc heights".
+        label: what tells these data from other data of this kind, such as the amplitude.
         at: times [s] or other positions of the figures in a picture, (n,).
         y: logarithms of the measured figures, (n,).
         covariance: covariance of the errors of y, (n, n).
         model: function that predicts y from the parameters.
-        drawn: further times, and a function that predicts the figures at these, for a picture.
+        drawn: further times, and a function that predicts the figures at these times, for a
+            picture.
     """
 
     kind: str
@@ -235,7 +238,7 @@ class Posterior:
     def slopes(self, model: Model) -> np.ndarray:
         """Return the slopes (n, p) of predicted figures by the logarithms of the parameters.
 
-        They hold at the most probable parameters.
+        The slopes hold at the most probable parameters.
         """
         return slopes(model, self.prior, self.mean)
 
@@ -243,8 +246,8 @@ class Posterior:
         """Return the standard deviations (n,) of the logarithms of predicted figures.
 
         Args:
-            covariance: covariance of the logarithms of the parameters, (p, p); by default the one
-                after measuring.
+            covariance: covariance of the logarithms of the parameters, (p, p); by default the
+                covariance after measuring.
         """
         rows = self.slopes(model)
         spread = self.covariance if covariance is None else covariance
@@ -323,7 +326,7 @@ def explaining_posterior(
     """Find the most probable parameters, with errors so large that the model explains all data.
 
     The errors of each kind of data, and then the covariance of the parameters, are enlarged until
-    chance allows the misfit. The arguments are those of `find_posterior`.
+    chance allows the misfit. `find_posterior` has the same arguments.
     """
     from scipy.special import chdtrc
 
@@ -348,7 +351,7 @@ def _misfits(
     """Return how far each kind of data is from the model, and by which factor its errors must grow.
 
     Args:
-        scales: factor by which the errors of each kind are multiplied already.
+        scales: factor by which the errors of each kind of data are multiplied already.
     """
     from scipy.special import chdtrc
 

@@ -1,14 +1,14 @@
-"""Readings of simulated impacts, as of a measurement: logarithms of figures.
+"""Read off simulated impacts what a measurement would give: logarithms of its figures.
 
 Notation
     h     arc strength of a strip [m], see strip.py
     x     dented area of the part over its area, per second [1/s]; coverage is 1 - exp(-x t)
     d     diameter of a dent on the part [m], as B^(-1/4) with its hardness
-    K, B, beta   as in design/calibration.py; slopes by these are exact, but for the slope of arcs
-                 by beta, for which h is taken at other times
+    T     saturation time of a strip [s]
+    K, B, beta   parameters of the machine, see design/calibration.py. Formulas give the figures for
+                 other K, B and beta; for another beta, h is taken at other times.
 
-The figures are ln(K h(beta t)), ln x, ln d, ln T, and ln of the rate of impacts. Slopes are slopes
-of these logarithms.
+The figures are ln(K h(beta t)), ln x, ln d, ln T, and ln of the rate of impacts.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ class Impacts(NamedTuple):
         replicas: impacts of each replica, on the whole part.
         seconds: simulated time of each replica [s].
         density: density of the balls [kg/m³].
-        strip: metal of a strip, with the restitution of the simulation.
+        strip: metal of an Almen strip, with the restitution that the simulation takes for it.
     """
 
     replicas: Sequence[Hits]
@@ -65,11 +65,12 @@ def impacts_of(design: Design, replicas: Sequence[Replica]) -> Impacts:
 
 
 class Reading(NamedTuple):
-    """Logarithms of the figures that one run gives for a measurement.
+    """Logarithms of the figures that a simulation gives for a measurement.
 
     Attributes:
-        at: function of the logarithm of beta that returns them, (n,).
-        noise: covariance of their errors by the number of impacts, (n, n).
+        at: function that returns these logarithms (n,) for a logarithm of beta, the calibrated
+            factor on the number of dents of a strip.
+        noise: covariance (n, n) of the errors that they have because impacts are limited in number.
     """
 
     at: Callable[[float], np.ndarray]
@@ -103,9 +104,9 @@ class ArcProbe:
 
 @dataclass(frozen=True)
 class SaturationProbe:
-    """Reads a strip's saturation time, and its arc strength then, off simulated impacts.
+    """Reads a strip's saturation time, and its arc strength at this time, off simulated impacts.
 
-    This arc strength times the calibration constant K is the Almen intensity [mmA].
+    The arc strength times the calibration constant K is the Almen intensity [mmA].
     """
 
     cells: Cells
@@ -125,9 +126,9 @@ class PartProbe:
     """Reads figures of dents and impacts on the part off simulated impacts.
 
     Args:
-        names: figures to read: "rate" of dented area, "mean" and "p90" of dent diameters, or rate
-            of "impacts".
-        target: whether dents on each triangle of the part count, (m,) bool.
+        names: figures to read: "rate" (dented area per second), "mean" and "p90" (of dent
+            diameters), or "impacts" (per second).
+        target: for each triangle of the part, whether dents on it count, (m,) bool.
         area: area of the triangles that count [m²].
     """
 
@@ -142,9 +143,9 @@ class PartProbe:
         return tuple({"hardness": self.SLOPES[name]} for name in self.names)
 
     def read(self, impacts: Impacts) -> Reading:
-        """Return the logarithms of those figures that `names` asks for.
+        """Return the logarithms of the figures that `names` asks for.
 
-        These are dented area over area per second [1/s], mean and 90th percentile of the dent
+        The figures are dented area over area per second [1/s], mean and 90th percentile of the dent
         diameters [mm], and impacts on the part per second [1/s].
         """
         dents = [hits.on(self.target).dent.astype(float) for hits in impacts.replicas]
@@ -180,7 +181,7 @@ Probe = ArcProbe | SaturationProbe | PartProbe
 
 
 def whole_target(target: np.ndarray, area: float) -> Cells:
-    """Return the target of a part as the single cell of a strip that covers all of it.
+    """Return the target, the surface to be peened, as an imagined Almen strip of a single cell.
 
     Args:
         target: triangles of the part that are its target, (m,) bool.
@@ -197,7 +198,7 @@ def _logs(found: Sequence[Estimate]) -> np.ndarray:
 
 
 def _noise(found: Sequence[Estimate]) -> np.ndarray:
-    """Return the covariance (n, n) of the logarithms of figures, from the scatter of replicas."""
+    """Return the covariance (n, n) of figures' logarithms, from their scatter among replicas."""
     relative = np.array([np.array(one.pseudovalues) / one.value for one in found])
     scatter = np.atleast_2d(np.cov(relative)) / relative.shape[1]
     # The possible error of the correction for few dents is added.

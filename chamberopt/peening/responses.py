@@ -3,10 +3,10 @@
 Notation
     m    a figure, such as mean_coverage
     L    the scale on which m is nearly a straight line: ln(-ln(1 - m)) for a share of the area,
-         ln m for another positive figure, m itself for the others          (FigureScale)
+         ln m for another positive figure, m itself for all other figures   (FigureScale)
 
-Avrami's coverage is 1 - exp(-x) with the dent density x, which goes with powers of amplitude, mass
-and time: hence the scale of shares.
+Avrami's coverage is 1 - exp(-x). The dent density x is proportional to powers of amplitude, mass
+and time, so that ln x = ln(-ln(1 - m)) is a straight line over their logarithms.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 class FigureScale(NamedTuple):
-    """A scale on which a figure is nearly straight: a function, its inverse and its slope."""
+    """A scale on which a figure responds nearly linearly: function, inverse and slope."""
 
     forward: Callable[[float], float]
     inverse: Callable[[float], float]
@@ -44,10 +44,10 @@ SHARE = FigureScale(
 
 
 def scale_of(name: str) -> FigureScale:
-    """Return the scale on which a metric responds nearly in a straight line.
+    """Return the scale on which a metric responds to a design's numbers nearly in a straight line.
 
-    That is ln(-ln(1 - m)) for a share, the logarithm for another figure that is never negative,
-    and the figure itself for all others.
+    It is ln(-ln(1 - m)) for a share m of an area, the logarithm for another metric that is never
+    negative, and the metric itself for all other metrics.
     """
     metric = find_metric(name)
     if metric is None or metric.lowest < 0.0:
@@ -56,12 +56,12 @@ def scale_of(name: str) -> FigureScale:
 
 
 def on_scale(figure: Estimate, scale: FigureScale) -> Estimate:
-    """Return the estimate of a figure on its scale; it has no interval where the figure has none.
+    """Return the estimate of a figure on its scale, with an interval if the figure has an interval.
 
-    Its half-width is so chosen that `back_from_scale` returns that of the figure, because near full
-    coverage the slope would make it far wider. Pseudo-values and shared errors are multiplied by
-    the slope, as far as the half-width has room for them. A logarithm has no interval where the
-    interval of the figure reaches 0.
+    The half-width on the scale is so chosen that `back_from_scale` returns the half-width of the
+    figure. Half-width times slope of the scale would be far wider near full coverage. Pseudo-values
+    and shared errors are multiplied by the slope, as far as the half-width has room for them. A
+    logarithm has no interval where the interval of the figure reaches 0.
     """
     if not math.isfinite(figure.half_width):
         return figure.not_known(figure.in_words or NOT_RESOLVED)
@@ -89,8 +89,8 @@ def on_scale(figure: Estimate, scale: FigureScale) -> Estimate:
 def with_errors_of(nominal: Estimate, changed: Estimate) -> Estimate:
     """Give a changed design's figure the calibration errors of the nominal design's figure.
 
-    Both figures are on their scale, where these errors move them together. A figure that has such
-    errors already stays as it is.
+    Both figures are on their scale, on which calibration errors move them by the same amount. A
+    figure that has calibration errors already stays as it is.
     """
     errors = nominal.shared[FIRST_OF_CALIBRATION:]
     if not errors or changed.shared[FIRST_OF_CALIBRATION:]:
@@ -101,7 +101,7 @@ def with_errors_of(nominal: Estimate, changed: Estimate) -> Estimate:
 def back_from_scale(value: Estimate, scale: FigureScale) -> Estimate:
     """Return the estimate of a figure from its estimate on the scale.
 
-    Its half-width is the wider side of the interval.
+    The scale makes the interval lopsided; the half-width is its longer side.
     """
     middle = scale.inverse(value.value)
     if value.in_words or not math.isfinite(value.half_width):

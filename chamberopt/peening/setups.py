@@ -1,4 +1,4 @@
-"""The chambers in which measurements were made, simulated at any values of the parameters."""
+"""Simulate the chambers in which measurements were made, at any parameters of the machine."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Setup:
 
     Attributes:
         design: the design as it was set on the machine, without a calibration.
-        simulated: parameters of the machine that take a simulation.
+        simulated: parameters of the machine whose effect only a simulation tells.
         models: each kind of measurement, with the function that predicts its figures.
     """
 
@@ -45,20 +45,20 @@ class Setup:
         self.mesh = chamber_mesh(self.chamber)
 
     def model(self, probe: Probe) -> SimulatedModel:
-        """Return a function that predicts a measurement's figures from all runs that follow.
+        """Return a function that predicts a measurement's figures from all runs added from now on.
 
         Args:
-            probe: reads these figures off the impacts of a run.
+            probe: reads these figures off the impacts of a simulation run.
         """
         made = SimulatedModel(probe, self.simulated)
         self.models.append((probe, made))
         return made
 
     def add_run(self, place: np.ndarray, impacts: Impacts) -> None:
-        """Read the figures of all measurements off the impacts of a run, and keep them.
+        """Read the figures of all measurements off the impacts of a simulation run, and keep them.
 
         Args:
-            place: logarithms in the run of the parameters that take a simulation, (k,).
+            place: logarithms of the simulated parameters in this run, (k,).
         """
         for probe, model in self.models:
             model.add(place, probe.read(impacts))
@@ -71,7 +71,7 @@ def simulate_setup(
 
     Args:
         values: logarithms of the parameters by name.
-        seed: seed of the run; runs with the same seed start alike.
+        seed: seed of random numbers; simulations with the same seed start alike.
     """
     design = setup.design
     process = design.process.model_copy(update={"seed": seed})
@@ -102,9 +102,10 @@ def exact_calibration(design: Design, values: Mapping[Parameter, float]) -> Cali
 
 @dataclass(frozen=True)
 class DropModel:
-    """A function that predicts how much of its speed a ball keeps when it bounces off a surface.
+    """A function that predicts the restitution of a ball, the share of its speed left by a bounce.
 
-    It returns the logarithm of the restitution, which is e = C0 (v / v0)^(-1/4) as a rule.
+    It returns the logarithm of the restitution, which is C0 (v / v0)^(-1/4) above the yield speed
+    v0 as a rule.
 
     Attributes:
         law: restitution of the surface against speed.
@@ -124,7 +125,7 @@ class DropModel:
 
 
 def amplitude_model(theta: Mapping[Parameter, float]) -> Figures:
-    """Return the logarithm of the sonotrode's real amplitude over the set amplitude."""
+    """Return the logarithm of the sonotrode's real amplitude over its set amplitude."""
     return Figures(np.array([theta["amplitude"]]), np.zeros((1, 1)))
 
 
@@ -132,7 +133,7 @@ def rows_of(model: Model, rows: Sequence[int]) -> Model:
     """Return a function that predicts only some of the figures that `model` predicts.
 
     Args:
-        rows: positions of the figures to keep; one may come twice.
+        rows: positions of the figures to keep; a position may come twice.
     """
     at = list(rows)
 

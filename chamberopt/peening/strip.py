@@ -4,18 +4,19 @@ Notation: as in coverage/strength.py, and
     x, y      position along the strip and across it, from its middle [m]
     a, b      half distances of the gauge's balls along x and y [m]            (GAUGE)
     k_x, k_y  curvatures of the strip [1/m], in proportion to the local h
-    w         share of a place in the arc height; its integral over the strip is 1
+    w         weight of a point of the strip in the arc height; its integral over the strip is 1
 
     arc height = 1/2 integral of (a - |x|) k_x dx + 1/2 integral of (b - |y|) k_y dy
 
-The gauge's four balls stand at (± a, ± b), and its tip measures the middle against the balls. A
-strip bends along x as a whole, so that k_x goes with the mean of h over its width. k_y goes with
-the mean of h over the length between the balls. So x counts for a² / (a² + b²) = 80 %. Discs,
-strips of other sizes and zones of a part count evenly, as the weights of their gauge are not known.
+The gauge's four balls stand at (± a, ± b), and its tip measures the height of the middle over the
+balls. A strip bends along x as a whole, so that k_x is proportional to the mean of h over its
+width. k_y is proportional to the mean of h over the length between the balls. So bending along x
+makes a² / (a² + b²) = 80 % of the arc height. On discs, strips of other sizes and zones of a part
+all points have the same weight, as the weights of their gauge are not known.
 
-h of a cell of the strip follows from its dents, and is summed over cells with their w. Few dents
-make h of a cell saturate too early. So neighbouring cells are put together until they have
-ENOUGH_DENTS, and their dents count by the w of their cells.
+The strip is divided into cells. h of a cell follows from its dents, and is summed over cells with
+their w. With few dents, h of a cell saturates too early. So neighbouring cells are put together
+until they have ENOUGH_DENTS, and their dents count by the w of their cells.
 
 Source: the gauge of SAE J442: balls 31.75 mm and 15.87 mm apart.
 """
@@ -60,7 +61,7 @@ class StripSize:
 
     @property
     def calibrated_as(self) -> str:
-        """Name by which a calibration records strips of this size."""
+        """Name of this size in a calibration, which holds only for strips of one size."""
         if self.is_whole:
             return WHOLE_STRIP
         return f"{self}" if self.is_disc else f"{self} strip"
@@ -76,7 +77,7 @@ class Cells(NamedTuple):
 
     Attributes:
         area: area of each cell [m²], (c,).
-        weight: share of each cell in the arc height, (c,); their sum is 1.
+        weight: weight of each cell in the arc height, (c,); their sum is 1.
         of: function of impacts that gives the cell of each impact, (k,); -1 outside.
     """
 
@@ -86,12 +87,14 @@ class Cells(NamedTuple):
 
 
 class StripDents(NamedTuple):
-    """Dents in the cells of a strip, by level of strength: dent diameter² / ball diameter.
+    """Dents in the cells of a strip, sorted by strength (dent diameter² / ball diameter).
+
+    The range of strengths is divided into LEVELS equal intervals, the levels.
 
     Attributes:
         parts: dented area over area, of each replica in each cell, (g, c, LEVELS).
         strength: mean strength of the dents of each level [m], ascending, (LEVELS,).
-        weight: share of each cell in the arc height, (c,).
+        weight: weight of each cell in the arc height, (c,).
         number: number of dents in each cell in all replicas, (c,).
         seconds: simulated time of each replica [s].
     """
@@ -173,7 +176,7 @@ def strip_cells(size: StripSize) -> Cells:
 def _leverage(edges: np.ndarray, half: float) -> np.ndarray:
     """Return the share of each interval between edges in the integral of half - |x|.
 
-    The integral runs from -half to half.
+    The integral runs from x = -half to half. The gauge weighs bending at x with half - |x|.
     """
     x = np.clip(edges, -half, half)
     return np.asarray(np.diff(x * (2.0 * half - np.abs(x))) / (2.0 * half**2))
@@ -197,7 +200,7 @@ def _disc_cells(radius: float) -> Cells:
 def surface_cells(vertices: np.ndarray, triangles: np.ndarray, area: np.ndarray) -> Cells:
     """Divide a surface into about 16 cells of neighbouring triangles, in which dents are counted.
 
-    All places of the surface count evenly.
+    Each cell has its share of the area as its weight in the arc height.
 
     Args:
         vertices: vertices of the part [m], (n, 3).
@@ -246,7 +249,7 @@ def count_dents(
 
 
 def _put_together(dents: StripDents) -> StripDents:
-    """Return the dents in 4 cells, or in 1, where they are too few for all cells."""
+    """Return the dents in 4 larger cells, or in 1 cell, if they are too few for all cells."""
     cells, total = len(dents.weight), dents.number.sum()
     groups = next((k for k in (cells, 4) if total >= ENOUGH_DENTS * k), 1)
     if groups >= cells:

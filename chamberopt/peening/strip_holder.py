@@ -46,10 +46,10 @@ def strip_design(
 
     Args:
         folder: folder for the mesh.
-        distance_mm: distance from the sonotrode to the strip; None for the distance of the part.
+        distance_mm: distance from the sonotrode to the strip; None: as far as the part.
 
     Raises:
-        InputError: the chamber is of another shape, or the strip does not fit into it.
+        InputError: the chamber has a shape without a lid, or the strip does not fit into it.
     """
     chamber = design.chamber
     if not isinstance(chamber, PolygonChamber | Cylinder):
@@ -128,7 +128,7 @@ def _edge_mm(size: StripSize) -> np.ndarray:
 
 
 def _holder_obj(edge: np.ndarray, half_sides: np.ndarray, thickness: float) -> str:
-    """Return the OBJ text of a plate [mm] whose lower face, at z = 0, has the strip as a group.
+    """Return the OBJ file's text of a plate [mm], in whose lower face (z = 0) the strip is a group.
 
     Args:
         edge: corners of the strip [mm], (n, 2).

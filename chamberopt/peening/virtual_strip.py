@@ -1,12 +1,13 @@
-"""Peen a virtual strip, and give the figures that a shop would read off it.
+"""Peen a virtual strip, and give its arc heights, intensity and saturation time with intervals.
 
 Notation: as in strip.py, and
     K, beta   arc height over h [mm/mm], dents on a real strip over simulated dents; 1 where the
               design is not calibrated
     H(t)      arc height of a real strip, K h(beta t); its saturation time is T / beta
 
-Slopes of a figure by the logarithms of amplitude, restitution, yield speed and friction come from
-runs on the same seeds (calibration_errors.py). Slopes by K and beta come from the formula.
+The errors of a calibration widen the intervals of the figures. The slopes of a figure by the
+logarithms of amplitude, restitution, yield speed and friction come from simulations with the same
+seeds (calibration_errors.py). The slopes by K and beta come from the formula of H.
 """
 
 from __future__ import annotations
@@ -72,14 +73,14 @@ OF_A_ZONE = (
 
 
 class StripSetting(NamedTuple):
-    """Where and how a virtual strip is peened.
+    """Where and how a virtual strip is peened: the chamber, the strip's position and its cells.
 
     Attributes:
         design: design in which the strip is peened.
         type: type of the strip, as N, A or C.
-        place: place of the strip, in words.
-        cells: cells of the strip.
-        notes: sentences on how much each place of the strip counts in the arc height.
+        place: where the strip is, in words.
+        cells: pieces of the strip in which dents are counted.
+        notes: sentences for the user on the weights of the strip's points in the arc height.
     """
 
     design: Design
@@ -91,7 +92,7 @@ class StripSetting(NamedTuple):
 
 @dataclass(frozen=True)
 class VirtualStrip:
-    """The figures of a peened strip; arc heights and the intensity are in `unit`."""
+    """Simulated arc heights, intensity and saturation time of a strip; heights are in `unit`."""
 
     setting: StripSetting
     unit: str
@@ -106,7 +107,7 @@ class VirtualStrip:
 
     @property
     def is_calibrated(self) -> bool:
-        """Whether the machine is calibrated, so that arc heights are those of a real strip."""
+        """Whether the machine is calibrated, so that a real strip would get these arc heights."""
         return bool(self.of)
 
     @property
@@ -123,11 +124,11 @@ def strip_in_lid(
     folder: Path,
     distance_mm: float | None = None,
 ) -> StripSetting:
-    """Return the setting of a strip that is flush in a lid on the design's chamber.
+    """Return where and how to peen a strip that is flush in a lid on the design's chamber.
 
     Args:
         folder: folder for the mesh of the lid.
-        distance_mm: distance from the sonotrode to the strip; None for the distance of the part.
+        distance_mm: distance from the sonotrode to the strip; None: as far as the part.
 
     Raises:
         InputError: the chamber has a shape without a lid, or the strip does not fit into it.
@@ -142,7 +143,9 @@ def strip_in_lid(
 def strip_in_zone(
     design: Design, strip_type: StripType, zone: str, chamber: Chamber
 ) -> StripSetting:
-    """Return the setting of a strip in the place of a zone of the part, which stays as it is.
+    """Return where and how to peen a strip that is imagined on a zone of the part.
+
+    The part stays as it is: its zone only counts the dents that a strip would get there.
 
     Args:
         chamber: chamber of the design.
@@ -231,14 +234,14 @@ def _as_measured(
     slopes: list[dict[Parameter, float]],
     times: list[float],
 ) -> list[Estimate]:
-    """Return the figures of a real strip from simulated ones, with the errors of the calibration.
+    """Convert simulated figures of a strip to those of a real strip, with the calibration's errors.
 
     Args:
         found: the figures: arc height at the saturation time, the saturation time, and arc heights
             at `times`.
-        slopes: for each figure its slope by each parameter of the calibration, from runs with this
-            parameter changed.
-        times: times of the arc strengths [s].
+        slopes: for each figure its slope by each parameter of the calibration, from simulations
+            with this parameter changed.
+        times: peening times of the arc heights [s].
     """
     calibration = setting.design.calibration
     scale, slower = MICROMETRES, 1.0
@@ -266,8 +269,8 @@ def _as_measured(
 def _unit(setting: StripSetting) -> str:
     """Return the unit of the arc heights.
 
-    That is µm without a calibration, mmA (or N, C) if standard strips were calibrated, and mm if
-    strips of another size were.
+    It is µm without a calibration, and mmA (or N, C) if the calibration measured standard strips.
+    It is mm if the calibration measured strips of another size.
     """
     calibration = setting.design.calibration
     if calibration is None or not calibration.has_strips:
@@ -276,7 +279,7 @@ def _unit(setting: StripSetting) -> str:
 
 
 def _calibrated_notes(setting: StripSetting, height: float) -> tuple[str, ...]:
-    """Return notes on what strip the arc heights hold for, and which type of strip would suit.
+    """Return notes for the user: which strip gets these arc heights, and which type suits better.
 
     Args:
         height: Almen intensity, in mm of the strip's type (N, A or C).

@@ -30,7 +30,7 @@ def light(plotter: Any) -> None:
 
 
 def colour_meanings(parts: Sequence[DrawnPart]) -> list[tuple[str, str]]:
-    """Return the colours of surface without a value on these parts, each with its meaning."""
+    """Return the colours that stand for no value, such as out of reach, each with its meaning."""
     entries = (
         (any(part.rest.n_cells for part in parts), GREY, "not in the target"),
         (any(not np.all(part.target["resolved"]) for part in parts), FEW_DENTS, "too few dents"),
@@ -83,7 +83,7 @@ def add_part(
 
 
 def _add_zones(plotter: Any, part: DrawnPart) -> list[Any]:
-    """Add a part to a plotter with each zone in its own colour. Return the actors."""
+    """Add a part to a plotter with each zone in a colour of its own, and return the actors."""
     actors = []
     for number, surface in part.zones.items():
         colour = zone_colour(number - 1) if number else GREY
@@ -97,10 +97,11 @@ def _add_zones(plotter: Any, part: DrawnPart) -> list[Any]:
 def add_chamber(plotter: Any, chamber: Surface) -> tuple[dict[int, Any], list[Any]]:
     """Add a chamber to a plotter: the sonotrodes, and the walls as glass with their edges.
 
-    Clicks pass through them.
+    Clicks pass through both, to the part.
 
     Returns:
-        The actors of the sonotrodes by tag, and the actors of the walls.
+        The actors of the sonotrodes, by the tag (number) of a sonotrode's surface, and the actors
+        of the walls.
     """
     tags = np.asarray(chamber["tag"])
     style = {"pickable": False, **NO_RENDER}
@@ -134,8 +135,8 @@ class Discs(NamedTuple):
     Attributes:
         place: centres [mm], shape (k, 3).
         normal: unit vectors away from the surface, shape (k, 3).
-        radius: [mm], shape (k,).
-        colour: red, green, blue, uint8, shape (k, 3).
+        radius: radii [mm], shape (k,).
+        colour: colours as red, green and blue, uint8, shape (k, 3).
     """
 
     place: np.ndarray
@@ -144,12 +145,16 @@ class Discs(NamedTuple):
     colour: np.ndarray
 
     def only(self, rows: np.ndarray) -> Discs:
-        """Return a copy with only the given rows."""
+        """Return a copy with only the given discs.
+
+        Args:
+            rows: numbers of the discs to keep, or a mask.
+        """
         return Discs(*(column[rows] for column in self))
 
 
 def disc_actor(discs: Discs, ambient: float = 1.0) -> Any:
-    """Return an actor that shows discs, later discs over earlier discs.
+    """Return a VTK actor that shows discs, later discs over earlier discs.
 
     Args:
         ambient: brightness of a disc seen edge on, as a share of a disc seen face on.

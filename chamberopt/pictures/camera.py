@@ -1,7 +1,8 @@
 """Find camera directions that show most of a target, by drawing it from dozens of directions.
 
-Every patch of the target has its own colour, and all that may hide it is white. So the pixels of a
-small picture tell the visible area of each patch.
+The target is divided into patches, groups of neighbouring triangles that face the same way. In a
+small picture every patch has its own colour, and all that may hide it is white. So the pixels tell
+the visible area of each patch.
 """
 
 from __future__ import annotations
@@ -34,7 +35,8 @@ def view_frame(eye: np.ndarray) -> np.ndarray:
     """Return the unit vectors to the right, upwards and to the eye of a picture, shape (3, 3).
 
     Args:
-        eye: direction from the part to the eye. z is upright unless the eye looks along it.
+        eye: direction from the part to the eye. The z axis is upright in the picture unless the eye
+            looks along it.
     """
     to_eye = np.asarray(eye, dtype=float) / np.linalg.norm(eye)
     upright = (0.0, 0.0, 1.0) if abs(to_eye[2]) < 0.99 else (0.0, 1.0, 0.0)
@@ -44,9 +46,10 @@ def view_frame(eye: np.ndarray) -> np.ndarray:
 
 
 def directions(steep: bool = True) -> np.ndarray:
-    """Return unit vectors from the part to the eye to try for a picture, shape (e, 3).
+    """Return directions from which to try to draw a picture: unit vectors to the eye, (e, 3).
 
-    With steep=False, steep directions, which show a chamber badly, are left out.
+    Args:
+        steep: whether to include steep directions, which show a chamber badly.
     """
     turn = 2.0 * np.pi * (np.arange(AZIMUTHS) + 0.5) / AZIMUTHS
     rows = [
@@ -57,9 +60,9 @@ def directions(steep: bool = True) -> np.ndarray:
 
 
 def near_directions(target: Surface) -> np.ndarray:
-    """Return directions to the eye to try for a near picture of a target, shape (e, 3).
+    """Return directions from which to try to draw a target from near: vectors to the eye, (e, 3).
 
-    For a flat target one of them is square to it.
+    For a flat target one direction is perpendicular to it.
     """
     normal = flat_normal(target)
     return directions() if normal is None else np.vstack([directions(), normal])
@@ -77,7 +80,8 @@ def flat_normal(target: Surface) -> np.ndarray | None:
 def seen_area(target: Surface, hiding: Sequence[Surface], eyes: np.ndarray) -> np.ndarray:
     """Return the area of each patch of a target that is visible from each direction [mm²].
 
-    The area is the area in the picture. The shape is (e, patches).
+    The area is measured in the picture, so that oblique surface counts less. The shape of the
+    result is (e, patches).
 
     Args:
         target: at least one triangle. Neighbouring triangles that face the same way are a patch.
@@ -132,7 +136,7 @@ def _patches(surface: Surface) -> np.ndarray:
 
 
 def pushed_back(actor: Any) -> None:
-    """Draw an actor behind other actors in the same place."""
+    """Let VTK draw an actor behind other actors that lie at the same depth."""
     mapper = actor.mapper
     mapper.SetResolveCoincidentTopologyToPolygonOffset()
     mapper.SetRelativeCoincidentTopologyPolygonOffsetParameters(2.0, 2.0)
@@ -154,11 +158,11 @@ def cells_of(surface: Surface, chosen: np.ndarray) -> Surface:
 
 
 def near_views(seen: np.ndarray, eyes: np.ndarray) -> list[np.ndarray]:
-    """Return the direction that shows most of a target, and one that shows what is hidden there.
+    """Return the direction that shows most of a target, and a direction that shows the rest.
 
     Args:
-        seen: visible area of each patch from each direction, shape (e, patches). Patches of several
-            results stand beside one another.
+        seen: visible area of each patch from each direction, shape (e, patches). The columns hold
+            the patches of the first result, then of the next.
         eyes: unit vectors, (e, 3).
     Returns:
         One direction if a second would add little, else two.
@@ -186,7 +190,7 @@ def chamber_view(seen: np.ndarray, eyes: np.ndarray) -> np.ndarray:
 def _worth(eyes: np.ndarray) -> np.ndarray:
     """Return the weight of visible area from each direction, shape (e,).
 
-    Directions near the usual one, and not steep, weigh more.
+    Directions near the usual direction weigh more, and steep directions less.
     """
     nearness = eyes @ USUAL / np.linalg.norm(USUAL)
     is_middle = _is_middle(np.degrees(np.arcsin(eyes[:, 2])))
@@ -212,7 +216,7 @@ def fit_camera(
     """Point the camera of a plotter at points so that they fill a view beside its text.
 
     Args:
-        points: [mm], (k, 3).
+        points: points to show [mm], (k, 3).
         eye: direction to the eye.
         size: width and height of the view [pixels].
         room: sides of the view that stay free for text.

@@ -79,7 +79,7 @@ def _time_to_98(time: Estimate) -> str:
 def _impact_labels(
     comparison: Comparison, found: Distributions, means: Sequence[float | None], unit: str
 ) -> list[str]:
-    """Return a legend text for each result with its number of impacts and their mean.
+    """Return a legend text for each result: its number of impacts, and their mean speed or angle.
 
     Args:
         means: mean speed or angle of each result, None without impacts.

@@ -1,4 +1,4 @@
-"""Draw the coverage of one result, or of several below one another on one colour scale."""
+"""Draw the coverage of a result on its part, or of several results on one colour scale."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def render_coverage(job: dict[str, Any]) -> None:
 def coverage_bar(parts: Sequence[DrawnPart], limits: tuple[float, float]) -> ColourBar:
     """Return the colour bar of the quantity that the parts show.
 
-    Its label has the limits unless they are 0 and 100 %.
+    The label names the limits unless they are 0 and 100 %.
     """
     quantity = parts[0].quantity
     shown = np.concatenate([part.target["shown"] for part in parts])

@@ -1,4 +1,4 @@
-"""Draw every dent of one peening on the part as a .png, with unpeened surface black.
+"""Draw every dent of one peening treatment on the part as a .png, with unpeened surface black.
 
 Each dent is a flat disc of its diameter in the plane of the triangle that was hit. It is lifted a
 little so that the facets of a rounded edge do not hide it. Later dents are drawn over earlier
@@ -99,7 +99,7 @@ def dent_colours() -> Colormap:
 
 
 def _views(part: DrawnPart, wanted: Vector | None) -> list[np.ndarray]:
-    """Return the wanted direction to the eye, or if it is None, directions that show the target."""
+    """Return the wanted direction to the eye; None: directions that show the target."""
     if wanted is not None:
         return [np.array(wanted)]
     eyes = near_directions(part.whole)
@@ -112,7 +112,7 @@ def render_side(
     """Render the black target and its dents from one direction.
 
     Args:
-        part: the part to draw, with its whole target. The rest of it is grey.
+        part: the part to draw, with its whole target. The rest of the part is grey.
         discs: dents in order of time.
         view: direction to the eye.
         pixels: longer side of the image.
@@ -163,9 +163,9 @@ def _screenshot(plotter: Any) -> np.ndarray:
 
 
 def _with_rims(discs: Discs, pixel_mm: float) -> Discs:
-    """Return the discs with a darker rim round each large one.
+    """Return the discs with a darker rim round each large disc.
 
-    A large disc becomes a darker disc under a smaller disc of its own colour.
+    A large disc becomes two: a darker disc under a smaller disc of the disc's colour.
     """
     rimmed = 2.0 * discs.radius > MIN_RIM_PIXELS * pixel_mm
     row = np.repeat(np.arange(len(rimmed)), 1 + rimmed)

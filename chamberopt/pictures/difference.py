@@ -1,4 +1,4 @@
-"""Draw the places where later candidates cover more or less than the first candidate."""
+"""Draw where the later candidates of a comparison cover more or less than the first candidate."""
 
 from __future__ import annotations
 
@@ -110,7 +110,7 @@ def _add_difference(plotter: Any, target: Surface, rest: Surface, k: int, limit:
 
 
 def _scale_limit(surface: Surface, count: int) -> float:
-    """Return a round limit above nearly all real differences [percentage points]."""
+    """Return a round number above nearly all real differences, to end the colour scale [%]."""
     real = [
         np.abs(surface[f"difference_{k}"])[np.asarray(surface[f"real_{k}"]) > 0]
         for k in range(1, count + 1)

@@ -1,4 +1,4 @@
-"""Prepare the part of a result for drawing: its target with a quantity's values, and the rest."""
+"""Prepare the part of a result for drawing: its target with values to colour it, and the rest."""
 
 from __future__ import annotations
 
@@ -22,20 +22,21 @@ class DrawnPart:
     """The target of a part with the values of one quantity, and the rest of the part.
 
     Attributes:
-        whole: the target.
-        target: its touchable surface, with point data "shown" in the quantity's unit and cell data
-            "resolved", true if the simulated dents are enough for a value.
+        whole: the whole target.
+        target: the part of the target that balls can touch, with point data "shown" in the
+            quantity's unit and cell data "resolved", true if the simulated dents are enough for a
+            value.
         unreached: the target in the chamber that no ball can touch.
         outside: the target outside the chamber; empty if the chamber is not given.
-        inside: target and unreached together.
+        inside: the target inside the chamber: `target` and `unreached` together.
         surface: all of the part.
         rest: the part beside the target.
         zones: the surface of each zone by its number, from 1, and the surface in no zone as 0.
             Empty without zones.
         quantity: the quantity in "shown".
 
-    The majority of its corners decides the class of a triangle. All surfaces have cell data
-    "triangle", the number of the part's triangle, and "area" [mm²].
+    A triangle belongs to the surface to which most of its corners belong. All surfaces have cell
+    data "triangle", the number of the part's triangle, and "area" [mm²].
     """
 
     def __init__(
@@ -81,11 +82,11 @@ class DrawnPart:
         self.show(quantity)
 
     def show(self, quantity: Quantity, times: float = 1.0) -> None:
-        """Put the values of a quantity into "shown".
+        """Put the values of a quantity, such as coverage, into "shown", the data to be coloured.
 
         Args:
-            times: peening time over treatment time. It scales coverage and all that grows with
-                time.
+            times: peening time over treatment time. It scales coverage and all other quantities
+                that grow with time.
         """
         self.quantity = quantity
         if quantity.column == ZONE:  # drawn by `zones`
@@ -130,12 +131,14 @@ def _is_outside(surface: Surface, chamber: Surface) -> np.ndarray:
 
 
 def _majority(marked: np.ndarray, among: np.ndarray, corners: np.ndarray) -> np.ndarray:
-    """Return marks that agree with most neighbours of each point, so that dents make no specks.
+    """Return marks of points, after each point has taken the mark of most points round it.
+
+    So single dents do not become specks in a picture.
 
     Args:
-        marked: (v,) bool.
-        among: points that count, (v,) bool.
-        corners: of the triangles, (c, 3).
+        marked: marks of the points, (v,) bool.
+        among: points whose marks count, (v,) bool.
+        corners: points at the corners of the triangles, (c, 3).
     """
     of, to = _neighbours(corners)
     of, to = of[among[to]], to[among[to]]
@@ -146,7 +149,7 @@ def _majority(marked: np.ndarray, among: np.ndarray, corners: np.ndarray) -> np.
 
 
 def _neighbours(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return each point and its neighbour along each side of each triangle, both ways.
+    """Return the two points of each side of each triangle, as pairs in both orders.
 
     Both arrays have the shape (6 c,) for c triangles.
     """
@@ -157,9 +160,14 @@ def _neighbours(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def _fill_from_neighbours(
     columns: dict[str, np.ndarray], name: str, known: np.ndarray, corners: np.ndarray
 ) -> None:
-    """Replace unknown values of a column by the mean of their known neighbours.
+    """Replace unknown values of points by the mean of the known values of neighbouring points.
 
-    Otherwise colours would fade at the edge of the reachable surface.
+    Otherwise colours would fade at the edge of the surface that balls can reach.
+
+    Args:
+        columns: values of the points by name, of which `name` is changed.
+        known: which values are known, (v,) bool.
+        corners: points at the corners of the triangles, (c, 3).
     """
     values = np.asarray(columns[name])
     known = known & np.isfinite(values)

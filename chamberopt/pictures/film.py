@@ -112,10 +112,10 @@ def _gif(frames: Sequence[np.ndarray], fps: int) -> bytes:
 
 
 def _balanced_pixels(frames: Sequence[np.ndarray]) -> np.ndarray:
-    """Return the colours of frames as one row of pixels, (1, n, 3) uint8.
+    """Return pixels from which to choose the few colours of a .gif, (1, n, 3) uint8.
 
-    Each colour occurs as often as the square root of its pixels. So small bright things get their
-    own colours beside a large background.
+    Each colour of the frames occurs as often as the square root of the number of its pixels. So
+    small bright things get colours of their own beside a large background.
     """
     pixels = np.concatenate([frame.reshape(-1, 3) for frame in frames])
     codes = (pixels >> 2).astype(np.uint32) @ np.array([1, 64, 4096], dtype=np.uint32)
@@ -210,7 +210,7 @@ def render_replay(job: dict[str, Any]) -> Iterator[int | None]:
 
 
 class _ReplayScene:
-    """Show the chamber with part, balls and dents in a plotter, frame after frame."""
+    """The chamber with part, balls and dents in a pyvista plotter, shown frame after frame."""
 
     def __init__(
         self, plotter: Any, folder: Path, flight: dict[str, np.ndarray], job: dict[str, Any]
@@ -239,7 +239,7 @@ class _ReplayScene:
         plotter.enable_anti_aliasing("ssaa")
 
     def show(self, number: int) -> None:
-        """Move sonotrodes, part, balls and dents to where they are at the time of a frame."""
+        """Move sonotrodes, part, balls and dents to their places at the time of frame `number`."""
         flight, now = self.flight, self.flight["time"][number]
         for tag, displacement in zip(flight["tags"], flight["displacements"], strict=True):
             self.sonotrodes[int(tag)].position = displacement[number]
@@ -267,9 +267,10 @@ class _ReplayScene:
         self.plotter.render()
 
     def _clock(self, number: int, dents: int) -> str:
-        """Return a line with the time of a frame and the number of impacts until then.
+        """Return a line with the time of frame `number`, and the impacts and dents until this time.
 
-        It also names `dents`, the number of dents.
+        Args:
+            dents: number of dents until this time.
         """
         flight, now = self.flight, self.flight["time"][number]
         impacts = int((flight["hit_time"] <= now).sum())
@@ -287,9 +288,9 @@ class _ReplayScene:
         self._replace(name, mesh, color=colour, smooth_shading=True, specular=0.4)
 
     def _show_dents(self, number: int) -> int:
-        """Show the dents made until the time of a frame, recent ones in another colour.
+        """Show the dents made until the time of frame `number`, and return how many they are.
 
-        Return their number.
+        Recent dents have another colour.
         """
         flight, now = self.flight, self.flight["time"][number]
         made = flight["dent_time"] <= now

@@ -1,6 +1,7 @@
 """Draw text and charts over a 3D view.
 
-These are the title, the colour bar, the legend, the numbers of a triangle and the list of keys.
+They are the title, the colour bar, the legend, the values of a chosen triangle and the list of
+keys.
 """
 
 from __future__ import annotations
@@ -77,7 +78,7 @@ def title_height(title: str, size: Size) -> float:
 
 
 def show_title(plotter: Any, title: str, lines: Sequence[str], size: Size) -> None:
-    """Write the title in the upper left of a view, and below it the lines on a chosen triangle."""
+    """Write the title in the upper left of a view, and below it lines about a chosen triangle."""
     small, large = fonts(size)
     title = wrap(title, TITLE * size[0], large)
     text = _add_text(plotter, "title", title, (EDGE, size[1] - EDGE), large)
@@ -93,7 +94,14 @@ def show_title(plotter: Any, title: str, lines: Sequence[str], size: Size) -> No
 def show_colour_bar(
     plotter: Any, quantity: Quantity, limits: tuple[float, float], actor: Any, name: str, size: Size
 ) -> None:
-    """Draw the colour bar of a coloured surface at the right edge of the view, under its title."""
+    """Draw the colour bar of a surface at the right edge of the view, with its title above it.
+
+    Args:
+        limits: values at the ends of the bar.
+        actor: actor of the surface, whose mapper has the colours.
+        name: title of the bar.
+        size: width and height of the view [pixels].
+    """
     steps, number_format = colour_bar_ticks(limits)
     bar = plotter.add_scalar_bar(
         title=name,  # blanks, because VTK would shrink a title to the bar: it is written below
@@ -154,9 +162,11 @@ def show_histogram(plotter: Any, speed: np.ndarray) -> None:
 
 
 def mark_triangle(plotter: Any, corners: np.ndarray, length: float) -> None:
-    """Outline a triangle in a view and put a pin of a length [mm] on it.
+    """Outline a triangle in a view, and draw a pin that stands on it.
 
-    `corners` are its corners [mm], shape (3, 3).
+    Args:
+        corners: corners of the triangle [mm], (3, 3).
+        length: length of the pin [mm].
     """
     centre = corners.mean(axis=0)
     tip = centre + length * unit_normals(corners)
@@ -169,7 +179,7 @@ def mark_triangle(plotter: Any, corners: np.ndarray, length: float) -> None:
 
 
 def show_keys(plotter: Any, text: str, size: Size) -> None:
-    """Write the list of keys of the window over everything else."""
+    """Write the list of the keys that the viewer understands over everything else."""
     font = fonts(size)[0]
     left = max(EDGE, 0.5 * size[0] - 30 * font)
     prop = _add_text(plotter, "keys", text, (left, 0.5 * size[1]), font).prop
@@ -180,7 +190,11 @@ def show_keys(plotter: Any, text: str, size: Size) -> None:
 
 
 def _add_text(plotter: Any, name: str, text: str, place: tuple[float, float], font: int) -> Any:
-    """Add a text to a view with its lower left corner at a place [pixels]. Return its actor."""
+    """Add a text to a view, and return its actor.
+
+    Args:
+        place: position of the text's lower left corner in the view [pixels].
+    """
     return plotter.add_text(
         escape_dollars(text), position=place, font_size=font, color=DARK, name=name, render=False
     )

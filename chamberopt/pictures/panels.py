@@ -1,4 +1,4 @@
-"""Draw the views of a part: in its chamber with dimensions, and its target from near."""
+"""Draw the panels of a picture, views of a part: in its chamber, and its target from near."""
 
 from __future__ import annotations
 
@@ -43,7 +43,8 @@ def choose_views(
 
     Args:
         parts: for each result the target, and the surface that may hide it.
-        chambers: for each result the cavity, with cell data "tag".
+        chambers: for each result the cavity's surface; cell data "tag" tells walls, sonotrodes and
+            part apart.
     Returns:
         The direction that shows chambers, and one or two directions that show targets from near.
     """
@@ -63,12 +64,13 @@ def part_panels(
     chamber: Surface,
     views: tuple[np.ndarray, Sequence[np.ndarray]],
 ) -> list[Panel]:
-    """Draw the part in its chamber with dimensions, and its target from near. Return the panels.
+    """Draw the part in its chamber with dimensions, and its target from near, as panels of a page.
 
     Args:
         add: function that adds the part to a plotter.
-        target, part, chamber: surfaces that fill the views.
-        views: direction to the eye for the chamber, and one or two for the target from near.
+        target, part, chamber: surfaces that the views must hold.
+        views: the direction to the eye that shows the chamber, and one or two directions that show
+            the target from near.
     """
 
     def add_both(plotter: Any) -> None:
@@ -88,9 +90,9 @@ def part_panels(
 def near_panels(
     add: Add, target: Surface, part: Surface, eyes: Sequence[np.ndarray]
 ) -> list[Panel]:
-    """Draw the target from near, from one or two directions to the eye, and return the panels.
+    """Draw the target from near, from one or two directions, as panels (views with captions).
 
-    `add` adds the part to a plotter.
+    `add` is a function that adds the part to a plotter.
     """
     length, whole = (np.linalg.norm(np.ptp(one.points, axis=0)) for one in (target, part))
     is_cut = bool(whole > WHOLE * length)
@@ -104,10 +106,10 @@ def near_panels(
 def chamber_dimensions(chamber: Surface, eye: np.ndarray) -> list[Dimension]:
     """Return the dimensions to write at a chamber.
 
-    They are its size, and the distance from the sonotrode to the part's lowest point.
+    They are the chamber's size, and the distance from the sonotrode to the part's lowest point.
 
     Args:
-        chamber: cavity with cell data "tag".
+        chamber: surface of the cavity; cell data "tag" tells walls, sonotrodes and part apart.
         eye: direction to the eye.
     """
     frame = view_frame(eye)
@@ -148,7 +150,12 @@ def chamber_dimensions(chamber: Surface, eye: np.ndarray) -> list[Dimension]:
 
 
 def _upright(foot: np.ndarray, low: float, high: float, row: int) -> Dimension:
-    """Return the vertical dimension between two levels [mm], drawn at the place of `foot`."""
+    """Return the vertical dimension between the heights `low` and `high` [mm].
+
+    Args:
+        foot: point in whose x and y the dimension is drawn.
+        row: how far outside it is drawn; row 1 is farther out than row 0.
+    """
     ends = np.array([foot, foot])
     ends[:, 2] = low, high
     return Dimension(ends, f"{high - low:.4g} mm", row)

@@ -1,4 +1,4 @@
-"""Draw a part as its file has it: its target in the chamber, or the faults of its mesh."""
+"""Draw a part before any simulation: its target in the chamber, or the faults of its mesh."""
 
 from __future__ import annotations
 
@@ -43,13 +43,13 @@ def draw_part(
     """Draw a part with its target in its chamber, or with its faults.
 
     Args:
-        corners: corners of its triangles [m], shape (n, 3, 3).
-        title: written above the picture.
+        corners: corners of the part's triangles [m], shape (n, 3, 3).
+        title: text above the picture.
         picture: file to write, .png.
-        marked: marks the triangles of the target, shape (n,).
+        marked: which triangles belong to the target, shape (n,).
         edges: lines drawn red and visible through the part [m], shape (k, 2, 3).
-        missed: marks the triangles of the target that hardly any ball can touch, shape (n,).
-        chamber: drawn as glass round the part in a further view, with dimensions.
+        missed: which triangles of the target balls can hardly touch, shape (n,).
+        chamber: the chamber, drawn as glass round the part in a further view, with dimensions.
     Returns:
         None, or one line that says why there is no picture.
     Raises:

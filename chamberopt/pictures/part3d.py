@@ -1,8 +1,8 @@
-"""Prepare the part in its chamber for a 3D view on a page: surfaces, and numbers to colour them.
+"""Prepare the part in its chamber for a 3D view on a web page: surfaces, and values to colour them.
 
-The browser makes the colours (part.js). The page carries the numbers at each point of the target
-once, in single precision. It shows any number, or the coverage at any time: 1 - exp(-dent density ·
-time / treatment time).
+The browser makes the colours (part.js). The page carries the values of each quantity at the points
+of the target once, in single precision. It can show any quantity, and the coverage at any time:
+1 - exp(-dent density · time / treatment time).
 """
 
 from __future__ import annotations
@@ -37,8 +37,8 @@ class PartScene:
     Args:
         data: surfaces and numbers for part.js; None for a part that is too large.
         remarks: sentences on surfaces that are not shown.
-        coverage: at points of the target, 0..1, 0 out of reach, shape (k,). None if single places
-            have too few simulated dents.
+        coverage: coverage at points of the target, 0..1, shape (k,); 0 where no ball fits. None if
+            there are too few simulated dents to tell points apart.
         area: area of the surface around each point [mm²], shape (k,).
     """
 
@@ -130,8 +130,9 @@ def _surfaces(
 ) -> dict[str, dict[str, object]]:
     """Return the surfaces that view3d.js draws, by name.
 
-    part: target with enough dents; few: target with too few dents; unreached: target that no ball
-    can touch; rest: the rest of the part; sonotrode; glass: the walls.
+    The names are part (the target with enough dents), few (the target with too few dents),
+    unreached (the target that no ball can touch), rest (the rest of the part), sonotrode, and glass
+    (the walls).
     """
     tags = np.asarray(chamber["tag"])
     target, resolved = part.target, np.asarray(part.target["resolved"])
@@ -159,13 +160,13 @@ def _surfaces(
 
 
 def _eye(normal: np.ndarray) -> np.ndarray:
-    """Return the direction to the camera that most of the target faces, a little aside.
+    """Return the direction to the camera: where most of the target faces, turned a little aside.
 
-    It is from above, where the border of the chamber hides least, unless twice as much faces down.
-    If all sides show about the same, as on a gear, it is USUAL.
+    The camera is above, where the border of the chamber hides least, unless twice as much of the
+    target faces down. If all sides show about the same area, as on a gear, the direction is USUAL.
 
     Args:
-        normal: of the target's triangles, any length, shape (k, 3).
+        normal: normals of the target's triangles, as long as the triangles are large, (k, 3).
     """
     turn = np.arctan2(USUAL[1], USUAL[0]) + np.radians(np.arange(0.0, 360.0, 30.0))
     around = np.hypot(*USUAL[:2]) * np.column_stack([np.cos(turn), np.sin(turn)])
@@ -181,7 +182,7 @@ def _eye(normal: np.ndarray) -> np.ndarray:
 
 
 def _view(chamber: Surface, eye: np.ndarray) -> dict[str, object]:
-    """Return the middle of the cavity, the place of the eye and the size of the view [mm]."""
+    """Return the middle of the cavity, and the camera's position and viewing size [mm]."""
     around = np.asarray(chamber.points, dtype=float)
     size = float(np.linalg.norm(np.ptp(around, axis=0)))
     middle = 0.5 * (around.min(axis=0) + around.max(axis=0))
@@ -193,7 +194,7 @@ def _view(chamber: Surface, eye: np.ndarray) -> dict[str, object]:
 
 
 def _edges(chamber: Surface, tags: np.ndarray) -> np.ndarray:
-    """Return the ends of the sharp edges of the cavity, edge after edge, shape (2 n, 3)."""
+    """Return the end points of the n sharp edges of the cavity, edge after edge, (2 n, 3)."""
     around = chamber.extract_cells(tags != TAG_PART).extract_surface(algorithm="dataset_surface")
     lines = around.extract_feature_edges(
         feature_angle=EDGE_ANGLE, manifold_edges=False, non_manifold_edges=False

@@ -32,10 +32,11 @@ STUB = 3.5  # mm, of arrows outside
 def dimension(
     axes: Axes, start: Point, end: Point, away: float, text: str, upright: bool = False
 ) -> None:
-    """Draw a dimension: the horizontal distance of two points, or if upright the vertical one.
+    """Draw a dimension: the horizontal or, if upright, the vertical distance of two points.
 
     Args:
-        away: distance of its line below the points, or left of the points if upright.
+        away: distance of the dimension line below the points, or left of the points if upright.
+        text: text at the line.
     """
 
     def turn(x: float, y: float) -> Point:
@@ -69,7 +70,7 @@ def dimension(
 
 
 def across_line(axes: Axes, start: Point, end: Point, name: str = "") -> None:
-    """Draw a dash-dotted line: an axis, or with a name at both ends the place of a section."""
+    """Draw a dash-dotted line: an axis, or a section's plane with its name at both ends."""
     axes.plot(*zip(start, end, strict=True), color=DARK_GREY, lw=0.5, ls=(0, (9, 2, 1.5, 2)))
     if name:
         length = math.dist(start, end)
@@ -95,7 +96,7 @@ LEGEND = (
 
 @dataclass(frozen=True)
 class View:
-    """The place and scale of one view of the chamber on the page.
+    """A view of the chamber, such as its plan: its position and scale on the page.
 
     Attributes:
         right: axis of the chamber (0, 1, 2) that points to the right.
@@ -114,11 +115,11 @@ class View:
     outside: np.ndarray
 
     def place(self, points: ArrayLike) -> np.ndarray:
-        """Return the places on the page [mm] of points (..., 2) [mm] in the chamber."""
+        """Return the points on the page [mm] that show points (..., 2) [mm] of the chamber."""
         return np.asarray(self.corner + self.scale * (np.asarray(points) - self.low))
 
     def window(self, axes: Axes) -> Rectangle:
-        """Return the area of the view on the page, as a rectangle to clip drawings with."""
+        """Return the rectangle of the page that the view takes, at which drawings are cut off."""
         from matplotlib.patches import Rectangle
 
         sides, above = self.outside
@@ -165,8 +166,14 @@ def _fit(
 ) -> tuple[float, np.ndarray, float]:
     """Return the largest scale at which section and plan of a cavity fit on a page.
 
-    Also return how much is drawn of the part where it leaves the cavity, and the width of both
-    views [mm].
+    Args:
+        cavity: size of the cavity along x, y and z [mm].
+        across: axis (0 or 1) that points to the right in the section.
+        beyond: how far the part extends beyond the cavity, to a side and upwards [mm].
+        size: width and height that the drawing may have [mm].
+    Returns:
+        The scale; how much of the part beyond the cavity is drawn, on the page [mm]; and the width
+        of both views [mm].
     """
     for scale in SCALES:
         outside = np.minimum(MOST_OUTSIDE, scale * beyond)
@@ -178,9 +185,10 @@ def _fit(
 
 
 def _place_of_section(chamber: Chamber, axis: int) -> float:
-    """Return where the section cuts an axis [mm]: at the chamber's axis if it meets the part.
+    """Return where the plane of the section cuts a horizontal axis (0 or 1) [mm].
 
-    Otherwise it is the middle of the part inside the chamber.
+    The plane runs through the chamber's axis if it meets the part there, otherwise through the
+    middle of the part inside the chamber.
     """
     own = np.unique(chamber.triangles[chamber.tags == TAG_PART])
     side = 1e3 * chamber.vertices[own, axis]

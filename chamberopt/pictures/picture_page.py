@@ -1,7 +1,7 @@
 """Write a picture of several views with captions, dimensions, a colour bar and a legend.
 
-Only the views are drawn in 3D. Matplotlib lays out all else round them, so nothing lies over the
-part, and the size of texts does not depend on the picture's size.
+A view is an image of surfaces, drawn in 3D. Matplotlib lays out all else round the views, so
+nothing lies over the part, and the size of texts does not depend on the picture's size.
 """
 
 from __future__ import annotations
@@ -34,9 +34,11 @@ AXIS_COLOURS = {"x": "#a33530", "y": "#2e7d32", "z": "#1f4e9c"}
 
 
 class Dimension(NamedTuple):
-    """A dimension to draw at a view between two points [mm], `ends`, shape (2, 3).
+    """A dimension to draw beside a view.
 
-    `row` tells how far outside it is drawn: row 1 is farther out than row 0.
+    Attributes:
+        ends: the two points between which it is measured [mm], (2, 3).
+        row: how far outside it is drawn; row 1 is farther out than row 0.
     """
 
     ends: np.ndarray
@@ -72,7 +74,7 @@ class ColourBar(NamedTuple):
 
 
 class Row(NamedTuple):
-    """A row of a picture: views beside one another, and their title."""
+    """A row of a picture: panels (views with captions) side by side, and their common title."""
 
     title: str
     panels: Sequence[Panel]
@@ -85,13 +87,13 @@ def write_page(
     bar: ColourBar | None = None,
     remarks: Sequence[str] = (),
 ) -> None:
-    """Write views in rows as a picture.
+    """Write rows of views as a picture.
 
     Args:
         picture: .png file to write.
         rows: rows of views, each with the same number of views.
         legend: colours and their meaning.
-        bar: drawn beside the views.
+        bar: colour bar beside the views.
         remarks: sentences below the views.
     """
     images = [[one.view.image.shape for one in row.panels] for row in rows]
@@ -110,7 +112,7 @@ def write_page(
     figure = new_figure(across / PER_INCH, total / PER_INCH)
 
     def place(x: float, y: float, width: float, height: float) -> tuple[float, float, float, float]:
-        """Convert a rectangle from pixels to shares of the figure. y counts from its top."""
+        """Convert a rectangle from pixels, with y from the top, to shares of the figure."""
         return x / across, 1.0 - (y + height) / total, width / across, height / total
 
     top = float(EDGE)
@@ -168,7 +170,7 @@ def draw_scale(axes: Axes, view: View, place: tuple[float, float]) -> None:
 
 
 def _draw_triad(axes: Axes, frame: np.ndarray, place: tuple[float, float]) -> None:
-    """Draw the x, y and z axes as arrows. Arrows that point towards the eye are drawn last."""
+    """Draw the x, y and z axes of a view as arrows, arrows towards the eye last."""
     for k in np.argsort(frame[2]):
         name = "xyz"[k]
         step = TRIAD * frame[:2, k] * [1.0, -1.0]
@@ -184,7 +186,10 @@ def _draw_triad(axes: Axes, frame: np.ndarray, place: tuple[float, float]) -> No
 
 
 def _draw_dimension(axes: Axes, panel: Panel, one: Dimension) -> None:
-    """Draw a dimension with extension lines and its length, outside of all that the view shows."""
+    """Draw a dimension line with its length, outside of all that the view shows.
+
+    Extension lines join it to the points between which it is measured.
+    """
     assert panel.outside is not None
     around = panel.view.pixels(panel.outside)
     start, end = panel.view.pixels(one.ends)
@@ -221,7 +226,10 @@ def _draw_bar(axes: Axes, bar: ColourBar) -> None:
 def _legend_lines(
     legend: Sequence[tuple[str, str]], across: float
 ) -> list[list[tuple[float, str, str]]]:
-    """Return the place, colour and meaning of each legend entry, in lines of `across` pixels."""
+    """Return the entries of a legend, broken into lines of at most `across` pixels.
+
+    An entry has its distance from the left [pixels], its colour and its meaning.
+    """
     lines: list[list[tuple[float, str, str]]] = []
     x = across
     for colour, meaning in legend:
@@ -241,7 +249,8 @@ def _draw_foot(
 
     Args:
         axes: axes in pixels from the upper left corner of the foot.
-        lines: place, colour and meaning of each legend entry, in lines.
+        lines: lines of the legend; an entry has its distance from the left [pixels], colour and
+            meaning.
     """
     from matplotlib.patches import Rectangle
 

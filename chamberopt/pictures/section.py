@@ -27,13 +27,13 @@ def cut(
     """Return the lines in which a plane square to an axis cuts a mesh.
 
     Args:
-        vertices: (n, 3) [m].
-        triangles: (m, 3).
-        axis: 0, 1 or 2, the plane's normal.
-        at: place of the plane on the axis [m].
+        vertices: vertices of the mesh, (n, 3) [m].
+        triangles: triangles of the mesh, (m, 3).
+        axis: 0, 1 or 2, the axis along the plane's normal.
+        at: coordinate of the plane on the axis [m].
     Returns:
         Ends of the lines (k, 2, 2) [m] in the two other axes, and the triangle of each line, (k,).
-        Lines go round each body in one sense. Ends that meet are equal to the last bit.
+        All lines go round a body in the same sense. Ends that meet are equal to the last bit.
     """
     height = vertices[:, axis] - (at + OFF_THE_CORNERS)
     above = (height > 0.0)[triangles]
@@ -75,9 +75,9 @@ def inside(lines: np.ndarray) -> Path | None:
 
 
 def _turns_around(lines: np.ndarray, point: Point) -> int:
-    """Return how often the lines go round a point.
+    """Return how often the lines, which close to outlines, go round a point.
 
-    This is the number of upward lines to its right minus the number of downward lines.
+    It is the number of upward lines minus the number of downward lines to the right of the point.
     """
     (x1, y1), (x2, y2) = lines[:, 0].T, lines[:, 1].T
     way = (y2 > point.y).astype(int) - (y1 > point.y)

@@ -31,7 +31,7 @@ OFFSCREEN_WINDOWS = (
 
 
 def missing_opengl() -> str | None:
-    """Return None if this machine may be able to draw, else one line that names what is missing."""
+    """Return None if this computer may be able to draw in 3D, else a line on what is missing."""
     if not sys.platform.startswith("linux") or offscreen_window():
         return None
     return f"no OpenGL library found: {INSTALL}"
@@ -88,7 +88,7 @@ def file_path(file: str | Path, suffixes: tuple[str, ...], written: str, option:
 
 
 def require_opengl(picture: Path) -> Path:
-    """Return the path of a picture. Raise InputError if this machine has no library to draw it."""
+    """Return the path of a picture, or raise InputError if this computer cannot draw in 3D."""
     if missing := missing_opengl():
         raise InputError(f"{picture}: cannot be drawn: {missing}")
     return picture

@@ -15,10 +15,10 @@ NARROWEST = 0.6  # shortest side of an image over the largest side
 
 
 class View(NamedTuple):
-    """A rendered image of surfaces, and the place of its pixels in space.
+    """A rendered image of surfaces, and the position of its pixels in space.
 
     Attributes:
-        image: uint8, shape (rows, columns, 3).
+        image: red, green and blue of each pixel, uint8, shape (rows, columns, 3).
         frame: unit vectors to the right, upwards and to the eye, (3, 3).
         corner: upper left corner of the image along the first two unit vectors [mm].
         pixel_mm: size of a pixel [mm].

@@ -1,1 +1,1 @@
-"""The loop from a design to a better one: what is asked, searched, judged, recorded and found."""
+"""Search for a better design: study files, search algorithms, trial logs and results."""

@@ -1,12 +1,14 @@
-"""A search as questions and answers: it asks for candidates, and is told their figures.
+"""Run a search as questions and answers: it asks for candidates, and is told their figures.
 
     search = Search(study)
     while (candidate := search.ask()) is not None:
         search.tell(candidate, measure(candidate.design))
     search.best.parameters
 
-The figures may come from a simulation or from experiments. First come the candidates of the search,
-then the best of them again, to be confirmed. A sweep asks for a list of candidates.
+A candidate is a design to evaluate. Its figures, the objectives and metrics, may come from a
+simulation or from experiments. A trial is a candidate with its figures. First the search asks for
+new candidates, then for the best of them again, to confirm them with new seeds. A sweep asks for
+the candidates of a given list.
 """
 
 from __future__ import annotations
@@ -57,7 +59,7 @@ Place = tuple[int | None, np.ndarray]
 
 @dataclass
 class _Asked:
-    """A candidate that the search has asked for, and that is not on the list of trials yet."""
+    """A candidate that the search has asked for, and whose figures it has not taken yet."""
 
     candidate: Candidate
     began: float  # by the clock [s]
@@ -69,12 +71,13 @@ class _Asked:
 class Search:
     """Runs the search of a study: asks for candidates, and is told their figures.
 
-    Up to `optimizer.batch` candidates may be out at a time. They are told in the order in which
-    they were asked for, and what is asked next follows from what was told, so that nothing depends
-    on speed. `trials` are all that were told, `confirmed` those of the confirmation.
+    Up to `optimizer.batch` candidates may be under evaluation at a time. Their figures are told in
+    the order in which the candidates were asked for, and the next candidate follows from the
+    figures told so far, so that nothing depends on speed. `trials` are all candidates with their
+    figures. `confirmed` are the candidates that were evaluated again with new seeds.
 
     Args:
-        folder: where trials are recorded; those on record are not asked for again. By default
+        folder: where trials are recorded; trials on record are not asked for again. By default
             nothing is recorded.
         progress: called after each trial as progress(trials done, trials in all, best score).
         points: the candidates of a sweep as points of the unit cube, shape (n, d); by default the
@@ -122,8 +125,8 @@ class Search:
     def ask(self) -> Candidate | None:
         """Return the next candidate to evaluate.
 
-        Return None if figures of earlier candidates must be told first, and when the search has
-        ended. Raises InputError if an algorithm cannot take the study's parameters.
+        The result is None if figures of earlier candidates must be told first, and when the search
+        has ended. Raises InputError if an algorithm cannot take the study's parameters.
         """
         while True:
             candidate = next(self._steps, None)
@@ -138,11 +141,12 @@ class Search:
                 return None
 
     def tell(self, candidate: Candidate, answer: Answer) -> Trial:
-        """Take the figures of a candidate, and return its trial. The oldest candidate comes first.
+        """Take the figures of the oldest candidate without figures, and return its trial.
 
         Args:
-            answer: an evaluation, measured figures by name, or the reason why there are none.
-                Measured figures are at least those named by `figures`; plain numbers are exact.
+            answer: an evaluation, measured figures by name, or the reason why there are no figures.
+                Measured figures are at least the names in `figures`; a number without an interval
+                is exact.
         Raises:
             InputError: an older candidate has no figures yet, a figure is missing or not finite, or
                 the start has no figures.
@@ -163,15 +167,16 @@ class Search:
 
     @property
     def phases(self) -> str:
-        """The phases of the search that ran, e.g. "sobol, then surrogate"."""
+        """The algorithms that the search has used in turn, e.g. "sobol, then surrogate"."""
         return ", then ".join(self._search.phases)
 
     @property
     def best(self) -> ConfirmedCandidate:
         """The confirmed candidate with the best first objective that meets the constraints.
 
-        If none surely meets them, one that may meet them counts. Raises InputError if the search
-        has not ended, if the start could not be confirmed, or if no candidate meets them.
+        If no candidate surely meets the constraints, candidates that may meet them count. Raises
+        InputError if the search has not ended, if the start (the unchanged design) could not be
+        confirmed, or if no candidate meets the constraints.
         """
         start = self.confirmed[0] if self.confirmed else None
         if start is None or start.searched != 0:
@@ -193,7 +198,8 @@ class Search:
         """Return what the model of the search learns from the trials so far.
 
         Args:
-            weight: weights of two objectives, (2,); by default random ones for this step.
+            weight: weights of two objectives in the score, (2,); by default random weights for this
+                step.
         """
         if weight is None:
             weight = draw_weights(self._study.optimizer.seed, len(self._search.points))
@@ -202,22 +208,22 @@ class Search:
 
     @cached_property
     def objective_model(self) -> SearchModel | None:
-        """Model of the first objective by all trials of a search that has ended.
+        """Model of the first objective, fitted to all trials of a search that has ended.
 
-        It also knows the largest objective of candidates that were not simulated, as the reach of
-        the balls gives it. It is None if there are too few points for a model.
+        The reach of the balls limits the objective of candidates that were not simulated; the model
+        also learns these limits. It is None if there are too few points for a model.
         """
         return self._model(FIRST_OBJECTIVE, learns_bounds=True)
 
     def _model(self, weight: np.ndarray, learns_bounds: bool = False) -> SearchModel | None:
-        """Return a model of the score by all trials of the search.
+        """Return a model of the score, fitted to all trials of the search.
 
         Return None if the points are too few, or if all their scores are equal.
 
         Args:
             weight: weights of two objectives in the score, (2,).
-            learns_bounds: whether it also learns the largest score of candidates that were not
-                simulated.
+            learns_bounds: whether the model also learns the largest possible score of candidates
+                that were not simulated.
         """
         seen = self.observations(weight)
         scores = seen.scores[seen.simulated]
@@ -245,16 +251,17 @@ class Search:
 
     @property
     def _best_low(self) -> float:
-        """The value that the best objective so far has at least: the highest lower interval end."""
+        """What the best objective so far is at least: the highest lower end of all intervals."""
         lows = (t.objective.low for t in self.trials if t.feasible and t.objective)
         return max(lows, default=-np.inf)
 
     def _confirm(self) -> Iterator[Candidate | None]:
         """Ask for the start and the best candidates with new seeds and the design's own accuracy.
 
-        They get more replicas than in the search, unless the design asks for an accuracy, which
-        then sets the number. While the best cannot be told from the next, and the study has rounds
-        left, these and the start get twice the replicas. Failures are left out.
+        Each gets more replicas than in the search. If the design asks for an accuracy, this sets
+        the number of replicas. While noise hides which candidate is best, and the study has rounds
+        left, the close candidates and the start get twice the replicas. Candidates whose evaluation
+        fails are left out.
         """
         settings = self._study.optimizer
         asks_for_accuracy = self._study.design.process.accuracy.objective_half_width is not None
@@ -285,7 +292,8 @@ class Search:
         """Return a candidate with its confirmed figures; None if its evaluation failed.
 
         Args:
-            searched: number of its trial in the search; None if it was not evaluated there.
+            searched: number of the candidate's trial in the search; None if the search did not
+                evaluate it.
         """
         figures = self._answers.pop(candidate.number, None)
         if figures is None:
@@ -305,9 +313,9 @@ class Search:
     def _promising(self, count: int) -> list[Place]:
         """Return the start and up to `count` other points to confirm, each with its trial number.
 
-        For one objective: the best feasible candidates and the two that the model recommends, of
-        which one was evaluated. For two: what the model recommends for `count` weights, from one
-        end of the front to the other.
+        With one objective, these are the best feasible candidates and the two points that the model
+        recommends, of which one was evaluated. With two objectives, these are the points that the
+        model recommends for `count` weights, from one end of the Pareto front to the other.
         """
         points, best_low = self._search.points, self._best_low
         chosen: list[Place] = [(0, points[0])]
@@ -329,7 +337,7 @@ class Search:
     def _wanted(self, count: int) -> list[np.ndarray]:
         """Return points (d,) that are worth a confirmation, the most promising first.
 
-        Some of them may be equal, or nearly so.
+        Some of the points may be equal, or nearly so.
         """
         has_two_objectives = len(self._study.objective.goals) > 1
         first = (np.arange(count) + 0.5) / count
@@ -348,9 +356,10 @@ class Search:
     # Answers.
 
     def _with_answer(self, candidate: Candidate) -> _Asked:
-        """Return a candidate with its answer, if this is known without an evaluation.
+        """Return a candidate with its answer, if the answer is known without an evaluation.
 
-        It is known if it is on record, or if the design cannot have the candidate's parameters.
+        The answer is known if it is on record, or if the design cannot have the candidate's
+        parameters.
         """
         asked = _Asked(candidate, time.perf_counter())
         if self._folder:
@@ -365,7 +374,7 @@ class Search:
         return asked
 
     def _require_turn(self, candidate: Candidate) -> None:
-        """Raise InputError unless the candidate is the oldest one whose figures are awaited."""
+        """Raise InputError unless no older candidate than this waits for its figures."""
         first = next((one.candidate for one in self._asked if one.answer is None), None)
         if first is not None and candidate is first:
             return
@@ -387,7 +396,7 @@ class Search:
         return InputError(answer) if isinstance(answer, str) else answer
 
     def _take(self, answer: Figures | InputError) -> Trial:
-        """Put the oldest candidate without a trial on the list of trials, and return its trial."""
+        """Make the trial of the oldest candidate without a trial from its answer, and return it."""
         asked = self._asked[0]
         trial = asked.recorded or self._record(asked, answer)
         self._asked.popleft()
@@ -423,7 +432,7 @@ class Search:
     def _expected(self) -> int:
         """Return how many trials there will be in all, as far as can be told now.
 
-        Candidates that cost only a part of an evaluation leave room for more.
+        Candidates that cost only a part of an evaluation leave budget for more candidates.
         """
         if self._sweep is not None:
             return len(self._sweep)

@@ -1,4 +1,4 @@
-"""Candidates: points of a study with their designs, their evaluation, and those confirmed."""
+"""Candidates of a study, sets of parameter values with their designs, and their evaluation."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ InputError or an error of sim_core for a candidate that cannot be simulated."""
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """A set of values for what a study varies, with its design, to be evaluated once."""
+    """A set of values of a study's varied parameters, with its design, to be evaluated once."""
 
     number: int  # of its trial
     stage: str  # "search", "sweep", or "confirm" for one with new seeds, or to be measured anew
@@ -48,12 +48,12 @@ class Candidate:
 
     @cached_property
     def parameters(self) -> dict[str, float | str]:
-        """Values of what the study varies, by dotted name, in the units of the design file."""
+        """Values of the varied parameters by dotted name, in the units of the design file."""
         return self.space.values_at(self.point)
 
     @cached_property
     def design(self) -> Design:
-        """The study's design with these parameters; InputError if it cannot have them."""
+        """The study's design with these parameters. Raises InputError if it cannot have them."""
         return self.space.design_at(self.point)
 
     @property
@@ -116,14 +116,14 @@ class ConfirmedCandidate:
 
     @property
     def reason(self) -> str:
-        """The limits that are, or may be, violated, in words."""
+        """A text on the limits that the candidate violates, or may violate."""
         return "; ".join(one.text for one in self.violations)
 
 
 def close_to_best(confirmed: Sequence[ConfirmedCandidate]) -> list[ConfirmedCandidate]:
-    """Return the best candidate and those that noise cannot tell from it.
+    """Return the best candidate and the candidates that noise cannot tell from it.
 
-    Return nothing if the best one is clearly better than all others.
+    The list is empty if the best candidate is clearly better than all others.
     """
     feasible = [one for one in confirmed if one.feasibility != INFEASIBLE]
     if not feasible:
@@ -135,7 +135,7 @@ def close_to_best(confirmed: Sequence[ConfirmedCandidate]) -> list[ConfirmedCand
 
 
 class NoPromiseError(InputError):
-    """Raised for a candidate that is not worth a simulation: its objective is at most `highest`."""
+    """Raised for a candidate not worth a simulation, as its objective cannot exceed `highest`."""
 
     def __init__(self, text: str, highest: float) -> None:
         super().__init__(text)
@@ -143,17 +143,17 @@ class NoPromiseError(InputError):
 
 
 class CandidateEvaluator:
-    """Evaluates the candidates of a study by a simulator."""
+    """Evaluates the candidates of a study with a simulator."""
 
     def __init__(self, study: Study, simulator: Simulator) -> None:
         self._study, self._simulator = study, simulator
         self._first_look = study.first_look
 
     def evaluate(self, candidate: Candidate) -> Evaluation | InputError:
-        """Simulate a candidate and return its evaluation, or the error why that is impossible.
+        """Simulate a candidate and return its evaluation, or the error why this is impossible.
 
-        All but confirmations are evaluated at the accuracy and with the seeds of a search. Several
-        threads may call this at a time.
+        Confirmations have new seeds and the accuracy of the design. All other candidates have the
+        seeds and the accuracy of the search. Several threads may call this function at a time.
 
         Raises:
             InputError or an error of sim_core: the start of a search cannot be simulated.
@@ -178,9 +178,9 @@ class CandidateEvaluator:
         return evaluation
 
     def has_promise(self, candidate: Candidate) -> bool:
-        """Return whether a candidate can be built and may be as good as the best one so far.
+        """Return whether a candidate can be built and may be as good as the best candidate so far.
 
-        Its objective is bounded by the share of the target that the balls can reach.
+        The share of the target that balls can reach limits its objective.
         """
         try:
             self._require_promise(self._study.at_search_accuracy(candidate.design), candidate.bar)
@@ -202,12 +202,13 @@ class CandidateEvaluator:
         return self._simulate(design, "search", candidate.replicas)
 
     def _require_promise(self, design: Design, bar: float | None) -> None:
-        """Raise NoPromiseError if a candidate is clearly worse than the best one so far.
+        """Raise NoPromiseError if a candidate is clearly worse than the best candidate so far.
 
-        That is shown without a simulation, by the share of the target that the balls can reach.
+        The share of the target that balls can reach limits its objective, without a simulation.
 
         Args:
-            bar: least value of the best objective so far; None if there is none.
+            bar: value that the best objective so far has at least; None if there is no objective
+                yet.
         """
         find_reachable = getattr(self._simulator, "reachable", None)
         goals = self._study.objective.goals
@@ -233,5 +234,5 @@ class CandidateEvaluator:
 
 
 def evaluation_cost(replicas: int, all_replicas: int) -> float:
-    """Return the cost of simulating some replicas of a candidate, as a share of that of all."""
+    """Return the cost of some replicas of a candidate over the cost of all its replicas."""
     return SET_UP + (1.0 - SET_UP) * replicas / all_replicas

@@ -1,4 +1,4 @@
-"""The judge of a study: from the figures of a candidate to its row of the trial log."""
+"""Turn the figures of a study's candidate into a trial: score, penalty, feasibility and cost."""
 
 from __future__ import annotations
 
@@ -25,8 +25,9 @@ FAILURE_PENALTY = 2.0
 class Judge:
     """Judges candidates by the objectives and limits of a study: score, penalty, feasibility, cost.
 
-    Scores are measured by the start: a search sets `reference` to its score, and `unit` to the size
-    of the largest term of its objective.
+    A search sets `reference` to the score of the start, the study's own design, from which the
+    score of a failed candidate follows. It sets `unit`, by which penalties are multiplied, to the
+    size of the largest term of the start's objective.
     """
 
     def __init__(self, study: Study) -> None:
@@ -41,12 +42,12 @@ class Judge:
         return tuple(dict.fromkeys((*self._study.objective.goals, *limited)))
 
     def measured(self, told: Mapping[str, Estimate | float]) -> Figures:
-        """Return the figures of a measured candidate.
+        """Return the figures of a candidate that was measured instead of simulated.
 
-        Raises InputError if one of `names` is missing, or if a figure is not finite.
+        Raises InputError if a figure in `names` is missing, or if a figure is not finite.
 
         Args:
-            told: measured figures by name; a plain number is exact.
+            told: measured figures by name; a number without an interval is exact.
         """
         if missing := [name for name in self.names if name not in told]:
             raise InputError(f"tell: {missing[0]} is missing; give {', '.join(self.names)}")
@@ -56,7 +57,7 @@ class Judge:
     def limited(self, candidate: Candidate, figures: Figures) -> dict[str, Estimate]:
         """Return a candidate's figures that have limits, by name.
 
-        These are metrics, and numbers of the design, which are exact.
+        The limits hold for metrics, and for numbers of the design, which are exact.
         """
         known = exact(candidate.parameters) | dict(figures.metrics)
         return {
@@ -65,10 +66,10 @@ class Judge:
         }
 
     def cost(self, trial: Trial) -> float:
-        """Return what a trial of the search has cost, as a share of one with all its replicas.
+        """Return what a trial of the search has cost, as a share of a trial with all replicas.
 
-        It is 0 if the candidate was not simulated. It follows from the number of replicas, not from
-        a clock, so that it is the same everywhere.
+        The cost is 0 if the candidate was not simulated. It follows from the number of replicas,
+        not from a clock, so that it is the same on all computers.
         """
         if not trial.goals:
             return 0.0
@@ -76,10 +77,10 @@ class Judge:
         return 1.0 if few is None or trial.replicas != few else evaluation_cost(few, self._replicas)
 
     def trial(self, candidate: Candidate, answer: Figures | InputError) -> Trial:
-        """Return the row of the trial log for a candidate.
+        """Return the trial of a candidate, a row of the trial log.
 
         Args:
-            answer: its figures, or the reason why it has none.
+            answer: the candidate's figures, or the reason why it has none.
         """
         worst = self.reference - FAILURE_PENALTY * self.unit
         at = candidate.number, candidate.stage, tuple(candidate.point.tolist())
@@ -112,10 +113,10 @@ class Judge:
         )
 
     def unit_of(self, figures: Figures) -> float:
-        """Return the size of the largest term of the first objective, by which scores are measured.
+        """Return the size of the largest term of the first objective, the unit of penalties.
 
-        For a metric between 0 and 1 this is its weight, for another also the size of the metric, or
-        of the objective where the metric was not measured.
+        The size of a term is its weight if its metric is between 0 and 1. Else it is the weight
+        times the size of the metric, or of the objective if the metric was not measured.
         """
         sizes = []
         for name, weight in parse_objective(self._study.objective.goals[0]).terms.items():
@@ -126,9 +127,9 @@ class Judge:
 
 
 def _finite(name: str, given: Estimate | float) -> Estimate:
-    """Return a measured figure as an estimate; a plain number is exact.
+    """Return a measured figure as an estimate; a number without an interval is exact.
 
-    Raises InputError if it is not finite.
+    Raises InputError if the figure is not finite.
     """
     if isinstance(given, Estimate):
         if math.isfinite(given.value) and given.half_width >= 0.0:

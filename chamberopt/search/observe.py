@@ -1,4 +1,4 @@
-"""Observations: what the models of a search learn from its trials."""
+"""Collect what the models of a search learn from its trials: scores, and figures with limits."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def observe(
     """Return what the models of a search learn from its trials: scores, and figures with limits.
 
     Args:
-        weight: of two objectives, (2,); not looked at where there is one.
+        weight: weights of two objectives in the score, (2,); not used if there is one objective.
     """
     simulated = np.array([bool(trial.goals) for trial in trials])
     spared = np.array([trial.highest is not None for trial in trials])
@@ -52,9 +52,9 @@ def observe(
 def _limited_figure(name: str, limits: Limits, trials: Sequence[Trial]) -> LimitedFigure:
     """Return the values of a figure with limits in all trials, as a model learns them.
 
-    A value that is not resolved gets so large an error that it tells next to nothing. One far
-    outside the limits, such as a time that stands for never, is brought nearer to its limit: how
-    far outside it is decides nothing, and would bend the model.
+    A value from too few dents gets so large an error that it tells next to nothing. A value far
+    outside the limits, such as a time that stands for never, is moved nearer to its limit. How far
+    outside it is decides nothing, and would bend the model.
     """
     figures = [(trial.metrics | exact(trial.parameters)).get(name) for trial in trials]
     known = np.array([one.value if one else np.nan for one in figures])
@@ -73,7 +73,7 @@ def _limited_figure(name: str, limits: Limits, trials: Sequence[Trial]) -> Limit
 
 
 def _error(figure: Estimate | None, trial: Trial) -> float:
-    """Return the standard error of a figure of a trial, from its half-width; NaN if it has none."""
+    """Return the standard error of a figure, from its half-width; NaN if it has no half-width."""
     if figure is None or not math.isfinite(figure.half_width):
         return math.nan
     if trial.replicas is None:  # measured, or not varied by chance
@@ -84,8 +84,8 @@ def _error(figure: Estimate | None, trial: Trial) -> float:
 def _variances(goals: list[Estimate]) -> np.ndarray:
     """Return the squared standard errors (n,) of one objective of n candidates.
 
-    They come from the scatter of replicas, and are drawn towards those of all candidates. Where an
-    objective was measured, they come from the half-width of its interval.
+    They come from the scatter of each candidate's replicas, and are drawn towards the errors of all
+    candidates. If the objective was measured, they come from the half-width of its interval.
     """
     samples = [goal.pseudovalues for goal in goals]
     spreads = [float(np.var(one, ddof=1)) if len(one) > 1 else np.nan for one in samples]

@@ -1,4 +1,4 @@
-"""The Pareto front of a study with two objectives, as confirmed and as the search saw it."""
+"""Find the Pareto front of a study with two objectives, by confirmed and by searched figures."""
 
 from __future__ import annotations
 
@@ -30,12 +30,12 @@ class ParetoPoint:
 def on_front(values: np.ndarray, among: np.ndarray | None = None) -> np.ndarray:
     """Return which candidates are on the Pareto front, shape (n,) bool.
 
-    These are the candidates that no other one beats in one objective and equals in the rest.
+    No other candidate beats them in an objective while it is at least equal in all others.
 
     Args:
         values: objectives, shape (n, k), to be maximised.
-        among: candidates that count, shape (n,) bool; by default all. The others are never on the
-            front.
+        among: candidates that count, shape (n,) bool; by default all. Other candidates are never on
+            the front.
     """
     counts = np.ones(len(values), dtype=bool) if among is None else among
     as_good = (values[:, None] >= values[None]).all(axis=2)
@@ -47,7 +47,7 @@ def on_front(values: np.ndarray, among: np.ndarray | None = None) -> np.ndarray:
 def pareto_points(result: StudyResult) -> list[ParetoPoint]:
     """Return the confirmed candidates of a study, then those of its search, with their objectives.
 
-    The start is the first of each.
+    The start, the unchanged design, comes first in both groups.
     """
     stages = {
         "confirm": [(one.parameters, one.goals, one.feasibility) for one in result.confirmed],

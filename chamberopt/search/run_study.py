@@ -52,7 +52,7 @@ MAXIMISED = (
 
 @dataclass(frozen=True)
 class StudyResult:
-    """The result of a study."""
+    """The result of a study: the best design, and how the search found it."""
 
     study: Study
     folder: Path
@@ -72,7 +72,7 @@ class StudyResult:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Sentences on what tolerances did to the search, and on best values on their bounds."""
+        """Sentences on how tolerances changed the search, and on best values at their bounds."""
         lost = self.best.lost_to_tolerances
         which = "mean" if self.study.objective.over_tolerances == "mean" else "worst value"
         sentences = tolerance_notes(lost, which) if self.study.design.tolerances else []
@@ -86,7 +86,7 @@ class StudyResult:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """A sentence on constraints that the best design may not meet; empty if it meets all."""
+        """A sentence on constraints that the best design may violate; empty if it meets all."""
         if self.best.feasibility != NOT_KNOWN:
             return ()
         return (f"constraints: {self.best.reason}",)
@@ -100,7 +100,7 @@ class StudyResult:
 
     @property
     def improved(self) -> bool:
-        """Whether the whole interval of the gain of the best design over the start is above 0."""
+        """Whether the best design surely beats the start: the interval of its gain is above 0."""
         return self.gain.low > 0.0
 
 
@@ -115,19 +115,19 @@ def run_study(
 ) -> StudyResult:
     """Search for a better design within the budget, then confirm the best and the start.
 
-    All candidates of the search are simulated with the same seeds. The best of them and the start
-    are then simulated with more replicas and new seeds, because the search's own figures favour
-    lucky candidates. The answer is the best of those. (Picking it by its reported figures favours
-    it a little, too.)
+    All candidates of the search are simulated with the same seeds. The best of them and the start,
+    the unchanged design, are then simulated with more replicas and new seeds, because the search's
+    own figures favour lucky candidates. The result is the best by these confirmed figures. (They
+    favour it a little, too, because it is chosen by them.)
 
     Args:
         study: the study of the folder, with its effects resolved.
-        folder: if this very study was interrupted in it, it is resumed, and the result is the same,
-            bit for bit, as without the interruption.
+        folder: folder of the study. If this very study was interrupted in it, it is resumed, and
+            the result is the same, bit for bit, as without the interruption.
         progress: called as progress(done, total, best) after each evaluation.
         simulator: replaces the simulation, e.g. in tests.
         stop: called before each evaluation; the study stops with KeyboardInterrupt if it is True.
-        at_once: evaluations for which there is memory, by default all of optimizer.batch.
+        at_once: number of evaluations that memory can hold at a time; by default optimizer.batch.
     Raises:
         InputError: the start cannot be simulated, or no candidate meets the constraints.
         OSError: a trial cannot be written.
@@ -171,7 +171,7 @@ def run_study(
 def run_search(
     search: Search, submit: Callable[[Candidate], Future[Outcome]], stop: Stop | None = None
 ) -> None:
-    """Have all candidates of a search evaluated, and tell it their figures, until it ends.
+    """Have all candidates of a search evaluated, and tell the search their figures, until it ends.
 
     Args:
         submit: function that begins an evaluation of a candidate.
@@ -208,10 +208,10 @@ def _outcome(candidate: Candidate, evaluation: Future[Outcome]) -> Outcome:
 
 
 def tolerance_notes(lost: float, which: str = "mean") -> list[str]:
-    """Return sentences on what a search maximised over the design's tolerances.
+    """Return sentences for the user: what a search maximised, as the design has tolerances.
 
     Args:
-        lost: score that tolerances cost at the best design; 0 if no model tells it.
+        lost: score that the tolerances cost the best design; 0 if this is not known.
         which: "mean" or "worst value" of the objective over the tolerances.
     """
     side = "below" if lost > 0.0 else "above"
@@ -222,9 +222,9 @@ def tolerance_notes(lost: float, which: str = "mean") -> list[str]:
 def fixed_target(study: Study) -> np.ndarray | None:
     """Return which triangles of the part are the target in all candidates, shape (m,) bool.
 
-    This holds where the target is what the shot reaches: it is found once, in the chamber of the
-    start, because a search could otherwise shrink the area that it has to cover. Return None where
-    the design itself says what the target is.
+    If the target is all that the shot reaches, it is found once, in the chamber of the unchanged
+    design. A search could otherwise shrink the area that it has to cover. The result is None if the
+    design itself names the target.
     """
     from chamberopt.chamber.build import build_chamber
 
@@ -249,7 +249,7 @@ def save_inputs(study: Study, folder: Path) -> None:
 
 @dataclass
 class _Simulated:
-    """The chamber and the replicas of a candidate, kept in case it is simulated further."""
+    """The chamber and the replicas of a candidate, kept in case more replicas are wanted."""
 
     chamber: Chamber
     known: ReplicaSet = field(default_factory=ReplicaSet)
@@ -258,8 +258,8 @@ class _Simulated:
 class ChamberSimulator:
     """Simulates the candidates of a study: builds the chamber, runs replicas, evaluates coverage.
 
-    Asked for more replicas of a candidate, it adds them to those it has. Several threads may call
-    it at a time.
+    If it is asked for more replicas of a candidate, it adds them to the replicas that it has.
+    Several threads may call it at a time.
     """
 
     def __init__(self, study: Study, executor: Executor, target: np.ndarray | None) -> None:

@@ -1,7 +1,8 @@
-"""How the score depends on each parameter near the best design, by the model of the search.
+"""Compute how the score depends on each parameter near the best design, by the search's model.
 
-The model gives main effects (means over the other parameters), slices through the best design,
-and the range in which each parameter may change without loss.
+The model gives the main effect of a parameter (the mean score over all values of the other
+parameters), slices (the score with the other parameters as in the best design), and the range in
+which each parameter may change without loss.
 """
 
 from __future__ import annotations
@@ -26,9 +27,9 @@ RANGE_POINTS = 201
 
 @dataclass(frozen=True)
 class Slice:
-    """How the model's score depends on one parameter; arrays have the shape (k,).
+    """The score that the model predicts at k values of one parameter; arrays have the shape (k,).
 
-    A parameter that is chosen among texts has one entry in the arrays for each text.
+    If the parameter is a choice of texts, the arrays have an entry for each text.
     """
 
     name: str
@@ -46,7 +47,7 @@ class Slice:
 
 @dataclass(frozen=True)
 class Sensitivity:
-    """How the score depends on each parameter near the best design, with one slice for each."""
+    """How the score depends on each parameter near the best design: a slice for each parameter."""
 
     slices: tuple[Slice, ...]
     noise: float  # loss that counts as none
@@ -54,7 +55,7 @@ class Sensitivity:
     together: float  # share of the designs within all flat ranges that lose no more than the noise
 
     def sentences(self) -> list[str]:
-        """Return sentences on how far parameters may change without loss: one each, one for all."""
+        """Return sentences on how far parameters may change without loss, alone and together."""
         loss = f"without losing more than the noise, {self.noise:.2g}"
         ranges = []
         for one in self.slices:
@@ -75,7 +76,8 @@ def analyse_sensitivity(
     Args:
         search: model of the score by the trials of the search.
         best: values of the best design by parameter, in the units of the file.
-        noise: loss of score that counts as none; raised to what the model can tell.
+        noise: loss of score that counts as no loss. It is raised to the least loss that the model
+            can tell.
     """
     from scipy.stats.qmc import Sobol
 
@@ -127,8 +129,8 @@ def _with_best_of_its_own(
 ) -> np.ndarray:
     """Return points (k, d), one for each chamber shape, with the best values for this shape.
 
-    A parameter that the best design has keeps its value there. The others, which only this shape
-    has, get the values with the best score by the model.
+    A parameter that the best design has keeps the value of the best design. Parameters that only
+    this shape has get the values with the best score by the model.
 
     Args:
         line: points that differ in their shape alone, (k, d).
@@ -146,7 +148,7 @@ def _with_best_of_its_own(
 def _main_effect(
     model: GaussianProcess, sample: np.ndarray, i: int, steps: np.ndarray
 ) -> np.ndarray:
-    """Return the mean score at each value of parameter i, over all values of the others.
+    """Return the mean score at each value of parameter i, over all values of the other parameters.
 
     Args:
         sample: points with evenly spread values of the other parameters, (n, d).
@@ -163,9 +165,9 @@ def _main_effect(
 def _flat_range(
     search: SearchModel, at: np.ndarray, i: int, threshold: float
 ) -> tuple[float, float]:
-    """Return how far down and up parameter i may go without loss, as shares of its bounds.
+    """Return the lowest and highest value of parameter i without loss, as shares of its bounds.
 
-    The score stays at or above the threshold, and the limits are probably met.
+    Between them the score stays at or above the threshold, and the limits are probably met.
 
     Args:
         at: point of the best design, (d,).

@@ -1,1 +1,1 @@
-"""Simulate a design in independent replicas, and compute its figures with intervals from them."""
+"""Simulate a design in independent replicas, and compute coverage and other figures from them."""

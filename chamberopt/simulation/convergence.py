@@ -1,9 +1,11 @@
 """Convergence study: each numerical parameter at several settings, compared with a reference.
 
-The reference has every parameter at its finest setting. Each other run has one parameter coarser,
-and the bias of this setting is its difference from the reference. All runs take turns, a few
-replicas each, so that a machine that slows down slows all of them. The error against the number of
-replicas comes from batches of the reference's replicas.
+A numerical parameter, such as the simulated time, sets how accurately a design is simulated. Its
+settings are the values that are tried. The reference is a run, a series of replicas, with every
+parameter at its finest setting. Each other run has one parameter coarser, and the bias of this
+setting is its difference from the reference. All runs take turns, a few replicas each, so that a
+computer that slows down slows all of them. The error against the number of replicas comes from
+batches of the reference's replicas.
 """
 
 from __future__ import annotations
@@ -52,9 +54,9 @@ REFERENCE, DESIGNED = "reference", "as designed"
 
 
 def numerical_parameters(design: Design) -> dict[str, tuple[object, ...]]:
-    """Return the settings to try of each numerical parameter, by its dotted name.
+    """Return the values to try of each numerical parameter of a design, by its dotted name.
 
-    The last setting is the reference's.
+    The last value is the value in the reference, with which all others are compared.
     """
     accuracy = design.process.accuracy
     settings: dict[str, Iterable[Any]] = {}
@@ -79,16 +81,16 @@ def numerical_parameters(design: Design) -> dict[str, tuple[object, ...]]:
 def _falling(value: float, factor: float) -> list[float]:
     """Return `factor` times a value, the value, and the value over `factor`, the largest first.
 
-    All are within the range of the value's field, 0.1 to 1000.
+    They are cut off at 0.1 and 1000, the range that a design file allows.
     """
     return sorted({min(1e3, factor * value), value, max(0.1, value / factor)}, reverse=True)
 
 
 def study_designs(design: Design) -> tuple[dict[str, object], dict[tuple[str, str], Design]]:
-    """Return the reference's settings by parameter, and the designs to simulate by parameter and
-    setting.
+    """Return the finest setting of each numerical parameter, and all designs to simulate.
 
-    The designs are the reference, a design for each other setting, and the design as it is.
+    The designs are the reference (all parameters finest), a copy of it for each other setting of a
+    parameter, and the design as it is. Their keys are the parameter and its setting as text.
     """
     parameters = numerical_parameters(design)
     settings = {name: values[-1] for name, values in parameters.items()}
@@ -100,12 +102,12 @@ def study_designs(design: Design) -> tuple[dict[str, object], dict[tuple[str, st
 
 
 def setting_text(value: object) -> str:
-    """Return the text of a setting as in a design file, without quotes."""
+    """Return the value of a numerical parameter as a design file writes it, without quotes."""
     return f"{value:g}" if isinstance(value, int | float) else str(value)
 
 
 def short_name(parameter: str) -> str:
-    """Return the key of a parameter in words, without table and unit, such as "simulated time"."""
+    """Return the name of a parameter in words, without its table and unit, as "simulated time"."""
     return re.sub("_(mm_s|mm2|ms|s)$", "", parameter.rsplit(".", 1)[-1]).replace("_", " ")
 
 
@@ -119,7 +121,7 @@ ZERO = Estimate(0.0, 0.0)
 
 @dataclass(frozen=True)
 class Run:
-    """The result of one setting of one numerical parameter."""
+    """The result of simulations in which one numerical parameter has one of its settings."""
 
     parameter: str  # dotted name of the numerical parameter that differs from the reference
     setting: str  # its value as text
@@ -132,18 +134,18 @@ class Run:
 
     @property
     def is_biased(self) -> bool:
-        """True if the bias differs from 0 by more than its interval."""
+        """True if the bias, the difference from the reference, is certainly not 0."""
         return abs(self.bias.value) > self.bias.half_width
 
     @property
     def max_bias(self) -> float:
-        """The larger absolute value of the two ends of the bias's interval."""
+        """Largest absolute value that the bias may have by its interval."""
         return max(self.bias.high, -self.bias.low)
 
 
 @dataclass(frozen=True)
 class ConvergenceStudy:
-    """The runs with coarser parameters, their reference, and the errors of batches of replicas."""
+    """The runs of a convergence study, their reference, and the errors of batches of replicas."""
 
     design: Design
     settings: dict[str, Any]  # of the reference, by parameter
@@ -156,7 +158,10 @@ class ConvergenceStudy:
 
 
 class TimedReplica(NamedTuple):
-    """The footprints of one replica's dents in windows, and the CPU seconds that it took."""
+    """The dents of a replica, as their footprints in windows, and the CPU seconds that it took.
+
+    A window is a disc of the surface in which dents are counted.
+    """
 
     footprints: Prints
     cpu_s: float
@@ -174,13 +179,11 @@ class Replicas:
 
     @property
     def cpu(self) -> Estimate:
-        """Estimate of the CPU seconds that a replica takes."""
+        """Estimate of the CPU seconds that a replica of this design takes."""
         return estimate([one.cpu_s for one in self.done[self.skipped :]], 0.0)
 
     def estimates(self, part: slice = slice(None)) -> tuple[Estimate, Estimate, bool]:
-        """Return the objective and the mean coverage from some replicas, and whether these have
-        enough dents for both.
-        """
+        """Return objective and mean coverage from some replicas, and if dents suffice for both."""
         prints = [one.footprints for one in self.done[part]]
         metrics, found = window_estimates(
             self.target, self.target.gauge, prints, self.setting.design
@@ -189,9 +192,12 @@ class Replicas:
         return objective, metrics["mean_coverage"], found.has_mean
 
     def run(self, parameter: str, setting: str, reference: Run | None = None) -> Run:
-        """Return the result of the replicas, with its difference from a reference.
+        """Return the result of all replicas, with its difference from the result of a reference.
 
-        Without a reference, the replicas are the reference itself and differ by nothing.
+        Args:
+            parameter, setting: name of the parameter that differs from the reference, and its
+                value.
+            reference: result of the reference; None if these replicas are the reference themselves.
         """
         objective, mean, _ = self.estimates()
         run = Run(parameter, setting, len(self.done), self.cpu, objective, mean)
@@ -209,7 +215,7 @@ def require_budget(budget_s: float) -> None:
 
 
 def describe_cost(design: Design, budget_s: float) -> str:
-    """Return a sentence for the user on the cost of a study, to show before it begins."""
+    """Return a sentence for the user on the cost of a study, to show before the study begins."""
     settings = len(study_designs(design)[1])
     return (
         f"{settings} settings, each in {MIN_ROUNDS} replicas or more: about {budget_s:g} CPU s "
@@ -223,11 +229,12 @@ def run_convergence_study(
     executor: Executor,
     prepare: Callable[[Design, Chamber], None] = lambda design, chamber: None,
 ) -> ConvergenceStudy:
-    """Simulate all runs for about the budgeted CPU seconds, at least three replicas of each.
+    """Simulate each setting of each numerical parameter, for about the budgeted CPU seconds.
 
-    Each round adds a replica to every run, and as many replicas to the reference as there are runs.
-    `prepare` is called for each design before the first simulation, to compile. Raises InputError
-    if the budget is not positive, the memory is too small, or a design cannot be evaluated.
+    Each round simulates a replica of every setting, and as many replicas of the reference as there
+    are settings. There are at least three rounds. `prepare` is called for each design before the
+    first simulation, to compile. Raises InputError if the budget is not positive, the memory is too
+    small, or a design cannot be evaluated.
     """
     from chamberopt.chamber.build import build_chamber
 
@@ -276,8 +283,10 @@ def run_convergence_study(
 
 
 def require_memory(designs: Collection[Design], chamber: Chamber) -> None:
-    """Raise InputError if the windows of all designs and the dents of the reference's replicas do
-    not fit into memory.
+    """Raise InputError if a study's replicas do not fit into memory.
+
+    Memory holds the windows (discs in which dents are counted) of all designs, and the dents of
+    LIKELY_REPLICAS replicas.
     """
     reference = next(iter(designs))
     points = sum(one.process.accuracy.points for one in designs)
@@ -286,8 +295,9 @@ def require_memory(designs: Collection[Design], chamber: Chamber) -> None:
 
 
 def _add_replicas(designs: Sequence[Replicas], executor: Executor) -> float:
-    """Simulate another replica of each design, as often as the design is listed. Return the CPU
-    seconds of all these replicas.
+    """Simulate another replica of each design, and return the CPU seconds of all these replicas.
+
+    A design that is listed several times gets as many replicas.
     """
     futures = []
     for one in designs:
@@ -303,9 +313,9 @@ def _add_replicas(designs: Sequence[Replicas], executor: Executor) -> float:
 
 
 def simulate_timed(setting: ReplicaSetting, target: TargetField, number: int) -> TimedReplica:
-    """Simulate the replica with this number, and return its footprints and CPU seconds.
+    """Simulate the replica with this number, and return its dents' footprints and CPU seconds.
 
-    All else is dropped, so that hundreds of replicas fit into memory.
+    Its other results are dropped, so that hundreds of replicas fit into memory.
     """
     begin = time.thread_time()
     replica = simulate_replica(setting, replica_seed(setting.design.process.seed, number))
@@ -323,8 +333,9 @@ def _require_error(size: float) -> None:
 
 
 def _batch_sizes(reference: Replicas, whole: Run) -> tuple[BatchSize, ...]:
-    """Return the errors of the objective from batches of 4, 8, 16 ... of the reference's replicas,
-    compared with the objective from all of them.
+    """Return the errors of the objective from batches of 4, 8, 16 ... of the reference's replicas.
+
+    The error of a batch is its difference from the objective of all the reference's replicas.
     """
     sizes, count = [], 4
     while (batches := whole.replicas // count) >= MIN_BATCHES:

@@ -70,15 +70,15 @@ def advise(
     progress: Progress | None = None,
     prepare: Prepare | None = None,
 ) -> list[Advice]:
-    """Return advice on every effect that can be switched in this design, the most important first.
+    """Return advice on each physical effect that the design can switch, the most important first.
 
     Args:
-        prepare: called with each variant of the design before it runs, for example to compile the
-            simulator for its effects.
+        prepare: called with each variant of the design before its simulation, for example to
+            compile the simulator for its effects.
 
     Raises:
-        InputError: no triangle of the target bounds the cavity, the windows are too small or too
-            wide for it, or no ball touches a zone.
+        InputError: no triangle of the target bounds the cavity, the windows in which dents are
+            counted are too small or too wide for it, or no ball touches a zone.
         sim_core.SimulationError: a replica cannot be simulated.
     """
     return _Pilot(design, chamber, executor, progress, prepare).advise()
@@ -94,10 +94,11 @@ def with_effects_resolved(
     """Choose the effects of a design that has effects = "auto"; other designs stay as they are.
 
     All effects are on at first, and each is switched off alone. Effects that make no difference
-    alone are then switched off together. While that matters, the most important of them is kept.
+    alone are then switched off together. While this makes a difference, the most important of these
+    effects is switched on again.
 
     Args:
-        prepare: called with each variant of the design before it runs.
+        prepare: called with each variant of the design before its simulation.
 
     Returns:
         The design with its effects chosen, and the advice behind the choice. The advice is empty
@@ -140,7 +141,7 @@ class _Pilot:
         self.unchanged = self.measure({})
 
     def advise(self) -> list[Advice]:
-        """Return advice on each effect that can be switched, the most important first."""
+        """Return advice on each physical effect that can be switched, the most important first."""
         advice = []
         for effect in self.effects:
             is_on = _is_on(effect, self.design, self.chamber)
@@ -154,17 +155,19 @@ class _Pilot:
         """Simulate the design with some effects switched, and return what the pilot compares.
 
         Returns:
-            For each replica the mean normal speed of impacts [m/s], and the coverage of two halves
-            of the target, which are nearer to and farther from the sonotrode. By the names in
-            MEASURED, (REPLICAS,) each.
+            Arrays (REPLICAS,) by the names in MEASURED: for each replica the mean normal speed of
+            impacts [m/s], the coverage of the half of the target nearer to the sonotrode, and the
+            coverage of the farther half.
         """
         self.runs.ended += 1
         variant, replicas = self._simulate(effects)
         return _measure(variant, self.chamber, replicas)
 
     def _simulate(self, effects: Mapping[str, bool]) -> tuple[Design, list[Hits]]:
-        """Simulate the design with some effects switched. Return this design, and the impacts of
-        its replicas.
+        """Simulate the design with some effects switched.
+
+        Returns:
+            The design with these effects, and the impacts of each replica.
         """
         accuracy = {
             "replicas": REPLICAS,
@@ -187,10 +190,10 @@ def _is_on(effect: str, design: Design, chamber: Chamber) -> bool:
 
 
 def groups(design: Design, chamber: Chamber) -> list[dict[str, object]]:
-    """Return a table of the effects that can be switched: the name of each, whether it is on, and a
-    sentence on its importance.
+    """Return a table of the effects that can be switched, with the importance of each effect.
 
-    The sentences come from dimensionless groups, without a simulation.
+    A row has the keys effect (name), on, and said (a sentence). The sentences come from
+    dimensionless groups, without a simulation.
     """
     found = []
     for effect in _switchable(design, chamber):
@@ -202,7 +205,7 @@ def groups(design: Design, chamber: Chamber) -> list[dict[str, object]]:
 
 
 def _reason(effect: str, design: Design, chamber: Chamber) -> str:
-    """Return the importance of an effect in words, by a dimensionless group."""
+    """Return in words how important an effect is, by a dimensionless group such as g H / V²."""
     return {
         "gravity": f"g H / V² = {dimensionless.gravity_speed_change(design, chamber):.2g}",
         "ball_collisions": (
@@ -247,7 +250,8 @@ def _switched(design: Design, effects: Mapping[str, bool]) -> Design:
 def _measure(design: Design, chamber: Chamber, replicas: Sequence[Hits]) -> dict[str, np.ndarray]:
     """Return three figures of every replica of a design, by name, (replicas,) each.
 
-    These are the mean speed of impacts, and the coverage of the target's nearer and farther half.
+    These are the mean normal speed of impacts, the coverage of the half of the target nearer to the
+    sonotrode, and the coverage of the farther half.
     """
     target = exposed_target(chamber)
     centres = chamber.part.vertices[chamber.part.triangles].mean(axis=1)
@@ -271,7 +275,7 @@ def _measure(design: Design, chamber: Chamber, replicas: Sequence[Hits]) -> dict
 
 
 def _median(distances: np.ndarray, areas: np.ndarray) -> float:
-    """Return the distance within which half of the area lies."""
+    """Return the distance within which half of the triangles' area lies."""
     order = np.argsort(distances, kind="stable")
     return float(distances[order][np.searchsorted(np.cumsum(areas[order]), 0.5 * areas.sum())])
 
@@ -281,8 +285,8 @@ def _changes(
 ) -> dict[str, Estimate]:
     """Return the mean change of each figure by an effect, from replicas with and without it.
 
-    Both have the same seeds. The change of the speed has no interval if nothing was hit without the
-    effect.
+    Replicas with and without the effect have the same seeds. The change of the speed is infinitely
+    uncertain if nothing was hit without the effect.
     """
     changes = {}
     for name in MEASURED:

@@ -63,12 +63,13 @@ class ErrorLaw:
 def rms_error(values: np.ndarray, whole: float, share: float) -> float:
     """Return the root mean square error of batches of replicas against infinitely many replicas.
 
-    A batch is a part of the pool that it is compared with. Independent replicas of variance s² have
-    the mean square difference s²/k - s²/R = s²/k (1 - k/R).
+    The batches are parts of all R replicas, with whose estimate they are compared. For independent
+    replicas of variance s² the mean square difference is s²/k - s²/R = s²/k (1 - k/R). Division by
+    1 - k/R gives the square of the error, s²/k.
 
     Args:
-        values: estimates of the batches, (m,).
-        whole: estimate of all replicas.
+        values: estimates of the objective from each batch, (m,).
+        whole: estimate of the objective from all replicas.
         share: number of replicas of a batch over the number of all replicas, k/R.
     """
     return math.sqrt(float(np.mean((np.asarray(values) - whole) ** 2)) / (1.0 - share))
@@ -89,8 +90,8 @@ def rms_interval(rms: float, batches: int) -> tuple[float, float]:
 def fit_error_law(sizes: Sequence[BatchSize]) -> ErrorLaw:
     """Fit the law of the error against the cost, by weighted least squares in logarithms.
 
-    Sizes of batches with too few dents are left out if two other sizes remain. The logarithm of an
-    RMS error of m batches has the standard deviation 1 / sqrt(2 (m - 1)).
+    Sizes at which batches have too few dents are left out if two other sizes remain. The logarithm
+    of an RMS error of m batches has the standard deviation 1 / sqrt(2 (m - 1)).
     """
     resolved = [size for size in sizes if size.is_resolved]
     sizes = resolved if len(resolved) > 1 else sizes

@@ -65,10 +65,11 @@ SHARES = frozenset({"mean_coverage", "std_coverage", "p05_coverage", "p95_covera
 
 @dataclass
 class SeenDents:
-    """The dents of the replicas so far in windows of both sizes, and the impacts in one sector.
+    """The dents of all replicas so far, counted in windows (discs of the surface) of two sizes.
 
-    A symmetric target has its windows in one sector, into which all impacts are turned. The sizes
-    are the gauge, which the design sets, and twice its radius.
+    The smaller size is the gauge, which the design sets, and the larger has twice its radius. A
+    surface that is alike in several sectors has windows in one sector, into which all impacts are
+    turned.
     """
 
     field: TargetField
@@ -78,11 +79,15 @@ class SeenDents:
 
     @classmethod
     def none(cls, field: TargetField) -> SeenDents:
-        """Return a surface before the first replica, without dents."""
+        """Return the dents of a surface before the first replica: none."""
         return cls(field, [], [], [])
 
     def add(self, hits: Sequence[Hits]) -> None:
-        """Locate the dents of those replicas in `hits` that were not added before."""
+        """Add the dents of new replicas.
+
+        Args:
+            hits: impacts of all replicas, of which the first were added before.
+        """
         for one in hits[len(self.gauge) :]:
             in_sector = self.field.in_sector(one)
             dents = locate_dents(self.field, in_sector)
@@ -92,15 +97,13 @@ class SeenDents:
 
     @property
     def crease_share(self) -> float:
-        """Share of the dented area of the target that is on creases."""
+        """Share of the dented area that is on creases, the sharp edges of the surface."""
         area = sum(one.area for one in self.gauge)
         return sum(one.area_on_creases for one in self.gauge) / area if area else 0.0
 
 
 class Estimates(NamedTuple):
-    """The metrics of some replicas in windows of both sizes, and whether there are enough dents for
-    them.
-    """
+    """The metrics of some replicas in windows of two sizes, and if dents suffice for them."""
 
     metrics: dict[str, Estimate]
     metrics_of_wide: dict[str, Estimate]
@@ -110,8 +113,9 @@ class Estimates(NamedTuple):
 def estimate_metrics(
     seen: SeenDents, hits: Sequence[Hits], chamber: Chamber, design: Design
 ) -> Estimates:
-    """Estimate all metrics from the impacts of replicas. From a single replica the half-widths of
-    the intervals are infinite.
+    """Estimate all metrics from the impacts of replicas.
+
+    The half-widths of the intervals are infinite if there is a single replica.
     """
     found, resolution = raw_estimates(seen, design)
     found |= _ratios(in_batches(hits), chamber, design)
@@ -150,10 +154,10 @@ def estimate_zones(
 
 
 def raw_estimates(seen: SeenDents, design: Design) -> tuple[dict[str, Estimate], Resolution]:
-    """Return the metrics of coverage and intensity in windows of the gauge, and the dents that they
-    have and need.
+    """Return the metrics of coverage and intensity, and the dents that they have and need.
 
-    The metrics have intervals even where there are too few dents.
+    They are measured in windows, discs of the area that the design sets (the gauge). The metrics
+    have intervals even where there are too few dents.
     """
     found, resolution = window_estimates(seen.field, seen.field.gauge, seen.gauge, design)
     process, batches = design.process, in_batches(seen.in_sector)
@@ -171,7 +175,7 @@ def _calibrated(
 ) -> dict[str, Estimate]:
     """Return the Almen intensities and the saturation time of a real strip, by name.
 
-    There are none without a calibration to strips.
+    The result is empty unless the calibration measured strips.
     """
     if calibration is None or not calibration.has_strips:
         return {}
@@ -188,8 +192,9 @@ def _calibrated(
 def window_estimates(
     field: TargetField, gauge: Gauge, prints: Sequence[Prints], design: Design
 ) -> tuple[dict[str, Estimate], Resolution]:
-    """Return the metrics of coverage in windows of one size, and how many dents these windows have
-    and need.
+    """Return the metrics of coverage in windows of one size, and the dents that they have and need.
+
+    A window is a disc of the surface in which dents are counted.
     """
     process = design.process
     time_ratio = process.treatment_time / process.recorded_time
@@ -209,8 +214,9 @@ def window_estimates(
 def least_half_width(reach: Reach, prints: Sequence[Prints]) -> float:
     """Return the least half-width that the interval of a share of the target may have.
 
-    It is the error of the share in reach, by the choice of points, or the share that no dent may
-    have hit by chance, by the rule of three, if that is larger.
+    The share in reach of the balls is measured at random points, and has an error by their choice.
+    By the rule of three, a share 3 / n of the target may lack dents by chance, if there are n
+    dents. The least half-width is the larger of this error and this share.
     """
     area, squares = sum(one.area for one in prints), sum(one.squares for one in prints)
     dents = area**2 / squares if squares else 0.0  # as many, all alike, would scatter as these do
@@ -218,10 +224,10 @@ def least_half_width(reach: Reach, prints: Sequence[Prints]) -> float:
 
 
 def _all_resolved(found: Mapping[str, Estimate], resolution: Resolution) -> dict[str, Estimate]:
-    """Return all estimates, without an interval where there are too few dents for one.
+    """Return all estimates, without intervals where there are too few dents for them.
 
-    A mean takes many dents where nearly all is covered. If it is not resolved, the 5th percentile
-    gives a bound below it.
+    The mean coverage needs many dents where nearly all is covered. If there are too few, the 5th
+    percentile of the coverage gives it a lower bound.
     """
     shown = {name: as_resolved(name, one, resolution) for name, one in found.items()}
     for name in SHARES & shown.keys():
@@ -235,7 +241,7 @@ def _all_resolved(found: Mapping[str, Estimate], resolution: Resolution) -> dict
 
 
 def as_resolved(name: str, value: Estimate, resolution: Resolution) -> Estimate:
-    """Return the estimate of a metric, without an interval if there are too few dents for one."""
+    """Return the estimate of a metric, without its interval if there are too few dents for it."""
     metric = METRICS[name]
     enough = resolution.has_places if metric.of_places else resolution.has_mean
     # A percentile of exactly 0 follows from places out of reach, not from dents.
@@ -251,7 +257,7 @@ def as_resolved(name: str, value: Estimate, resolution: Resolution) -> Estimate:
 def _ratios(
     batches: Sequence[Sequence[Hits]], chamber: Chamber, design: Design
 ) -> dict[str, Estimate]:
-    """Return estimates of the metrics that are ratios of sums over impacts, by name."""
+    """Return estimates of the metrics that are ratios of sums over impacts, such as mean speeds."""
     exposed, count = exposed_target(chamber), len(batches)
     area, time = float(chamber.exposed_area[exposed].sum()), design.process.recorded_time
     on_target = [tuple(hits.on(exposed) for hits in batch) for batch in batches]
@@ -274,8 +280,9 @@ def _ratios(
 
 
 def reach_notes(reach: Reach, surface: str = TARGET) -> tuple[str, ...]:
-    """Return a note on the highest coverage that a surface can have if some of it is out of reach
-    of the balls. There is no note if all is in reach.
+    """Return a note on the highest coverage of a surface that balls do not reach everywhere.
+
+    There is no note if balls reach all of the surface.
     """
     reachable, beyond = reach.share, reach.beyond(1.0 - P05)
     if reachable > 1.0 - MIN_MISSED_SHARE:
@@ -324,9 +331,7 @@ def resolution_notes(found: Resolution, surface: str = TARGET) -> tuple[str, ...
 def strength_notes(
     metrics: Mapping[str, Estimate], resolution: Resolution, surface: str = TARGET
 ) -> tuple[str, ...]:
-    """Return a note if strength and saturation time have too few dents, but other figures of places
-    have enough.
-    """
+    """Return a note if dents are too few for strength and saturation time only."""
     saturation = metrics["saturation_time_s"]
     if saturation.in_words != NOT_RESOLVED or not resolution.has_places or not saturation.value:
         return ()
@@ -341,7 +346,7 @@ def strength_notes(
 def weighted_sum(objective: ObjectiveFunction, metrics: dict[str, Estimate]) -> Estimate:
     """Return the estimate of an objective, the weighted sum of metrics.
 
-    Its interval accounts for errors that the metrics share.
+    The interval accounts for errors that the metrics have in common.
     """
     terms = [(weight, metrics[name]) for name, weight in objective.terms.items()]
     value = sum(weight * metric.value for weight, metric in terms)

@@ -63,7 +63,7 @@ SPEEDS = 1001  # impact speeds from 0 on that are tried for the widest dent
 
 @dataclass(frozen=True)
 class ReplicaPlan:
-    """The replicas to simulate: their number, their seeds, and the objective they are for."""
+    """The replicas to simulate: their number and seeds, and the objective to estimate."""
 
     # Number of replicas; None for as many as the design's [process.accuracy] asks for.
     count: int | None = None
@@ -88,7 +88,7 @@ def evaluate(
 
     Args:
         cavity: simulate in this exact cavity instead of the chamber's mesh.
-        known: replicas of this very candidate, to which the missing ones are added.
+        known: replicas of this very candidate, to which the missing replicas are added.
 
     Raises:
         InputError: the shot does not fit into the chamber, or the objective takes a metric that
@@ -113,7 +113,7 @@ def evaluate(
 
 @dataclass
 class _Run:
-    """The simulation of one candidate, to which replicas are added."""
+    """The simulation of one candidate design, to which replicas can be added."""
 
     design: Design
     chamber: Chamber
@@ -140,9 +140,11 @@ class _Run:
         beside.shutdown(wait=False)
 
     def look(self) -> tuple[list[Hits], SeenDents, dict[str, SeenDents]]:
-        """Locate the dents of new replicas.
+        """Locate the dents of new replicas in the windows in which dents are counted.
 
-        Return the impacts of all replicas, and their dents on the target and on each zone.
+        Returns:
+            The impacts of each replica, the dents of all replicas on the target, and their dents on
+            each zone by its name.
         """
         hits = [replica.hits for replica in self.known.replicas]
         target, zones = self.seen.result()
@@ -154,7 +156,8 @@ class _Run:
         """Add replicas until there are `count`, and return the evaluation of all replicas.
 
         Args:
-            wanted: half-width of the objective to reach; None where the number was given.
+            wanted: half-width of the objective's interval to reach; None if the user gave the
+                number of replicas.
         """
         design, plan, replicas = self.design, self.plan, self.known.replicas
         how = design.process.seed, self.executor, plan.stream, range(len(replicas), count), count
@@ -216,8 +219,8 @@ class _Run:
 def require_figures(design: Design, chamber: Chamber, mesh: TriangleMesh) -> None:
     """Raise InputError if a chamber can give no figures of the target and its zones.
 
-    This is if no triangle of the target bounds the cavity, if the windows are too small or too wide
-    for the target, or if no ball touches a zone.
+    The causes are: no triangle of the target bounds the cavity; the windows, discs in which dents
+    are counted, are too small or too wide for the target; or no ball touches a zone.
     """
     window = window_setting(design, chamber)
     require_narrow_gauge(chamber, window)
@@ -225,15 +228,15 @@ def require_figures(design: Design, chamber: Chamber, mesh: TriangleMesh) -> Non
 
 
 def prepare_target(design: Design, chamber: Chamber, mesh: TriangleMesh) -> TargetField:
-    """Return the target of a chamber with all that is needed to measure coverage in windows on it.
+    """Return the target of a chamber with windows, discs in which its coverage is measured.
 
-    Raises InputError if no triangle of the target bounds the cavity, or the windows are too small.
+    Raises InputError if no triangle of the target bounds the cavity, or windows are too small.
     """
     return find_target_field(chamber, mesh, window_setting(design, chamber))
 
 
 def see_zones(design: Design, chamber: Chamber, mesh: TriangleMesh) -> dict[str, SeenDents]:
-    """Return the zones of a chamber's part by name, before any dent is simulated.
+    """Return an empty record for the dents on each zone of a chamber's part, by name of the zone.
 
     Raises InputError if no triangle of a zone bounds the cavity, or the windows are too small.
     """
@@ -244,8 +247,10 @@ def see_zones(design: Design, chamber: Chamber, mesh: TriangleMesh) -> dict[str,
 
 
 def window_setting(design: Design, chamber: Chamber) -> WindowSetting:
-    """Return the size of the windows, the smallest ball and the largest dent, for which the windows
-    of a target are prepared.
+    """Return the numbers from which windows, discs in which dents are counted, are prepared.
+
+    They are the size of the windows, the number of their middles, the smallest ball, the largest
+    dent, and whether the target may be symmetric.
 
     Raises:
         InputError: no triangle of the target bounds the cavity, or the windows are too small.
@@ -281,10 +286,9 @@ def _symmetry_note(alike: int) -> tuple[str, ...]:
 
 
 def _end(replicas: int, objective: Estimate, wanted: float | None) -> tuple[str, tuple[str, ...]]:
-    """Return the reason why a simulation ended, and a note on whether the wanted accuracy was
-    reached.
+    """Return why a simulation ended, and a note on whether it reached the wanted accuracy.
 
-    There is no note if no accuracy was wanted.
+    There is no note if no accuracy was wanted (None).
     """
     if wanted is None:
         return "replicas", ()

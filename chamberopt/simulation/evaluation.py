@@ -23,7 +23,7 @@ REMEDY = "restore the file or run the study in a new folder"
 
 @dataclass(frozen=True)
 class Evaluation:
-    """The figures of one candidate, from independent replicas."""
+    """The objective, metrics and impacts of one candidate design, from independent replicas."""
 
     objective_name: str
     objective: Estimate  # the weighted sum of metrics that a study maximises
@@ -68,9 +68,7 @@ def load_evaluation(path: Path) -> Evaluation:
 
 
 def require_triangles(evaluation: Evaluation, triangles: int) -> None:
-    """Raise InputError unless all impacts are on triangles of a part that has `triangles`
-    triangles.
-    """
+    """Raise InputError if an impact is on a triangle that a part with so many triangles lacks."""
     for hits in evaluation.hits:
         if len(hits) and not 0 <= hits.triangle.min() <= hits.triangle.max() < triangles:
             text = "confirm: an impact is on a triangle that the part does not have"
@@ -78,9 +76,7 @@ def require_triangles(evaluation: Evaluation, triangles: int) -> None:
 
 
 def _require_sound(found: Evaluation) -> None:
-    """Raise ValueError unless all values have types, lengths and ranges that an evaluation can
-    have.
-    """
+    """Raise ValueError if a value has a type, length or range that no evaluation has."""
     if not is_of_type(found, Evaluation):
         raise ValueError("a value is of another type")
     names = {*found.metrics, *found.metrics_of_wide}

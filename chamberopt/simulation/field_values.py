@@ -1,8 +1,10 @@
-"""Compute figures in windows round places of the part, and figures of each of its triangles.
+"""Compute figures in windows round points of the part, and figures of each of its triangles.
 
 Notation
-    x   dent density of a window at the treatment time: expected dents, by their share of it
-    y   x of the simulated dents, sum of k w_j; v the sum of (k w_j)², see coverage_intervals.py
+    places   points of the part's surface, with their normals
+    window   disc of the surface round a place, in which dents and impacts are counted
+    x   dent density of a window: its expected dented area over its area, at the treatment time
+    y   x from the simulated dents, sum of k w_j; v the sum of (k w_j)², see coverage_intervals.py
     C   coverage, 1 - exp(-x)
 """
 
@@ -53,13 +55,13 @@ HIGH_SPEED = 0.9  # share of the impacts that are not faster than p90_normal_spe
 
 
 def _some_at_once(dents: int, windows: int) -> Iterator[slice]:
-    """Return slices of the dents, so short that the pairs of each with all windows fit memory."""
+    """Return slices of the dents; a slice's pairs of a dent and a window fit into memory."""
     step = max(1, MAX_PAIRS // max(windows, 1))
     return (slice(first, first + step) for first in range(0, dents, step))
 
 
 class PartField:
-    """Coverage and other figures at any places of the part, from the impacts of an evaluation."""
+    """Coverage and other figures at any points of the part, from the impacts of an evaluation."""
 
     def __init__(self, design: Design, chamber: Chamber, evaluation: Evaluation) -> None:
         self._design, self._chamber = design, chamber
@@ -74,16 +76,16 @@ class PartField:
         self._scale = design.process.treatment_time / evaluation.simulated_time
 
     def reachable(self, places: Places) -> np.ndarray:
-        """Return whether a ball fits at each place, (p,) bool."""
+        """Return for each point of the surface whether the smallest ball fits there, (p,) bool."""
         return ball_fits(
             self._mesh, places.place, places.normal, 0.5 * min(self._design.shot.diameters)
         )
 
     def coverage(self, places: Places) -> np.ndarray:
-        """Return the coverage at the treatment time in a window round each place, (p,); NaN out of
-        reach.
+        """Return the coverage round each point of the surface at the treatment time, (p,).
 
-        Dents on creases do not count, because they cover a band as narrow as a dent.
+        It is measured in a window, a disc round the point; NaN where no ball fits. Dents on creases
+        (sharp edges) do not count, because they cover a band as narrow as a dent.
         """
         gauge = self._gauge_off_creases(places)
         coverage = coverage_from_dent_density(self._dents(gauge)["dent_density"])
@@ -110,17 +112,18 @@ class PartField:
         return replace(self.field.gauge_round(places, self.field.radius), band=None)
 
     def values(self, places: Places, gauge: Gauge | None = None) -> dict[str, np.ndarray]:
-        """Compute all figures in the windows round some places.
+        """Compute all figures in windows, discs of the surface round some points.
 
         Returns:
-            Arrays (p,) by name; NaN where nothing was hit, and but for the first two out of reach.
+            Arrays (p,) by name; NaN where nothing was hit. Out of reach of the balls all but the
+            first two are NaN.
 
             coverage: at the treatment time, 0..1; 0 out of reach.
             reachable: 1 where a ball fits, else 0.
-            dent_density: x.
+            dent_density: expected dented area over the area of the window, x.
             coverage_interval: width of the 95 % interval of the coverage.
             dents_in_window: simulated dents.
-            resolved: 1 where the interval of the coverage is no wider than WIDEST, else 0.
+            resolved: 1 where the coverage's interval is no wider than WIDEST, else 0.
             impacts_per_mm2, energy_per_mm2: impacts and energy [mJ] at the treatment time.
             mean_normal_speed, p90_normal_speed: mean and 90th percentile [m/s].
             mean_angle_deg: mean angle of the impacts [degrees]; 90 is head on.
@@ -145,8 +148,9 @@ class PartField:
         }
 
     def _moved(self, places: Places) -> dict[str, np.ndarray]:
-        """Return the distance [µm] by which smoothing has moved the surface at each place, as
-        moved_um. It is absent if the part is not smoothed.
+        """Return how far smoothing has moved the surface at each point [µm], named moved_um.
+
+        The result is empty if the part is not smoothed.
         """
         part = self._chamber.part
         if part.smoothing is None or part.file is None or part.file.original is None:
@@ -157,8 +161,7 @@ class PartField:
         return {"moved_um": 1e6 * closest_points(facets, places.place, size).distance}
 
     def element_values(self) -> dict[str, np.ndarray]:
-        """Compute the means of `values` over each triangle of the part, and figures of the triangle
-        itself.
+        """Compute means of `values` over each triangle of the part, and counts of impacts on it.
 
         Returns:
             Arrays (m,) by name: the names of `values`, NaN where the triangle is not exposed, and
@@ -210,8 +213,9 @@ class PartField:
         }
 
     def _zones(self) -> dict[str, np.ndarray]:
-        """Return for each triangle of the part the number of its last zone, and marks of each zone,
-        by name. They are absent without zones.
+        """Return for each triangle of the part the number of its last zone, and marks of each zone.
+
+        They have the names `zone` and zone_NAME. The result is empty for a part without zones.
         """
         zones = self._chamber.part.zones
         if not zones:
@@ -222,9 +226,7 @@ class PartField:
         return {"zone": last, **{f"zone_{k}": one.astype(np.uint8) for k, one in zones.items()}}
 
     def _dents(self, gauge: Gauge) -> dict[str, np.ndarray]:
-        """Return the dent density, the number of dents, and the width of the interval of the
-        coverage in each window, by name.
-        """
+        """Return by name each window's dent density, number of dents and coverage interval."""
         from chamberopt.coverage.field.windows import add_powers
 
         sums, largest = np.zeros((len(gauge.area), 3)), 0.0
@@ -245,8 +247,9 @@ class PartField:
         }
 
     def _impacts(self, gauge: Gauge) -> dict[str, np.ndarray]:
-        """Return means and percentiles over the impacts in each window, by name, dents on creases
-        included.
+        """Return means and percentiles over the impacts in each window, by name.
+
+        Impacts on creases, the sharp edges of the surface, count as well.
         """
         from chamberopt.coverage.field.windows import add_columns, add_to_levels
 
@@ -301,16 +304,16 @@ class PartField:
 def density_bounds(
     y: np.ndarray, v: np.ndarray, one_more: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the lower and the upper end of the 95 % interval of each window's dent density, (p,)
-    each.
+    """Return lower and upper ends of the 95 % intervals of windows' dent densities, (p,) each.
 
-    The dents of a window fall as a Poisson process, each with a weight of its own. The gamma
-    interval for the sum of such weights holds for few dents and for none. It does not hold for the
-    series of dents that a ball leaves which bounces on its spot.
+    The dents of a window, a disc of the surface, fall as a Poisson process. The weight of a dent is
+    its area in the window over the window's area. The gamma interval for the sum of such weights
+    holds for few dents and for none. It does not hold for dents that follow each other because a
+    ball bounces on one spot.
 
     Args:
         y: sum of the weights of the dents, (p,).
-        v: sum of their squares, (p,).
+        v: sum of the squares of these weights, (p,).
         one_more: weight of a dent of the largest size, (p,).
 
     Source: M. P. Fay and E. J. Feuer, "Confidence intervals for directly standardized rates",
@@ -335,8 +338,11 @@ def _ratio(top: np.ndarray, bottom: np.ndarray) -> np.ndarray:
 
 
 def _quantile(counts: np.ndarray, share: float) -> np.ndarray:
-    """Return the value that a share of the counts in each row (p, LEVELS) do not exceed, as a share
-    of the highest level, (p,).
+    """Return the quantile of each row of a histogram, as a share of its upper end, (p,).
+
+    Args:
+        counts: histograms, with LEVELS equal intervals from 0 on, (p, LEVELS).
+        share: share of the counts that are below the quantile.
     """
     upto = np.cumsum(counts, axis=1)
     wanted = share * upto[:, -1]
@@ -349,7 +355,7 @@ def _quantile(counts: np.ndarray, share: float) -> np.ndarray:
 
 @dataclass(frozen=True)
 class CandidateResult:
-    """A simulated candidate with all that is computed before its result folder is written."""
+    """A simulated candidate design, with the fields and curves that its result folder holds."""
 
     design: Design
     chamber: Chamber
@@ -360,9 +366,10 @@ class CandidateResult:
 
 
 def complete_result(design: Design, chamber: Chamber, evaluation: Evaluation) -> CandidateResult:
-    """Compute the fields and curves of a final result, which a search does without.
+    """Compute the fields and curves of a final result; a search for a design does without these.
 
-    Raises InputError if the evaluation is of another part, as the file of a resumed study may be.
+    Raises InputError if the evaluation is of another part, as may happen with a file of a resumed
+    study.
     """
     require_triangles(evaluation, len(chamber.part.triangles))
     seen = PartField(design, chamber, evaluation)

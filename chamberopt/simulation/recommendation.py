@@ -1,4 +1,4 @@
-"""Recommend the settings for an accuracy from a convergence study, and predict their cost."""
+"""Recommend numerical settings (simulated time, replicas, ...) for an accuracy, with their cost."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ TABLE = "process.accuracy."
 
 @dataclass(frozen=True)
 class Recommendation:
-    """The settings that reach one accuracy of the objective."""
+    """The numerical settings of a design that reach one accuracy of the objective."""
 
     accuracy: float
     settings: dict[str, Any]  # by numerical parameter
@@ -37,7 +37,10 @@ class Recommendation:
 
     @property
     def lines(self) -> tuple[str, ...]:
-        """Lines to paste into a design file. Settings of other tables are written as comments."""
+        """Lines to paste into a design file: its table [process.accuracy].
+
+        Settings of other tables are written as comments.
+        """
         remarks = tuple(f"# {text}" for text in self.remarks)
         if not self.replicas:
             return f"# ± {self.accuracy:g}: not reachable with these settings", *remarks
@@ -59,9 +62,10 @@ class Recommendation:
 def recommend(study: ConvergenceStudy, accuracy: float) -> Recommendation:
     """Choose for each numerical parameter the cheapest setting that is accurate enough.
 
-    The bias of the setting is certainly within a third of the accuracy. A coarser setting is chosen
-    only if its CPU time is significantly less. Savings of several parameters multiply. The
-    simulated time is the cheapest for this accuracy.
+    The bias of a setting, its difference from the finest settings, must be certainly within a third
+    of the accuracy. A coarser setting is chosen only if its CPU time is significantly less. Savings
+    of several parameters multiply. The simulated time of a replica is the time with the cheapest
+    total.
     """
     settings, remarks = dict(study.settings), []
     reference = study.reference.cpu.value
@@ -96,11 +100,11 @@ def recommend(study: ConvergenceStudy, accuracy: float) -> Recommendation:
 
 
 def replicas_for(study: ConvergenceStudy, accuracy: float, seconds: float) -> int:
-    """Return the number of replicas, of `seconds` of simulated time each, whose interval is within
-    the accuracy.
+    """Return how many replicas give the objective an interval within the accuracy.
 
-    The variance of replicas is proportional to 1/seconds. Intervals from few replicas are wider
-    than this law says, so the intervals of the batches count as well.
+    Each replica has `seconds` of simulated time, and a variance proportional to 1 / seconds.
+    Intervals from few replicas are wider than this law says. So the intervals of the study's
+    batches of replicas, measured at several sizes, count as well.
     """
     time_ratio = float(study.settings[TIME]) / seconds
     reference = study.reference

@@ -36,7 +36,7 @@ MIN_GROWTH, MAX_GROWTH = 1.25, 2.0
 
 
 class ReplicaSetting(NamedTuple):
-    """The design, the chamber and its surface, which all replicas of a candidate share."""
+    """Input of all replicas of a candidate: design, chamber and the chamber's surface."""
 
     design: Design
     chamber: Chamber
@@ -55,8 +55,9 @@ class Replica:
 
 @dataclass
 class ReplicaSet:
-    """The replicas of one candidate so far, and its target with windows if that was prepared
-    before.
+    """The replicas of one candidate so far, and its target.
+
+    The target has windows, discs in which dents are counted. It is None until it is prepared.
     """
 
     replicas: list[Replica] = field(default_factory=list)
@@ -87,15 +88,16 @@ def run_in_order(
     numbers: Sequence[int],
     ahead: int,
 ) -> Iterator[T]:
-    """Yield the results of `task`, one for each replica's number, in order. The tasks run on the
-    workers.
+    """Run a task for each replica on the workers, and yield the results in order.
 
-    Each is task(setting, seed of the replica). The results do not depend on the number of workers.
+    Each call is task(setting, seed of the replica). The results do not depend on the number of
+    workers.
 
     Args:
         setting: the argument that all tasks share, as executor.share returns it.
         seed: seed of the design's process.
-        stream: stream of seeds, "search" or "confirm".
+        stream: "search" or "confirm", which give replicas of equal number different seeds.
+        numbers: numbers of the replicas.
         ahead: number of tasks that are started before their results are wanted. It bounds the
             memory that waiting results take.
     """
@@ -130,13 +132,15 @@ def most_replicas(design: Design) -> int:
 
 
 def next_replica_count(done: int, half_width: float, wanted: float, maximum: int) -> int:
-    """Return the number of replicas at which to look at the interval again, predicted from its
-    width.
+    """Return how many replicas to simulate before looking at the interval again.
+
+    The number is predicted from the interval's present width.
 
     Args:
         done: number of replicas so far.
         half_width: half-width of the interval from these replicas.
         wanted: half-width to reach.
+        maximum: largest number of replicas.
 
     Returns:
         `done` if no more replicas are needed or allowed.
@@ -148,9 +152,7 @@ def next_replica_count(done: int, half_width: float, wanted: float, maximum: int
 
 
 def simulate_replica(setting: ReplicaSetting, seed: int) -> Replica:
-    """Simulate one replica with this seed, and return its impacts on the part and its resting
-    balls.
-    """
+    """Simulate one replica with this seed, and return its balls at rest and impacts on the part."""
     design, chamber, mesh = setting
     result = simulate_seed(design, chamber, mesh, seed)
     impacts, part_turns = result.impacts, design.effects.part_turn is not None
@@ -170,8 +172,9 @@ def simulate_replica(setting: ReplicaSetting, seed: int) -> Replica:
 def simulate_seed(
     design: Design, chamber: Chamber, mesh: TriangleMesh | AnalyticCavity, seed: int
 ) -> SimulationResult:
-    """Run the simulator once with this seed, and return its result with impacts on the chamber's
-    triangles.
+    """Run the simulator once with this seed, and return its result.
+
+    The impacts in the result are on triangles of the chamber.
     """
     from sim_core import TriangleMesh, simulate
 

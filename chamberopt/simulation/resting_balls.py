@@ -1,6 +1,6 @@
 """Write notes on balls that no longer peen when a replica ends: at rest, or bouncing on one spot.
 
-The notes name surfaces and places as the designer of a chamber would, who can make room there.
+The notes name surfaces and positions in the terms of a chamber's designer, who can make room there.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ MIN_BOUNCING_SHARE = 0.1  # share of the shot from which on there is a note
 
 @dataclass(frozen=True)
 class RestingBalls:
-    """The share of the balls at rest at the end of a replica, and where they lie in words."""
+    """The share of the balls at rest at the end of a replica, and a text on where they lie."""
 
     share: float  # their share of the shot
     line: str  # their number, what holds them and where, in words
@@ -44,8 +44,9 @@ def find_resting_balls(
     """Describe the balls at rest at the end of a replica. Return None if there are none.
 
     Args:
+        resting: the balls at rest, as the simulator reports them.
         balls: number of all balls.
-        diameter: of the balls [m].
+        diameter: diameter of the balls [m].
         part_turns: whether the part rotates. Its position at the end is then unknown, so that no
             ball is said to touch it.
     """
@@ -66,10 +67,10 @@ def find_resting_balls(
 
 
 def bouncing_share(velocities: np.ndarray) -> float:
-    """Return the share of the balls that move straight up and down, until they meet another ball.
+    """Return the share of the balls that move straight up or down, and so bounce on one spot.
 
     Args:
-        velocities: of the balls [m/s], (n, 3).
+        velocities: velocities of the balls [m/s], (n, 3).
     """
     sideways = np.hypot(velocities[:, 0], velocities[:, 1])
     speed = np.linalg.norm(velocities, axis=1)
@@ -77,7 +78,7 @@ def bouncing_share(velocities: np.ndarray) -> float:
 
 
 def bouncing_notes(shares: Sequence[float]) -> tuple[str, ...]:
-    """Return a note if much of the shot ends bouncing on the spot, as between ideal parallel faces.
+    """Return a note if many balls bounce on one spot in the end, as between ideal parallel faces.
 
     Args:
         shares: share of bouncing balls in each replica.
@@ -118,8 +119,15 @@ def _percent(share: float) -> str:
 def _kind(
     resting: Resting, i: int, surfaces: np.ndarray, chamber: Chamber, reach: float, part_turns: bool
 ) -> str:
-    """Return what holds a ball at rest, such as "on the part's upper side", or ON_BALLS if other
-    balls alone hold it.
+    """Return what holds a ball at rest, such as "on the part's upper side".
+
+    The result is ON_BALLS if other balls alone hold it.
+
+    Args:
+        i: row of the ball in `resting`.
+        surfaces: name of the surface of each triangle of the chamber.
+        reach: distance from the ball's centre within which a triangle holds it [m].
+        part_turns: whether the part rotates, so that its position is unknown.
     """
     under = resting.triangles[i][resting.triangles[i] >= 0]
     if resting.jammed[i]:
@@ -147,7 +155,7 @@ def _join(preposition: str, names: list[str]) -> str:
 def _triangles_near(
     chamber: Chamber, triangles: np.ndarray, position: np.ndarray, reach: float
 ) -> np.ndarray:
-    """Return those of the given triangles that are within `reach` [m] of a position (3,)."""
+    """Return the numbers of the given triangles that are within `reach` [m] of a position (3,)."""
     corners = chamber.vertices[chamber.triangles[triangles]]
     low, high = corners.min(axis=1), corners.max(axis=1)
     near = (np.abs(position - np.clip(position, low, high)) <= reach).all(axis=1)
@@ -158,7 +166,7 @@ def _triangles_near(
 def _with_carriers(resting: Resting, kinds: list[str]) -> list[str]:
     """Return what holds each ball at rest.
 
-    A ball that only other balls carry gets what holds one of these balls.
+    A ball that only other balls carry is held by what holds one of these balls, such as a wall.
     """
     row = {int(ball): i for i, ball in enumerate(resting.ball)}
     kinds = list(kinds)
@@ -171,10 +179,12 @@ def _with_carriers(resting: Resting, kinds: list[str]) -> list[str]:
 
 
 def _places(resting: Resting, kinds: list[str], diameter: float) -> list[tuple[str, np.ndarray]]:
-    """Return what holds the balls of each place, and the rows of these balls. The place with most
-    balls comes first.
+    """Return groups of balls at rest: what holds them, and their rows; the largest group first.
 
-    Balls near each other that are held alike lie in one place.
+    Balls that are near each other and held by the same surfaces belong to one group.
+
+    Args:
+        kinds: what holds each ball, in words.
     """
     from scipy.spatial import KDTree
 

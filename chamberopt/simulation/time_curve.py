@@ -1,7 +1,8 @@
 """Compute coverage against peening time: mean and 5th percentile with intervals.
 
-The errors of a calibration move the dent density x of all times by the same factor. By Avrami's
-C = 1 - exp(-x) they move a coverage C by -(1 - C) ln(1 - C) times the logarithm of this factor.
+The dent density x is the dented area over the area. The errors of a calibration change x at all
+times by the same factor. By Avrami's law C = 1 - exp(-x) they change a coverage C by
+-(1 - C) ln(1 - C) times the logarithm of this factor.
 """
 
 from __future__ import annotations
@@ -37,12 +38,13 @@ def coverage_against_time(
 ) -> list[dict[str, float]]:
     """Compute the coverage of the target at rising peening times.
 
-    The curve ends where the 5th percentile is 98 %, but not before the treatment time, nor after
-    MAX_TREATMENT_TIMES of it, nor where the mean coverage is not resolved.
+    The curve ends where the 5th percentile of the coverage is 98 %, but not before the treatment
+    time. It also ends after MAX_TREATMENT_TIMES treatment times, and where there are too few dents
+    for the mean coverage.
 
     Returns:
-        Rows with time_s, mean_coverage and half_width, and, where the 5th percentile is resolved,
-        p05_coverage and p05_half_width.
+        Rows with time_s, mean_coverage and half_width. If there are enough dents for the 5th
+        percentile, they also have p05_coverage and p05_half_width.
     """
     treatment, found = design.process.treatment_time, evaluation.resolution
     full = evaluation.metrics["time_to_98_s"]
@@ -76,11 +78,10 @@ def coverage_against_time(
 
 
 def _open_density(mean: Estimate) -> float:
-    """Return the half-width of the logarithm of the dent density that the errors of the calibration
-    cause.
+    """Return the half-width that a calibration's errors give to the logarithm of the dent density.
 
     Args:
-        mean: coverage after the treatment time.
+        mean: mean coverage after the treatment time, with these errors.
     """
     slope = _by_density(mean.value)
     return shared_half_width(mean.shared[FIRST_OF_CALIBRATION:]) / slope if slope > 1e-6 else 0.0
@@ -93,14 +94,14 @@ def _by_density(coverage: float) -> float:
 
 
 def _rates_of_p05(p05: Estimate, treatment: float, full: Estimate) -> list[float]:
-    """Return low, middle and high estimate of the dent density per second at the 5th percentile of
-    coverage.
+    """Return low, middle and high estimates of dents per second at the 5th percentile of coverage.
 
-    A coverage near 1 hardly tells a density from twice this density, but the time to full coverage
+    The rate of dents is the growth of the dent density (dented area over area) per second. A
+    coverage near 1 hardly tells a density from twice this density, but the time to full coverage
     does.
 
     Args:
-        p05: the percentile after the treatment time.
+        p05: the 5th percentile after the treatment time.
         treatment: treatment time [s].
         full: time until the percentile is FULL_COVERAGE [s].
 

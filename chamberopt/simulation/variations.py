@@ -1,8 +1,9 @@
-"""Evaluate a design and changed designs in the same replicas on the same seeds.
+"""Evaluate a design and changed designs in equally many replicas with the same seeds.
 
-A chamber is chaotic, so that two runs on equal seeds correlate little. The noise of the slope
-between them falls as one over the step, and curvature makes the slope wrong by a share that grows
-with the step (benchmarks/response_steps.py measures both).
+The slope of a figure by a number of the design is the difference of two simulations over the step
+of this number. A chamber is chaotic, so that two simulations with equal seeds correlate little. The
+noise of the slope is proportional to 1 / step. Curvature makes the slope wrong by a share that
+grows with the step (benchmarks/response_steps.py measures both).
 """
 
 from __future__ import annotations
@@ -26,14 +27,14 @@ if TYPE_CHECKING:
 
 @dataclass
 class RunsProgress:
-    """Progress of several runs, reported as one. Each run has the same number of replicas."""
+    """Progress of several runs with equally many replicas, reported as a single run."""
 
     progress: Progress | None
     runs: int
     ended: int = 0  # number of runs before the present run
 
     def __call__(self, done: int, total: int, best: float | None) -> None:
-        """Report the number of replicas done, in the present run and in the runs before it."""
+        """Report the number of replicas done in the present run and all runs before it."""
         if self.progress:
             runs = max(self.runs, self.ended + 1)
             self.progress(self.ended * total + done, runs * total, best)
@@ -41,7 +42,7 @@ class RunsProgress:
 
 @dataclass
 class Variations:
-    """The runs of a design, and of changed designs in the same replicas on the same seeds.
+    """Simulations of a design and of changed designs, with as many replicas and the same seeds.
 
     The design itself is evaluated at once; `nominal` is its evaluation.
     """
@@ -66,8 +67,9 @@ class Variations:
         Raises InputError or an error of sim_core if it cannot be simulated.
 
         Args:
-            chamber: the chamber of the changed design; None where it is the same.
-            replicas: the replicas of the changed design, where nothing need be simulated.
+            chamber: the chamber of the changed design; None if it is the chamber of the design
+                itself.
+            replicas: replicas of the changed design that are known already, without a simulation.
         """
         self.progress.ended += not replicas
         nominal, known = self.nominal, ReplicaSet(list(replicas))

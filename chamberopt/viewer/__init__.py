@@ -1,1 +1,1 @@
-"""Show results in 3D in the window of `chamberopt inspect`."""
+"""Show results of simulations in 3D, in the window of `chamberopt inspect`."""

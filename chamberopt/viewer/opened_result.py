@@ -28,7 +28,7 @@ _REMEDIES = {  # for a quantity that a result lacks
 
 @dataclass(frozen=True)
 class ResultInfo:
-    """The data of a result.json for the viewer, which can be sent to the process that draws.
+    """The data of a result.json that the viewer needs; they can be sent to a drawing process.
 
     Attributes:
         treatment_s: peening time [s].
@@ -86,11 +86,15 @@ class OpenedResult:
         return load_matching_hits(self._path(HITS_FILE), np.asarray(self.surface["impacts"]))
 
     def time_ratio(self, state: ViewState) -> float:
-        """Return the peening time that the state shows over the result's treatment time."""
+        """Return the shown peening time over the result's treatment time.
+
+        Args:
+            state: what the viewer shows.
+        """
         return 1.0 if state.time_s is None else state.time_s / self.info.treatment_s
 
     def show(self, state: ViewState) -> None:
-        """Colour the part by the quantity that the state shows.
+        """Colour the part by the quantity, such as coverage, that the viewer is to show.
 
         Raises InputError if the result lacks the quantity.
         """
@@ -103,16 +107,17 @@ class OpenedResult:
         self.part.show(QUANTITIES[state.quantity], self.time_ratio(state))
 
     def above_threshold(self, state: ViewState) -> np.ndarray | None:
-        """Return True for each triangle of the drawn target that the threshold makes pale.
+        """Return True for each triangle of the drawn target that is to be pale.
 
-        Its coverage is at least `state.below`. Return None without such a threshold.
+        The coverage of these triangles is at least `state.below`. The result is None if
+        `state.below` is None.
         """
         if state.below is None:
             return None
         return self.part.covered_to(state.below, self.time_ratio(state))
 
     def describe_triangle(self, triangle: int, state: ViewState) -> list[str]:
-        """Return lines of text, each with one value of a triangle.
+        """Return lines of text about a triangle of the part, each with a value such as coverage.
 
         Raises InputError if there is no such triangle.
         """
@@ -155,10 +160,7 @@ def common_quantities(results: Sequence[OpenedResult]) -> list[str]:
 
 
 def colour_limits(results: Sequence[OpenedResult], state: ViewState) -> tuple[float, float]:
-    """Colour all results by the quantity that the state shows.
-
-    Return the values at the ends of their common colour scale.
-    """
+    """Colour all results by the shown quantity; return the ends of the common colour scale."""
     for one in results:
         one.show(state)
     if state.quantity == "zones":
@@ -169,7 +171,7 @@ def colour_limits(results: Sequence[OpenedResult], state: ViewState) -> tuple[fl
 
 
 def same_part(results: Sequence[OpenedResult]) -> bool:
-    """Return True if all results have the same triangles, wherever the part stands."""
+    """Return True if the part of all results has the same triangles, wherever it stands."""
     first = results[0].surface
     return all(
         one.surface.n_cells == first.n_cells

@@ -1,4 +1,4 @@
-"""Draw the views of `inspect`, one for each result, as a ViewState asks for."""
+"""Draw the views of `chamberopt inspect`, one for each result, as a ViewState says."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ PIN_LENGTH = 0.06  # length of the mark on a triangle, over the target's size
 
 
 class ResultPlotter:
-    """Draw several results with pyvista, each in a view of its own.
+    """Draws several results with pyvista, each in a view (a part of the window) of its own.
 
     Attributes:
         plotter: the plotter of pyvista.
@@ -74,10 +74,10 @@ class ResultPlotter:
         """Open the plotter.
 
         Args:
-            results: at most MAX_RESULTS.
+            results: results to show, at most MAX_RESULTS.
             off_screen: true to draw without a window.
             size: size of each view [pixels]; by default it depends on the number of results.
-            menu: true to list the keys of the quantities.
+            menu: true to write which key shows which quantity.
         """
         if len(results) > MAX_RESULTS:
             raise InputError(
@@ -106,7 +106,7 @@ class ResultPlotter:
         self._actors: list[set[str]] = [set() for _ in results]  # names of the actors in each view
 
     def draw(self, state: ViewState) -> None:
-        """Draw all views as a state asks for, without moving the cameras.
+        """Draw all views with the quantity, time, cut and so on of a state; the cameras stay.
 
         Raises InputError if a result cannot show the state.
         """
@@ -136,9 +136,9 @@ class ResultPlotter:
             self.plotter.link_views()
 
     def _room(self, number: int, state: ViewState) -> Room:
-        """Return the room to keep free in a view for text [pixels].
+        """Return how much to keep free for text at each side of a view [pixels].
 
-        The text is the title, the colour bar or chart, the legend and the numbers of a triangle.
+        The text is the title, the colour bar or chart, the legend and the values of a triangle.
         """
         size, left, right = self.view_size(), LEFT, RIGHT
         if state.triangle is not None and state.view in (None, number):
@@ -148,10 +148,10 @@ class ResultPlotter:
         return Room(left, right, BELOW, overlay.title_height(title, size))
 
     def _eye(self, results: Sequence[OpenedResult], state: ViewState) -> np.ndarray:
-        """Return the direction to the eye.
+        """Return the direction from the part to the eye.
 
-        It is the wanted direction. Without one, it faces the chosen triangle. Without both, it
-        shows most of the targets.
+        It is the direction in the state. If this is None, the eye faces the chosen triangle. If
+        there is no such triangle either, it is the direction that shows most of the targets.
         """
         if state.eye is not None:
             return np.array(state.eye)
@@ -167,7 +167,8 @@ class ResultPlotter:
     def _seen_area(self, result: OpenedResult, chamber: bool, eyes: np.ndarray) -> np.ndarray:
         """Return the area of each patch of a result's target that is visible from each direction.
 
-        It is computed once for each result.
+        A patch is a group of triangles that face the same way. The area is computed once for each
+        result.
 
         Args:
             chamber: True if the sonotrode may hide the target.
@@ -183,9 +184,9 @@ class ResultPlotter:
         return self._seen[key]
 
     def pick_triangle(self, x: float, y: float) -> tuple[int, int] | None:
-        """Return the number of the view and of the triangle at a point of the window [pixels].
+        """Return the number of the view, and of the triangle at a point of the window [pixels].
 
-        None if no part is drawn at the point.
+        The result is None if no part is drawn at the point.
         """
         import vtk
 
@@ -258,12 +259,12 @@ class ResultPlotter:
 
 
 def _bar_name(number: int) -> str:
-    """Return a name of blanks for a view's colour bar, which VTK needs to be unique and writes."""
+    """Return a name for a view's colour bar: blanks, as VTK writes the name and needs it unique."""
     return " " * (number + 1)
 
 
 def _menu(names: Sequence[str], state: ViewState) -> str:
-    """Return a line with the keys of the quantities, with the shown quantity in brackets."""
+    """Return a line that says which key shows which quantity; the shown quantity is in brackets."""
     keys = [
         f"[{key} {name}]" if name == state.quantity else f"{key} {name}"
         for key, name in enumerate(QUANTITIES, 1)
@@ -275,14 +276,15 @@ def _menu(names: Sequence[str], state: ViewState) -> str:
 def _triangle_lines(
     result: OpenedResult, triangle: int, state: ViewState
 ) -> tuple[list[str], np.ndarray]:
-    """Return lines of text with the values of a triangle, and its impact speeds (k,) [m/s]."""
+    """Return lines of text with a triangle's values, and the speeds (k,) of its impacts [m/s]."""
     return result.describe_triangle(triangle, state), result.hits.of(triangle).speed
 
 
 def _remarks(result: OpenedResult, state: ViewState, pale: np.ndarray | None) -> list[str]:
-    """Return remarks on a view: the size of the part, the shown time and the pale threshold.
+    """Return remarks to write in a view: size of the part, shown time, area below the threshold.
 
-    `pale` marks the triangles that are drawn pale.
+    Args:
+        pale: marks of the triangles whose coverage reaches the threshold `state.below`.
     """
     quantity, part = QUANTITIES[state.quantity], result.part
     remarks = [f"part {size_text(result.surface)}"]
@@ -300,7 +302,7 @@ def _remarks(result: OpenedResult, state: ViewState, pale: np.ndarray | None) ->
 
 
 def _legend(result: OpenedResult, state: ViewState) -> list[tuple[str, str]]:
-    """Return the legend of a view: each colour that is not on the colour bar, with its meaning."""
+    """Return the legend of a view: colours that are not on the colour bar, with meanings."""
     if state.quantity == "zones":
         entries = [(zone_colour(k), name) for k, name in enumerate(result.info.zones)]
         entries.append((GREY, "in no zone"))
@@ -312,7 +314,7 @@ def _legend(result: OpenedResult, state: ViewState) -> list[tuple[str, str]]:
 
 
 def _cut(actors: Sequence[Any], cut: Plane, result: OpenedResult) -> None:
-    """Cut away the parts of actors that lie on the normal's side of a plane."""
+    """Cut away what lies on one side of a plane, to which the normal points, from VTK actors."""
     normal, origin = cut
     point = result.chamber.center if origin is None else origin
     plane = pyvista().core.utilities.helpers.generate_plane(-np.array(normal), point)
@@ -323,7 +325,7 @@ def _cut(actors: Sequence[Any], cut: Plane, result: OpenedResult) -> None:
 def _points(result: OpenedResult, state: ViewState) -> np.ndarray:
     """Return the points that a view has to show [mm], shape (k, 3).
 
-    They are those of part and chamber, or those of the target if the chamber is not drawn.
+    They are the points of part and chamber, or of the target alone if the chamber is not drawn.
     """
     if not state.chamber:
         return np.asarray(result.part.whole.points)

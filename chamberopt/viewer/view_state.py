@@ -1,4 +1,4 @@
-"""Read the options and keys of `inspect`, each of which changes what its views show."""
+"""Read the options and keys of `chamberopt inspect`, which change what its views show."""
 
 from __future__ import annotations
 
@@ -37,18 +37,18 @@ q        quit"""
 
 @dataclass(frozen=True)
 class ViewState:
-    """The shown quantity, time, cut and other settings of a view.
+    """What the viewer shows: quantity, time, cut, chosen triangle and so on.
 
     Attributes:
         quantity: name of the quantity that colours the part, a key of QUANTITIES.
-        time_s: shown peening time [s] of quantities that grow with it. None for each result's
-            treatment time.
+        time_s: peening time [s] after which quantities that grow with time are shown. None: the
+            treatment time of each result.
         below: coverage [%] from which triangles are pale; None for no threshold.
         cut: plane that cuts the chamber open; None for no cut.
         cut_part: true if the part is cut too.
         chamber: true if the chamber is drawn.
         triangle: number of the triangle whose values are shown; None for no triangle.
-        view: number of the triangle's result; None for all results.
+        view: number of the result in which the triangle's values are shown; None for all results.
         eye: direction from the part to the eye; None for a direction that shows the target.
         keys: true if the list of keys is shown.
     """
@@ -86,7 +86,7 @@ class ViewState:
 def parse_clip(text: str) -> Plane:
     """Return the cutting plane that the option --clip asks for, as normal and point.
 
-    The text is X, Y or Z, and an optional place on this axis in mm.
+    The text is X, Y or Z, the axis along the normal, and optionally the coordinate on it in mm.
 
     >>> parse_clip("Z=12.5")
     ((0.0, 0.0, 1.0), (0.0, 0.0, 12.5))
@@ -106,7 +106,7 @@ def parse_clip(text: str) -> Plane:
 
 
 def parse_view(text: str) -> Vector:
-    """Return the direction from the part to the eye that the option --view gives as X,Y,Z."""
+    """Return the direction from the part to the eye, which the option --view gives as X,Y,Z."""
     try:
         x, y, z = (float(number) for number in text.split(","))
     except ValueError:
@@ -122,10 +122,11 @@ def parse_view(text: str) -> Vector:
 def state_after_key(
     state: ViewState, key: str, first: ViewState, quantities: Sequence[str]
 ) -> ViewState:
-    """Return what the views show after a key of the window was pressed.
+    """Return what the views show after a key was pressed.
 
     Args:
-        first: the state that key r returns to.
+        state: what the views showed before.
+        first: the state to which key r returns.
         quantities: names of the quantities that all results have.
     """
     names = list(QUANTITIES)

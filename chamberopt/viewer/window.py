@@ -1,4 +1,4 @@
-"""Open the window of `inspect`, which keys, slider and clicks change, or write its picture."""
+"""Open the window of `chamberopt inspect`, with keys, slider and clicks, or write its picture."""
 
 from __future__ import annotations
 
@@ -36,8 +36,8 @@ def inspect(
         state: what the window shows first.
         screenshot: .png file to write; no window is opened then.
     Raises:
-        InputError: a result's files are missing, damaged or another's, a result lacks a wanted
-            quantity, or there is no display.
+        InputError: a result's files are missing, damaged or from another result, a result lacks a
+            wanted quantity, or there is no display.
     """
     if screenshot is not None:
         job = {"results": infos, "state": state}
@@ -65,7 +65,7 @@ def render_inspect(job: dict[str, Any]) -> None:
 
 
 def open_results(infos: Sequence[ResultInfo], state: ViewState) -> list[OpenedResult]:
-    """Return opened results, coloured as the state asks for.
+    """Open results and colour their parts by the quantity in the state.
 
     Raises InputError if a result cannot show the state.
     """
@@ -78,7 +78,7 @@ def open_results(infos: Sequence[ResultInfo], state: ViewState) -> list[OpenedRe
 
 
 class Window:
-    """Show results on the screen. Keys, slider, cutting plane and clicks change what is shown."""
+    """A window with results. Keys, slider, cutting plane and clicks change what it shows."""
 
     def __init__(
         self, results: Sequence[OpenedResult], state: ViewState, off_screen: bool = False
@@ -93,7 +93,7 @@ class Window:
         self._update_handles()
 
     def run(self) -> None:
-        """Show the window until it is closed."""
+        """Show the window, and return when it is closed."""
         plotter, iren = self.view.plotter, self.view.plotter.iren
         iren.clear_key_event_callbacks()
         for key in HANDLED_KEYS:
@@ -108,7 +108,10 @@ class Window:
         plotter.show(title="chamberopt inspect")
 
     def change(self, state: ViewState) -> None:
-        """Show another state. If a result cannot show it, print why and keep the present state."""
+        """Show another quantity, time, cut and so on, as `state` says.
+
+        If a result cannot show the state, print why and keep the present state.
+        """
         before, self.state = self.state, state
         try:
             self.view.draw(state)
@@ -135,13 +138,13 @@ class Window:
     def select_triangle(self, view: int, triangle: int) -> None:
         """Show the values of a clicked triangle.
 
-        They are shown in all views if these show the same part, else only in the clicked view.
+        The values appear in all views if these show the same part, else only in the clicked view.
         """
         view_shown = None if self.view.linked else view
         self.change(replace(self.state, triangle=triangle, view=view_shown))
 
     def move_plane(self, normal: Sequence[float], origin: Sequence[float]) -> None:
-        """Cut the chamber open where the cutting plane was released."""
+        """Cut the chamber open where the user released the cutting plane."""
         if self.state.cut is not None:
             self.change(replace(self.state, cut=(tuple(normal), tuple(origin))))  # type: ignore[arg-type]
 
@@ -159,13 +162,13 @@ class Window:
     def _seconds(self) -> float:
         """Return the shown peening time [s].
 
-        If each result shows its own treatment time, it is that of the first result.
+        If each result shows its own treatment time, it is the treatment time of the first result.
         """
         time = self.state.time_s
         return self.view.results[0].info.treatment_s if time is None else time
 
     def _update_handles(self) -> None:
-        """Show the slider if the picture depends on time, and the plane if there is a cut."""
+        """Show the time slider if time matters, and the cutting plane if there is a cut."""
         results, plotter = self.view.results, self.view.plotter
         quantity = QUANTITIES[self.state.quantity]
         timed = quantity.grows or quantity.name == "coverage"

@@ -72,7 +72,7 @@ def claim_folder(
 ) -> Iterator[Path]:
     """Make a folder for results, and keep other processes from it during a `with` block.
 
-    Folders that are made here and are empty at the end are removed.
+    Folders that this function makes and that are empty at the end are removed.
 
     Args:
         is_own: tells if a folder that holds files may be used all the same.
@@ -122,9 +122,9 @@ def _only_writer(lock_file: Path, output: Path, remedy: str, wait: float = 0.0) 
     Raises InputError if the disk is nearly full, and OutputTakenError if another process still
     holds the lock after `wait` seconds. Messages name `output` and end with `remedy`.
 
-    The lock belongs to the operating system and ends with its process, however the process ends. A
-    forked child would share the lock until both have ended, so that workers are spawned. The lock
-    file holds the name of its process.
+    The operating system keeps the lock, and releases it when its process ends in any way. A forked
+    child would share the lock until both have ended, so that workers are spawned and not forked.
+    The lock file holds the name of the process.
     """
     name, until = lock_file.name, time.monotonic() + wait
     with _writing_in(output, remedy):
@@ -156,8 +156,8 @@ def _only_writer(lock_file: Path, output: Path, remedy: str, wait: float = 0.0) 
 def _locked(folder: OpenFolder, name: str) -> int | None:
     """Lock a file and return its descriptor; None if another process holds the lock.
 
-    Raises InputError for a file with a second name, which may lie anywhere: its content would be
-    lost.
+    Raises InputError for a file with a second name (a hard link). The second name may lie anywhere,
+    and the content there would be lost.
     """
     while True:
         file = folder.open(name, os.O_RDWR | os.O_CREAT)
@@ -212,7 +212,7 @@ def _holder(folder: OpenFolder, name: str) -> str:
 
 @contextmanager
 def _writing_in(place: Path | str, remedy: str) -> Iterator[None]:
-    """Turn an OSError in the `with` block into an InputError that `place` cannot be written.
+    """Turn an OSError in the `with` block into an InputError: `place` cannot be written.
 
     The message ends with `remedy`.
     """
@@ -255,7 +255,7 @@ def require_place(path: Path, option: str = "") -> None:
 
 
 def _require_writable(folder: Path) -> None:
-    """Raise OSError if no file can be made in the folder, now rather than after an hour's work."""
+    """Raise OSError if no file can be made in the folder, before long work begins in vain."""
     with tempfile.TemporaryFile(dir=folder):
         pass
 

@@ -1,6 +1,6 @@
 """Open plain files and folders without following links that others made.
 
-A link in a folder that came from elsewhere leads to a place that its author chose. No such link is
+A folder that came from elsewhere may hold links to any file that its author chose. No such link is
 followed. Links on the way to a folder, and links to files that a design names, are the user's own.
 """
 
@@ -68,7 +68,7 @@ def read_file(path: Path, follow: bool = False) -> bytes:
 
 
 def require_plain(path: Path, status: os.stat_result) -> None:
-    """Raise InputError, which names `path`, unless `status` is that of a plain file."""
+    """Raise InputError, which names `path`, unless `status` is the status of a plain file."""
     if not stat.S_ISREG(status.st_mode):
         raise InputError(f"{path}: {_kind(status)}; put a plain file in its place, or remove it")
 
@@ -115,10 +115,10 @@ def _kind(status: os.stat_result) -> str:
 
 
 class OpenFolder:
-    """Open folder, for work on the files in it. No name in it is looked up through a link.
+    """An opened folder, for work on the files in it, which follows no link in it.
 
-    On systems with descriptors of folders, the object stays the same folder, even if another one
-    takes its place meanwhile.
+    On systems with descriptors of folders, the object stays the same folder, even if another folder
+    gets its path meanwhile.
     """
 
     def __init__(self, path: Path) -> None:
@@ -135,7 +135,7 @@ class OpenFolder:
     def status(self, name: str) -> os.stat_result | None:
         """Return the status of the file with this name, or None if there is no such file.
 
-        The status of a link is that of the link itself and not of its target.
+        A link gives the status of the link itself, not of its target.
         """
         try:
             return os.stat(self._at(name), dir_fd=self._file, follow_symlinks=False)
@@ -159,7 +159,7 @@ class OpenFolder:
         return file
 
     def rename(self, name: str, new: str) -> None:
-        """Give a file a new name. A file that has this name already is replaced."""
+        """Give a file a new name, and replace any file that has the new name already."""
         at = {"src_dir_fd": self._file, "dst_dir_fd": self._file}
         os.replace(self._at(name), self._at(new), **at)
 
@@ -182,7 +182,7 @@ class OpenFolder:
         raise OSError(error, os.strerror(error))
 
     def remove(self, name: str) -> None:
-        """Remove the file with this name, if it exists. Of a link, the target stays."""
+        """Remove the file with this name, if it exists. If it is a link, its target stays."""
         with suppress(FileNotFoundError):
             os.unlink(self._at(name), dir_fd=self._file)
 

@@ -27,11 +27,12 @@ def new_file(path: Path, look: Callable[[Path], None] | None = None) -> Iterator
 
     The file is on the disk before it gets its name, so that neither a crash nor a power cut leaves
     half a file. It has the permissions of the replaced file. Libraries that need a file name find
-    it in `name`. This name cannot be foreseen, and it has the suffix of `path`.
+    the temporary file's in its attribute `name`. Others cannot foresee this name. It has the suffix
+    of `path`.
 
     Args:
-        look: called with a file that holds the replaced content. If it raises an error, that
-            content stays in place.
+        look: called with the path of a file that holds the replaced content. If it raises an error,
+            the replaced content stays in place.
     Raises:
         OSError: if the file cannot be written.
         InputError: if a link, a folder or another thing that is no plain file is at `path`.
@@ -93,8 +94,8 @@ def write_bytes(
     """Write a file, whole or not at all.
 
     Args:
-        look: called with a file that holds the replaced content. If it raises an error, that
-            content stays in place.
+        look: called with the path of a file that holds the replaced content. If it raises an error,
+            the replaced content stays in place.
     """
     with new_file(path, look) as file:
         file.write(content)
@@ -208,7 +209,7 @@ def _empty(folder: Path, which: Callable[[str], bool]) -> None:
 
 
 def is_leftover(path: Path) -> bool:
-    """Return True if this is a plain file whose name is one that killed commands leave behind."""
+    """Return True if this is a plain file with a name as killed commands leave behind."""
     return path.name.startswith(LEFTOVER_PREFIXES) and stat.S_ISREG(path.lstat().st_mode)
 
 
@@ -220,7 +221,7 @@ def private_folder() -> AbstractContextManager[str]:
 def csv_text(rows: Sequence[Mapping[str, object]]) -> str:
     """Return a table as CSV text, with a header.
 
-    Its columns are all names that occur in any row. Values that a row lacks stay empty.
+    The columns are all names that occur in any row. Values that a row lacks stay empty.
     """
     text = io.StringIO()
     columns = dict.fromkeys(name for row in rows for name in row)

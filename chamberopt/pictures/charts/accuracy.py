@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 def accuracy_picture(path: Path, study: ConvergenceStudy) -> None:
-    """Write a chart of error against CPU seconds, and of the bias of every run, as .png."""
+    """Write charts of an accuracy study as .png: error against cost, and bias of each setting."""
     figure = new_figure(13.0, 6.6)
     left, right = figure.subplots(1, 2, width_ratios=[1.5, 1.0])
     _draw_errors(left, study)
@@ -35,9 +35,11 @@ def accuracy_picture(path: Path, study: ConvergenceStudy) -> None:
 
 
 def _draw_errors(axes: Axes, study: ConvergenceStudy) -> None:
-    """Draw error against cost: numbers of replicas with a fitted curve, biases, recommendations.
+    """Draw the error of the objective against the cost of an evaluation in CPU seconds.
 
-    Biases stand at the cost of the design's own replicas.
+    Marks show errors of several numbers of replicas with a fitted curve, the biases of coarser
+    settings, and the recommended settings. A bias is drawn at the cost of as many replicas as the
+    design has.
     """
     axes.set_xscale("log")
     axes.set_yscale("log")
@@ -65,9 +67,10 @@ def _draw_errors(axes: Axes, study: ConvergenceStudy) -> None:
 
 
 def _draw_bias_marks(axes: Axes, study: ConvergenceStudy) -> None:
-    """Draw a mark for the bias of each run.
+    """Draw a mark for the bias of each numerical setting, its difference from the finest setting.
 
-    It is filled if the bias is more than noise, else open and at the bias's upper limit.
+    The mark is filled if the bias is more than noise. Else it is open, and at the upper limit of
+    the bias.
     """
     # The gauge changes the measured quantity, not its accuracy.
     names = dict.fromkeys(run.parameter for run in study.runs)
@@ -89,7 +92,10 @@ def _draw_bias_marks(axes: Axes, study: ConvergenceStudy) -> None:
 
 
 def _draw_biases(axes: Axes, study: ConvergenceStudy) -> None:
-    """Draw the signed bias of each run with its interval, and write its CPU time beside it."""
+    """Draw each numerical setting's bias (difference from the finest setting) with its interval.
+
+    Beside each setting stands its CPU time over the CPU time of the finest settings.
+    """
     from matplotlib.ticker import MaxNLocator
 
     runs = study.runs

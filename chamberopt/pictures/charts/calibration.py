@@ -1,6 +1,6 @@
-"""Draw the picture of a calibration: measured points on predicted bands.
+"""Draw the picture of a calibration: measured points over the bands that the model predicts.
 
-Each kind of measurement has a panel.
+Each kind of measurement, such as arc heights, has a chart of its own.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ Z = normal_quantile(0.95)
 def calibration_picture(path: Path, found: Calibrated) -> None:
     """Write a chart for each kind of measurement into one .png.
 
-    Measured points have 95 % bars, and predictions 95 % bands.
+    Measured points have bars of 95 %, and predictions have bands of 95 %.
     """
     kinds = list(dict.fromkeys(one.kind for one in found.data))
     rows = -(-len(kinds) // COLUMNS)
@@ -71,7 +71,7 @@ def _band(found: Calibrated, model: Model) -> tuple[np.ndarray, np.ndarray, np.n
 def _bars(one: Data) -> tuple[np.ndarray, np.ndarray]:
     """Return measured figures, shape (n,), and the lengths of their 95 % bars, shape (2, n).
 
-    The lengths are those below and above each figure.
+    Row 0 has the lengths below the figures, and row 1 the lengths above.
     """
     y, sd = np.exp(one.y), np.sqrt(one.covariance.diagonal())
     ends = np.exp(one.y + Z * np.array([[-1.0], [1.0]]) * sd)

@@ -32,7 +32,7 @@ def zone_colour(index: int) -> str:
 
 
 def line_style(index: int) -> dict[str, object]:
-    """Return the colour and line style of the compared result with this index."""
+    """Return the colour and line style of the result with this index in a comparison."""
     return {"color": _COLOURS[index % len(_COLOURS)], "ls": _LINES[index % len(_LINES)]}
 
 

@@ -84,12 +84,12 @@ def distributions_picture(
     treatment_time: float,
     impacts: Sequence[HistogramData],
 ) -> None:
-    """Write a picture with histograms of coverage and impacts and coverage over time, as .png.
+    """Write four charts as .png: coverage as histogram and over time, and two of impacts.
 
-    The legends of its four panels have the numbers.
+    Legends give means and other numbers.
 
     Args:
-        treatment_time: [s].
+        treatment_time: treatment time of the design [s].
         impacts: two histograms, such as of speed and angle.
     """
     figure = new_figure(13.0, 8.4 + 0.34 * len(curves))
@@ -137,8 +137,8 @@ def draw_coverage_over_time(
     """Draw the mean coverage as a thick line and its 5th percentile as a thin line, with bands.
 
     Args:
-        treatment_time: [s].
-        max_half_width: a line ends where its interval is wider.
+        treatment_time: treatment time of the design [s].
+        max_half_width: half-width of the interval above which a line ends.
     """
     lines = [_known_lines(curve.rows, max_half_width) for curve in curves]
     last = [line[0][-1] for pair in lines for line in pair if line.size]
@@ -186,7 +186,8 @@ def _draw_time_to_98(axes: Axes, curve: CoverageCurve, end: float, height: float
 
     Args:
         end: end of the axis [s].
-        height: height of the mark [%]. Each result has its own, so that near marks do not overlap.
+        height: height of the mark [%]. Each result has another height, so that near marks do not
+            overlap.
     """
     assert curve.time_to_98 is not None
     time, half_width = curve.time_to_98.value, curve.time_to_98.half_width
@@ -205,7 +206,7 @@ def coverage_over_time_figure(
 
     Args:
         curves: coverage at several times, by the name of the result.
-        treatment_time: [s].
+        treatment_time: treatment time of the design [s].
     """
     figure = new_figure(*NARROW)
     axes = figure.subplots()
@@ -218,10 +219,11 @@ def coverage_over_time_figure(
 
 
 def histogram_figure(coverage_and_area: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> Figure:
-    """Return a histogram of the target's area by its coverage.
+    """Return a chart of how much of the target's area has which coverage.
 
     Args:
-        coverage_and_area: for each result by name, coverage 0..1 and area of triangles, (k,) each.
+        coverage_and_area: for each result by its name, coverages 0..1 and the areas that have them,
+            (k,) each.
     """
     shares = [
         np.histogram(100.0 * coverage, BIN_EDGES, weights=area)[0] / max(area.sum(), 1e-300)

@@ -25,7 +25,7 @@ SVG = "http://www.w3.org/2000/svg"
 
 
 def new_figure(width: float, height: float) -> Figure:
-    """Return an empty figure of this size [inch] that needs no display."""
+    """Return an empty figure of this size [inch], which can be drawn without a display."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -55,8 +55,8 @@ def svg_text(figure: Figure, name: str, tooltips: Mapping[str, Sequence[str]] | 
 
     Args:
         name: makes the ids inside unique among the figures of a page.
-        tooltips: for the gid of a line, the texts that appear when pointing at its markers, in the
-            order of its points.
+        tooltips: for the gid (id) of a line, the texts that appear when the mouse is over its
+            markers, in the order of its points.
     """
     from matplotlib import rc_context
 
@@ -93,15 +93,16 @@ def style_axes(axes: Axes, x_label: str = "", y_label: str = "") -> None:
 
 
 def name_choices(axis: Axis, texts: Sequence[str]) -> None:
-    """Write texts at their positions on an axis. Without texts the axis stays as it is."""
+    """Label an axis with texts, the first at 0, the next at 1. Without texts it stays as it is."""
     if texts:
         axis.set_ticks(range(len(texts)), texts)
 
 
 def value_range(estimates: Sequence[Estimate]) -> tuple[float, float]:
-    """Return axis limits that show every value, and its interval up to the span of the values.
+    """Return axis limits that show all values, and intervals unless they are very wide.
 
-    A wider interval, for example of a time that may be infinite, would flatten everything else.
+    Wide intervals, for example of a time that may be infinite, would flatten everything else. They
+    are cut off where they extend beyond the values by more than the span of the values.
     """
     values = np.array([one.value for one in estimates])
     half_widths = np.array([one.half_width for one in estimates])

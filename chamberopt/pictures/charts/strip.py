@@ -1,6 +1,7 @@
 """Draw the picture of a virtual Almen strip (`chamberopt strip`).
 
-It has the saturation curve, and the curves that a shop would fit to five arc heights.
+It has the saturation curve (arc height over time), and the curves that a peening shop would fit to
+five arc heights.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ MULTIPLE_NAMES = "T/4", "T/2", "T", "2 T", "4 T"
 def fit_text(fit: KirkFit, strip: VirtualStrip) -> str:
     """Return a text with intensity and saturation time of a fitted curve.
 
-    Each has its deviation [%] from the value of the virtual strip itself.
+    With each value stands its deviation [%] from the value of the virtual strip itself.
     """
     off = 100.0 * (fit.intensity / strip.intensity.value - 1.0)
     late = 100.0 * (fit.saturation_time / strip.time.value - 1.0)

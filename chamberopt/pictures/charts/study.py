@@ -1,4 +1,4 @@
-"""Draw charts of a study: its search, the influence of each parameter, and the Pareto front."""
+"""Draw charts of an optimisation study: search, influence of each parameter, Pareto front."""
 
 from __future__ import annotations
 
@@ -42,11 +42,11 @@ class EvaluatedCandidate:
     """One evaluation of a study as its chart shows it.
 
     Args:
-        number: place in the order of evaluations, from 1.
+        number: number of the evaluation in the order of the study, from 1.
         stage: "search" or "confirm".
-        objective: None if the candidate was not simulated.
+        objective: its objective; None if the candidate was not simulated.
         feasible: true if it meets the constraints.
-        parameters: values by dotted name.
+        parameters: values of the varied parameters by their dotted names.
     """
 
     number: int
@@ -102,10 +102,11 @@ def draw_convergence(
 ) -> dict[str, list[str]]:
     """Draw the objective of every evaluation in its order, with 95 % intervals.
 
-    The best so far and the confirmations of candidates are drawn too.
+    The best candidate so far and the confirmations (second evaluations) of candidates are drawn
+    too.
 
     Returns:
-        Tooltips for svg_text: value and parameters of each point, by gid of its line.
+        Tooltips for svg_text: value and parameters of each point, by the gid (id) of the line.
     """
     from matplotlib.ticker import MaxNLocator
 
@@ -163,7 +164,7 @@ def _draw_parameter(
 ) -> None:
     """Draw the objective of each candidate over one parameter, later candidates darker.
 
-    The confirmed start and best design are marked.
+    The unchanged design and the best design are marked, with their confirmed values.
     """
     varied = result.study.vary[name]
     search = [one for one in candidates if one.stage == "search"]
@@ -198,15 +199,15 @@ def _draw_parameter(
 
 
 def is_there(value: float | str, texts: Sequence[str]) -> bool:
-    """Return True if a candidate has a parameter: a number, or one of the allowed texts.
+    """Return True if a value is the value of a parameter: a number, or one of the allowed texts.
 
-    A parameter that a candidate lacks has another text as its value.
+    Where a candidate lacks the parameter, any other text stands in place of the value.
     """
     return not isinstance(value, str) or value in texts
 
 
 def slices_picture(path: Path, result: StudyResult, sensitivity: Sensitivity) -> None:
-    """Write the objective over each parameter, as the study's model predicts it, as .png."""
+    """Write charts of the objective over each parameter, by the study's model, as .png."""
     figure = slices_figure(
         sensitivity.slices,
         result.start.parameters,
@@ -224,13 +225,15 @@ def slices_figure(
     flat_label: str,
     y_label: str,
 ) -> Figure:
-    """Return a chart of the objective over each parameter, as the study's model predicts it.
+    """Return charts of the objective over each parameter, as the study's model predicts it.
 
-    It shows the interval, the mean over the other parameters, and the range without real loss.
+    Each chart varies a parameter of the best design. It shows the interval of the prediction, the
+    mean over the other parameters, and the range in which the objective is hardly worse.
 
     Args:
-        start, best: parameter values of these two designs.
-        flat_label: meaning of a parameter's shaded range.
+        slices: predictions over each parameter.
+        start, best: parameter values of the unchanged and of the best design.
+        flat_label: legend for the shaded range of a parameter.
     """
     columns = min(len(slices), MAX_COLUMNS)
     rows = -(-len(slices) // columns)
@@ -277,7 +280,8 @@ def _place(of: Slice, value: float | str) -> float:
 def pareto_picture(path: Path, result: StudyResult) -> None:
     """Write a chart of one objective against the other for every candidate, as .png.
 
-    It shows the confirmed Pareto front.
+    It marks the Pareto front: the confirmed candidates that no other candidate beats in one
+    objective without being worse in the other.
     """
     from chamberopt.search.pareto import pareto_points
 
@@ -321,7 +325,7 @@ def pareto_picture(path: Path, result: StudyResult) -> None:
 def convergence_figure(
     candidates: Sequence[EvaluatedCandidate], y_label: str, smaller_is_better: bool
 ) -> tuple[Figure, dict[str, list[str]]]:
-    """Return a chart of every evaluation in its order, and tooltips with the parameters of each."""
+    """Return a chart of the objective of every evaluation in order, and tooltips for it."""
     figure = new_figure(*WIDE)
     axes = figure.subplots()
     tooltips = draw_convergence(axes, candidates, fill(y_label, Y_LABEL), smaller_is_better)
@@ -336,6 +340,11 @@ def influence_figure(
     best: Mapping[str, float | str],
     y_label: str,
 ) -> Figure:
-    """Return a chart of the objective over each parameter, as the study's model predicts it."""
+    """Return charts of the objective that the study's model predicts over each parameter.
+
+    Args:
+        slices: predictions over each parameter.
+        start, best: parameter values of the unchanged and of the best design.
+    """
     label = fill(y_label, Y_LABEL)
     return slices_figure(slices, start, best, "loses no more than the noise", label)

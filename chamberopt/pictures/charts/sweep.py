@@ -1,4 +1,4 @@
-"""Draw the map of a sweep: its objective over one or more parameters."""
+"""Draw the map of a sweep, which simulates a grid of parameter values: its objective over them."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def sweep_map(path: Path, sweep: SweepResult) -> list[str]:
     a map for each pair, over which the other parameters vary too.
 
     Returns:
-        Remarks: a sentence if pairs are left out.
+        Remarks for the user: a sentence if pairs of parameters are left out.
     """
     names = list(sweep.study.vary)
     pairs = list(combinations(names, 2))
@@ -71,7 +71,7 @@ def _title(sweep: SweepResult) -> str:
 
 
 def _draw_curve(axes: Axes, sweep: SweepResult, name: str) -> None:
-    """Draw the objective over the only parameter, with 95 % intervals."""
+    """Draw the objective over a sweep's only parameter, with 95 % intervals."""
     for feasible, colour, line, label in (
         (True, BLUE, "-o", "95 % interval"),
         (False, GREY, "x", "misses a constraint"),
@@ -93,7 +93,7 @@ def _draw_curve(axes: Axes, sweep: SweepResult, name: str) -> None:
 def _draw_maps(
     figure: Figure, sweep: SweepResult, pairs: list[tuple[str, str]], shape: tuple[int, int]
 ) -> None:
-    """Draw a map for each pair of parameters, with one colour bar and one legend for all."""
+    """Draw a map of the objective for each pair of parameters, with one colour bar for all."""
     is_grid = sweep.plan.method == "grid" and len(sweep.study.vary) == 2
     panels, colours = [], None
     for i, pair in enumerate(pairs):
@@ -141,7 +141,7 @@ def _draw_points(axes: Axes, sweep: SweepResult, pair: tuple[str, str]) -> PathC
 def _draw_marks(axes: Axes, sweep: SweepResult, pair: tuple[str, str]) -> None:
     """Mark the unchanged design, the best candidate, and candidates without a valid result.
 
-    These could not be simulated or miss a constraint.
+    Candidates without a valid result could not be simulated or miss a constraint.
     """
     infeasible = [trial for trial in sweep.trials if trial.objective and not trial.feasible]
     failed = [trial for trial in sweep.trials if not trial.objective]
@@ -164,9 +164,9 @@ def _draw_marks(axes: Axes, sweep: SweepResult, pair: tuple[str, str]) -> None:
 
 
 def _places(sweep: SweepResult, trials: Sequence[Trial], name: str) -> list[float]:
-    """Return the value of a parameter in each trial, for an axis.
+    """Return where the value of a parameter in each trial lies on an axis.
 
-    A text gives its position among the allowed texts.
+    It is the value itself, or for a text the position among the allowed texts.
     """
     return [sweep.study.vary[name].place(trial.parameters[name]) for trial in trials]
 

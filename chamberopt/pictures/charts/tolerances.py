@@ -1,4 +1,4 @@
-"""Draw tornado charts, which show the effect of each single tolerance on a figure."""
+"""Draw tornado charts, which show the effect of each single tolerance on coverage or intensity."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 class TornadoBar(NamedTuple):
-    """Changes of a figure at the low and at the high end of a number's tolerance."""
+    """Changes of a result at the low and at the high end of the tolerance of a design's number."""
 
     name: str
     low: Estimate
@@ -24,7 +24,7 @@ class TornadoBar(NamedTuple):
 
 
 class TornadoPanel(NamedTuple):
-    """The chart of one figure: its bars by the names of the toleranced numbers."""
+    """The chart of a result, such as mean coverage: its bars, by names of toleranced numbers."""
 
     title: str
     x_label: str
@@ -32,9 +32,9 @@ class TornadoPanel(NamedTuple):
 
 
 def tornado_figure(panels: Sequence[TornadoPanel]) -> Figure:
-    """Return the tornado charts of several figures side by side.
+    """Return the tornado charts of several results, such as mean coverage, side by side.
 
-    The numbers are ordered by their effect on the first figure.
+    The toleranced numbers are ordered by their effect on the first result.
     """
 
     def size(name: str) -> float:
@@ -50,9 +50,9 @@ def tornado_figure(panels: Sequence[TornadoPanel]) -> Figure:
 
 
 def draw_tornado(axes: Axes, bars: Sequence[TornadoBar], x_label: str) -> None:
-    """Draw the change of a figure at each end of each number's tolerance, with 95 % intervals.
+    """Draw the change of a result at each end of each number's tolerance, with 95 % intervals.
 
-    The first number is on top. Bars no longer than their interval are grey.
+    The first toleranced number is on top. Bars no longer than their interval are grey.
     """
     for row, bar in enumerate(bars):
         for end, colour in ((bar.low, ORANGE), (bar.high, BLUE)):

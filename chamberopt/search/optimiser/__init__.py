@@ -1,1 +1,1 @@
-"""Where the search looks next: Sobol points, NLopt, and a Gaussian process."""
+"""Choose the next point of a search: by Sobol points, NLopt, and a Gaussian process."""

@@ -1,8 +1,9 @@
-"""Acquisition: the point to evaluate next, and the point to recommend, by the model.
+"""Choose the point to evaluate next, and the points to recommend, by the model of a search.
 
-The value of an evaluation is its knowledge gradient: the mean rise of the best mean of the model.
-Expected improvement trusts the luckiest evaluation too much; it ended with twice the regret on
-noisy test functions (benchmarks/optimizers.py).
+The model is a Gaussian process that predicts the mean score at each point. The value of an
+evaluation is its knowledge gradient: by how much it raises the model's best mean, on average.
+Expected improvement, the usual value, trusts the luckiest evaluation too much; it ended with twice
+the regret on noisy test functions (benchmarks/optimizers.py).
 
 Source: P. Frazier, W. Powell and S. Dayanik, "The knowledge-gradient policy for correlated normal
 beliefs", INFORMS J. Comput. 21 (2009) 599. Notation (shape, name in the code):
@@ -68,10 +69,11 @@ def propose_point(model: SearchModel, rng: np.random.Generator) -> np.ndarray:
 
 
 def recommend_points(model: SearchModel, seed: int) -> list[np.ndarray]:
-    """Return two points (d,) that are best by a cautious reading of the model.
+    """Return two points (d,) with the best cautious estimate of the score by the model.
 
-    The first is the best of those that were evaluated, the second the best of all; they may be the
-    same. The model's mean counts less CAUTION standard deviations, and limits must be met.
+    The first is the best of the points that were evaluated, the second is the best of all points.
+    They may be the same. The estimate is the model's mean less CAUTION standard deviations, and
+    limits must be met.
     """
 
     def cautious_value(at: np.ndarray) -> np.ndarray:
@@ -90,18 +92,18 @@ def recommend_points(model: SearchModel, seed: int) -> list[np.ndarray]:
 def _best(model: SearchModel) -> float:
     """Return the best mean score by the model among points whose evaluation has begun.
 
-    The height of each mean above the lowest score is multiplied by the probability that the point
-    meets all limits.
+    The difference of each mean from the lowest score is multiplied by the probability that the
+    point meets all limits.
     """
     mean, _ = model.expected(model.points)
     return model.lowest + float(((mean - model.lowest) * model.feasible(model.points)).max())
 
 
 def _knowledge_gradient(model: SearchModel, leaders: np.ndarray) -> Function:
-    """Return a function of points (k, d) that computes how much their evaluation is worth, (k,).
+    """Return a function that computes how much the evaluation of each point (k, d) is worth, (k,).
 
-    It computes the logarithm of the knowledge gradient, because NLopt works better on the shape of
-    a function than on tiny values.
+    The function computes the logarithm of the knowledge gradient, because NLopt climbs badly where
+    all values are tiny.
 
     Args:
         leaders: points (m, d) where the model's best mean may be.
@@ -139,7 +141,7 @@ def _expected_improvement(mean: np.ndarray, deviation: np.ndarray, best: float) 
 
 
 def _choices(model: SearchModel, rng: np.random.Generator) -> np.ndarray:
-    """Draw points (k, d) to choose the next from: near the model's five best, and over the cube."""
+    """Draw points (k, d) to choose the next from: near the model's five best, and anywhere."""
     from scipy.stats.qmc import Sobol
 
     points, domain = model.points, model.domain
@@ -157,10 +159,11 @@ def _choices(model: SearchModel, rng: np.random.Generator) -> np.ndarray:
 
 
 def _climb(function: Function, starts: np.ndarray, domain: Domain) -> np.ndarray:
-    """Return the point (d,) with the largest value of a function that NLopt finds.
+    """Return the point (d,) at which NLopt finds the largest value of a function.
 
     Args:
-        starts: points from which it climbs, (k, d). Parameters with levels stay as they are there.
+        starts: points from which NLopt climbs, (k, d). Parameters that are steps or choices keep
+            their values of the start.
     """
     tried: list[tuple[float, np.ndarray]] = []
     free, count = domain.free, int(domain.free.sum())

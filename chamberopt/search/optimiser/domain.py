@@ -1,10 +1,10 @@
 """The values that the parameters of a search can have: numbers, steps and choices.
 
-A search works on points of the unit cube, one coordinate for each parameter. A parameter with
-levels has the places 0, 1/(n - 1), ..., 1. Its model is told the place that is meant, not the point
-that was drawn: E. C. Garrido-Merchán and D. Hernández-Lobato, "Dealing with categorical and
-integer-valued variables in Bayesian optimization with Gaussian processes", Neurocomputing 380
-(2020) 20.
+A search works on points of the unit cube, with a coordinate for each parameter. A parameter that
+can have only n values, its levels, has the coordinates 0, 1/(n - 1), ..., 1. The model of a search
+learns the nearest of these coordinates, not the coordinate that was drawn: E. C. Garrido-Merchán
+and D. Hernández-Lobato, "Dealing with categorical and integer-valued variables in Bayesian
+optimization with Gaussian processes", Neurocomputing 380 (2020) 20.
 """
 
 from __future__ import annotations
@@ -22,10 +22,11 @@ MISSES = 16  # places in the box of tolerances
 class Axis(NamedTuple):
     """The values that one parameter of a search can have, and which points have this parameter.
 
-    levels: how many values it can have; 0 for any number between its bounds.
-    ordered: whether near levels are alike. If not, they are choices, and all differ alike.
-    where: if only some points have it: the axis of choices that decides, and the levels of that
-        axis with which they do.
+    levels: number of values that it can have; 0 for any number between its bounds.
+    ordered: whether neighbouring values are similar. If not, they are choices, all equally
+        different.
+    where: None if all points have the parameter. Else the position of another parameter that
+        decides, and the levels (values) of the other parameter for which points have this one.
     """
 
     levels: int = 0
@@ -36,15 +37,16 @@ class Axis(NamedTuple):
 class Domain:
     """The points (d,) of the unit cube that a search may try.
 
-    `free` (d,) bool are the parameters without levels, which can be any number between bounds.
+    `free` (d,) bool marks the parameters that can be any number between their bounds.
 
     Args:
         axes: which values each parameter can have.
-        misses: by how much a shop that aims at a value may miss it, as a share of the bounds, shape
-            (2, 2, d): where the coordinate is 0 and 1, the lowest and highest miss of each
-            parameter. Between 0 and 1 it is in proportion; by default it is 0.
-        counts_worst: whether the worst of the values counts that a shop may get, instead of their
-            mean.
+        misses: by how much a shop that aims at a value may miss it by the tolerances, as a share of
+            the distance between bounds, shape (2, 2, d): at coordinate 0 and 1 the lowest and the
+            highest miss of each parameter. Between 0 and 1 they change linearly. By default there
+            are no misses.
+        counts_worst: whether the worst score over the values that a shop may get counts, instead of
+            the mean score.
     """
 
     def __init__(
@@ -62,8 +64,8 @@ class Domain:
     def snap(self, points: np.ndarray) -> np.ndarray:
         """Return points (k, d) with each coordinate moved to the nearest value that it can have.
 
-        Choices have equal parts of the cube, so that evenly spread points try each as often. A
-        parameter that a point does not have is 0.
+        All values of a choice have equal parts of the cube, so that evenly spread points try them
+        equally often. A parameter that a point does not have gets the coordinate 0.
         """
         choice = np.minimum(np.floor(points * (self._steps + 1.0)), self._steps)
         level = np.where(self._are_ordered, np.rint(points * self._steps), choice)
@@ -101,9 +103,9 @@ class Domain:
         return self._misses is not None
 
     def around(self, points: np.ndarray) -> np.ndarray:
-        """Return points that a shop may get when it aims at points (k, d), shape (s, k, d).
+        """Return s points that a shop may get when it aims at each of the points (k, d), (s, k, d).
 
-        They are evenly spread over what the tolerances allow; without tolerances s is 1.
+        The s points are evenly spread over what the tolerances allow; without tolerances s is 1.
         """
         if self._misses is None:
             return points[None]
@@ -113,7 +115,7 @@ class Domain:
 
     @cached_property
     def _shares(self) -> np.ndarray:
-        """Points spread evenly over what a shop may miss, as shares of the widths, shape (s, d)."""
+        """Evenly spread points of the tolerances' box, as shares of the box's widths, (s, d)."""
         from scipy.stats.qmc import Sobol
 
         # The middles of equal boxes: unscrambled, the first point of the sequence is a corner.

@@ -17,19 +17,20 @@ Source: C. E. Rasmussen and C. K. I. Williams, "Gaussian Processes for Machine L
     mean at x             m(x) = (b + k(x, X)) K⁻¹ y                             _weights: K⁻¹ y
     covariance at x, x'   c(x, x') = b + k(x, x') - (b + k(x, X)) K⁻¹ (b + k(X, x'))
 
-Far from all points the mean is thus not that of the scores, which gather where the search finds it
-good, but their generalised least squares mean, where many near points count little more than one
-(section 2.7 there).
+Far from all points the model's mean is not the plain mean of the scores, because the points gather
+where scores are good. It is the generalised least squares mean of the scores, in which many near
+points count little more than one point (section 2.7 of the source).
 
-While a point's evaluation still runs, the model takes its own mean there for the score, with the
-usual noise: its mean is then the same everywhere, but it is surer near the point, so that the next
-proposal goes elsewhere (the "kriging believer": D. Ginsbourger, R. Le Riche and L. Carraro,
-"Kriging is well-suited to parallelize optimization", in "Computational Intelligence in Expensive
-Optimization Problems", Springer 2010).
+While a point's evaluation still runs, the model takes its own mean at the point for the score, with
+the usual noise. Its mean then stays the same everywhere, but it is surer near the point, so that
+the next proposal goes elsewhere (the "kriging believer": D. Ginsbourger, R. Le Riche and L.
+Carraro, "Kriging is well-suited to parallelize optimization", in "Computational Intelligence in
+Expensive Optimization Problems", Springer 2010).
 
-The hyperparameters are the most probable ones, not the likeliest: log a, log l and log w have a
-normal prior, which keeps the model from reading too much into 20 points (mean regret 0.027 with
-it, 0.032 without, on noisy test functions with 40 evaluations; benchmarks/optimizers.py).
+The hyperparameters are those of the largest posterior probability, not of the largest likelihood:
+log a, log l and log w have a normal prior. It keeps the model from reading too much into 20 points
+(mean regret 0.027 with the prior, 0.032 without, on noisy test functions with 40 evaluations;
+benchmarks/optimizers.py).
 """
 
 from __future__ import annotations
@@ -72,11 +73,10 @@ class GaussianProcess:
         points: points with scores, shape (n, d); only the best MAX_POINTS are used.
         scores: score of each point, (n,).
         variances: squared standard errors of the scores, (n,); 0 where unknown.
-        domain: which values each parameter can have; by default any.
+        domain: which values each parameter can have; by default any value.
         length_factor: multiplies the fitted length scales. Below 1 the model is less certain away
             from its points.
-        running: points whose scores are not there yet, shape (m, d); they become the last of
-            `points`.
+        running: points whose evaluation still runs, shape (m, d); they become the last of `points`.
     """
 
     def __init__(
@@ -112,7 +112,7 @@ class GaussianProcess:
         self.noise = float(known.mean() + process.kernel_.k2.noise_level * self._spread**2)
 
     def __call__(self, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return mean (k,) and standard deviation (k,) of the true score at points (k, d)."""
+        """Return mean (k,) and standard deviation (k,) of the noiseless score at points (k, d)."""
         kernel = self._kernel(self._domain.features(at), self._features)
         explained = ((kernel @ self._inverse.T) ** 2).sum(axis=1)
         variance = np.maximum(TREND + self._signal - explained, 1e-12)
@@ -120,7 +120,7 @@ class GaussianProcess:
         return mean, self._spread * np.sqrt(variance)
 
     def covariance(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
-        """Return the covariance (k, m) of the true scores at points a (k, d) and b (m, d)."""
+        """Return the covariance (k, m) of the noiseless scores at points a (k, d) and b (m, d)."""
         a, b = self._domain.features(a), self._domain.features(b)
         from_a, from_b = (self._kernel(x, self._features) @ self._inverse.T for x in (a, b))
         explained = from_a @ from_b.T
@@ -138,9 +138,9 @@ class GaussianProcess:
 def moderate_variances(spreads: np.ndarray, replicas: np.ndarray) -> np.ndarray:
     """Return the squared standard error of each candidate's mean over its replicas, shape (n,).
 
-    Each is drawn towards those of all candidates.
-    A few replicas estimate a candidate's own variance badly. How far the true ones differ shows in
-    how much more the estimates scatter than chance lets them; the less, the more they are pooled.
+    A few replicas estimate a candidate's own variance badly, so each estimate is drawn towards the
+    estimates of all candidates. The true variances differ from each other if the estimates scatter
+    more than chance lets them. The less they differ, the more the estimates are drawn together.
 
     Source: G. K. Smyth, "Linear models and empirical Bayes methods", Stat. Appl. Genet. Mol. Biol.
     3 (2004) 3, section 6.2.
@@ -176,7 +176,7 @@ def _fit(
     Args:
         points: points in the form that the model learns from, (n, f).
         values: scores, moved and scaled to mean 0 and standard deviation 1, (n,).
-        noise: variance of each of these, (n,).
+        noise: variance of each scaled score, (n,).
         length_factor: multiplies the fitted length scales.
     """
     from sklearn.exceptions import ConvergenceWarning

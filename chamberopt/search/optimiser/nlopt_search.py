@@ -1,4 +1,4 @@
-"""Search with one algorithm of NLopt over the unit cube. The only file that imports nlopt."""
+"""Search the unit cube with an algorithm of NLopt. This is the only file that imports nlopt."""
 
 from __future__ import annotations
 
@@ -20,7 +20,8 @@ LOCAL = "LN_BOBYQA"
 class NloptThread:
     """Runs NLopt in a thread of its own, where it can wait for a score while the search goes on.
 
-    NLopt's random numbers are those of the thread: the seed is for all of its runs.
+    NLopt has one sequence of random numbers in each thread, so the seed is for all runs in the
+    thread.
     """
 
     def __init__(self, seed: int) -> None:
@@ -83,8 +84,8 @@ def run_nlopt(
     The function must keep its own record of points and values: NLopt's result is not used.
 
     Args:
-        step: first step of local algorithms, as a share of the bounds.
-        tolerance: step below which local algorithms stop, as a share of the bounds.
+        step: first step of local algorithms, as a share of the cube's side.
+        tolerance: step below which local algorithms stop, as a share of the cube's side.
         max_calls: number of calls of the function after which the run ends.
     Raises:
         InputError: the algorithm cannot search this number of parameters. Errors of the function

@@ -1,12 +1,15 @@
-"""The points of a search, asked for and told: one algorithm after another on one budget.
+"""Search the unit cube for the best score, with one algorithm after another on one budget.
+
+A caller asks for the next point, evaluates it, and tells its score. The budget is a number of
+evaluations, and each algorithm with its share of the budget is a phase of the search.
 
 A search ends for one of these reasons:
 
 1. The budget is spent: what is left of `optimizer.evaluations` is less than a whole evaluation
-   (BudgetSpentError). A point that got only a few replicas, as it is clearly worse than the best,
-   costs a part of one. A point that cannot be simulated, or that geometry alone shows to be no
-   better, costs nothing, until there are as many of those as the budget.
-2. All points were evaluated, where every parameter has levels.
+   (BudgetSpentError). A point that got only a few replicas, as it is clearly worse than the best
+   point, costs a part of an evaluation. A point that cannot be simulated, or that geometry alone
+   shows to be no better, costs nothing, until there are as many of these points as the budget.
+2. All points were evaluated, where every parameter has a finite number of values.
 3. It has converged: the last phase ends because the steps of its local algorithm are below
    `optimizer.tolerance` (nlopt_search.py), or rounds of local searches find no new point.
 4. The user stops it: run_study.py asks `stop()` before each evaluation, finishes those that run and
@@ -14,7 +17,7 @@ A search ends for one of these reasons:
 5. An error ends it: the start cannot be simulated, an algorithm cannot take the parameters, the
    disk is full, or workers are lost. A candidate that cannot be simulated does not end it.
 
-A phase ends in the same way, at its share of the budget.
+A phase ends in the same ways, at its share of the budget.
 """
 
 from __future__ import annotations
@@ -55,24 +58,24 @@ Wait = Generator[np.ndarray | None, None, None]
 
 
 class BudgetSpentError(Exception):
-    """Ends a phase, or the search, from inside an algorithm."""
+    """Raised inside an algorithm when the budget of its phase, or of the search, is spent."""
 
 
 class PointSearch:
     """Searches the unit cube for the point with the largest score, beginning at the start.
 
-    Each point is asked for once. Evenly spread points and those of the model may be evaluated
-    `settings.batch` at a time: the next is proposed when all but the last `batch - 1` have scores.
-    Other algorithms take one point after another. The same seed and the same scores give the same
-    search. `points` (d,) are all that were asked for; the first of them have `scores`. `phases`
-    are those that ran.
+    Each point is asked for once. Evenly spread points and points of the model may be evaluated
+    `settings.batch` at a time: the next point is proposed when all but the last `batch - 1` points
+    have scores. Other algorithms take one point after another. The same seed and the same scores
+    give the same search. `points` (d,) are all points that were asked for. `scores` are the scores
+    of the first of these points. `phases` are the algorithms that ran.
 
     Args:
         start: first point, shape (d,).
         settings: the table [optimizer] of the study: algorithm, budget and so on.
         observe: function that returns what the model learns; by default these are the scores, with
             unknown noise.
-        domain: which values each parameter can have; by default any.
+        domain: which values each parameter can have; by default any value.
         begin_with: points (d,) that are evaluated after the start.
     """
 
@@ -98,17 +101,17 @@ class PointSearch:
     def ask(self) -> np.ndarray | None:
         """Return the next point (d,) to evaluate.
 
-        Return None if scores of earlier points must be told first, and when the search has ended.
-        Raises InputError if an algorithm cannot take these parameters.
+        The result is None if scores of earlier points must be told first, and when the search has
+        ended. Raises InputError if an algorithm cannot take these parameters.
         """
         return next(self._steps, None)
 
     def tell(self, score: float, cost: float = 1.0) -> None:
-        """Take the score of the oldest point that has none.
+        """Take the score of the oldest point that has no score yet.
 
         Args:
             score: a finite number, to be maximised.
-            cost: cost of its evaluation: 1 for one with all replicas, less for one with fewer.
+            cost: cost of the point's evaluation: 1 with all replicas, less with fewer replicas.
         """
         self.scores.append(score)
         self._costs.append(cost)
@@ -138,7 +141,7 @@ class PointSearch:
                 yield from self._climb(LOCAL, self._budget, step, nlopt)
 
     def _plan(self) -> list[tuple[str, float]]:
-        """Return the algorithm of each phase, and the share of the budget at which it ends."""
+        """Return the algorithm of each phase, and the share of the budget at the phase's end."""
         phases, budget = self._settings.phases, self._budget
         if phases:
             ends = np.cumsum([phase.share for phase in phases]).tolist()
@@ -151,7 +154,7 @@ class PointSearch:
         return [(phase, min(1.0, n / budget)) for phase, n in zip(AUTO, counts, strict=True)]
 
     def _run(self, phase: str, limit: int, nlopt: NloptThread) -> Wait:
-        """Run one phase until it converges, or until all points so far cost `limit` evaluations."""
+        """Run an algorithm until it converges, or until all points so far cost `limit`."""
         limit = min(limit, self._budget)
         left = yield from self._left(limit)
         if not left:
@@ -192,7 +195,7 @@ class PointSearch:
 
         Args:
             algorithm: NLopt's name of the algorithm.
-            limit: largest number of points.
+            limit: cost of all points of the search, in evaluations, at which the algorithm ends.
             step: first step, as a share of the unit cube's side.
             nlopt: thread in which NLopt runs.
         """
@@ -229,9 +232,10 @@ class PointSearch:
         return self._numbers[key]
 
     def _left(self, limit: int) -> Generator[np.ndarray | None, None, int]:
-        """Return how many more whole evaluations may begin before all so far cost `limit`.
+        """Return how many more whole evaluations may begin before all evaluations cost `limit`.
 
-        Where none is left, wait for those that run, because they may turn out to cost less.
+        If none may begin, wait for the evaluations that run, because they may cost less than a
+        whole evaluation.
         """
         if len(self.points) >= self._domain.size:
             return 0
@@ -245,7 +249,7 @@ class PointSearch:
         return 0
 
     def _wait(self, running: int = 0) -> Wait:
-        """Wait until no more than the last `running` points are without scores."""
+        """Wait for scores until at most the last `running` points have none."""
         while len(self.points) - len(self.scores) > running:
             yield None
 

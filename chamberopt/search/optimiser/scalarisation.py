@@ -1,4 +1,4 @@
-"""Two objectives as one score, with weights drawn for each step of the search (ParEGO).
+"""Join two objectives to one score, with random weights for each step of the search (ParEGO).
 
 Source: J. Knowles, "ParEGO", IEEE Trans. Evol. Comput. 10 (2006) 50.
 """
@@ -23,12 +23,12 @@ def scalarise(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Join several objectives of each candidate to one score, to be maximised.
 
-    It is minus the augmented Tchebycheff distance from the best value of each objective.
-    Each point of the Pareto front is the best one for some weights.
+    The score is minus the augmented Tchebycheff distance from the best value of each objective.
+    Each point of the Pareto front has the best score for some weights.
 
     Args:
         values: objectives of the candidates, shape (n, k).
-        variances: their squared standard errors, shape (n, k).
+        variances: squared standard errors of the values, shape (n, k).
         weight: weights of the objectives, shape (k,).
         among: candidates that define the range of each objective, shape (n,) bool; default all.
     Returns:

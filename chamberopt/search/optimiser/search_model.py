@@ -1,4 +1,4 @@
-"""What a search knows: a model of the score, of each limited figure, and of what can be simulated.
+"""Model what a search has learnt: the score, figures with limits, and what can be simulated.
 
 Source for constraints with models of their own: J. R. Gardner et al., "Bayesian optimization with
 inequality constraints", ICML 2014.
@@ -44,12 +44,11 @@ class Observations:
 
     scores: score of each candidate, to be maximised, (n,).
     variances: squared standard errors of the scores, (n,).
-    simulated: which candidates were simulated, (n,) bool; the figures of the others are not looked
-        at.
-    figures: the figures of the candidates that have limits.
+    simulated: which candidates were simulated, (n,) bool; figures of other candidates are not used.
+    figures: the figures that have limits.
     spared: which candidates were not simulated because geometry shows them to be no better, (n,)
-        bool; their scores are the largest that they can have. Of the others that were not
-        simulated nothing is known but that.
+        bool. Their scores are the largest scores that they can have. The other candidates without
+        a simulation could not be simulated.
     """
 
     scores: np.ndarray
@@ -60,17 +59,18 @@ class Observations:
 
 
 class SearchModel:
-    """Models of the score, of each figure with limits, and of what can be simulated, in one search.
+    """Models of a search: of the score, of each figure with limits, and of what can be simulated.
 
     Args:
-        points: all points whose evaluation began, shape (m, d). The first n are those of `seen`,
-            the evaluation of the others still runs.
+        points: all points whose evaluation began, shape (m, d). The first n are the points of
+            `seen`; the evaluation of the other points still runs.
         seen: what is known of the points that were evaluated.
         length_factor: multiplies the fitted length scales; below 1 the models are less certain away
             from their points.
-        learns_bounds: whether the model of the score learns the bounds of what was spared, for
-            pictures. A search does better where it does not: a cliff bends a smooth model, also on
-            the side that is good. It learns where candidates are spared, as where they fail.
+        learns_bounds: whether the model of the score learns the largest possible scores of
+            candidates that were spared a simulation, for pictures. A search does better without
+            them, because a sudden drop of the score bends a smooth model, also on the good side.
+            For the model of what can be simulated, spared candidates are like candidates that fail.
     """
 
     def __init__(
@@ -109,8 +109,9 @@ class SearchModel:
     def expected(self, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return mean and standard deviation of the score that a shop gets at points (k, d), (k,).
 
-        The shop aims at each point, and gets one that the tolerances allow. Both are means over
-        these; where the study counts the worst value over tolerances, they are those of the worst.
+        The shop aims at each point, and gets a point near it that the tolerances allow. Mean and
+        deviation are averaged over these points. If the study counts the worst value over
+        tolerances, they are taken at the worst of these points.
         """
         if self.domain.counts_worst:
             return self.score(self._worst(at))
@@ -125,11 +126,12 @@ class SearchModel:
         return places
 
     def covariance(self, at: np.ndarray, aims: np.ndarray) -> np.ndarray:
-        """Return the covariance (k, m) of the scores at points and of what a shop gets at others.
+        """Return the covariance (k, m) between scores at points and scores that a shop gets.
 
         Args:
-            at: points, (k, d).
-            aims: points at which a shop aims and gets one that the tolerances allow, (m, d).
+            at: points whose scores are taken exactly there, (k, d).
+            aims: points at which a shop aims, (m, d); it gets a point near each that the tolerances
+                allow.
         """
         if self.domain.counts_worst:
             return self.score.covariance(at, self._worst(aims))
@@ -140,10 +142,10 @@ class SearchModel:
     def feasible(self, at: np.ndarray, margin: float = 0.0) -> np.ndarray:
         """Return the probability (k,) that a shop that aims at points (k, d) meets all limits.
 
-        That of the worst point counts that the tolerances allow.
+        It is the lowest probability among the points that the tolerances allow.
 
         Args:
-            margin: standard errors of an evaluation by which a figure must be inside.
+            margin: by how many standard errors of an evaluation a figure must be inside its limits.
         """
         around = self.domain.around(at)
         worst: np.ndarray = np.min([self._feasible(one, margin) for one in around], axis=0)

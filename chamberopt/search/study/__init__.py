@@ -1,4 +1,4 @@
-"""What a study file says: design, what varies, what is maximised, what must hold, and budget."""
+"""Read and check study files: the design, varied parameters, objective, constraints, budget."""
 
 from chamberopt.search.study.constraints import Limits
 from chamberopt.search.study.load import load, load_study

@@ -1,4 +1,4 @@
-"""Constraints: what the file may ask for, and whether a candidate's estimates meet it."""
+"""Constraints: limits in a study file, and whether a candidate's estimates meet them."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -22,7 +22,7 @@ MET = {FEASIBLE: "met", NOT_KNOWN: "not known", INFEASIBLE: "not met"}  # a limi
 
 
 class Violation(NamedTuple):
-    """A limit that a candidate violates, or may violate, with its figure and a text."""
+    """A limit that a candidate violates, or may violate, with the limited figure and a text."""
 
     figure: str  # name of the metric, or of the number of the design
     text: str  # the figure, and how it compares with the limit
@@ -52,7 +52,7 @@ def zone_constraints(design: Design) -> dict[str, Limits]:
 
 
 def zone_limits(zone: Zone) -> Iterator[tuple[str, str, Limits]]:
-    """Return each key of the design file that limits a zone, the limited metric, and the limit."""
+    """Yield each limit of a zone: its key in the design file, the limited metric, and the limit."""
     for key, limited in LIMITED.items():
         given = getattr(zone, key)
         if given is not None:
@@ -64,8 +64,9 @@ def zone_limits(zone: Zone) -> Iterator[tuple[str, str, Limits]]:
 def judge_zones(design: Design, metrics: Mapping[str, Estimate]) -> dict[str, list[dict[str, Any]]]:
     """Return which limits of each zone are met, by name of the zone, as plain JSON values.
 
-    Each limit has a row with its key in the design file, the limit, the metric that it limits, and
-    its standing: whether the whole interval of the metric is "met", "not met" or "not known" to be.
+    Each limit has a row: its key in the design file, the limit, the metric that it limits, and its
+    standing. The standing is "met" or "not met" if it holds for the metric's whole interval, else
+    "not known".
     """
     judged: dict[str, list[dict[str, Any]]] = {}
     for zone in design.zones:
@@ -116,7 +117,7 @@ def limit_problems(
 
 
 def exact(values: Mapping[str, float | str]) -> dict[str, Estimate]:
-    """Return the numbers among values of a design as exact estimates; texts are left out."""
+    """Return a design's values that are numbers as exact estimates; texts are left out."""
     numbers = ((k, value) for k, value in values.items() if not isinstance(value, str))
     return {name: Estimate(value, 0.0) for name, value in numbers}
 
@@ -124,10 +125,10 @@ def exact(values: Mapping[str, float | str]) -> dict[str, Estimate]:
 def expected_violation(figure: Estimate, limits: Limits) -> float:
     """Return the expected excess of a figure's true value over its limits, relative to the limits.
 
-    The mean of max(0, x - limit) for x normally distributed about the estimate. Even an estimate
-    within its limit has a small penalty if it is uncertain, which keeps the search away from the
-    limit by about its own uncertainty. For an exact number it is the plain excess, and 0 for a
-    figure that is not resolved.
+    It is the mean of max(0, x - limit) for x normally distributed about the estimate. Even an
+    estimate within its limit has a small excess if it is uncertain. This keeps the search away from
+    the limit by about the uncertainty. The result is the plain excess for an exact number, and 0
+    for a figure with too few dents.
     """
     if figure.in_words == NOT_RESOLVED:
         return 0.0
@@ -144,7 +145,7 @@ def expected_violation(figure: Estimate, limits: Limits) -> float:
 def describe_violations(name: str, figure: Estimate, limits: Limits) -> list[str]:
     """Return a text for each limit that the value of a figure violates, whatever its interval.
 
-    Return nothing if the figure is not resolved.
+    The list is empty if the figure has too few dents.
     """
     if figure.in_words == NOT_RESOLVED:
         return []
@@ -184,9 +185,9 @@ def standard_error(figure: Estimate) -> float:
 
 
 def _excesses(figure: Estimate, limits: Limits) -> list[tuple[float, float, str]]:
-    """Return each limit of a figure, how far its value is beyond it, and the violation in words.
+    """Return each limit of a figure, the excess of the figure's value, and the violation in words.
 
-    How far is negative where the value is within the limit.
+    The excess is negative if the value is within the limit.
     """
     excesses = []
     if limits.min is not None:

@@ -1,4 +1,4 @@
-"""Load study files; all problems of a file and of the design it names are reported in one error."""
+"""Load study files, and report all problems of a file and its design in one error."""
 
 import os
 from collections.abc import Callable, Mapping
@@ -19,7 +19,7 @@ from chamberopt.search.study.schema import Study
 def load_study(path: str | Path) -> Study:
     """Load a study file and the design that it names.
 
-    Raises InputError with every problem of both, each with its file and line.
+    Raises InputError with every problem of both files, each with its file and line.
     """
     path = Path(path)
     source, data = read_toml(path, "study")
@@ -32,7 +32,7 @@ def load_study(path: str | Path) -> Study:
 def load(path: str | Path) -> Design | Study:
     """Load a file that is either a design or a study.
 
-    It is a study if it names a design, or has [vary] or [optimizer].
+    The file is a study if it names a design, or has a table [vary] or [optimizer].
     """
     path = Path(path)
     source, data = read_toml(path, "design or study")
@@ -60,7 +60,7 @@ def _study(path: Path, source: str, data: dict[str, object]) -> Study:
 
 
 def _with_dotted_names(data: dict[str, Any]) -> dict[str, Any]:
-    """Return the study's data with [vary], [constraints] and objective.sum by whole dotted names.
+    """Return the data of a study file, with dotted names as keys of [vary], [constraints] and sums.
 
     A file may write such names as nested tables: [vary.chamber] with height_mm becomes
     "chamber.height_mm".
@@ -76,7 +76,7 @@ def _with_dotted_names(data: dict[str, Any]) -> dict[str, Any]:
 
 
 def _other_problems(data: Mapping[str, object], path: Path, source: str) -> list[str]:
-    """Return the problems of a study file beside its design, which cannot be loaded, as texts."""
+    """Return the problems of a study file itself, as texts, where its design cannot be loaded."""
     try:
         Study.model_validate({**data, "design": None}, context={"folder": path.parent})
     except ValidationError as error:
@@ -91,11 +91,12 @@ def _flatten(
     prefix: str = "",
     is_table: Callable[[Mapping[str, Any]], bool] = lambda _: False,
 ) -> dict[str, Any]:
-    """Return a table's values by dotted name, whether a file has quoted or dotted keys or tables.
+    """Return a table's values by dotted name; a file may nest tables or write dotted names.
 
     Args:
-        prefix: what comes before each name.
-        is_table: whether a mapping is what is named, such as { min = 0.9 }, not a part of a name.
+        prefix: text before each name.
+        is_table: tells whether a mapping is itself a value, such as { min = 0.9 }, and its key thus
+            the last part of a name.
     """
     flat: dict[str, Any] = {}
     for name, value in table.items():

@@ -1,11 +1,11 @@
-"""The parameters that a study varies: which values they may have, and their place in the unit cube.
+"""The parameters that a study varies: their values, and their coordinates in the unit cube.
 
 A search works on points of the unit cube [0, 1]^d, where d is the number of parameters in [vary];
-0 and 1 are the bounds of each. Numbers are rounded before they are simulated, because a shop
-cannot set more decimals: to about a thousandth of the distance between the bounds.
+0 and 1 are the bounds of each. Numbers are rounded before they are simulated, to about a thousandth
+of the distance between the bounds, because a shop cannot set more decimals.
 
-If `chamber.shape` varies, a key of the chamber that only some of the shapes have is a parameter of
-their candidates alone; the others have NONE in its place.
+If `chamber.shape` varies, some shapes may have a key of the chamber that other shapes lack. The key
+is then a parameter of candidates with these shapes; other candidates have the value NONE.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ CATALOGUE = "catalogue"  # in the place of a list: the sizes in which balls are 
 
 
 class Varied(FileTable):
-    """What one parameter may be: any number between bounds, steps between them, or values."""
+    """The values that a varied parameter may have: any number between bounds, steps, or a list."""
 
     low: float | None = Field(default=None, description="lower bound")
     high: float | None = Field(default=None, description="upper bound")
@@ -63,17 +63,17 @@ class Varied(FileTable):
             yield Problem("step", f"{text} between {self.low:g} and {self.high:g}")
 
     def _fits(self, width: float) -> bool:
-        """Return whether steps of this size give at least two values between bounds, not too many.
+        """Return whether steps of this size give two or more, but not too many values.
 
         Args:
-            width: distance of the bounds.
+            width: distance between the bounds.
         """
         step = self.step or 0.0
         return 0.0 < step <= width * (1.0 + NEAR) and width < MAX_LEVELS * step
 
     @model_serializer
     def _as_written(self) -> object:
-        """Return the shortest form in which a study file can state these values."""
+        """Return the shortest form in which a study file can write these values."""
         if self.choose:
             return {"choose": list(self.choose)}
         if self.step is None:
@@ -91,10 +91,10 @@ class Varied(FileTable):
         return self.texts or self.bounds
 
     def place(self, value: float | str) -> float:
-        """Return the number that stands for a value of the parameter.
+        """Return the number that stands for a value of the parameter, on an axis or in a search.
 
-        That is a number itself, or the position of a text among `texts`. A value that a candidate
-        does not have (NONE) has the least number.
+        It is the value itself, or the position of a text among `texts`. It is the least number for
+        NONE, the value of candidates that lack the parameter.
         """
         if value == NONE and NONE not in self.texts:
             return self.bounds[0]
@@ -116,7 +116,7 @@ class Varied(FileTable):
     def values(self, is_whole: bool) -> tuple[float, ...]:
         """Return all values of the parameter in order; for texts, their positions in `texts`.
 
-        Return nothing if it may be any number between the bounds.
+        The result is empty if the parameter may be any number between the bounds.
 
         Args:
             is_whole: whether the parameter can only be a whole number.
@@ -133,7 +133,7 @@ class Varied(FileTable):
 
 
 def _from_list(given: object) -> object:
-    """Return a list [low, high] of a study file as a table; all else stays as it is."""
+    """Return a list [low, high] of a study file as a table; any other value stays as it is."""
     if isinstance(given, (list, tuple)) and len(given) == 2:
         return {"low": given[0], "high": given[1]}
     return given
@@ -143,15 +143,16 @@ Vary = Annotated[Varied, BeforeValidator(_from_list)]
 
 
 def from_catalogue(vary: Mapping[str, Any], material: str | None) -> dict[str, Any]:
-    """Return [vary] with the diameters in which balls are sold in the place of "catalogue".
+    """Return the table [vary] with "catalogue" replaced by the diameters in which balls are sold.
 
     Materials of balls that have several names get their first name.
 
     Args:
-        material: shot.material of the design. If it varies, balls of all its materials must be
-            sold in a size.
+        material: shot.material of the design. If [vary] varies it, a diameter counts only if balls
+            of all these materials are sold in it.
     Raises:
-        CrossCheckError: a size is asked of balls of no material.
+        CrossCheckError: the material of the balls is not given, or fewer than two diameters are
+            sold between the bounds.
     """
     read = dict(vary)
     others = vary.get("shot.material")
@@ -184,29 +185,29 @@ def from_catalogue(vary: Mapping[str, Any], material: str | None) -> dict[str, A
 
 
 def has_key(design: Design, name: str) -> bool:
-    """Return whether a design has a key: not every shape has all keys of the chamber.
+    """Return whether a design has a key, as not every chamber shape has all keys of the chamber.
 
     Args:
-        name: dotted name of the key; True for a key outside the chamber.
+        name: dotted name of the key. All designs have the keys outside the table of the chamber.
     """
     key = name.removeprefix("chamber.").split(".")[0]
     return not name.startswith("chamber.") or key in type(design.chamber).model_fields
 
 
 def setting(design: Design, name: str) -> float | str:
-    """Return the design's value of a parameter that varies.
+    """Return the design's value of a parameter that a study varies.
 
-    Return NONE if the design's chamber shape does not have it. Raises InputError if the design has
-    no value for it.
+    The value is NONE if the design's chamber shape does not have the parameter. Raises InputError
+    if the design has no value for it.
     """
     return design.setting(name) if has_key(design, name) else NONE
 
 
 def designs_by_shape(design: Design, vary: Mapping[str, Varied]) -> dict[str, Design]:
-    """Return the design in each chamber shape that it may have, by shape, its own one first.
+    """Return copies of the design in each chamber shape that it may have, its own shape first.
 
-    Parameters that only another shape has are at their first value there. Raises InputError if the
-    design cannot have a shape.
+    Parameters that the design's own shape lacks have their first value in the copies. Raises
+    InputError if the design cannot have a shape.
     """
     own = design.chamber.shape
     found = {own: design}
@@ -269,7 +270,7 @@ def vary_problems(design: Design, name: str, varied: Varied) -> list[Problem]:
 
 
 def _choice_problems(design: Design, name: str, varied: Varied) -> Iterator[str]:
-    """Return the reasons why a parameter that is a text cannot vary as [vary] says."""
+    """Yield the reasons why a parameter that is a text cannot vary as [vary] says."""
     allowed, start = design.choices()[name], design.setting(name)
     unknown = [one for one in varied.texts if one not in allowed]
     if not varied.texts:
@@ -299,7 +300,7 @@ def _misses(designs: Mapping[str, Design], vary: Mapping[str, Varied], side: int
 
     Args:
         designs: a design that has the parameter, for each parameter.
-        side: 0 for the lower bound, 1 for the upper one.
+        side: 0 for the lower bound, 1 for the upper bound.
     """
     ends = []
     for name, varied in vary.items():
@@ -311,16 +312,17 @@ def _misses(designs: Mapping[str, Design], vary: Mapping[str, Varied], side: int
 
 
 def with_key(by_shape: Mapping[str, Design], name: str) -> Design | None:
-    """Return the first of the designs by shape that has a key; None if none has it."""
+    """Return the first of the designs by chamber shape that has a key; None if none has it."""
     return next((one for one in by_shape.values() if has_key(one, name)), None)
 
 
 def _where(
     by_shape: Mapping[str, Design], vary: Mapping[str, Varied], name: str
 ) -> tuple[int, frozenset[int]] | None:
-    """Return with which chamber shapes candidates have a parameter; None if all have it.
+    """Return the chamber shapes with which candidates have a parameter; None if all have it.
 
-    Return the position of the shape among the parameters, and the positions of these shapes.
+    The result is the position of `chamber.shape` among the parameters, and the positions of these
+    shapes among its values.
     """
     if SHAPE not in vary or all(has_key(one, name) for one in by_shape.values()):
         return None
@@ -330,14 +332,14 @@ def _where(
 
 
 class ParameterSpace:
-    """Maps the varied parameters of a design to points of the unit cube, and back.
+    """Converts values of a study's varied parameters to points of the unit cube, and back.
 
     `start` is the design of the study as a point (d,), `domain` says which values each coordinate
     can have, and `bounds` are low and high (d, 2) in the units of the file.
 
     Args:
-        counts_worst: whether the worst value over the design's tolerances counts in the search,
-            instead of the mean.
+        counts_worst: whether the worst score over the design's tolerances counts in the search,
+            instead of the mean score.
     """
 
     def __init__(
@@ -367,9 +369,10 @@ class ParameterSpace:
         return np.array([self._share(k, place) for k, place in enumerate(places)])
 
     def values_on(self, k: int, shares: np.ndarray) -> np.ndarray:
-        """Return values of parameter k in the unit of the file; for texts, their positions.
+        """Return values of parameter k at coordinates of the unit cube, in the unit of the file.
 
-        A share between those of two allowed values gives a number between these.
+        Texts are given by their positions. A coordinate between two allowed values gives a number
+        between these values.
 
         Args:
             shares: coordinates of the unit cube, (n,).
@@ -420,9 +423,10 @@ class ParameterSpace:
 
 
 def bound_at(value: float | str, ends: Sequence[float | str]) -> str:
-    """Return "lower" or "upper" for a number on that bound, to a thousandth of their distance.
+    """Return which bound of its parameter a number is at, "lower" or "upper"; else "".
 
-    Return "" for a number between the bounds, and for a text.
+    A number is at a bound if it differs from it by at most a thousandth of the bounds' distance. A
+    text gives "".
     """
     if isinstance(value, str):
         return ""

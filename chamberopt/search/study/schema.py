@@ -1,4 +1,4 @@
-"""The tables of a study file: what varies, what is maximised, what must hold, and the budget."""
+"""The tables of a study file: varied parameters, objective, constraints and budget."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -112,7 +112,7 @@ class Objective(FileTable):
 
 
 class Phase(FileTable):
-    """A part of a search with one algorithm."""
+    """A phase of a search: an algorithm, and its share of the budget."""
 
     algorithm: Algorithm = Field(
         description='"sobol", "surrogate" or an NLopt name without its prefix'
@@ -128,7 +128,7 @@ class Phase(FileTable):
 
 
 class Optimizer(FileTable):
-    """How the best design is searched for, and with which budget."""
+    """The table [optimizer]: how to search for the best design, and with which budget."""
 
     algorithm: Algorithm = Field(
         default="auto", description="auto, sobol, surrogate, or an NLopt name without prefix"
@@ -177,7 +177,7 @@ class Optimizer(FileTable):
 
 
 class Study(FileTable):
-    """A design, what may vary in it, what is maximised, what must hold, and the budget.
+    """A study: a design, its varied parameters, objective and constraints, and the budget.
 
     `vary` maps the dotted name of a parameter to the values it may have, in the units of the file.
     """
@@ -226,7 +226,7 @@ class Study(FileTable):
     @model_validator(mode="before")
     @classmethod
     def _read_begin_with(cls, data: Any, info: ValidationInfo) -> object:
-        """Replace the design files in `begin_with` by their values of what varies.
+        """Replace the design files in `begin_with` by their values of the varied parameters.
 
         So the study is complete without these files.
         """
@@ -246,15 +246,15 @@ class Study(FileTable):
 
     @property
     def all_constraints(self) -> dict[str, Limits]:
-        """Limits by name of the metric or number: those of the study and of its design's zones."""
+        """Limits of the study and of its design's zones, by the limited metric or number."""
         return {**self.constraints, **zone_constraints(self.design)}
 
     @property
     def first_look(self) -> int | None:
-        """Number of replicas after which a candidate of the search may be given up.
+        """Number of replicas after which the search may give up a candidate as clearly worse.
 
-        It is None where each candidate gets all replicas: with two objectives, or where the design
-        asks for an accuracy of the objective.
+        It is None if each candidate gets all replicas: with two objectives, or if the design asks
+        for an accuracy of the objective, or if the study sets no such number.
         """
         accuracy = self.at_search_accuracy(self.design).process.accuracy
         few = self.optimizer.first_replicas
@@ -262,7 +262,7 @@ class Study(FileTable):
         return few if refines and 0 < few < accuracy.replicas else None
 
     def at_search_accuracy(self, design: Design) -> Design:
-        """Return a candidate's design with the accuracy of the search, usually a coarser one.
+        """Return a candidate's design with the accuracy of the search, which is usually coarser.
 
         Raises InputError if [search_accuracy] does not fit the design.
         """
@@ -271,7 +271,7 @@ class Study(FileTable):
         return design.changed({f"{tables.get(k, 'process.accuracy')}.{k}": v for k, v in values})
 
     def _shape_problems(self) -> list[Problem]:
-        """Return the reasons why the design cannot have the chamber shapes of [vary]."""
+        """Return the reasons why the design cannot have the chamber shapes that [vary] lists."""
         if SHAPE not in self.vary:
             return []
         if problems := vary_problems(self.design, SHAPE, self.vary[SHAPE]):
