@@ -99,7 +99,7 @@ def print_json(values: Mapping[str, object]) -> None:
 def _json_value(value: object) -> object:
     """Return an estimate or a record as JSON values. Raise TypeError for other types."""
     from chamberopt.common.estimate import Estimate
-    from chamberopt.results.records import Table
+    from chamberopt.common.record_types import Table
 
     if isinstance(value, Estimate):
         return value.interval_json()

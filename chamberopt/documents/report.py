@@ -104,7 +104,7 @@ def report(result: Result) -> Document:
         influence_section(study, label) if study else None,
         coverage_section(shown, of, scenes),
         zones_section(result),
-        tolerance_section(result.record.tolerances),
+        tolerance_section(result),
         _accuracy_and_cost(result, trials),
         _effects(result),
         _notes(result),

@@ -17,7 +17,7 @@ from chamberopt.documents.coverage import figures
 from chamberopt.documents.document import Block, Document, Section, Sentence, Table
 from chamberopt.documents.report import limits_of_intervals, notes_of, seed_text
 from chamberopt.documents.study import exposed_target
-from chamberopt.documents.tolerances import tolerated_figures
+from chamberopt.documents.tolerances import sheet_rows
 from chamberopt.documents.wording import metric_label, plain
 from chamberopt.results.load import load_start
 
@@ -282,12 +282,7 @@ def _tolerances(result: Result) -> Iterator[Row]:
     elif found is None:
         yield "", "What they cost was not simulated: chamberopt simulate --tolerances tells it."
     else:
-        wanted = [metric_label(name) for name in ("almen_intensity", "mean_coverage")]
-        first, *others = tolerated_figures(found)
-        for label, one in [first, *(pair for pair in others if pair[0] in wanted)][:3]:
-            worst = f"; worst {label.number(one.corner.simulated)}" if one.corner else ""
-            ends = f"5 % below {label.number(one.q05)}; 5 % above {label.number(one.q95)}"
-            yield label.with_unit, f"{ends}{worst}"
+        yield from sheet_rows(found)
 
 
 def _warnings(result: Result) -> Iterator[Row]:

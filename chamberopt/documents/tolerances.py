@@ -1,9 +1,16 @@
-"""Text about the tolerances of a design."""
+"""Text about the tolerances of a design.
+
+Every interval of a ToleratedFigure is a column, here and in the CSV table. COLUMNS has the words of
+those that have better words than their names.
+"""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, NamedTuple
 
+from chamberopt.common.errors import InputError
+from chamberopt.common.estimate import Estimate
 from chamberopt.common.number_text import estimate_text
 from chamberopt.common.number_text import plain as ascii_number
 from chamberopt.documents.document import Block, Chart, Items, Section, Sentence, Table
@@ -12,13 +19,40 @@ from chamberopt.documents.wording import Label, metric_label, plain
 from chamberopt.pictures.charts.tolerances import TornadoBar, TornadoPanel, tornado_figure
 
 if TYPE_CHECKING:
-    from chamberopt.peening.tolerances import ToleranceResult
-    from chamberopt.results.records import EffectEnds, TolerancesRecord, ToleratedFigureRecord
+    from chamberopt.peening.tolerance_result import ToleranceResult, ToleratedFigure
+    from chamberopt.results.load import Result
 
 MAX_CHARTS = 3
+MOST_ON_SHEET = 3  # figures
+ON_SHEET = "almen_intensity", "mean_coverage"  # beside the figure of the worst corner
 
 
-def tolerated_figures(found: TolerancesRecord) -> list[tuple[Label, ToleratedFigureRecord]]:
+class Column(NamedTuple):
+    """The words for an interval of a figure, in three places; empty where it is left out."""
+
+    page: str
+    terminal: str
+    sheet: str
+
+
+COLUMNS = {
+    "nominal": Column("as designed", "as designed", ""),
+    "q05": Column("5 %", "q05", "5 % below"),
+    "q95": Column("95 %", "q95", "5 % above"),
+    "lowest": Column("", "", ""),
+    "highest": Column("", "", ""),
+    "worst_corner_simulated": Column("worst corner", "in the worst corner", "worst"),
+    "worst_corner_predicted": Column("the same to first order", "", ""),
+}
+
+
+def _columns(found: ToleranceResult) -> dict[str, Column]:
+    """Return the words for each interval that a figure has, by the names of the intervals."""
+    names = dict.fromkeys(name for one in found.figures.values() for name in one.intervals)
+    return COLUMNS | {name: Column(name, name, name) for name in names if name not in COLUMNS}
+
+
+def _labelled(found: ToleranceResult) -> list[tuple[Label, ToleratedFigure]]:
     """Return each figure over the tolerances with its label.
 
     The figure that is lowest in the worst corner comes first.
@@ -27,8 +61,9 @@ def tolerated_figures(found: TolerancesRecord) -> list[tuple[Label, ToleratedFig
     return [(metric_label(name), found.figures[name]) for name in names]
 
 
-def tolerance_section(found: TolerancesRecord | None) -> Section | None:
+def tolerance_section(result: Result) -> Section | None:
     """Return the report's section on tolerances, or None for a result without tolerances."""
+    found = result.record.tolerances
     if not found:
         return None
     text = (
@@ -48,11 +83,18 @@ def tolerance_section(found: TolerancesRecord | None) -> Section | None:
             for name, one in found.box.items()
         ],
     )
-    figures = tolerated_figures(found)
-    head = ("", "as designed", "5 %", "95 %", "worst corner", "the same to first order")
-    rows = [(label.with_unit, *_columns(label, one)) for label, one in figures]
-    content: list[Block] = [Sentence(text), ranges, Table("± 95 % intervals", head, rows)]
-    charted = [pair for pair in figures if any(map(_is_resolved, pair[1].effects.values()))]
+    figures = _labelled(found)
+    shown = {name: column.page for name, column in _columns(found).items() if column.page}
+    rows = [
+        (
+            label.with_unit,
+            *(label.number(one) if one else "" for one in map(figure.intervals.get, shown)),
+        )
+        for label, figure in figures
+    ]
+    table = Table("± 95 % intervals", ("", *shown.values()), rows)
+    content: list[Block] = [Sentence(text), ranges, table]
+    charted = [pair for pair in figures if any(e.is_resolved for e in pair[1].effects.values())]
     if charted:
         caption = (
             "What each tolerance alone changes: orange at its low end, blue at its high end, with "
@@ -63,14 +105,7 @@ def tolerance_section(found: TolerancesRecord | None) -> Section | None:
     return Section("Tolerances", [*content, Items(found.notes)])
 
 
-def _columns(label: Label, figure: ToleratedFigureRecord) -> list[str]:
-    estimates = [figure.nominal, figure.q05, figure.q95]
-    if figure.corner:
-        estimates += [figure.corner.simulated, figure.corner.predicted]
-    return [label.number(one) for one in estimates]
-
-
-def _panel(label: Label, figure: ToleratedFigureRecord) -> TornadoPanel:
+def _panel(label: Label, figure: ToleratedFigure) -> TornadoPanel:
     bars = {
         name: TornadoBar(name, label.scale(ends.low), label.scale(ends.high))
         for name, ends in figure.effects.items()
@@ -78,8 +113,36 @@ def _panel(label: Label, figure: ToleratedFigureRecord) -> TornadoPanel:
     return TornadoPanel(label.text, Label("change", label.unit).with_unit, bars)
 
 
-def _is_resolved(ends: EffectEnds) -> bool:
-    return any(abs(one.value) > one.half_width for one in (ends.low, ends.high))
+def sheet_rows(found: ToleranceResult) -> Iterator[tuple[str, str]]:
+    """Yield rows of the process sheet: what the tolerances do to the most important figures."""
+    wanted = [metric_label(name) for name in ON_SHEET]
+    first, *others = _labelled(found)
+    shown = {name: column.sheet for name, column in _columns(found).items() if column.sheet}
+    for label, figure in [first, *(pair for pair in others if pair[0] in wanted)][:MOST_ON_SHEET]:
+        known = figure.intervals
+        texts = [f"{shown[name]} {label.number(known[name])}" for name in shown if name in known]
+        yield label.with_unit, "; ".join(texts)
+
+
+def table_rows(result: Result) -> Iterator[dict[str, object]]:
+    """Yield a row of the CSV table for each figure and toleranced number.
+
+    Raises InputError for a result without tolerances.
+    """
+    found = result.record.tolerances
+    if not found:
+        remedy = "simulate a design that has [tolerances] with --tolerances"
+        raise InputError(f"{result.folder}: this result is without tolerances; {remedy}")
+    for figure_name, figure in found.figures.items():
+        for number, ends in figure.effects.items():
+            box = found.box[number]
+            row: dict[str, object] = {"figure": figure_name, "number": number}
+            row |= {"low": box.low, "high": box.high}
+            changes = {"change_at_low": ends.low, "change_at_high": ends.high}
+            for name in (*changes, *_columns(found)):
+                one: Estimate | None = {**changes, **figure.intervals}.get(name)
+                row |= {name: one and one.value, f"{name}_half_width": one and one.half_width}
+            yield row
 
 
 def tolerance_lines(found: ToleranceResult) -> list[str]:
@@ -87,9 +150,10 @@ def tolerance_lines(found: ToleranceResult) -> list[str]:
 
     They give the figures over all tolerances, the worst corner and the effect of each tolerance.
     """
-    rows = [["over the tolerances", "as designed", "q05", "q95", "in the worst corner"]]
+    shown = {name: column.terminal for name, column in _columns(found).items() if column.terminal}
+    rows = [["over the tolerances", *shown.values()]]
     for name, figure in found.figures.items():
-        known = (figure.nominal, figure.q05, figure.q95, figure.simulated)
+        known = map(figure.intervals.get, shown)
         rows.append([name, *(estimate_text(one) if one else "" for one in known)])
     lines = [f"{name:34}{''.join(f'{one:19} ' for one in ends)}".rstrip() for name, *ends in rows]
     if found.corner:
@@ -99,16 +163,16 @@ def tolerance_lines(found: ToleranceResult) -> list[str]:
     for name, figure in found.figures.items():
         lines.append(f"{name}: change at the low and at the high end of")
         small, none = [], []
-        for number in found.numbers:
-            effects = figure.effects[number.name]
-            if any(abs(end.value) > end.half_width for end in effects):
-                low, high = (estimate_text(end, sign=True) for end in effects)
-                span = f"{number.name} {ascii_number(number.low)} .. {ascii_number(number.high)}"
+        for number, ends in figure.effects.items():
+            box = found.box[number]
+            if ends.is_resolved:
+                low, high = (estimate_text(end, sign=True) for end in (ends.low, ends.high))
+                span = f"{number} {ascii_number(box.low)} .. {ascii_number(box.high)}"
                 lines.append(f"    {span:50}{low:21} {high}")
-            elif all(end.half_width == 0.0 for end in effects):
-                none.append(number.name)
+            elif ends.low.half_width == ends.high.half_width == 0.0:
+                none.append(number)
             else:
-                small.append(number.name)
+                small.append(number)
         lines += [f"    not resolved: {', '.join(small)}"] if small else []
         lines += [f"    does not depend on: {', '.join(none)}"] if none else []
     return [*lines, *note_lines(found.notes)]

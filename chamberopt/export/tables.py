@@ -3,15 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
-from chamberopt.common.errors import InputError
 from chamberopt.common.files import csv_text, write_text
+from chamberopt.documents.tolerances import table_rows
 from chamberopt.results.load import load_result, load_trials
 from chamberopt.search.trial_log import trials_as_csv
-
-if TYPE_CHECKING:
-    from chamberopt.common.estimate import Estimate
 
 
 def write_study_table(folder: Path, file: Path) -> None:
@@ -32,30 +28,4 @@ def write_tolerance_table(folder: Path, file: Path) -> None:
 
     Raises InputError for a result without tolerances.
     """
-    result = load_result(folder)
-    found = result.record.tolerances
-    if not found:
-        remedy = "simulate a design that has [tolerances] with --tolerances"
-        raise InputError(f"{folder}: this result is without tolerances; {remedy}")
-    rows = []
-    for name, figure in found.figures.items():
-        corner = figure.corner
-        values: dict[str, Estimate | None] = {
-            "nominal": figure.nominal,
-            "q05": figure.q05,
-            "q95": figure.q95,
-            "lowest": figure.lowest,
-            "highest": figure.highest,
-            "worst_corner_simulated": corner.simulated if corner else None,
-            "worst_corner_predicted": corner.predicted if corner else None,
-        }
-        for number, ends in figure.effects.items():
-            box = found.box[number]
-            row: dict[str, Any] = {"figure": name, "number": number}
-            row |= {"low": box.low, "high": box.high}
-            changes = {"change_at_low": ends.low, "change_at_high": ends.high}
-            for key, interval in (changes | values).items():
-                row[key] = interval and interval.value
-                row[f"{key}_half_width"] = interval and interval.half_width
-            rows.append(row)
-    write_text(file, csv_text(rows))
+    write_text(file, csv_text(list(table_rows(load_result(folder)))))

@@ -46,6 +46,13 @@ from chamberopt.peening.responses import (
     scale_of,
     with_errors_of,
 )
+from chamberopt.peening.tolerance_result import (
+    EffectEnds,
+    InCorner,
+    ToleranceResult,
+    ToleratedFigure,
+    ToleratedRange,
+)
 from chamberopt.simulation.variations import RunsProgress, Variations
 
 if TYPE_CHECKING:
@@ -184,44 +191,6 @@ NAMED = 3  # largest number of unresolved figures that a note names, instead of 
 DECIDING = ("p05_coverage", "mean_coverage", "impacts_per_mm2_s")
 
 
-@dataclass(frozen=True)
-class ToleratedFigure:
-    """A figure of a design over all values that the tolerances allow (their box).
-
-    nominal: value of the design as it is.
-    q05, q95: values below which the figure is in 5 % and in 95 % of the box.
-    lowest and highest: values in the corners of the box that are extreme to first order.
-    effects: changes of the figure at the low and at the high end of each number alone.
-    predicted, simulated: values in the worst corner; None where it could not be simulated.
-    agrees: whether both values differ by no more than noise, or than BENT of the change.
-    """
-
-    nominal: Estimate
-    q05: Estimate
-    q95: Estimate
-    lowest: Estimate
-    highest: Estimate
-    effects: dict[str, tuple[Estimate, Estimate]]
-    predicted: Estimate | None = None
-    simulated: Estimate | None = None
-    agrees: bool = True
-
-
-@dataclass(frozen=True)
-class ToleranceResult:
-    """All figures of a design over the values that its tolerances allow.
-
-    worst_for: the figure that is lowest in `corner`; empty where no such figure is resolved.
-    corner: value of each number in the worst corner.
-    """
-
-    numbers: tuple[ToleratedNumber, ...]
-    figures: dict[str, ToleratedFigure]
-    worst_for: str
-    corner: dict[str, float]
-    notes: tuple[str, ...]
-
-
 def simulate_tolerances(
     design: Design,
     chamber: Chamber,
@@ -308,7 +277,7 @@ def find_tolerances(
     worst_for = next((name for name in DECIDING if name in figures), "")
     found = {name: one.over_the_box() for name, one in figures.items()}
     if not worst_for:
-        return ToleranceResult(numbers, found, "", {}, tuple(notes))
+        return _result(numbers, found, "", {}, notes)
     slopes = figures[worst_for].slopes
     corner = {
         one.name: one.low if slope > 0.0 else one.high
@@ -321,21 +290,45 @@ def find_tolerances(
         raise
     except InputError as error:
         notes.append(f"the worst corner cannot be simulated, so first order is unchecked: {error}")
-        return ToleranceResult(numbers, found, worst_for, corner, tuple(notes))
+        return _result(numbers, found, worst_for, corner, notes)
     at = np.array([effective_move(there, one) - effective_move(design, one) for one in numbers])
     confidence = 1.0 - (1.0 - CONFIDENCE) / len(figures)  # of all figures together (Bonferroni)
     found = {
         name: figures[name].with_corner(one, at, simulated.metrics[name], confidence)
         for name, one in found.items()
     }
-    bent = [name for name, one in found.items() if not one.agrees]
+    bent = [name for name, one in found.items() if one.corner and not one.corner.agrees]
     if bent:
         notes.append(
             f"in the worst corner {', '.join(bent)}: not as first order in the tolerances says, by "
             f"more than noise and {BENT:.0%} of the change; what is simulated there counts, and "
             "q05 and q95 are rough"
         )
-    return ToleranceResult(numbers, found, worst_for, corner, tuple(notes))
+    return _result(numbers, found, worst_for, corner, notes)
+
+
+def _result(
+    numbers: tuple[ToleratedNumber, ...],
+    figures: dict[str, ToleratedFigure],
+    worst_for: str,
+    corner: dict[str, float],
+    notes: list[str],
+) -> ToleranceResult:
+    return ToleranceResult(
+        box={
+            one.name: ToleratedRange(
+                low=one.low,
+                nominal=one.nominal,
+                high=one.high,
+                changed_to=one.changed.value(one.name),
+            )
+            for one in numbers
+        },
+        worst_for=worst_for,
+        corner=corner,
+        figures=figures,
+        notes=notes,
+    )
 
 
 class _Figure:
@@ -379,7 +372,7 @@ class _Figure:
         highest = np.where(self.slopes > 0.0, *ends.T[::-1])
         extremes = [self._possible(self._at(corner)) for corner in (lowest, highest)]
         effects = {
-            x.name: (self._change(k, ends[k, 0]), self._change(k, ends[k, 1]))
+            x.name: EffectEnds(low=self._change(k, ends[k, 0]), high=self._change(k, ends[k, 1]))
             for k, x in enumerate(self._numbers)
         }
         return ToleratedFigure(
@@ -389,6 +382,7 @@ class _Figure:
             lowest=extremes[0],
             highest=extremes[1],
             effects=effects,
+            corner=None,
         )
 
     def with_corner(
@@ -404,15 +398,16 @@ class _Figure:
         """
         predicted = self._at(u)
         there, shown = on_scale(simulated, self._scale), self._back(predicted)
-        found = replace(found, predicted=shown, simulated=_without_replicas(simulated))
-        if not _is_resolved(there):
-            return found
-        if self._on[NOMINAL].shared[FIRST_OF_CALIBRATION:]:
-            there = with_errors_of(self._on[NOMINAL], there)
-            found = replace(found, simulated=self._back(there))
-        gap = paired_difference(there, predicted, confidence)
-        change = abs(predicted.value - self._on[NOMINAL].value)
-        return replace(found, agrees=abs(gap.value) <= max(gap.half_width, BENT * change))
+        agrees, simulated = True, _without_replicas(simulated)
+        if _is_resolved(there):
+            if self._on[NOMINAL].shared[FIRST_OF_CALIBRATION:]:
+                there = with_errors_of(self._on[NOMINAL], there)
+                simulated = self._back(there)
+            gap = paired_difference(there, predicted, confidence)
+            change = abs(predicted.value - self._on[NOMINAL].value)
+            agrees = bool(abs(gap.value) <= max(gap.half_width, BENT * change))
+        corner = InCorner(predicted=shown, simulated=simulated, agrees=agrees)
+        return found.model_copy(update={"corner": corner})
 
     def _at(self, u: np.ndarray) -> Estimate:
         """Return the figure on its scale after changes u (k,) of the numbers, to first order."""

@@ -11,9 +11,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from chamberopt.common.files import write_text
+from chamberopt.common.record_types import Interval, Table, WholeEstimate
 from chamberopt.common.versions import versions
 from chamberopt.peening.kirk_fit import MULTIPLES
-from chamberopt.results.records import CoverageAtTime, Interval, Table, WholeEstimate
+from chamberopt.results.records import CoverageAtTime
 
 if TYPE_CHECKING:
     from chamberopt.peening.calibrate import Calibrated

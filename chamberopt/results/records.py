@@ -7,18 +7,14 @@ checked before any value is used.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from datetime import datetime
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self, TypeAlias
 
 from pydantic import (
     AfterValidator,
-    BaseModel,
     ConfigDict,
     Field,
-    PlainSerializer,
     ValidationError,
-    WrapValidator,
     field_serializer,
     model_serializer,
     model_validator,
@@ -26,13 +22,14 @@ from pydantic import (
 
 from chamberopt.common.errors import InputError, first_wrong_value
 from chamberopt.common.estimate import Estimate
+from chamberopt.common.record_types import Interval, KnownInterval, Positive, Table, WholeEstimate
 from chamberopt.coverage.metrics import METRICS, find_metric, parse_objective
+from chamberopt.peening.tolerance_result import ToleranceResult
 from chamberopt.search.study.parameters import bound_at
 
 FORMAT = 8
 ROUNDING = 1e-9
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
-Positive = Annotated[float, Field(ge=0.0)]
 Count = Annotated[int, Field(ge=0)]
 Digest = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
 FileName = Annotated[str, Field(pattern=r"^[^/\\:]+$")]  # no path to another folder
@@ -46,60 +43,9 @@ def _dated(text: str) -> str:
     return text
 
 
-class Table(BaseModel):
-    """The base of all tables of result.json. Unknown keys are allowed and ignored."""
-
-    model_config = ConfigDict(strict=True, allow_inf_nan=False)
-
-    def as_json(self) -> dict[str, object]:
-        """Return the table as JSON values, without the keys that its writer did not set."""
-        return self.model_dump(mode="json", exclude_unset=True)
-
-
-class _IntervalValues(Table):
-    """A value and its half-width. An unknown number is null, and `in_words` tells why."""
-
-    value: float | None
-    half_width: Positive | None
-    in_words: str = ""
-
-    def estimate(self) -> Estimate:
-        return Estimate.from_interval_json(self.model_dump())
-
-
-class _KnownValues(_IntervalValues):
-    """An interval whose value must be known. Words may take the place of its half-width."""
-
-    @model_validator(mode="after")
-    def _is_known(self) -> Self:
-        if self.value is None or (self.half_width is None and not self.in_words):
-            raise ValueError("an estimate without a value or half_width")
-        return self
-
-
-class _EstimateValues(_KnownValues):
-    pseudovalues: list[float]
-    bias: float | None  # None if it is infinite, because there are no dents
-    shared: list[float]
-
-    def estimate(self) -> Estimate:
-        return Estimate.from_json(self.model_dump())
-
-
-def _estimate(value: object, read: Callable[[object], _IntervalValues]) -> Estimate:
-    return value if isinstance(value, Estimate) else read(value).estimate()
-
-
 if TYPE_CHECKING:
-    Interval: TypeAlias = Estimate
-    KnownInterval: TypeAlias = Estimate
-    WholeEstimate: TypeAlias = Estimate
     Ends: TypeAlias = list[float | str]
-else:  # an estimate is stored with fewer or more of its numbers, as readers need them
-    _READ, _AS_INTERVAL = WrapValidator(_estimate), PlainSerializer(Estimate.interval_json)
-    Interval = Annotated[_IntervalValues, _READ, _AS_INTERVAL]
-    KnownInterval = Annotated[_KnownValues, _READ, _AS_INTERVAL]
-    WholeEstimate = Annotated[_EstimateValues, _READ, PlainSerializer(Estimate.to_json)]
+else:
     Ends = Bounds | Texts  # bounds of a number, or the allowed texts
 
 
@@ -232,7 +178,7 @@ class SliceRecord(Table):
     """
 
     flat: Ends
-    choices: list[str] = []
+    choices: list[str] = Field(default_factory=list)
     share_of_variance: float
     values: Curve
     mean: Curve
@@ -315,9 +261,9 @@ class StudyRecord(Table):
     missing_a_constraint: Count
     gain: WholeEstimate
     improved: bool
-    notes: list[str] = []
+    notes: list[str] = Field(default_factory=list)
     model: ModelRecord | None = None
-    front: list[FrontPoint] = []
+    front: list[FrontPoint] = Field(default_factory=list)
     best: BestRecord
     start: StartRecord
     confirmed: list[ConfirmedRecord]
@@ -340,63 +286,6 @@ class StudyRecord(Table):
         return self
 
 
-class ToleratedRange(Table):
-    """A number of the design with its tolerance, and the changed value that was also simulated."""
-
-    low: int | float
-    nominal: int | float
-    high: int | float
-    changed_to: int | float
-
-
-class EffectEnds(Table):
-    low: KnownInterval
-    high: KnownInterval
-
-
-class InCorner(Table):
-    predicted: KnownInterval
-    simulated: KnownInterval
-    agrees: bool
-
-
-class ToleratedFigureRecord(Table):
-    nominal: KnownInterval
-    q05: KnownInterval
-    q95: KnownInterval
-    lowest: KnownInterval
-    highest: KnownInterval
-    effects: dict[str, EffectEnds]
-    corner: InCorner | None
-
-
-class TolerancesRecord(Table):
-    """How figures vary while all toleranced numbers of the design vary within their tolerances.
-
-    Args:
-        box: the toleranced numbers with their ranges, by dotted name.
-        worst_for: figure that is lowest in the worst corner. Empty if no figure is resolved.
-        corner: values of the numbers in the worst corner.
-        figures: each figure's spread, by name.
-    """
-
-    box: dict[str, ToleratedRange]
-    worst_for: str
-    corner: dict[str, int | float]
-    figures: dict[str, ToleratedFigureRecord]
-    notes: list[str]
-
-    @model_validator(mode="after")
-    def _is_of_one_box(self) -> Self:
-        of_numbers = [set(one.effects) for one in self.figures.values()]
-        of_numbers += [set(self.corner)] if self.corner else []
-        if not self.box or any(one != set(self.box) for one in of_numbers):
-            raise ValueError("other numbers than those of the box")
-        if self.worst_for and self.worst_for not in self.figures:
-            raise ValueError(f"worst_for: {self.worst_for!r} is none of the figures")
-        return self
-
-
 class ResultRecord(Table):
     """The keys that every result.json has."""
 
@@ -405,7 +294,7 @@ class ResultRecord(Table):
     created: Annotated[str, AfterValidator(_dated)]
     notes: list[str]
     warnings: list[str] | None = None  # of `chamberopt check`; None if it was not run
-    effects: list[AdviceRecord] = []
+    effects: list[AdviceRecord] = Field(default_factory=list)
     files: dict[FileName, Digest]
     versions: dict[str, str]
     sha256: str = ""  # of all other keys
@@ -446,7 +335,7 @@ class CandidateRecord(ResultRecord):
 
     objective: Objective
     metrics: dict[str, WholeEstimate]
-    zones: list[ZoneRecord] = []
+    zones: list[ZoneRecord] = Field(default_factory=list)
     field: FieldRecord
     coverage_against_time: list[CoverageAtTime]
     seed: Annotated[int, Field(ge=0, le=2**63 - 1)]
@@ -463,7 +352,7 @@ class CandidateRecord(ResultRecord):
     part_unit: str
     shape_sha256: Digest | Literal[""] = ""
     study: StudyRecord | None = None
-    tolerances: TolerancesRecord | None = None
+    tolerances: ToleranceResult | None = None
 
     _units = field_serializer("metrics")(_with_units)
 

@@ -26,10 +26,8 @@ from chamberopt.results.records import (
     ChamberRecord,
     ConfirmedRecord,
     CoverageAtTime,
-    EffectEnds,
     FieldRecord,
     FrontPoint,
-    InCorner,
     ModelRecord,
     Needed,
     Objective,
@@ -39,9 +37,6 @@ from chamberopt.results.records import (
     StudyRecord,
     SweepFacts,
     SweepRecord,
-    TolerancesRecord,
-    ToleratedFigureRecord,
-    ToleratedRange,
     ViolationRecord,
     ZoneLimit,
     ZoneRecord,
@@ -56,7 +51,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from chamberopt.chamber.build import Chamber
-    from chamberopt.peening.tolerances import ToleranceResult, ToleratedFigure
+    from chamberopt.peening.tolerance_result import ToleranceResult
     from chamberopt.search.run_study import StudyResult
     from chamberopt.search.run_sweep import SweepResult
     from chamberopt.search.sensitivity import Sensitivity
@@ -70,7 +65,7 @@ def write_simulation(
 ) -> CandidateRecord:
     """Write the data files of a simulation into an empty folder and return its record."""
     save_design(candidate.design, folder / "design.toml")
-    more = {"tolerances": _about_tolerances(tolerances)} if tolerances else {}
+    more = {"tolerances": tolerances} if tolerances else {}
     return _write_candidate(folder, candidate, kind="simulation", **more)
 
 
@@ -346,43 +341,6 @@ def _about_front(result: StudyResult) -> list[FrontPoint]:
         )
         for one in sorted(front, key=lambda one: -one.goals[0].value)
     ]
-
-
-def _about_tolerances(found: ToleranceResult) -> TolerancesRecord:
-    return TolerancesRecord(
-        box={
-            one.name: ToleratedRange(
-                low=one.low,
-                nominal=one.nominal,
-                high=one.high,
-                changed_to=one.changed.value(one.name),
-            )
-            for one in found.numbers
-        },
-        worst_for=found.worst_for,
-        corner=found.corner,
-        figures={name: _about_tolerated(one) for name, one in found.figures.items()},
-        notes=list(found.notes),
-    )
-
-
-def _about_tolerated(figure: ToleratedFigure) -> ToleratedFigureRecord:
-    corner = None
-    if figure.predicted and figure.simulated:
-        corner = InCorner(
-            predicted=figure.predicted, simulated=figure.simulated, agrees=figure.agrees
-        )
-    return ToleratedFigureRecord(
-        nominal=figure.nominal,
-        q05=figure.q05,
-        q95=figure.q95,
-        lowest=figure.lowest,
-        highest=figure.highest,
-        effects={
-            name: EffectEnds(low=low, high=high) for name, (low, high) in figure.effects.items()
-        },
-        corner=corner,
-    )
 
 
 def _about_sweep(sweep: SweepResult) -> SweepRecord:

@@ -19,7 +19,7 @@ from chamberopt.simulation.field_values import CandidateResult, complete_result
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
     from chamberopt.design.load import Design
-    from chamberopt.peening.tolerances import ToleranceResult
+    from chamberopt.peening.tolerance_result import ToleranceResult
     from chamberopt.search.candidate import ConfirmedCandidate
     from chamberopt.search.run_study import StudyResult
     from chamberopt.search.run_sweep import SweepResult

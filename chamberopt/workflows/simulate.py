@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
     from chamberopt.common.progress import Progress
     from chamberopt.design.load import Design
-    from chamberopt.peening.tolerances import ToleranceResult
+    from chamberopt.peening.tolerance_result import ToleranceResult
     from chamberopt.simulation.advice import Advice
     from chamberopt.simulation.evaluation import Evaluation
     from sim_core import AnalyticCavity

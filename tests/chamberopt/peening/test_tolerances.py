@@ -12,12 +12,8 @@ from chamberopt.common.estimate import FIRST_OF_CALIBRATION, Estimate, estimate
 from chamberopt.common.executor import SerialExecutor
 from chamberopt.design.load import Design
 from chamberopt.peening.responses import combine, on_scale, scale_of
-from chamberopt.peening.tolerances import (
-    ToleranceResult,
-    find_tolerances,
-    plan_tolerances,
-    simulate_tolerances,
-)
+from chamberopt.peening.tolerance_result import EffectEnds, ToleranceResult
+from chamberopt.peening.tolerances import find_tolerances, plan_tolerances, simulate_tolerances
 from chamberopt.simulation.evaluate import evaluate
 from chamberopt.simulation.evaluation import Evaluation
 from chamberopt.simulation.variations import RunsProgress, Variations
@@ -29,6 +25,8 @@ PLATE = plate_design()
 DOSE = 0.5  # dent density of the plate as designed
 REPLICAS = 8
 Response = Callable[[dict[str, float]], float]
+
+ZERO = EffectEnds(low=Estimate(0.0, 0.0), high=Estimate(0.0, 0.0))
 
 
 def tolerated(tolerances: dict, **values: float) -> Design:
@@ -85,16 +83,19 @@ def test_a_power_law_is_recovered() -> None:
     truth = sampled_coverage(np.random.default_rng(1))
     assert coverage.q05.value == pytest.approx(np.quantile(truth, 0.05), abs=4e-4)
     assert coverage.q95.value == pytest.approx(np.quantile(truth, 0.95), abs=4e-4)
-    low, high = coverage.effects["sonotrode.amplitude_um"]
+    ends = coverage.effects["sonotrode.amplitude_um"]
+    low, high = ends.low, ends.high
     at = [-np.expm1(-DOSE * ratio**1.4) + np.expm1(-DOSE) for ratio in (23 / 25, 27 / 25)]
     assert [low.value, high.value] == pytest.approx(at, abs=2e-5)
-    assert coverage.effects["shot.mass_g"][1] == Estimate(0.0, 0.0)
+    assert coverage.effects["shot.mass_g"].high == Estimate(0.0, 0.0)
     assert found.worst_for == "mean_coverage"  # the 5th percentile is not resolved
     mass = PLATE.value("shot.mass_g")
     assert list(found.corner.values()) == pytest.approx([23.0, 0.9 * mass, 4.8])
-    assert coverage.lowest.value == pytest.approx(coverage.predicted.value)
-    assert coverage.simulated.value == pytest.approx(coverage.predicted.value, abs=2e-5)
-    assert coverage.agrees
+    assert coverage.lowest.value == pytest.approx(coverage.corner.predicted.value)
+    assert coverage.corner.simulated.value == pytest.approx(
+        coverage.corner.predicted.value, abs=2e-5
+    )
+    assert coverage.corner.agrees
     assert set(found.figures) == {"mean_coverage", "impacts_per_mm2_s", "time_to_98_s"}
     assert found.notes[0].startswith("not resolved over the tolerances: p05_coverage; raise ")
     assert "27 to 30 whole balls" in found.notes[1]
@@ -110,13 +111,13 @@ def test_intervals_hold_the_truth() -> None:
         run = simulator(lambda rng=rng: 0.02 * rng.standard_normal(REPLICAS), power_law)
         found = find_tolerances(design, numbers, run(design), run)
         coverage = found.figures["mean_coverage"]
-        low = coverage.effects["sonotrode.amplitude_um"][0]
+        low = coverage.effects["sonotrode.amplitude_um"].low
         true_low = -np.expm1(-DOSE * (23 / 25) ** 1.4) + np.expm1(-DOSE)
         held.append(
             (
                 abs(coverage.q05.value - truth) <= coverage.q05.half_width,
                 abs(low.value - true_low) <= low.half_width,
-                coverage.agrees,
+                coverage.corner.agrees,
             )
         )
     # 95 % of 25; one time in 150 fewer than 21 hold.
@@ -128,7 +129,7 @@ def test_curvature_that_the_worst_corner_shows_is_named() -> None:
         return power_law(u) * float(np.exp(-8.0 * u["sonotrode.amplitude_um"] ** 2))
 
     found = found_by(simulator(common_noise, bent), tolerated(BOX))
-    assert not found.figures["mean_coverage"].agrees
+    assert not found.figures["mean_coverage"].corner.agrees
     assert "mean_coverage, impacts_per_mm2_s, time_to_98_s: not as first" in found.notes[-1]
 
 
@@ -145,11 +146,11 @@ def test_what_a_calibration_leaves_open_moves_all_runs_alike() -> None:
     calibrated = find_tolerances(design, numbers, replace(nominal, metrics=wider), run)
     open_ = calibrated.figures["mean_coverage"]
     assert open_.q05.half_width > 0.03 > plain.q05.half_width
-    assert open_.simulated.half_width > 0.03
+    assert open_.corner.simulated.half_width > 0.03
     time = calibrated.figures["time_to_98_s"]  # how long is peened does not change it
-    assert time.effects["process.treatment_time_s"] == (Estimate(0.0, 0.0), Estimate(0.0, 0.0))
+    assert time.effects["process.treatment_time_s"] == ZERO
     name = "sonotrode.amplitude_um"
-    wide, narrow = open_.effects[name][0], plain.effects[name][0]
+    wide, narrow = open_.effects[name].low, plain.effects[name].low
     assert narrow.half_width < wide.half_width < narrow.half_width + 0.1 * abs(narrow.value)
 
 
@@ -186,8 +187,8 @@ def test_the_effect_of_the_peening_time_has_the_error_of_the_figure_itself() -> 
 
     figures = found_by(run, design).figures
     time = "process.treatment_time_s"
-    assert figures["impacts_per_mm2_s"].effects[time] == (Estimate(0.0, 0.0),) * 2
-    low = figures["exposure"].effects[time][0]
+    assert figures["impacts_per_mm2_s"].effects[time] == ZERO
+    low = figures["exposure"].effects[time].low
     assert low.value == pytest.approx(-0.04 * DOSE)
     share = figures["exposure"].nominal.half_width / DOSE
     assert low.half_width == pytest.approx(share * abs(low.value), rel=0.05)
@@ -198,7 +199,7 @@ def test_a_corner_may_lie_on_a_bound_of_its_number() -> None:
     design = tolerated({"materials.wall.C0": [0, 0.09], "amplitude_um": 2})
     found = found_by(simulator(common_noise, power_law), design)
     assert found.corner == {"materials.wall.C0": 1.0, "sonotrode.amplitude_um": 23.0}
-    assert found.figures["mean_coverage"].simulated is not None
+    assert found.figures["mean_coverage"].corner is not None
 
 
 def test_few_balls_change_by_whole_ones() -> None:
@@ -234,7 +235,7 @@ def test_a_short_real_run() -> None:
     assert len(done) == 9  # nominal, amplitude and the worst corner
     assert done[-1] == (9, 9, None)
     assert found.corner == {"sonotrode.amplitude_um": 23.0, "process.treatment_time_s": 4.8}
-    low = found.figures["mean_coverage"].effects["process.treatment_time_s"][0]
+    low = found.figures["mean_coverage"].effects["process.treatment_time_s"].low
     runs = Variations(design, chamber, SerialExecutor(), RunsProgress(None, 1))
     changed = design.changed({"process.treatment_time_s": 4.8})
     at_low = runs.run(changed, replicas=runs.known.replicas)
@@ -242,7 +243,7 @@ def test_a_short_real_run() -> None:
     assert low.value == pytest.approx(gap, abs=1e-4)
     one = nominal.metrics["mean_coverage"]
     assert low.half_width / abs(gap) == pytest.approx(one.half_width / one.value, rel=0.2)
-    assert found.figures["impacts_per_mm2_s"].effects["process.treatment_time_s"][0].value == 0.0
+    assert found.figures["impacts_per_mm2_s"].effects["process.treatment_time_s"].low.value == 0.0
     scale = scale_of("mean_coverage")
     ends = {"low": at_low, "nominal": nominal}
     pair = {end: on_scale(one.metrics["mean_coverage"], scale) for end, one in ends.items()}

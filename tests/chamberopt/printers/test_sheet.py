@@ -19,6 +19,7 @@ from chamberopt.documents.coverage import figures
 from chamberopt.documents.document import Document, Section, Sentence, Table
 from chamberopt.documents.sheet import first_checks, setting_tables
 from chamberopt.documents.wording import metric_label
+from chamberopt.peening.tolerance_result import ToleranceResult, ToleratedFigure
 from chamberopt.pictures.section import cut, face_size_mm, inside
 from chamberopt.printers.sheet_page import (
     HEIGHT,
@@ -30,12 +31,7 @@ from chamberopt.printers.sheet_page import (
     write_sheet,
 )
 from chamberopt.results.load import Result, load_result
-from chamberopt.results.records import (
-    TolerancesRecord,
-    ToleratedFigureRecord,
-    ZoneLimit,
-    ZoneRecord,
-)
+from chamberopt.results.records import ZoneLimit, ZoneRecord
 from tests.helpers.results.report_folders import simulated
 from tests.helpers.synthetic import machine_values, plate_design
 
@@ -139,8 +135,8 @@ def test_a_calibrated_mix_with_zones_and_tolerances(folder: Path) -> None:
     assert checks[0] == "50 (45.3 to 55.1) µm peak to valley where 50 is set"
     assert "0.200 ± 0.010 mmA" in checks
     ends = dict.fromkeys(("nominal", "q05", "q95", "lowest", "highest"), intensity)
-    figure = ToleratedFigureRecord(**ends, effects={}, corner=None)
-    found = TolerancesRecord.model_construct(worst_for="", figures={"almen_intensity": figure})
+    figure = ToleratedFigure(**ends, effects={}, corner=None)
+    found = ToleranceResult.model_construct(worst_for="", figures={"almen_intensity": figure})
     record = result.record.model_copy(update={"tolerances": found})
     label = metric_label("almen_intensity").with_unit
     tolerated = replace(result, record=record)

@@ -10,9 +10,17 @@ import pytest
 from chamberopt.chamber.build import build_chamber
 from chamberopt.cli import main
 from chamberopt.common.errors import InputError
+from chamberopt.common.record_types import KnownInterval
 from chamberopt.design.load import save_design
 from chamberopt.documents.report import report
+from chamberopt.documents.tolerances import (
+    sheet_rows,
+    table_rows,
+    tolerance_lines,
+    tolerance_section,
+)
 from chamberopt.export.tables import write_tolerance_table
+from chamberopt.peening.tolerance_result import ToleratedFigure
 from chamberopt.peening.tolerances import find_tolerances, plan_tolerances
 from chamberopt.printers.report_page import write_report
 from chamberopt.results.load import load_result
@@ -68,6 +76,27 @@ def test_the_table_has_a_row_for_each_figure_and_number(folder: Path, tmp_path: 
     assert data is not None
     assert len(rows) == 2 * len(data.figures)
     assert float(rows[0]["q05"]) == data.figures[rows[0]["figure"]].q05.value
+
+
+def test_a_new_interval_of_a_figure_is_shown_everywhere(folder: Path, tmp_path: Path) -> None:
+    class Wider(ToleratedFigure):
+        q50: KnownInterval
+
+    result = load_result(folder)
+    found = result.record.tolerances
+    assert found is not None
+    figures = {name: Wider(**dict(one), q50=one.q05) for name, one in found.figures.items()}
+    wider = found.model_copy(update={"figures": figures})
+    result = replace(result, record=result.record.model_copy(update={"tolerances": wider}))
+    section = tolerance_section(result)
+    assert section is not None
+    table = section.content[2]
+    assert table.head[-1] == "q50"
+    assert table.rows[0][-1] == table.rows[0][2]
+    assert "q50" in tolerance_lines(wider)[0]
+    assert all("; q50 " in text for _, text in sheet_rows(wider))
+    row = next(table_rows(result))
+    assert (row["q50"], row["q50_half_width"]) == (row["q05"], row["q05_half_width"])
 
 
 def test_a_result_without_tolerances_has_no_table(folder: Path, tmp_path: Path) -> None:
