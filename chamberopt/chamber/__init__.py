@@ -1,1 +1,1 @@
-"""Build the closed cavity of a design, and the scene in it that the simulator runs."""
+"""Build the closed cavity of a design, in which the balls fly, and the scene to simulate in it."""

@@ -1,7 +1,7 @@
 """Analytical cavity of a chamber: exact planes and a true circle for a cylinder, box or prism.
 
-It is the same chamber without a mesh of triangles, simulated by the same event loop. The part must
-be the chamber's lid, and nothing may reach into the chamber.
+It describes the same chamber without a mesh of triangles, and the same event loop simulates it. The
+part must be the chamber's lid, and nothing may reach into the chamber.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ def cavity_note(cavity: AnalyticCavity) -> str:
 
 
 def impacts_on_chamber(impacts: ImpactLog, chamber: Chamber) -> ImpactLog:
-    """Return impacts on an analytical cavity's ceiling as impacts on the chamber's part triangles.
+    """Return impacts on an analytical cavity's ceiling as impacts on the triangles of the part.
 
     Args:
         impacts: recorded impacts, all on the ceiling, which is the part.

@@ -1,7 +1,7 @@
 """Add holes, wells of further sonotrodes and deflectors to the cavity of a chamber's shape.
 
-A hole and a well are both round bores from a bottom to the room. The tag of the bottom tells them
-apart: wall for a hole, sonotrode for a well.
+A hole and a well are both round bores from a bottom to the room, the inside of the chamber. The tag
+of the bottom (the number for its kind of surface) tells them apart: wall or sonotrode.
 
          room        |        the bore is followed from its bottom to where it enters the room,
     ___         _____|        whatever the wall looks like there; its end lies inside the room and
@@ -49,7 +49,7 @@ SIDES = 64  # flat sides of a round rod or bore, their corners on the circle
 
 
 class DeflectorMesh(NamedTuple):
-    """The closed surface of a deflector as it stands in the chamber."""
+    """Closed surface of a deflector, a body placed in the chamber to redirect balls."""
 
     name: str  # in the design
     at_mm: tuple[float, float, float]  # its middle in the design, for messages
@@ -114,7 +114,9 @@ TAG_END = 255  # tag of a bore's end, which must vanish
 
 
 class TriangleProperties(NamedTuple):
-    """Tag, direction, part triangle and fitting (hole or deflector) of a surface's triangles."""
+    """Properties of a surface's triangles: tag (number for part, wall or sonotrode), direction,
+    part triangle under each, and fitting (hole or deflector).
+    """
 
     tags: np.ndarray  # (k,), uint8
     facing: np.ndarray  # area vector out of the cavity [m²], (k, 3)
@@ -125,11 +127,11 @@ class TriangleProperties(NamedTuple):
 def triangle_properties(
     facing: np.ndarray, tags: np.ndarray | int, source: np.ndarray | None = None, fitting: int = -1
 ) -> TriangleProperties:
-    """Return the properties of triangles that belong to one fitting, or to none.
+    """Return the properties of triangles that belong to one hole or deflector, or to none.
 
     Args:
         facing: area vectors out of the cavity [m²], (k, 3).
-        tags: one tag for all, or a tag of each triangle, (k,).
+        tags: number for the kind of surface, one for all triangles or one for each, (k,).
         source: part triangle under each triangle, (k,); None if they are not on the part.
         fitting: index of a hole or deflector in `fitting_names`, else -1.
     """
@@ -150,9 +152,9 @@ def fitting_names(design: Design) -> list[str]:
 
 @dataclass(frozen=True)
 class CavitySolid:
-    """The cavity as a solid, and properties of the triangles of each solid it was made from.
+    """The cavity as a solid, and properties of the triangles of each solid from which it was made.
 
-    `pieces` has the properties by the solid's label.
+    `pieces` has these properties by the label of the solid.
     """
 
     body: Solid
@@ -181,7 +183,7 @@ class CavitySolid:
 
 
 class Bore(NamedTuple):
-    """A round bore from its bottom into the room."""
+    """A round bore from its bottom into the room, the inside of the chamber."""
 
     name: str  # in the design
     bottom: np.ndarray  # middle of its bottom [m], shape (3,)
@@ -285,9 +287,9 @@ def _with_bore(cavity: CavitySolid, bore: Bore) -> CavitySolid:
 
 
 def _length_to_room(cavity: CavitySolid, bore: Bore, rim: np.ndarray) -> float:
-    """Return the length [m] at which a bore is inside the room all round.
+    """Return the length [m] at which a bore has its whole circumference inside the chamber's room.
 
-    Raises InputError if it does not lead into the room.
+    Raises InputError if the bore does not lead into the room.
 
     Args:
         rim: points on the edge of the bore's bottom [m], (p, 3).
@@ -315,8 +317,8 @@ def _without_deflectors(
 ) -> CavitySolid:
     """Return the cavity after all deflectors were cut out of it.
 
-    Raises InputError if a deflector is outside the room, or a sonotrode would hit it. They are cut
-    out together, because each cut divides triangles of the surface.
+    All are cut out together, because each cut divides triangles of the surface. Raises InputError
+    if a deflector is outside the room, or a sonotrode would hit it.
     """
     sweeps, solids, pieces = swept_faces(design, cavity), [], {}
     for k, deflector in enumerate(deflectors, start=len(design.chamber.holes)):
@@ -370,7 +372,7 @@ def _first_crossings(
 
 
 def _area_by_tag(cavity: CavitySolid) -> np.ndarray:
-    """Return the cavity's surface area [m²] with each tag from 0 to TAG_END."""
+    """Return the area [m²] of each kind of surface of the cavity (part, wall ...), by its tag."""
     surface = cavity.body.surface()
     tags = cavity.trace(surface).tags
     return np.bincount(tags, areas(surface.vertices, surface.triangles), TAG_END + 1)

@@ -1,9 +1,10 @@
 """Build the chamber of a design: the closed cavity that the shot flies in.
 
-The cavity is the shape with its bores and deflectors, without the part. One subtraction serves a
+The cavity is the shape with its bores and deflectors, less the part. The same subtraction serves a
 part that hangs freely, a part whose shaft goes out through the ceiling, and a part that closes the
-chamber like a lid. Only the room over the sonotrode is kept. A part that is drawn with its chamber
-may already be a piece of the chamber's surface. All files are read before solids are cut.
+chamber like a lid. Of the rooms that are left, only the room over the sonotrode is kept. A part
+that is drawn with its chamber may already be a piece of the chamber's surface. All files are read
+before solids are cut.
 
 Frame: metres, z up, mean sonotrode face at z = 0, chamber axis at x = y = 0.
 """
@@ -90,7 +91,7 @@ class Chamber:
 
     @property
     def on_target(self) -> np.ndarray:
-        """Return True for each triangle of the cavity that is on the target, (k,) bool."""
+        """Return True for each triangle of the cavity on the target (the surface to peen), (k,)."""
         # A source of -1, off the part, reads the appended False.
         return np.asarray(np.append(self.part.target, False)[self.source])
 
@@ -183,7 +184,7 @@ def _misplaced(part: Part, shape: ShapeSurface, text: str) -> SurfaceError:
 
 
 def _where_to_look(is_drawn: bool) -> str:
-    """Return a remedy for a part in the wrong place: the fields of the design that place it.
+    """Return a remedy for a part in the wrong place, which names the design's keys to change.
 
     Args:
         is_drawn: True if the part is drawn with its chamber in one file.
@@ -199,7 +200,7 @@ def _where_to_look(is_drawn: bool) -> str:
 def _refuse_misplaced_part(part: Part, shape: ShapeSurface, design: Design) -> None:
     """Raise InputError if the part is outside the chamber, or so low that the sonotrode hits it.
 
-    Raise it too if the part is drawn with its chamber and no ball fits under it.
+    The error is also raised if the part is drawn with its chamber and no ball fits under the part.
     """
     distance, amplitude = design.chamber.sonotrode_distance, design.sonotrode.amplitude
     if distance <= amplitude:
@@ -243,7 +244,7 @@ def _refuse_free_edges(design: Design, room: SolidSurface, tags: np.ndarray) -> 
 
     Args:
         room: surface of the cavity.
-        tags: tags of its triangles, (k,).
+        tags: kind of surface of its triangles (part, sonotrode or wall), (k,).
     """
     for k in range(len(design.sonotrodes)):
         if not (tags == further_sonotrode_tag(k)).any():
@@ -264,7 +265,7 @@ def _refuse_wide_swings(design: Design, room: SolidSurface, tags: np.ndarray) ->
 
     Args:
         room: surface of the cavity.
-        tags: tags of its triangles, (k,).
+        tags: kind of surface of its triangles (part, sonotrode or wall), (k,).
     """
     from sim_core import TriangleMesh, largest_amplitude
 
@@ -287,8 +288,8 @@ def _room_over_sonotrode(whole: SolidSurface, tags: np.ndarray) -> tuple[SolidSu
     """Return the surface of the room over the sonotrode, and a note on rooms that were left out.
 
     Args:
-        whole: surface of all closed rooms of the chamber.
-        tags: tags of its triangles, (k,).
+        whole: surface of all closed rooms into which the part divides the chamber.
+        tags: kind of surface of its triangles (part, sonotrode or wall), (k,).
     """
     rooms = find_cavities(whole)
     floor = tags == TAG_SONOTRODE
@@ -331,13 +332,13 @@ def _ceiling_notes(room: SolidSurface, ceiling: float, key: str) -> list[str]:
 def _only_reachable(
     part: Part, room: SolidSurface, traced: TriangleProperties, design: Design
 ) -> tuple[Part, str]:
-    """Return the part with only what a ball can touch as its target, and a note.
+    """Return the part with its target narrowed to the triangles that a ball can touch, and a note.
 
     Raises InputError if balls touch nothing of the target.
 
     Args:
         room: surface of the cavity.
-        traced: properties of its triangles.
+        traced: properties of its triangles, such as the part triangle under each.
     """
     from sim_core import TriangleMesh
 
@@ -362,7 +363,7 @@ def _only_reachable(
 
 
 def selection_of(surface: str) -> str:
-    """Return which field of a design chooses the target or a zone, for messages.
+    """Return the name of the design's table that chooses the target or a zone, for messages.
 
     Args:
         surface: "the target" or "zone NAME".
@@ -371,13 +372,17 @@ def selection_of(surface: str) -> str:
 
 
 def hidden_share(chamber: Chamber) -> float:
-    """Return the share of the target's area that is outside the cavity, where no shot gets."""
+    """Return the share of the target's area that is outside the cavity, where no balls fly."""
     part = chamber.part
     return float(1.0 - chamber.exposed_area[part.target].sum() / part.area[part.target].sum())
 
 
 def _refuse_hidden_zones(part: Part, exposed: np.ndarray) -> None:
-    """Raise InputError for a zone whose triangles have no exposed area (m,) in the cavity."""
+    """Raise InputError for a zone of the part that has no area inside the cavity.
+
+    Args:
+        exposed: area of each part triangle that is inside the cavity [m²], (m,).
+    """
     for name, zone in part.zones.items():
         if not (exposed[zone] > 0.0).any():
             raise InputError(
@@ -387,7 +392,7 @@ def _refuse_hidden_zones(part: Part, exposed: np.ndarray) -> None:
 
 
 def _hidden_notes(chamber: Chamber) -> list[str]:
-    """Return a note for the target and for each zone of which a part is outside the cavity."""
+    """Return a note on each surface, target or zone, that is not wholly inside the cavity."""
     shares = {name: hidden_share(one) for name, one in chamber.surfaces().items()}
     return [
         f"{hidden:.1%} of the area of {name} is outside the cavity and counts as not covered; "
@@ -405,11 +410,11 @@ def _pieces_in_air(vertices: np.ndarray, triangles: np.ndarray, tags: np.ndarray
 
 
 def _notes_on_room(room: SolidSurface, traced: TriangleProperties, part_name: str) -> Iterator[str]:
-    """Yield a note on triangles turned by rounding, and one on pieces of the part without holder.
+    """Yield a note on triangles turned by rounding, and a note on pieces of the part in the air.
 
     Args:
         room: surface of the cavity.
-        traced: properties of its triangles.
+        traced: properties of its triangles, such as their directions before rounding.
     """
     own = area_vectors(room.vertices, room.triangles)
     across = np.linalg.norm(np.cross(own, traced.facing), axis=1)

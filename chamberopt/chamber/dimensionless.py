@@ -22,7 +22,7 @@ MAX_SPIN_SHARE = 2.0 / 7.0
 
 
 def gravity_speed_change(design: Design, chamber: Chamber) -> float:
-    """Return how much gravity changes a ball's speed over the chamber's height, as a share.
+    """Return the share by which gravity changes a ball's speed over the chamber's height.
 
     It is g H / V² for gravity g, height H and peak speed V of the sonotrode.
     """
@@ -32,7 +32,7 @@ def gravity_speed_change(design: Design, chamber: Chamber) -> float:
 def free_path(design: Design, chamber: Chamber) -> float:
     """Return the mean path of a ball from ball to ball, in chamber heights; infinite for one ball.
 
-    The path is 1 / (sqrt(2) pi d² n chi) for n balls a volume, with chi = (1 - p/2)/(1 - p)³ for
+    The path is 1 / (sqrt(2) pi d² n chi) for n balls per volume, with chi = (1 - p/2)/(1 - p)³ for
     the packing fraction p.
 
     Source: Chapman and Cowling, "The Mathematical Theory of Non-uniform Gases", chapter 16;

@@ -1,6 +1,7 @@
 """Find the largest ball that touches the cavity's surface at a point and crosses it nowhere.
 
-A ball that touches at the point is shrunk past the closest obstacle until no obstacle is left.
+A large ball that touches at the point is shrunk until it clears the closest obstacle, again and
+again until no obstacle is left.
 
 Source: J. Ma, S. W. Bae, S. Choi, The Visual Computer 28 (2012) 7.
 """
@@ -54,7 +55,7 @@ def find_touch_points(
     Args:
         normals: unit vectors of the surface at the triangles' corners, into the cavity, (m, 3, 3).
         spacing: distance between the points on each triangle [m], shape (m,).
-        max_radius: limit of the radius [m].
+        max_radius: limit of the balls' radius [m].
         overlap: depth to which a ball may reach into a surface [m].
     """
     triangle, point, area = spread_points(mesh.vertices, mesh.triangles, spacing)
@@ -71,8 +72,8 @@ def spread_points(
     Args:
         spacing: distance between the points on each triangle [m], (m,).
     Returns:
-        For each point its triangle (p,), its place [m] (p, 3), and the area [m²] that it stands
-        for (p,).
+        For each point its triangle (p,), its position [m] (p, 3), and the area [m²] for which it
+        stands (p,).
     """
     size = areas(vertices, triangles)
     count = np.where(size > 0.0, np.maximum(np.ceil(size / spacing**2), 1.0), 0.0).astype(np.int64)
@@ -103,8 +104,13 @@ def largest_balls(
     Returns its radius [m], the triangle that limits it (-1 if none does), and the cosine between
     the normals of point and triangle, (p,) each.
 
-    A ball of radius R touches at p with normal n. It is o > 0 deep in a surface at q where |q - p -
-    R n| = R - o.
+    A ball of radius R that touches at p, where the normal is n, has its centre at p + R n. It
+    reaches into another surface, at the point q, by the depth o if |q - p - R n| = R - o.
+
+    Args:
+        point, normal: points [m] and unit normals into the cavity there, (p, 3) each.
+        max_radius: limit of the radius [m].
+        overlap: the allowed depth o [m].
     """
     from sim_core import closest_points
 

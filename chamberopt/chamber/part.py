@@ -36,7 +36,7 @@ def chosen_triangles(mesh: PartMesh, wanted: Selection, field: str = "part.targe
     """Mark the triangles (m,) of a part that meet all conditions of a selection.
 
     Args:
-        field: the field of the design, for messages.
+        field: name of the design's key with the selection, for messages.
     Raises:
         InputError: no triangle meets all conditions.
     """
@@ -71,7 +71,7 @@ def chosen_triangles(mesh: PartMesh, wanted: Selection, field: str = "part.targe
 def _on_faces(mesh: PartMesh, wanted: Sequence[FaceAt], field: str) -> np.ndarray:
     """Mark the triangles (m,) on any of the wanted faces.
 
-    Raises InputError if the place that selects a face is off the part's surface.
+    Raises InputError if the point that selects a face is off the part's surface.
     """
     by_crease: dict[float, Faces] = {}
     chosen = np.zeros(len(mesh.triangles), dtype=bool)
@@ -104,7 +104,7 @@ MAX_ELEMENTS = 3e5  # makes a few minutes of meshing, and slow steps after it
 
 @dataclass(frozen=True)
 class PartOfFile:
-    """What a result keeps of the part's file: its triangles, and how it stands in the chamber."""
+    """Data on the part's file that a result keeps: triangles, and their pose in the chamber."""
 
     simulated: PartMesh  # in the file's frame
     original: PartMesh | None  # the file's own triangles, if other triangles are simulated
@@ -154,11 +154,11 @@ class Part:
     ) -> np.ndarray:
         """Return unit normals into a cavity at the corners of the cavity's triangles, (k, 3, 3).
 
-        On the part they are normals of the surface behind its facets.
+        On the part they are normals of the curved surface behind its facets.
 
         Args:
-            vertices: of the cavity [m], shape (n, 3).
-            triangles: of the cavity, normals outward, shape (k, 3).
+            vertices: vertices of the cavity [m], shape (n, 3).
+            triangles: triangles of the cavity, normals outward, shape (k, 3).
             source: part triangle under each triangle of the cavity, else -1, shape (k,).
         """
         corners = vertices[triangles]
@@ -169,7 +169,7 @@ class Part:
         return normals
 
     def normals_at(self, triangle: np.ndarray, place: np.ndarray) -> np.ndarray:
-        """Return unit normals (p, 3) out of the part at places (p, 3) [m] on its triangles (p,)."""
+        """Return unit normals (p, 3) out of the part at points (p, 3) [m] on its triangles (p,)."""
         corners = self.vertices[self.triangles[triangle]]
         if self.normals is None:
             return unit_normals(corners)
@@ -189,9 +189,10 @@ class Part:
 def posed_part(design: Design) -> tuple[Part, list[str]]:
     """Return the part as it stands in the chamber, and notes on its file.
 
-    It is turned about the file's x, then y, then z. Its box is centred on the chamber's axis and
-    moved sideways by the offset. It is raised or lowered until its lowest point is at the sonotrode
-    distance. A part that is drawn with its chamber stays as drawn.
+    The part is turned about the file's x, then y, then z. Its bounding box is centred on the
+    chamber's axis and moved sideways by part.offset_mm. The part is raised or lowered until its
+    lowest point is chamber.sonotrode_distance_mm above the sonotrode. A part that is drawn with its
+    chamber stays as drawn.
 
     Raises:
         InputError: the file cannot be used, or the target is empty.
@@ -247,7 +248,7 @@ def _smoothing_notes(part: Part) -> list[str]:
 
 
 def _sharp_edges(count: int) -> str:
-    """Return the end of a note on edges that are taken for sharp, although they turn little.
+    """Return the end of a note on edges that are taken for sharp, though the surface turns little.
 
     Args:
         count: number of such edges. The text is empty for 0.
@@ -277,9 +278,10 @@ class PartPreview:
 
 
 def preview_part(design: Design) -> PartPreview:
-    """Return the part with the triangles of its file, which takes less time than `posed_part`.
+    """Return the part, its target and its zones on the triangles of the file, for a quick view.
 
-    Curved surfaces are not divided, and target.element_mm has no effect.
+    In contrast to `posed_part`, curved surfaces are not divided, and target.element_mm has no
+    effect, which saves time.
 
     Raises:
         InputError: the file cannot be used, or target or zone are empty.
@@ -314,7 +316,7 @@ def _part_of_file(design: Design) -> PartMesh:
 
 
 def _is_wall(design: Design) -> bool:
-    """True if the part is drawn as a piece of the room's surface. Such a part cannot be divided."""
+    """True if the part is drawn as a piece of the chamber's surface, and so cannot be divided."""
     setup = design.chamber.setup()
     return setup is not None and setup.room.source is not None
 
@@ -327,9 +329,10 @@ def _chosen(mesh: PartMesh, wanted: Selection, field: str) -> np.ndarray:
 class _Simulated(NamedTuple):
     """The mesh of the part as it is simulated, in the file's frame.
 
-    For each of its triangles `origin` is the file's triangle it came from. `normals` are those of
-    the surface behind the triangles at their corners, and `hollow` is its largest hollow curvature
-    [1/m]. `facts` says what was smoothed. They are None where nothing was smoothed.
+    `origin` is the file's triangle from which each triangle comes. `normals` are unit normals, at
+    the corners of the triangles, of the smooth surface behind them, and `hollow` is the largest
+    hollow curvature of this surface on each triangle [1/m]. `facts` says what was smoothed. The
+    last three are None where nothing was smoothed.
     """
 
     mesh: PartMesh
@@ -351,7 +354,7 @@ def _simulated(
 
     Args:
         mesh: the part as its file has it.
-        is_wall: True if the part is a piece of the room's surface, which is not divided.
+        is_wall: True if the part is a piece of the chamber's surface, which is not divided.
     """
     chosen = _chosen(mesh, target, "part.target")
     rules = [
@@ -369,10 +372,11 @@ def _simulated(
 def _remeshed(found: _Simulated, target: np.ndarray, size: float) -> _Simulated:
     """Return the part with its target in new triangles whose sides are about `size` [m].
 
-    Raises InputError if they would be too many.
+    Raises InputError if the triangles would be too many.
 
     Args:
-        target: marks triangles of the part, (m,).
+        found: the part, perhaps with smoothed rounds.
+        target: marks the triangles of the target, (m,).
     """
     mesh = found.mesh
     area = float(areas(mesh.vertices, mesh.triangles)[target].sum())
@@ -418,9 +422,9 @@ def _find_origin(mesh: PartMesh, corners: np.ndarray, source: np.ndarray) -> np.
     """Return the triangle of a mesh under the middle of each new triangle, (k,).
 
     Args:
-        corners: of the new triangles [m], shape (k, 3, 3).
-        source: a triangle of the mesh in the same flat face, shape (k,). It is already right where
-            the new triangle has the same corners.
+        corners: corners of the new triangles [m], shape (k, 3, 3).
+        source: a triangle of the mesh in the same flat face, shape (k,). It is the result where
+            it has the same corners as the new triangle.
     """
     from sim_core import TriangleMesh, closest_points
 
@@ -436,7 +440,7 @@ def _pose(given: PartMesh, vertices: np.ndarray, design: Design) -> tuple[np.nda
     """Return the rotation (3, 3), then shift (3,) [m], from the part file's frame to the chamber's.
 
     Args:
-        given: the part as its file has it. Its middle comes onto the axis.
+        given: the part as its file has it. The middle of its bounding box comes onto the axis.
         vertices: vertices of the simulated part [m], (n, 3). Their lowest point counts, because
             vertices on a round may reach a little further than its facets.
     """

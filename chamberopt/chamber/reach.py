@@ -1,4 +1,4 @@
-"""Find the places where a ball from the sonotrode can touch the cavity's surface."""
+"""Find the points at which a ball from the sonotrode can touch the cavity's surface."""
 
 from __future__ import annotations
 
@@ -34,7 +34,10 @@ STEP = 0.25  # of the radius, between two checks of a straight way
 
 
 class Cells(NamedTuple):
-    """A grid (nx, ny, nz) of cubic cells over the cavity: where the centre of a ball may lie."""
+    """A grid (nx, ny, nz) of cubic cells over the cavity that marks where a ball's centre may lie.
+
+    An open space is a connected set of cells in which the centre may lie anywhere.
+    """
 
     low: np.ndarray  # lowest corner [m], (3,)
     edge: float  # of a cell [m]
@@ -48,7 +51,7 @@ class Cells(NamedTuple):
         return np.asarray(self.low + self.edge * (np.argwhere(chosen) + 0.5))
 
     def at(self, places: np.ndarray) -> np.ndarray:
-        """Return the number of the open space at each place (n, 3) [m], 0 where there is none."""
+        """Return the number of the open space at each point (n, 3) [m], 0 where there is none."""
         index = np.clip(
             ((places - self.low) / self.edge).astype(np.int64), 0, np.array(self.space.shape) - 1
         )
@@ -58,7 +61,7 @@ class Cells(NamedTuple):
 def cell_edge(mesh: TriangleMesh, radius: float) -> float:
     """Return the side [m] of the grid's cells for a ball of this radius [m].
 
-    It is at least so large that there are at most about MAX_CELLS.
+    The side is large enough that there are at most about MAX_CELLS cells.
     """
     volume = float(np.prod(np.ptp(mesh.vertices, axis=0)))
     return float(max(EDGE * radius, (volume / MAX_CELLS) ** (1.0 / 3.0)))
@@ -96,6 +99,7 @@ def find_regions(
     """Find the separate regions in which the centre of a ball of this radius [m] can move.
 
     Args:
+        touches: points of the surface at which the ball may touch, with the largest ball at each.
         spacing: largest distance between neighbouring touch points [m].
     Returns:
         Region of each touch point, -1 where the ball does not fit, (p,) int, and the volume [m³] of
@@ -125,9 +129,10 @@ def find_regions(
 
 
 def _midway_points(mesh: TriangleMesh, cells: Cells, radius: float) -> np.ndarray:
-    """Return points (n, 3) [m] for a ball's centre in cells near no open space, or near several.
+    """Return points (n, 3) [m] for a ball's centre in narrow places: in cells that have no open
+    space nearby, or several.
 
-    Each point starts at the cell's middle. It moves away from the closest wall, in ever smaller
+    Each point starts at its cell's middle. It moves away from the closest wall, in ever smaller
     steps, until it is midway between the walls.
     """
     from scipy.ndimage import maximum_filter, minimum_filter
@@ -158,11 +163,12 @@ def _links_to_spaces(
 ) -> np.ndarray:
     """Return index pairs (point, open space), (k, 2), between which the ball can move straight.
 
-    Each point has each open space nearby at most once.
+    An open space is a connected set of cells in which the centre may lie anywhere. Each point is
+    paired at most once with each open space nearby.
 
     Args:
         centre: points in narrow places [m], (n, 3).
-        radius: of the ball [m].
+        radius: radius of the ball [m].
         spacing: largest distance between neighbouring points [m].
     """
     from scipy.ndimage import binary_erosion
@@ -197,8 +203,8 @@ def _links_between(
 
     Args:
         centre: points in narrow places [m], (n, 3).
-        region: region of each point, (n,).
-        radius: of the ball [m].
+        region: number of each point's region, in which it is connected already, (n,).
+        radius: radius of the ball [m].
         spacing: largest distance between neighbouring points [m].
     """
     from scipy.spatial import KDTree
@@ -219,7 +225,7 @@ def _links_between(
 def _is_way_clear(
     mesh: TriangleMesh, start: np.ndarray, end: np.ndarray, radius: float
 ) -> np.ndarray:
-    """Mark the pairs (n,) of start and end (n, 3) [m] between which the ball can move straight."""
+    """Mark the pairs (n,) of start and end (n, 3) [m] between which a ball can move straight."""
     from sim_core import closest_points
 
     clear = np.ones(len(start), dtype=bool)
@@ -244,7 +250,7 @@ MEASURED_WIDTH = 1.25  # widest gap that is measured, over the largest ball's di
 
 @dataclass(frozen=True)
 class Reach:
-    """The places on a cavity's surface that a ball from the sonotrode reaches."""
+    """Points of a cavity's surface, and whether a ball from the sonotrode can touch each."""
 
     mesh: TriangleMesh  # with k triangles
     diameter: float  # of the ball [m]
@@ -263,14 +269,14 @@ def find_reach(
     largest: float | None = None,
     normals: np.ndarray | None = None,
 ) -> Reach:
-    """Find the places where a ball can touch the surface of a cavity.
+    """Find the points at which a ball from the sonotrode can touch the surface of a cavity.
 
-    The ball is taken as smaller by TOLERATED_OVERLAP. In narrow places its way is followed from
-    point to point in steps of a quarter radius. So a bent passage hardly wider than the ball may
-    count as closed.
+    The ball may reach into surfaces by TOLERATED_OVERLAP of its radius. In narrow places its way is
+    followed along straight lines from point to point, and checked every quarter of a radius. So a
+    bent passage hardly wider than the ball may count as closed.
 
     Args:
-        diameter: of the smallest ball of the shot [m].
+        diameter: diameter of the smallest ball of the shot [m].
         largest: diameter of the largest ball [m].
         normals: unit vectors of the surface at the corners of the cavity's triangles, into the
             cavity, shape (k, 3, 3). None if the triangles are the surface.
@@ -308,11 +314,11 @@ def reached_part_share(reach: Reach, source: np.ndarray, count: int) -> np.ndarr
 
 
 def _share(triangle: np.ndarray, area: np.ndarray, touched: np.ndarray, count: int) -> np.ndarray:
-    """Return the touched share of each triangle, (count,), from those of its pieces.
+    """Return the touched share of each triangle, (count,), from the touched shares of its pieces.
 
     Args:
-        triangle: triangle that each piece is of, (p,).
-        area: of each piece [m²], (p,).
+        triangle: triangle to which each piece belongs, (p,).
+        area: area of each piece [m²], (p,).
         touched: share of each piece that is touched, (p,).
     """
     whole = np.bincount(triangle, area, count)
@@ -321,9 +327,10 @@ def _share(triangle: np.ndarray, area: np.ndarray, touched: np.ndarray, count: i
 
 
 def _spacing(mesh: TriangleMesh, wanted: float) -> np.ndarray:
-    """Return the distance [m] between touch points on each triangle of a cavity, (k,).
+    """Return the distance [m] between the points to test on each triangle of a cavity, (k,).
 
-    It is the wanted distance, unless the points would be too many or too few on a part triangle.
+    It is the wanted distance [m], unless there would be too many points, or too few on a triangle
+    of the part.
     """
     size = areas(mesh.vertices, mesh.triangles)
     spacing = np.full(len(size), wanted)

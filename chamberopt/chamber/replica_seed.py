@@ -8,9 +8,12 @@ STREAMS = ("search", "confirm")
 def replica_seed(seed: int, replica: int, stream: str = "search") -> int:
     """Return the random seed, 128 bits, of one replica of a design with this seed.
 
-    It is the same for every candidate of a study (common random numbers). It differs between
-    replicas and between streams, so a candidate that is chosen on "search" is confirmed on other
-    seeds. It comes from sha256, because hash() differs between Python processes.
+    The seed is the same for every candidate of a study (common random numbers). It differs between
+    replicas and between streams, so that a candidate that was chosen on "search" is confirmed on
+    other seeds. It comes from sha256, because hash() differs between Python processes.
+
+    Args:
+        stream: use of the simulation: "search" or "confirm".
     """
     if stream not in STREAMS:
         raise ValueError(f"stream {stream!r}: one of {', '.join(STREAMS)}")

@@ -50,7 +50,7 @@ def part_rotation(design: Design, axis: Axis | None, phase: float = 0.0) -> Part
 
     Args:
         axis: a point [m] on the axis and its direction, in the chamber's frame.
-        phase: at the start [rad].
+        phase: phase of a motion to and fro at the start [rad].
     """
     from sim_core import PartRotation
 
@@ -78,7 +78,9 @@ def require_turnable(design: Design, mesh: TriangleMesh, axis: Axis | None) -> N
 
 
 def balls_can_rest(design: Design, mesh: TriangleMesh | AnalyticCavity) -> bool:
-    """True if balls can lie still: as effects.rest says, or if a surface at rest faces up."""
+    """True if balls can lie still: as effects.rest says or, if the design does not give it, if a
+    surface that does not move faces up.
+    """
     from sim_core import Gravity, can_rest
 
     if design.effects.rest is not None:
@@ -91,11 +93,11 @@ def balls_can_rest(design: Design, mesh: TriangleMesh | AnalyticCavity) -> bool:
 
 
 def vibrations(design: Design, phase: float) -> Vibration | tuple[Vibration, ...]:
-    """Return the vibration of the only sonotrode, or a tuple with that of each of several.
+    """Return the vibration of the only sonotrode, or a tuple of the vibrations of several.
 
     Args:
-        phase: of the first sonotrode at the start [rad]. The phases of the others are added to it,
-            so two sonotrodes of one frequency always keep the same shift in time.
+        phase: phase of the first sonotrode at the start [rad]. The phases of further sonotrodes are
+            added to it, so two sonotrodes of one frequency always keep the same shift in time.
     """
     from sim_core import Vibration
 
@@ -120,8 +122,8 @@ def scene_physics(
     Raises InputError if the effects are still "auto".
 
     Args:
-        axis: of a turning part: a point [m] and a direction, in the chamber's frame.
-        phase, turn_phase: of the sonotrode and of a turning part at the start [rad].
+        axis: axis of a turning part: a point [m] and a direction, in the chamber's frame.
+        phase, turn_phase: phases of the sonotrode and of a turning part at the start [rad].
         phase_seed: for motion = "random_phase", the seed of each ball's phase.
     """
     import sim_core
@@ -158,15 +160,16 @@ def scene_physics(
 def build_scene(
     design: Design, mesh: TriangleMesh | AnalyticCavity, seed: int, axis: Axis | None = None
 ) -> Scene:
-    """Return the scene that one replica simulates. Equal arguments give bit-identical scenes.
+    """Return the scene of one simulation. Equal arguments give bit-identical scenes.
 
-    The shot starts packed low in the chamber, at the speed scale of the sonotrode, 2 pi f A. So the
-    warm-up has to forget only the arrangement, and the shot's energy need not change by orders of
-    magnitude. The phases of the sonotrode and of a turning part are random, because a turn of the
-    part may take longer than a replica.
+    The shot starts packed low in the chamber, with random velocities of the rms speed 2 pi f A, the
+    peak speed of the sonotrode. The warm-up then has to remove only the effect of the arrangement,
+    and need not change the shot's energy by orders of magnitude. The phases of the sonotrode and of
+    a turning part are random, because a turn of the part may take longer than the simulation.
 
     Args:
-        axis: of a turning part: a point [m] and a direction, in the chamber's frame.
+        seed: random seed of the simulation.
+        axis: axis of a turning part: a point [m] and a direction, in the chamber's frame.
     Raises:
         InputError: the shot does not fit or has too many balls, or the part cannot turn.
     """

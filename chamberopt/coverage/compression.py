@@ -1,8 +1,10 @@
 """Depth of the layer that peening puts under compression, estimated from the dents.
 
 Notation
+    window  disc of the surface round a point of the target, in which dents are counted
     d       diameter of a dent on the part [m]
-    L(d)    rate of dents wider than d in a window [1/s]: sum of their areas over window and time
+    L(d)    rate of dents wider than d [1/s]: sum of their areas in a window over the window's area
+            and the time
     z(t)    depth of compression after a time t [m]
 
     z(t) = 1.1 integral over d of 1 - exp(-L(d) t)
@@ -12,10 +14,10 @@ metals at 4 to 8 m/s and balls of 1.5 to 3 mm. S. T. S. Al-Hassani, "Mechanical 
 stress development in shot peening", ICSP-1, 1981, uses the dent of the full energy. J. K. Li et
 al., "Mechanical approach to the residual stress field induced by shot peening", Mater. Sci. Eng.
 A147 (1991) 167, use the depth where the elastic stress of Hertz meets the yield stress. D. Kirk's
-rule takes the depth from the dent's size. The error left is 30 %, and no measured profile was
-compared.
+rule takes the depth from the dent's size. An error of 30 % is left, and the depth was not compared
+with measured profiles.
 
-The second estimate gives 1.6 to 1.7 d for a metal that hardens strongly, such as 316L, because its
+The estimate of Li gives 1.6 to 1.7 d for a metal that hardens strongly, such as 316L, because its
 first yielding says little about its flow stress. Such a metal gets no estimate.
 """
 
@@ -52,7 +54,8 @@ def compression_depth(histogram: np.ndarray, time_ratio: float, highest: float) 
     """Return the depth [m] of the layer under compression below each measuring window, (p,).
 
     Args:
-        histogram: dented area over area of each window, by level of dent diameter, (p, LEVELS).
+        histogram: dented area over area of each window (a disc of the surface in which dents are
+            counted), by level (step) of dent diameter, (p, LEVELS).
         time_ratio: peening time over the time in which the dents fell.
         highest: dent diameter at the upper end of the levels [m].
     """
@@ -69,9 +72,10 @@ def compression_estimate(
     Its interval includes the error of the formula for the depth, which is most of the width.
 
     Args:
-        batches: impacts of each replica, in batches of replicas, turned into the windows' sector.
+        batches: impacts of each replica, in batches of replicas, turned into the sector of the
+            chamber in which the windows lie.
         seconds: simulated time of each replica.
-        peening_time: [s].
+        peening_time: how long the part is peened [s].
     """
     found = level_histograms(field, batches, seconds, lambda hits: (hits.dent, hits.dent))
     count, total = len(batches), found.parts.sum(axis=0)

@@ -1,4 +1,4 @@
-"""Coverage of windows round points of the target, from impacts.
+"""Coverage of windows (discs of the surface round points of the target) from impacts.
 
 Notation
     A  area of a window that a ball can touch [m²]                       (gauge.area, (p,))
@@ -39,8 +39,9 @@ MAX_BATCHES = 40  # batches of replicas; more batches would not improve the inte
 
 
 class Prints(Protocol):
-    """Interface to the footprints of one or more replicas: the share of each window that each dent
-    takes.
+    """Interface to the footprints of one or more replicas (independent simulations).
+
+    Footprints are the shares of windows that dents take.
 
     Attributes:
         area: sum of the areas of all dents on the target [m²].
@@ -63,7 +64,7 @@ class Prints(Protocol):
 
 
 class Footprints(NamedTuple):
-    """Pairs of a point and the share of its window that a dent takes.
+    """Pairs of a point of the target and the share of its window that a dent takes.
 
     Attributes:
         point: index of the window's point in each pair, shape (k,).
@@ -84,7 +85,7 @@ class Footprints(NamedTuple):
 
 
 class JoinedFootprints(NamedTuple):
-    """The footprints of several replicas, read from the replicas' own footprints without a copy."""
+    """Footprints of several replicas, read from the footprints of each replica without a copy."""
 
     replicas: tuple[Prints, ...]
     area: float
@@ -99,8 +100,8 @@ class JoinedFootprints(NamedTuple):
 class FoundAgain(NamedTuple):
     """Footprints of one replica that are computed again at each use.
 
-    This saves memory: a dent takes 80 bytes, and each of its 60 to 340 pairs with a window 12
-    bytes.
+    This saves memory: a dent takes 80 bytes, but it is in 60 to 340 windows, and each of these
+    pairs takes 12 bytes more.
     """
 
     find: Callable[[], Footprints]
@@ -113,7 +114,7 @@ class FoundAgain(NamedTuple):
 
 
 class Batch(NamedTuple):
-    """The number of replicas in a batch, and the footprints of all their dents."""
+    """Number of replicas (independent simulations) in a batch, and footprints of their dents."""
 
     replicas: int
     footprints: Prints
@@ -157,9 +158,9 @@ def batches_of(replicas: Sequence[Prints]) -> list[Batch]:
 
 
 def kept_footprints(field: TargetField, gauge: Gauge, dents: LocatedDents) -> Prints:
-    """Return the footprints of one replica, kept in memory as long as there is room for them.
+    """Return the shares of windows that the dents of one replica take, kept in memory if they fit.
 
-    Without room they are computed again at each use, with the same values.
+    If there is no room, they are computed again at each use, with the same values.
     """
     found = find_footprints(field, gauge, dents)
     if MEMORY.keeps(found.point, found.weight):
@@ -168,14 +169,14 @@ def kept_footprints(field: TargetField, gauge: Gauge, dents: LocatedDents) -> Pr
 
 
 class LocatedDents(NamedTuple):
-    """Dents of one replica with the smooth face or the crease under each.
+    """Dents of one replica (simulation) with the smooth face or the crease under each dent.
 
-    They may be in windows of the target, or of the whole part.
+    They lie on the target, or for pictures on the whole part.
 
     Attributes:
-        contacts: places of the dents.
+        contacts: positions of the dents.
         triangle: part triangle under each dent, shape (k,).
-        radius: [m], shape (k,).
+        radius: radius of each dent [m], shape (k,).
         edge: crease under each dent, -1 on a smooth face, shape (k,).
     """
 
@@ -192,7 +193,8 @@ class LocatedDents(NamedTuple):
 def locate_dents(field: TargetField, in_sector: Hits) -> LocatedDents:
     """Return the dents that impacts leave, with the smooth face or the crease under each.
 
-    The impacts must have been turned into the symmetry sector of the windows.
+    Args:
+        in_sector: impacts, turned into the sector of the chamber in which the windows lie.
     """
     dents = in_sector.select((in_sector.dent > 0.0) & field.has_windows[in_sector.triangle])
     contacts = field.places_of(dents, np.arange(len(dents)))
@@ -201,8 +203,12 @@ def locate_dents(field: TargetField, in_sector: Hits) -> LocatedDents:
 
 
 def find_footprints(field: TargetField, gauge: Gauge, hits: Hits | LocatedDents) -> Footprints:
-    """Return the share of each window that each dent of one replica takes, for windows of one size.
+    """Return the share of each window that each dent of one replica takes.
+
     Dents off the target do not count.
+
+    Args:
+        gauge: the windows, all of one size.
     """
     dents = hits if isinstance(hits, LocatedDents) else locate_dents(field, field.in_sector(hits))
     contacts, radius, edge = dents.contacts, dents.radius, dents.edge
@@ -229,7 +235,9 @@ Pairs = Iterator[tuple[np.ndarray, np.ndarray]]
 
 
 def _on_creases(field: TargetField, gauge: Gauge, dents: LocatedDents) -> Pairs:
-    """Yield the windows beside creases, and the share of each that a dent on its crease takes."""
+    """Yield the windows beside creases (sharp edges), and the share of each window that a dent on
+    its crease takes.
+    """
     band, own = gauge.band, np.flatnonzero(dents.edge >= 0)
     if band is None:
         return
@@ -242,8 +250,10 @@ def _on_creases(field: TargetField, gauge: Gauge, dents: LocatedDents) -> Pairs:
 
 
 def _on_soft_edges(field: TargetField, gauge: Gauge, dents: LocatedDents) -> Pairs:
-    """Yield the windows that see no crease under a dent where other windows see one, and the share
-    of each that the dent takes.
+    """Yield the windows to which an edge under a dent is no crease, and the share of each window
+    that the dent takes.
+
+    An edge may turn so little that only some of the windows treat it as a crease.
     """
     line, windows = field.creases.line, gauge.windows
     own = np.flatnonzero((dents.edge >= 0) & (line[-1, dents.edge] < 0))
@@ -256,14 +266,14 @@ def _on_soft_edges(field: TargetField, gauge: Gauge, dents: LocatedDents) -> Pai
 def in_halves(
     field: TargetField, contacts: Places, triangle: np.ndarray
 ) -> tuple[Places, np.ndarray, np.ndarray]:
-    """Divide each contact on a crease into two halves, one on the smooth face on each side.
+    """Divide each contact on a crease (a sharp edge) into two halves, one on the face on each side.
 
-    The division does not depend on the face that was hit.
+    Both halves are the same whichever of the two faces was hit.
 
     Args:
         triangle: part triangle of each contact, (k,).
     Returns:
-        The contacts, the row of each in the given contacts, and its share of the dent.
+        The contacts and halves, the row of each in the given contacts, and its share of the dent.
     """
     edge = crease_of_contacts(field, contacts.place, triangle)
     on = np.flatnonzero(edge >= 0)

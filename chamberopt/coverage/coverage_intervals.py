@@ -1,6 +1,7 @@
 """Mean and standard deviation of the target's coverage, with confidence intervals.
 
 Notation
+    window   disc of the surface round a point of the target, in which dents are counted
     x        dent density of a window at the treatment time T: expected sum of the dents' shares
     C        coverage, 1 - exp(-x)
     n, t     number of replicas, and the simulated time of each replica [s]
@@ -21,8 +22,8 @@ I. J. Good and G. H. Toulmin, Biometrika 43 (1956) 45. It asks for about 3 dents
 each unit of x. With fewer dents the products scatter more than the quantity that they estimate.
 
 Intervals have two parts: the delete-one jackknife over replicas (B. Efron and R. J. Tibshirani, "An
-Introduction to the Bootstrap", Chapman & Hall 1993, chapter 11), and the choice of the points, from
-figures of every tenth point.
+Introduction to the Bootstrap", Chapman & Hall 1993, chapter 11), and the error by the choice of the
+points, which results from every tenth point show.
 """
 
 from __future__ import annotations
@@ -51,11 +52,12 @@ from chamberopt.coverage.percentile import (
 class Products(NamedTuple):
     """Product of 1 - k w over the dents in each window, for K time ratios k.
 
-    Here w is the share of the window that a dent takes. The mean product is the share left bare.
+    A window is a disc of the target, and w is the share of it that a dent takes. The ratio k is the
+    treatment time over the simulated time. The mean product is the share of the target left bare.
 
     Attributes:
-        of_all: over all batches, shape (p, K).
-        of_rest: the same without each batch in turn, means over the windows, shape (g, K).
+        of_all: products over the dents of all batches of replicas, shape (p, K).
+        of_rest: means over the windows of the products without each batch in turn, shape (g, K).
     """
 
     of_all: np.ndarray
@@ -63,10 +65,10 @@ class Products(NamedTuple):
 
 
 def multiply_dents(batches: Sequence[Batch], points: int, ratios: Sequence[float]) -> Products:
-    """Multiply 1 - k w over the dents in each window, for each time ratio k.
+    """Multiply 1 - k w over the dents in each window (disc of the target), for each time ratio k.
 
     Here w is the share of the window that a dent takes. The products are over the dents of all
-    batches, and of all batches without each one in turn.
+    batches of replicas, and of all batches without each batch in turn.
 
     Args:
         points: number of windows.
@@ -97,7 +99,7 @@ def coverage_estimates(
     """Estimate mean, deviation and percentiles of coverage and exposure by Avrami's equation.
 
     Args:
-        sums: of the dents of the batches in each window.
+        sums: number and shares of the dents of the batches in each window.
         reach: share of the target that a ball can touch.
         time_ratio: treatment time over the simulated time of one replica.
     """
@@ -122,7 +124,8 @@ def mean_and_variance_estimates(products: Products, reach: Reach) -> tuple[Estim
     """Return estimates of the mean and of the variance of coverage over the target.
 
     Args:
-        products: of the dents, for the time ratio and for twice the time ratio.
+        products: products over the dents in each window, for the ratio of the treatment time to the
+            simulated time, and for twice this ratio.
     """
     of_all, of_rest = products
     values = mean_and_variance(np.vstack([of_all.mean(axis=0), of_rest]), reach.share)
@@ -143,8 +146,10 @@ def mean_and_variance_estimates(products: Products, reach: Reach) -> tuple[Estim
 
 
 def products_without_each(products: np.ndarray) -> np.ndarray:
-    """Return the products (g, p, k) over all batches but one, for each of the g batches left out,
-    from the products (g, p, k) of single batches.
+    """Return the products over all batches but one, for each of the g batches left out, (g, p, k).
+
+    Args:
+        products: products over the dents of each single batch, in p windows, (g, p, k).
     """
     before, after = np.ones_like(products), np.ones_like(products)
     np.cumprod(products[:-1], axis=0, out=before[1:])
@@ -155,8 +160,10 @@ def products_without_each(products: np.ndarray) -> np.ndarray:
 def mean_and_variance(uncovered: np.ndarray, reachable: float) -> tuple[np.ndarray, np.ndarray]:
     """Return mean and variance of coverage over the target.
 
-    The last axis of `uncovered` (..., 2) holds the means over the windows of exp(-x) and exp(-2 x),
-    with x the dent density of a window.
+    Args:
+        uncovered: means over the windows of exp(-x) and exp(-2 x), where x is the dent density of a
+            window, (..., 2).
+        reachable: share of the target that a ball can touch.
     """
     m1, m2 = np.moveaxis(uncovered, -1, 0)
     mean = reachable * (1.0 - m1)
@@ -189,8 +196,8 @@ NOT_RESOLVED = "not resolved"
 
 @dataclass(frozen=True)
 class Resolution:
-    """The number of dents in the median window of a simulation, and the numbers that its figures
-    need.
+    """Number of dents in the median window (disc of the target) of a simulation, and the numbers of
+    dents that its results need to be trusted.
     """
 
     dents: float  # in the median window
@@ -207,9 +214,9 @@ class Resolution:
         return self.dents >= self.needed_for_places
 
     def time_for(self, needed: float) -> float:
-        """Return the simulated time [s] in which the median window gets `needed` dents.
+        """Return the simulated time [s] in which the median window (disc) gets `needed` dents.
 
-        It has a margin if the window has fewer dents now.
+        The time has a margin if the window has fewer dents so far.
         """
         if not self.dents:
             return math.inf
@@ -220,12 +227,13 @@ class Resolution:
 def find_resolution(
     batches: Sequence[Batch], sums: DentSums, gauge: Gauge, time_ratio: float, time: float
 ) -> Resolution:
-    """Return the number of dents in the median window, and the numbers that the figures need.
+    """Return the number of dents in the median window (disc of the target), and the numbers of
+    dents that the results need to be trusted.
 
     Args:
-        sums: of the dents of the batches in each window.
+        sums: number and shares of the dents of the batches in each window.
         time_ratio: treatment time over the simulated time of one replica.
-        time: simulated by each replica [s].
+        time: simulated time of each replica [s].
     """
     replicas = sum(one.replicas for one in batches)
     prints, dents = [one.footprints for one in batches], float(np.median(sums.number))

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Dents:
-    """Dents on the part in order of time. Places are in the part's own frame."""
+    """Dents on the part in order of time. Positions are in the part's own frame."""
 
     place: np.ndarray  # contact points [m], (k, 3)
     normal: np.ndarray  # unit normals of the triangles that were hit, (k, 3)
@@ -56,10 +56,10 @@ def dent_diameter(
     The energy that the impact loses makes a spherical cap in the material.
 
     Args:
-        normal_speed: v [m/s], (n,).
-        diameter: D [m], (n,) or one for all.
-        density: rho [kg/m³].
-        material: of the part, with its restitution e(v), yield speed v0 and hardness B.
+        normal_speed: v, speed of the impact along the normal [m/s], (n,).
+        diameter: D, diameter of the ball [m], (n,) or one for all.
+        density: rho, density of the balls [kg/m³].
+        material: material of the part, with restitution e(v), yield speed v0 and hardness B.
     Returns:
         Diameter [m], (n,); 0 where the normal speed is not above the yield speed v0.
 

@@ -1,4 +1,4 @@
-"""The registry of a candidate's metrics, and of the objectives that a study can maximise.
+"""The registry of metrics, numbers that describe a simulated design, and of objectives of studies.
 
 A new metric is an entry of `METRICS`, and a new objective is an entry of `OBJECTIVES`. Study files,
 tables, reports and result folders take names, units and ranges from `find_metric`. The metrics of
@@ -31,7 +31,7 @@ P95 = 0.95  # share of the target's area that may be covered less than p95_cover
 
 @dataclass(frozen=True)
 class Metric:
-    """A named figure of a simulated design, such as its mean coverage.
+    """A named number that describes a simulated design, such as its mean coverage.
 
     Metrics of coverage and intensity have their own estimators, see simulation/estimates.py.
     """
@@ -60,12 +60,12 @@ class ObjectiveFunction:
 
 
 def exposed_target(chamber: Chamber) -> np.ndarray:
-    """Return marks of the part triangles that are on the target and bound the cavity, (m,) bool."""
+    """Return marks (m,) of the part triangles of the target that bound the room of the balls."""
     return chamber.part.target & (chamber.exposed_area > 0.0)
 
 
 def require_target(chamber: Chamber) -> None:
-    """Raise InputError if no triangle of the target bounds the cavity."""
+    """Raise InputError if no triangle of the target bounds the cavity, the room of the balls."""
     if not exposed_target(chamber).any():
         raise InputError(
             "part.target: no triangle of the target bounds the cavity, so its coverage is not "
@@ -236,7 +236,7 @@ def metric_problem(design: Design, name: str) -> str:
 
 
 def metric_names(design: Design) -> tuple[str, ...]:
-    """Return the names of all metrics that a design has. The metrics of its zones come last."""
+    """Return the names of all metrics of a design. The metrics of its zones come last."""
     of_target = tuple(name for name in METRICS if not metric_problem(design, name))
     of_zones = (f"{zone.name}.{name}" for zone in design.zones for name in of_target)
     return (*of_target, *(name for name in of_zones if find_metric(name)))
@@ -274,7 +274,7 @@ def renamed_objective(old: str) -> str:
 
 
 def parse_objective(name: str) -> ObjectiveFunction:
-    """Return the objective of this name, or the objective that a text of weighted objectives and
+    """Return the objective of this name, or the objective that a weighted sum of objectives and
     metrics describes.
 
     >>> parse_objective("1 uniform_coverage + -0.001 time_to_98_s").terms
@@ -306,8 +306,8 @@ def highest_uniform_coverage(reachable: float) -> float:
     """Return the largest uniform_coverage (mean minus standard deviation of coverage) that is
     possible if balls reach only a share r of the target.
 
-    The rest has no coverage. If all reachable places are covered alike, to c, the mean is r c and
-    the standard deviation is c sqrt(r (1 - r)).
+    The rest of the target has no coverage. If the share r has the same coverage c everywhere, the
+    mean is r c and the standard deviation is c sqrt(r (1 - r)).
     """
     return max(0.0, reachable - math.sqrt(max(0.0, reachable * (1.0 - reachable))))
 
@@ -315,7 +315,7 @@ def highest_uniform_coverage(reachable: float) -> float:
 def highest_objective(name: str, reachable: float) -> float:
     """Return the largest possible value of an objective if balls reach only a share of the target.
 
-    It is infinite if no bound is known.
+    The value is infinite if no bound is known.
     """
     terms = parse_objective(name).terms
     if terms == OBJECTIVES["uniform_coverage"].terms:

@@ -1,6 +1,6 @@
 """Single impacts on the part, and their file hits.npz, for distributions and percentiles.
 
-An impact takes 32 bytes in this form, and a hundred in the simulator's log.
+An impact takes 32 bytes in this form, and about 100 bytes in the simulator's log.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ HITS_FILE = "hits.npz"
 
 @dataclass(frozen=True)
 class Hits:
-    """Impacts of one or more replicas on the part, one row for each impact."""
+    """Impacts of one or more replicas (simulations) on the part, one row for each impact."""
 
     triangle: np.ndarray  # part triangle, (k,) int32
     place: (
@@ -43,7 +43,7 @@ class Hits:
         return len(self.triangle)
 
     def on(self, triangles: np.ndarray) -> Hits:
-        """Return the impacts on those part triangles that `triangles` marks, (m,) bool."""
+        """Return the impacts on the part triangles that `triangles` marks, (m,) bool."""
         return self.select(triangles[self.triangle])
 
     def select(self, rows: slice | np.ndarray) -> Hits:
@@ -52,7 +52,7 @@ class Hits:
 
 @dataclass(frozen=True)
 class TargetImpacts:
-    """The impacts of some replicas on those triangles of the target that bound the cavity."""
+    """Impacts of some replicas (simulations) on the triangles of the target inside the chamber."""
 
     hits: tuple[Hits, ...]  # of each replica
     time: float  # simulated time of the impacts [s]
@@ -79,12 +79,12 @@ class HitsByTriangle:
         return self.hits.select(slice(self.first[triangle], self.first[triangle + 1]))
 
     def on(self, triangles: np.ndarray) -> Hits:
-        """Return the impacts on those part triangles that `triangles` marks, (m,) bool."""
+        """Return the impacts on the part triangles that `triangles` marks, (m,) bool."""
         return self.hits.select(np.repeat(triangles, np.diff(self.first)))
 
 
 def hits_on_part(impacts: ImpactLog, chamber: Chamber, design: Design) -> Hits:
-    """Return those impacts of a simulator log that hit the part."""
+    """Return the impacts in a simulator log that hit the part."""
     source = chamber.source[impacts.triangle]
     on_part = source >= 0
     speed = np.asarray(impacts.normal_speed)
@@ -145,8 +145,8 @@ def load_hits(path: Path) -> HitsByTriangle:
 
 
 def _require_sound(first: np.ndarray, columns: dict[str, np.ndarray]) -> None:
-    """Raise ValueError unless `first` holds the first row of each triangle and the columns hold
-    impacts.
+    """Raise ValueError unless `first` holds the first row of each triangle, and the columns hold
+    values of impacts.
     """
     if first.dtype != np.int64 or first.ndim != 1 or not len(first) or first[0] != 0:
         raise ValueError("first is no list of rows from 0")

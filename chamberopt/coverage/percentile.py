@@ -1,16 +1,19 @@
 """Estimate percentiles of coverage and exposure over the target, and the time to full coverage.
 
-The 5th percentile of simulated dent densities is too low, because counts scatter. The scatter of
-sqrt(x) is alike everywhere (M. S. Bartlett, J. Roy. Stat. Soc. Suppl. 3 (1936) 68). So the roots
-are drawn to their mean until they vary over the target as the true roots do. This takes away the
-variance of counting, which shows from replica to replica. The result of half of the replicas shows
-the remaining error. The step from this result to the result of all replicas is made once more, and
-the interval includes it. The method asks for about 25 dents in a window. The 95th percentile, which
-is too high, is corrected alike.
+Notation
+    window  disc of the surface round a point of the target, in which dents are counted
+    x       dent density: expected sum of the shares of a window that dents take
+    M       exposure, x / ln 50: the peening time over the time in which a window with as many dents
+            is 98 % covered by Avrami's equation; M = 2 is "200 %"
 
-Notation: the dent density x is the expected sum of the shares of a window that dents take. The
-exposure M = x / ln 50 is the peening time over the time in which a place with as many dents is 98 %
-covered by Avrami's equation: M = 2 is "200 %".
+The 5th percentile of simulated dent densities is too low, because the counts of dents scatter. The
+scatter of sqrt(x) is the same at any x (M. S. Bartlett, J. Roy. Stat. Soc. Suppl. 3 (1936) 68). So
+the roots of all windows are moved towards their mean until they vary over the target as the true
+roots do. This takes away the variance of counting, which is known from the differences between
+replicas (independent simulations). The result of half of the replicas shows the remaining error:
+the step from it to the result of all replicas is made once more, and the interval includes this
+step. The method needs about 25 dents in a window. The 95th percentile, which is too high, is
+corrected in the same way.
 """
 
 from __future__ import annotations
@@ -34,8 +37,8 @@ SHORTEST = 1e-6  # shortest treatment, over the whole treatment
 
 
 class Quantile(NamedTuple):
-    """A percentile over the target: the figure of each place, such as coverage, and the share of
-    the target's area with a lower figure.
+    """A percentile over the target: a quantity of each point, such as coverage, and the share of
+    the target's area where it is lower.
     """
 
     level: float
@@ -58,8 +61,8 @@ P95_EXPOSURE = Quantile(P95, exposure_from_density, math.inf)
 
 
 class DentSums(NamedTuple):
-    """Numbers of the dents in windows of one size, and sums of the shares of a window that they
-    take.
+    """Numbers of dents in windows (discs of the target), and sums of the shares of a window that
+    the dents take.
 
     Attributes:
         replicas: number of replicas in each batch, shape (g,).
@@ -73,14 +76,14 @@ class DentSums(NamedTuple):
 
     @property
     def weight(self) -> float:
-        """Mean share of a window that a dent takes; infinite if there are no dents."""
+        """Mean share of a window (disc) that a dent takes; infinite if there are no dents."""
         count = float(self.number.sum())
         return float(self.share.sum()) / count if count else math.inf
 
 
 def sum_dents(batches: Sequence[Batch], points: int) -> DentSums:
-    """Return the number of dents in each of `points` windows, and the sum of the shares of the
-    window that the dents of each batch take.
+    """Return the number of dents in each of `points` windows (discs of the target), and the sum of
+    the shares of the window that the dents of each batch of replicas take.
     """
     from chamberopt.coverage.field.windows import add_powers
 
@@ -95,16 +98,16 @@ def sum_dents(batches: Sequence[Batch], points: int) -> DentSums:
 def quantile_estimate(
     quantile: Quantile, sums: DentSums, reach: Reach, time_ratio: float
 ) -> Estimate:
-    """Estimate a percentile of a figure such as coverage over the target. Places out of reach are
-    bare.
+    """Estimate a percentile of a quantity such as coverage over the target.
 
-    The percentile is 0 where the share out of reach is more than its level. If the reach is not
-    known well enough to tell, the value is the mean of both cases, so that the choice of points
-    does not throw it to and fro. The interval then holds both cases.
+    Points that no ball can touch are bare. The percentile is 0 if they make up more of the target
+    than its level. If their share is not known well enough to tell, the value is the mean of both
+    cases, so that it does not jump with the choice of points. The interval then holds both cases.
 
     Args:
-        quantile: such as P05_COVERAGE.
-        sums: of the dents of each batch of replicas.
+        quantile: the percentile, such as P05_COVERAGE.
+        sums: number and shares of the dents in each window, by batch of replicas.
+        reach: share of the target that a ball can touch.
         time_ratio: treatment time over the simulated time of one replica.
     """
     from scipy.special import ndtr
@@ -135,8 +138,8 @@ def quantile_estimate(
 def _quantile_of_reached(
     quantile: Quantile, sums: DentSums, reach: Reach, time_ratio: float
 ) -> Estimate:
-    """Estimate a percentile over the target if the share of the target out of reach is surely less
-    than the percentile's level.
+    """Estimate a percentile over the target, if the share of the target that no ball can touch is
+    surely less than the percentile's level.
     """
     batches = len(sums.replicas)
     share, further = (
@@ -200,7 +203,7 @@ def mean_exposure(sums: DentSums, reach: Reach, time_ratio: float) -> Estimate:
     The estimate has no bias, because it is linear in the dents.
 
     Args:
-        sums: of the dents of each batch of replicas.
+        sums: number and shares of the dents in each window, by batch of replicas.
         reach: share of the target that a ball can touch.
         time_ratio: treatment time over the simulated time of one replica.
     """
@@ -216,12 +219,12 @@ def mean_exposure(sums: DentSums, reach: Reach, time_ratio: float) -> Estimate:
 
 
 def in_order(low: Estimate, high: Estimate, name: str) -> dict[str, Estimate]:
-    """Return the 5th and 95th percentile of a figure, by name, with the 5th not above the 95th.
+    """Return the 5th and 95th percentile of a quantity, by name, with the 5th not above the 95th.
 
-    The corrections may exchange the percentiles of an even surface. Then both are their middle.
+    On an even surface the corrections may put the 5th above the 95th. Both then get their mean.
 
     Args:
-        name: of the figure, with {} in the place of p05 and p95.
+        name: name of the quantity, with {} for p05 and p95.
     """
     if low.value > high.value:
         middle = 0.5 * (low.value + high.value)
@@ -233,10 +236,12 @@ def in_order(low: Estimate, high: Estimate, name: str) -> dict[str, Estimate]:
 
 
 class DensityRoots(NamedTuple):
-    """Figures of the square roots of dent densities in windows, per replica.
+    """Quantile, mean and variances of the square roots of dent densities in windows, per replica.
+
+    A dent density is the sum of the shares of a window (disc of the target) that dents take.
 
     Attributes:
-        at_share: root that a share of the windows do not exceed.
+        at_share: quantile: the root that a given share of the windows do not exceed.
         middle: mean root.
         over_target: variance of the roots over the windows.
         counting: part of the variance that comes from counting.
@@ -248,11 +253,11 @@ class DensityRoots(NamedTuple):
     counting: float
 
     def density(self, more: float = 0.0) -> float:
-        """Return the dent density that a share of the windows do not exceed, without the scatter of
-        counting.
+        """Return the dent density that the given share of the windows do not exceed, corrected for
+        the scatter of counting.
 
         Args:
-            more: variance to add to the remaining variance.
+            more: variance to add to the variance without counting.
         """
         if not self.over_target:
             return self.at_share**2
@@ -287,11 +292,11 @@ def time_to_98(
     """Estimate the time [s] until 95 % of the target's area is 98 % covered.
 
     A coverage near 1 hardly changes with twice as many dents. So the time comes from the coverage
-    after a shorter part of the treatment, which leaves more bare.
+    after a shorter part of the treatment, when more of the target is bare.
 
     Args:
         p05: 5th percentile of the coverage after the treatment.
-        sums: of the dents of each batch of replicas.
+        sums: number and shares of the dents in each window, by batch of replicas.
         reach: share of the target that a ball can touch.
         time_ratio: treatment time over the simulated time of one replica.
         seconds: treatment time [s].
@@ -306,7 +311,8 @@ def time_to_98(
 def time_to_98_estimate(p05: Estimate, seconds: float) -> Estimate:
     """Estimate the time [s] until 95 % of the target's area is 98 % covered, by Avrami's equation.
 
-    The time is steep where little is covered, so the longer side of its interval serves for both.
+    At little coverage the time changes steeply with it, so the two sides of the time's interval
+    differ. The longer side serves for both.
 
     Args:
         p05: 5th percentile of the coverage after `seconds` of peening.

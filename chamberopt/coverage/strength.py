@@ -1,22 +1,24 @@
-"""Peening strength of a place: the reading of an Almen strip there.
+"""Peening strength at a point of the part: the reading of an Almen strip there.
 
 Notation
+    window  disc of the surface round a point of the target, in which dents are counted
     d, D    diameters of a dent on the strip and of its ball [m]
     s       strength of one impact, d² / D: eight times dent volume over dent area [m]
-    L(s)    rate of dents stronger than s in a window [1/s]: sum of their areas over window and time
-    h(t)    strength of a place after a time t, if each spot keeps its strongest dent [m]
+    L(s)    rate of dents stronger than s [1/s]: sum of their areas in a window over the window's
+            area and the time
+    h(t)    strength in a window after a time t, if each spot keeps its strongest dent [m]
     T       saturation time: the largest time with h(2 T) = 1.1 h(T) [s]
     S       peening strength, h(T) [m]
 
     h(t) = integral over s of 1 - exp(-L(s) t)
 
 A strip's arc height saturates like h. SAE J443 calls it saturated if twice the time adds 10 %. The
-arc height goes with d²/D as long as the strip's in-plane stretch, and not its yielding, limits it.
-For equal impacts h is the curve a (1 - exp(-b t)) of D. Kirk, "Almen saturation curve solver
-program", The Shot Peener, 2005. The Almen intensity is S times a constant that a set of strips
-calibrates. The impacts are the part's, and the dents are the dents that they would leave in the
-strip's steel. The same sum with s = d, on the part's own metal, gives the depth of compression
-(compression.py).
+arc height is proportional to d²/D as long as the strip's in-plane stretch, and not its yielding,
+limits it. For equal impacts h is the curve a (1 - exp(-b t)) of D. Kirk, "Almen saturation curve
+solver program", The Shot Peener, 2005. The Almen intensity is S times a constant that a set of
+strips calibrates. The impacts are those on the part, and the dents are the dents that these impacts
+would leave in the strip's steel. The same sum with s = d, on the part's own metal, gives the depth
+of compression (compression.py).
 """
 
 from __future__ import annotations
@@ -44,7 +46,7 @@ def ball_diameter(hits: Hits, density: float) -> np.ndarray:
     rest.
 
     Args:
-        density: of the balls [kg/m³].
+        density: density of the balls [kg/m³].
     """
     speed = hits.speed.astype(float)
     mass = np.divide(2.0 * hits.energy, speed**2, out=np.zeros(len(hits)), where=speed > 0.0)
@@ -58,7 +60,8 @@ def strip_dents(hits: Hits, density: float, strip: PartMaterial) -> tuple[np.nda
     Both are 0 if the impact leaves no dent.
 
     Args:
-        density: of the balls [kg/m³].
+        density: density of the balls [kg/m³].
+        strip: material of the strip.
     """
     ball = ball_diameter(hits, density)
     dent = dent_diameter(hits.speed.astype(float), ball, density, strip)
@@ -71,8 +74,9 @@ def area_of_dent(diameter: np.ndarray) -> np.ndarray:
 
 
 def levels(values: np.ndarray, highest: float) -> np.ndarray:
-    """Return for each value which of LEVELS equal steps from 0 to `highest` it is in, from 0 to
-    LEVELS - 1.
+    """Return the number, from 0 to LEVELS - 1, of the step in which each value lies.
+
+    The range from 0 to `highest` is divided into LEVELS equal steps.
 
     >>> levels(np.array([0.0, 0.5, 1.0]), highest=1.0)
     array([ 0, 16, 31])
@@ -86,10 +90,10 @@ def strength_histogram(
     """Return the dented area over the area of each window, by level of strength, (p, LEVELS).
 
     Args:
-        area: of the windows [m²], (p,).
-        contacts: places of the dents.
+        area: areas of the windows [m²], (p,).
+        contacts: positions of the dents.
         dent: diameter of each dent [m], (k,).
-        level: level of each dent, (k,).
+        level: number of the step of strength in which each dent lies, (k,).
     """
     from chamberopt.coverage.field.windows import add_to_levels
 
@@ -100,12 +104,13 @@ def strength_histogram(
 
 
 def saturated_strength(histogram: np.ndarray, highest: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return the peening strength [m] and the saturation time of each window, (p,) each.
+    """Return the peening strength [m] and the saturation time of each window (disc of the target),
+    (p,) each.
 
     Both are 0 in a window without dents. The unit of time is the time in which the dents fell.
 
     Args:
-        histogram: dented area over area of each window by level, (p, LEVELS).
+        histogram: dented area over area of each window, by level (step) of strength, (p, LEVELS).
         highest: strength at the upper end of the levels [m].
     """
     rate = dent_rates(histogram)
@@ -117,8 +122,10 @@ def saturation_time(rate: np.ndarray) -> np.ndarray:
     """Return the saturation time of each window, (p,): the last time after which as much time again
     adds 10 % of strength.
 
-    `rate` (p, n) holds the rates of dents stronger than each level. The unit of time is the time in
-    which the dents fell.
+    The unit of time is the time in which the dents fell.
+
+    Args:
+        rate: rates of dents stronger than each level of strength, (p, n).
     """
     # T lies between these times. For equal dents it is ln 10 over their rate.
     top = rate.max(axis=1)
@@ -134,9 +141,10 @@ def saturation_time(rate: np.ndarray) -> np.ndarray:
 
 
 def time_near(rate: np.ndarray, time: np.ndarray) -> np.ndarray:
-    """Return the saturation time of each window, (p,), if it is known to be near `time` (p,).
+    """Return the saturation time of each window, (p,), by a search that begins near `time` (p,).
 
-    `rate` holds the rates of dents stronger than each level.
+    Args:
+        rate: rates of dents stronger than each level of strength, (p, n).
     """
     for _ in range(NEWTON_STEPS):
         gain, slope = _gain(rate, time)
@@ -148,16 +156,24 @@ def time_near(rate: np.ndarray, time: np.ndarray) -> np.ndarray:
 def dent_rates(histogram: np.ndarray) -> np.ndarray:
     """Return the rate of dents stronger than the middle of each level, in each window, (p, LEVELS).
 
-    It comes from the dented area over the window's area by level. The unit of time is the time in
-    which the dents fell.
+    A level is a step of strength. The rate is dented area over the window's area and the time, in
+    units of the time in which the dents fell.
+
+    Args:
+        histogram: dented area over area of each window, by level of strength, (p, LEVELS).
     """
     down = np.cumsum(histogram[:, ::-1], axis=1)[:, ::-1]
     return np.asarray(down - 0.5 * histogram)
 
 
 def _gain(rate: np.ndarray, time: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return h(2 T) - 1.1 h(T) for the strength h after a time T, in levels, and its slope over T.
-    It is 0 at the saturation time.
+    """Return h(2 T) - 1.1 h(T) and its derivative by T, (p,) each, for the strength h after a time.
+
+    The first is 0 at the saturation time. The unit of h is a level (step) of strength.
+
+    Args:
+        rate: rates of dents stronger than each level, (p, n).
+        time: the time T of each window, (p,).
     """
     left = np.exp(-rate * time[:, None])
     gain = (1.0 - left**2).sum(axis=1) - SATURATED * (1.0 - left).sum(axis=1)
@@ -166,7 +182,12 @@ def _gain(rate: np.ndarray, time: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def strength_at(rate: np.ndarray, time: np.ndarray, highest: float) -> np.ndarray:
-    """Return the strength [m] of each window, (p,), after a peening time (p,). The unit of time is
-    the time in which the dents fell.
+    """Return the strength [m] of each window, (p,), after a peening time (p,).
+
+    The unit of time is the time in which the dents fell.
+
+    Args:
+        rate: rates of dents stronger than each level of strength, (p, LEVELS).
+        highest: strength at the upper end of the levels [m].
     """
     return np.asarray(-np.expm1(-rate * time[:, None]).sum(axis=1) * highest / LEVELS)

@@ -4,12 +4,12 @@ Notation: as in strength.py, and
     S       strength of each window, from all batches                     (whole.strength, (p,))
     y_j     pseudo-value of S for batch j, from all other batches         (pseudo, (g, p))
 
-S of a window is too small if it has few dents, because the strongest dents are missing. S also
-scatters as counts do, which would add to its variance over the target. So the mean square comes
-from products of S in two disjoint halves of the batches, whose scatter is independent. Percentiles
-are drawn to the mean until they vary as the true percentiles do. Halves and quarters of the batches
-show how much few dents change a figure. The step from halves to all batches is made once more, and
-the interval includes it, as often as OF_STEP says.
+S of a window is too small if the window has few dents, because the strongest dents are missing. S
+also scatters as counts do, which would add to its variance over the target. So the mean square of S
+comes from products of S in two disjoint halves of the batches, whose scatter is independent.
+Percentiles are moved towards the mean until S varies over the target as the true strength does.
+Halves and quarters of the batches show how much a result changes with few dents. The step from
+halves to all batches is made once more, and the interval includes this step times OF_STEP.
 """
 
 from __future__ import annotations
@@ -58,10 +58,10 @@ MICROMETRES = 1e6
 
 
 class StrengthHistograms(NamedTuple):
-    """Dented areas in windows, by batch of replicas and level of strength.
+    """Dented areas in windows (discs of the target), by batch of replicas and level of strength.
 
     Attributes:
-        parts: dented area over area, by batch, window and level, (g, p, LEVELS).
+        parts: dented area over the window's area, by batch, window and level, (g, p, LEVELS).
         seconds: simulated time of each batch [s], (g,).
         highest: strength at the upper end of the levels [m].
     """
@@ -95,15 +95,16 @@ def strength_estimates(
     """Estimate the metrics of peening strength, by name, over the target's reachable surface.
 
     Args:
-        batches: impacts of the replicas of each batch, in the sector of the windows.
+        batches: impacts of the replicas of each batch, turned into the sector of the chamber in
+            which the windows lie.
         seconds: simulated time of each replica.
-        density: of the balls [kg/m³].
-        strip: the metal of a strip.
+        density: density of the balls [kg/m³].
+        strip: the metal of an Almen strip.
     Returns:
         strength_um: mean of the peening strength S.
         strength_p05_um, strength_p95_um: S that 95 % and 5 % of the area exceed.
         intensity_uniformity: 1 - (standard deviation of S) / (mean of S) over the whole target,
-            where places out of reach have S = 0.
+            where S = 0 at points that no ball can touch.
         saturation_time_s: saturation time of the mean strength of all windows.
     """
     found = level_histograms(
@@ -130,10 +131,11 @@ def level_histograms(
     seconds: float,
     dents_of: Callable[[Hits], tuple[np.ndarray, np.ndarray]],
 ) -> StrengthHistograms:
-    """Return the dented areas by level of strength, in at most WINDOWS windows of the target.
+    """Return the dented areas by level (step) of strength, in at most WINDOWS windows (discs).
 
     Args:
-        batches: impacts of the replicas of each batch, in the sector of the windows.
+        batches: impacts of the replicas of each batch, turned into the sector of the chamber in
+            which the windows lie.
         seconds: simulated time of each replica.
         dents_of: function of impacts that gives diameter and strength [m] of each dent, (k,) each.
             Both are 0 for an impact without a dent.
@@ -158,7 +160,12 @@ def level_histograms(
 
 
 def estimates_of(found: StrengthHistograms, reach: Reach) -> dict[str, Estimate]:
-    """Return estimates of the metrics of peening strength, by name, from dented areas by level."""
+    """Return estimates of the metrics of peening strength, by name.
+
+    Args:
+        found: dented areas in windows of the target, by level of strength.
+        reach: share of the target that a ball can touch.
+    """
     reachable = reach.share
     batches, total = len(found.parts), found.parts.sum(axis=0)
     whole = _saturated(found, np.arange(batches))
@@ -249,8 +256,9 @@ def _without(
 def _pairs(
     found: StrengthHistograms, size: int, rng: np.random.Generator
 ) -> list[tuple[Saturated, Saturated]]:
-    """Return SPLITS pairs of strength and saturation time, from two random sets of `size` batches
-    each that share no batch.
+    """Return SPLITS pairs of results (strength and saturation time of the windows).
+
+    Each pair comes from two random sets of `size` batches that have no batch in common.
     """
     pairs = []
     for _ in range(SPLITS):
@@ -260,10 +268,11 @@ def _pairs(
 
 
 def _figures(found: Saturated, spread: float) -> dict[str, float]:
-    """Return the metrics of peening strength from some batches, by name, except the evenness.
+    """Return the metrics of peening strength, by name, except intensity_uniformity.
 
     Args:
-        spread: true mean square of S over its squared mean, on the reachable surface.
+        found: strength of each window, from some of the batches.
+        spread: true mean square of the strength over its squared mean, on the reachable surface.
     """
     strength = found.strength
     mean, raw = float(strength.mean()), _spread(strength, strength) - 1.0
@@ -290,9 +299,12 @@ def _uniformity_estimate(
     """Estimate the evenness of strength over the whole target, 1 - standard deviation / mean.
 
     Args:
-        spreads: mean square of S over its squared mean, corrected for few dents, (SPLITS,).
+        spreads: mean square of the strength over its squared mean, corrected for few dents,
+            (SPLITS,).
         of_halves: the same without the correction, (SPLITS,).
-        variances: relative variance of S, from all batches and without each in turn, (g + 1,).
+        variances: relative variance of the strength, from all batches and then without each batch
+            in turn, (g + 1,).
+        whole: strength of each window, from all batches.
     """
     reachable = reach.share
     value = _uniformity(float(spreads.mean()), reachable)
@@ -329,8 +341,11 @@ def _spread(one: np.ndarray, two: np.ndarray) -> float:
 def _uniformity(spread: float, reachable: float) -> float:
     """Return the evenness of strength over the whole target, 1 - standard deviation / mean.
 
-    `spread` is the mean square of strength over its squared mean, on the reachable surface. Places
-    out of reach have no strength.
+    Points that no ball can touch have no strength.
+
+    Args:
+        spread: mean square of strength over its squared mean, on the reachable surface.
+        reachable: share of the target that a ball can touch.
     """
     return 1.0 - math.sqrt(max(0.0, spread / reachable - 1.0))
 
@@ -339,7 +354,8 @@ def _relative_variance(squares: np.ndarray, means: np.ndarray, reachable: float)
     """Return the variance of strength over the target, divided by its squared mean.
 
     Args:
-        squares: means over the windows of products of two batches' pseudo-values, (g, g).
+        squares: means over the windows of products of the pseudo-values of two batches, (g, g). A
+            pseudo-value is a batch's contribution to the strength in the jackknife.
         means: mean over the windows of each batch's pseudo-values, (g,).
     """
     batches, mean = len(means), float(means.mean())

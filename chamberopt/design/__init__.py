@@ -1,4 +1,4 @@
-"""Content of design files and study files, and their loading.
+"""Design files: the tables and keys of a chamber and its process, and their loading.
 
 Example: load the shipped plate, make a copy with another height and save it.
 

@@ -19,7 +19,7 @@ STRIP_HB = 450.0  # SAE 1070 spring steel of 44 to 50 HRC (SAE J442)
 
 @dataclass(frozen=True)
 class AlmenStrip:
-    """Dimensions [m] of an Almen strip. Its type, N, A or C, tells the thickness (SAE J442)."""
+    """Dimensions [m] of an Almen strip. Its type, N, A or C, sets the thickness (SAE J442)."""
 
     type: StripType
     thickness: float
@@ -43,7 +43,7 @@ STRIP_STEEL = Elastic(205e9, 0.29)
 def strip_material(shot: ShotTable) -> PartMaterial:
     """Return the hardness of an Almen strip and its restitution under this shot.
 
-    A charge that is given only by its density has the elasticity of steel.
+    Shot of which only the density is given is taken to have the elasticity of steel.
     """
     elastic = ball(shot.material or "steel").elastic
     hardness = STRIP_HB * BRINELL_TO_PASCAL

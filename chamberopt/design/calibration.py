@@ -1,7 +1,7 @@
-"""Calibration of one machine by measurements: factors on design numbers, and Almen constants.
+"""Calibration of one machine by measurements: factors on a design's numbers, and Almen constants.
 
-`chamberopt calibrate` finds them. A design that names the calibration file is simulated with these
-values in place of its own. The intervals of its figures include the uncertainty of the calibration.
+`chamberopt calibrate` finds these values. A design that names the calibration file is simulated
+with them in place of its own. The intervals of its results include the calibration's uncertainty.
 
 Notation, with the names of PARAMETERS
     amplitude   factor on the amplitude of the sonotrode
@@ -12,8 +12,8 @@ Notation, with the names of PARAMETERS
     beta        number of dents on a real strip over the simulated number
     m, C        mean and covariance of their natural logarithms     (log_mean, log_covariance)
     L           lower triangle with L L' = C
-    g           slopes of a figure by the logarithms
-    L' g        independent standard errors of the figure
+    g           derivatives of a result, such as the mean coverage, by the logarithms
+    L' g        independent standard errors of the result
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ Law = TypeVar("Law", bound=RestitutionTable)
 
 
 class Misfit(FileTable):
-    """How well the simulation agrees with the measurements of one kind, after calibration."""
+    """Agreement of the simulation with the measurements of one kind, after calibration."""
 
     kind: str = Field(description="of measurement")
     chi2: float = quantity(0, 1e12, "", "sum of squared residuals over their variances")
@@ -144,7 +144,7 @@ class Calibration(FileTable):
 
     @property
     def not_mmA(self) -> str:  # noqa: N802
-        """Return a note if intensities are not those of whole Almen strips; otherwise ""."""
+        """Return a note if the strips of the calibration were not whole Almen strips, else ""."""
         if not self.has_strips or self.strips == WHOLE_STRIP:
             return ""
         return (
@@ -175,13 +175,13 @@ class Calibration(FileTable):
         return found
 
     def errors(self, slopes: Mapping[Parameter, float], of_model: float = 0.0) -> tuple[float, ...]:
-        """Return the independent standard errors L' g that the calibration gives a figure.
+        """Return the independent standard errors L' g of a result by the calibration.
 
-        There is one for each of PARAMETERS, and last the model's own error. The errors of the
-        difference of two figures are the differences of their errors.
+        There is an error for each of PARAMETERS, and last the model's own error. The errors of the
+        difference of two results are the differences of their errors.
 
         Args:
-            slopes: slope of the figure by each parameter's logarithm; a missing one is 0.
+            slopes: derivative of the result by each parameter's logarithm; 0 where missing.
             of_model: standard error by effects that the model leaves out.
         """
         slope = np.array([slopes.get(name, 0.0) for name in PARAMETERS])
@@ -297,7 +297,7 @@ def calibrated_strip(shot: ShotTable, calibration: Calibration | None) -> PartMa
 
 
 def _times(table: Any, factors: Mapping[str, float]) -> Any:
-    """Return a copy of a table with some numbers multiplied by factors. Unset ones stay unset."""
+    """Return a copy of a table with some numbers multiplied by factors. None stays None."""
     values = {name: getattr(table, name) for name in factors}
     changed = {name: one * factors[name] for name, one in values.items() if one is not None}
     return table.model_copy(update=changed)

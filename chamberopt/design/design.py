@@ -1,4 +1,4 @@
-"""One complete candidate chamber, with the values of its design file.
+"""One complete design of a chamber and its process, with the values of its design file.
 
 Fields have the names and units of the file (`height_mm`). Properties without a suffix are SI
 (`height`, in metres). This package is the only place where units are converted. Every table is
@@ -47,7 +47,7 @@ NOT_VARIED = ("calibration.", "zones.", "part.tessellation.")
 
 
 class Design(FileTable):
-    """One complete candidate: part, chamber, sonotrode, shot, materials, effects, process."""
+    """One complete design: part, chamber, sonotrode, shot, materials, effects, process."""
 
     part: PartTable
     chamber: ChamberTable
@@ -88,7 +88,7 @@ class Design(FileTable):
         return design_class(data, info.context).model_validate(data, context=info.context)
 
     def __reduce__(self) -> tuple[object, ...]:
-        """Pickle the values. A worker process creates the class of a shape's designs itself."""
+        """Pickle only the values. A worker process makes the class for the design's shape anew."""
         return _unpickled, (self.model_dump(), self.is_recorded, self.chamber.sha256)
 
     @property
@@ -200,7 +200,7 @@ class Design(FileTable):
                 yield Problem(f"part.{key}", text)
 
     def numbers(self) -> tuple[str, ...]:
-        """Return the dotted names of all continuous numbers of the design that a study may vary."""
+        """Return the dotted names, such as shot.mass_g, of all continuous numbers that may vary."""
         fields = toml_errors.numeric_fields(self)
         return tuple(
             name
@@ -216,7 +216,7 @@ class Design(FileTable):
         return tuple(name for name in whole if not name.startswith(others))
 
     def choices(self) -> dict[str, tuple[str, ...]]:
-        """Return the allowed texts of each text key that a study may vary, by its dotted name."""
+        """Return the allowed texts of each key with texts that a study may vary, by dotted name."""
         tables = {"chamber": self.chamber, "sonotrode": self.sonotrode, "shot": self.shot}
         found = (one for name, table in tables.items() for one in text_choices(table, name))
         choices = {name: texts for name, texts in found if name != "chamber.unit"}
@@ -224,9 +224,8 @@ class Design(FileTable):
         return choices | ({SHAPE: generated} if self.chamber.shape in generated else {})
 
     def chamber_keys(self, shape: str) -> dict[str, bool]:
-        """Return True or False for each key of this shape's chamber, by its dotted name.
-
-        True means that the value of the key is a whole number.
+        """Return for each key of a chamber of this shape, by its dotted name, whether its value is
+        a whole number.
         """
         fields = SHAPES[shape].model_fields.items()
         return {f"chamber.{key}": field.annotation is int for key, field in fields}
@@ -259,7 +258,7 @@ class Design(FileTable):
         return "" if name in numbers else "a whole number cannot vary; leave it out"
 
     def value(self, name: str) -> float:
-        """Return the number at a dotted name, in the unit of the design file.
+        """Return the number at a dotted name such as shot.mass_g, in the unit of the design file.
 
         Raises InputError if there is no such number, or it is not set in this design.
         """
@@ -275,7 +274,8 @@ class Design(FileTable):
         return cast(float, value)
 
     def setting(self, name: str) -> float | str:
-        """Return the number at a dotted name, or the text if `choices` has the name.
+        """Return the number at a dotted name such as shot.mass_g, or the text if `choices` has the
+        name.
 
         Raises InputError if there is neither, or it is not set in this design.
         """
@@ -352,7 +352,7 @@ def _of_the_same_kind(old: Any, value: Any) -> Any:
 
 
 class AnyShape(ChamberTable):
-    """Replaces a chamber of an unknown shape, so that other problems are reported too."""
+    """Stand-in for a chamber of an unknown shape, so that other problems are reported too."""
 
     model_config = pydantic.ConfigDict(**{**STRICT, "extra": "ignore"})
 

@@ -1,4 +1,4 @@
-"""Physical effects of a design: one optional key of [effects] each."""
+"""Physical effects of a design, such as gravity and friction: keys of the table [effects]."""
 
 import math
 from collections.abc import Iterator
@@ -86,9 +86,9 @@ class FrictionTable(FileTable):
 
 
 class SurfaceEffectTable(FileTable):
-    """Base class of a table of [effects] that adds a further effect of hits on surfaces.
+    """Base class of a table in [effects] that adds a further effect of hits on surfaces.
 
-    The simulator has the effect under the same name as the table.
+    The simulator knows the effect by the key of the table.
     """
 
     @property

@@ -39,7 +39,7 @@ def save_design(design: Design, path: str | Path) -> None:
 
 
 def with_paths_from(folder: Path, value: Any) -> Any:
-    """Return a design's values with paths of meshes and of an own shape relative to a folder."""
+    """Return a design's values with the paths of files among them relative to a folder."""
     if isinstance(value, Mapping):
         return {
             name: _relative(inner, folder)
@@ -59,7 +59,7 @@ def _relative(path: str, folder: Path) -> str:
 
 
 def is_study(data: Mapping[str, object]) -> bool:
-    """True if these values are those of a study file rather than of a design file."""
+    """True if these values come from a study file rather than from a design file."""
     return isinstance(data.get("design"), str) or not {"vary", "optimizer"}.isdisjoint(data)
 
 

@@ -1,4 +1,4 @@
-"""The part of a design: its mesh file, its place in the chamber, and the target to be covered."""
+"""The part of a design: its mesh file, its pose in the chamber, and the target to be covered."""
 
 import math
 from collections.abc import Iterator
@@ -30,7 +30,7 @@ MAX_FACES = 500
 
 
 class FaceAt(FileTable):
-    """A face of the part, selected by a place on it."""
+    """A face of the part, selected by a point on it."""
 
     at_mm: Position = Field(description="a place on the face, in the part file's frame")
     crease_deg: float = quantity(
@@ -40,7 +40,7 @@ class FaceAt(FileTable):
 
 
 class Selection(FileTable):
-    """Conditions that choose triangles of the part: those that meet all given conditions."""
+    """Conditions that choose triangles of the part. A triangle must meet all given conditions."""
 
     surface: Names = list_field(
         'a name in quotes, or a list of names, e.g. ["flank", "root"]',
@@ -108,7 +108,7 @@ class Target(Selection):
 
 
 class TessellationTable(FileTable):
-    """How fine the triangles are into which the surface of a STEP file is divided."""
+    """Fineness of the triangles into which the surface of a STEP file is divided."""
 
     chord_mm: float = quantity(
         1e-4, 10, "mm", "distance that triangles keep from the surface", 0.02
@@ -126,7 +126,7 @@ class TessellationTable(FileTable):
 
 
 class SmoothingTable(FileTable):
-    """How finely facets of curved surfaces are divided, and how far that may move the surface.
+    """Fineness to which facets of curved surfaces are divided, and limit to the surface's move.
 
     A ball of radius r in a hollow touches two neighbouring facets, a distance r tan(a / 2) from
     their common edge, where a is the angle between the facets. Dents of diameter d cover the strip
@@ -164,7 +164,7 @@ Smoothing = Annotated[SmoothingTable, BeforeValidator(_accept_off)]
 
 
 class PartTable(FileTable):
-    """The part's mesh and its place in the chamber."""
+    """The part's mesh file and the part's pose in the chamber."""
 
     mesh: MeshFile = Field(description="mesh file, path relative to the design file")
     unit: Unit = Field(default="guess", description="of the numbers in the mesh file")

@@ -13,7 +13,7 @@ MIN_POINTS, MAX_POINTS = 1_000, 1_000_000  # limits on the number of coverage wi
 
 
 class Accuracy(FileTable):
-    """Number and length of the independent replicas. Each replica has its own start and warm-up."""
+    """Number and length of the replicas: simulations of one design, each from its own start."""
 
     RENAMED: ClassVar[dict[str, str]] = {
         "coverage": "objective_half_width",

@@ -1,4 +1,6 @@
-"""The closed surface of a chamber's shape. Tags mark its triangles as part, sonotrode or wall."""
+"""The closed surface of a chamber's shape. Tags, a number for each triangle, mark the triangles of
+part, sonotrode and wall.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,12 +12,12 @@ TAG_PART, TAG_SONOTRODE, TAG_WALL = 0, 1, 2
 
 
 def further_sonotrode_tag(k: int) -> int:
-    """Return the tag of triangles on further sonotrode k, which is `sonotrodes.k` in a design."""
+    """Return the tag (number of the kind of surface) of the further sonotrode `sonotrodes.k`."""
     return TAG_WALL + 1 + k
 
 
 def is_sonotrode(tags: np.ndarray) -> np.ndarray:
-    """Return True for each tag (k,) of a sonotrode, whether the first or a further one."""
+    """Return True for each tag (k,) of a sonotrode, be it the first or a further sonotrode."""
     return np.asarray((tags == TAG_SONOTRODE) | (tags > TAG_WALL))
 
 
@@ -38,8 +40,12 @@ def lofted(rings: Sequence[np.ndarray], peak: np.ndarray | None = None) -> Shape
            /____\\
            |    | ring 0     floor: a fan about its middle
 
-    Rings are points [m], each (n, 3) with the same n, round a convex outline, counter-clockwise
-    from above; the peak is [m], (3,). There are 2 n triangles a ring.
+    There are 2 n triangles for each ring.
+
+    Args:
+        rings: points of each ring [m], (n, 3) with the same n, round a convex outline,
+            counter-clockwise from above.
+        peak: point in the middle of the ceiling [m], (3,); None for the mean of the last ring.
     """
     n, k = len(rings[0]), len(rings)
     middle = rings[-1].mean(axis=0) if peak is None else peak

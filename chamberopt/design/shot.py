@@ -1,4 +1,4 @@
-"""The charge of a design: all its balls, either of one size or a mix of sizes by mass."""
+"""The shot of a design: all its balls, either of one size or a mix of sizes by mass."""
 
 import math
 from collections.abc import Iterator
@@ -74,7 +74,7 @@ class ShotTable(FileTable):
     def sizes(self) -> tuple[tuple[float, int], ...]:
         """Return the diameter [m] and the number of balls of each size.
 
-        The mass of a size is rounded to whole balls, at least one.
+        The number is rounded to whole balls, and is at least 1.
         """
         if self.mix is not None:
             shares = [(size.diameter_mm * 1e-3, size.share) for size in self.mix]

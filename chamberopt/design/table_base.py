@@ -10,7 +10,7 @@ from chamberopt.common.toml_fields import metres
 
 
 class SI:
-    """Attribute of a table that gives the value of a key in SI units: its value times a factor."""
+    """Attribute of a table that gives a key's value in SI units: the value times a factor."""
 
     def __init__(self, key: str, factor: float, meaning: str) -> None:
         self._key, self._factor, self.__doc__ = key, factor, meaning

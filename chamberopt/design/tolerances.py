@@ -40,9 +40,9 @@ def _deviation(side: object) -> tuple[float, bool]:
 
 
 def _checked(given: Any) -> object:
-    """Return a tolerance as its file gives it, after a check that it is one.
+    """Return a tolerance as its file gives it, after a check.
 
-    A tolerance is one deviation for both sides, or a pair of a lower and an upper deviation.
+    A tolerance is one deviation up and down, or a pair of a lower and an upper deviation.
     """
     several = isinstance(given, (list, tuple))
     shown = list(given) if several else given
@@ -78,7 +78,8 @@ class ToleratedDesign(Protocol):
 
 
 def tolerance_box(design: ToleratedDesign) -> dict[str, tuple[float, float]]:
-    """Return the lowest and highest value of each number with a tolerance, by its dotted name.
+    """Return the lowest and highest value of each number with a tolerance, by its dotted name, such
+    as shot.mass_g.
 
     The values are in the units of the file, for the key that the design gives.
     """
@@ -103,9 +104,8 @@ def require_tolerances(design: ToleratedDesign) -> None:
 def tolerance_problems(
     design: ToleratedDesign, fields: Mapping[str, FieldInfo]
 ) -> Iterator[Problem]:
-    """Yield a problem for each tolerance of no number of the design, or with a wrong range.
-
-    A range is wrong if it is empty or goes beyond the values allowed for the number.
+    """Yield a problem for each tolerance that names no number of the design, or whose range is
+    empty or goes beyond the values allowed for the number.
 
     Args:
         fields: fields of every number of the design, by dotted name.
@@ -134,9 +134,9 @@ def tolerance_problems(
 def _number_of(design: ToleratedDesign, key: str) -> tuple[str, float]:
     """Return the dotted name of the number that a key of [tolerances] means, and a factor.
 
-    A tolerance of the key times the factor is a tolerance of the number. The factor is 2 or 1/2 if
-    the key is the zero-to-peak amplitude and the design gives peak-to-valley, or the other way
-    round; otherwise it is 1.
+    The tolerance at the key, times the factor, is the tolerance of the number. The factor is 2 if
+    the key is the zero-to-peak amplitude and the design gives peak-to-valley, 1/2 in the opposite
+    case, and 1 otherwise.
     """
     name = SHORT_NAMES.get(key, key)
     table, _, last = name.rpartition(".")

@@ -1,8 +1,8 @@
-"""Zones of the part, as a drawing gives them, each with its own figures and limits.
+"""Zones: surfaces of the part, as a drawing gives them, each with its own results and limits.
 
-Limits are on figures that hold for nearly all of the zone's area, because a drawing's limit holds
-for every place of the zone. The least coverage is taken on the 5th percentile, the largest coverage
-and the largest exposure on the 95th, and the band of the intensity on both.
+A limit on a drawing holds at every point of a zone. So limits are on percentiles over the zone's
+area: the least coverage on the 5th percentile, the largest coverage and the largest exposure on the
+95th, and the band of the Almen intensity on both.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ LIMITED = {
 
 
 class Zone(FileTable):
-    """A surface of the part with its own figures and limits. It may lie beside the target."""
+    """A surface of the part with its own results and limits. It may lie outside the target."""
 
     name: Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$", max_length=40)] = Field(
         description="e.g. root: its figures are root.mean_coverage ...",
@@ -61,7 +61,7 @@ class Zone(FileTable):
 
     @property
     def is_spared(self) -> bool:
-        """True if the zone has a largest coverage but no least one: it is to be spared."""
+        """True if the zone is to be spared: it has a largest coverage, but no least coverage."""
         return self.coverage_max is not None and self.coverage_min is None
 
     def _problems(self) -> Iterator[Problem]:
@@ -81,7 +81,7 @@ class Zone(FileTable):
 def zone_problems(zones: Sequence[Zone], calibration: Calibration | None) -> Iterator[Problem]:
     """Yield a problem for each zone whose name is taken or whose intensity is not calibrated.
 
-    Limits on the Almen intensity of a zone take a calibration that has measured strips.
+    Limits on the Almen intensity of a zone need a calibration with measured strips.
     """
     names = [zone.name for zone in zones]
     for k, zone in enumerate(zones):

@@ -1,1 +1,1 @@
-"""Work with triangles, solids and mesh files. Nothing here knows about shot or designs."""
+"""Work with triangles, solids and mesh files. Nothing here knows about shot or chambers."""

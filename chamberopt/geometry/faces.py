@@ -1,4 +1,4 @@
-"""Divide a surface into faces: connected triangles whose neighbours turn by less than an angle."""
+"""Divide a surface into faces: connected triangles that meet at less than a given angle."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class Faces:
         return int(self.of_triangle[away.argmin()]), float(away.min())
 
     def normal(self, face: int) -> np.ndarray:
-        """Return the mean unit normal (3,) of a face; zero for a face that bends all round."""
+        """Return the mean unit normal (3,) of a face; zero if it goes all round, as a cylinder."""
         own = self.of_triangle == face
         mean = self._weight[own] @ self._normal[own] / max(float(self._weight[own].sum()), 1e-30)
         length = float(np.linalg.norm(mean))
@@ -60,7 +60,10 @@ class Faces:
         return np.asarray(middles[np.linalg.norm(middles - middle, axis=1).argmin()])
 
     def alike(self, face: int) -> np.ndarray:
-        """Return marks (count,) of the faces that are congruent with a face or its mirror image."""
+        """Return marks (count,) of the faces that are congruent with the face of number `face`.
+
+        Mirror images count as congruent.
+        """
         figures = self._figures
         scale = np.maximum(np.abs(figures[face]), 1e-12 * np.abs(figures).max())
         return np.asarray((np.abs(figures - figures[face]) <= SAME * scale).all(axis=1))

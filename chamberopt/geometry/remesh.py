@@ -1,10 +1,11 @@
 """Remesh the target, the part's surface to be peened, with triangles of a given size.
 
-The surface itself does not change. Sides longer than 4/3 of the size are halved, and sides shorter
-than 0.6 of it are collapsed. Edges are turned until they are Delaunay. Points move towards the mean
-of their neighbours. Each change is made only where the surface stays the same: within a flat face,
-or along a straight edge between two flat faces. A surface that curves in steps finer than the size
-keeps these steps.
+The surface itself does not change. Sides longer than 4/3 of the size are halved. Sides shorter than
+0.6 of the size are collapsed: their ends become a single point. Edges are turned (replaced by the
+other diagonal of their two triangles) until they are Delaunay. Points move towards the mean of
+their neighbours. Each change is made only where the surface stays the same: within a flat face, or
+along a straight edge between two flat faces. A curved surface made of flat faces smaller than the
+size keeps these faces.
 
 Notation: a triangle's side k runs from its corner k to the next. Side 3 t + k is side k of triangle
 t. A crease is an edge between two flat faces.
@@ -43,7 +44,7 @@ def remesh(
 
     Args:
         target: marks the triangles to remesh, (m,) bool.
-        kinds: kind of each triangle, (m,). Triangles of different kinds are never mixed.
+        kinds: number of the kind of each triangle, (m,). No new triangle covers two kinds.
     Returns:
         Vertices, triangles (k, 3), and for each new triangle a given triangle of the same flat face
         and kind, (k,).
@@ -95,15 +96,16 @@ def _flat_faces(vertices: np.ndarray, triangles: np.ndarray, kinds: np.ndarray) 
 class _TargetMesh:
     """Closed surface while part of it, the target, is remeshed.
 
-    Each change is made at many places at once, chosen so that no two places touch.
+    Each split, turn or collapse is made at many edges at once, chosen so that no two of the changes
+    touch the same triangle.
 
     Attributes:
         target: marks the target's triangles, (m,).
         face: flat face of each triangle, (m,).
         source: given triangle from which each triangle stems, (m,).
-        touched: marks the triangles that may change, (m,): the target's triangles, and others that
-            the target's edges had to split.
-        edge_order: keys of all edges in order, from the last call of `_edges`.
+        touched: marks the triangles that may change, (m,): the target's triangles, and triangles
+            beside the target that were split because their common edge was.
+        edge_order: sorted numbers that identify all edges, from the last call of `_edges`.
     """
 
     def __init__(
@@ -131,7 +133,10 @@ class _TargetMesh:
         return any_long
 
     def _split_once(self) -> bool:
-        """Halve one side that is too long in each triangle. Return True if any was halved."""
+        """Halve sides that are too long, at most one in each triangle.
+
+        Returns True if any was halved.
+        """
         edges, sides, _ = self._edges()
         length = self._lengths(edges)
         beside = self.target[sides // 3].any(axis=1)
@@ -222,7 +227,7 @@ class _TargetMesh:
     def smooth(self) -> None:
         """Move points inside flat faces half way to the mean of their neighbours.
 
-        Points stay where a triangle would get worse.
+        A point stays where it is if a triangle at it would get a worse shape.
         """
         edges, _, crease = self._edges()
         free, _ = self._movable(edges, crease)
@@ -276,7 +281,7 @@ class _TargetMesh:
         return area_vectors(self.vertices, triangles)
 
     def _angle(self, t: np.ndarray, k: np.ndarray) -> np.ndarray:
-        """Return the angle [rad] of each triangle of t (e,) opposite its side of k (e,), (e,)."""
+        """Return the angle [rad] in each triangle t (e,) opposite to its side of number k (e,)."""
         a, b, apex = (self.vertices[self.triangles[t, (k + j) % 3]] for j in range(3))
         to_a, to_b = a - apex, b - apex
         sine = np.linalg.norm(np.cross(to_a, to_b), axis=1)
@@ -285,9 +290,9 @@ class _TargetMesh:
     def _independent(
         self, triangle: np.ndarray, change: np.ndarray, rank: np.ndarray, wanted: np.ndarray
     ) -> np.ndarray:
-        """Return the indices of wanted changes of which no two touch the same triangle.
+        """Return the indices of wanted changes of the mesh of which no two touch the same triangle.
 
-        Of changes that compete for a triangle, the change of lowest rank is made.
+        Of the changes that touch a triangle, only the change of lowest rank may be made.
 
         Args:
             triangle, change: pairs of a triangle and a change that touches it, (k,) each.
@@ -302,10 +307,10 @@ class _TargetMesh:
         return at[~np.isin(at, change[beaten])]
 
     def _movable(self, edges: np.ndarray, crease: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return marks of points that may move in their face, and along their crease, (n,) each.
+        """Return marks (n,) of points that may move in a flat face, and of points that may move
+        along a straight crease.
 
-        The first lie inside flat faces, the others on straight creases. All triangles around them
-        must be free to change.
+        All triangles around such a point must be free to change.
         """
         n = len(self.vertices)
         inside = np.ones(n, dtype=bool)

@@ -1,8 +1,8 @@
 """Remove slivers from a surface: triangles too thin to have a direction.
 
 A boolean operation leaves triangles 1e-12 m high where two faces nearly coincide. The rounding of
-their corners is as large as their height. Their normals are therefore arbitrary, and a ball could
-be thrown back into the wall. The surface stays closed and moves by less than the height of a
+their corners is as large as their height. Their normals are therefore arbitrary, and could throw a
+ball that hits them into the wall. The surface stays closed and moves by less than the height of a
 sliver.
 """
 
@@ -90,7 +90,8 @@ class _EditableMesh:
     def turn(self, index: int) -> bool:
         """Turn the edge of a triangle that gives the thickest new pair of triangles.
 
-        Returns False, with nothing changed, if no edge gives a thicker pair than before.
+        To turn an edge is to replace it by the other diagonal of its two triangles. Returns False,
+        with nothing changed, if no edge gives a thicker pair than before.
         """
         options = []
         for a, b in _edges(self.triangles[index]):

@@ -1,8 +1,8 @@
 """Make solids of closed surfaces, and unite, subtract, sweep and project them.
 
-This is the only file that imports manifold3d. Each triangle of a result remembers its solid and the
-triangle of that solid on which it lies. manifold3d keeps this only for meshes with reserved ids. An
-unlabelled Mesh64 would lose it (its original_id() is -1).
+This is the only file that imports manifold3d. Each triangle of a result remembers the solid that it
+comes from, and the triangle of that solid on which it lies. manifold3d keeps these numbers only for
+meshes with reserved ids. A Mesh64 without such an id loses them (its original_id() is -1).
 
 Internal lengths are millimetres on a grid of 2^-20 mm (1 nm). Faces that coincide in the design
 then coincide exactly, and leave no needles 1e-10 mm high between them.
@@ -110,7 +110,7 @@ def simplify_planes(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return a closed surface without the vertices that its planes do not need.
 
-    Those are the vertices inside planes and on their straight borders.
+    These vertices lie inside a plane, or inside a straight border of a plane.
 
     Args:
         vertices: vertex positions [m], shape (n, 3).
@@ -233,7 +233,7 @@ class Outline:
 
 
 def plan_outline(vertices: np.ndarray, triangles: np.ndarray, below: float) -> Outline:
-    """Return the area, seen from above, of all that lies below a height z [m] in closed bodies.
+    """Return the area, seen from above, of all that closed bodies have below a height [m].
 
     The normals of the surface point outward.
     """

@@ -17,8 +17,8 @@ AMPLITUDE_RANGE, DIAMETER_RANGE, DENSITY_RANGE = 1.3, 1.5, 1.05
 def calibration_warnings(design: Design) -> list[str]:
     """Return warnings about a design for which its calibration may not hold.
 
-    They are about values beyond those measured at, measurements that the calibrated model does not
-    explain, and strips that were not measured or not whole.
+    A warning is about values of the design beyond the measured range, measurements that the
+    calibrated model does not explain, or Almen strips that were not measured or not whole.
     """
     one = design.calibration
     if one is None:

@@ -47,10 +47,10 @@ def describe(design: Design, chamber: Chamber, reach: Reach | None = None) -> di
     """Return facts and warnings about a design and its chamber, as JSON values with named units.
 
     Args:
-        reach: the places that the shot reaches, if they are already known.
+        reach: the points of the surface that the shot reaches, if they are already known.
     Raises:
         InputError: there are too many balls, or the part cannot turn.
-        sim_core.SceneError: the cavity is not closed; names the place.
+        sim_core.SceneError: the cavity is not closed; the message says where.
     """
     require_ball_count(design)
     reach = shot_reach(design, chamber) if reach is None else reach
@@ -170,9 +170,9 @@ def notes(design: Design, chamber: Chamber) -> list[str]:
 
 
 def shot_reach(design: Design, chamber: Chamber) -> Reach:
-    """Return the places of a chamber that the shot reaches, with a turning part at rest as drawn.
+    """Return the points of a chamber's surface that the shot reaches. A turning part is at rest.
 
-    It takes a second or two.
+    The search takes a second or two.
     """
     return find_reach(
         chamber_mesh(chamber),
@@ -186,7 +186,7 @@ def warnings(design: Design, chamber: Chamber, reach: Reach | None = None) -> li
     """Return warnings about values that are allowed but probably not intended, with remedies.
 
     Args:
-        reach: the places that the shot reaches, if they are already known.
+        reach: the points of the surface that the shot reaches, if they are already known.
     """
     reach = shot_reach(design, chamber) if reach is None else reach
     texts = first_warnings(design, chamber, reach.mesh)
@@ -200,10 +200,10 @@ def warnings(design: Design, chamber: Chamber, reach: Reach | None = None) -> li
 
 
 def first_warnings(design: Design, chamber: Chamber, mesh: TriangleMesh) -> list[str]:
-    """Return the warnings that do not depend on which places the shot reaches.
+    """Return the warnings that do not depend on where the shot reaches the surface.
 
     Args:
-        mesh: of the chamber.
+        mesh: surface of the chamber.
     """
     shot, texts = design.shot, []
     filled = shot.volume / chamber.volume
@@ -330,7 +330,7 @@ def _turn_facts(design: Design, part: Part) -> dict[str, Facts]:
 
 
 def _tolerance_facts(design: Design) -> dict[str, Facts]:
-    """Return lowest, given and highest value of each number with a tolerance.
+    """Return the lowest, given and highest value of each number of a design that has a tolerance.
 
     Raises InputError if the design is not valid at either end of a range.
     """
@@ -396,7 +396,7 @@ def _sonotrode_warnings(design: Design, mesh: TriangleMesh, line: Axis | None) -
 def sonotrode_clearance(mesh: TriangleMesh) -> float:
     """Return the least distance [m] between part and sonotrode; inf without a part.
 
-    It is the least from a corner of either to the surface of the other.
+    It is the least distance of a corner of either surface from the other surface.
     """
     from sim_core import closest_points
 
@@ -412,8 +412,8 @@ def sonotrode_clearance(mesh: TriangleMesh) -> float:
 def _lowest_height(line: Axis, points: np.ndarray, amplitude: float | None) -> float:
     """Return the lowest height [m] that points (n, 3) [m] of the turning part reach.
 
-    At angle a of the part, the height of a point is c + r cos(a - a0) for some c, r and a0. It is
-    least where a is furthest from a0.
+    At angle a of the part, the height of a point is c + r cos(a - a0) for some c, r and a0. The
+    height is least where a is furthest from a0.
 
     Args:
         line: axis of the rotation.
@@ -430,5 +430,5 @@ def _lowest_height(line: Axis, points: np.ndarray, amplitude: float | None) -> f
 
 
 def _rounded(value: float) -> float:
-    """Return the value rounded to six figures, for readers."""
+    """Return the value rounded to six digits, for readers."""
     return float(f"{value:.6g}")

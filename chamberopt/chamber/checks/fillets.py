@@ -33,7 +33,7 @@ def facets_are_left(part: Part) -> bool:
 
 
 def facet_warnings(part: Part, ball: float, reachable: float) -> list[str]:
-    """Return a warning if the target's coverage is that of coarse facets, not of its true surface.
+    """Return a warning if the simulated target has coarse facets in place of its curved surface.
 
     Args:
         ball: diameter of the smallest ball [m].
@@ -64,7 +64,7 @@ def touched_by_curvature(part: Part, ball: float) -> float:
     """Return the share of the target's area with no hollow too sharp for a ball.
 
     Args:
-        ball: diameter [m].
+        ball: diameter of the ball [m].
     """
     if part.hollow is None:
         return 1.0
@@ -85,7 +85,7 @@ def fillet_warnings(reach: Reach, chamber: Chamber, largest: float) -> list[str]
     """Return warnings about fillets and slots of target and zones too small for the largest ball.
 
     Args:
-        largest: diameter of that ball [m].
+        largest: diameter of the largest ball [m].
     """
     part = chamber.part
     chosen = np.any([part.target, *part.zones.values()], axis=0) & (chamber.exposed_area > 0.0)
@@ -102,17 +102,18 @@ def inner_edges(
 
     Facets of a height L that turn by an angle a at each edge touch a circle of the radius L / (2
     tan(a / 2)). The radius is 0 at edges that turn by more than SHARP. Triangles of a shaft or a
-    cone turn inwards at some edges too, so an edge counts only if the surface round it is HOLLOW.
-    Facets of a surface that bends both ways fold inwards here and there, so the radius comes from
-    the curvature behind the facets where it is known.
+    cone turn inwards at some edges too, so an edge counts only if the surface round it turns
+    inwards on the whole (see HOLLOW). Facets of a surface that bends both ways fold inwards here
+    and there, so the radius comes from the curvature behind the facets where it is known.
 
     Args:
-        vertices: [m], shape (n, 3).
-        triangles: normals out of the part, shape (m, 3).
-        chosen: marks triangles, shape (m,).
+        vertices: vertices of the part [m], shape (n, 3).
+        triangles: triangles of the part, normals outward, shape (m, 3).
+        chosen: marks the triangles to look at, shape (m,).
         hollow: curvature of the surface behind the triangles [1/m], 0 where unknown, shape (m,).
     Returns:
-        Middles [m], shape (e, 3), lengths [m] and radii [m], shape (e,).
+        Middles of the inner edges [m], shape (e, 3), their lengths [m] and the radii of the fillets
+        there [m], shape (e,).
     """
     sides, triangle = sides_of(triangles), np.repeat(np.arange(len(triangles)), 3)
     keys = edge_keys(triangles)
@@ -149,13 +150,13 @@ def inner_edges(
 def _turn_across(ends: np.ndarray, way: np.ndarray, turns: np.ndarray) -> np.ndarray:
     """Return how much the surface turns across each edge [m rad], summed over edges at its ends.
 
-    Each edge counts by its turn, its length and its squared cosine to the given edge. Sharp edges,
-    at which a fillet ends, do not count.
+    Each of these edges counts by its turn, its length and its squared cosine to the given edge.
+    Sharp edges, at which a fillet ends, do not count.
 
     Args:
         ends: vertices of each edge, shape (e, 2).
         way: vector from the first to the second vertex [m], shape (e, 3).
-        turns: of each edge [rad], shape (e,).
+        turns: angle by which the surface turns at each edge [rad], shape (e,).
     """
     length = np.maximum(np.linalg.norm(way, axis=1), 1e-300)
     along = way / length[:, None]

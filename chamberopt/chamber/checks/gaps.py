@@ -1,4 +1,4 @@
-"""Warnings about shapes that keep the shot from the surface, each with its place and a remedy.
+"""Warnings about shapes that keep the shot from the surface, each with a position and a remedy.
 
 Such shapes are gaps too narrow for a ball, wedges that hold a ball, pockets behind a narrow mouth,
 and hollows sharper than a ball.
@@ -46,7 +46,7 @@ def gap_warnings(reach: Reach, chamber: Chamber, largest: float, turns: bool = F
     """Return warnings about gaps narrower than the largest ball, the largest areas first.
 
     Args:
-        largest: diameter of that ball [m].
+        largest: diameter of the largest ball [m].
         turns: True if the part turns, so that a ball may be jammed beside it.
     """
     touches = reach.touches
@@ -122,7 +122,8 @@ def surface_warnings(
 
 
 def _clusters(centre: np.ndarray, near: float) -> list[np.ndarray]:
-    """Return the indices of the points in each group that steps of at most ``near`` [m] link.
+    """Return the indices of the points in each group whose points are linked by steps of at most
+    ``near`` [m].
 
     Args:
         centre: the points [m], (n, 3).
@@ -212,16 +213,16 @@ REMEDY = {
 
 
 class Ledge(NamedTuple):
-    """A place on part or wall where balls can come to rest: surfaces that face up."""
+    """Surfaces of the part or of the wall that face up, so that balls can come to rest on them."""
 
     message: str
     level: bool  # true if enough of the surface is level for a ball to lie on
 
 
 def find_ledges(design: Design, chamber: Chamber) -> list[Ledge]:
-    """Return the places on part and wall where balls can come to rest, each with a message.
+    """Return the surfaces of part and wall on which balls can come to rest, each with a message.
 
-    Such surfaces face up, and neither vibrate nor turn.
+    These surfaces face up, and neither vibrate nor turn.
     """
     from sim_core import Rest
 
@@ -260,7 +261,7 @@ def find_ledges(design: Design, chamber: Chamber) -> list[Ledge]:
 
 
 def _in_hollows(chamber: Chamber, upward: np.ndarray, downward: np.ndarray) -> np.ndarray:
-    """Mark the upward faces (k,) at the bottom of a hollow, where every way leads up.
+    """Mark the triangles (k,) that face up at the bottom of a hollow, from where all ways lead up.
 
     A wall that leans out is not a hollow: its lowest points are on the sonotrode. A face beside a
     downward face is not a hollow either, because a ball falls off there.

@@ -1,4 +1,4 @@
-"""Put places and surfaces of a chamber into words, for messages."""
+"""Name positions and surfaces of a chamber in words, for messages."""
 
 from __future__ import annotations
 
@@ -37,14 +37,14 @@ def around(points: np.ndarray, weights: np.ndarray | None = None) -> str:
 
 
 def mm2(area: float) -> str:
-    """Return an area given in m² as text in mm², to three figures."""
+    """Return an area given in m² as text in mm², with three digits."""
     return f"{float(f'{1e6 * area:.3g}'):g} mm²"
 
 
 def one_of(points: np.ndarray, weights: np.ndarray) -> str:
-    """Return as text the one of the points (n, 3) [m] that is closest to their weighted mean.
+    """Return as text the point, among points (n, 3) [m], that is closest to their weighted mean.
 
-    The mean itself may lie off the points, as that of a ring does.
+    The mean itself may lie far from all points, as the middle of a ring does.
     """
     middle = np.average(points, axis=0, weights=weights)
     return around(points[[np.linalg.norm(points - middle, axis=1).argmin()]])

@@ -1,10 +1,11 @@
 """Propose a pose of a part over the sonotrode: its target down, and evenly exposed.
 
-Balls come from below. So the exposure of a place is (1 + cosine) / 2 of the angle between its
-normal and the way down: 1 where it faces the sonotrode, 1/2 on upright walls, 0 where it faces up.
-The pose has the highest mean less standard deviation of the exposure over the target's area, the
-form of the objective (coverage/metrics.py). Upright walls all round are better than a lying shaft,
-which is hit below and not above. This rule gives a first pose and is no simulation.
+Balls come from below. So the exposure of a point of the target is (1 + cos a) / 2, where a is the
+angle between its normal and the way down: 1 where the target faces the sonotrode, 1/2 on upright
+walls, 0 where it faces up. The pose has the highest mean minus standard deviation of the exposure
+over the target's area, as the objective of a study has of coverage (coverage/metrics.py). A shaft
+should therefore stand upright: if it lies, it is hit below and not above. This rule gives a first
+pose and is no simulation.
 """
 
 from __future__ import annotations
@@ -28,9 +29,9 @@ def propose_pose(
     """Return turns of a part about x, then y, then z [degrees], and the reason for them.
 
     Args:
-        vertices: [m], shape (n, 3).
-        triangles: shape (m, 3).
-        target: marks triangles, shape (m,).
+        vertices: vertices of the part [m], shape (n, 3).
+        triangles: triangles of the part, normals outward, shape (m, 3).
+        target: marks the triangles of the target, the surface to peen, shape (m,).
     """
     vectors = area_vectors(vertices, triangles)[target]
     weight = np.linalg.norm(vectors, axis=1)
@@ -60,9 +61,9 @@ def propose_pose(
 
 
 def square_to_walls(vertices: np.ndarray, turns: Turns) -> Turns:
-    """Return the turns [degrees] with one more about z that brings the part's long side along x.
+    """Return the turns [degrees] with a further turn about z that brings the part's long side to x.
 
-    The long side is that of the smallest rectangle round the part as seen from above.
+    The long side is the longer side of the smallest rectangle round the part, seen from above.
     """
     from shapely import MultiPoint
 
@@ -78,11 +79,11 @@ def square_to_walls(vertices: np.ndarray, turns: Turns) -> Turns:
 def _downs(normal: np.ndarray, weight: np.ndarray) -> Iterator[tuple[np.ndarray, float]]:
     """Yield directions (3,) of the part's file that may be turned down, and an advantage for each.
 
-    The advantage is added to what the exposure of the pose is worth.
+    The advantage is added to the mean minus standard deviation of the exposure.
 
     Args:
         normal: unit normals of the target's triangles, (m, 3).
-        weight: share of the target's area of each, (m,).
+        weight: area of each triangle over the target's area, (m,).
     """
     for axis in (2, 0, 1):
         for sign in (-1.0, 1.0):

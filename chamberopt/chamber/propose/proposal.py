@@ -1,6 +1,6 @@
-"""Propose a whole design for a part, and improve it until its own check has no warnings.
+"""Propose a whole design for a part, with a wider chamber if its own check warns of gaps.
 
-Every number is a rule of thumb with its reason beside it. A study then varies the numbers.
+Every number comes from a rule of thumb, with its reason beside it. A study then varies the numbers.
 """
 
 from __future__ import annotations
@@ -52,9 +52,9 @@ def touched_shares(
     """Return the share of a part's target that balls of each diameter [m] can touch from any side.
 
     Args:
-        vertices: of the part [m], shape (n, 3).
-        triangles: normals out of the part, shape (m, 3).
-        target: marks triangles, shape (m,).
+        vertices: vertices of the part [m], shape (n, 3).
+        triangles: triangles of the part, normals outward, shape (m, 3).
+        target: marks the triangles of the target, the surface to peen, shape (m,).
     Returns:
         The share for each diameter.
     """
@@ -76,12 +76,12 @@ def fit_fillets(
 ) -> np.ndarray:
     """Return True for each ball diameter [m] that is small enough for the target's fillets.
 
-    Inner edges without a fillet are left out, because no ball fits.
+    Inner edges without a fillet are left out, because no ball fits there.
 
     Args:
-        vertices: of the part [m], shape (n, 3).
-        triangles: normals out of the part, shape (m, 3).
-        target: marks triangles, shape (m,).
+        vertices: vertices of the part [m], shape (n, 3).
+        triangles: triangles of the part, normals outward, shape (m, 3).
+        target: marks the triangles of the target, the surface to peen, shape (m,).
     """
     _, length, radius = inner_edges(vertices, triangles, target)
     small = [(radius > 0.0) & (OF_FILLET * radius < one) for one in diameters]
@@ -93,13 +93,13 @@ def propose_ball(
 ) -> tuple[float, str]:
     """Return the diameter [m] of the proposed ball, and the reason for it.
 
-    It is the largest ball that touches nearly as much as the smallest, and that is small enough for
-    the fillets if there is such a ball.
+    It is the largest ball that touches nearly as much of the target as the smallest ball does. It
+    is also small enough for the fillets, if there is such a ball.
 
     Args:
         shares: share of the target that balls of each diameter can touch.
         fits: True for each diameter that is small enough for the target's fillets.
-        diameters: [m], in ascending order.
+        diameters: diameters of the balls [m], in ascending order.
     """
     touching = shares >= shares[0] - MISSED
     both = touching & fits
@@ -134,7 +134,7 @@ def propose_charge(floor: float, diameter: float, ball_mass: float) -> tuple[flo
 
     Args:
         floor: area of the sonotrode [m²].
-        diameter, ball_mass: of a ball [m], [kg].
+        diameter, ball_mass: diameter [m] and mass [kg] of a ball.
     """
     count = max(1, round(LAYER * PACKED * floor / (math.pi / 4.0 * diameter**2)))
     wanted, most = 1e3 * count * ball_mass, _heaviest_g(ball_mass)
@@ -150,9 +150,9 @@ def propose_ranges(
 
     Args:
         sizes: sizes of the chamber.
-        mass_g: of all balls together.
+        mass_g: mass of all balls together.
         ball_mm: ball diameter.
-        ball_mass: of one ball [kg].
+        ball_mass: mass of one ball [kg].
     """
     distance, height = round(1e3 * sizes.distance), round(1e3 * sizes.height)
     far = round(1.25 * distance)
@@ -176,7 +176,7 @@ def _lengths(low: float, high: float) -> Range:
 
 
 def _second_digit(mass: float) -> float:
-    """Return the step of a mass's second significant digit, such as 10 for 345."""
+    """Return the value of one step in a mass's second significant digit, such as 10 for 345."""
     return 10.0 ** (math.floor(math.log10(mass)) - 1)
 
 
@@ -184,7 +184,7 @@ def _heaviest_g(ball_mass: float) -> float:
     """Return the largest mass of all balls [g], to two digits, that the program takes.
 
     Args:
-        ball_mass: of one ball [kg].
+        ball_mass: mass of one ball [kg].
     """
     most = min(1e3 * MAX_BALLS * ball_mass, HEAVIEST_G)
     digit = _second_digit(most)

@@ -58,9 +58,9 @@ def propose_sizes(
     """Return the sizes of a chamber of the named shape, with room for balls round the part.
 
     Args:
-        vertices: of the turned part, with its lowest point at z = 0 [m], shape (n, 3).
-        target_top: the target's highest point [m].
-        ball: diameter [m].
+        vertices: vertices of the turned part, with its lowest point at z = 0 [m], shape (n, 3).
+        target_top: height of the target's highest point [m].
+        ball: diameter of a ball [m].
         wider: factor on the room beside, below and above the part.
     """
     top = float(vertices[:, 2].max())
@@ -113,7 +113,7 @@ WHOLE: Keys = {"surface": ["all"]}
 
 @dataclass(frozen=True)
 class Surface:
-    """A surface that can be the target: a name of the file, or a face with all faces like it."""
+    """A surface that can be the target: named by the file, or a face with all faces like it."""
 
     name: str  # value for --target
     keys: Keys
@@ -151,7 +151,7 @@ def surfaces(mesh: PartMesh) -> list[Surface]:
 
 
 def propose_target(mesh: PartMesh, known: Sequence[Surface], wanted: Iterable[str]) -> Target:
-    """Return the target that has the wanted surfaces, or the likeliest one if none is wanted.
+    """Return the target made of the wanted surfaces, or the likeliest target if none is wanted.
 
     Raises:
         InputError: there is no surface of that name.

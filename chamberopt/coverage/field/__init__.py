@@ -1,1 +1,1 @@
-"""Measure coverage over the target: the covered share of windows of a stated area, the gauge."""
+"""Measure coverage in windows: discs of the target whose area, the gauge, the design gives."""

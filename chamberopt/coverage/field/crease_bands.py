@@ -21,8 +21,8 @@ PIECES_PER_WINDOW = 32  # pieces that measure the length of a crease in a window
 
 
 class CreasePieces(NamedTuple):
-    """Short pieces of creases that a ball can touch: middles [m], indices of edges, and lengths
-    [m].
+    """Short pieces of creases (sharp edges) that a ball can touch: middle [m], index of the edge,
+    and length [m] of each piece.
     """
 
     place: np.ndarray
@@ -37,8 +37,8 @@ def crease_pieces(
 
     Args:
         mesh: surface of the chamber.
-        ball_radius: [m].
-        radius: of the windows [m].
+        ball_radius: radius of the ball [m].
+        radius: radius of the measuring windows, from which the length of pieces follows [m].
     """
     start, end = creases.ends[:, 0], creases.ends[:, 1]
     length = np.linalg.norm(end - start, axis=1)
@@ -54,12 +54,16 @@ def crease_pieces(
 
 
 def on_lines(creases: Creases, place: np.ndarray, edge: np.ndarray) -> tuple[Places, np.ndarray]:
-    """Return contact points on crease edges as places on the crease lines to which the edges
-    belong.
+    """Return contact points on crease edges as points on crease lines, which are chains of edges.
 
-    An edge may be on another line in each division of the part into faces, so a point comes once
-    for each. `place` (k, 3) [m] and `edge` (k,) give the points. The second result is the row of
-    each place in them.
+    An edge may belong to a different line in each division of the part into faces. A point
+    therefore comes once for each division in which its edge is a crease.
+
+    Args:
+        place: contact points [m], (k, 3).
+        edge: crease edge under each contact point, (k,).
+    Returns:
+        The points on lines, and the row in `place` of each.
     """
     from chamberopt.coverage.field.smooth_faces import Places
 
@@ -69,13 +73,15 @@ def on_lines(creases: Creases, place: np.ndarray, edge: np.ndarray) -> tuple[Pla
 
 
 class CreaseBand(NamedTuple):
-    """Middles of windows near creases, with a row for each middle and each crease line near it.
+    """Windows near creases: a row for each pair of a window's middle and a crease line near it.
+
+    The foot of a middle is the point of the crease line nearest to it.
 
     Attributes:
-        point: index of the point, shape (b,).
-        height: distance from the crease [m], shape (b,).
-        length: of the crease in the window round the point's foot on it [m], shape (b,).
-        windows: along the lines, round the feet, the nearest places on the lines.
+        point: index of the window's middle, shape (b,).
+        height: distance of the middle from the crease [m], shape (b,).
+        length: length of the crease in the window round the foot [m], shape (b,).
+        windows: windows round the feet, along the crease lines.
     """
 
     point: np.ndarray
@@ -87,9 +93,10 @@ class CreaseBand(NamedTuple):
 def find_band(
     windows: Windows, creases: Creases, pieces: CreasePieces, dent_radius: float
 ) -> CreaseBand | None:
-    """Return the middles of windows that dents on creases reach, or None if there are none.
+    """Return the windows whose middles dents on creases can cover, or None if there are none.
 
-    The dents have radii up to dent_radius [m].
+    Args:
+        dent_radius: largest radius of a dent [m].
     """
     from scipy.spatial import cKDTree
 

@@ -1,8 +1,8 @@
 r"""Build a mesh to draw coverage on: fine where coverage changes, coarse where it does not.
 
-The part's triangles are divided round by round. An edge is split at its middle where coverage
-changes along it, and always where it is longer than MAX_EDGE. A triangle is divided by the number
-of its split edges, so that neighbours always meet at whole edges:
+The part's triangles are divided again and again, in rounds. An edge is split at its middle where
+coverage changes along it, and always where it is longer than MAX_EDGE. A triangle is divided by the
+number of its split edges, so that neighbours always meet at whole edges:
 
       /|\            /\            /\
      / | \          /__\          /__\
@@ -39,7 +39,7 @@ class DisplayMesh:
     """A mesh whose vertices belong to one smooth face each. At creases vertices are repeated.
 
     Attributes:
-        vertices: [m], shape (v, 3).
+        vertices: positions of the vertices [m], shape (v, 3).
         triangles: normals out of the part, shape (c, 3).
         normal: unit vectors out of the part, shape (v, 3).
         face: smooth face of each vertex, shape (v,).
@@ -54,17 +54,17 @@ class DisplayMesh:
 
     @property
     def places(self) -> Places:
-        """The vertices with normals and smooth faces, as places at which coverage is computed.
+        """The vertices, with normals and smooth faces, as points at which coverage is computed.
 
-        Dents on creases make a band as narrow as a dent. Fields at vertices should leave the band
-        out, because the drawing would smear it over whole triangles.
+        Dents on creases (sharp edges) make a band as narrow as a dent. Values at vertices should
+        leave this band out, because the drawing would smear it over whole triangles.
         """
         return Places(self.vertices, self.normal, self.face)
 
 
 @dataclass(frozen=True)
 class DisplayField:
-    """A mesh to draw, and fields such as coverage at its vertices."""
+    """A mesh to draw, and values of coverage and the like at its vertices."""
 
     mesh: DisplayMesh
     fields: dict[str, np.ndarray]  # by name, (v,) each
@@ -82,14 +82,15 @@ def display_mesh(
     """Divide a part's triangles until coverage can be drawn by interpolation between vertices.
 
     Args:
-        vertices: [m], shape (n, 3).
-        triangles: shape (m, 3).
+        vertices: vertices of the part [m], shape (n, 3).
+        triangles: triangles of the part, shape (m, 3).
         normals: unit vectors of the surface at the triangles' corners, outward, shape (m, 3, 3).
-        shown: marks the triangles on which the field is drawn, shape (m,). Others are divided only
-            where they meet a shown triangle.
+        shown: marks the triangles on which coverage is drawn, shape (m,). Other triangles are
+            divided only where they meet a shown triangle.
         face: smooth face of each triangle, shape (m,).
-        gauge: area of a window [m²].
-        coverage: function of places, called once a round with all places of the round.
+        gauge: area of a window, a disc in which coverage is measured [m²].
+        coverage: function that returns the coverage at points, called once in each round of
+            divisions.
     """
     diameter = 2.0 * float(np.sqrt(gauge / np.pi))
     # point: number of each vertex's place, equal for all vertices at one place of a crease.
@@ -170,16 +171,16 @@ def _same_edge(ends: np.ndarray) -> np.ndarray:
 def _spread_split(
     split: np.ndarray, ends: np.ndarray, of_side: np.ndarray, length: np.ndarray
 ) -> np.ndarray:
-    """Return the marks of edges to split, with more edges marked.
+    """Return the marks of edges to split, with further edges marked.
 
-    These are the same edges of neighbouring faces, and the longest edge of each triangle that has a
-    split edge.
+    Further edges are the edges at the same position in a neighbouring face, and the longest edge of
+    each triangle that has a split edge.
 
     Args:
         split: marks the edges to split, shape (e,).
         ends: points at the ends of the edges, shape (e, 2).
         of_side: edges of the triangles, shape (c, 3).
-        length: of the edges [m], shape (e,).
+        length: length of each edge [m], shape (e,).
     """
     same = _same_edge(ends)
     longest = of_side[np.arange(len(of_side)), length[of_side].argmax(axis=1)]

@@ -1,9 +1,9 @@
 """Estimate the memory that the evaluation of a design takes, before it begins.
 
 Pairs of dents and windows are not included, because they are kept only while there is room for them
-(common/memory.py). The bytes were measured, see docs/trust.md. The impacts are the impacts
-of a gas of balls as fast as the sonotrode at its peak: n V A / 4 on an area A for n balls a volume.
-This is 0.7 to 2.1 times the simulated number.
+(common/memory.py). The bytes were measured, see docs/trust.md. The number of impacts is estimated
+as in a gas of balls: n V A / 4 a second on an area A, with n balls per volume and the peak speed V
+of the sonotrode. This is 0.7 to 2.1 times the simulated number.
 """
 
 from __future__ import annotations
@@ -30,7 +30,9 @@ OF_IMPACT, OF_LOGGED = 150.0, 100.0  # bytes an impact: kept on the part; logged
 
 
 def evaluation_bytes(design: Design, chamber: Chamber, replicas: int) -> float:
-    """Return the estimated memory [bytes] of one evaluation, beside the memory of its process."""
+    """Return the estimated memory [bytes] to simulate and evaluate a design, without the memory of
+    the process itself.
+    """
     accuracy, target = design.process.accuracy, chamber.part.target
     fields = 1 + len(design.zones)
     of_points = OF_POINT * (fields - 1) + OF_POINT_AT_WORK
@@ -49,15 +51,14 @@ def evaluation_bytes(design: Design, chamber: Chamber, replicas: int) -> float:
 
 
 def how_many_fit(most: int, each: float, common: float = 0.0) -> int:
-    """Return the largest number of equal things, from 1 to `most`, that fit into the allowed
-    memory.
+    """Return how many tasks of equal size, from 1 to `most`, may run at once in the allowed memory.
 
     Args:
         most: largest number.
-        each: bytes of one thing.
-        common: bytes that all things share.
+        each: bytes of one task, such as the evaluation of a design.
+        common: bytes that all tasks share.
     Raises:
-        InputError: not even one fits.
+        InputError: not even one task fits.
     """
     room = memory.OF_FREE * memory.free_memory()
     if math.isinf(room):

@@ -4,9 +4,10 @@ All edges between a face's triangles turn by less than a crease does. So the div
 surface into triangles makes no difference to its faces and creases.
 
 No single angle makes an edge sharp, because a rounding error would decide for a part with just this
-angle. The part is divided by DIVISIONS angles spread over a range, and each division serves the
-same share of the windows. An edge that turns by 45 degrees is sharp to three quarters of the
-windows beside it. So figures pass continuously from a surface that goes on to a surface that ends.
+angle. The part is divided into faces by each of DIVISIONS angles spread over a range. Each division
+serves the same share of the windows (discs of the surface in which dents are counted). A convex
+edge that turns by 45 degrees is sharp to three quarters of the windows beside it. So results pass
+continuously from a surface that goes on across an edge to a surface that ends there.
 """
 
 from __future__ import annotations
@@ -53,7 +54,8 @@ class Places(NamedTuple):
 class Faces(NamedTuple):
     """Smooth faces of a part, by each of several divisions of the part into faces.
 
-    Divisions differ in the angle from which on an edge is sharp. The finest division comes first.
+    Divisions differ in the angle from which on an edge is sharp. The division into most faces, the
+    finest, comes first.
 
     Attributes:
         of_triangle: the face of each triangle by the finest division, shape (m,).
@@ -67,20 +69,21 @@ class Faces(NamedTuple):
     of_angle: np.ndarray
 
     def divisions(self, count: int) -> np.ndarray:
-        """Return the index of the division that each of `count` windows uses, (count,). All angles
-        serve equally many windows.
+        """Return the index of the division that each of `count` windows uses, (count,).
+
+        Each of the angles from which on an edge is sharp serves as many windows as any other.
         """
         angle = (DIVISIONS * ((np.arange(count) + 0.5) * GOLDEN % 1.0)).astype(int)
         return np.asarray(self.of_angle[angle])
 
     @property
     def middle(self) -> int:
-        """Index of the division whose sharp angles are in the middle of their ranges."""
+        """Index of the division into faces for pictures: an edge is sharp from a mean angle on."""
         return int(self.of_angle[DIVISIONS // 2])
 
     @property
     def shares(self) -> np.ndarray:
-        """Share of the windows that use each division, shape (d,)."""
+        """Share of the measuring windows that use each division into faces, shape (d,)."""
         return np.bincount(self.of_angle, minlength=len(self.joined)) / DIVISIONS
 
 
@@ -88,10 +91,11 @@ class Creases(NamedTuple):
     """Creases: convex edges at which the surface of the target turns sharply.
 
     Attributes:
-        ends: of each edge [m], shape (e, 2, 3).
+        ends: both ends of each edge [m], shape (e, 2, 3).
         outward: unit vectors midway between the normals of the two sides, shape (e, 3).
-        line: number of each edge's line, a chain of edges without corners, by each division, or -1
-            for an edge that does not divide; divisions share no numbers, shape (d, e).
+        line: number of each edge's line (a chain of edges without corners) in each division of the
+            part into faces, -1 where the edge is not sharp, shape (d, e). Different divisions have
+            different numbers.
         faces: the faces of the finest division on both sides, shape (e, 2).
         of_triangle: crease at each side of each part triangle, -1 without a crease, shape (m, 3).
         at_corner: the sharpest crease that begins or ends at each corner, else -1, shape (m, 3).
@@ -111,8 +115,8 @@ def find_faces(
     """Divide a part into smooth faces. The border of the target divides faces as creases do.
 
     Args:
-        vertices: [m], shape (n, 3).
-        triangles: normals out of the part, shape (m, 3).
+        vertices: vertices of the part [m], shape (n, 3).
+        triangles: triangles of the part, normals outward, shape (m, 3).
         target: marks the triangles of the target, shape (m,).
 
     Returns:
@@ -176,7 +180,11 @@ def find_faces(
 
 
 def _joined_faces(pairs: np.ndarray, count: int) -> np.ndarray:
-    """Return for each face the first of all faces that pairs (k, 2) join to it, shape (count,)."""
+    """Return for each face the lowest number of all faces joined to it, shape (count,).
+
+    Args:
+        pairs: pairs of faces to join, (k, 2).
+    """
     piece = connected_pieces(pairs[:, 0], pairs[:, 1], count)[1]
     _, first = np.unique(piece, return_index=True)
     return np.asarray(first[piece])
@@ -185,8 +193,8 @@ def _joined_faces(pairs: np.ndarray, count: int) -> np.ndarray:
 def _links(
     vertices: np.ndarray, start: np.ndarray, end: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the pairs of edges that meet at a vertex, (k, 2), and the angle by which the way over
-    both edges turns [degrees], (k,).
+    """Return the pairs of edges that meet at a vertex, (k, 2), and the angles [degrees] by which a
+    line along both edges turns there, (k,).
     """
     edges = len(start)
     edge, vertex = np.tile(np.arange(edges), 2), np.concatenate([start, end])

@@ -1,4 +1,4 @@
-"""Points spread evenly over a surface, and a test for balls that fit there."""
+"""Points spread evenly over a surface, and a test if a ball fits at a point."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class SurfacePoints(NamedTuple):
     """Points spread evenly over triangles.
 
     Attributes:
-        place: [m], shape (p, 3).
+        place: positions of the points [m], shape (p, 3).
         normal: unit vectors out of the part, shape (p, 3).
         triangle: triangle under each point, shape (p,).
     """
@@ -44,7 +44,8 @@ def spread_points(
     a point. Within a triangle the points follow the additive recurrence of the plastic number.
 
     Args:
-        area: of the triangles [m²], shape (m,); 0 where no points are wanted.
+        area: areas of the triangles [m²], shape (m,); 0 where no points are wanted.
+        count: number of points.
 
     Sources: G. M. Morton, "A computer oriented geodetic data base", IBM 1966. M. Roberts, "The
     unreasonable effectiveness of quasirandom sequences", 2018.
@@ -63,9 +64,9 @@ def spread_within(
     """Spread points over each triangle with an area, at least one point on each.
 
     Args:
-        area: of the triangles [m²], shape (m,); 0 where no points are wanted.
-        share: area for each further point [m²].
-        most: largest number of further points.
+        area: areas of the triangles [m²], shape (m,); 0 where no points are wanted.
+        share: area of a triangle for each point after its first [m²].
+        most: largest number of such further points.
     """
     share = max(share, float(area.sum()) / most)
     count = np.where(area > 0.0, 1 + (area / share).astype(int), 0)
@@ -77,8 +78,12 @@ def spread_within(
 def _within(
     vertices: np.ndarray, triangles: np.ndarray, triangle: np.ndarray, number: np.ndarray
 ) -> SurfacePoints:
-    """Return points on triangles (p,), each at the place that its number (p,) has in an evenly
-    spread sequence, the additive recurrence of the plastic number.
+    """Return points on triangles, each at the position of its number in an evenly spread sequence,
+    the additive recurrence of the plastic number.
+
+    Args:
+        triangle: triangle of each point, (p,).
+        number: number of each point in the sequence, (p,).
     """
     corners = vertices[triangles[triangle]]
     place = on_triangles(corners, *_in_square(number))
@@ -86,10 +91,10 @@ def _within(
 
 
 def within_each(corners: np.ndarray, count: int) -> np.ndarray:
-    """Return the places [m] of `count` points on each triangle (n, 3, c), shape (count, n, c).
+    """Return the positions [m] of `count` points on each triangle (n, 3, c), shape (count, n, c).
 
-    Each triangle takes the next numbers of an evenly spread sequence. So a spot that the points
-    miss on one of many alike triangles is not missed on all of them.
+    Each triangle takes the next numbers of an evenly spread sequence. So the points of congruent
+    triangles differ, and do not all miss the same spot.
     """
     return on_triangles(corners, *_in_square(np.arange(count * len(corners)).reshape(-1, count).T))
 
@@ -104,8 +109,10 @@ def _in_square(number: np.ndarray) -> Iterator[np.ndarray]:
 
 
 def morton(places: np.ndarray) -> np.ndarray:
-    """Return the position of each place (n, 3) along a Morton curve, on which near places mostly
-    follow one another. It interleaves the bits of the coordinates.
+    """Return a number for each point (n, 3): its position along a Morton curve, on which points
+    near each other mostly follow one another.
+
+    The number interleaves the bits of the coordinates.
     """
     low = places.min(axis=0)
     cells = ((places - low) / max(float(np.ptp(places, axis=0).max()), 1e-12) * 1023).astype(int)
@@ -119,13 +126,13 @@ def morton(places: np.ndarray) -> np.ndarray:
 def ball_fits(
     mesh: TriangleMesh, place: np.ndarray, normal: np.ndarray, radius: float
 ) -> np.ndarray:
-    """Return for each place on the surface of the cavity whether a ball fits there, (p,) bool.
+    """Return for each point on the surface of the cavity whether a ball can touch it, (p,) bool.
 
     Args:
         mesh: the surface of the cavity.
-        place: [m], shape (p, 3). No ball fits at a place off the surface.
-        normal: unit vectors into the cavity, shape (p, 3).
-        radius: of the ball [m].
+        place: the points [m], shape (p, 3). No ball fits at a point off the surface.
+        normal: unit vectors into the cavity at the points, shape (p, 3).
+        radius: radius of the ball [m].
     """
     from sim_core import closest_points
 
@@ -146,11 +153,13 @@ def sparse_points(values: np.ndarray) -> list[np.ndarray]:
 
 
 def sampling_errors(of_some: np.ndarray) -> list[float]:
-    """Return the standard errors, with signs, that a figure has by the choice of its points.
+    """Return the parts, with signs, of a result's standard error from the choice of its points.
 
-    `of_some` holds the figure from each subset of `sparse_points`. Figures of the same points move
-    together, so their common error drops out of their difference. The standard error is the root of
-    the sum of the squares.
+    The standard error is the root of the sum of their squares. Two results from the same points
+    have similar parts, which drop out of the difference of the results.
+
+    Args:
+        of_some: the result, such as a mean coverage, from each subset of `sparse_points`.
     """
     count = len(of_some)
     errors: list[float] = ((of_some - of_some.mean()) / math.sqrt(count * (count - 1))).tolist()
@@ -165,8 +174,8 @@ class Reach(NamedTuple):
     """The share of the target that a ball can touch, and its error.
 
     Attributes:
-        share: of the target's area.
-        error: standard error of the share, by the choice of points.
+        share: share of the target's area.
+        error: standard error of the share, by the choice of the points at which it was tested.
     """
 
     share: float
@@ -178,8 +187,8 @@ class Reach(NamedTuple):
         return min(1.0, self.share + CERTAIN * self.error)
 
     def beyond(self, share: float) -> float:
-        """Return by how many standard errors the touchable share is above a given share of the
-        target. It is negative if the touchable share is smaller.
+        """Return by how many standard errors the touchable share of the target is above a given
+        share; negative if it is below.
         """
         more = self.share - share
         return more / self.error if self.error else math.copysign(math.inf, more or -1.0)

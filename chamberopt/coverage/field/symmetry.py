@@ -1,4 +1,4 @@
-"""Find the turns about the chamber's axis that change nothing, and count alike places together.
+"""Find turns about the chamber's axis that change nothing, and count equivalent points together.
 
 Notation
     n       number of turns, by multiples of 2 pi / n, that leave cavity, target and sonotrode as
@@ -48,15 +48,15 @@ class Symmetry:
         return 2.0 * np.pi / self.copies
 
     def into_sector(self, place: np.ndarray, margin: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
-        """Return the turns that bring places (k, 3) [m] into the sector of the cavity round the x
-        axis.
+        """Return the turns that bring points into the sector of the cavity round the x axis.
 
         Args:
-            margin: distance from the sector [m] up to which a turned place is returned too.
+            place: the points [m], (k, 3).
+            margin: distance from the sector [m] up to which a turned point is returned too.
         Returns:
-            Row numbers of `place`, and for each the number of steps of the symmetry by which the
-            place is turned. Each row comes once, with the turn into the sector. Rows that another
-            turn brings closer to the sector than `margin` come again after these.
+            Row numbers of `place`, and the number of steps (smallest turns) by which the point in
+            each of these rows is turned. Each row comes once, with the turn into the sector. Rows
+            that another turn brings closer to the sector than `margin` come again after these.
         """
         angle = np.arctan2(place[:, 1], place[:, 0])
         sector = np.round(angle / self.step)
@@ -72,14 +72,14 @@ class Symmetry:
         return np.concatenate(rows), (np.concatenate(turns) % self.copies).astype(int)
 
     def on_each(self, face: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return a place on each smooth face, in the middle of its largest triangle that bounds the
+        """Return a point on each smooth face: the middle of its largest triangle that bounds the
         cavity.
 
         Args:
-            face: of each triangle of the part, (m,).
+            face: number of the smooth face of each triangle of the part, (m,).
 
         Returns:
-            Places (f, 3) [m] and triangles of the part (f,).
+            Points (f, 3) [m], and the triangle of the part under each, (f,).
         """
         own = np.flatnonzero(self.source >= 0)
         size = areas(self.mesh.vertices, self.mesh.triangles[own])
@@ -89,17 +89,17 @@ class Symmetry:
         return self.mesh.corners[chosen].mean(axis=1), self.source[chosen]
 
     def turned(self, place: np.ndarray, turn: np.ndarray) -> np.ndarray:
-        """Return places or directions (k, 3) turned about the axis by `turn` (k,) times the
+        """Return points or directions (k, 3) turned about the axis by `turn` (k,) times the
         smallest turn.
         """
         return turn_about_axis(place, turn * self.step)
 
     def triangles_at(self, place: np.ndarray, reach: float = 10.0 * TOLERANCE) -> np.ndarray:
-        """Return the index of the part triangle at each place (k, 3), (k,), or -1 off the part's
-        exposed surface.
+        """Return the index of the part triangle at each point (k, 3), or -1 if the point is off the
+        part's surface in the cavity, (k,).
 
         Args:
-            reach: largest distance of the triangle from the place [m].
+            reach: largest distance of the triangle from the point [m].
         """
         from sim_core import closest_points
 
@@ -119,8 +119,12 @@ def find_symmetry(chamber: Chamber, mesh: TriangleMesh) -> Symmetry | None:
     """Return the symmetry by the smallest turn about the axis that leaves a chamber as it is, or
     None if there is no such turn.
 
-    Turned corners must lie on the surface again. Turned places just inside the corners of a
-    triangle must lie on a triangle with the same tag, and in the target or outside it as before.
+    Turned corners of triangles must lie on the surface again. Turned points just inside the corners
+    must lie on a triangle of the same kind (part, wall or sonotrode), in the target or outside it
+    as before.
+
+    Args:
+        mesh: surface of the chamber.
     """
     from sim_core import closest_points
 
@@ -146,7 +150,7 @@ def find_symmetry(chamber: Chamber, mesh: TriangleMesh) -> Symmetry | None:
 
 
 def turn_about_axis(place: np.ndarray, angle: float | np.ndarray) -> np.ndarray:
-    """Return places (k, 3) turned about the z axis by angles [rad], one for each place (k,) or one
+    """Return points (k, 3) turned about the z axis by angles [rad], one for each point (k,) or one
     for all.
     """
     cosine, sine = np.cos(angle), np.sin(angle)

@@ -1,13 +1,14 @@
 """Place measuring windows on the target, and find the area of each that the shot can touch.
 
 Notation
+    window: disc of the surface in which dents are counted
     p     middle of a window                                           (points, (p,))
     l     radius of the window: pi l² is the gauge [m]                 (radius)
     A     area of the window that a ball can touch [m²]                (area, (p,))
 
-A place that no ball can touch, because an obstacle is in the ball's way, counts as bare and belongs
-to no window. Convex creases have their own windows, which are pieces of the crease. If n places are
-alike by symmetry, their windows are one window with n times the area (symmetry.py).
+A point that no ball can touch, because an obstacle is in the ball's way, counts as bare and belongs
+to no window. Convex creases have their own windows, which are pieces of the crease. If n points are
+equivalent by symmetry, their windows are one window with n times the area (symmetry.py).
 """
 
 from __future__ import annotations
@@ -51,13 +52,13 @@ MAX_PIECES, MAX_PIECES_OFF_TARGET = 3e6, 4e5  # pieces off the target are only f
 
 
 class WindowSetting(NamedTuple):
-    """The size and number of the measuring windows, and the balls and dents that they are for.
+    """Size and number of the measuring windows, and the sizes of balls and dents.
 
     Attributes:
-        gauge: area of a window [m²].
-        points: number of windows; figures are means over them.
+        gauge: area of a window, a disc of the surface in which dents are counted [m²].
+        points: number of windows; results are means over them.
         ball: diameter of the smallest ball [m].
-        largest_dent: diameter [m].
+        largest_dent: diameter of the largest dent [m].
         symmetric: true if all motion keeps the chamber's symmetry about its axis.
     """
 
@@ -70,8 +71,9 @@ class WindowSetting(NamedTuple):
 
 @dataclass(frozen=True)
 class Gauge:
-    """Measuring windows of one size round points. Each also stands for all windows that symmetry
-    makes alike.
+    """Measuring windows of one size round points of the target.
+
+    Each window also stands for the windows that a turn by the chamber's symmetry makes of it.
     """
 
     windows: Windows
@@ -113,7 +115,7 @@ class TargetField:
 
     @property
     def alike(self) -> int:
-        """Number of places of the target that symmetry makes alike; 1 without symmetry."""
+        """Number of points of the target that symmetry makes equivalent; 1 without symmetry."""
         return self.symmetry.copies if self.symmetry else 1
 
     @property
@@ -129,7 +131,7 @@ class TargetField:
 
     @property
     def is_one_window(self) -> bool:
-        """True if each window holds most of the target, so that windows show no evenness."""
+        """True if each window covers most of the target, so that windows show no differences."""
         of_window = float(np.median(self.gauge.area)) / self.alike
         return self.reachable * self.target_area < MIN_WINDOWS * of_window
 
@@ -146,7 +148,7 @@ class TargetField:
     def _gauge_of(self, count: int, radius: float) -> Gauge:
         """Return windows of a radius [m] round at most `count` points of the target.
 
-        All divisions of the part into smooth faces take turns among the windows.
+        The windows use the divisions of the part into smooth faces in turn.
         """
         gauge = math.pi * radius**2
         most = max(MOST_AREA, MOST_OVERLAP * self.target_area) / gauge
@@ -159,7 +161,8 @@ class TargetField:
         """Return windows of a radius [m] round given points of the part.
 
         Args:
-            division: of the part into faces, for each window; None for the division of pictures.
+            division: index of the division of the part into faces that each window uses; None for
+                the division that pictures use.
         """
         from chamberopt.coverage.field.window_areas import window_areas
         from chamberopt.coverage.field.windows import Windows
@@ -181,10 +184,10 @@ class TargetField:
         return self.touched.select(rows)
 
     def in_sector(self, hits: Hits) -> Hits:
-        """Return the impacts turned into the symmetry sector of the windows. Without symmetry,
-        return all impacts as they are.
+        """Return the impacts turned into the sector of the chamber in which the windows lie.
 
-        Impacts outside the cavity, which no simulation makes, stay in their place.
+        Without symmetry all impacts stay as they are. Impacts outside the cavity, which no
+        simulation makes, stay in their place.
         """
         if self.symmetry is None:
             return hits
@@ -210,8 +213,8 @@ class TargetField:
         return Places(place, normal, self._faces_after(self.symmetry)[turn, points.face])
 
     def _faces_after(self, symmetry: Symmetry) -> np.ndarray:
-        """Return the smooth face that each smooth face becomes by each number of turns of the
-        symmetry, (n, faces).
+        """Return the number of the smooth face to which each number of turns by the symmetry brings
+        each smooth face, (n, faces).
         """
         after = np.tile(np.arange(int(self.face.max()) + 1), (symmetry.copies, 1))
         middles, triangles = symmetry.on_each(self.face)
@@ -223,7 +226,11 @@ class TargetField:
         return after
 
     def sharpness(self, edge: np.ndarray) -> np.ndarray:
-        """Return for each edge the share of the windows that treat it as a crease, (k,)."""
+        """Return the share of the windows that treat each edge as a crease, (k,).
+
+        Args:
+            edge: indices of edges, (k,).
+        """
         return np.asarray((self.faces.shares @ (self.creases.line >= 0))[edge])
 
     def places_of(self, hits: Hits, rows: np.ndarray) -> Places:
@@ -235,7 +242,7 @@ class TargetField:
 
 
 def require_wide_gauge(chamber: Chamber, setting: WindowSetting) -> None:
-    """Raise InputError if windows are so small that the target would take too many pieces."""
+    """Raise InputError if windows are so small that the target must be cut into too many pieces."""
     area, gauge = float(chamber.part.area[chamber.part.target].sum()), setting.gauge
     wanted = PIECES_PER_WINDOW * area / gauge
     if wanted > MAX_PIECES:
@@ -260,7 +267,8 @@ def require_narrow_gauge(chamber: Chamber, setting: WindowSetting) -> None:
 def require_touchable_zones(chamber: Chamber, mesh: TriangleMesh, ball: float) -> None:
     """Raise InputError for a zone of the part that no ball with the radius `ball` [m] can touch.
 
-    The test takes POINTS_OF_ZONE points. Less than a thousandth of a zone would give no figures.
+    The test takes POINTS_OF_ZONE points of each zone. A zone of which a ball touches less than a
+    thousandth may be refused too.
     """
     part = chamber.part
     for name, zone in part.zones.items():
@@ -311,7 +319,9 @@ def find_target_field(chamber: Chamber, mesh: TriangleMesh, setting: WindowSetti
 
 
 def with_whole_part(field: TargetField, chamber: Chamber, mesh: TriangleMesh) -> TargetField:
-    """Return the field extended from the target to the rest of the exposed part, for pictures."""
+    """Return the field extended from the target to the rest of the part in the chamber, for
+    pictures.
+    """
     from chamberopt.coverage.field.window_areas import joined_pieces, surface_pieces
 
     rest = ~chamber.part.target & (chamber.exposed_area > 0.0)
@@ -343,7 +353,11 @@ def _touched(
     chamber: Chamber, mesh: TriangleMesh, area: np.ndarray, face: np.ndarray, setting: WindowSetting
 ) -> tuple[Places, np.ndarray]:
     """Return the points that a ball can touch, and marks of them among all points that were tried.
-    The points are spread over the part's triangles by their `area` (m,).
+
+    Args:
+        area: area of each triangle of the part over which points are spread [m²]; 0 for the other
+            triangles, (m,).
+        face: smooth face of each triangle, (m,).
     """
     from chamberopt.coverage.field.smooth_faces import Places
 

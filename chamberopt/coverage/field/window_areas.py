@@ -1,4 +1,4 @@
-"""Exact areas of windows on the surface, and the part of each that a ball can touch.
+"""Exact areas of windows (discs of the surface), and the part of each that a ball can touch.
 
 The surface is divided into pieces about as large as a window. Pieces are finer at the border of the
 touchable surface. A window meets the plane of a piece in a circle, so its share of the piece is the
@@ -42,10 +42,10 @@ class SurfacePieces(NamedTuple):
     """Triangular pieces of the part's surface, and the share of each that a ball can touch.
 
     Attributes:
-        corners: [m], shape (c, 3, 3).
+        corners: corners of each piece [m], shape (c, 3, 3).
         normal: unit vectors out of the part, shape (c, 3).
         face: smooth face of each piece, shape (c,).
-        area: [m²], shape (c,).
+        area: area of each piece [m²], shape (c,).
         touched: share of each piece that a ball can touch, shape (c,).
     """
 
@@ -62,10 +62,11 @@ def surface_pieces(
     """Divide triangles into pieces, and find the touchable share of each piece.
 
     Args:
-        corners: corner [m] and normal of the surface that a ball touches there, shape (m, 3, 6).
+        corners: position [m] of each corner, and normal there of the surface that a ball touches,
+            shape (m, 3, 6).
         face: smooth face of each triangle, shape (m,).
         mesh: surface of the chamber.
-        ball_radius: [m].
+        ball_radius: radius of the ball [m].
         longest: longest side that a piece may have [m].
     """
     corners, owner = _halved_until(corners, np.arange(len(corners)), longest)
@@ -89,7 +90,7 @@ def joined_pieces(one: SurfacePieces, two: SurfacePieces) -> SurfacePieces:
 
 
 def window_areas(windows: Windows, pieces: SurfacePieces) -> np.ndarray:
-    """Return the area [m²] of each window that a ball can touch, (p,)."""
+    """Return the area [m²] of each window (disc of the surface) that a ball can touch, (p,)."""
     middle = pieces.corners.mean(axis=1)
     size = float(np.linalg.norm(pieces.corners - middle[:, None], axis=2).max(initial=0.0))
     kept = pieces.touched > 0.0
@@ -110,7 +111,8 @@ def _halved_until(
     """Halve triangles (m, 3, 6) across their longest sides until no side is longer than `longest`
     [m].
 
-    Return the smaller triangles, and for each the `owner` of the triangle that it is a piece of.
+    Returns:
+        The smaller triangles, and for each the `owner` of the triangle from which it was cut.
     """
     done, owners = [], []
     while len(corners):
@@ -132,9 +134,10 @@ def _halved_until(
 
 
 def _touched_share(places: np.ndarray, mesh: TriangleMesh, ball_radius: float) -> np.ndarray:
-    """Return for each of n triangles the share of its k places where a ball fits, (n,).
+    """Return for each of n triangles the share of its k points that a ball can touch, (n,).
 
-    `places` (k, n, 6) holds the positions [m] and the normals of the surface there.
+    Args:
+        places: positions [m] of the points, and normals of the surface there, (k, n, 6).
     """
     place, normal = np.split(places.reshape(-1, 6), 2, axis=1)
     fits = ball_fits(mesh, place, unit_vectors(normal), ball_radius)

@@ -1,4 +1,4 @@
-"""Windows on a surface: the contacts in the window round each point, and products over them.
+"""Windows, discs of a surface round points: the contacts of balls in each, and sums over them.
 
 Notation
     p, q      point and contact [m]
@@ -33,13 +33,13 @@ PAIRS_AT_ONCE = 500_000  # bounds memory, and fits in the processor's cache
 
 
 class Windows:
-    """Measuring windows of one radius round points on a surface.
+    """Measuring windows of one radius: discs of a surface round points.
 
     Args:
         points: the middles of the windows.
-        radius: [m].
-        faces: for each division of the part and each face, the face that stands for all faces
-            joined to it; None without joins.
+        radius: radius of the windows [m].
+        faces: for each division of the part into faces, and each face of the finest division, the
+            face that stands for all faces joined to it; None if no faces are joined.
         division: index of the division that each window uses, shape (p,); None for the first.
     """
 
@@ -87,7 +87,7 @@ class Windows:
         window's point, and the share of the window's area that the contact's `size` (k,) takes.
 
         Args:
-            area: of the windows, (p,).
+            area: area of each window, (p,).
         """
         found = [
             _divide(self._order, area, size[rows], point, contact)
@@ -100,17 +100,17 @@ class Windows:
         return np.concatenate([none, *points]), np.concatenate([none, *shares])
 
     def sums(self, contacts: Places, values: np.ndarray) -> np.ndarray:
-        """Return the sum of the `values` (k,) of the contacts in each window, shape (p,)."""
+        """Return the sum of the `values` (k,) of the contacts (k,) in each window, shape (p,)."""
         total = np.zeros(len(self.points.place))
         for point, contact in self.pairs(contacts):
             total += np.bincount(point, values[contact], len(total))
         return total
 
     def _found(self, contacts: Places) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-        """Yield pairs of a point and a contact in its window, in portions.
+        """Yield pairs of a point and a contact in its window, in portions of three arrays.
 
-        Each portion is the positions of the points in `_order`, the positions of the contacts in
-        `rows`, and `rows`, the indices of all contacts on faces with points.
+        The first array has the positions of the points in `_order`, and the second the positions of
+        the contacts in the third. The third has the indices of all contacts on faces with points.
         """
         point, contact = np.empty((2, max(PAIRS_AT_ONCE, len(self._order))), dtype=np.int32)
         done, grid = 0, self._grid
@@ -177,7 +177,7 @@ def _find_pairs(grid, first, x, n_x, contacts, radius, begin, point, contact):  
 
     Args:
         first: points first[c] to first[c + 1] are in cell c.
-        x, n_x: places and normals of the points, shape (3, p).
+        x, n_x: positions and normals of the points, shape (3, p).
         begin: first contact to look at.
         point, contact: arrays to write into.
     Returns:
@@ -244,7 +244,10 @@ def _divide(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the index of the point of each pair, and the contact's size over the window's area.
 
-    The pairs are those that `Windows._found` yields.
+    Args:
+        order, place, contact: order of the points, and pairs, as `Windows._found` yields them.
+        area: area of each window, (p,).
+        size: size of each contact, (k,).
     """
     point, share = np.empty(len(place), dtype=np.int32), np.empty(len(place))
     _write_shares(order, area, size, place, contact, point, share)
@@ -260,8 +263,10 @@ def _write_shares(order, area, size, place, contact, point, share):  # type: ign
 
 @jit
 def add_powers(point, share, sums):  # type: ignore[no-untyped-def]
-    """For each pair of a window `point` and a dent's `share` of it, add 1, share and share² to the
-    window's row of `sums` (p, 3).
+    """Add number, shares and squared shares of the dents in windows to `sums` (p, 3).
+
+    For each pair of a window `point` and a dent's `share` of it, 1, share and share² are added to
+    the window's row.
     """
     for pair in range(len(point)):
         one, w = point[pair], share[pair]
@@ -272,8 +277,10 @@ def add_powers(point, share, sums):  # type: ignore[no-untyped-def]
 
 @jit
 def add_columns(point, contact, columns, sums):  # type: ignore[no-untyped-def]
-    """For each pair of a window `point` and a `contact` in it, add the contact's row of `columns`
-    (k, c) to the window's row of `sums` (p, c).
+    """Add the values of contacts to the sums of the windows in which they are.
+
+    For each pair of a window `point` and a `contact` in it, the contact's row of `columns` (k, c)
+    is added to the window's row of `sums` (p, c).
     """
     for pair in range(len(point)):
         for column in range(columns.shape[1]):
@@ -282,8 +289,10 @@ def add_columns(point, contact, columns, sums):  # type: ignore[no-untyped-def]
 
 @jit
 def add_to_levels(point, contact, size, level, histogram):  # type: ignore[no-untyped-def]
-    """For each pair of a window `point` and a `contact` in it, add the contact's `size` (k,) to the
-    window's row of `histogram` (p, levels), at the contact's `level` (k,).
+    """Add the `size` (k,) of contacts to the histograms of windows, by their `level` (k,).
+
+    For each pair of a window `point` and a `contact` in it, the size is added to the window's row
+    of `histogram` (p, levels), in the column of the contact's level.
     """
     for pair in range(len(point)):
         histogram[point[pair], level[contact[pair]]] += size[contact[pair]]
@@ -291,11 +300,11 @@ def add_to_levels(point, contact, size, level, histogram):  # type: ignore[no-un
 
 @jit
 def multiply_products(products, point, weight, scales):  # type: ignore[no-untyped-def]
-    """For each pair of a window `point` and the share `weight` of it that a dent takes, multiply
-    products[point, k] by 1 - scales[k] weight.
+    """Multiply products[point, k] by 1 - scales[k] weight, for each pair of a window and a dent.
 
-    A factor is at least 0. Negative factors would leave the mean without bias, but if a dent takes
-    more than a window the product would grow beyond all bounds.
+    The pair is given by the index `point` of the window and the share `weight` of it that the dent
+    takes. A factor is at least 0. Negative factors would leave the mean without bias, but if a dent
+    takes more than a window the product would grow beyond all bounds.
     """
     for pair in range(len(point)):
         for k in range(len(scales)):

@@ -51,7 +51,7 @@ class Elastic:
 def yield_speed(
     ball: Elastic, surface: Elastic, density: float, hardness: float, c0: float
 ) -> float:
-    """Return the speed v0 [m/s] from which a ball dents a surface, by Johnson's formula above.
+    """Return the speed v0 [m/s] from which a ball dents a surface, by Johnson's formula.
 
     Args:
         density: density of the ball [kg/m³].
@@ -167,7 +167,8 @@ def ball_sizes(material: str) -> tuple[float, ...]:
 def unknown(name: object, among: Iterable[Named]) -> str:
     """Return a message that a name is unknown.
 
-    It has the most similar name of the given solids if one is similar, otherwise all names.
+    The message gives the most similar name among the given materials, or all names if none is
+    similar.
     """
     known = [word for one in among for word in (one.name, *one.also)]
     close = did_you_mean(str(name), known)

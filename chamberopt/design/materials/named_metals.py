@@ -31,11 +31,12 @@ NOT_NAMED = (
 def with_numbers(materials: Mapping[str, object], material: object) -> dict[str, object]:
     """Return the tables of [materials] with numbers in place of names of metals.
 
-    Given numbers stay. A v0 that was computed for another ball, hardness or C0 is computed again. A
-    name that is not in the catalogue stays, and the tables report it.
+    Numbers that the design gives stay. A yield speed v0 that was computed for another ball,
+    hardness or C0 is computed again. A name that is not in the catalogue stays, and is reported
+    when the tables are checked.
 
     Args:
-        material: shot.material as given. An unknown material is reported at its own place.
+        material: shot.material as given. An unknown material is reported when [shot] is checked.
     """
     ball = find(material, balls()) or (None if material is None else balls()[0])
     tables = {name: _surface(name, given, ball) for name, given in materials.items()}
@@ -82,7 +83,7 @@ def _surface(name: str, given: object, ball: Ball | None) -> object:
 
 
 def _pair(given: object, ball: Ball | None) -> object:
-    """Return the table of impacts of ball on ball, computed for this material of the balls.
+    """Return the table of ball on ball in [materials], computed for this material of the balls.
 
     Return the given value unchanged if it has a restitution law of its own.
     """
@@ -97,7 +98,7 @@ def _pair(given: object, ball: Ball | None) -> object:
 def _with_v0(
     table: dict[str, Any], ball: Ball | None, other: Alloy | Ball | None, hardness: Any
 ) -> dict[str, Any]:
-    """Return a table with restitution C0, yield speed v0, and a note of what v0 was computed for.
+    """Return a table with restitution C0, yield speed v0, and the ball and hardness behind v0.
 
     A table with a restitution law of its own stays as it is.
 

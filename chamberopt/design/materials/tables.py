@@ -7,8 +7,9 @@ ways:
     { C0 = 0.91, v0_m_s = 0.44, exponent = 0.2 }  with another exponent; 0 makes e = C0 at all v
     { e_at_m_s = [[0.1, 0.97], [5, 0.6]] }        pairs [v, e]: linear between, constant beyond
 
-The first is McNamara & Falcon's (2005). Their paper and Badreddine's give no values, so a design
-must give them, or name a metal of the catalogue: named_metals.py computes them.
+The first law is by McNamara and Falcon (2005). Their paper and the paper by Badreddine give no
+values, so a design must give C0 and v0, or name a metal of the catalogue, for which named_metals.py
+computes them.
 """
 
 from __future__ import annotations
@@ -128,9 +129,10 @@ class SurfaceMaterial(RestitutionTable):
 
 
 class PartMaterial(RestitutionTable):
-    """Restitution over impact speed of a ball on the part, and what sets the size of its dents.
+    """Restitution over impact speed of a ball on the part, and the part's hardness.
 
-    Hardness and v0_m_s set it. Below the speed v0_m_s the contact is elastic and leaves no dent.
+    Hardness and v0_m_s set the size of dents. Below the normal speed v0_m_s the contact is elastic
+    and leaves no dent.
     """
 
     alloy: str | None = Field(default=None, description=ALLOY)

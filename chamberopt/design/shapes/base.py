@@ -63,8 +63,11 @@ class ChamberTable(FileTable):
     def surface(self, vertices: np.ndarray, triangles: np.ndarray) -> ShapeSurface:
         """Return the closed surface of the cavity before the part is taken out of it.
 
-        Raises InputError if the values make no cavity. Vertices (n, 3) [m] and triangles (m, 3) of
-        the part in the chamber are for shapes that follow the part.
+        Raises InputError if the values make no cavity.
+
+        Args:
+            vertices, triangles: surface of the part in the chamber, (n, 3) [m] and (m, 3), for
+                shapes that follow the part.
         """
 
     def setup(self) -> Setup | None:
@@ -72,19 +75,19 @@ class ChamberTable(FileTable):
         return None
 
     def widths_mm(self) -> dict[str, float]:
-        """Return inner widths [mm] of the cavity by the key that sets each.
+        """Return the inner widths [mm] of the cavity, each by the key of the design that sets it.
 
         Every ball must be smaller than each width.
         """
         return {}
 
     def room(self) -> float:
-        """Return an upper bound [m³] of the cavity's volume, without building its surface."""
+        """Return an upper bound of the cavity's volume [m³], without building its surface."""
         return math.inf
 
     @property
     def is_round(self) -> bool:
-        """True if the cavity has round walls, whose number of flat sides is the key `facets`."""
+        """True if the cavity has round walls, whose number of flat sides the key `facets` sets."""
         return False
 
     def notes(self, ball: float) -> list[str]:
@@ -102,7 +105,7 @@ class WalledChamber(ChamberTable):
 
     @property
     def slope(self) -> float:
-        """Outward shift of the side walls for each metre up."""
+        """Outward shift of the side walls for each metre of height [m/m]."""
         return math.tan(math.radians(self.inclination_deg))
 
 
@@ -117,7 +120,7 @@ class ParametricChamber(WalledChamber):
 
     @property
     def lean(self) -> float:
-        """Outward shift of the side walls over the height [m]."""
+        """Outward shift of the side walls from floor to ceiling [m]."""
         return self.height * self.slope
 
     def lofted_over(self, floor: np.ndarray, ceiling: np.ndarray) -> ShapeSurface:
@@ -152,7 +155,7 @@ class PolygonChamber(ParametricChamber):
 
     @property
     def radius(self) -> float:
-        """Radius of the upright edges [m]; 0 for sharp ones."""
+        """Radius of the upright edges [m]; 0 for sharp edges."""
         return 1e-3 * self.corner_radius_mm if self.corner_radius_mm > MIN_LENGTH_MM else 0.0
 
     @property
@@ -210,7 +213,7 @@ class RoundChamber(WalledChamber):
 
     @property
     def is_round(self) -> bool:
-        """True, because the flat sides of the round wall are as many as the key `facets` says."""
+        """True: the wall is round, made of flat sides whose number the key `facets` sets."""
         return True
 
     def profile(self) -> np.ndarray:
@@ -239,7 +242,7 @@ class RoundChamber(WalledChamber):
         return self
 
     def surface(self, vertices: np.ndarray, triangles: np.ndarray) -> ShapeSurface:
-        """Return the cavity's surface, with 2 * facets triangles for each point of its profile."""
+        """Return the cavity's surface: 2 * facets triangles for each profile point but the last."""
         return outlines.revolve(self._rounded(), self.facets)
 
     def room(self) -> float:
@@ -251,5 +254,5 @@ class RoundChamber(WalledChamber):
 
 
 def is_custom(shape: object) -> bool:
-    """True if a design's shape names a Python file of the user's."""
+    """True if a design's shape is the path of a Python file, written by the user."""
     return isinstance(shape, str) and shape.endswith(".py")

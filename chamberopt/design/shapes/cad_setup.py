@@ -1,9 +1,9 @@
 """Read a CAD set-up, in which chamber, sonotrode and part are drawn together in one file.
 
-What is read is the room over the sonotrode, moved so that the sonotrode's face is at z = 0.
-The part is either a separate closed body, which is cut out of the room later, or the piece of the
-room's surface that it bounds. The room is the closed surface that the sonotrode's face belongs to.
-Its triangles may face either way.
+The result is the room over the sonotrode, moved so that the sonotrode's face is at z = 0. The room
+is bounded by the closed surface to which the sonotrode's face belongs, whose triangles may face
+either way in the file. The part is either a separate closed body, which is cut out of the room
+later, or a piece of the room's surface.
 """
 
 from __future__ import annotations
@@ -35,7 +35,9 @@ FACING_TOLERANCE = 1e-3  # share of the area that triangles facing another way m
 
 @dataclass(frozen=True)
 class Setup:
-    """Chamber and part as drawn in one file, with the sonotrode's face at z = 0 and facing up."""
+    """Set-up: chamber and part as drawn in one file, moved so that the sonotrode's face is at z = 0
+    and faces up.
+    """
 
     room: ShapeSurface  # without the part if the part is a separate body
     # The part in the file's frame, normals out of the part, with the notes on the whole set-up. It
@@ -47,10 +49,13 @@ class Setup:
 
 
 def read_setup(path: Path, unit: str, part: tuple[str, ...], sonotrode: tuple[str, ...]) -> Setup:
-    """Return the set-up in a file. The file is read again only if it has changed.
+    """Return the set-up (chamber, part and sonotrode) in a file, read again only if it has changed.
 
-    `part` and `sonotrode` (its face) are names of the file's groups. Raises InputError if a name is
-    not in the file, the room is not closed, or the face is not flat.
+    Raises InputError if a name is not in the file, the room is not closed, or the sonotrode's face
+    is not flat.
+
+    Args:
+        part, sonotrode: names of the file's groups for the part and for the sonotrode's face.
     """
     try:
         stamp = path.stat()
@@ -101,7 +106,7 @@ def _select_some(read: TriangleSoup, names: tuple[str, ...], field: str) -> np.n
     """Mark the triangles (m,) of the named groups. Raises InputError if none or all are marked.
 
     Args:
-        field: the field of the design that gives the names, for messages.
+        field: name of the design's key that gives the names, for messages.
     """
     chosen = select_triangles(read.groups, names, len(read.corners), field)
     if not chosen.any() or chosen.all():
@@ -155,7 +160,7 @@ def _pick(mesh: PartMesh, triangles: np.ndarray, rows: np.ndarray) -> PartMesh:
 def _piece_of_part(mesh: PartMesh, in_part: np.ndarray) -> PartMesh:
     """Return the piece of the room's surface that belongs to the part, with normals out of it.
 
-    Its triangles have the order of the room's.
+    Its triangles are in the order of the room's triangles.
     """
     if not in_part.any():
         text = "none of it bounds the room over the sonotrode; check the groups of the file"
@@ -167,8 +172,12 @@ def _piece_of_part(mesh: PartMesh, in_part: np.ndarray) -> PartMesh:
 def _room_over_sonotrode(mesh: PartMesh, sonotrode: tuple[str, ...]) -> tuple[PartMesh, list[str]]:
     """Return the surface of the room over the sonotrode, and notes on what was left out.
 
-    It is the closed surface that has the sonotrode's face, and those of bodies inside it, with
-    normals out of the room. Surfaces around it, such as the outside of thick walls, are left out.
+    It consists of the closed surface with the sonotrode's face and of the surfaces of bodies inside
+    it, with normals out of the room. Surfaces around it, such as the outside of thick walls, are
+    left out.
+
+    Args:
+        sonotrode: names of the file's groups for the sonotrode's face.
     """
     face = select_triangles(mesh.groups, sonotrode, len(mesh.triangles), "chamber.sonotrode")
     facing = area_vectors(mesh.vertices, mesh.triangles[face])
@@ -241,7 +250,7 @@ def _pose(mesh: PartMesh, face: np.ndarray) -> tuple[np.ndarray, np.ndarray, lis
 def _rotation_to_z(up: np.ndarray) -> np.ndarray:
     """Return the smallest rotation (3, 3) that turns a unit vector to (0, 0, 1).
 
-    For (0, 0, -1), where there are many, it is the half turn about x.
+    For (0, 0, -1), where many rotations are equally small, it is the half turn about x.
     """
     x, y, z = up
     if z < -1.0 + AXIS_TOLERANCE:

@@ -105,7 +105,7 @@ class Conformal(ParametricChamber):
         return ShapeSurface(vertices, triangles, tags)
 
     def widths_mm(self) -> dict[str, float]:
-        """Return the chamber's height [mm] by its key. In plan it is wider than the part."""
+        """Return the chamber's height [mm] by its key. Other widths depend on the part."""
         return {"height_mm": self.height_mm}
 
     def notes(self, ball: float) -> list[str]:

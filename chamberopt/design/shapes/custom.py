@@ -60,7 +60,7 @@ def find_fault(cavity: object) -> str | None:
 
 
 def with_array_types(cavity: ShapeSurface) -> ShapeSurface:
-    """Return a surface without fault with its arrays in the types of a ShapeSurface."""
+    """Return a sound surface with its arrays converted to the types of a ShapeSurface."""
     arrays = (cavity.vertices, np.float64), (cavity.triangles, np.int32), (cavity.tags, np.uint8)
     return ShapeSurface(*(np.asarray(array, dtype=kind) for array, kind in arrays))
 
@@ -100,7 +100,7 @@ def _crossing_fault(vertices: np.ndarray, triangles: np.ndarray) -> str | None:
 
 
 class RecordedShape(ChamberTable):
-    """Stands for a user's own shape in the design of a result: its values, without its code."""
+    """Stand-in for a user's own shape in the design of a result: its values, without its code."""
 
     model_config = ConfigDict(**{**STRICT, "extra": "allow"})
 
@@ -167,9 +167,8 @@ def _run(path: Path, source: bytes) -> type[ChamberTable]:
 
 
 def _with_checks(path: Path, shape: type[ChamberTable], digest: str) -> type[ChamberTable]:
-    """Return a subclass of a user's shape that reports faults of its code and surface.
-
-    All are reported as InputError.
+    """Return a subclass of a user's shape that reports faults of its code and surface as
+    InputError.
 
     Args:
         path: the Python file of the shape.

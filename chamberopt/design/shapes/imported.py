@@ -40,10 +40,10 @@ SAME_DISTANCE = 1e-9  # m
 
 
 def move_sonotrode(setup: Setup, distance: float) -> ShapeSurface:
-    """Return the room's surface with its sonotrode at this distance [m] from the part's low end.
+    """Return the room's surface with its sonotrode moved to this distance [m] below the part.
 
-    Raises InputError if the sonotrode is to come nearer than the walls rise straight from it, or
-    farther where another part of the room is in the way.
+    Raises InputError if the sonotrode cannot be moved there: up, beyond the height to which the
+    walls rise straight from it, or down, where another part of the room is in the way.
     """
     room, farther = setup.room, distance - setup.distance
     if abs(farther) < SAME_DISTANCE:
@@ -130,7 +130,7 @@ IMPORTED = "imported"
 
 
 class Imported(ChamberTable):
-    """A chamber drawn with its part in one file. All but part and sonotrode is wall."""
+    """A chamber drawn with its part in one file. All surfaces but part and sonotrode are wall."""
 
     shape: Literal["imported"]
     sonotrode_distance_mm: float | None = quantity(  # type: ignore[assignment]

@@ -77,7 +77,7 @@ def move_sides(outline: np.ndarray, distance: float) -> np.ndarray:
 def largest_inward_move(outline: np.ndarray) -> float:
     """Return the largest distance [m] by which all sides of an outline can be moved inward.
 
-    Then the first side is as short as MIN_LENGTH.
+    At this distance the shortest side has the length MIN_LENGTH.
     """
     tangent = np.tan(corner_angles(outline) / 2.0)
     length = np.hypot(*(np.roll(outline, -1, axis=0) - outline).T)
@@ -94,12 +94,13 @@ def area_inside(outline: np.ndarray, distance: float = 0.0) -> float:
 
 
 def corner_arcs(outline: np.ndarray, facets: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return the corner (k,) of each point of a rounded outline, and its direction (k, 2) from it.
+    """Return the corner (k,) of each point of a rounded outline, and the direction (k, 2) from the
+    corner to the point.
 
-    Corners plus radius times directions are the outline grown by the radius. Each corner has a fan
-    from the normal of one side to the normal of the next, in steps of at most a full turn / facets.
-    A corner of less than half a step gets one direction, longer than 1, that moves both sides by
-    the radius.
+    The positions of the corners plus a radius times the directions are the outline grown by the
+    radius. Each corner has a fan of directions, from the normal of one side to the normal of the
+    next, in steps of at most a full turn / facets. A corner that turns by less than half a step has
+    a single direction, longer than 1, which moves both sides by the radius.
     """
     before, _ = _directions(outline)
     turn = corner_angles(outline)
@@ -224,7 +225,7 @@ def _distance(point: np.ndarray, start: np.ndarray, end: np.ndarray) -> np.ndarr
 
 
 def _cross(a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray) -> np.ndarray:
-    """Return True where the straight piece from a to b crosses that from c to d, (k,) bool."""
+    """Return True where the straight lines from a to b and from c to d cross, (k,) bool."""
 
     def side(p: np.ndarray, q: np.ndarray, x: np.ndarray) -> np.ndarray:
         return np.asarray(np.sign((q - p)[:, 0] * (x - p)[:, 1] - (q - p)[:, 1] * (x - p)[:, 0]))

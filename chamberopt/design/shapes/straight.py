@@ -19,7 +19,7 @@ class Box(PolygonChamber):
     width_mm: float = quantity(2, 2000, "mm", "inner size along y, at the sonotrode")
 
     def floor(self) -> np.ndarray:
-        """Return the floor's corners (4, 2) [m], counter-clockwise from the one at +x, -y."""
+        """Return the floor's corners (4, 2) [m], counter-clockwise from the corner at +x, -y."""
         half_sides = 0.5e-3 * np.array([self.length_mm, self.width_mm])
         return np.asarray(half_sides * np.array([[1, -1], [1, 1], [-1, 1], [-1, -1]]))
 
@@ -67,7 +67,7 @@ class Prism(PolygonChamber):
     turn_deg: float = quantity(-360, 360, "degrees", "about z; at 0 the first side faces +x", 0.0)
 
     def floor(self) -> np.ndarray:
-        """Return the floor's corners (n, 2) [m], from the one after the first side on."""
+        """Return the floor's corners (n, 2) [m], beginning with the corner after the first side."""
         half_angle = np.pi / self.sides
         angle = np.radians(self.turn_deg) + half_angle * (2.0 * np.arange(self.sides) + 1.0)
         return np.asarray(

@@ -1,1 +1,1 @@
-"""Read mesh files of parts and set-ups, close their surface, and find their named groups."""
+"""Read mesh files of parts, close their surface, and find their named groups of triangles."""

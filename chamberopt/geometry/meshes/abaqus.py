@@ -52,7 +52,7 @@ _FindRows = Callable[[Iterable[Member]], np.ndarray]
 
 @dataclass
 class _Scope:
-    """Nodes, elements and sets of one *PART of the file, or of all that stands outside of parts."""
+    """Nodes, elements and sets of one *PART of the file, or of the file outside of all parts."""
 
     nodes: dict[int, list[float]] = field(default_factory=dict)
     elements: dict[int, tuple[str, list[int]]] = field(default_factory=dict)
@@ -66,9 +66,9 @@ class _Instance(NamedTuple):
     lines: list[list[float]]
 
     def place(self, points: np.ndarray) -> np.ndarray:
-        """Return a part's points (n, 3) at the place of this instance.
+        """Return a part's points (n, 3), moved and turned as this instance of the part is.
 
-        The first data line of *INSTANCE moves them. The second then turns them about an axis
+        The first data line of *INSTANCE moves the points. The second then turns them about an axis
         through two points.
         """
         if self.lines:
@@ -127,7 +127,7 @@ def _read_scopes(
 ) -> tuple[dict[str, _Scope], dict[str, _Instance], list[str]]:
     """Return the parts and the instances of a file by upper-case name, and notes for the user.
 
-    What stands outside of parts has the name "".
+    Nodes, elements and sets outside of all parts are under the name "".
     """
     scopes, instances, left_out = {"": _Scope()}, {}, Counter[str]()
     current = ""
@@ -208,7 +208,11 @@ def _one(instance: str, number: int | str) -> Member:
 
 
 def _members(options: Options, data: list[str], sets: dict[str, Members]) -> Members:
-    """Return the members that an *ELSET or *NSET lists, generates, or copies from another set."""
+    """Return the elements or nodes that an *ELSET or *NSET lists, generates, or takes from a set.
+
+    Args:
+        sets: members of the sets read so far, by name.
+    """
     members: Members = {}
     instance = options.get("INSTANCE", "").upper()
     by_upper = {name.upper(): name for name in sets}
@@ -232,8 +236,8 @@ def _assemble(
 ) -> ElementMesh:
     """Return one mesh of all instances or, in a file without instances, of everything in it.
 
-    Elements keep the file's numbers. If several instances number their own elements, the numbers
-    are positions.
+    Elements keep the file's numbers. If several instances have elements, whose numbers may be the
+    same, each element gets its position in the mesh as its number.
     """
     placed = [(scopes[instance.part], instance) for instance in instances.values()]
     placed += [
@@ -290,7 +294,7 @@ def _add_groups(mesh: ElementMesh, scope: _Scope, elements: _FindRows, nodes: _F
     """Add the sets and surfaces of a part of the file to the mesh.
 
     Args:
-        elements, nodes: functions that return the mesh's rows of members of a set.
+        elements, nodes: functions that return the rows, in the mesh, of the members of a set.
     """
     for name, members in scope.element_sets.items():
         mesh.element_sets[name] = np.r_[mesh.element_sets.get(name, NO_ROWS), elements(members)]

@@ -1,4 +1,4 @@
-"""Make triangles of finite elements: of shells as they are, and of the skin of solids.
+"""Make triangles of finite elements: of shell elements, and of the skin of solid elements.
 
 Sets of elements, faces or points become groups of triangles.
 
@@ -61,10 +61,10 @@ class Block(NamedTuple):
 
 @dataclass
 class ElementMesh:
-    """Finite element mesh. Its elements are counted through all blocks.
+    """Finite element mesh. Its elements are counted from 0 on, through all blocks.
 
-    Sets have a name each: sets of elements (e,), sets of elements with a face of each, and sets of
-    points. A triangle is in the group of a node set if all its corners are in the set.
+    The mesh has named sets: sets of elements, sets of elements with a face of each element, and
+    sets of points. A triangle is in the group of a node set if all its corners are in the set.
     """
 
     points: np.ndarray  # (n, 3) in the file's numbers
@@ -125,8 +125,8 @@ def extract_surface(mesh: ElementMesh) -> RawMesh:
 def _origin(mesh: ElementMesh, faces: _Polygons) -> tuple[np.ndarray, np.ndarray]:
     """Return the element number (k,) of each face, and the number (k,) of the face in its element.
 
-    Faces of solids are numbered from 1 on, and a shell has the number 0. If a shell lies on
-    a solid, the shell counts, because the file's author put it there to show results.
+    Faces of solids are numbered from 1 on, and a shell has the face number 0. If a shell lies on a
+    solid, the shell's number is returned: the file's author put it there to show results.
     """
     has_shell = faces.shell != NONE
     is_solid = [np.full(len(block.nodes), block.kind in SOLIDS) for block in mesh.blocks]
@@ -180,7 +180,9 @@ def _skin(faces: _Polygons, points: np.ndarray, blocks: list[Block]) -> _Polygon
 
 
 def _with_shells(skin: _Polygons, shells: _Polygons) -> tuple[_Polygons, int]:
-    """Return the skin with the shell on each face noted, and the number of shells not on it."""
+    """Return the skin of the solids with the shell element on each face entered, and the number of
+    shell elements that are not on the skin.
+    """
     if not len(shells.corners):
         return skin, 0
     keys = np.sort(np.concatenate([skin.corners, shells.corners]), axis=1)
@@ -211,7 +213,7 @@ def _groups(mesh: ElementMesh, faces: _Polygons) -> dict[str, np.ndarray]:
 
 
 def _triangulate(faces: _Polygons, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Divide faces into triangles (t, 3) of points, and return these and the face (t,) of each.
+    """Divide faces into triangles. Return the points (t, 3) and the face (t,) of each triangle.
 
     Triangles with two equal corners are left out.
     """

@@ -1,7 +1,8 @@
 """Read Gmsh's .msh files of versions 2.2 and 4.1, text and binary.
 
 Physical groups of the file become groups of triangles. Text and binary files hold the same numbers
-in the same order, so that one reader serves both. It asks a stream for "two int, three double".
+in the same order, so that one reader serves both. It asks a stream, which hides the difference, for
+the next integers or reals.
 
 Source: Gmsh reference manual, sections "MSH file format" and "Node ordering".
 """
@@ -203,9 +204,9 @@ def _node_count(path: Path, kind: int) -> int:
 
 
 def _element_mesh(path: Path, mesh: _GmshMesh, name_of: dict[tuple[int, int], str]) -> ElementMesh:
-    """Return the elements with a surface, with each physical group as a set of elements.
+    """Return the shells and solids of a file, with each physical group as a set of elements.
 
-    The group number 0 means no group.
+    Points and lines are left out. The group number 0 means no group.
 
     Args:
         name_of: name of each group by its dimension and number.

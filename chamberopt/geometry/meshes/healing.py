@@ -1,6 +1,6 @@
 """Join loose triangles to one closed surface that faces outward, and repair small faults.
 
-Each change gives a note for the user. Faults that need a guess are refused.
+Each change gives a note for the user. Faults that only a guess could repair are refused.
 """
 
 from __future__ import annotations
@@ -73,7 +73,7 @@ def close_holes(
 
 
 def count_holes(edges: np.ndarray) -> int:
-    """Return the number of holes: of connected pieces of the open edges (k, 2)."""
+    """Return the number of holes of a surface: the connected pieces of its open edges (k, 2)."""
     ends, numbers = np.unique(edges, return_inverse=True)
     a, b = numbers.reshape(-1, 2).T
     return connected_pieces(a, b, len(ends))[0]
@@ -82,8 +82,11 @@ def count_holes(edges: np.ndarray) -> int:
 def _simple_rims(triangles: np.ndarray, edges: np.ndarray) -> list[list[int]]:
     """Return the rims of holes: closed loops of points, in the direction that new triangles need.
 
-    This direction is opposite to the side of the triangle beside the first edge. Holes that touch
-    in a corner are left out.
+    The triangles beside a hole run along its rim in the opposite direction. Holes that touch in a
+    corner are left out.
+
+    Args:
+        edges: open edges of the surface, (k, 2).
     """
     neighbours: dict[int, list[int]] = defaultdict(list)
     for a, b in edges.tolist():
@@ -140,7 +143,7 @@ WELD = 1e-6  # share of the bounding box's diagonal: rounding of a text format w
 
 
 class SewnSurface(NamedTuple):
-    """Triangles that share vertices, and what was changed to join them."""
+    """Triangles that share vertices, and notes on the changes that were made to join them."""
 
     points: np.ndarray  # (n, 3) [m]
     triangles: np.ndarray  # (k, 3), rows of the points
@@ -248,11 +251,10 @@ def _drop_useless(points: np.ndarray, triangles: np.ndarray, source: np.ndarray)
 
 
 def _drop_strays(surface: SewnSurface) -> SewnSurface:
-    """Return the surface without stray facets.
+    """Return the surface without stray triangles, which belong to no closed surface.
 
-    They are loose, or hang by an edge that is closed without them. Stray facets form pieces,
-    joined where exactly two triangles meet, that have at least as many open edges as triangles. A
-    body with a hole has few open edges.
+    Triangles form a piece where exactly two of them meet at each edge. A piece is stray if it has
+    at least as many open edges as triangles. A body with a hole has few open edges.
     """
     points, triangles = surface.points, surface.triangles
     _, edge, times = np.unique(edge_keys(triangles), return_inverse=True, return_counts=True)
@@ -329,9 +331,10 @@ def _against_neighbours(path: Path, triangles: np.ndarray) -> np.ndarray:
 
     Of each connected piece of the surface, the fewest possible triangles are marked.
 
-    In a graph each triangle has two nodes, one as it is and one turned. Nodes that agree across an
-    edge are linked. A piece of the surface then falls into two halves, each the other's mirror
-    image. Only a one-sided surface does not fall apart.
+    In a graph each triangle has two nodes: the triangle as it is, and the triangle turned over.
+    Nodes of neighbours that face the same way are linked. Each piece of the surface then falls into
+    two halves, of which each is the other half turned over. Only a one-sided surface does not fall
+    apart.
     """
     m, pairs, sides = len(triangles), side_pairs(triangles), sides_of(triangles)
     agree = sides[pairs[:, 0], 0] != sides[pairs[:, 1], 0]

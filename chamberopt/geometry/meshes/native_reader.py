@@ -1,8 +1,8 @@
 """Read files with libraries in C++, in a child process.
 
-A damaged file can end the process that reads it, and so ends only the child. It can also keep a
-library busy for ever, so the child's memory and computing time are limited. Computing time does not
-count how long other programs use the processor.
+A damaged file can crash the process that reads it, which is then only the child process. It can
+also keep a library busy for ever, so the child's memory and computing time are limited. Computing
+time does not count how long other programs use the processor.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ class NativeReader(NamedTuple):
     Attributes:
         read: function of the path of a file and further arguments, called in the child.
         name: name of the file that the child reads.
-        fault: message, without the path, on a file that ends its reader.
+        fault: message, without the path, about a file that crashes its reader.
         seconds_per_mb: computing time allowed beside LEAST_SECONDS [s/MB].
     """
 

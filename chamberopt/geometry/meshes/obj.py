@@ -70,7 +70,7 @@ def _direction(word: str, count: int) -> int:
     """Return the row of the normal that a corner such as 3/1/2 names, or 0 if it names none.
 
     Args:
-        count: number of rows so far, from which negative numbers count backwards.
+        count: number of normals read so far, from which negative numbers count backwards.
     """
     parts = word.split("/")
     number = int(parts[2]) if len(parts) > 2 and parts[2] else 0

@@ -3,12 +3,12 @@
 A file passes through these steps:
     formats: recognise the format and read its triangles;
     units: convert to metres;
-    healing, holes: make one closed surface of the triangles;
+    healing: make one closed surface of the triangles;
     self_intersection: refuse a surface that crosses itself.
 
-Faults that need no guess are repaired, with a note for the user. Other faults are refused, with the
-reason and the place. The triangles keep their order and their corners, so that coverage can be
-given on the user's mesh.
+Faults that can be repaired without a guess are repaired, with a note for the user. Other faults are
+refused, with the reason and the position. The triangles keep their order and their corners, so that
+results can be given on the user's mesh.
 """
 
 from __future__ import annotations
@@ -164,7 +164,7 @@ def close_surface(soup: TriangleSoup, only: np.ndarray | None = None) -> PartMes
     """Make one closed surface of all triangles, or of the triangles marked by `only` (m,).
 
     Raises:
-        SurfaceError: if the surface is open, not manifold or crosses itself; it names the place.
+        SurfaceError: if the surface is open, not manifold or crosses itself; it says where.
     """
     path = soup.path
     chosen = np.arange(len(soup.corners)) if only is None else np.flatnonzero(only)
@@ -188,11 +188,10 @@ def close_surface(soup: TriangleSoup, only: np.ndarray | None = None) -> PartMes
 
 
 def _normals_at(soup: TriangleSoup, corners: np.ndarray, given: np.ndarray) -> np.ndarray | None:
-    """Return the normals at the corners (k, 3, 3) of triangles, as the file states them, or None.
+    """Return the normals at the corners (k, 3, 3) of triangles, as the file states them.
 
-    None means that the file states no normals.
-
-    A corner without a plausible normal in the file has the normal of its triangle.
+    A corner without a plausible normal in the file has the normal of its triangle. The result is
+    None if the file states no normals.
 
     Args:
         given: the file's triangle from which each triangle comes, -1 for a new triangle, (k,).
@@ -215,11 +214,11 @@ def select_triangles(
 ) -> np.ndarray:
     """Return marks (count,) of the triangles in the named groups. "all" means every triangle.
 
-    Case matters only between names of the file that differ in nothing else.
+    Upper and lower case count as equal, unless two names of the file differ in nothing else.
 
     Raises:
-        InputError: for a name without a group in the file; the message names the design's
-            ``field``.
+        InputError: for a name without a group in the file; the message begins with `field`, the
+            name of the design's key.
     """
     by_lower = {name.lower(): name for name in groups}
     chosen = np.zeros(count, dtype=bool)

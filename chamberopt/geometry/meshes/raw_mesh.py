@@ -1,4 +1,4 @@
-"""Define what each mesh reader returns: a file's triangles, element numbers and groups."""
+"""Define the result of each mesh reader: a file's triangles, element numbers and groups."""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ TOUCH = 1e-6
 
 
 def refuse_self_intersection(path: Path, vertices: np.ndarray, triangles: np.ndarray) -> None:
-    """Raise SurfaceError, which names the place, if a body's closed surface crosses itself.
+    """Raise SurfaceError, which says where, if a body's closed surface crosses itself.
 
     Several bodies may overlap: they are united where the chamber is made.
     """
@@ -103,7 +103,7 @@ def _close_pairs(corners: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]
 def _crossing(
     corners: np.ndarray, a: np.ndarray, b: np.ndarray, touch: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return those pairs of triangles a, b (k,) that cross each other by more than `touch` [m]."""
+    """Return the pairs of triangles a, b (k,) that cross each other by more than `touch` [m]."""
     for _ in range(2):  # each triangle must have corners on both sides of the other's plane
         distance = _distances(corners[a], corners[b])
         through = (distance.min(axis=1) < -touch) & (distance.max(axis=1) > touch)

@@ -126,7 +126,7 @@ def _decoded(text: str) -> str:
 
 
 def _character(escape: re.Match[str]) -> str:
-    """Return the characters that an escape sequence stands for. Half a character becomes U+FFFD."""
+    """Return the characters that an escape sequence stands for; U+FFFD for an incomplete one."""
     kind = str(escape.lastgroup)
     given = escape[kind]
     if kind in ("utf16", "utf32"):
@@ -206,8 +206,8 @@ def read_step(path: Path, content: bytes, how: Tessellation | None = None) -> Ra
 def _face_names(solids: list[list[StepFace]], middles: np.ndarray) -> tuple[str, ...] | None:
     """Return the names of the faces of a body, in order.
 
-    Faces have the order of the solid in the file. The solid is recognised by the middles of its
-    faces, which coincide with the body's after a motion.
+    Gmsh's body has its faces in the order of its solid in the file. The solid is recognised by the
+    middles of its faces: moved and turned, they coincide with the middles of the body's faces.
 
     Args:
         solids: faces of each solid in the file.
@@ -228,7 +228,7 @@ def _face_names(solids: list[list[StepFace]], middles: np.ndarray) -> tuple[str,
 
 
 def _is_moved(one: np.ndarray, other: np.ndarray) -> bool:
-    """Return True if points (k, 3) are the other points (k, 3), moved and turned.
+    """Return True if points `one` (k, 3) are the points `other` (k, 3), moved and turned.
 
     Points that are nan are left out.
     """

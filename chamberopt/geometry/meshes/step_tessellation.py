@@ -6,10 +6,10 @@ are fine and planes coarse:
     h = min(side, sqrt(5 chord r), max(angle r, 4 chord)), where r is 3 chord at least
 
 side is the largest side of a triangle, chord the largest distance of a triangle from the face, and
-angle the largest angle between neighbouring triangles. That angle is kept, except at radii too
-small for a ball. The middle of an
-equilateral triangle is h² / 6 r below a sphere. The factor 5 instead of 6 leaves room for sides
-longer than wanted. Faces with four sides get grids, with longer cells where the face is straight.
+angle the largest angle between neighbouring triangles. This angle is kept, except at radii too
+small for a ball. The middle of an equilateral triangle is h² / 6 r below a sphere. The factor 5
+instead of 6 leaves room for sides longer than wanted. Curved faces with four sides get grids, whose
+cells are longer in a direction in which the face is straight.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ Grid = tuple[tuple[int, int, int], tuple[int, int, int]]
 
 
 def lay_grids(model: type[gmsh.model], faces: list[int], side_at: Callable[[float], float]) -> None:
-    """Make Gmsh lay grids on curved faces with four sides. Other faces get its usual triangles.
+    """Make Gmsh lay grids on curved faces with four sides. Other faces get Gmsh's usual triangles.
 
     Args:
         model: gmsh.model.
@@ -257,14 +257,14 @@ def _normals(model: type[gmsh.model], face: int, nodes: np.ndarray) -> np.ndarra
 
 
 class _TriangleCount:
-    """Estimate of the number of triangles that a meshed model will have, by their fineness."""
+    """Estimate of the number of triangles that a model will have, meshed with a given fineness."""
 
     def __init__(self, model: type[gmsh.model], faces: list[int]) -> None:
         self._areas = np.array([model.occ.getMass(2, face) for face in faces])
         self._radii = [_radii(model, face) for face in faces]
 
     def __call__(self, how: Tessellation) -> float:
-        """Return about how many triangles there will be, if equilateral with the wanted sides."""
+        """Return the number of triangles, as if all were equilateral with the wanted sides."""
         each = [np.mean([how.side_at(one) ** -2.0 for one in own]) for own in self._radii]
         return float(self._areas @ np.array(each)) * 4.0 / math.sqrt(3.0)
 

@@ -8,7 +8,7 @@ from chamberopt.common.errors import InputError
 
 
 class SurfaceError(InputError):
-    """Error for a surface that cannot be used, by itself or where it stands.
+    """Error for a surface that cannot be used, by itself or at its place in the chamber.
 
     Args:
         corners: corners of the surface's triangles as read, (m, 3, 3) [m].

@@ -35,9 +35,10 @@ def read_3mf(path: Path, content: bytes) -> RawMesh:
 
 
 def _copies(model: bytes) -> int:
-    """Return the largest number of bodies of one object of a 3MF model.
+    """Return the number of bodies in the largest object of a 3MF model.
 
-    An object may consist of other objects, and these again, so that they can be very many.
+    An object may repeat other objects, which repeat objects in turn, so that a short file can hold
+    very many bodies.
     """
     bodies: dict[bytes, int] = {}
     current = b""

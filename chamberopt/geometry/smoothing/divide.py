@@ -1,13 +1,14 @@
-"""Divide triangles: edges along which the smooth surface bends are split at moved middles.
+"""Divide triangles whose smooth surface bends: split their edges, and move the middles onto it.
 
-Each edge decides alone about its split. The triangles on both sides therefore always meet at whole
-edges, and a closed surface stays closed. The middle of an edge lies on the arc through its ends
-that has their normals. The tangents of a crease are the cross products of the normals of both
-sides. The normals of a crease are perpendicular to its tangents, in the plane in which it bends. A
-piece of a plane stays in its plane, its border included.
+An edge is split for both of its triangles or for neither. The triangles on both sides therefore
+always meet at whole edges, and a closed surface stays closed. The middle of an edge moves to the
+arc through both ends that has the surface's normals there. A crease is an edge of the part, where
+two smooth surfaces meet. Its tangents are the cross products of the normals of these surfaces. Its
+own normals are perpendicular to its tangents, in the plane in which the crease bends. A piece of a
+plane stays in its plane, its border included.
 
 Notation
-p, n   ends of an edge [m] and the surface's unit normals there
+p, n   ends of an edge [m] and the surface's unit normals there; dp, dn: from start to end
 t      unit tangents of a crease at its ends
 e      unit vector from end to end
 s      rise of the middle over the chord [m]
@@ -66,7 +67,7 @@ class Surface:
         parent: triangle of the file from which each triangle comes, shape (k,).
         normals: unit normals of the smooth surface at the corners, shape (k, 3, 3).
         crease: marks the sides at creases, shape (k, 3).
-        rise: largest move of the middle of a side [m], shape (k,).
+        rise: largest allowed move of the middle of a side [m], shape (k,).
     """
 
     vertices: np.ndarray
@@ -78,15 +79,15 @@ class Surface:
 
 
 def divide(surface: Surface, limit: np.ndarray, narrow: np.ndarray) -> Surface:
-    """Return the surface with edges split until none bends by more than its limit.
+    """Return the surface with its edges split until it bends by at most a limit along each edge.
 
     The limit of an edge is the lower limit of the file's triangles on both sides.
 
     Args:
-        limit: largest bend of each triangle of the file [rad], shape (m,); infinite where no edge
-            is divided.
-        narrow: distance across the bend [m] below which an edge of such a triangle is not split,
-            shape (m,).
+        limit: largest angle by which the surface may bend along an edge [rad], for each triangle of
+            the file, shape (m,); infinite where no edge is split.
+        narrow: extent of an edge in the direction of the bend [m] below which it is not split, for
+            each triangle of the file, shape (m,).
     """
     whole = np.zeros((len(surface.triangles), 3), dtype=bool)  # sides that must not be split
     for _ in range(LEVELS):
@@ -103,6 +104,7 @@ def _split_once(
     """Split once all edges that bend too much, except where a new triangle would turn over.
 
     Args:
+        limit, narrow: as in `divide`.
         whole: marks the sides that must not be split, shape (k, 3).
 
     Returns:
@@ -139,8 +141,9 @@ def _split_once(
 def _folds(surface: Surface, limit: np.ndarray) -> np.ndarray:
     """Return marks (k, 3) of the longest side of each triangle that leans by more than its limit.
 
-    A long and narrow triangle leans away from the surface's normals by the rise along its longest
-    side over its height, although no side bends by much. Two such triangles make a fold.
+    To lean is to be inclined to the surface's normals. A long and narrow triangle leans by the rise
+    of the surface over its longest side, divided by its height, although the surface bends little
+    along each side. Two such triangles make a fold.
     """
     corners = surface.vertices[surface.triangles]
     cosine = np.einsum("ki,ki->k", unit_normals(corners), unit_vectors(surface.normals.sum(axis=1)))
@@ -150,12 +153,16 @@ def _folds(surface: Surface, limit: np.ndarray) -> np.ndarray:
 
 
 def _middles(surface: Surface, sides: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Return where the middles of edges with two sides (e, 2) each would move, and their bends.
+    """Return the points to which the middles of edges would move, and the bends of the edges.
+
+    Args:
+        sides: numbers of the two sides at each edge, shape (e, 2).
 
     Returns:
-        Places [m], shape (e, 3); normals on both sides, shape (2, e, 3); the bend along each edge
-        [rad], shape (e,), and its width across the bend [m], shape (e,); marks of the edges whose
-        middle may move to its surface, or nearly so, shape (e,).
+        Points [m], shape (e, 3); normals there of the surfaces on both sides, shape (2, e, 3); the
+        angle by which the surface bends along each edge [rad], shape (e,); the extent of the edge
+        in the direction of the bend [m], shape (e,); marks of the edges whose middle would need
+        little more than the allowed move, shape (e,).
     """
     triangle, k = np.divmod(sides.T, 3)
     own, following = (
@@ -231,7 +238,7 @@ def _tilts(
 
 
 def _lean(normal: np.ndarray, e: np.ndarray) -> np.ndarray:
-    """Return the angles [rad], (e,), by which normals (e, 3) lean along unit vectors e (e, 3)."""
+    """Return the angles [rad], (e,), of normals (e, 3) to planes perpendicular to e (e, 3)."""
     return np.asarray(np.abs(np.arcsin(np.clip(np.einsum("ei,ei->e", normal, e), -1.0, 1.0))))
 
 
@@ -255,7 +262,7 @@ def _curve_normals(n0: np.ndarray, n1: np.ndarray, e: np.ndarray) -> tuple[np.nd
 def _tangent(one: np.ndarray, two: np.ndarray, e: np.ndarray) -> np.ndarray:
     """Return the unit tangents (e, 3) of creases, from the normals of both sides.
 
-    Where these hardly differ, the tangent is the unit vector e along the edge.
+    Where these normals hardly differ, the tangent is the unit vector e along the edge.
     """
     cross = np.cross(one, two)
     cross *= np.sign(np.einsum("ei,ei->e", cross, e))[:, None]
@@ -326,9 +333,9 @@ def _divided(
 
 
 def _sides_of_codes() -> np.ndarray:
-    """Return a table (6, 6) of the side of a triangle on which two of its points lie, or -1.
+    """Return a table (6, 6) of the side of a triangle on which any two of its points lie, or -1.
 
-    Its points are corners 0 to 2 and middles of sides 3 to 5.
+    The points 0 to 2 are the corners, and 3 to 5 the middles of the sides.
     """
     table = np.full((6, 6), -1)
     for k in range(3):

@@ -1,7 +1,7 @@
 r"""Find the normals of the smooth surface behind the facets of a mesh.
 
 Notation
-t      turn of an edge [rad], convex positive                            Edges.turn, (e,)
+t      angle between the facets at an edge [rad], convex positive        Edges.turn, (e,)
 l, h   length of an edge, and the lower height of its triangles [m]
 phi    angle from a facet's normal to the surface's, in the middle of each side of the facet
        [rad], positive where the surface falls away from it              phi, (m, 3)
@@ -93,7 +93,7 @@ class Pieces(NamedTuple):
     """Facets of a surface: small planes, such as quadrangles, or single triangles.
 
     Attributes:
-        number: number of the piece of each triangle, shape (m,).
+        number: number of the piece to which each triangle belongs, shape (m,).
         inner: marks the sides between triangles of one piece, shape (3 m,).
     """
 
@@ -108,7 +108,8 @@ class Pieces(NamedTuple):
     def around(self, triangle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the outer sides of the pieces to which some triangles (r,) belong.
 
-        The first array has the row in `triangle` of each side, (k,), the second the sides, (k,).
+        The first array (k,) has, for each side, the index in `triangle` of its triangle. The second
+        array (k,) has the numbers of the sides.
         """
         outer = np.flatnonzero(~self.inner)
         outer = outer[np.argsort(self.number[outer // 3], kind="stable")]
@@ -122,7 +123,8 @@ class Pieces(NamedTuple):
 def find_pieces(edges: Edges, count: int) -> Pieces:
     """Return the facets of `count` triangles.
 
-    A plane of at most MANY_SIDES outer sides is one facet. In larger planes each triangle is one.
+    A plane of at most MANY_SIDES outer sides is one facet. In larger planes each triangle is a
+    facet.
     """
     number = plane_facets(edges, count)
     one, two = number[edges.triangles].T
@@ -143,18 +145,18 @@ def fit_phi(
     doubted: np.ndarray | None = None,
     told: np.ndarray | None = None,
 ) -> np.ndarray:
-    """Return the angles phi (m, 3) [rad] that fit the turns of the edges best.
+    """Return the angles phi (m, 3) [rad] that fit the angles between facets best.
 
     phi is the angle from a triangle's normal to the normal of the smooth surface, in the middle of
-    each side. It is 0 off the fitted triangles.
+    each side. It is 0 for triangles that are not fitted.
 
     Args:
         is_crease: marks the creases, shape (e,).
         fitted: marks the triangles that have unknown phi, shape (m,).
         apexes: marks edges that end at the apex of a cone, shape (e,).
-        doubted: marks the creases that may be no creases, shape (e,). They hold phi by very little.
-            The phi then serves for a further search, and a few steps are enough.
-        told: marks the creases whose turn counts although they are creases, shape (e,).
+        doubted: marks the creases that may be no creases, shape (e,), where phi is pulled to 0 only
+            weakly. If it is given, fewer steps are made: phi then serves only to find creases.
+        told: marks the creases at which the angle between the facets is fitted too, shape (e,).
     """
     phi = np.zeros(3 * len(fitted))
     if not fitted.any():
@@ -186,9 +188,9 @@ def fit_phi(
 def _straight_to_creases(
     facets: Facets, pieces: Pieces, edges: Edges, is_crease: np.ndarray
 ) -> np.ndarray:
-    """Return marks (3 m,) of sides of facets at creases, towards which no other side bends.
+    """Return marks (3 m,) of sides at creases towards which their facets do not bend.
 
-    Such sides are at the ends of a cylinder or cone, whose facets turn only along them.
+    Such sides are at the ends of a cylinder or cone, whose facets bend along these sides only.
     """
     turns = np.zeros(3 * len(facets.area), dtype=bool)
     turns[edges.sides[~is_crease & (np.abs(edges.turn) > PLANE)]] = True
@@ -320,7 +322,7 @@ def shape_operators(facets: Facets, phi: np.ndarray) -> np.ndarray:
 
 
 def hollow_curvature(facets: Facets, phi: np.ndarray) -> np.ndarray:
-    """Return the largest curvature of each facet in a hollow [1/m], shape (m,).
+    """Return the largest hollow (concave) curvature of each facet [1/m], shape (m,).
 
     It is 0 for a facet that is not hollow in any direction.
     """
@@ -382,9 +384,13 @@ def _at_corners_of_pieces(
 ) -> np.ndarray:
     """Return unit normals at the corners (3 m, 3), corrected in facets of several triangles.
 
-    Other normals stay those of `own` (3 m, 3). In a facet of several triangles, the normal leans by
-    phi across each side of the facet that ends at the corner. A side at a crease with a phi of 0
-    shows nothing, because a cone leans only across its straight lines.
+    In a facet of several triangles, the normal is inclined by phi across each of the facet's two
+    sides that end at the corner. A side at a crease with a phi of 0 is not used, because the normal
+    of a cone changes only across its straight lines. Other corners keep their normals.
+
+    Args:
+        own: normals at the corners before the correction, (3 m, 3).
+        phi: angles from the facets to the smooth surface at their sides [rad], (m, 3).
     """
     corners = np.flatnonzero(np.repeat(pieces.has_several, 3))
     told = ~pieces.inner & np.repeat(pieces.has_several, 3)
@@ -418,11 +424,12 @@ def _even_along_lines(
     fan: np.ndarray,
     is_smooth: np.ndarray,
 ) -> np.ndarray:
-    """Return the normals (f, 3) of fans, made equal along each line where two plane facets meet.
+    """Return the normals (f, 3) of fans (triangles round a vertex, up to creases), made equal along
+    each line where two plane facets meet.
 
     Two plane facets of several triangles each belong to a developable surface, whose normal does
-    not change along such a line. New vertices then lie in planes too, which are few faces for a
-    ball.
+    not change along such a line. New vertices then lie in planes too, so that a ball meets few
+    faces.
     """
     one, two = edges.triangles.T
     facet = plane_facets(edges, len(triangles))

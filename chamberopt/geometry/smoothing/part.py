@@ -1,8 +1,9 @@
-"""Divide the rounds of a part's mesh into finer facets, and tell facts about the facets.
+"""Divide the rounds of a part's mesh into finer facets, and say how coarse the facets are.
 
-A round is a curved surface, such as a fillet, that the file divides into plane facets.
-A ball meets the drawn surface, while the file has facets. The rounds of the target (the surface to
-peen) and of zones are divided, and rounds so near that a ball can touch them at the same time.
+A round is a curved surface, such as a fillet, that the file divides into plane facets. A ball meets
+the curved surface of the real part, but plane facets in the file. The rounds of the target (the
+surface to peen) and of zones (surfaces with limits of their own) are divided, and rounds so near
+that a ball can touch them at the same time.
 """
 
 from __future__ import annotations
@@ -57,7 +58,7 @@ def kept(
     """Return the record of a key from the user's cache, or make and keep it if it is not there.
 
     Args:
-        kind: class of the record.
+        kind: class of the record, which is an object that takes seconds to make.
         others: classes of the objects in the record.
         key: name of the record, such as a digest of all on which it depends.
         make: called to make the record.
@@ -89,21 +90,22 @@ MOST_TRIANGLES = 1.5e6  # triangles of a part: more take too long to fly among
 
 @dataclass(frozen=True)
 class SmoothingFacts:
-    """Figures on the smoothing of a part: what moved, and which facets remain coarse.
+    """Facts about the smoothing of a part: how far the surface moved, and how coarse facets remain.
 
     Attributes:
         largest_move: largest move of the surface [m].
         moved_share: share of the target's area where the surface was moved.
         volume_change: relative change of the part's volume.
         given_triangles: number of the file's triangles.
-        blunt_creases: number of creases that turn by no more than facets of rounds may.
-        facet_turn: largest turn between the file's facets on rounds of the target [rad], without
-            the tenth of the area with the largest turns.
-        coarse_turn: largest turn in this sense of facets left coarser than requested; 0 without
-            such facets.
+        blunt_creases: number of sharp edges that turn by no more than facets of a curved surface
+            may.
+        facet_turn: largest angle between the file's facets on curved surfaces of the target [rad],
+            without the tenth of the area with the largest angles.
+        coarse_turn: the same angle, only for facets left coarser than requested; 0 without such
+            facets.
         coarse_share: share of the target's area on facets that are left coarser.
-        noisy_share: part of coarse_share on rounds left because they are noise.
-        crossing_share: part of coarse_share on rounds left because they would cross others.
+        noisy_share: part of coarse_share that was left because the facets are noise, as of a scan.
+        crossing_share: part of coarse_share that was left because finer facets would cross others.
     """
 
     largest_move: float
@@ -120,7 +122,7 @@ class SmoothingFacts:
 
 @dataclass(frozen=True)
 class SmoothPart:
-    """Mesh of a part with divided rounds.
+    """Mesh of a part whose rounds (curved surfaces, such as fillets) are divided into finer facets.
 
     Attributes:
         vertices: vertex positions [m], shape (n, 3).
@@ -165,7 +167,7 @@ class Rule(NamedTuple):
         is_off: True if the triangles stay as they are.
         turn: largest angle between facets [rad].
         narrow: width [m] below which facets are not divided.
-        tolerance: largest move of the surface [m].
+        tolerance: largest allowed move of the surface [m].
     """
 
     triangles: np.ndarray
@@ -176,11 +178,11 @@ class Rule(NamedTuple):
 
 
 def smooth(mesh: PartMesh, target: Rule, zones: list[Rule]) -> SmoothPart:
-    """Return a part with divided rounds, loaded if an earlier command has made it.
+    """Return a part with its curved surfaces divided, loaded if an earlier command has made it.
 
     Args:
         target: rule for the triangles to cover, and for triangles near them and near the zones.
-        zones: rules for surfaces that may lie on the target.
+        zones: rules for surfaces with limits of their own, which may lie on the target.
     """
     values = [one for rule in (target, *zones) for one in rule]
     key = key_of([mesh.vertices, mesh.triangles, mesh.normals, mesh.is_exact, *values])
@@ -188,11 +190,11 @@ def smooth(mesh: PartMesh, target: Rule, zones: list[Rule]) -> SmoothPart:
 
 
 def _smooth(mesh: PartMesh, target: Rule, zones: list[Rule]) -> SmoothPart:
-    """Divide the rounds of a part, simplified first if its facets have vertices inside.
+    """Divide the curved surfaces of a part, simplified first if its facets have vertices inside.
 
     Args:
         target: rule for the triangles to cover, and for triangles near them and near the zones.
-        zones: rules for surfaces that may lie on the target.
+        zones: rules for surfaces with limits of their own, which may lie on the target.
     """
     rules = [target, *zones]
     if mesh.normals is None and _has_points_in_facets(mesh, rules):
@@ -204,9 +206,9 @@ def _smooth(mesh: PartMesh, target: Rule, zones: list[Rule]) -> SmoothPart:
 
 
 def _has_points_in_facets(mesh: PartMesh, rules: list[Rule]) -> bool:
-    """Return True if a facet of a round to be divided has vertices of the file inside.
+    """Return True if a facet to be divided has vertices of the file in its interior.
 
-    Such vertices are on the facet, and not on the surface behind it.
+    Such vertices are on the facet, and not on the curved surface behind it.
     """
     edges = find_edges(mesh.vertices, mesh.triangles)
     facet, size = plane_facets(edges, len(mesh.triangles)), np.abs(edges.turn)
@@ -244,11 +246,12 @@ def _without_points_in_planes(mesh: PartMesh, rules: list[Rule]) -> tuple[PartMe
 
 
 def _on_file(found: SmoothPart, plain: PartMesh, mesh: PartMesh) -> SmoothPart:
-    """Return a divided part with origins among the file's triangles.
+    """Return a divided part whose origins are triangles of the file.
 
-    The origin of a new triangle is the file's triangle closest to its middle, moved into the
-    origin's plane. If this middle is beyond the plane's border, the middle of the simplified
-    triangle counts.
+    So far the origin of a new triangle is a triangle of the simplified mesh. The new triangle's
+    middle is moved into the plane of this origin. The file's triangle closest to it is the new
+    origin. If the moved middle is beyond the plane's border, the middle of the simplified triangle
+    is taken instead.
 
     Args:
         found: the divided part, with origins in the simplified mesh.
@@ -271,11 +274,11 @@ def _on_file(found: SmoothPart, plain: PartMesh, mesh: PartMesh) -> SmoothPart:
 
 
 def _divided(mesh: PartMesh, target: Rule, zones: list[Rule]) -> SmoothPart:
-    """Divide the rounds of a part whose vertices all lie on the smooth surface.
+    """Divide the curved surfaces of a part whose vertices all lie on these surfaces.
 
     Args:
         target: rule for the triangles to cover, and for triangles near them and near the zones.
-        zones: rules for surfaces that may lie on the target.
+        zones: rules for surfaces with limits of their own, which may lie on the target.
     """
     vertices, triangles, on_target = mesh.vertices, mesh.triangles, target.triangles
     near = _near(vertices, triangles, np.any([one.triangles for one in (target, *zones)], axis=0))
@@ -328,10 +331,11 @@ def _divided(mesh: PartMesh, target: Rule, zones: list[Rule]) -> SmoothPart:
 def _divide_apart(
     mesh: PartMesh, surfaces: Surfaces, limit: np.ndarray, narrow: np.ndarray
 ) -> tuple[Surface, np.ndarray]:
-    """Divide the rounds, except rounds that would then cross others.
+    """Divide the rounds (curved surfaces), except rounds whose finer facets would cross others.
 
     Args:
-        limit: turn [rad] above which edges are split, (m,); infinite where nothing is divided.
+        limit: angle between facets [rad] above which edges are split, (m,); infinite where nothing
+            is divided.
         narrow: width [m] below which facets are not divided, (m,).
 
     Returns:
@@ -371,12 +375,12 @@ def _near(vertices: np.ndarray, triangles: np.ndarray, chosen: np.ndarray) -> np
 
 
 def _usual_turn(turn: np.ndarray, area: np.ndarray, chosen: np.ndarray) -> float:
-    """Return the turn [rad] that nine tenths of the chosen area do not exceed.
+    """Return the turn (angle between facets) [rad] that nine tenths of the area do not exceed.
 
-    Only triangles with a turn above 0 count. The result is 0 if none of them does.
+    Only chosen triangles with a turn above 0 count. The result is 0 if there are none.
 
     Args:
-        turn, area: largest turn [rad] and area [m²] of each triangle, (m,).
+        turn, area: largest turn at the sides [rad] and area [m²] of each triangle, (m,).
         chosen: marks the triangles that count, (m,).
     """
     rows = np.flatnonzero(chosen & (turn > 0.0))

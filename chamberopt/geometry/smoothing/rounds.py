@@ -89,12 +89,13 @@ def find_edges(vertices: np.ndarray, triangles: np.ndarray) -> Edges:
 
 
 def is_hard(edges: Edges) -> np.ndarray:
-    """Return marks (e,) of edges that turn so much that they are creases beside any neighbours."""
+    """Return marks (e,) of edges at which the surface turns so much that they must be creases."""
     return np.asarray((edges.turn > CONVEX_CREASE) | (edges.turn < -HOLLOW_CREASE))
 
 
 def find_creases(edges: Edges, area: np.ndarray) -> np.ndarray:
-    """Return marks (e,) of the creases: edges without evidence that they belong to a round.
+    """Return marks (e,) of the creases: edges without evidence that they belong to a round, which
+    is a curved surface of many facets.
 
     Args:
         area: areas of the triangles [m²], shape (m,).
@@ -119,7 +120,8 @@ def find_creases(edges: Edges, area: np.ndarray) -> np.ndarray:
 def _has_evidence(
     edges: Edges, level: np.ndarray, hard: np.ndarray, area: np.ndarray
 ) -> np.ndarray:
-    """Return marks (e,) of the edges that belong to a round, by the facets beside them.
+    """Return marks (e,) of the edges that belong to a round (a curved surface), judged by the
+    facets beside them.
 
     Args:
         level: marks the edges within facets, shape (e,).
@@ -144,12 +146,14 @@ def _has_evidence(
 
 
 def _is_in_round(facet: np.ndarray, edges: Edges, sure: np.ndarray, area: np.ndarray) -> np.ndarray:
-    """Return marks (k,) of the edges that belong to a round, among edges that turn one way.
+    """Return marks (k,) of the edges that belong to a round, which is a curved surface.
+
+    The given edges are either all convex or all hollow.
 
     Args:
         facet: facets on both sides of each edge, shape (k, 2).
         edges: the edges with turns made positive.
-        sure: marks the edges that are evidence, shape (k,).
+        sure: marks the edges that turn so little that they are evidence of a round, shape (k,).
         area: areas of the facets, shape (f,).
     """
     bend = edges.length * edges.turn
@@ -170,11 +174,11 @@ def _is_in_round(facet: np.ndarray, edges: Edges, sure: np.ndarray, area: np.nda
 
 
 def _bends_beside(facet: np.ndarray, bend: np.ndarray, along: np.ndarray, count: int) -> np.ndarray:
-    """Return how much the other edges of both facets at each edge bend about it [m rad], (k, 2).
+    """Return how much the two facets at each edge bend about it at their other edges, (k, 2).
 
-    A bend is a turn times the length of its edge. A bend about an axis across the edge does not
-    count: the round of a shaft shows nothing about the edge at its end. The round of a cone does
-    not count either, although its lines are not quite across its end.
+    The bend [m rad] at an edge is its turn times its length. A bend about an axis across the given
+    edge does not count: the round of a shaft shows nothing about the edge at the shaft's end. The
+    round of a cone does not count either, although its lines are not quite across its end.
     """
     tensor = np.einsum("k,ki,kj->kij", bend, along, along).reshape(-1, 9)
     sums = np.stack(

@@ -5,10 +5,9 @@ facets and leaves a bare strip between them. Rounds are therefore found and thei
 with new vertices on the surface through the file's vertices. Planes, sharp edges and noise stay as
 they are. No vertex of the file moves.
 
-rounds    edges that divide a round into facets
-irregular further such edges between irregular triangles
-normals   normals of the smooth surface at the corners of the facets
-divide    finer triangles
+The modules beside this file do the steps: `rounds` finds the edges that divide a round into facets,
+`normals` the normals of the smooth surface at the corners of the facets, and `divide` makes finer
+triangles. This file also finds further edges of rounds, between irregular triangles.
 """
 
 from __future__ import annotations
@@ -52,11 +51,12 @@ SWEEPS = 20  # triangles in a row, each of which takes the curvature of the prev
 
 
 def valleys(edges: Edges, pieces: Pieces, is_crease: np.ndarray) -> np.ndarray:
-    """Return marks (e,) of creases that may lie between irregular triangles of one round.
+    """Return marks (e,) of supposed creases that may lie inside a curved surface of irregular
+    triangles.
 
-    Both triangles are single triangles with other edges that turn in the other direction, and by
-    more. Two rows of triangles, each half a triangle ahead of the other, have such an edge along
-    each row.
+    The triangles on both sides are facets by themselves, and have other edges that turn more and in
+    the other direction. Rows of triangles that are shifted by half a triangle have such edges
+    between them.
     """
     largest = np.zeros((2, len(pieces.number)))  # largest turns in each of the two directions
     for way, sign in enumerate((1.0, -1.0)):
@@ -72,11 +72,11 @@ def valleys(edges: Edges, pieces: Pieces, is_crease: np.ndarray) -> np.ndarray:
 def find_continued(
     sides: np.ndarray, edges: Edges, facets: Facets, is_crease: np.ndarray, phi: np.ndarray
 ) -> np.ndarray:
-    """Return marks (e,) of supposed creases across which a round goes on.
+    """Return marks (e,) of supposed creases across which a round (a curved surface) goes on.
 
     Args:
         sides: sides of the triangles, as vectors [m], shape (m, 3, 3).
-        is_crease: marks the edges without evidence, shape (e,).
+        is_crease: marks the edges without evidence that they belong to a round, shape (e,).
         phi: angles from a fit to the other edges [rad], shape (m, 3).
     """
     shape = shape_operators(facets, phi)
@@ -129,11 +129,11 @@ class Surfaces(NamedTuple):
     Attributes:
         normals: unit normals of the smooth surface at the corners, shape (m, 3, 3).
         hollow: largest hollow curvature on each triangle [1/m], 0 without it, shape (m,).
-        turn: largest turn at the smooth edges of each triangle [rad], shape (m,).
+        turn: largest angle to a neighbour across a smooth edge, per triangle [rad], shape (m,).
         crease: marks the sides at creases, shape (m, 3).
         rise: largest move of the surface from each triangle [m], shape (m,).
-        face: number of the round of each triangle, shape (m,).
-        noisy: marks the triangles of rounds that are noise, shape (m,).
+        face: number of the round (curved surface) of each triangle, shape (m,).
+        noisy: marks the triangles of rounds that are noise, as of a scan, shape (m,).
         blunt: number of the creases that turn by less than the facets of a round may.
     """
 
@@ -150,7 +150,8 @@ class Surfaces(NamedTuple):
 def find_surfaces(
     vertices: np.ndarray, triangles: np.ndarray, wanted: np.ndarray, given: np.ndarray | None = None
 ) -> Surfaces:
-    """Return rounds and creases of a part, and the normals of the surface behind its facets.
+    """Return the rounds (curved surfaces) and creases (sharp edges) of a part, and the normals of
+    the surface behind its facets.
 
     Args:
         vertices: vertex positions [m], shape (n, 3).
@@ -211,8 +212,8 @@ def divide_rounds(
     """Return the mesh with the triangles of rounds divided, new vertices on the smooth surface.
 
     Args:
-        limit: turn [rad] above which each triangle's edges are split, shape (m,); infinite where
-            the triangle stays as it is.
+        limit: angle between facets [rad] above which each triangle's edges are split, shape (m,);
+            infinite where the triangle stays as it is.
         narrow: width of facets [m] below which each triangle is not divided, shape (m,).
     """
     surface = Surface(
@@ -256,7 +257,7 @@ def _continued(
     """Return marks (e,) of edges that look like creases, but across which a round goes on.
 
     Args:
-        lone: marks the edges without evidence, shape (e,).
+        lone: marks the edges without evidence that they belong to a round, shape (e,).
         wanted: marks the triangles that are to be divided, shape (m,).
     """
     _, fitted = _faces_to_fit(edges, facets, lone, wanted)
@@ -273,7 +274,8 @@ def _continued(
 def _faces_to_fit(
     edges: Edges, facets: Facets, is_crease: np.ndarray, wanted: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the round of each triangle, and marks of triangles whose normals are to be found.
+    """Return the round (curved surface) of each triangle, and marks of triangles whose normals are
+    to be found.
 
     Args:
         wanted: marks the triangles that are to be divided, shape (m,).
@@ -297,9 +299,9 @@ def _faces_to_fit(
 def _planes(edges: Edges, facets: Facets, is_crease: np.ndarray) -> np.ndarray:
     """Return marks (m,) of triangles of plane facets far larger than all facets beside them.
 
-    The facets of a round are nearly alike, so that these planes are not part of it. A few irregular
-    triangles of a round may lie in one plane by chance. Beside single triangles, each triangle of
-    the plane therefore counts separately.
+    The facets of a round are nearly alike, so that such a plane is not part of the round beside it.
+    A few irregular triangles of a round may lie in one plane by chance. Beside single triangles,
+    the area of a plane is therefore divided by its number of triangles, up to BY_CHANCE.
     """
     facet = plane_facets(edges, len(facets.area))
     count, area = np.bincount(facet), np.bincount(facet, facets.area)
@@ -331,12 +333,15 @@ def _noise(
     fitted: np.ndarray,
     ends: np.ndarray,
 ) -> np.ndarray:
-    """Return the share of each face's turns that no round and no line of creases explains, (f,).
+    """Return the share of the turning of each round (curved surface) that is noise, (f,).
+
+    This is the share of its edges' turns that neither the fit of a smooth surface nor lines of
+    creases explain.
 
     Args:
         lone: marks the edges without evidence of a round, shape (e,).
         left: turn of each edge that the fit does not explain [rad], shape (e,).
-        face: face of each triangle, shape (m,).
+        face: number of the round of each triangle, shape (m,).
         fitted: marks the triangles for which there is a fit, shape (m,).
         ends: vertices of each edge, shape (e, 2).
     """
@@ -362,9 +367,10 @@ def _noise(
 def _turns_and_rises(
     edges: Edges, facets: Facets, is_crease: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the largest turn [rad] at smooth sides of each triangle, and its rise [m], (m,) each.
+    """Return the largest angle to a neighbour across a smooth side of each triangle [rad], and the
+    rise of the surface over it [m], (m,) each.
 
-    The rise is the height of a circle's arc over its chord. The triangle's facet is the chord.
+    The rise is the height of a circle's arc over its chord, which is the triangle's facet.
     """
     turn = np.zeros(3 * len(facets.area))
     turn[edges.sides[~is_crease]] = np.abs(edges.turn[~is_crease])[:, None]
