@@ -9,15 +9,15 @@ NOT_NUMBERS = (bool, np.bool_, str, bytes)
 
 
 class SceneError(ValueError):
-    """Error for an impossible scene. It names the ball, triangle or field, and the remedy."""
+    """Error for an impossible scene. The message names the ball, triangle or field and a remedy."""
 
 
 class SimulationError(RuntimeError):
-    """Error of a simulation that has gone wrong, such as a lost ball. It says what to try."""
+    """Error of a simulation gone wrong, as by a lost ball. The message says what to try."""
 
 
 def number(name: str, value: object) -> float:
-    """Return ``value`` as a float. Raises SceneError that names the field if it is no number."""
+    """Return ``value`` as a float. Raise SceneError, with ``name``, if it is not a number."""
     try:
         if isinstance(value, NOT_NUMBERS):
             raise TypeError

@@ -3,13 +3,12 @@
 Notation:
     x(t) = base + velocity t + ½ a t²: position of a ball [m]; ``motion`` holds base (0:3) [m] and
         velocity (3:6) [m/s] of each ball, shape (n, 6)
-    t: time on the window's clock, that is, since the start of the present time window of
-        ``WINDOW`` seconds or so [s], one clock for all balls
+    t: time since the start of the present time window [s]. A window lasts about ``WINDOW``. At
+        its start the clock, one clock for all balls, begins anew at 0.
     a: acceleration [m/s²], equal to gravity unless the ball is in contact mode
 
-The difference between two balls is a straight line in this frame. Pairs need no clock of their own,
-and the numbers of a ball change only at its events. The clock's zero moves on every window, so that
-t and its rounding stay small.
+In this frame every ball in flight moves along a straight line. The numbers of a ball change only at
+its events. Time windows keep t and its rounding small.
 """
 
 from typing import NamedTuple
@@ -49,7 +48,7 @@ class BallState(NamedTuple):
 
 @jit
 def free_fall_position(motion: np.ndarray, ball: int, time: float) -> Vec3:
-    """Return a ball's position [m] at ``time`` without the share of its acceleration, ½ a t²."""
+    """Return a ball's position [m] at ``time`` [s] in the free-fall frame, without ½ a t²."""
     return Vec3(
         motion[ball, 0] + motion[ball, 3] * time,
         motion[ball, 1] + motion[ball, 4] * time,
@@ -69,7 +68,7 @@ def state_under(motion: np.ndarray, ball: int, time: float, acceleration: Vec3) 
 
 @inlined
 def change_velocity(motion: np.ndarray, ball: int, time: float, change: Vec3) -> None:
-    """Add ``change`` [m/s] to a ball's velocity at ``time`` [s] and keep its position there."""
+    """Add ``change`` [m/s] to a ball's velocity at ``time`` [s]. Its position at ``time`` stays."""
     here = free_fall_position(motion, ball, time)
     for axis, (now, add) in enumerate(((here.x, change.x), (here.y, change.y), (here.z, change.z))):
         velocity = motion[ball, 3 + axis] + add
@@ -84,7 +83,7 @@ def set_path(
     """Set a ball's row of ``motion`` to the parabola with a given state at ``time`` [s].
 
     Args:
-        motion: base and velocity of each ball, shape (n, 6).
+        motion: base position and velocity of each ball, shape (n, 6).
         ball: number of the ball.
         time: time since the start of the present time window [s].
         here: position and velocity of the ball at ``time``.
@@ -102,7 +101,7 @@ def set_path(
 def shift_motion(
     motion: np.ndarray, window: float, gravity: Gravity | None, contact: ContactState | None = None
 ) -> None:
-    """Rewrite every ball's row of ``motion`` for a clock whose zero lies ``window`` [s] later.
+    """Rewrite every ball's row of ``motion`` for a clock that starts ``window`` [s] later.
 
     The paths of the balls stay the same.
     """

@@ -28,10 +28,10 @@ supports. Without Friction this is sliding friction. With Friction the ball spin
 decides between rolling and slipping, and the resistance acts against rolling.
 
 **Moving surfaces support no ball,** unless ``Rest.on_vibrating`` is True. Then a ball sticks to a
-vibrating face, and moves with it, for as long as the face presses the ball. Balls on such a ball
-hop. Otherwise no ball rests on a vibrating surface, and no ball ever rests on a turning part: hits
-there lose speed as restitution says. The turning part moves every ball that it touches, however
-slowly. A ball that the part presses moves still balls in its way.
+vibrating face, and moves with it, for as long as the face presses the ball. Balls that lie on
+this ball hop. Otherwise no ball rests on a vibrating surface. No ball ever rests on a turning part:
+hits there lose speed as restitution says. The turning part moves every ball that it touches, even
+in the slowest hit. A ball that the part presses moves still balls in its way.
 
 **Balls on balls.** A ball that lies still acts as a still surface for hits slower than
 ``Restitution.elastic_below``, as if friction held it. Heaps therefore come to rest from below. Two

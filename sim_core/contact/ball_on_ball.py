@@ -1,6 +1,6 @@
 """Collision of two balls of which at least one is in contact mode: it slides, rolls or lies still.
 
-A fast hit is an ordinary collision. The reaction of a surface behind a ball is the next event.
+A fast hit is an ordinary collision. A surface behind a ball that is hit reacts in the next event.
 
 A slow hit is slower than Restitution.elastic_below. For slow hits a ball that lies still acts as a
 still surface: friction holds it. This neglects an energy per mass below elastic_below²/2. A slow
@@ -37,7 +37,7 @@ PARTING = 1e-9
 
 @jit
 def place(contact: ContactState, motion: np.ndarray, ball: int, time: float) -> BallState:
-    """Return a ball's position [m] and velocity [m/s] at ``time`` since the window's start [s]."""
+    """Return a ball's position [m] and velocity [m/s] at ``time`` since the time window's start."""
     return state_under(motion, ball, time, vec3_at(contact.acceleration, ball))
 
 
@@ -114,12 +114,12 @@ def _land_on_ball(
 
     Args:
         contact: state of contact mode.
-        motion: base and velocity of each ball, shape (n, 6).
+        motion: base position and velocity of each ball, shape (n, 6).
         event: the ball that hits, and the time. Nothing happens if this ball lies still too.
         other: number of the ball that lies still.
         at: position and velocity of the ball that hits.
         normal: unit vector from the other ball to the ball that hits.
-        rebound: change of the normal speed [m/s] if the ball bounces.
+        rebound: change of the normal velocity [m/s] if the ball bounces.
     """
     ball = event.ball
     if contact.mode[ball] >= ASLEEP:
@@ -140,9 +140,10 @@ def _land_on_ball(
 
 @jit
 def _of_balls(restitution: RestitutionState | None, speed: float) -> float:
-    """Return the coefficient of restitution [-] of ball on ball at a ``speed`` [m/s].
+    """Return the coefficient of restitution [-] of two balls that meet at a ``speed`` [m/s].
 
-    It is 1 in a scene without restitution. Hits slower than elastic_below lose speed here too.
+    It is 1 in a scene without restitution. In contact mode hits slower than elastic_below lose
+    speed too.
     """
     if restitution is None:
         return 1.0
@@ -156,7 +157,7 @@ def _press(
     """Return the acceleration [m/s²] that presses two balls together along ``normal``.
 
     ``normal`` is the unit vector from ball ``one`` to ball ``two``. With friction the result is at
-    most twice gravity, because a slip that presses harder soon ends.
+    most twice gravity: only balls that slip press harder, and their slip soon ends.
     """
     accelerations = contact.acceleration
     press = -dot(sub(vec3_at(accelerations, two), vec3_at(accelerations, one)), normal)

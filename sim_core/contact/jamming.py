@@ -1,6 +1,7 @@
-"""Hold balls still that keep bouncing at one place, about twice as long each further time there.
+"""Jams: balls that make many slow hits without leaving their place are held still.
 
-A ball that makes many slow hits without leaving its place is jammed between its neighbours.
+Such a ball is caught between its neighbours. Each further jam at the same place holds it about
+twice as long.
 """
 
 import numpy as np
@@ -36,7 +37,7 @@ MAX_REPEATS = 40  # a ball with more jams at one place is held for ever
 
 @jit
 def hold_still(contact: ContactState, motion: np.ndarray, event: BallEvent, position: Vec3) -> None:
-    """Stop a ball at ``position`` [m] as jammed, for longer if it was jammed there before."""
+    """Hold a jammed ball still at ``position`` [m], longer each time it jams there again."""
     ball, jams = event.ball, contact.jams
     if _is_elsewhere(contact, jams.position, ball, position):
         set_vec3(jams.position, ball, position)
@@ -53,7 +54,7 @@ def hold_still(contact: ContactState, motion: np.ndarray, event: BallEvent, posi
 def count_slow_hit(
     contact: ContactState, motion: np.ndarray, event: BallEvent, position: Vec3, slow: bool
 ) -> None:
-    """Count a ball's slow hits at one place, and hold the ball still when the hits lead nowhere.
+    """Count a ball's slow hits at one place, and hold the ball still after JAM_HITS hits.
 
     ``slow``: True if this hit is slower than ContactState.elastic_below.
     """
@@ -89,9 +90,9 @@ def count_slow_hit(
 
 @jit
 def _is_elsewhere(contact: ContactState, places: np.ndarray, ball: int, position: Vec3) -> bool:
-    """Return True if a ball has moved away from the place noted for it in ``places`` (n, 3) [m].
+    """Return True if a ball has left the position noted for it in ``places`` (n, 3) [m].
 
-    A ball has moved away if ``position`` is further from there than a hundredth of its radius.
+    It has left if ``position`` is further from the noted position than a hundredth of its radius.
     """
     gone = sub(position, vec3_at(places, ball))
     return dot(gone, gone) > (SAME_PLACE * contact.radius) ** 2

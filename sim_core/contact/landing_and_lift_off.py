@@ -1,10 +1,12 @@
-"""Landing of balls on surfaces, and choice of the surfaces on which a ball still stands later.
+"""Landing of balls on surfaces, and choice of the supports that a moving ball keeps.
 
-The time at which a rolling ball leaves its support is computed in path_end.py.
+A support is a surface, or a ball that lies still, on which a ball stands. The time at which a
+rolling ball leaves its support is computed in path_end.py.
 
 Notation: b: ball. n: unit normal of a surface, towards the ball. v: velocity of the ball [m/s].
 The approach speed is -n v. A still surface captures a ball if the approach speed is below
-ContactState.capture and gravity or the ball's own acceleration presses the ball on the surface.
+ContactState.capture and gravity or the ball's own acceleration presses the ball on the surface, or
+if the ball has a support already.
 """
 
 import math
@@ -68,11 +70,11 @@ LAST_LEFT = -2
 
 @jit
 def settle(contact: ContactState, motion: np.ndarray, event: BallEvent, at: BallState) -> None:
-    """Set a ball's new path from the state ``at``, on those of its supports that still hold it.
+    """Set a ball's new path from the state ``at``, along the supports that still hold the ball.
 
     A support that the ball hits faster than ContactState.capture is dropped. The search for
-    contacts then finds it at once as a wall. A support that is another ball is dropped when that
-    ball has begun to move, because the two are an ordinary pair again.
+    contacts then finds this support at once, as a wall. A support that is another ball is dropped
+    when that ball has begun to move: from then on the two balls can collide as any pair can.
     """
     ball, supports = event.ball, contact.supports
     contact.wake_pending[ball] = 0
@@ -120,7 +122,7 @@ def move_on(
 
     Args:
         contact: state of contact mode.
-        motion: base and velocity of each ball, shape (n, 6).
+        motion: base position and velocity of each ball, shape (n, 6).
         event: the ball and the present time.
         at: position and velocity of the ball now.
         acceleration: acceleration of the ball from now on [m/s²].
@@ -173,8 +175,9 @@ def moved_off_edge(
 ) -> BallState:
     """Put a ball that overlaps an edge back to one radius from it, and return its new state.
 
-    Rounding makes contact up to 1e-13 m deep, and thousands of small hops on one edge would add up.
-    The ball is moved along the planes of its supports. ``away``: vector from the edge to the ball.
+    Rounding lets a ball overlap an edge by up to 1e-13 m, which would add up in thousands of small
+    hops. The ball is moved along the planes of its supports. ``away``: vector from the edge to the
+    ball.
     """
     if contact is None:
         return at
@@ -206,12 +209,12 @@ def land(
 
     BOUNCES means that the ball does not stay on the surface, and its path is as before. CAUGHT
     means that the ball now stands on the surface. ROLLS means that it goes on as if this surface
-    and the one it stood on were the same surface.
+    and its last support were the same surface.
 
     Args:
         contact: state of contact mode. Without it every ball bounces.
         tree: tree of the obstacles.
-        motion: base and velocity of each ball, shape (n, 6).
+        motion: base position and velocity of each ball, shape (n, 6).
         event: the ball and the present time.
         obstacle: number of the obstacle that is hit.
         at: position and velocity of the ball.
@@ -241,10 +244,10 @@ def touch_down(
 
     Args:
         contact: state of contact mode.
-        motion: base and velocity of each ball, shape (n, 6).
+        motion: base position and velocity of each ball, shape (n, 6).
         event: the ball and the present time.
         obstacle: number of the obstacle, or ON_BALL minus the number of a ball that lies still.
-        bend: radius [m] of the path of the ball's centre round the object, infinite on a flat one.
+        bend: radius [m] of the path of the ball's centre round the object; infinite on a plane.
         at: position and velocity of the ball.
         normal: unit normal of the object, towards the ball.
     """
@@ -312,9 +315,10 @@ def _smooth_neighbour(contact: ContactState, ball: int, normal: Vec3) -> tuple[i
 
 @jit
 def _lies_in_valley(contact: ContactState, one: Vec3, two: Vec3, velocity: Vec3) -> bool:
-    """Return True if two faces run down to their common edge and the ball hardly moves across it.
+    """Return True if a ball hardly moves across the bottom of a valley between two faces.
 
-    Such a ball stays on both faces. ``one``, ``two``: unit normals of the faces.
+    In a valley both faces run down to their common edge. Such a ball stays on both faces. ``one``,
+    ``two``: unit normals of the faces.
     """
     gravity = contact.gravity
     down_one = add_scaled(gravity, -dot(gravity, one), one)
@@ -335,7 +339,7 @@ def end_path(
 
     Args:
         contact: state of contact mode.
-        motion: base and velocity of each ball, shape (n, 6).
+        motion: base position and velocity of each ball, shape (n, 6).
         event: the ball and the present time.
         reason: why the path ends: BRAKE_ENDS, WAKES, or LEAVES_SUPPORT minus a support's number.
         at: position and velocity of the ball.

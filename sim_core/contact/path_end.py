@@ -48,7 +48,8 @@ def out_of_reach(
 ) -> bool:
     """Return True if a ball cannot meet an obstacle while it moves along its supports' planes.
 
-    Such an obstacle is a support itself, or an edge behind the plane of a support.
+    Such an obstacle is a support itself, a face parallel to a support, or an edge behind the plane
+    of a support.
     """
     if contact is None:
         return False
@@ -146,7 +147,7 @@ def _end_of_ride(
     flight: Flight,
     length: float,
 ) -> tuple[float, int]:
-    """Do the work of ``end_of_path`` for a ball that moves with a vibrating face."""
+    """Return what ``end_of_path`` returns, for a ball that moves with a vibrating face."""
     if ride is None:
         return length, PATH_GOES_ON
     face = int(np.int64(ride.face[event.ball]))
@@ -171,10 +172,10 @@ def _leaves_face(numbers: np.ndarray, row: int, flight: Flight, over: float) -> 
 def _leaves_edge(
     supports: Supports, numbers: np.ndarray, ball: int, support: int, flight: Flight, over: float
 ) -> float:
-    """Return the time [s] until a ball that stands on an edge leaves it.
+    """Return the time [s] until a ball that stands on an edge leaves its support plane.
 
-    The support is a plane that touches the tube of one ball radius round the edge. It holds for a
-    short way across the edge, and along the edge up to its ends.
+    The plane touches the tube of one ball radius round the edge. It holds for a short way across
+    the edge, and along the edge up to ``over`` [m] beyond its ends.
     """
     row = supports.obstacles[ball, support]
     start = vec3_at(numbers, row)
@@ -221,10 +222,10 @@ def _leaves_round(supports: Supports, ball: int, support: int, flight: Flight, l
 def _brake_ends(
     friction_state: FrictionState | None, contact: ContactState, event: BallEvent, flight: Flight
 ) -> tuple[float, bool]:
-    """Return for how long [s] friction or resistance on a ball keeps its direction, and what then.
+    """Return the time [s] for which friction or resistance on a ball keeps its direction.
 
-    The second value is True if the force then has to turn, and False if it ends because the slip or
-    the motion has stopped.
+    The second value is True if the slip or the motion turns, so that the force must be set anew,
+    and False if the force lasts until the slip or the motion stops.
     """
     if friction_state is not None:
         slips, ball = friction_state.slips, event.ball

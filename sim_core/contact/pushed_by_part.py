@@ -1,6 +1,7 @@
 """Pushes by the turning part: on the balls that it touches, and on still balls in their way.
 
-A slow hit is a single constrained impact, as between two balls in ball_on_ball.py.
+A slow hit, slower than Restitution.elastic_below, moves a ball only where its supports leave it
+free, as between two balls in ball_on_ball.py.
 """
 
 import math
@@ -30,12 +31,12 @@ def constrained_change(
 ) -> Vec3:
     """Return the velocity change [m/s] of a ball that the turning part hits, without friction.
 
-    A slow hit moves the ball only where its supports leave it free. For a fast hit the result is
-    ``change``.
+    A hit slower than ContactState.elastic_below moves the ball only where its supports leave it
+    free. For a faster hit the result is ``change``.
 
     ``change``: velocity change [m/s] of a free ball.
     ``away``: vector from the touched point to the ball, in the part's frame.
-    ``approach``: speed [m/s] along the normal.
+    ``approach``: speed [m/s] of the hit along the normal.
     """
     if contact is None:
         return change
@@ -58,14 +59,14 @@ def _constrained(contact: ContactState, ball: int, normal: Vec3, approach: float
 def push_ball(
     contact: ContactState | None, motion: np.ndarray, event: BallEvent, at: BallState, change: Vec3
 ) -> None:
-    """Add ``change`` [m/s] to the velocity of a ball that the turning part hits; note the hit."""
+    """Add ``change`` [m/s] to the velocity of a ball hit by the turning part, and note the time."""
     deflect(contact, motion, event, at, change)
     note_touch(contact, event)
 
 
 @jit
 def note_touch(contact: ContactState | None, event: BallEvent) -> None:
-    """Write down that the turning part, or a ball that it presses, has touched a ball now."""
+    """Note that the turning part, or a ball that the part presses, touches the event's ball now."""
     if contact is None:
         return
     hits, ball = contact.slow_hits, event.ball
@@ -77,7 +78,7 @@ def note_touch(contact: ContactState | None, event: BallEvent) -> None:
 def is_pressed(contact: ContactState, event: BallEvent) -> bool:
     """Return True if the turning part presses a ball that cannot give way to it.
 
-    The ball's neighbours must then move.
+    The balls around this ball must then move.
     """
     hits, ball = contact.slow_hits, event.ball
     recent = event.time_since_start - hits.touched_at[ball] < TOUCHING

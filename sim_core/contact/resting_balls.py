@@ -1,4 +1,4 @@
-"""Balls that lie still at the end of a simulation, and a test for chambers that let balls rest."""
+"""Balls that lie still at the end of a simulation, and a test if balls can rest in a chamber."""
 
 from dataclasses import dataclass
 
@@ -19,11 +19,11 @@ NONE = -1
 
 @dataclass(frozen=True)
 class Resting:
-    """The k balls that lie still at the end.
+    """The k balls that lie still at the end of a simulation.
 
     ball: numbers of the balls, (k,).
     position: positions of the ball centres [m], (k, 3).
-    since: times at which the balls came to lie still [s], (k,), on the clock of the impacts. A time
+    since: times at which the balls came to lie still [s since the end of the warm-up], (k,). A time
         during the warm-up is negative.
     triangles: triangles under each ball, (k, 4), -1 for unused entries.
     balls: balls under each ball, (k, 4), -1 for unused entries.
@@ -49,7 +49,7 @@ def resting(
     middle: np.ndarray,
     origin: float,
 ) -> Resting:
-    """Find the balls that lie still now, and what is under them.
+    """Find the balls that lie still now, and the triangles and balls under them.
 
     Args:
         contact: state of contact mode. Without it no ball lies still.

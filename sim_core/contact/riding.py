@@ -1,8 +1,8 @@
-"""Balls that move with a vibrating face: a ball sticks while the face presses it, and then lets go.
+"""Balls that move with a vibrating face: a ball sticks to it while the face presses the ball.
 
 A ball that bounces ever lower on a face that presses it bounces infinitely often in finite time. A
-hit slower than capture therefore ends the bouncing. From then on the ball's normal velocity is the
-face's velocity, until the face accelerates away from the ball by more than the ball's weight.
+hit slower than Rest.capture therefore ends the bouncing. From then on the ball's normal velocity is
+the face's velocity, until the face moves away faster than gravity lets the ball follow.
 
 Notation:
     n: unit normal of the face, towards the ball
@@ -54,13 +54,13 @@ PARTING = 1e-12
 
 @jit
 def time_to_let_go(weight: float, strength: float, omega: float, angle: float) -> float:
-    """Return how long [s] a vibrating face goes on pressing a ball; NEVER if it always does.
+    """Return how long [s] a vibrating face goes on pressing a ball; NEVER if it never lets go.
 
     The time is 0 if the face does not press the ball now.
 
     Args:
-        weight: w [m/s²].
-        strength: A omega² [m/s²].
+        weight: acceleration w with which gravity presses the ball on the face [m/s²].
+        strength: largest acceleration of the face, A omega² [m/s²].
         omega: angular frequency of the face [rad/s].
         angle: present phase of the face [rad].
     """
@@ -97,8 +97,8 @@ def stick(
     """Let a ball stick to a vibrating face if it can, and return BOUNCES, ROLLS or CAUGHT.
 
     BOUNCES means that the ball does not stick, and nothing has been changed. CAUGHT means that the
-    ball moves on with the face. ROLLS means that the face leaves a ball behind that has no speed
-    relative to it, which is not an impact.
+    ball moves on with the face. ROLLS means that the face moves away from a ball that had no
+    speed relative to it. The ball flies on, and this is not an impact.
     """
     if contact is None:
         return BOUNCES
@@ -143,16 +143,16 @@ def _go_on(
     at: BallState,
     speed: float,
 ) -> None:
-    """Set the next path of a ball on a vibrating face: further with the face, or in flight.
+    """Set the next path of a ball on a vibrating face: on with the face, or in flight.
 
     Args:
         ride: state of the balls that move with a face.
         contact: state of contact mode.
-        motion: base and velocity of each ball, shape (n, 6).
+        motion: base position and velocity of each ball, shape (n, 6).
         event: the ball and the present time.
         at: position and velocity of the ball.
-        speed: speed [m/s] of the ball off the face. The ball stays on the face if the face presses
-            it and the speed lies between -capture and 0.
+        speed: speed [m/s] at which the ball leaves the face. The ball stays on the face if the face
+            presses it and the speed lies between -capture and 0.
     """
     ball, time = event.ball, event.time
     normal = support_normal(contact.supports, ball, 0)
@@ -228,7 +228,7 @@ def go_on_riding(
 
 @jit
 def is_of_plane(ride: Ride, tree: Tree, face: int, row: int) -> bool:
-    """Return True if obstacle ``row`` is a face in the same plane and sonotrode as ``face``."""
+    """Return True if obstacle ``row`` is a face of the same plane and sonotrode as ``face``."""
     return (
         tree.kinds[row] == VIBRATING_FACE
         and same_plane(tree.numbers, face, row)
@@ -280,7 +280,7 @@ def _shift_rides(ride: Ride | None, window: float) -> None:
 
 @inlined
 def shift_contact(contact: ContactState | None, window: float) -> None:
-    """Rewrite the times of contact mode for a clock whose zero lies ``window`` [s] later."""
+    """Rewrite the times of contact mode for a clock that starts ``window`` [s] later."""
     if contact is None:
         return
     _shift_rides(contact.ride, window)

@@ -19,7 +19,7 @@ touching points, about which the ball rolls. Friction then depends on the load o
 In both cases f changes u at the rate g + (1 + k) f. For f = -g/(1 + k) u stays zero: the ball rolls
 with k/(1 + k) of g, which is 5/7 of g on a plane. It rolls as long as f is less than mu times the
 load (Coulomb's law). While the ball slips, f is mu times the load and opposes u. The direction of u
-is read again as path_end.py says.
+is renewed from time to time, as path_end.py says.
 
 Simplifications:
 
@@ -82,8 +82,8 @@ def braked(
         friction_state: friction and spins of all balls; None for smooth balls.
         contact: state of contact mode, with the planes (supports) on which the ball stands.
         event: the ball and the present time.
-        velocity, acceleration: of the ball [m/s, m/s²], without the parts that would push it into a
-            support.
+        velocity: velocity of the ball [m/s], without a part that would push it into a support.
+        acceleration: acceleration of the ball [m/s²], without such a part.
 
     Returns:
         Velocity [m/s] and acceleration [m/s²] with which the ball goes on, and the way in which it
@@ -225,11 +225,10 @@ def stopped_if_creeping(
     velocity: Vec3,
     creeping: float,
 ) -> Vec3:
-    """Return ``velocity`` [m/s], or zero if the ball is slower than ``creeping`` and friction holds
-    it.
+    """Return ``velocity`` [m/s], or zero for a slow ball on a support with friction.
 
-    ``creeping``: speed [m/s] below which friction holds a ball. Without this stop a spinning ball
-    between two surfaces would go on in ever smaller hops.
+    ``creeping``: speed [m/s] below which a ball is slow. Without this stop a spinning ball between
+    two surfaces would go on in ever smaller hops.
     """
     if friction_state is None:
         return velocity
@@ -258,7 +257,7 @@ def _with_supports_left(
 ) -> tuple[Vec3, Vec3, int]:
     """Remove the supports from which a ball with friction moves away.
 
-    Returns: velocity [m/s], acceleration [m/s²] and mode with which the ball goes on.
+    Returns: velocity [m/s], acceleration [m/s²] and mode (FLYING or SLIDING) of the ball then.
 
     The ball may meet these supports again as walls.
     """
@@ -274,8 +273,8 @@ def _with_supports_left(
 def _load(weight: float, size: float) -> float:
     """Return the load on a ball's supports per mass [m/s²].
 
-    ``weight``: gravity [m/s²]. ``size``: acceleration [m/s²] that the supports leave of it. The
-    load and that acceleration are perpendicular (Moreau's polar cones).
+    ``weight``: gravity [m/s²]. ``size``: part of gravity that still accelerates the ball [m/s²].
+    This part and the load are perpendicular (Moreau's polar cones).
     """
     return math.sqrt(max(0.0, weight * weight - size * size))
 

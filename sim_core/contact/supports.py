@@ -92,7 +92,7 @@ def response(contact: ContactState, ball: int, push: Vec3) -> Vec3:
 
 @jit
 def drop_support(supports: Supports, ball: int, support: int) -> None:
-    """Remove support number ``support`` of a ball. The later supports move up by one place."""
+    """Remove support number ``support`` of a ball. The numbers of later supports fall by one."""
     last = supports.number[ball] - 1
     for k in range(support, last):
         supports.obstacles[ball, k] = supports.obstacles[ball, k + 1]

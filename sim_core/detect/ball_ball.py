@@ -24,8 +24,8 @@ def pair_delay(apart: Vec3, closing: Vec3, reach: float) -> float:
         reach: sum of the radii [m].
 
     Returns:
-        Time [s] until |apart + closing s| = reach, approaching. The time is 0 for balls that
-        overlap and approach, and NEVER for balls that do not meet.
+        Time s [s] at which |apart + closing s| = reach and the balls approach. It is 0 for balls
+        that overlap and approach, and NEVER for balls that do not meet.
     """
     rate = dot(apart, closing)
     if rate >= 0.0:

@@ -1,8 +1,9 @@
-"""Time at which a ball in an upright cylinder touches the wall. From above it flies straight.
+"""Time at which a ball in an upright cylinder touches the wall.
 
-The centre p of a ball of radius r stays within R - r of the axis. The gap (R - r)² - |p + v s|² is
-a quadratic in s and never rises again once it falls. A ball outside that moves further out is
-therefore in contact now, however far out it is.
+Seen from above, the ball flies straight: its centre is at p + v s after the time s. In a cylinder
+of radius R the centre of a ball of radius r stays within R - r of the axis. The gap
+(R - r)² - |p + v s|² is a quadratic in s and never rises again once it falls. A ball outside that
+moves further out is therefore in contact now, however far out it is.
 """
 
 import math
@@ -19,7 +20,7 @@ from sim_core.numerics.vec3 import Flight, Vec3
 
 @jit
 def is_cylinder_wall(cylinder: CylinderAxis | None, kind: int) -> bool:
-    """Return True if an obstacle of this ``kind`` is a cylinder wall. A mesh has none."""
+    """Return True if an obstacle of this ``kind`` is a cylinder wall. A mesh has no such wall."""
     if cylinder is None:
         return False
     return kind == CYLINDER_WALL
@@ -45,7 +46,7 @@ def normal_at(
 ) -> Vec3:
     """Return the unit normal, towards the balls, of obstacle ``row``.
 
-    On a cylinder wall it is the normal next to a ball whose centre is ``at``.
+    On a cylinder wall it is the normal at the point nearest to the ball's centre ``at``.
     """
     if cylinder is None:
         return face_normal(numbers, row)

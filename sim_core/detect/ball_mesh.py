@@ -55,8 +55,8 @@ def aim_ray(ray: np.ndarray, ball: Flight, length: float, error: float) -> None:
 
     ``ray`` holds upper origin (0:3), lower origin (3:6) and inverse velocity (6:9).
 
-    The arc lies between its chord and the chord shifted by -a T²/8. The two origins belong to these
-    two lines, moved apart by ``error``.
+    A flight of acceleration a lies between its chord and the chord shifted by -a T²/8. The origins
+    are the upper and lower bound of the starts of these two lines, moved apart by ``error``.
 
     Args:
         ray: output array, shape (9,) float32.
@@ -78,7 +78,7 @@ def aim_ray(ray: np.ndarray, ball: Flight, length: float, error: float) -> None:
 
 @inlined
 def stack_children(tree: Tree, scratch: Scratch, node: int, depth: int, longest: np.float32) -> int:
-    """Put those child boxes of a tree node that a flight enters on the stack, the first on top.
+    """Put the child boxes of a tree node that a flight enters on the stack, the earliest on top.
 
     Args:
         tree: tree of the obstacles.

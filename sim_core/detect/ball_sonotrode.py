@@ -24,9 +24,10 @@ def vibrating_plane_delay(
     time: float,
     limit: float,
 ) -> float:
-    """Return the time [s] until a ball touches the plane of a vibrating face, beside the face too.
+    """Return the time [s] until a ball touches the plane of a vibrating face.
 
-    The result is NEVER if that does not happen within ``limit`` [s], or without vibration.
+    A contact with the plane beside the face counts too. The result is NEVER if there is no contact
+    within ``limit`` [s], or no vibration.
     ``time``: time since the start of the present time window [s].
     """
     if wave is None:
@@ -83,7 +84,7 @@ def find_later_contact(
     delay: float,
     limit: float,
 ) -> tuple[float, int]:
-    """Find the hit of a ball on a vibrating plane that it has first met beside the plane's faces.
+    """Find when a ball that met a vibrating plane beside the plane's faces hits one of the faces.
 
     Beside the sonotrode, over a pit, a ball can be below the plane. It may then come down on the
     plane later.
@@ -97,7 +98,7 @@ def find_later_contact(
         radius: radius of the ball [m].
         face_overlap: overlap of neighbouring faces [m].
         time: time since the start of the present time window [s].
-        delay: delay of the meeting with the plane [s].
+        delay: delay of the first meeting with the plane, beside its faces [s].
         limit: end of the search [s].
 
     Returns:

@@ -60,7 +60,8 @@ def _inside_border(numbers: np.ndarray, row: int, border: int, at: Vec3) -> floa
 def _near_corners(numbers: np.ndarray, row: int, at: Vec3, reach: float) -> bool:
     """Return False if a point lies more than ``reach`` [m] beyond a corner of a face.
 
-    The overlaps of two borders cross far beyond a corner that is as sharp as a needle's tip.
+    A face is widened by an overlap over each border. At a corner as sharp as a needle's tip the
+    widened borders cross far beyond the corner.
     """
     for border in range(4, 20, 4):
         over = _inside_border(numbers, row, border, at)
@@ -128,8 +129,8 @@ def capsule_delay(
 
     The distance to a convex body is never below the distance to the plane that touches the body at
     the nearest point. Along the flight the plane distance is a quadratic in time. Each step goes to
-    the time at which this quadratic closes and takes the plane there. Each stop lies before the
-    contact, so that no contact is missed.
+    the time at which this quadratic becomes 0, and takes the touching plane anew there. Each stop
+    lies before the contact, so that no contact is missed.
     """
     delay = 0.0
     for _ in range(MAX_STEPS):

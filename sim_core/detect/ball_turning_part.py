@@ -1,13 +1,13 @@
 """Time at which a ball first touches a turning part, searched in the part's frame.
 
-The part's tree stands still in this frame. The flight is cut into short pieces, each a parabola in
-the part's frame up to a small share of a radius. The tree is searched along this parabola, widened
-by its error.
+The part's tree stands still in this frame. The flight is cut into short pieces. Each piece is a
+parabola in the part's frame, up to an error of a small share of a radius. The tree is searched
+along this parabola, widened by the error.
 
 At each obstacle found, the true path is followed by conservative advancement (Mirtich, PhD thesis,
 Berkeley 1996). Within a piece the gap is never below a quadratic made of its present value, rate
 and curvature and of the bound J on its third derivative. Each step goes to the time at which the
-quadratic closes. Each stop lies before the contact, so that no contact is missed, and near the
+quadratic becomes 0. Each stop lies before the contact, so that no contact is missed, and near the
 contact the steps are Newton's.
 """
 

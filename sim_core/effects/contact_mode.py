@@ -55,7 +55,7 @@ class Supports(NamedTuple):
     """The planes on which each of n balls stands, at most MAX_SUPPORTS planes a ball.
 
     number: number of supports of each ball, (n,) int32.
-    obstacles: obstacle number of each support, or see ON_BALL, (n, 4) int32.
+    obstacles: obstacle number of each support, or ON_BALL minus a ball's number, (n, 4) int32.
     normals: unit normals towards the ball, (n, 4, 3).
     origins: ball positions at which the supports were added [m], (n, 4, 3).
     ranges: distance from the origin up to which a plane stands for a round object [m], (n, 4).
@@ -69,11 +69,11 @@ class Supports(NamedTuple):
 
 
 class SlowHits(NamedTuple):
-    """Successive slow hits of each of n balls, from which a jam is recognised.
+    """The present series of slow hits of each of n balls at one place. A long series means a jam.
 
-    number: number of hits in the row, (n,) int32.
-    position: ball position at the first hit of the row [m], (n, 3).
-    began: time of the first hit of the row [s since the start], (n,).
+    number: number of hits in the series, (n,) int32.
+    position: ball position at the first hit of the series [m], (n, 3).
+    began: time of the first hit of the series [s since the start], (n,).
     part_contact: UNTOUCHED, TOUCHED or PRESSED by the turning part, (n,) int32.
     touched_at: last time at which the part, or a ball pressed by it, touched the ball [s], (n,).
     """
@@ -104,7 +104,7 @@ class ContactList(NamedTuple):
     """List of the balls that are not in flight.
 
     balls: ball numbers, (n,) int32. The first length[0] entries are in use.
-    places: place of each ball in the list, -1 for a ball in flight, (n,) int32.
+    places: index of each ball in ``balls``, -1 for a ball in flight, (n,) int32.
     length: number of balls in the list, (1,) int64.
     """
 
@@ -117,7 +117,7 @@ class Ride(NamedTuple):
     """State of n balls that may move with a vibrating face.
 
     face: number of the obstacle that a ball rides on, -1 for none, (n,) int32.
-    height: offset of the face's plane at rest, moved by a ball radius [m], (n,).
+    height: distance of the face's plane at rest from the origin, plus a ball radius [m], (n,).
     until: end of the ball's present parabola along the face [s since the start of the present time
         window], (n,).
     wave: wave of the only sonotrode.
@@ -144,7 +144,7 @@ class ContactState(NamedTuple):
     capture, resistance: as in Rest.
     elastic_below: speed [m/s] below which collisions of balls lose no speed.
     radius: radius of every ball [m].
-    reach: distance at which two balls touch [m], 0 if balls never touch.
+    reach: distance of the centres at which two balls touch [m], 0 if balls never touch.
     ride: None unless balls stick to vibrating faces.
     """
 
@@ -205,7 +205,7 @@ def new_contact_state(
         rest: options of contact mode. Without them the result is None.
         balls: number of balls.
         radius: radius of every ball [m].
-        reach: distance at which two balls touch [m], 0 if balls never touch.
+        reach: distance of the centres at which two balls touch [m], 0 if balls never touch.
         gravity: acceleration of the balls in flight.
         restitution: restitution of the scene.
         friction_state: friction and spins of the balls.
@@ -265,7 +265,7 @@ def rides(ride: Ride | None, ball: int) -> bool:
 
 @inlined
 def ball_acceleration(contact: ContactState | None, ball: int, gravity: Gravity | None) -> Vec3:
-    """Return a ball's acceleration [m/s²]: gravity, or on supports the one set by contact mode."""
+    """Return a ball's acceleration [m/s²]: gravity in flight, else as contact mode has set it."""
     if contact is None:
         return gravity_acceleration(gravity)
     return vec3_at(contact.acceleration, ball)

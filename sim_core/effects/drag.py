@@ -2,21 +2,21 @@
 
 Notation:
     Re: rho_air v D / mu, Reynolds number [-]
-    C_d: drag coefficient of a sphere [-], 24/Re (1 + 0.15 Re^0.687) for Re < 1000, 0.44 beyond
+    C_d: drag coefficient of a sphere [-], 24/Re (1 + 0.15 Re^0.687) for Re < 1000, else 0.44
     v, D, rho: speed [m/s], diameter [m] and density [kg/m³] of a ball
     rho_air, mu: density [kg/m³] and viscosity [Pa s] of the air
-    c: 18 mu / (rho D²) [1/s], ``stokes``: the deceleration is c v (1 + b v^p) for Re < 1000
-    k: 3/4 C_d rho_air / (rho D) [1/m], ``quadratic``: the deceleration is k v² beyond
+    c: 18 mu / (rho D²) [1/s], ``stokes``: deceleration c v (1 + 0.15 Re^0.687) for Re < 1000
+    k: 3/4 C_d rho_air / (rho D) [1/m], ``quadratic``: deceleration k v² for Re >= 1000
     h: ``piece`` of a flight [s]
 
 The closed solutions of both decelerations are used. Buoyancy and added mass, 1.5e-4 of steel's
-weight and inertia, are left out. 3 mm steel at 5 m/s decelerates by 0.4 m/s².
+weight and inertia, are left out. A 3 mm steel ball at 5 m/s decelerates by 0.4 m/s².
 
 Flights stay parabolas: the air acts by impulses along the velocity, one in the middle of each piece
 of a flight (half a flight, impulse, half a flight). If an event comes before the end of a piece,
-the ball gets the rest of the impulse, or the excess is taken back. Velocities at events therefore
-hold to second order in h. Within a piece the path deviates from the true path by at most a h²/8,
-with a the ball's deceleration: 5 µm for 0.4 m/s² and 10 ms.
+the ball gets the rest of the impulse, or the excess is taken back. Velocities at events are
+therefore exact to second order in h. Within a piece the path deviates from the true path by at most
+a h²/8, with a the ball's deceleration: 5 µm for 0.4 m/s² and 10 ms.
 
 Sources: Schiller & Naumann, Z. Ver. Dtsch. Ing. 77 (1935) 318; Clift, Grace & Weber, Bubbles, Drops
 and Particles (1978), chapter 5; Strang, SIAM J. Numer. Anal. 5 (1968) 506.
@@ -55,7 +55,7 @@ class Drag(NamedTuple):
 
 
 class DragState(NamedTuple):
-    """Air drag on n balls, as numbers for compiled code."""
+    """Air drag on n balls, as numbers for compiled code, in the notation of this module."""
 
     # time up to which the air has acted [s on the window's clock], shape (n,)
     acted_until: np.ndarray
@@ -91,7 +91,7 @@ def new_drag_state(
 ) -> DragState | None:
     """Return the air drag on balls at time 0, from their diameters [m] and densities [kg/m³].
 
-    Both have the shape (n,).
+    Both arrays have the shape (n,).
     """
     if drag is None:
         return None
@@ -127,7 +127,7 @@ def remaining_speed(drag: DragState, ball: int, speed: float, span: float) -> fl
 
 @jit
 def shift_drag(drag: DragState | None, window: float) -> None:
-    """Rewrite the times of air drag for a clock whose zero lies ``window`` [s] later."""
+    """Rewrite the times of air drag for a clock that starts ``window`` [s] later."""
     if drag is None:
         return
     for ball in range(len(drag.acted_until)):

@@ -8,9 +8,9 @@ Notation:
         the energy
     m_eff: mass m at a surface, m/2 for a pair of equal balls [kg]
 
-The tangential impulse opposes v_t and is the smaller of two impulses. One is mu J_n, if the points
-slip throughout. The other is 2/7 (1 + beta0) m_eff |v_t|, if they stick and v_t turns into
--beta0 v_t; solid spheres have the factor 2/7. In contact mode mu is also Coulomb's coefficient of a
+The tangential impulse opposes v_t and is the smaller of two impulses. If the points slip
+throughout, it is mu J_n. If they stick and v_t turns into -beta0 v_t, it is 2/7 (1 + beta0) m_eff
+|v_t|, with the factor 2/7 of solid spheres. In contact mode mu is also Coulomb's coefficient of a
 ball that slips, rolls or lies on a surface (contact/rolling_friction.py).
 
 Sources: O. R. Walton, in Particulate Two-Phase Flow (ed. Roco, 1993) ch. 25; Foerster, Louge, Chang
@@ -101,7 +101,7 @@ def new_friction_state(
 def friction_of(friction: FrictionState, tag: int) -> tuple[float, float]:
     """Return mu and beta0 of the surface ``tag``, or of ball on ball if ``tag`` is OF_BALLS.
 
-    mu is the coefficient of friction, beta0 that of tangential restitution.
+    mu is the coefficient of friction, beta0 the coefficient of tangential restitution.
     """
     if tag == OF_BALLS:
         return friction.mu, friction.beta0
@@ -142,7 +142,7 @@ def set_slip(friction: FrictionState, ball: int, time: float, slip: Vec3, change
 
 @inlined
 def shift_spins(friction: FrictionState | None, window: float) -> None:
-    """Rewrite spins and slips for a clock whose zero lies ``window`` [s] later."""
+    """Rewrite spins and slips for a clock that starts ``window`` [s] later."""
     if friction is None:
         return
     for ball in range(len(friction.spins)):

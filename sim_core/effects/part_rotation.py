@@ -57,7 +57,7 @@ class PartRotation(NamedTuple):
 
 
 class RotationAxis(NamedTuple):
-    """Axis and range of a part's rotation, from which the part's obstacles are built; hashable."""
+    """Axis and range of a part's rotation, from which the part's obstacles are built."""
 
     tag: int  # surface tag of the part
     point: tuple[float, float, float]  # a point of the axis [m]
@@ -111,7 +111,7 @@ def checked_axis(turn: PartRotation | None) -> RotationAxis | None:
     """Check the rotation of the part, and return its axis and range.
 
     Raises:
-        SceneError: for numbers out of range. It names the field.
+        SceneError: for a number out of range. The message names its field.
     """
     if turn is None:
         return None
@@ -178,7 +178,7 @@ def rotate_points(
 
 @jit
 def shift_rotation(rotation: RotationState | None, window: float) -> None:
-    """Rewrite the part's rotation for a clock whose zero lies ``window`` [s] later."""
+    """Rewrite the part's rotation for a clock that starts ``window`` [s] later."""
     if rotation is None:
         return
     rotation.argument[0] = (rotation.argument[0] + rotation.rate * window) % TURN
@@ -216,7 +216,8 @@ def _turn_back(rotation: RotationState, vector: Vec3, c: float, s: float) -> Vec
 def relative_flight(rotation: RotationState, flight: Flight, time: float) -> Flight:
     """Return position, velocity and acceleration of a ball as seen from the turning part.
 
-    ``flight``: the same three in the room, at ``time`` [s] since the start of the time window.
+    ``flight``: position, velocity and acceleration in the room at ``time`` [s], counted from the
+    start of the time window.
     """
     argument = rotation.argument[0] + rotation.rate * time
     angle, speed, change = argument, rotation.rate, 0.0

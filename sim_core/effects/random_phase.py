@@ -1,17 +1,17 @@
 """Random arrival: each ball that comes to the vibrating face finds it at a random phase.
 
-From the arrival to the contact the face's path is exact. With the plain sinusoid a single ball that
+From the arrival to the contact the face's path is exact. Without this option a single ball that
 loses energy can fall into step with the face and hit it at the same phase for ever. In a chamber,
-collisions with other balls and slanted walls decorrelate the phase. The two models then agree in
-mean speeds and impact rates (tests/sim_core/effects/test_random_phase.py).
+collisions with other balls and slanted walls decorrelate the phase. Simulations with and without
+the option then agree in mean speeds and impact rates (tests/sim_core/effects/test_random_phase.py).
 
 A ball that arrives at any time finds a uniform phase at the edge of the band that the face moves
 in. The phase at contact is not uniform, because a rising face is met more often. The phase stays
 while the ball is within reach of the face, so that a second impact finds the face's motion
 continued.
 
-A draw is a hash of seed, ball and number of the draw. No state is shared, and the same scene gives
-the same bits on any thread.
+Each random phase is drawn as a hash of the seed, the ball and the number of draws for this ball. No
+state is shared, and the same scene gives the same bits on any thread.
 
 Source: C. Wellons, "Prospecting for hash functions" (2018), 32 bits, multipliers below 2^31.
 """
@@ -106,7 +106,7 @@ def new_random_phase_state(
 def hash_word(x: int) -> int:
     """Return a 32-bit number that looks random, always the same for the same 32-bit number ``x``.
 
-    Every product fits in an int64.
+    Every product of the computation fits in an int64.
     """
     x = ((x ^ (x >> 15)) * 0x2C1B3C6D) & WORD
     x = ((x ^ (x >> 12)) * 0x297A2D39) & WORD
@@ -115,7 +115,7 @@ def hash_word(x: int) -> int:
 
 @jit
 def draw_phase(seed: int, ball: int, draw: int) -> float:
-    """Return a random phase [rad], uniform in [0, 2π), from seed, ball and number of the draw."""
+    """Return a random phase [rad], uniform in [0, 2π): the ``draw``-th draw of a ball."""
     mixed = hash_word(hash_word(hash_word(seed) ^ int(ball)) ^ (int(draw) & WORD))
     return TURN * (mixed / SEEDS)
 

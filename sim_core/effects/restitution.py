@@ -107,7 +107,7 @@ def checked_restitution(restitution: Restitution, tags: int) -> RestitutionState
     ``tags``: number of surface tags in the scene. More laws may be given.
 
     Raises:
-        SceneError: for a bad law, and for a tag without one.
+        SceneError: for a bad law, and for a tag without a law.
     """
     form = f"give {LAW_FORMS} for each of the tags 0 to {tags - 1}"
     if isinstance(restitution.surfaces, TabulatedRestitution):
@@ -133,11 +133,11 @@ def checked_restitution(restitution: Restitution, tags: int) -> RestitutionState
 def _points(name: str, law: object) -> np.ndarray:
     """Return the points of a law of restitution, as an array (n, 3).
 
-    A row has speed [m/s], coefficient of restitution, and exponent of the fall above the last
-    speed.
+    Each point has a speed [m/s], the coefficient of restitution at it, and the exponent of the
+    fall above the last speed.
 
     Raises:
-        SceneError: if the law is bad. It calls the law ``name``.
+        SceneError: if the law is bad. The message calls the law ``name``.
     """
     if isinstance(law, TabulatedRestitution):
         return _table(name, law)
@@ -182,7 +182,8 @@ def _table(name: str, table: TabulatedRestitution) -> np.ndarray:
 def restitution_law(points: np.ndarray, law: int, speed: float) -> float:
     """Return the coefficient of restitution [-] at a relative normal ``speed`` [m/s].
 
-    ``law``: tag of the surface that is hit, or BALLS for ball on ball.
+    ``points``: points of all laws, as in RestitutionState. ``law``: tag of the surface that is hit,
+    or BALLS for ball on ball.
     """
     last = points.shape[1] - 1
     if speed < points[law, last, V]:
@@ -195,7 +196,7 @@ def restitution_law(points: np.ndarray, law: int, speed: float) -> float:
 
 @jit
 def _between(points: np.ndarray, law: int, speed: float) -> float:
-    """Return the coefficient of restitution at a speed between the first and last of a table."""
+    """Return the coefficient of restitution at a speed, by interpolation in the law's points."""
     low, high = 0, points.shape[1] - 1
     while high - low > 1:
         middle = (low + high) // 2

@@ -1,9 +1,10 @@
 """Phases of sonotrodes that do not make whole periods in a time window of the simulation.
 
-These are several sonotrodes, or one that is shaken slowly.
+These are several sonotrodes, or a single sonotrode that is shaken slowly.
 
-The clock's window is a whole number of periods of the fastest sonotrode. A window shorter than one
-period keeps its length, so that the arrays of a window stay as small at any frequency.
+The clock restarts from 0 at the start of each time window. A window lasts a whole number of periods
+of the fastest sonotrode. Where a period would be longer than a window, the window keeps its length,
+so that its arrays stay as small at any frequency.
 
 A face that does not make whole periods in a window carries its phase on. The missing phase is added
 at every window's end, counted in 2^-62 of a turn. Whole numbers are added without rounding, so that
@@ -44,15 +45,15 @@ class SonotrodeWaves(NamedTuple):
 def carry_phases(vibrations: tuple[Vibration, ...], window: float) -> bool:
     """Return True if the phases must be carried on from one time window to the next.
 
-    This is so for several vibrations, and for one whose period is longer than ``window`` [s].
+    This is so for several vibrations, and for a vibration whose period exceeds ``window`` [s].
     """
     return len(vibrations) > 1 or any(window * one.frequency < 1.0 for one in vibrations)
 
 
 def clock_window(vibrations: tuple[Vibration, ...], window: float) -> float:
-    """Return the time [s] nearest to ``window`` [s] that is whole periods of the fastest vibration.
+    """Return ``window`` [s], rounded to a whole number of periods of the fastest vibration.
 
-    A window shorter than a period is returned unchanged.
+    A window shorter than a period is returned as it is.
     """
     fastest = max((one.frequency for one in vibrations), default=0.0)
     if window * fastest < 1.0:
@@ -69,7 +70,7 @@ def new_waves(
 
     Args:
         vibrations: vibrations of the sonotrodes.
-        waves: waves of the sonotrodes.
+        waves: the same vibrations, as numbers for compiled code.
         window: length of the window from clock_window [s].
         tags: tags of all obstacles, shape (obstacles,).
     """
@@ -96,7 +97,7 @@ def new_waves(
 
 @inlined
 def wave_of_face(waves: SonotrodeWaves | None, wave: AnyWave, face: int) -> AnyWave:
-    """Return the vibration of a face, which is given by its obstacle number.
+    """Return the vibration of the face with the obstacle number ``face``.
 
     ``wave``: vibration of the only sonotrode, returned if ``waves`` is None.
     """

@@ -86,7 +86,7 @@ def checked_waves(vibration: Vibration | tuple[Vibration, ...] | None) -> tuple[
 def _checked_wave(which: str, vibration: Vibration) -> Wave:
     """Return the vibration of one surface, as numbers for compiled code.
 
-    Raises SceneError for numbers out of range. It calls the vibration ``which``.
+    Raises SceneError for numbers out of range. The message calls the vibration ``which``.
     """
     for name in ("amplitude", "frequency", "phase"):
         number(f"{which}.{name}", getattr(vibration, name))

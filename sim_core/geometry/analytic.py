@@ -7,7 +7,7 @@
             0 floor
 
 This is the first system of Badreddine et al., "CAD based simulation of ultrasonic shot peening".
-Being convex it has no edge that a ball could hit, so its planes need no borders. All effects are
+A convex cavity has no edge that a ball could hit, so its planes need no borders. All effects are
 simulated except contact mode and a turning part.
 
 A box may be periodic along x, y or both: it has no sides there, and a ball that leaves it on one
@@ -79,7 +79,7 @@ class AnalyticCavity:
         return np.where(np.isin(np.arange(3), self.periodic), sides, 0.0)
 
     def put_back(self, points: np.ndarray) -> np.ndarray:
-        """Return points (..., 3) [m], moved by whole sides into the box where it is periodic."""
+        """Return points (..., 3) [m], moved back into a periodic box by whole side lengths."""
         if not self.periodic:
             return points
         sides = self.periods
@@ -140,7 +140,7 @@ class AnalyticCavity:
 
     @property
     def corners(self) -> np.ndarray:
-        """Corners of one triangle in each plane surface [m], wound as in a mesh, shape (k, 3, 3).
+        """Corners of one triangle on each of k surfaces [m], wound as in a mesh, shape (k, 3, 3).
 
         The triangle of a cylinder wall has no area.
         """
@@ -152,9 +152,9 @@ class AnalyticCavity:
         return np.array(flat + sides)
 
     def gaps(self, points: np.ndarray) -> np.ndarray:
-        """Return the distance [m] of points (n, 3) from each surface, (n, k).
+        """Return the distance [m] of points (n, 3) from each of k surfaces, shape (n, k).
 
-        It is negative outside.
+        It is negative for a point beyond the surface.
         """
         normals, offsets = self.planes
         flat = points @ normals.T - offsets
@@ -164,13 +164,16 @@ class AnalyticCavity:
         return np.column_stack([flat, wall])
 
     def contains(self, points: np.ndarray, amplitude: float = 0.0) -> np.ndarray:
-        """Return True for points (n, 3) inside when the floor is ``amplitude`` [m] lower, (n,)."""
+        """Return True for points (n, 3) inside, with a floor that is ``amplitude`` [m] lower."""
         gaps = self.gaps(points)
         gaps[:, FLOOR] += amplitude
         return np.asarray((gaps > 0.0).all(axis=1))
 
     def narrowest(self) -> tuple[float, int, int]:
-        """Return the smallest distance [m] of two opposite sides, and the numbers of the two."""
+        """Return the smallest distance [m] of two opposite sides, and the two surfaces' numbers.
+
+        It is the diameter of a cylinder, and inf without sides.
+        """
         if self.radius is not None:
             return 2.0 * self.radius, SIDE, SIDE
         normals, offsets = (values[SIDE:] for values in self.planes)
@@ -304,7 +307,7 @@ def periods_of(room: TriangleMesh | AnalyticCavity) -> np.ndarray:
 
 
 def _all_tags(tags: Sequence[int], sides: int) -> np.ndarray:
-    """Return one tag for each surface. If only the first side has a tag, all sides get it."""
+    """Return the tag of each surface. A single tag for the sides goes to all ``sides`` sides."""
     each = [*tags, *([tags[-1]] * (sides - 1) if sides and len(tags) == SIDE + 1 else [])]
     valid = all(tag == int(tag) and 0 <= tag < MAX_TAGS for tag in each)
     if len(each) != SIDE + sides or not valid:
@@ -335,11 +338,11 @@ def _cavity(
 def build_analytic_table(
     cavity: AnalyticCavity, radius: float, vibrating_tag: int, amplitude: float
 ) -> ObstacleTable:
-    """Return the obstacles that centres of balls of one radius meet in a cavity, one row a surface.
+    """Return the obstacles that centres of balls of one radius meet in a cavity, one a surface.
 
     Coordinates are relative to the cavity's middle. A plane is a face without borders, because no
-    ball in a convex cavity gets beyond them. The bounding box of floor, ceiling and plane sides is
-    flat. Any other surface has the cavity's box.
+    ball in a convex cavity gets beyond them. The bounding boxes of floor, ceiling and plane sides
+    are flat. A cylinder wall has the cavity's bounding box.
 
     Args:
         cavity: the cavity.

@@ -68,7 +68,7 @@ def face_overlap_of_ball(sizes: BallSizes | None, face_overlap: float, ball: int
 def share_by_mass(sizes: BallSizes | None, ball: int, other: int, change: Vec3) -> Vec3:
     """Return the velocity change [m/s] of ``ball`` when it collides with ``other``.
 
-    ``change`` [m/s] is what it would be at equal masses.
+    ``change``: velocity change [m/s] of ``ball`` if both balls had the same mass.
 
     The reduced mass is m1 m2 / (m1 + m2), half a mass for equal balls. Momentum is kept.
     """

@@ -200,11 +200,11 @@ def _merge(box: np.ndarray, row: int, other: np.ndarray, other_row: int) -> None
 
 @jit
 def _cheapest(bins: np.ndarray, left: np.ndarray) -> tuple[float, int]:
-    """Find the cut between bins with the least sum of box area times number of obstacles.
+    """Find the cut between ``bins`` with the least sum of box area times number of obstacles.
 
-    ``left`` is a working array.
+    Bins are equal slices of a group of obstacles along one axis. ``left`` is a working array.
 
-    Returns: this sum [m²], and the last bin of the left side.
+    Returns: this sum [m²], and the last bin before the cut.
     """
     _clear(left)
     for b in range(BINS):  # left[b]: all bins up to b
@@ -239,9 +239,10 @@ def _bin_of(boxes: _Boxes, i: int, axis: int, first: float, scale: float) -> int
 
 @jit
 def _cut(boxes: _Boxes, start: int, end: int, bins: np.ndarray, sweep: np.ndarray) -> int:
-    """Cut a group of obstacles in two, at the cheapest of BINS - 1 places along each axis.
+    """Cut a group of obstacles in two, at the cheapest of BINS - 1 planes across each axis.
 
-    The group is the obstacles ``start`` to ``end`` of the order, which is sorted accordingly.
+    The group is ``start`` to ``end`` of ``boxes.order``. This piece of the order is sorted so that
+    the first part comes before the second.
 
     Returns: the start of the second part.
     """

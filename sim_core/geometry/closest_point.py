@@ -1,7 +1,7 @@
-"""Search for the surface points closest to many places in the cavity at once.
+"""Search for the surface points closest to many places (positions in the cavity) at once.
 
 The walk through the tree of boxes leaves out boxes that are farther than the closest point found so
-far. The distance is also the radius of the largest ball that fits at the place.
+far. The distance of a place is also the radius of the largest ball that fits with its centre there.
 
 Source: C. Ericson, Real-Time Collision Detection (2005), section 5.1.5, for the closest point of a
 triangle.
@@ -23,10 +23,10 @@ from sim_core.numerics.vec3 import Vec3, add_scaled, dot, sub
 
 
 class ClosestPoints(NamedTuple):
-    """Surface points closest to n places.
+    """Surface points closest to n places, which are positions in the cavity.
 
-    A place without surface within its reach has the reach as distance, -1 as triangle and itself as
-    point.
+    If no surface is within the reach of the search from a place, the distance is the reach, the
+    triangle -1 and the point the place itself.
 
     Args:
         distance: distance from the place [m], shape (n,).
@@ -79,9 +79,11 @@ def _tree_of(mesh: TriangleMesh, tag: int | None) -> Tree:
 
 @jit
 def _find(tree: Tree, found: ClosestPoints, stack: np.ndarray, entry: np.ndarray) -> None:
-    """Replace reaches and places in ``found`` by the closest points.
+    """Find the closest surface points, and write them into ``found``.
 
-    ``stack`` and ``entry``: working arrays for nodes and their squared distances [m²].
+    ``found`` holds the reach of each search as distance, and each place as point, until a closer
+    point is found. ``stack`` and ``entry``: working arrays for nodes and their squared distances
+    [m²].
     """
     for i in range(len(found.distance)):
         at = Vec3(found.point[i, 0], found.point[i, 1], found.point[i, 2])

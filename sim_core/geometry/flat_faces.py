@@ -1,10 +1,11 @@
 """Flat faces: connected triangles of one surface in one plane are one face for the ball.
 
-A fine mesh on a flat wall serves to show coverage and adds no shape. A flat face grows from its
-largest triangle over edges whose far corner lies in that triangle's plane up to rounding. Its
-outline is then cut, square by square, into convex quadrangles. Faces overlap, so that the
-quadrangles need not share corners as the triangles of a mesh do. They are therefore large inside
-and small along a curved border, and their number follows the outline, not the mesh.
+On a flat wall a fine mesh shows coverage in detail but adds no shape. A flat face grows from its
+largest triangle. It takes in a triangle next to it if the far corner of this triangle lies in the
+largest triangle's plane up to rounding. Its outline is then cut, square by square, into convex
+quadrangles. Faces overlap, so that the quadrangles need not share corners as the triangles of a
+mesh do. They are therefore large inside and small along a curved border, and their number follows
+the outline, not the mesh.
 """
 
 from itertools import pairwise
@@ -60,7 +61,7 @@ class _Triangles(NamedTuple):
 def in_plane_tolerance(vertices: np.ndarray) -> float:
     """Return how far [m] a corner may be from a plane and count as in it.
 
-    The vertices (n, 3) [m] set the rounding.
+    It follows from the rounding of the mesh's vertices (n, 3) [m].
     """
     rounding = ROUNDINGS * float(np.finfo(np.float64).eps * np.abs(vertices).max())
     return min(max(IN_PLANE, rounding), MAX_IN_PLANE)
@@ -243,7 +244,7 @@ def _cut(region: shapely.Geometry) -> list[shapely.Geometry]:
 def _quadrangles(polygon: shapely.Geometry) -> np.ndarray:
     """Return convex quadrangles (k, 4, 2) [m] that make up a polygon, with no corner added.
 
-    A cut that passes a corner by a rounding leaves a side of 1e-17 m. Such a side has no direction
+    A cut that misses a corner by rounding leaves a side of 1e-17 m. Such a side has no direction
     and would shut balls out of the piece, so that its corner is left out.
     """
     polygon = shapely.simplify(polygon, STRAIGHT)

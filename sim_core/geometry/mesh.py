@@ -102,7 +102,7 @@ class TriangleMesh:
 def _whole_numbers(name: str, numbers: np.ndarray) -> np.ndarray:
     """Return the numbers as int64.
 
-    Raises SceneError for a number that is not whole or beyond int32.
+    Raises SceneError, with ``name`` in its message, for a number that is not whole or beyond int32.
     """
     try:
         whole = (numbers == np.floor(numbers)) & (np.abs(numbers) <= np.iinfo(np.int32).max)

@@ -82,7 +82,7 @@ def build_obstacle_set(
 def _swept_bounds(
     mesh: TriangleMesh | AnalyticCavity, amplitude: float, axis: RotationAxis | None
 ) -> np.ndarray:
-    """Return the box (2, 3) [m] about the mesh's middle that holds all that its surfaces sweep."""
+    """Return the box (2, 3) [m], relative to the mesh's middle, round all that surfaces sweep."""
     low, high = mesh.bounds - mesh.middle
     periodic = periods_of(mesh) > 0.0
     low[periodic], high[periodic] = -UNBOUNDED, UNBOUNDED

@@ -61,7 +61,7 @@ class ObstacleTable(NamedTuple):
 
 @jit
 def same_plane(numbers: np.ndarray, row: int, other: int) -> bool:
-    """Return True if two faces hold the same plane, bit for bit. Faces of a flat sonotrode do."""
+    """Return True if two faces have bit for bit the same plane, as on a flat sonotrode."""
     return bool(
         numbers[row, 0] == numbers[other, 0]
         and numbers[row, 1] == numbers[other, 1]
@@ -79,8 +79,8 @@ def build_obstacle_table(surface: SurfaceTriangles, radius: float) -> ObstacleTa
     """Build the obstacles for balls of one radius [m], relative to the mesh's middle.
 
     The boxes of vibrating faces hold the whole vibration. A flat face has fewer faces here than
-    triangles. Impacts on it are recorded on its seed triangle, and triangle_lookup.py finds the
-    triangle.
+    triangles. Impacts on it are recorded on its seed, the triangle that gives its plane, and
+    triangle_lookup.py later finds the triangle that was hit.
     """
     require_room_at_joints(surface, radius)
     border = find_border(surface, radius)
@@ -141,7 +141,8 @@ def _few_faces(
 ) -> np.ndarray | None:
     """Return the corners (k, 4, 3) [m] of a few faces that cover a flat face of this area [m²].
 
-    The result is None if the outline cannot be covered.
+    ``outline``, ``frame``: border and plane of the flat face, as in FlatFaces. The result is None
+    if the outline cannot be covered.
     """
     origin, axes = frame[0], frame[1:]
     start, end = corners[outline // 3, outline % 3], corners[outline // 3, (outline % 3 + 1) % 3]
@@ -181,8 +182,8 @@ def _share_plane(numbers: np.ndarray, vibrating: np.ndarray) -> None:
 def _capsules(surface: SurfaceTriangles, radius: float, border: SonotrodeBorder) -> ObstacleTable:
     """Return the capsules among the obstacles for balls of one radius [m].
 
-    There is one for each convex edge, or straight run of edges between two flat faces. Each edge
-    that goes on beneath a vibrating face has a capsule too.
+    There is a capsule for each convex edge, or straight run of edges between two flat faces. Each
+    edge that goes on beneath a vibrating face has a capsule too.
     """
     mesh, corners, normals = surface.mesh, surface.corners, surface.normals
     of_triangle, vibrating = surface.flat_faces.of_triangle, surface.vibrating

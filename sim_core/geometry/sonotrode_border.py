@@ -1,10 +1,10 @@
 """Extension of the walls, and of the edges where two walls meet, beneath a vibrating face.
 
 A ball's centre is a radius R from the face. On a face lowered by A the centre is R - A above the
-lower end of a wall that rises at a right angle. It is beneath this end if A > R, and on gentle
-slopes for smaller A. Walls and their edges are therefore extended down as far as the face goes. The
-face is extended under gentle slopes, because a ball on such a slope could otherwise get below the
-raised face. Where the faces would part all the same, the amplitude is too large.
+lower end of a wall that rises at a right angle. The centre is beneath this end if A > R, and beside
+gentle slopes at smaller A already. Walls and their edges are therefore extended down as far as the
+face goes. The face is extended under gentle slopes, because a ball on such a slope could otherwise
+get below the raised face. Where the faces would part all the same, the amplitude is too large.
 
              ball's centre meets     ....... raised face, extended under the slope
              one or the other  ....--''
@@ -27,7 +27,7 @@ LEVEL = 1e-9  # cosine or sine that is rounding
 
 
 class _Beside(NamedTuple):
-    """The k edges between vibrating faces and still ones."""
+    """The k edges between vibrating faces and still walls, with run and rise of each wall."""
 
     edge: np.ndarray  # directed edge 3 t + k of the still triangle, shape (k,)
     face: np.ndarray  # vibrating triangle, shape (k,)
@@ -36,7 +36,7 @@ class _Beside(NamedTuple):
 
 
 class SonotrodeBorder(NamedTuple):
-    """Surfaces beside vibrating faces, where balls get beneath the end of a wall."""
+    """Extensions of faces, walls and edges, for balls that get beneath a wall's lower end."""
 
     overhang: float  # extension of the vibrating faces over their borders [m]
     # The walls beneath the ends of the faces: four corners of each [m], wound like the mesh, shape
@@ -50,7 +50,7 @@ class SonotrodeBorder(NamedTuple):
 
 
 def find_border(surface: SurfaceTriangles, radius: float) -> SonotrodeBorder:
-    """Find the surfaces that balls of one radius [m] meet beneath the ends of walls.
+    """Find the extensions that balls of one radius [m] meet beneath the lower ends of walls.
 
     Raises:
         SceneError: where the amplitude is so large that a face would part from a wall.
@@ -77,11 +77,16 @@ def find_border(surface: SurfaceTriangles, radius: float) -> SonotrodeBorder:
 
 
 def largest_amplitude(mesh: TriangleMesh, tag: int, radius: float) -> tuple[float, np.ndarray, str]:
-    """Return the largest amplitude of a surface beside its walls, for balls of one radius [m].
+    """Return the largest amplitude that the walls beside a vibrating surface allow.
+
+    Args:
+        mesh: the cavity.
+        tag: tag of the vibrating surface.
+        radius: radius of the balls [m].
 
     Returns:
-        Zero-to-peak amplitude [m], inf where every wall is upright; the place [m] that limits it,
-        shape (3,); and the slope of the wall there, in words.
+        Zero-to-peak amplitude [m], inf where every wall is upright; the point [m] beside the wall
+        that limits it, shape (3,); and the slope of this wall, in words.
     """
     normals, _ = normals_towards_shot(mesh.corners)
     beside = _beside(mesh.triangles, normals, mesh.tags == tag)
@@ -107,8 +112,9 @@ def _beside(triangles: np.ndarray, normals: np.ndarray, vibrating: np.ndarray) -
 def _largest_amplitude(run: np.ndarray, rise: np.ndarray, radius: float) -> np.ndarray:
     """Return the amplitude [m], shape (k,), beyond which a face and the wall beside it part.
 
-    Beside a slope that rises outwards, the raised face comes out of the slope. Under a wall that
-    leans over it, a ball on the lowered face gets past the face's border.
+    ``run``, ``rise``: cosine and sine of the angle by which each wall rises, shape (k,). Beside a
+    slope that rises outwards, the raised face comes out of the slope. Under a wall that leans over
+    the face, a ball on the lowered face gets past the face's border.
     """
     limit = np.full(len(run), np.inf)
     out, over = run > LEVEL, run < -LEVEL
@@ -130,9 +136,9 @@ def _beneath(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Return the last four fields of SonotrodeBorder: walls and edges beneath vibrating faces.
 
-    A wall goes on in its plane to the line that this plane has in common with the next wall's
-    plane. A convex corner towards the shot is an edge there. A concave corner is behind both walls,
-    which may go on past it, as where a cone ends in a point.
+    A wall is extended down in its plane, to the line where this plane meets the next wall's plane.
+    If the corner of the two walls is convex towards the shot, this line is an edge. A concave
+    corner is behind both walls, which may go on past it, as where a cone ends in a point.
     """
     corners, normals, two = surface.corners, surface.normals, edge_partners(surface.mesh.triangles)
     walls: list[list[np.ndarray]] = []
@@ -172,12 +178,12 @@ def _beneath(
 def _next_wall(
     partners: np.ndarray, vibrating: np.ndarray, edge: int, last: int
 ) -> tuple[int, int]:
-    """Find the wall beside the next edge of the border, round one end of an edge.
+    """Find the wall beside the next edge of a vibrating face's border, round one end of ``edge``.
 
     ``last``: 0 for the first end of the edge, 1 for its last end.
 
     Returns:
-        The wall's triangle, and the number of its side on the border.
+        The wall's triangle, and the number of this triangle's side on the border.
     """
     step = 1 if last else 2
     while True:
@@ -190,9 +196,9 @@ def _next_wall(
 def require_room_at_joints(surface: SurfaceTriangles, radius: float) -> None:
     """Raise SceneError for sonotrodes that meet in an edge so blunt that balls get through.
 
-    A ball of this radius [m] that touches both sonotrodes has its centre radius (1 - cos) / sin
-    from the ends of their moved faces. The vibrations take at most the sum of their amplitudes off
-    the numerator.
+    A ball of this radius [m] that touches both sonotrodes has its centre at the distance radius (1
+    - cos) / sin from the ends of their moved faces. The cosine and sine are of the angle between
+    the faces' normals. The vibrations reduce the numerator by at most the sum of their amplitudes.
     """
     normals, amplitude, tags = surface.normals, surface.amplitude, surface.mesh.tags
     two = edge_partners(surface.mesh.triangles)

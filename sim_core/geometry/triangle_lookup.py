@@ -136,7 +136,7 @@ def _find_each(lookup: TriangleLookup, seed: int, points: np.ndarray, found: np.
 
 @jit
 def _distance_outside(corners: np.ndarray, triangle: int, u: float, v: float) -> float:
-    """Return how far [m] point (u, v) is outside a clockwise triangle. It is negative inside."""
+    """Return how far [m] point (u, v) is outside a clockwise triangle; negative inside it."""
     worst = -np.inf
     for k in range(3):
         a, b = 2 * k, 2 * ((k + 1) % 3)

@@ -61,11 +61,11 @@ def part_rows(
 def require_free_axis(mesh: TriangleMesh, axis: RotationAxis, radius: float) -> None:
     """Raise SceneError if the part cannot turn in its chamber, for balls of this radius [m].
 
-    The line where part and chamber are one surface must stay in place up to MAX_OPENING of the
+    The line along which part and chamber are joined must stay in place up to MAX_OPENING of the
     radius. It is then a circle about the axis, as where a round shaft goes through a wall.
     Elsewhere no corner of the part may pass through a triangle of the chamber as it turns, and no
-    corner of the chamber through the part. Two edges that cross are not noticed if no corner of
-    either passes through the other side.
+    corner of the chamber through the part. Two edges that cross are not noticed if no
+    corner of one body passes through the other body.
     """
     turning = mesh.tags == axis.tag
     joint = _joint(mesh, turning)
@@ -98,7 +98,7 @@ def select_rows(table: ObstacleTable, rows: np.ndarray) -> ObstacleTable:
 
 
 def _in_axis_frame(points: np.ndarray, axis: RotationAxis) -> np.ndarray:
-    """Return points (..., 3) [m] in a frame about the axis: two coordinates across, then along."""
+    """Return points (..., 3) [m] in the axis' frame: two coordinates across it, then one along."""
     along = np.array(axis.axis)
     side = np.cross(along, np.eye(3)[np.abs(along).argmin()])
     side /= np.linalg.norm(side)
@@ -110,7 +110,8 @@ def _in_axis_frame(points: np.ndarray, axis: RotationAxis) -> np.ndarray:
 def _joint(mesh: TriangleMesh, turning: np.ndarray) -> np.ndarray:
     """Return the edges between part and chamber, shape (n, 4).
 
-    Each row has the triangle of the part, the triangle of the chamber, and both vertices.
+    Each edge has the triangle of the part, the triangle of the chamber, and its two vertices.
+    ``turning``: True for triangles of the part, shape (m,) bool.
     """
     partner = edge_partners(mesh.triangles)
     edges = np.flatnonzero(np.repeat(turning, 3) & ~turning[partner // 3])
@@ -121,7 +122,7 @@ def _joint(mesh: TriangleMesh, turning: np.ndarray) -> np.ndarray:
 def _require_round_joint(
     mesh: TriangleMesh, joint: np.ndarray, axis: RotationAxis, radius: float
 ) -> None:
-    """Raise SceneError if a line of the joint would open too far as the part turns."""
+    """Raise SceneError if the joint of part and chamber would open too far as the part turns."""
     if len(joint) == 0:
         return
     line = connected_components(joint[:, 2:], len(mesh.vertices))[joint[:, 2]]
@@ -185,9 +186,9 @@ def _require_free_corners(
 def _passes_through(
     corners: np.ndarray, triangles: np.ndarray, sweep: _Sweep, place: np.ndarray
 ) -> bool:
-    """Return True if a corner's arc about the axis crosses a triangle.
+    """Return True if the arc of any corner about the axis crosses any triangle.
 
-    ``place`` gets their indices.
+    ``place``: output array (2,) for the indices of this corner and this triangle.
     """
     for t in range(len(triangles)):
         a, b, c = triangles[t, 0, 2], triangles[t, 1, 2], triangles[t, 2, 2]

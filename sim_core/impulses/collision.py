@@ -75,7 +75,8 @@ def leave_cylinder_wall(
 ) -> Vec3:
     """Return ``change``, enlarged where a ball would leave a cylinder wall at too small an angle.
 
-    The smallest angle is RECONTACT_ANGLE. The tangential speed provides the energy that is missing.
+    The smallest angle to the wall is RECONTACT_ANGLE. If the larger normal speed needs more energy
+    than the approach had, the tangential speed provides the rest.
 
     Args:
         cylinder: axis of the cylinder; None in a mesh.

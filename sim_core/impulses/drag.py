@@ -2,11 +2,11 @@
 
 If an event comes before the end of a piece, the ball's velocity is corrected.
 
-A ball gets no impulse on leaving an obstacle. A ball can bounce a thousand times on its way up with
-the sonotrode. If an impulse were taken back at the next bounce, in the opposite direction, it would
-take energy from each bounce and leave none. A ball in contact mode gets no impulse either, because
-it is slow: 3 mm steel that rolls at 1.7 m/s loses as much to the air as it loses by default to
-rolling (Rest.resistance).
+A ball gets no impulse at the moment when it leaves an obstacle. The next bounce would take such an
+impulse back in the opposite direction, and so each bounce would lose energy. A ball that bounces a
+thousand times on its way up with the sonotrode would lose all of it. A ball in contact mode gets no
+impulse either, because it is slow: at 1.7 m/s a rolling steel ball of 3 mm loses as much to the air
+as it loses by default to rolling (Rest.resistance).
 """
 
 import math
@@ -64,7 +64,7 @@ def apply_drag_until(
 ) -> None:
     """Correct a ball's velocity at an event so that the air has acted exactly until ``time`` [s].
 
-    Before, the air may have acted for too short or for too long a time.
+    Before this call the air may have acted for too short or for too long a time.
     """
     if drag is None:
         return

@@ -1,8 +1,8 @@
 """Friction at a collision: a tangential velocity change against the slip, and a change of spin.
 
 effects/friction.py has the formulas and their source. Impulses are per mass, that is, velocity
-changes. A change j on the surface of a solid sphere of radius R, at -R n from its centre, changes
-its spin by -5/(2R) n x j.
+changes. An impulse j on the surface of a solid sphere of radius R, at -R n from its centre, changes
+the sphere's spin by -5/(2R) n x j.
 """
 
 import math
@@ -100,7 +100,7 @@ def _tangential_change(
         normal: unit normal of the contact.
         push: normal velocity change in the same hit [m/s].
         coefficients: mu and beta0 of the contact.
-        mass: m_eff over the ball's mass, 1 at a surface and 1/2 for two balls.
+        mass: effective mass over the ball's mass, 1 at a surface and 1/2 for two balls.
     """
     mu, beta0 = coefficients
     slip = add_scaled(slip, -dot(slip, normal), normal)

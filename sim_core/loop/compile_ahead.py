@@ -26,9 +26,9 @@ FIRST_SET, FURTHER_SET = 200, 50
 
 
 def _marker(physics: Physics, balls: int, alike: bool, cylinder: bool) -> Path:
-    """Return the path of the file whose existence says that a set of effects is compiled.
+    """Return the path of the file that exists if the code for such a scene has been compiled.
 
-    Each set has its own machine code.
+    Each set of effects has its own machine code.
     """
     effects = {**physics._asdict(), **physics.surface._asdict()}
     present = [name for name, effect in effects.items() if effect is not None]
@@ -113,7 +113,7 @@ def compile_simulator(
 def _few_collections() -> Iterator[None]:
     """Let Python collect garbage rarely in this context.
 
-    The compiler's objects last, and the search for garbage took 7 % of the time.
+    The compiler keeps its objects, and the search for garbage took 7 % of the compilation.
     """
     before = gc.get_threshold()
     gc.set_threshold(max(before[0], 100_000), 50, 1000)

@@ -27,7 +27,7 @@ MAX_JAM_GAP = 2e-5
 
 @inlined
 def hide(contact: ContactState | None, neighbours: NeighbourFilter | None, ball: int) -> None:
-    """Leave a ball that rolls or rests out of the filter: as NaN it meets no other ball."""
+    """Hide a ball that rolls or rests from the filter, in which a position NaN meets no ball."""
     if contact is None or neighbours is None:
         return
     if contact.mode[ball] != FLYING:
@@ -36,7 +36,7 @@ def hide(contact: ContactState | None, neighbours: NeighbourFilter | None, ball:
 
 @jit
 def hide_all(contact: ContactState | None, neighbours: NeighbourFilter | None) -> None:
-    """Leave all balls that roll or rest out of the filter, after all paths were copied into it."""
+    """Hide all balls that roll or rest from the filter, after all paths were copied into it."""
     if contact is None or neighbours is None:
         return
     for k in range(contact.contact_list.length[0]):
@@ -52,10 +52,11 @@ def first_meeting(
     time: float,
     before: float,
 ) -> tuple[float, int]:
-    """Return time [s] and partner of the ball's first meeting with any ball before ``before``.
+    """Find the ball's first meeting with another ball after ``time`` and before ``before`` [s].
 
-    The partner may fly, roll or rest. Without a meeting it is -1, and the time is the one up to
-    which there is certainly no meeting [s].
+    Returns: the time of the meeting [s] and the partner, the number of the other ball, which may
+    fly, roll or rest. Without a meeting the partner is -1, and the time is the time up to which
+    there is certainly no meeting.
     """
     if contact is None:
         return next_meeting(neighbours, motion, ball, time, before)
@@ -77,10 +78,11 @@ def _with_contact(
     meeting: float,
     partner: int,
 ) -> tuple[float, int]:
-    """Return the earlier of a known meeting with a flying ball and those with balls in contact.
+    """Return the earlier of a known meeting and the first meeting with a ball in contact.
 
-    ``meeting`` [s] and ``partner``, -1 for none, are the known meeting. For a ball that rolls or
-    rests itself, the result is the earliest meeting with any ball.
+    ``meeting``, ``partner``: time [s] and other ball, -1 for none, of the first meeting with a
+    flying ball. For a ball that rolls or rests itself, the result is the first meeting with any
+    ball.
     """
     best = min(meeting, before) - time
     here = place(contact, motion, ball, time)
@@ -123,8 +125,8 @@ def wake_neighbours(
 ) -> None:
     """Wake the balls that stand on a ball that has begun to move, and balls held still beside it.
 
-    The balls are marked as well: a ball that is met at this very time has its events predicted
-    again, and the wake-up must not be lost with the old events.
+    The woken balls are marked as well. A woken ball may be met at this very time, and its events
+    are then predicted again. The mark keeps the wake-up from being lost with the old events.
     """
     ball, time = event.ball, event.time
     here = place(contact, motion, ball, time).position
@@ -147,7 +149,7 @@ def wake_neighbours(
 def _is_near(
     contact: ContactState, motion: np.ndarray, ball: int, time: float, position: Vec3
 ) -> bool:
-    """Return True if a ball is near enough to one at ``position`` [m] to hold it."""
+    """Return True if a ball is near enough to a ball at ``position`` [m] to hold it still."""
     apart = sub(place(contact, motion, ball, time).position, position)
     return dot(apart, apart) < (contact.reach + MAX_JAM_GAP) ** 2
 
@@ -164,8 +166,8 @@ def _drop_supports_on(contact: ContactState, ball: int, other: int) -> None:
 def count_neighbours(contact: ContactState, motion: np.ndarray, event: BallEvent) -> bool:
     """Note which balls are around a jammed ball: their count, and the sum of their numbers.
 
-    The count is noted as 0 if none of them moves. Once a neighbour has gone, the ball may have lost
-    its hold.
+    The count is noted as 0 if none of these balls moves. Once a ball around it has gone, the jammed
+    ball may be free.
 
     Returns: True if count or sum differ from what was noted before.
     """

@@ -1,7 +1,7 @@
 """Handlers of events: a ball meets a surface or another ball, or its path in contact ends.
 
 Every hit on a surface, still, vibrating or turning, is resolved in _resolve_contact. New effects of
-the contact between a ball and a surface belong into effects/surface/surface_effects.py.
+the contact between a ball and a surface belong in effects/surface/surface_effects.py.
 """
 
 import math
@@ -104,7 +104,10 @@ def _resolve_contact(
 
 @inlined
 def _in_room(rotation: RotationState | None, vector: Vec3, time: float) -> Vec3:
-    """Return a vector of a surface's frame in the room's frame, at ``time`` [s]."""
+    """Return a vector of a surface's frame in the room's frame, at ``time`` [s].
+
+    ``rotation``: rotation of the part; None for a surface that does not turn.
+    """
     if rotation is None:
         return vector
     return to_room_frame(rotation, vector, time)
@@ -251,7 +254,7 @@ def end_contact_path(
 ) -> bool:
     """Resolve the end of a path of a ball that rolls or rests: a border, a stop or a wake-up.
 
-    Returns: False if its path goes on unchanged.
+    Returns: False if the ball's path goes on unchanged.
     """
     if contact is None:
         return False
@@ -289,7 +292,7 @@ def _face_under(ride: Ride | None, state: SimulationState, event: BallEvent, at:
 
 @inlined
 def gives_up(contact: ContactState | None, queue: EventQueue, ball: int) -> bool:
-    """Return True if a ball is in an unresolved jam, so that contact mode must hold it still."""
+    """Return True if a ball has so many events in a time window that it must be held still."""
     if contact is None:
         return False
     if queue.events[ball] % JAM_EVENTS != 0 or contact.mode[ball] >= ASLEEP:
@@ -304,7 +307,7 @@ def gives_up(contact: ContactState | None, queue: EventQueue, ball: int) -> bool
 def hold_jammed_ball(
     contact: ContactState | None, state: SimulationState, event: BallEvent
 ) -> None:
-    """Hold a ball in an unresolved jam still where it is."""
+    """Hold a ball for which ``gives_up`` is True still at its present position."""
     if contact is None:
         return
     hold_still(contact, state.motion, event, _here(state, event).position)

@@ -40,7 +40,8 @@ class EventQueue(NamedTuple):
     meetings: None if balls do not collide with one another.
     next_time: the earlier of wall time and meeting time [s], (m,), padded with NEVER. m is the next
         power of two.
-    winners: balls that win the matches, (2 m,) int32. winners[1] is the ball with the next event.
+    winners: balls that win the tournament's matches, (2 m,) int32. winners[1] is the ball with the
+        next event.
     """
 
     wall_time: np.ndarray
@@ -131,7 +132,7 @@ def forget_events(queue: EventQueue, ball: int, time: float) -> None:
 def schedule_now(queue: EventQueue, ball: int, time: float, what: int) -> None:
     """Make an event of kind ``what`` the ball's next event, at ``time`` [s], which is now.
 
-    ``what``: a value that EventQueue.obstacle can have.
+    ``what``: number of an obstacle, or another value that EventQueue.obstacle can have.
     """
     _forget_meeting(queue.meetings, ball)
     queue.wall_time[ball] = time

@@ -1,8 +1,8 @@
 """The compiled event loop: find the next event, move, resolve, log, predict.
 
-All predictions are made in _predict. A meeting is stale if its partner has had another event since
-the meeting was found. A stale meeting is dropped and only the search among balls is repeated,
-because the ball's own path, and with it its wall contact, still stands.
+All predictions are made in _predict. A ball's meeting with a partner is stale if the partner's path
+has changed since the meeting was found. A stale meeting is dropped and only the search among balls
+is repeated, because the ball's own path, and with it its wall contact, still stands.
 """
 
 import math
@@ -175,7 +175,7 @@ def advance(state: SimulationState) -> tuple[int, int]:
 
 @inlined
 def _begin_window(state: SimulationState) -> None:
-    """Begin the next time window: make all times and paths of the state count from its start."""
+    """Begin the next time window: rewrite all times and paths so that they count from its start."""
     window = state.clock.window
     shift_motion(state.motion, window, state.gravity, state.contact)
     shift_sorting(state.neighbours)
@@ -191,7 +191,7 @@ def _begin_window(state: SimulationState) -> None:
 
 @jit
 def _sort_neighbours(state: SimulationState, time: float) -> None:
-    """Copy the paths of all balls into the filter anew, and sort many balls into blocks."""
+    """Copy all paths into the neighbour filter anew. If there are many balls, sort them first."""
     put_back(state.sides, state.motion, time)
     refresh_neighbours(state.neighbours, state.motion, time)
     hide_all(state.contact, state.neighbours)
@@ -214,7 +214,7 @@ def _kind_of_event(meetings: Meetings | None, state: SimulationState, ball: int)
 
 @inlined
 def _move(state: SimulationState, event: BallEvent, kind: int, partner: int) -> None:
-    """Apply the drag that the balls of an event have met up to its time.
+    """Apply the air drag up to the time of an event to the balls whose event it is.
 
     Nothing else has to be moved, because paths are functions of time.
     """
@@ -331,7 +331,7 @@ def _until_meeting(meetings: Meetings | None, ball: int, time: float) -> float:
 def _predict_wall(state: SimulationState, ball: int, time: float) -> None:
     """Find the obstacle that the ball meets next, or another end of its path.
 
-    Write it into the queue.
+    Write this event into the queue.
     """
     queue, clock, obstacles = state.queue, state.clock, state.obstacles
     face_overlap = face_overlap_of_ball(state.sizes, obstacles.face_overlap, ball)

@@ -177,7 +177,7 @@ def is_full(buffer: CollisionBuffer | None) -> bool:
 
 
 class Collision(NamedTuple):
-    """Two balls at the moment when they touch. It is not a collision if they already move apart.
+    """Two balls at the moment when they touch. They do not collide if they already move apart.
 
     one, two: numbers of the balls.
     position: point where the balls touch [m].
@@ -251,7 +251,7 @@ def empty_buffer(buffer: ImpactBuffer | CollisionBuffer, kind: type[Log]) -> Log
 
 
 def joined(logs: list[Log], room: TriangleMesh | AnalyticCavity) -> Log:
-    """Return one log with the rows of all logs, in order. Its positions [m] are those in the room.
+    """Return one log with the rows of all logs, in order, and with positions [m] in the room.
 
     The positions in ``logs`` are relative to the room's middle.
     """

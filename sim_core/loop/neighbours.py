@@ -63,8 +63,8 @@ TINY = 1e-30  # replaces a velocity component of zero, whose inverse would be in
 class NeighbourFilter(NamedTuple):
     """Float32 copies of the paths of all balls, and the data with which a search filters them.
 
-    paths: base position and velocity, a column a ball, (6, m) float32, padded with NaN, which meets
-        nothing.
+    paths: base position and velocity, one column a ball, (6, m) float32, padded with NaN, which
+        meets nothing.
     probe: data of the present search, (17,) float32: the column of the ball, the present time, the
         allowances for rounding, the end of the search, and the square of a distance within reach.
         simd.py describes the entries for periodic sides.
@@ -96,7 +96,7 @@ def new_neighbour_filter(
     radii: np.ndarray | None = None,
     sides: PeriodicSides | None = None,
 ) -> NeighbourFilter:
-    """Return a filter for balls of this motion (n, 6) in a room from ``low`` to ``high`` [m]."""
+    """Return a filter for the paths ``motion`` (n, 6) in a room from ``low`` to ``high`` [m]."""
     # A base position lies up to one window's flight outside the room, and up to two where the ball
     # may be outside the room.
     flights = 1.0 if sides is None else 2.0
@@ -121,7 +121,7 @@ def new_neighbour_filter(
 
 @jit
 def refresh_neighbours(neighbours: NeighbourFilter | None, motion: np.ndarray, time: float) -> None:
-    """Copy the paths of all balls into the filter anew, and sort many balls into blocks."""
+    """Copy all paths into the filter anew. If there are many balls, sort them into blocks first."""
     if neighbours is None:
         return
     note_all_speeds(neighbours.sides, motion)
@@ -195,9 +195,9 @@ def next_meeting(
 
     Returns:
         The time of the meeting [s] and the number of the other ball. Without a meeting the number
-        is -1, and the time is the one up to which this is certain: NEVER for few balls, the time
-        until which the boxes of the blocks hold for many balls. In a periodic box it is no later
-        than the time until which only the present nearest images can meet.
+        is -1, and the time is the time up to which this is certain. That is NEVER for few balls,
+        and for many balls the time until which the boxes of the blocks hold. In a periodic box it
+        is no later than the time until which only the present nearest images can meet.
     """
     probe = neighbours.probe
     column = column_of(neighbours.blocks, ball)
@@ -211,7 +211,10 @@ def next_meeting(
 
 @inlined
 def _aim_at_images(sides: PeriodicSides | None, probe: np.ndarray) -> None:
-    """In a periodic box, let the filter count time from now. It takes the nearest images of now."""
+    """Set ``probe`` so that the filter of a periodic box counts time from now.
+
+    The filter then compares the images of two balls that are nearest to each other now.
+    """
     if sides is None:
         return
     probe[12] = probe[6]
@@ -251,7 +254,7 @@ def _search(
     before: float,
     known: float,
 ) -> tuple[float, int]:
-    """Search all balls, or if there are blocks those on the ball's path, for its first meeting.
+    """Find the ball's first meeting: search all balls, or only the blocks that its path enters.
 
     Args:
         known: time up to which the answer "no meeting" can be certain [s].
@@ -323,10 +326,10 @@ def _best_in_block(
     best: float,
     partner: int,
 ) -> tuple[float, int]:
-    """Return delay [s] and ball of the best meeting so far, or of an earlier one in a block.
+    """Return delay [s] and other ball of the first meeting, so far or in one more block.
 
-    ``best`` [s] and ``partner`` are those of the best meeting so far. ``block``: number of the
-    block.
+    ``best``, ``partner``: delay [s] and other ball of the first meeting found so far. ``block``:
+    number of the block of balls that is searched now.
     """
     first = LANES * block
     near = _near_until(neighbours.sides, neighbours.paths, first, neighbours.probe, time, best)
@@ -338,13 +341,13 @@ def _best_in_block(
 
 @inlined
 def _without(near: int, lane: int) -> int:
-    """Return the bit mask ``near`` without the bit of the ball's own column, ``lane``."""
+    """Return the bit mask ``near`` of balls without the bit ``lane`` of the searching ball."""
     return near & ~(1 << lane) if 0 <= lane < LANES else near
 
 
 @inlined
 def _aim(ray: np.ndarray, motion: np.ndarray, ball: int, time: float) -> None:
-    """Write the ball's path from now on into ``ray``: its position twice, and 1 / velocity."""
+    """Write a ball's path from ``time`` on into ``ray``: position twice, then 1 / velocity."""
     here = free_fall_position(motion, ball, time)
     for axis in range(3):
         speed = motion[ball, 3 + axis]
@@ -381,11 +384,12 @@ def _nearest(
     best: float,
     partner: int,
 ) -> tuple[float, int]:
-    """Return delay [s] and ball of the best meeting so far, or of an earlier one in ``near``.
+    """Return delay [s] and other ball of the first meeting, so far or with the balls ``near``.
 
-    ``near`` has a bit for each column to examine, counted from column ``first``.
+    ``near`` has a bit for each column of the filter to examine, counted from column ``first``.
+    ``best``, ``partner``: delay [s] and other ball of the first meeting found so far.
 
-    The lower ball wins a tie, so that the order of the columns does not matter.
+    The lower ball number wins a tie, so that the order of the columns does not matter.
     """
     here = free_fall_position(motion, ball, time)
     velocity = Vec3(motion[ball, 3], motion[ball, 4], motion[ball, 5])

@@ -78,7 +78,7 @@ class SimulationResult:
 
     impacts: impacts on the recorded surfaces.
     balls: the balls at the end.
-    collisions: numbers of collisions.
+    collisions: numbers of hits, collisions and other events.
     resting: the balls that lie still at the end.
     frames: the balls at the requested times.
     ball_collisions: collisions of balls with one another; None unless Scene.record_collisions is
@@ -107,7 +107,7 @@ def simulate(
 
     Args:
         frames: ascending times [s since the end of the warm-up], (f,), at which the balls are
-            noted, each on its flight at that very time. They change no bit of the other results.
+            noted, each on its flight at that very time. Noting changes no bit of the other results.
         progress: called about every simulated second with the time since the start, including the
             warm-up [s].
 
@@ -152,7 +152,7 @@ _obstacle_set = computed_once(8)(build_obstacle_set)  # replicas of one chamber 
 
 
 class Simulation:
-    """A scene being simulated: the state that the loop works on, and the log so far."""
+    """A scene being simulated: the state that the event loop works on, and the logs so far."""
 
     def __init__(
         self, scene: Scene, progress: Callable[[float], None] = lambda seconds: None
@@ -260,7 +260,7 @@ class Simulation:
     ) -> list[Balls]:
         """Simulate until a time [s since the start].
 
-        Every CHECK_EVERY, check that balls are inside. ``record``: True to log impacts.
+        Check at least every CHECK_EVERY seconds that balls are inside. ``record``: True to log.
 
         Returns: the balls at each of the times ``frames`` [s since the start].
         """

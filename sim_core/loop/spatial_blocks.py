@@ -1,11 +1,11 @@
-"""Many balls in blocks of sixteen neighbours, each with a box around its balls' paths for a while.
+"""Blocks of sixteen neighbouring balls, each with a box around its balls' paths for some time.
 
 In the free-fall frame a path is a straight line, so that the box of a block grows only when a ball
 in it is hit. Balls are sorted into blocks along a curve that keeps neighbours together. They are
-sorted again before the boxes have grown much: every window, and more often where balls are hit
-often. A ball then searches only blocks whose boxes its own path enters, eight boxes at once, as in
-the tree of obstacles: first boxes around eight nodes of eight blocks each, then the boxes of the
-blocks.
+sorted again before the boxes have grown much: in every time window, and more often where balls are
+hit often. A ball then searches only blocks whose boxes its own path enters. Eight boxes are tested
+at once, as in the tree of obstacles: first boxes around eight nodes of eight blocks each, then the
+boxes of the blocks.
 
 Source: J. Skilling, Programming the Hilbert curve, AIP Conf. Proc. 707 (2004) 381.
 """
@@ -118,7 +118,7 @@ def ball_in_column(blocks: Blocks | None, column: int) -> int:
 
 @inlined
 def blocks_are_worn(blocks: Blocks | None, time: float) -> bool:
-    """Return True if the balls must be sorted again before the event at ``time`` [s]."""
+    """Return True if the balls must be sorted into blocks again before the event at ``time``."""
     if blocks is None:
         return False
     return bool(time >= blocks.until[0] or blocks.changes[0] > 2 * CHANGES * len(blocks.column))
@@ -128,8 +128,8 @@ def blocks_are_worn(blocks: Blocks | None, time: float) -> bool:
 def sort_blocks(blocks: Blocks | None, motion: np.ndarray, time: float, window: float) -> None:
     """Put balls that are near each other at ``time`` [s] into one block, and set its box.
 
-    The box holds until each ball is expected to have changed its path CHANGES times, at most until
-    the window ends.
+    The boxes hold until balls are expected to have changed their paths CHANGES times each, at most
+    until the time window ends.
     """
     if blocks is None:
         return
@@ -164,16 +164,16 @@ def sort_blocks(blocks: Blocks | None, motion: np.ndarray, time: float, window: 
 
 @inlined
 def _cell(blocks: Blocks, motion: np.ndarray, ball: int, axis: int, time: float) -> int:
-    """Return which cell of the curve's grid, along ``axis``, holds a ball at ``time`` [s]."""
+    """Return the index along ``axis`` of the grid cell that holds a ball at ``time`` [s]."""
     now = motion[ball, axis] + motion[ball, 3 + axis] * time
     return min(max(int((now - blocks.low[axis]) * blocks.scale), 0), (1 << BITS) - 1)
 
 
 @jit
 def _place_on_curve(x: int, y: int, z: int) -> int:
-    """Return the place of cell (x, y, z) along Hilbert's curve, which goes from cell to cell.
+    """Return the position number of grid cell (x, y, z) along Hilbert's curve.
 
-    It makes no jump.
+    The curve goes from each cell to a neighbouring cell, without a jump.
     """
     bit = 1 << (BITS - 1)
     while bit > 1:  # undo the turns of the curve, from the largest cubes to the smallest

@@ -67,7 +67,7 @@ class CheckedCache(FunctionCache):
 
 
 def is_private(folder: Path) -> bool:
-    """Return True if nobody else can put files into the folder, whose code would be run."""
+    """Return True if no other user can put files, whose code would be run, into the folder."""
     if not hasattr(os, "getuid"):
         return True
     found = folder.lstat()

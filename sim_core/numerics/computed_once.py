@@ -1,7 +1,7 @@
 """Results that threads share: the first thread that asks computes a result, and the others wait.
 
-`functools.lru_cache` alone lets all threads that ask at once compute the same result. The replicas
-of a chamber would then build its search tree once each.
+`functools.lru_cache` alone lets all threads that ask at once compute the same result. Several
+simulations of one chamber would then each build the chamber's search tree.
 """
 
 from collections.abc import Callable

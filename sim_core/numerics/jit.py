@@ -62,7 +62,7 @@ CACHE_FOLDER = _cache_root() / f"sim_core-{_sources_digest()}"
 def _remove_old_caches() -> None:
     """Remove all but the newest MAX_CACHES folders.
 
-    A process that uses a removed one makes it again.
+    A process that uses a removed folder makes it again.
     """
     folders = sorted(
         CACHE_FOLDER.parent.glob("sim_core-*"), key=lambda f: f.stat().st_mtime, reverse=True
@@ -163,9 +163,9 @@ def jit(function: F) -> F:
 
 
 def inlined(function: F) -> F:
-    """Compile a step of the event loop that has one call site as a part of its caller.
+    """Compile a step of the event loop into its caller. The step has a single call site.
 
-    A call passes every array as seven words or more, a hundred for a step, which took a fifth of
-    the loop's time.
+    A call passes every array as seven machine words or more, about a hundred for a step. These
+    calls took a fifth of the event loop's time.
     """
     return _compiled(function, inline=True)

@@ -1,17 +1,18 @@
 """Periodic sides: balls that leave a box on one side come in on the other.
 
-Nothing happens at a border. Places are taken modulo the sides. Two balls meet as their nearest
-images do, and balls are put back into the box whenever paths are read again.
+A ball that crosses a side has no event there: positions are taken modulo the side lengths. Images
+of a ball are its positions in the boxes beside. Two balls meet as their nearest images do. Balls
+are put back into the box whenever all paths are copied into the neighbour filter anew.
 
 Notation:
-    L: side of the box along x or y [m]; 0 where there are walls
+    L: side length of the box along x or y [m]; 0 where there are walls
     r: reach, the sum of two radii [m]
     v, V: speed of a ball along that direction, and the largest speed of any ball [m/s]
 
 Only the nearest images of two balls can meet next. Any other images are L/2 or more apart along x
 or y, and need (L/2 - r) / (v + V) to meet. A prediction looks no farther ahead than that
-(``horizon``). V is kept up to date as paths change. The ball of a pair whose path changed last has
-searched for the other with a V that holds for both.
+(``horizon``). V is kept up to date as paths change. Of two balls, the ball whose path changed last
+has searched for the other ball with a V that holds for both.
 """
 
 from typing import NamedTuple
@@ -31,7 +32,7 @@ FAR = 1e30
 class PeriodicSides(NamedTuple):
     """The sides of a box that is periodic along x, y or both and whose middle is the origin.
 
-    x, y: side of the box along each direction [m], 0 where there are walls.
+    x, y: side length of the box along each direction [m], 0 where there are walls.
     per_x, per_y: inverses of the sides [1/m], 0 where there are walls.
     fastest: largest speed of any ball along each direction [m/s], (2,).
     low, high: extent of the boxes of all balls' paths along each direction [m], (2,), where there
@@ -58,9 +59,9 @@ def new_periodic_sides(sides: np.ndarray) -> PeriodicSides | None:
 
 @inlined
 def nearest_image(sides: PeriodicSides | None, apart: Vec3) -> Vec3:
-    """Return the shortest of all differences [m] between the images of two places.
+    """Return the shortest difference [m] between the images of two points.
 
-    ``apart``: their difference inside the box.
+    ``apart``: difference of the two points inside the box [m].
     """
     if sides is None:
         return apart
@@ -87,7 +88,7 @@ def put_back(sides: PeriodicSides | None, motion: np.ndarray, time: float) -> No
 
 @inlined
 def note_speed(sides: PeriodicSides | None, motion: np.ndarray, ball: int) -> None:
-    """Raise the noted largest speed to the speed of a ball with a new path."""
+    """Raise the noted largest speed to the speed of a ball with a new path, if that is larger."""
     if sides is None:
         return
     for axis in range(2):
@@ -108,7 +109,7 @@ def note_all_speeds(sides: PeriodicSides | None, motion: np.ndarray) -> None:
 def top_speed(sides: PeriodicSides | None) -> float:
     """Return the noted largest speed of any ball [m/s], or 0 without periodic sides.
 
-    Gravity along a periodic direction raises it without end.
+    Gravity along a periodic direction raises this speed without end.
     """
     if sides is None:
         return 0.0
@@ -132,7 +133,7 @@ def horizon(sides: PeriodicSides | None, motion: np.ndarray, ball: int, reach: f
 
 @inlined
 def time_in_box(sides: PeriodicSides | None) -> float:
-    """Return how long [s] paths may be so that they reach few images of the box."""
+    """Return for how long [s] paths may be followed so that they reach few boxes beside."""
     if sides is None:
         return NEVER
     time = NEVER
@@ -168,7 +169,8 @@ def images(
 ) -> tuple[int, int, int, int]:
     """Return which of the ball's images have paths that get into the boxes around other paths.
 
-    The numbers are the first and the last image along x, and the first and the last along y.
+    Returns: the first and the last image along x, and the first and the last image along y, as
+    multiples of the side.
 
     Args:
         start: start of the path [s].

@@ -1,7 +1,7 @@
 """Find when a gap closes: the first time at which a function of time is at most 0 and falls.
 
 A gap that opens again is never a contact, whatever rounding did to its sign: an overlapping pair
-that approaches collides now, one that separates does not (Bannerman, Strobl, Formella & Pöschel,
+that approaches collides now, a pair that separates does not (Bannerman, Strobl, Formella & Pöschel,
 Comp. Part. Mech. 1 (2014) 191).
 
 Notation:
@@ -85,7 +85,7 @@ def _curvature(w: WaveGap, s: float) -> float:
 def _convex_approach(w: WaveGap, start: float, end: float) -> float:
     """Return the first time in [start, end] at which a convex gap closes; NEVER if there is none.
 
-    Newton started from the left never oversteps a root of a convex function.
+    Newton's method, started from the left, never oversteps a root of a convex function.
     """
     s = start
     for _ in range(NEWTON_STEPS):
@@ -108,7 +108,7 @@ def _convex_approach(w: WaveGap, start: float, end: float) -> float:
 def _time_of_largest_gap(w: WaveGap, start: float, end: float) -> float:
     """Return the time in [start, end] at which a concave gap is largest.
 
-    Search by safeguarded Newton steps on its rate.
+    Search by safeguarded Newton steps for the zero of the gap's rate.
     """
     low = start
     high = end
@@ -133,7 +133,7 @@ def _time_of_largest_gap(w: WaveGap, start: float, end: float) -> float:
 def _concave_approach(w: WaveGap, start: float, end: float) -> float:
     """Return the first time in [start, end] at which a concave gap closes; NEVER if there is none.
 
-    Newton starts from the right end.
+    Newton's method starts from the right end.
     """
     gap = _gap(w, start)
     rate = _rate(w, start)
@@ -164,9 +164,10 @@ def _concave_approach(w: WaveGap, start: float, end: float) -> float:
 def _time_to_band(w: WaveGap, depth: float) -> float:
     """Return the earliest time [s] at which the ball reaches the band in which the face moves.
 
-    Inside the band this is the present, unless the ball leaves the band faster than the face ever
-    moves: its speed is least now or on leaving. A ball more than ``depth`` behind the band must
-    first come out over the highest position of the face.
+    Inside the band this is now, time 0, unless the ball leaves the band faster than the face ever
+    moves. The face cannot catch such a ball before the ball falls back into the band. The ball's
+    speed is least now or on leaving. A ball more than ``depth`` behind the band must first come out
+    over the highest position of the face.
     """
     height = w.c - w.amplitude
     if height > 0.0 or w.c <= -w.amplitude - depth:
@@ -179,9 +180,9 @@ def _time_to_band(w: WaveGap, depth: float) -> float:
 
 @jit
 def first_wave_approach(w: WaveGap, limit: float, depth: float) -> float:
-    """Return the first s in [0, limit] at which a ball meets the vibrating face, or NEVER.
+    """Return the first s in [0, limit] at which a ball meets and approaches the vibrating face.
 
-    It also approaches the face then.
+    The result is NEVER if there is no such time.
 
     The search starts where the ball reaches the band that the face moves in. Inside the band the
     gap is split where its curvature changes sign, sin(angle) = -2a / (A omega²). Each piece then
@@ -238,7 +239,7 @@ def next_wave_approach(w: WaveGap, s: float, limit: float, depth: float) -> floa
 
 @jit
 def _shifted(w: WaveGap, s: float) -> WaveGap:
-    """Return the same gap with its time counted from s on."""
+    """Return the same gap as a function of the time since ``s``."""
     height, rate = w.c + s * (w.b + w.a * s), w.b + 2.0 * w.a * s
     return WaveGap(height, rate, w.a, w.amplitude, w.omega, w.theta + w.omega * s)
 
@@ -247,6 +248,7 @@ def _shifted(w: WaveGap, s: float) -> WaveGap:
 def _piece_start(half: float, alpha: float) -> float:
     """Return the angle omega s + theta [rad] at which the piece number ``half`` begins.
 
-    The gap is convex in even pieces and concave in odd ones.
+    A piece is a span without a change of sign of the gap's curvature. The gap is convex in even
+    pieces and concave in odd pieces. ``alpha``: asin(-2 a / (A omega²)) [rad].
     """
     return half * math.pi + (alpha if half % 2.0 == 0.0 else -alpha)

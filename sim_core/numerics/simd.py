@@ -62,7 +62,7 @@ class _Vectors:
         return self.builder.select(self.builder.fcmp_ordered(">", a, b), a, b)
 
     def fused(self, a: ir.Value, b: ir.Value, c: ir.Value) -> ir.Value:
-        """Return a b + c, rounded only once, which is allowed in a filter."""
+        """Return ``a b + c``, rounded only once, which is allowed in a filter."""
         kind = ir.FunctionType(self.type, [self.type] * 3)
         function = cgutils.get_or_insert_function(
             self.builder.module, kind, f"llvm.fma.v{self.width}f32"
@@ -70,7 +70,7 @@ class _Vectors:
         return self.builder.call(function, [a, b, c])
 
     def rounded(self, a: ir.Value) -> ir.Value:
-        """Return a rounded to whole numbers."""
+        """Return the numbers ``a``, rounded to whole numbers."""
         kind = ir.FunctionType(self.type, [self.type])
         function = cgutils.get_or_insert_function(
             self.builder.module, kind, f"llvm.rint.v{self.width}f32"
@@ -78,7 +78,7 @@ class _Vectors:
         return self.builder.call(function, [a])
 
     def sum(self, total: ir.Value | None, a: ir.Value, b: ir.Value) -> ir.Value:
-        """Return total + a b, or a b if the total is None."""
+        """Return ``total + a b``, or ``a b`` if the total is None."""
         return self.builder.fmul(a, b) if total is None else self.fused(a, b, total)
 
     def mask(self, condition: ir.Value) -> ir.Value:

@@ -96,5 +96,5 @@ def velocity_after(flight: Flight, delay: float) -> Vec3:
 
 @jit
 def flight_after(flight: Flight, delay: float) -> Flight:
-    """Return the flight of the same ball as it is ``delay`` [s] later."""
+    """Return position, velocity and acceleration of a flying ball after ``delay`` [s]."""
     return Flight(position_after(flight, delay), velocity_after(flight, delay), flight.acceleration)

@@ -36,7 +36,7 @@ def require_supported(cavity: AnalyticCavity, physics: Physics) -> None:
 
 
 def _require_floor(cavity: AnalyticCavity, vibration: Vibration, remedy: str) -> None:
-    """Raise SceneError unless only the floor vibrates, along z."""
+    """Raise SceneError, with ``remedy`` in its message, unless only the floor vibrates, along z."""
     if not (vibration.axis[0] == 0.0 and vibration.axis[1] == 0.0):
         raise SceneError(
             f"vibration.axis is {vibration.axis}: not supported with an analytical cavity unless "
@@ -57,7 +57,7 @@ def require_clear(
     """Raise SceneError for a ball that does not fit.
 
     Such a ball is outside the cavity, overlaps a surface by more than ``touch`` [m], or is wider
-    than the cavity at its narrowest. The vibrating floor is placed by its phase.
+    than the cavity at its narrowest. The vibrating floor is taken where it is at the start.
     """
     _require_inside_periods(cavity, balls)
     gap, radii = cavity.gaps(balls.positions), 0.5 * balls.diameters

@@ -34,7 +34,7 @@ class Frames:
 
 
 def frames_of(time: np.ndarray, noted: list[Balls], balls: Balls) -> Frames:
-    """Return as Frames the balls that were noted at each of the times ``time`` (f,) [s].
+    """Return the balls that were ``noted`` at each of the times ``time`` (f,) [s], as Frames.
 
     ``balls``: the balls at any time, which tell whether they have spins.
     """

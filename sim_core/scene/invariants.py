@@ -135,7 +135,7 @@ def _crossings(projection: _Projection, u: float, v: float, w: float) -> int:
 
 @jit
 def _cell(cells: _Cells, axis: int, x: float) -> int:
-    """Return which cell along ``axis`` is nearest to the coordinate ``x`` [m] of that axis."""
+    """Return the index of the cell along ``axis`` that is nearest to the coordinate ``x`` [m]."""
     steps = (x - cells.low[axis]) / cells.size[axis]
     return int(min(max(steps, 0.0), float(cells.side - 1)))
 
@@ -160,7 +160,10 @@ def _mark_near(projection: _Projection, points: np.ndarray, reach: float, near: 
 
 
 def triangles_near(mesh: TriangleMesh, points: np.ndarray, reach: float) -> np.ndarray:
-    """Return the numbers of all triangles within reach [m] of any point (n, 3), and some more."""
+    """Return the numbers of all triangles within ``reach`` [m] of any of the points (n, 3).
+
+    The numbers of some triangles farther away may be among them.
+    """
     projection, near = _projection(mesh, 0), np.zeros(len(mesh.triangles), dtype=np.bool_)
     wide = reach * (1.0 + 1e-9) + 1e-12 * float(np.abs(mesh.bounds).max())  # widened for rounding
     _mark_near(projection, np.ascontiguousarray(points @ projection.axes.T), wide, near)
@@ -178,8 +181,9 @@ def contained(
 ) -> np.ndarray:
     """Tell which points are inside the mesh, by the parity of crossings along a ray.
 
-    A turned part that goes through a wall leaves slits in the surface. A point outside by the
-    parity is then outside only if the surface's solid angle, which a slit hardly changes, agrees.
+    A turned part that goes through a wall leaves slits in the surface. A point that is
+    outside by the parity then counts as outside only if the surface's solid angle, which a slit
+    hardly changes, says so too.
 
     Args:
         mesh: the surface.
@@ -213,11 +217,11 @@ def beneath_mean_plane(
     radii: np.ndarray,
     corners: np.ndarray | None = None,
 ) -> np.ndarray:
-    """Tell which ball centres a vibrating face can let beneath its mean plane, where it is at rest.
+    """Tell which ball centres may be beneath a vibrating face's mean plane, where it is at rest.
 
-    This takes a face that swings wider than the ball's radius. Such a centre is beneath the mean
-    plane by less than the amplitude minus the radius, and inside the mesh once lifted above the
-    plane.
+    A ball gets there only if the face's amplitude is larger than the ball's radius. Its centre is
+    then beneath the mean plane by at most the amplitude minus the radius, and would be inside the
+    mesh if it were lifted above the plane.
 
     Args:
         mesh: the surface.
@@ -277,7 +281,7 @@ def turned_corners(
 ) -> np.ndarray:
     """Return the corners (m, 3, 3) [m] of the mesh with the part turned by ``angle`` [rad].
 
-    Without an angle the part is at its angle at the start.
+    Without ``angle`` the part is turned by its angle at the start.
     """
     rotation = new_rotation_state(turn, mesh.middle)
     assert rotation is not None
@@ -351,7 +355,7 @@ def _clear(
 
 
 def clearance(corners: np.ndarray, points: np.ndarray, reach: float) -> np.ndarray:
-    """Return distances (n,) [m] of points (n, 3) from the nearest triangle, at most ``reach``."""
+    """Return distances (n,) [m] of points (n, 3) from the nearest triangle, capped at ``reach``."""
     points = np.ascontiguousarray(points, dtype=np.float64)
     gap = np.zeros(len(points))
     _clear(corners, corners.min(axis=1), corners.max(axis=1), points, reach, gap)
@@ -359,7 +363,7 @@ def clearance(corners: np.ndarray, points: np.ndarray, reach: float) -> np.ndarr
 
 
 def closest_pair(balls: Balls, room: Room | None = None) -> tuple[float, int, int]:
-    """Return the smallest distance of two centres [m] and their balls.
+    """Return the smallest distance [m] of two ball centres, and the numbers of the two balls.
 
     For a single ball the result is (inf, -1, -1).
 
@@ -397,7 +401,7 @@ def narrowest_gap(balls: Balls, room: Room | None = None) -> tuple[float, int, i
 
 
 def _pair_tree(balls: Balls, room: Room | None) -> "KDTree":
-    """Return a search tree of the balls' centres, on a torus if the room is periodic."""
+    """Return a search tree of the balls' centres, with images if the room is periodic."""
     from scipy.spatial import KDTree
 
     if not isinstance(room, AnalyticCavity) or not room.periods.any():

@@ -1,8 +1,9 @@
 """Search for gaps that are narrower than the ball that starts in them, or will become narrower.
 
-No motion of a rigid ball in such a gap is right. The search checks pairs of surfaces that the ball
+A rigid ball in such a gap has no possible motion. The search checks pairs of surfaces that the ball
 touches on opposite sides, because a ball in a wedge can still move out. A vibrating surface counts
-at the place where its vibration brings it nearest. Two vibrating surfaces both do.
+at the position where its vibration brings it nearest to the ball, as do both of two vibrating
+surfaces.
 """
 
 from typing import NamedTuple
@@ -21,7 +22,7 @@ OPPOSED = -1.0 + 1e-9
 
 
 class NearSurface(NamedTuple):
-    """The triangles near the balls of a scene, k of them."""
+    """The k triangles of a mesh that are near the balls of a scene."""
 
     number: np.ndarray  # numbers in the mesh, shape (k,)
     tags: np.ndarray  # surface tags, shape (k,)
@@ -86,8 +87,8 @@ def _tightest(
 ) -> tuple[int, int, float, bool] | None:
     """Find the two triangles that leave a ball at ``here`` (3,) [m] the least room.
 
-    Returns: the numbers of the triangles, the missing width [m], and True if the gap is narrow by
-    vibration; or None if the ball fits.
+    Returns: the numbers of the triangles, the missing width [m], and True if vibration narrows the
+    gap; or None if the ball fits.
     """
     turn, reach = physics.part_rotation, radius + largest_approach(physics)
     corners, tags = surface.corners, surface.tags

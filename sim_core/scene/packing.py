@@ -80,9 +80,9 @@ def pack_balls(
 def _free_selector(
     mesh: TriangleMesh | AnalyticCavity, part_rotation: PartRotation | None
 ) -> Callable[[np.ndarray, float], np.ndarray]:
-    """Return a function that selects the free points from points (n, 3) [m] and a distance [m].
+    """Return a function of points (n, 3) [m] and a distance [m] that selects the free points.
 
-    A free point is inside the cavity and at least the distance away from every surface.
+    A free point is inside the cavity and at least this distance away from every surface.
     """
     if isinstance(mesh, AnalyticCavity):
         return lambda points, reach: points[(mesh.gaps(points) >= reach).all(axis=1)]
@@ -147,7 +147,7 @@ def _place(placed: "_PlacedBalls", layer: _Layer, count: int, rng: np.random.Gen
 
 
 class _PlacedBalls:
-    """The balls placed so far. Balls whose centres are in grid cells of one hash form a chain."""
+    """The balls placed so far. Balls whose grid cells have the same hash form a chain."""
 
     def __init__(self, most: int, edge: float, periods: np.ndarray) -> None:
         """Make room for ``most`` balls in cells of width ``edge`` [m], twice the largest radius.
@@ -160,7 +160,7 @@ class _PlacedBalls:
         self.older = np.full(most, -1)  # the next ball of its chain
 
     def add(self, points: np.ndarray, radius: float, most: int) -> None:
-        """Add a ball at each point (n, 3) where it overlaps none, up to ``most`` balls in all."""
+        """Add a ball at each point (n, 3) where it overlaps no ball, up to ``most`` in all."""
         at = self.points, self.radii, self.newest, self.older
         grid = self.edge, self.periods
         self.count = _add(np.ascontiguousarray(points), radius, most, self.count, *grid, *at)

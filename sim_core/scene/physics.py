@@ -69,8 +69,8 @@ class Physics(NamedTuple):
     def begun_at(self, time: float) -> "Physics":
         """Return these effects on a clock that begins ``time`` [s] later.
 
-        Vibrations and the turning part have gone on. Turns are counted as fractions, so that their
-        number takes no digits from the phase.
+        Vibrations and the turning part have gone on. Turns are counted as exact fractions, so that
+        a large number of turns takes no digits from the phase.
         """
         if time == 0.0:
             return self

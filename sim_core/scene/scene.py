@@ -66,9 +66,9 @@ class Scene:
         warmup: duration of the simulation before recording starts [s].
         record: tags of the surfaces whose impacts are logged; None means all.
         record_collisions: True to log collisions of balls with one another too.
-        start_time: time of the first instant on the clock of the vibrations and the turning part
-            [s]. Their phases are given at time 0. A scene that goes on with the balls of an earlier
-            result has that result's ``time``.
+        start_time: time of the scene's start [s] on the clock of the vibrations and the turning
+            part. Their phases are given at time 0 of this clock. A scene that goes on with the
+            balls of an earlier result has that result's ``time``.
 
     Raises:
         SceneError: naming the ball, triangle or field, for
@@ -244,7 +244,7 @@ class Scene:
     def _require_room_above_sonotrode(self, near: NearSurface) -> None:
         """Raise SceneError for a ball that overlaps a vibrating surface, displaced by its phase.
 
-        The corners of vibrating triangles in ``near`` are displaced for good.
+        The corners of vibrating triangles in ``near`` are displaced, and stay so after the call.
         """
         balls = self.balls
         for vibration in self.physics_at_start.vibrations:

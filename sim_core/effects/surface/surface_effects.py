@@ -1,7 +1,7 @@
 """Effects of a hit on a surface besides restitution and friction, in the order in which they act.
 
-A new effect of the contact between ball and surface changes only this place of the simulator. The
-effect itself, a NamedTuple of numbers and a compiled function, is a file beside this one.
+A new effect of the contact between ball and surface is added to the lists in this file. The effect
+itself, a NamedTuple of numbers and a compiled function, is a file beside this one.
 Restitution, friction and contact mode have their own files, because they keep state.
 """
 
@@ -13,7 +13,7 @@ from sim_core.numerics.vec3 import Touch, Vec3
 
 
 class SurfaceEffects(NamedTuple):
-    """Effects of hits besides restitution and friction that a scene has, a field each.
+    """Further effects of a scene's hits, besides restitution and friction: one field an effect.
 
     A field that is None takes no machine code.
     """
@@ -25,7 +25,7 @@ MAKERS: dict[str, Callable[..., Any]] = {}
 
 
 def surface_effects(**parameters: dict[str, float]) -> SurfaceEffects:
-    """Return the effects of a scene, made from the parameters of each effect by its name."""
+    """Return the effects of a scene. Each keyword is an effect's name with its parameters."""
     return SurfaceEffects(**{name: MAKERS[name](**values) for name, values in parameters.items()})
 
 
