@@ -19,6 +19,7 @@ if TYPE_CHECKING:
         peen_strip,
         show,
         simulate,
+        sweep,
     )
 
 __all__ = [
@@ -34,6 +35,7 @@ __all__ = [
     "peen_strip",
     "show",
     "simulate",
+    "sweep",
 ]
 
 

@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from chamberopt.peening.virtual_strip import VirtualStrip
     from chamberopt.results.compare.comparison import Comparison
     from chamberopt.results.load import Result
+    from chamberopt.search.run_sweep import SweepResult
     from chamberopt.simulation.convergence import ConvergenceStudy
     from chamberopt.workflows.strip import StripPlace
 
@@ -50,6 +51,7 @@ __all__ = [
     "peen_strip",
     "show",
     "simulate",
+    "sweep",
 ]
 
 
@@ -118,6 +120,49 @@ def optimise(
             done = optimise_study(folder, executor, Teller(progress))
             _warn([*map(str, done.advice), *done.remarks])
     return load_result(out)
+
+
+def sweep(
+    study: Study,
+    out: str | Path,
+    *,
+    grid: int | None = None,
+    sobol: int | None = None,
+    seed: int | None = None,
+    workers: int | None = None,
+    progress: Progress | None = None,
+) -> SweepResult:
+    """Simulate candidates on a grid or spread evenly over a study's [vary], into a folder.
+
+        swept = chamberopt.sweep(chamberopt.load_study("studies/gear.toml"), "map", sobol=64)
+        for trial in swept.trials:
+            print(trial.parameters, trial.objective)  # None if it failed: see trial.reason
+
+    Args:
+        out: new or empty folder, or the folder of the same sweep. An interrupted sweep is resumed.
+            The result of a finished sweep is only read.
+        grid: values of each parameter, bounds included. Give either grid or sobol.
+        sobol: number of candidates, at Sobol points.
+        seed: seed of the Sobol points, by default the study's optimizer.seed.
+        workers: number of processes, by default one per core. It does not change the result.
+        progress: called as progress(done, total, best) after each candidate.
+    Raises:
+        InputError: the candidates cannot be planned, the folder is another study's, or no
+            candidate can be simulated.
+    """
+    from chamberopt.search.run_sweep import plan_sweep
+    from chamberopt.search.study_folder import open_study_folder
+    from chamberopt.workflows.optimise import read_sweep, sweep_study
+    from chamberopt.workflows.simulate import Teller
+
+    _require("study", study, Study, "load_study")
+    plan = plan_sweep(study, grid, sobol, seed)
+    with open_study_folder(study, out, plan.as_json()) as folder:
+        if folder.finished:
+            return read_sweep(folder, plan)
+        done = sweep_study(folder, plan, Teller(progress), workers)
+    _warn([*map(str, done.advice), *done.remarks])
+    return done.result
 
 
 def compare(

@@ -1,38 +1,43 @@
-"""Run or resume a study in its folder. Python users and the command line share this workflow."""
+"""Run or resume a study or a sweep in its folder, for Python users and the command line."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Generic, TypeVar
 
 from chamberopt.chamber.build import build_chamber
+from chamberopt.common.executor import core_count, open_executor
 from chamberopt.coverage.field.memory import PROCESS, evaluation_bytes, how_many_fit
-from chamberopt.search.run_study import run_study
+from chamberopt.results.load import load_trials
+from chamberopt.search.run_study import StudyResult, run_study
+from chamberopt.search.run_sweep import SweepPlan, SweepResult, run_sweep
 from chamberopt.simulation.replicas import most_replicas
-from chamberopt.workflows.save_run import save_study
+from chamberopt.workflows.save_run import save_study, save_sweep
 from chamberopt.workflows.simulate import Teller, resolve_effects
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
 
     from chamberopt.chamber.build import Chamber
-    from chamberopt.search.run_study import StudyResult
     from chamberopt.search.study import Study
     from chamberopt.search.study_folder import StudyFolder
     from chamberopt.simulation.advice import Advice
 
 
+Found = TypeVar("Found", StudyResult, SweepResult)
+
+
 @dataclass(frozen=True)
-class Optimised:
-    """A study that has ended and was saved.
+class Ended(Generic[Found]):
+    """A study or a sweep that has ended and was saved.
 
     chamber: chamber of the study's design.
     advice: reasons for the optional effects, if the design left their choice to the program.
     remarks: remarks for the user, such as why a picture was skipped.
     """
 
-    result: StudyResult
+    result: Found
     chamber: Chamber
     advice: list[Advice]
     remarks: list[str]
@@ -40,7 +45,7 @@ class Optimised:
 
 def optimise_study(
     folder: StudyFolder, executor: Executor, teller: Teller, stop: Callable[[], bool] | None = None
-) -> Optimised:
+) -> Ended[StudyResult]:
     """Run or resume the study of a folder, and save its result there.
 
     Args:
@@ -52,13 +57,8 @@ def optimise_study(
     """
     with teller.step("building the chamber"):
         chamber = build_chamber(folder.study.design)
-    study, advice = folder.with_effects_resolved(
-        lambda design: resolve_effects(design, chamber, executor, teller)
-    )
-    at_once = _candidates_at_once(study, chamber, teller)
-    teller.compile(study.design, chamber, None)
-    if done := len(folder.recorded.trials):
-        teller.tell(f"{folder.path}: resuming after {done} evaluations")
+    at_once = _candidates_at_once(folder.study, chamber, teller)
+    study, advice = _prepare(folder, chamber, executor, teller)
     with teller.step("evaluations", study.optimizer.evaluations) as progress:
         result = run_study(study, folder, executor, progress, stop=stop, at_once=at_once)
     with teller.step("writing and drawing"):
@@ -66,7 +66,60 @@ def optimise_study(
         found = build_chamber(best, result.target)
         warnings = teller.check(best, found, " of the best design")
         remarks = save_study(folder.path, result, advice, warnings)
-    return Optimised(result, chamber, advice, remarks)
+    return Ended(result, chamber, advice, remarks)
+
+
+def sweep_study(
+    folder: StudyFolder,
+    plan: SweepPlan,
+    teller: Teller,
+    workers: int | None = None,
+    cluster: str | None = None,
+) -> Ended[SweepResult]:
+    """Run or resume the sweep of a folder, and save its result there.
+
+    Args:
+        workers: number of worker processes, by default one per core. Fewer are started if not all
+            fit into memory.
+        cluster: --cluster of the command line, for workers of a cluster instead.
+
+    Raises:
+        InputError: no candidate can be simulated, or one needs more memory than there is.
+    """
+    with teller.step("building the chamber"):
+        chamber = build_chamber(folder.study.design)
+    if cluster is None:
+        workers = _workers_that_fit(folder.study, chamber, workers, teller)
+    with open_executor(workers, cluster, "processes") as executor:
+        study, advice = _prepare(folder, chamber, executor, teller)
+        with teller.step("candidates", len(plan.points)) as progress:
+            result = run_sweep(study, plan, folder, executor, progress)
+    with teller.step("writing and drawing"):
+        remarks = save_sweep(folder.path, result)
+    return Ended(result, chamber, advice, remarks)
+
+
+def read_sweep(folder: StudyFolder, plan: SweepPlan) -> SweepResult:
+    """Return the result of a finished sweep from its folder.
+
+    Raises InputError if a file of the sweep was changed.
+    """
+    load_trials(folder.path)
+    trials = tuple(folder.recorded.trials)
+    return SweepResult(folder.study, plan, folder.path, trials, folder.seconds)
+
+
+def _prepare(
+    folder: StudyFolder, chamber: Chamber, executor: Executor, teller: Teller
+) -> tuple[Study, list[Advice]]:
+    """Return the study of a folder with its effects chosen, and why. Compile the simulator."""
+    study, advice = folder.with_effects_resolved(
+        lambda design: resolve_effects(design, chamber, executor, teller)
+    )
+    teller.compile(study.design, chamber, None)
+    if done := len(folder.recorded.trials):
+        teller.tell(f"{folder.path}: resuming after {done} evaluations")
+    return study, advice
 
 
 def _candidates_at_once(study: Study, chamber: Chamber, teller: Teller) -> int:
@@ -82,4 +135,22 @@ def _candidates_at_once(study: Study, chamber: Chamber, teller: Teller) -> int:
     if count < settings.batch:
         text = f"there is memory for {count} of the {settings.batch} candidates of optimizer.batch"
         teller.tell(f"{text} at a time; the others wait, and figures stay the same")
+    return count
+
+
+def _workers_that_fit(
+    study: Study, chamber: Chamber, wanted: int | None, teller: Teller
+) -> int | None:
+    """Return the number of worker processes to start: as many as wanted and fit into memory.
+
+    Raises InputError if not even one fits.
+    """
+    design = study.at_search_accuracy(study.design)
+    each = PROCESS + evaluation_bytes(design, chamber, most_replicas(design))
+    asked = core_count() if wanted is None else wanted
+    count = how_many_fit(asked, each, PROCESS)
+    if count >= asked:
+        return wanted
+    text = f"there is memory for {count} of {asked} worker processes; figures stay the same"
+    teller.tell(text)
     return count

@@ -21,6 +21,7 @@ def test_the_names_are_listed() -> None:
     [
         ("design", lambda folder: chamberopt.simulate("designs/gear.toml", folder)),  # type: ignore[arg-type]
         ("study", lambda folder: chamberopt.optimise({"vary": {}}, folder)),  # type: ignore[arg-type]
+        ("study", lambda folder: chamberopt.sweep({"vary": {}}, folder, grid=2)),  # type: ignore[arg-type]
         ("result", lambda folder: chamberopt.show(folder)),  # type: ignore[arg-type]
     ],
 )

@@ -10,12 +10,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+import chamberopt
 from chamberopt.cli import main
 from chamberopt.cli.resume import resume_note, unfinished
 from chamberopt.common.errors import InputError
 from chamberopt.common.executor import SerialExecutor, local_executor
 from chamberopt.design.load import load_design
 from chamberopt.results.load import load_result
+from chamberopt.search.run_study import save_inputs
 from chamberopt.search.run_sweep import plan_sweep
 from chamberopt.search.study import Study, load_study
 from chamberopt.search.trial_log import read_trials
@@ -193,8 +195,6 @@ def test_the_same_rows_whatever_works_on_them(tmp_path: Path) -> None:
 
 
 def test_the_command_line_maps_a_study(tmp_path: Path, capsys) -> None:
-    from chamberopt.search.run_study import save_inputs
-
     save_inputs(small_study(), tmp_path)
     command = [
         "sweep",
@@ -215,6 +215,33 @@ def test_the_command_line_maps_a_study(tmp_path: Path, capsys) -> None:
     }
     assert main(["sweep", str(tmp_path / "study.toml")]) == 2
     assert "--grid, --sobol: neither given" in capsys.readouterr().err
+
+
+def test_from_python_it_is_the_same(tmp_path: Path) -> None:
+    """Times, dates and the digests of files with times apart."""
+
+    def result_of(folder: str) -> dict:
+        said = json.loads((tmp_path / folder / "result.json").read_text())
+        del said["sweep"]["seconds"]
+        return {name: said[name] for name in said.keys() - {"created", "files", "sha256"}}
+
+    save_inputs(small_study(), tmp_path)
+    question, seen = tmp_path / "study.toml", []
+    asked = load_study(question), tmp_path / "python"
+    found = chamberopt.sweep(*asked, sobol=2, workers=1, progress=lambda *now: seen.append(now))
+    assert seen == [(1, 2, seen[0][2]), (2, 2, found.best.score)]
+    assert main(["sweep", str(question), "--sobol", "2", "--out", str(tmp_path / "command")]) == 0
+    assert rows(tmp_path / "python") == [trial.row() for trial in found.trials]
+    history = [(tmp_path / name / "history.jsonl").read_bytes() for name in ("python", "command")]
+    assert history[0] == history[1]
+    assert result_of("python") == result_of("command")
+
+    assert chamberopt.sweep(*asked, sobol=2).trials == found.trials  # it is finished
+    with pytest.raises(InputError, match=r"sweep\.count: was 2, is 3"):
+        chamberopt.sweep(*asked, sobol=3)
+    (tmp_path / "python" / "history.jsonl").write_bytes(history[0].splitlines(keepends=True)[0])
+    with pytest.raises(InputError, match=r"history\.jsonl: not the file that was written"):
+        chamberopt.sweep(*asked, sobol=2)
 
 
 @pytest.mark.parametrize("kept", [0, 1, 5, 8])

@@ -8,7 +8,6 @@ import pytest
 
 from chamberopt.chamber.build import build_chamber
 from chamberopt.cli import main
-from chamberopt.cli.commands import sweep
 from chamberopt.cli.teller import TerminalTeller
 from chamberopt.common import memory
 from chamberopt.common.executor import SerialExecutor
@@ -120,7 +119,7 @@ def test_fewer_run_at_a_time_where_not_all_fit(
     chamber = build_chamber(study.design)
     for gigabytes, workers, all_candidates in ((1.6, 1, False), (3.0, 3, True), (100.0, 8, True)):
         monkeypatch.setattr(memory, "free_memory", lambda free=gigabytes: free * GIGA)
-        assert sweep._workers_that_fit(study, chamber, 8) == workers
+        assert optimise._workers_that_fit(study, chamber, 8, TerminalTeller()) == workers
         told = capsys.readouterr().err
         assert (f"memory for {workers} of 8 worker processes" in told) == (workers < 8)
         found = optimise._candidates_at_once(study, chamber, TerminalTeller())
