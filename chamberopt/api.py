@@ -81,15 +81,14 @@ def simulate(
     from chamberopt.common.files import claim_folder
     from chamberopt.peening.tolerances import plan_tolerances
     from chamberopt.results.load import load_result
-    from chamberopt.workflows.simulate import Teller, simulate_design
+    from chamberopt.workflows.simulate import SimulationSettings, Teller, simulate_design
 
     _require("design", design, Design, "load_design")
     if tolerances:
         plan_tolerances(design)
     with claim_folder(out) as folder, local_executor(workers) as executor:
-        done = simulate_design(
-            design, folder, executor, Teller(progress), analytic=analytic, tolerances=tolerances
-        )
+        settings = SimulationSettings(analytic, tolerances)
+        done = simulate_design(design, folder, executor, Teller(progress), settings)
     _warn([*map(str, done.advice), *done.remarks])
     return load_result(out)
 

@@ -6,15 +6,13 @@ from collections.abc import Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from chamberopt.chamber.analytic import analytic_cavity
 from chamberopt.chamber.build import build_chamber
 from chamberopt.design.design import Design
 from chamberopt.design.load import load_design
-from chamberopt.peening.calibration_errors import evaluate_calibrated
 from chamberopt.results.arrays_file import load_chamber
 from chamberopt.results.compare.comparison import (
     labels,
@@ -28,8 +26,7 @@ from chamberopt.results.compare.comparison import (
 )
 from chamberopt.results.load import Result, load_result
 from chamberopt.simulation.evaluate import ReplicaPlan
-from chamberopt.workflows.save_run import save_simulation
-from chamberopt.workflows.simulate import Teller, resolve_effects
+from chamberopt.workflows.simulate import SimulationSettings, Teller, simulate_design
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
@@ -54,13 +51,6 @@ class Candidate:
     result: Result | None
     missing: bool
     chamber: Chamber | None = None
-
-
-class SeedSettings(NamedTuple):
-    """The seed of a simulation, and the number of its replicas with their objective."""
-
-    seed: int
-    plan: ReplicaPlan
 
 
 def read_candidates(
@@ -120,60 +110,54 @@ def simulate_missing(
         if one.result is not None and not one.missing:
             results.append(one.result)
             continue
-        settings = SeedSettings(one.design.process.seed, ReplicaPlan())
+        like = one.result or (results[0] if results else None)
         if one.result is not None:
-            settings = _seed_settings(one.result)
             seconds = one.design.process.treatment_time_s
             remarks.append(f"{one.label}: simulated again for {seconds:g} s, on its own seeds")
-        elif results:
-            settings = _seed_settings(results[0])
-            remarks += _overridden(one, settings)
-        new, more = _simulate(one, settings, folder / name, executor, teller)
+        elif like is not None:
+            remarks += _overridden(one, like)
+        new, more = _simulate(one, like, folder / name, executor, teller)
         results.append(new)
         remarks += more
     return results, remarks
 
 
 def _simulate(
-    one: Candidate, settings: SeedSettings, folder: Path, executor: Executor, teller: Teller
+    one: Candidate, like: Result | None, folder: Path, executor: Executor, teller: Teller
 ) -> tuple[Result, list[str]]:
+    """Simulate a candidate, with the seeds and the number of replicas of the result `like`."""
     assert one.chamber is not None
-    design = _with_seeds(one.design, settings)
-    analytic = one.result is not None and one.result.record.analytic
-    cavity = analytic_cavity(design, one.chamber) if analytic else None
+    design, plan = one.design, ReplicaPlan()
+    if like is not None:
+        record = like.record
+        plan = ReplicaPlan(record.replicas, record.stream, like.objective_name)
+        design = design.changed(
+            {
+                "process.seed": record.seed,
+                "process.accuracy.replicas": record.replicas,
+                "process.accuracy.objective_half_width": None,
+            }
+        )
     teller.check(design, one.chamber)
-    design, advice = resolve_effects(design, one.chamber, executor, teller)
-    teller.compile(design, one.chamber, cavity)
-    with teller.step(f"{one.label}: replicas", design.process.accuracy.replicas) as progress:
-        evaluation = evaluate_calibrated(
-            design, one.chamber, executor, progress, settings.plan, cavity
-        )
-    remarks = save_simulation(folder, design, one.chamber, evaluation, advice)
-    return load_result(folder), [f"{one.label}: {text}" for text in (*map(str, advice), *remarks)]
+    analytic = one.result is not None and one.result.record.analytic
+    settings = SimulationSettings(analytic, plan=plan, step=f"{one.label}: replicas")
+    done = simulate_design(design, folder, executor, teller, settings, one.chamber)
+    said = *map(str, done.advice), *done.remarks
+    return load_result(folder), [f"{one.label}: {text}" for text in said]
 
 
-def _with_seeds(design: Design, settings: SeedSettings) -> Design:
-    """Return the design with this seed and number of replicas in place of its own."""
-    values: dict[str, Any] = {"process.seed": settings.seed}
-    if settings.plan.count is not None:
-        values["process.accuracy.replicas"] = settings.plan.count
-        values["process.accuracy.objective_half_width"] = None
-    return design.changed(values)
-
-
-def _overridden(one: Candidate, settings: SeedSettings) -> list[str]:
-    """Return remarks on values of a design that are replaced by the first candidate's settings."""
+def _overridden(one: Candidate, first: Result) -> list[str]:
+    """Return remarks on values of a design that are replaced by the first candidate's."""
     process, accuracy = one.design.process, one.design.process.accuracy
+    seed, replicas = first.record.seed, first.record.replicas
     changes = []
-    if process.seed != settings.seed:
-        changes.append(f"seed = {settings.seed} instead of {process.seed}")
-    if settings.plan.count is not None and accuracy.objective_half_width is not None:
-        changes.append(
-            f"{settings.plan.count} replicas instead of as many as give "
-            f"± {accuracy.objective_half_width:g}"
-        )
-    elif settings.plan.count not in (None, accuracy.replicas):
-        changes.append(f"{settings.plan.count} replicas instead of {accuracy.replicas}")
+    if process.seed != seed:
+        changes.append(f"seed = {seed} instead of {process.seed}")
+    if accuracy.objective_half_width is not None:
+        asked = f"as many as give ± {accuracy.objective_half_width:g}"
+        changes.append(f"{replicas} replicas instead of {asked}")
+    elif replicas != accuracy.replicas:
+        changes.append(f"{replicas} replicas instead of {accuracy.replicas}")
     return [f"{one.label}: {' and '.join(changes)}, as the first candidate"] if changes else []
 
 
@@ -211,12 +195,6 @@ def _mesh(one: Candidate) -> tuple[str, str]:
 
 def _target(result: Result) -> np.ndarray:
     return load_chamber(result).part.target
-
-
-def _seed_settings(result: Result) -> SeedSettings:
-    seed, stream = result.seeds
-    plan = ReplicaPlan(result.record.replicas, stream, result.objective_name)
-    return SeedSettings(seed, plan)
 
 
 def _folder_names(candidates: Sequence[Candidate]) -> list[str]:

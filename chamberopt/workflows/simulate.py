@@ -7,7 +7,7 @@ has a Teller that prints.
 from __future__ import annotations
 
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,6 +17,7 @@ from chamberopt.coverage.field.memory import PROCESS, evaluation_bytes, how_many
 from chamberopt.peening.calibration_errors import evaluate_calibrated
 from chamberopt.peening.tolerances import simulate_tolerances
 from chamberopt.simulation.effect_pilot import with_effects_resolved
+from chamberopt.simulation.evaluate import ReplicaPlan
 from chamberopt.simulation.replicas import most_replicas
 from chamberopt.workflows.save_run import save_simulation
 
@@ -77,6 +78,22 @@ def _uncounted(done: int, total: int, best: float | None) -> None:
 
 
 @dataclass(frozen=True)
+class SimulationSettings:
+    """How a design is simulated.
+
+    analytic: use the exact cylinder, box or prism instead of its mesh, if the chamber is one.
+    tolerances: also simulate the effect of the design's tolerances.
+    plan: the replicas to simulate, by default those of the design.
+    step: name of the step in which replicas are simulated.
+    """
+
+    analytic: bool = False
+    tolerances: bool = False
+    plan: ReplicaPlan = field(default_factory=ReplicaPlan)
+    step: str = "replicas"
+
+
+@dataclass(frozen=True)
 class Simulated:
     """A design that was simulated and saved.
 
@@ -98,33 +115,34 @@ def simulate_design(
     folder: Path,
     executor: Executor,
     teller: Teller,
-    *,
-    analytic: bool = False,
-    tolerances: bool = False,
+    settings: SimulationSettings,
+    chamber: Chamber | None = None,
 ) -> Simulated:
     """Build, simulate and save a design in a new or empty folder.
 
     Args:
-        analytic: use the exact cylinder, box or prism instead of its mesh, if the chamber is one.
-        tolerances: also simulate the effect of the design's tolerances.
+        chamber: chamber of the design that was built and checked before; None to do so here.
 
     Raises:
         InputError: the chamber cannot be built, has no room for the shot, is not analytic or needs
             too much memory.
     """
-    with teller.step("building the chamber"):
-        chamber = build_chamber(design)
-        cavity = analytic_cavity(design, chamber) if analytic else None
-        how_many_fit(1, evaluation_bytes(design, chamber, most_replicas(design)), PROCESS)
-        warnings = teller.check(design, chamber)
+    warnings = None
+    if chamber is None:
+        with teller.step("building the chamber"):
+            chamber = build_chamber(design)
+            how_many_fit(1, evaluation_bytes(design, chamber, most_replicas(design)), PROCESS)
+            warnings = teller.check(design, chamber)
+    cavity = analytic_cavity(design, chamber) if settings.analytic else None
     design, advice = resolve_effects(design, chamber, executor, teller)
     teller.compile(design, chamber, cavity)
     found = None
-    with teller.step("replicas", design.process.accuracy.replicas) as progress:
-        if tolerances:
-            evaluation, found = simulate_tolerances(design, chamber, executor, progress, analytic)
+    with teller.step(settings.step, design.process.accuracy.replicas) as progress:
+        what = design, chamber, executor, progress
+        if settings.tolerances:
+            evaluation, found = simulate_tolerances(*what, settings.analytic)
         else:
-            evaluation = evaluate_calibrated(design, chamber, executor, progress, cavity=cavity)
+            evaluation = evaluate_calibrated(*what, settings.plan, cavity)
     with teller.step("writing and drawing"):
         remarks = save_simulation(folder, design, chamber, evaluation, advice, warnings, found)
     return Simulated(design, chamber, evaluation, found, advice, remarks)

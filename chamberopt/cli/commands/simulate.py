@@ -38,7 +38,7 @@ def simulate(
     from chamberopt.documents.terminal_lines import evaluation_lines, note_lines, zone_limit_lines
     from chamberopt.documents.tolerances import tolerance_lines
     from chamberopt.peening.tolerances import plan_tolerances
-    from chamberopt.workflows.simulate import simulate_design
+    from chamberopt.workflows.simulate import SimulationSettings, simulate_design
 
     candidate = load_design(design)
     if tolerances:
@@ -49,9 +49,8 @@ def simulate(
         console.results_folder(out, design.stem) as folder,
         open_executor(workers, cluster) as executor,
     ):
-        done = simulate_design(
-            candidate, folder, executor, TerminalTeller(), analytic=analytic, tolerances=tolerances
-        )
+        settings = SimulationSettings(analytic, tolerances)
+        done = simulate_design(candidate, folder, executor, TerminalTeller(), settings)
     console.print_remarks(done.remarks)
     notes = note_lines([*map(str, done.advice), *done.chamber.notes, *done.evaluation.notes])
     limits = zone_limit_lines(done.design, done.evaluation)

@@ -20,7 +20,7 @@ from chamberopt.design.design import Design, validate
 from chamberopt.design.load import load_design, save_design
 from chamberopt.results.compare.comparison import comparison_of
 from chamberopt.results.load import load_result
-from chamberopt.workflows import compared_candidates
+from chamberopt.workflows import simulate
 from chamberopt.workflows.compared_candidates import read_candidates, simulate_missing
 from chamberopt.workflows.save_run import save_simulation
 from chamberopt.workflows.simulate import Teller
@@ -51,7 +51,7 @@ class Simulations:
 @pytest.fixture
 def simulations(monkeypatch: pytest.MonkeyPatch) -> Simulations:
     found = Simulations()
-    monkeypatch.setattr(compared_candidates, "evaluate_calibrated", found.evaluate)
+    monkeypatch.setattr(simulate, "evaluate_calibrated", found.evaluate)
     monkeypatch.setattr("chamberopt.workflows.save_run.draw_coverage", lambda *_: None)
     return found
 
