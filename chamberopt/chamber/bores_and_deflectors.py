@@ -152,9 +152,9 @@ def fitting_names(design: Design) -> list[str]:
 
 @dataclass(frozen=True)
 class CavitySolid:
-    """The cavity as a solid, and properties of the triangles of each solid from which it was made.
+    """The cavity as a solid, and the solids from which it was made.
 
-    `pieces` has these properties by the label of the solid.
+    `pieces` has, by the label of such a solid, what surface its triangles become.
     """
 
     body: Solid

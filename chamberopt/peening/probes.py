@@ -145,7 +145,7 @@ class PartProbe:
     def read(self, impacts: Impacts) -> Reading:
         """Return the logarithms of the figures that `names` asks for.
 
-        The figures are dented area over area per second [1/s], mean and 90th percentile of the dent
+        The figures can be the share of the area that is dented in a second [1/s], mean and 90th percentile of the dent
         diameters [mm], and impacts on the part per second [1/s].
         """
         dents = [hits.on(self.target).dent.astype(float) for hits in impacts.replicas]

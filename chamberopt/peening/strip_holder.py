@@ -98,7 +98,7 @@ def _require_room(size: StripSize, outline: np.ndarray) -> None:
     reach = (normal * outline).sum(axis=1)  # distance of each side from the middle
 
     def share(edge: np.ndarray) -> float:
-        """Return the factor by which an edge (n, 2) could be enlarged and still fit."""
+        """Return the factor by which an outline, corners (n, 2), could grow and still fit."""
         return float((reach / (edge @ normal.T).max(axis=0)).min())
 
     if share(_edge_mm(size)) >= 1.0 - FIT_MM:

@@ -99,7 +99,10 @@ def dent_colours() -> Colormap:
 
 
 def _views(part: DrawnPart, wanted: Vector | None) -> list[np.ndarray]:
-    """Return the wanted direction to the eye; None: directions that show the target."""
+    """Return the directions to the eye from which the target is drawn.
+
+    These are the wanted direction alone, or if `wanted` is None, directions that show the target.
+    """
     if wanted is not None:
         return [np.array(wanted)]
     eyes = near_directions(part.whole)

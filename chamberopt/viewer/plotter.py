@@ -314,7 +314,7 @@ def _legend(result: OpenedResult, state: ViewState) -> list[tuple[str, str]]:
 
 
 def _cut(actors: Sequence[Any], cut: Plane, result: OpenedResult) -> None:
-    """Cut away what lies on one side of a plane, to which the normal points, from VTK actors."""
+    """Cut away one side of a plane from VTK actors: the side to which the plane's normal points."""
     normal, origin = cut
     point = result.chamber.center if origin is None else origin
     plane = pyvista().core.utilities.helpers.generate_plane(-np.array(normal), point)

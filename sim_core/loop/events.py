@@ -329,9 +329,10 @@ def _until_meeting(meetings: Meetings | None, ball: int, time: float) -> float:
 
 @inlined
 def _predict_wall(state: SimulationState, ball: int, time: float) -> None:
-    """Find the obstacle that the ball meets next, or another end of its path.
+    """Find the next event of a ball besides meetings with other balls, and write it into the queue.
 
-    Write this event into the queue.
+    It is the obstacle that the ball meets next, or the end of the piece of its path for which the
+    search was made. ``time``: present time [s].
     """
     queue, clock, obstacles = state.queue, state.clock, state.obstacles
     face_overlap = face_overlap_of_ball(state.sizes, obstacles.face_overlap, ball)

@@ -142,7 +142,7 @@ class TargetField:
 
     @cached_property
     def wide(self) -> Gauge:
-        """Windows of twice the radius that the design sets, round points of the target."""
+        """Windows (discs in which dents are counted) of twice the design's radius, round points."""
         return self._gauge_of(int(OF_WIDE * self.setting.points), 2.0 * self.radius)
 
     def _gauge_of(self, count: int, radius: float) -> Gauge:
@@ -213,8 +213,9 @@ class TargetField:
         return Places(place, normal, self._faces_after(self.symmetry)[turn, points.face])
 
     def _faces_after(self, symmetry: Symmetry) -> np.ndarray:
-        """Return the number of the smooth face to which each number of turns by the symmetry brings
-        each smooth face, (n, faces).
+        """Return where the symmetry's turns bring the smooth faces, (n, faces).
+
+        Row k has, for each smooth face, the number of the face on which it lies after k turns.
         """
         after = np.tile(np.arange(int(self.face.max()) + 1), (symmetry.copies, 1))
         middles, triangles = symmetry.on_each(self.face)
