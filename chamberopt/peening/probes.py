@@ -145,8 +145,8 @@ class PartProbe:
     def read(self, impacts: Impacts) -> Reading:
         """Return the logarithms of the figures that `names` asks for.
 
-        The figures can be the share of the area that is dented in a second [1/s], mean and 90th percentile of the dent
-        diameters [mm], and impacts on the part per second [1/s].
+        The figures can be the share of the area that is dented in a second [1/s], mean and 90th
+        percentile of the dent diameters [mm], and impacts on the part per second [1/s].
         """
         dents = [hits.on(self.target).dent.astype(float) for hits in impacts.replicas]
         dents = [one[one > 0.0] for one in dents]

@@ -171,8 +171,9 @@ def _obstacle_delay(
 ) -> tuple[float, bool]:
     """Return when a ball touches one obstacle of the part within a piece of its path.
 
-    Returns: (delay, sure). The delay [s] counts from now. It is NEVER if the ball does not touch the obstacle. If
-    ``sure`` is False, the search ran out of steps, and a contact can only come later.
+    Returns: (delay, sure). The delay [s] counts from now. It is NEVER if the ball does not touch
+    the obstacle. If ``sure`` is False, the search ran out of steps, and a contact can only come
+    later.
     A gap of at most CONTACT counts as contact.
 
     Args:

@@ -134,7 +134,7 @@ def _leaning(angle: float) -> str:
 def _beneath(
     surface: SurfaceTriangles, beside: _Beside, radius: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Return the walls and edges beneath vibrating faces, as the last four fields of SonotrodeBorder.
+    """Return walls and edges beneath vibrating faces, as the last four fields of SonotrodeBorder.
 
     A wall is extended down in its plane, to the line where this plane meets the next wall's plane.
     If the corner of the two walls is convex towards the shot, this line is an edge. A concave
