@@ -8,10 +8,11 @@
     result.notes                               # cautions about the figures
     chamberopt.show(result, "more-shot.png")
 
-A laboratory that measures instead of simulating asks a Search and tells it figures: docs/search.md.
+A laboratory can measure candidates instead of simulating them: a Search proposes candidates, and
+the laboratory tells it the measured figures, see docs/search.md.
 
-The result's coverage.vtp has the coverage on a mesh that suits it. part.vtp has mean coverage over
-each of the part's own triangles. pyvista and ParaView read both files.
+The result's coverage.vtp has the coverage on a fine mesh of the part. part.vtp has the mean
+coverage of each of the part's own triangles. pyvista and ParaView read both files.
 """
 
 from __future__ import annotations
@@ -64,7 +65,7 @@ def simulate(
     workers: int | None = None,
     progress: Progress | None = None,
 ) -> Result:
-    """Simulate one design into a folder, and return the result that is read from the folder.
+    """Simulate one design, write the result to a folder, and return it as read from there.
 
     Args:
         out: new or empty folder.
@@ -75,7 +76,7 @@ def simulate(
         progress: called as progress(done, total, None) after each replica.
     Raises:
         InputError: the chamber cannot be built, has no room for the shot or is not analytic.
-        sim_core.SimulationError: a run must stop.
+        sim_core.SimulationError: a simulation had to stop.
     """
     from chamberopt.common.executor import local_executor
     from chamberopt.common.files import claim_folder
@@ -96,7 +97,7 @@ def simulate(
 def optimise(
     study: Study, out: str | Path, *, workers: int | None = None, progress: Progress | None = None
 ) -> Result:
-    """Run a study into a folder, and return the confirmed result of its best design.
+    """Run a study, write it to a folder, and return the confirmed result of its best design.
 
     Args:
         out: new or empty folder, or the folder of the same study. An interrupted study is resumed.
@@ -131,7 +132,7 @@ def sweep(
     workers: int | None = None,
     progress: Progress | None = None,
 ) -> SweepResult:
-    """Simulate candidates on a grid or spread evenly over a study's [vary], into a folder.
+    """Simulate candidates on a grid or spread evenly over a study's [vary]; save them in a folder.
 
         swept = chamberopt.sweep(chamberopt.load_study("studies/gear.toml"), "map", sobol=64)
         for trial in swept.trials:
@@ -207,7 +208,7 @@ def peen_strip(
 
     Args:
         out: new or empty folder.
-        place: kind and place of the strip; None: a whole A strip as the lid.
+        place: type, size and place of the strip. None for an A strip of full size in the lid.
         workers: number of threads, by default one per core; it does not change the result.
         progress: called as progress(done, total, None) after each replica.
     Raises:
@@ -232,10 +233,10 @@ def calibrate(measured: str | Path, out: str | Path, *, workers: int | None = No
 
     Args:
         measured: file of measurements (.toml), see docs/peening.md.
-        out: new or empty folder; machine.toml in it is for designs.
+        out: new or empty folder. It receives machine.toml, which designs name as their calibration.
         workers: number of threads, by default one per core; it does not change the result.
     Raises:
-        InputError: the measurements or a design of theirs cannot be used.
+        InputError: the measurements, or a design that they name, cannot be used.
     """
     from chamberopt.common.executor import local_executor
     from chamberopt.common.files import claim_folder
@@ -252,7 +253,7 @@ def calibrate(measured: str | Path, out: str | Path, *, workers: int | None = No
 def measure_accuracy(
     design: Design, out: str | Path, *, budget_s: float = 300.0
 ) -> ConvergenceStudy:
-    """Measure error against computing time for the numerical parameters of a design.
+    """Measure how the error of a design's coverage etc. depends on numerical settings and CPU time.
 
     Args:
         out: new or empty folder.
@@ -273,7 +274,7 @@ def measure_accuracy(
 
 
 def show(result: Result, screenshot: str | Path | None = None) -> None:
-    """Show the part of a result in its chamber, coloured by coverage, in a window.
+    """Show the part of a result in its chamber in a window, coloured by coverage.
 
     Args:
         screenshot: image file to write instead of opening a window.
@@ -288,12 +289,15 @@ def show(result: Result, screenshot: str | Path | None = None) -> None:
 
 
 def _require(name: str, given: object, kind: type, source: str) -> None:
-    """Raise InputError unless an argument has the type `kind`. A path is a common mistake.
+    """Raise InputError unless an argument has the type `kind`.
+
+    A common mistake is a path in place of a loaded object.
+
 
     Args:
         name: name of the argument.
-        given: its value.
-        source: function of this package that returns such a value.
+        given: value of the argument.
+        source: function of this package that returns a value of the type.
     """
     if not isinstance(given, kind):
         raise InputError(

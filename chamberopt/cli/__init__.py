@@ -1,4 +1,4 @@
-"""Run the command line. commands/ has a file for each command, this folder their common code.
+"""Run the command line. commands/ has a file for each command, and this folder their shared code.
 
 Results go to stdout. Progress, remarks and errors go to stderr.
 

@@ -23,7 +23,7 @@ UNUSABLE_NAME = (errno.ENAMETOOLONG, errno.ELOOP)
 
 
 def run_command(arguments: Sequence[str] | None = None) -> int:
-    """Run one command, by default with the arguments of sys.argv, and return its exit status."""
+    """Run the command in `arguments`, by default sys.argv, and return its exit status."""
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):
             # A terminal that cannot show "±" must not end the command before it prints its results.
@@ -67,7 +67,7 @@ def run_command(arguments: Sequence[str] | None = None) -> int:
 def _without_progress(given: list[str]) -> list[str]:
     """Return the arguments without `--progress jsonl`, which every command accepts.
 
-    If they have it, progress is written as lines of JSON from now on.
+    If the option is there, progress is written as lines of JSON from now on.
     """
     if PROGRESS not in given:
         return given
@@ -81,7 +81,7 @@ def _without_progress(given: list[str]) -> list[str]:
 def _fail(message: str, status: int, error: BaseException | None = None) -> int:
     """Print a message and the notes of an error to stderr, and return `status`.
 
-    Notes name the candidate concerned and how to go on.
+    The notes name the candidate that failed and say how to go on.
     """
     show([message, *getattr(error, "__notes__", ())], sys.stderr)
     return status

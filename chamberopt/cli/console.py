@@ -1,4 +1,4 @@
-"""Print what commands say: results on stdout, remarks on stderr. Claim their results folders."""
+"""Print results of commands on stdout and remarks on stderr. Reserve folders for results."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def claimed_folder(
 
 
 def show(content: Iterable[Table | str], to: TextIO | None = None) -> None:
-    """Print tables and sentences to stdout, or to `to`, and make control characters visible.
+    """Print tables and sentences to stdout, or to `to`, with control characters made visible.
 
     Names of files, keys and groups may hold control characters, which a terminal would obey.
     """
@@ -75,7 +75,7 @@ def show(content: Iterable[Table | str], to: TextIO | None = None) -> None:
 
 
 def print_remarks(remarks: Iterable[str]) -> None:
-    """Print remarks, such as a skipped picture, to stderr, so that --json stays clean."""
+    """Print remarks, such as a skipped picture, to stderr: with --json, stdout holds only JSON."""
     for remark in remarks:
         show([remark], sys.stderr)
 
@@ -97,7 +97,7 @@ def print_json(values: Mapping[str, object]) -> None:
 
 
 def _json_value(value: object) -> object:
-    """Return an estimate or a record as JSON values. Raise TypeError for other types."""
+    """Return an estimate, record or dataclass as JSON values. Raise TypeError for other types."""
     from chamberopt.common.estimate import Estimate
     from chamberopt.common.record_types import Table
 
@@ -124,7 +124,7 @@ def print_result(
 
 
 def print_finished(folder: Path, what: str, lines: Sequence[str], as_json: bool) -> None:
-    """Print the result of a study or sweep that was already finished."""
+    """Print the stored result of a study or sweep that had finished before this command."""
     again = "to run it again, give another folder (--out)"
     print_remarks([f"{folder}: this {what} is finished, nothing was run; {again}"])
     print_result(lines, folder, as_json)
@@ -133,7 +133,7 @@ def print_finished(folder: Path, what: str, lines: Sequence[str], as_json: bool)
 def table_lines(table: Mapping[str, Any], prefix: str = "") -> list[str]:
     """Return a nested table as lines of text in aligned columns.
 
-    Each of its notes and warnings is a line.
+    A note or warning in the table is a line of its own.
     """
     lines: list[str] = []
     for name, value in table.items():

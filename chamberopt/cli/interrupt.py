@@ -26,8 +26,8 @@ IMPORTS, COMPILERS = "<frozen importlib", ("numba", "llvmlite")
 def interruptible() -> Iterator[None]:
     """Let Ctrl-C end the command, by KeyboardInterrupt or by ending the process at once.
 
-    The process ends at once if KeyboardInterrupt would be lost. It would be lost during an import,
-    and a command begins with imports. It was lost if the user presses Ctrl-C a second time. No file
+    The process ends at once if Python would lose KeyboardInterrupt. An import, with which a command
+    begins, loses it. If the user presses Ctrl-C a second time, the first was lost. No file
     is damaged, because files get their names when they are complete. Threads that simulate end with
     the process.
     """
@@ -59,7 +59,7 @@ def interruptible() -> Iterator[None]:
 def ignore_late_ctrl_c() -> None:
     """Ignore Ctrl-C at the end of a process whose command is done.
 
-    Python still joins threads at this point, and the signal would change the exit status.
+    Python still waits for threads at this point, and the signal would change the exit status.
     """
     if threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -101,7 +101,10 @@ class Interrupt:
         signal.signal(signal.SIGINT, self._before)
 
     def wait_for_evaluation(self, how_to_resume: str) -> None:
-        """Let Ctrl-C wait for the running evaluations from now on, unless it comes twice."""
+        """From now on, let the first Ctrl-C stop the study only after its running evaluations.
+
+        A second Ctrl-C ends the process at once and prints `how_to_resume`.
+        """
         self._waits, self._how_to_resume = True, how_to_resume
 
     def _on_signal(self, number: int, frame: FrameType | None) -> None:

@@ -11,7 +11,7 @@ from cyclopts import App, CoercionError, Parameter, Token, convert
 def _convert(kind: object, tokens: Sequence[Token]) -> object:
     """Return the value of an option, converted from its text.
 
-    Raises CoercionError for a whole number such as 1.5, which cyclopts would round.
+    Raises CoercionError if a whole number is wanted and 1.5 given, which cyclopts would round.
     """
     if int in (kind, *get_args(kind)):
         for token in tokens:

@@ -1,4 +1,4 @@
-"""Prepare a simulation: compile with a message, make pilot runs, load a replica."""
+"""Prepare a simulation: compile the simulator, make pilot simulations, load a replica."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def compile_with_message(
     """Compile the simulator for a design, with a message because the first time takes a minute.
 
     Raises:
-        InputError: the shot does not fit, or the part cannot turn. It is raised before compiling.
+        InputError: the shot does not fit, or the part cannot turn. It is raised early.
     """
     import sim_core
     from chamberopt.chamber.part import turning_axis
@@ -47,7 +47,7 @@ def compile_with_message(
 
 
 def advise_effects(design: Design, chamber: Chamber) -> list[dict[str, object]]:
-    """Find by pilot runs which optional physical effects matter for a design.
+    """Find by pilot simulations which optional physical effects matter for a design.
 
     Return the advice on each effect as JSON values.
     """
@@ -80,9 +80,8 @@ def advise_effects(design: Design, chamber: Chamber) -> list[dict[str, object]]:
 
 
 def seconds_of(progress: Progress, whole: float) -> Callable[[float], None]:
-    """Return a function of simulated seconds that reports them to `progress`.
+    """Return a function for sim_core.simulate to call, which reports simulated time to `progress`.
 
-    sim_core.simulate calls such a function.
 
     Args:
         whole: simulated time of the whole step [s].

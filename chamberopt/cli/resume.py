@@ -16,9 +16,9 @@ if TYPE_CHECKING:
 
 
 def resume_command(study: Path, folder: Path, plan: Mapping[str, object] | None = None) -> str:
-    """Return the command that resumes a run in `folder`, quoted for a shell.
+    """Return the command line that resumes a study or sweep in `folder`, quoted for a shell.
 
-    It is a sweep if `plan` gives its method, count and seed. Without a plan it is a study.
+    `plan` has the method, count and seed of a sweep. It is None for a study.
     """
     if plan is None:
         return quoted("run", study, "--out", folder)
@@ -27,13 +27,13 @@ def resume_command(study: Path, folder: Path, plan: Mapping[str, object] | None 
 
 
 def quoted(*words: object) -> str:
-    """Return a chamberopt command of these words, quoted for a shell."""
+    """Return the command line "chamberopt WORDS", with each word quoted for a shell."""
     return shlex.join(["chamberopt", *map(str, words)])
 
 
 @contextmanager
 def resume_note(folder: StudyFolder, command: str) -> Iterator[None]:
-    """Add a note on how to resume to an error in the enclosed code, if the study has begun.
+    """Add `command` as a note to an error in the `with` block, if the study can be resumed.
 
     An InputError gets no note.
     """
@@ -48,10 +48,10 @@ def resume_note(folder: StudyFolder, command: str) -> Iterator[None]:
 
 
 def unfinished(study: Path, name: str) -> list[str]:
-    """Return remarks on interrupted runs of a study, for a command that begins a new run.
+    """Return remarks on folders where a study was interrupted, for a command that begins it anew.
 
     Args:
-        name: name of the folder in results/ that the command would use.
+        name: name of the folder in results/ that the command uses first.
     """
     from chamberopt.common.files import INPUTS
     from chamberopt.common.limits import MAX_RESULT_BYTES, read_limited

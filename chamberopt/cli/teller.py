@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 class TerminalTeller(Teller):
-    """Show the steps, compilation and warnings that a workflow reports on stderr."""
+    """Show on stderr the steps, compilation and warnings that a workflow reports."""
 
     def step(self, what: str, total: int | None = None) -> AbstractContextManager[Progress]:
         return step(what, total)
@@ -37,7 +37,7 @@ class TerminalTeller(Teller):
 
 
 class SearchTeller(TerminalTeller):
-    """Show a search on stderr. On Ctrl-C, wait for running evaluations and say how to resume it."""
+    """Show a study on stderr. On Ctrl-C, wait for running evaluations and say how to resume it."""
 
     def __init__(self, interrupt: Interrupt, how_to_resume: str) -> None:
         super().__init__()

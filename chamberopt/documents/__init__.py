@@ -1,1 +1,1 @@
-"""Write what is said of a result: sentences, tables and charts, in a file for each subject."""
+"""Compose texts on a result: sentences, tables and charts, with a file for each subject."""

@@ -1,4 +1,4 @@
-"""Text about an accuracy study: how the error of the figures falls with the simulation's cost."""
+"""Text about an accuracy study: how the error of coverage etc. falls with the simulation's cost."""
 
 from __future__ import annotations
 
@@ -48,9 +48,9 @@ def _signed(bias: Estimate) -> str:
 
 
 def describe_reference(study: ConvergenceStudy) -> str:
-    """Return a sentence with the settings and estimates of the reference run.
+    """Return a sentence with the settings and estimates of the reference simulation.
 
-    All other runs of the study are compared with this run.
+    All other simulations of the study are compared with the reference.
     """
     run = study.reference
     settings = ", ".join(
@@ -68,7 +68,8 @@ def describe_reference(study: ConvergenceStudy) -> str:
 def describe_error_law(study: ConvergenceStudy) -> str:
     """Return a sentence with the factor in cost that halves the error.
 
-    It gives a reason if the factor is not the 4 of independent replicas.
+    The factor is 4 if the error comes from independent replicas alone. If it is another factor, the
+    sentence gives the reason.
     """
     law, sizes = study.law, study.sizes
     middle, low, high = law.halving

@@ -1,4 +1,4 @@
-"""Say what a result answers in one sentence, with sentences on constraints and zones."""
+"""Give the answer of a result in one sentence, with sentences on constraints and zones."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 def answer(result: Result, start: Result | None) -> str:
     """Return the answer of a result in one sentence, with its uncertainty.
 
-    Study: the objective of start and best, and whether the change is more than noise.
-    Simulation: the coverage.
+    For a study, the sentence gives the objective of the start design and of the best design, and
+    whether the change is more than noise. For a simulation, the sentence gives the coverage.
     """
     label = objective_label(result.objective_name)
     if start is None:
@@ -70,7 +70,8 @@ def answer(result: Result, start: Result | None) -> str:
 def answer_lines(result: Result) -> list[AnswerLine]:
     """Return sentences that qualify the answer.
 
-    They tell which limits of zones and constraints are met, and doubts about the calibration.
+    The sentences say which limits of zones and constraints are met, and name doubts about the
+    calibration.
     """
     lines = [*zone_lines(result), *_constraint_lines(result)]
     calibration = result.design.calibration
@@ -81,7 +82,7 @@ def answer_lines(result: Result) -> list[AnswerLine]:
 
 
 def _constraint_lines(result: Result) -> Iterator[AnswerLine]:
-    """Yield sentences on constraints that the best, the start or a better candidate violates.
+    """Yield sentences on constraints violated by the best design, the start or a better candidate.
 
     Limits of the best design's zones are left out, because each zone has its own sentence.
     """
@@ -107,7 +108,7 @@ def _constraint_lines(result: Result) -> Iterator[AnswerLine]:
 
 
 def full_coverage(result: Result) -> str:
-    """Return half a sentence with the time at which 95 % of the target's area is 98 % covered."""
+    """Return part of a sentence: the time after which 95 % of the target is 98 % covered."""
     time = result.metrics.get("time_to_98_s")
     if time is None:
         return "this older result does not say when it would be covered to 98 %"

@@ -1,4 +1,4 @@
-"""Text about a calibration: parameters, misfits, predictions, cautions."""
+"""Text about a calibration: its parameters, its misfits to measurements, predictions, cautions."""
 
 from __future__ import annotations
 

@@ -1,4 +1,8 @@
-"""Tables of a comparison: design values that differ, figures, and whether they differ really."""
+"""Tables of a comparison: design values that differ, figures, and which differences are real.
+
+Figures are the objective and the metrics, such as mean coverage. A difference is real if it is more
+than noise.
+"""
 
 from __future__ import annotations
 
@@ -14,9 +18,10 @@ HEADER = ("difference", "real", "to know: simulate")
 
 
 def comparison_lines(comparison: Comparison) -> list[Table | str]:
-    """Return design values that differ, figures and differences, with their legend.
+    """Return tables of the design values that differ, of the figures and differences, and a legend.
 
-    Two candidates share a single table. For more, a table of differences follows the figures.
+    For two candidates, figures and differences stand in a single table. For more candidates, a
+    table of differences follows the table of figures.
     """
     first, *later = comparison.labels
     rows = [
@@ -46,7 +51,7 @@ def comparison_lines(comparison: Comparison) -> list[Table | str]:
 
 
 def _legend(comparison: Comparison) -> list[str]:
-    """Return lines that explain the signs and words of the tables."""
+    """Return lines that explain the signs and terms in the tables."""
     first, *later = comparison.labels
     lines = [
         "(±: 95 % interval. real: the difference is larger than its interval, which holds for each "
@@ -83,7 +88,7 @@ def _legend(comparison: Comparison) -> list[str]:
 def _cells(gap: Difference) -> list[str]:
     """Return the three cells of a difference in a table.
 
-    They are its value, whether it is more than noise, and the replicas that would prove it.
+    The cells are its value, whether it is more than noise, and the replicas that would prove it.
     """
     shown = estimate_text(Estimate(gap.value, gap.half_width, in_words=gap.in_words), sign=True)
     if gap.half_width == 0.0 and not gap.in_words:

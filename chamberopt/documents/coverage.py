@@ -1,4 +1,7 @@
-"""Text about coverage: the figures of the result and of its start, with their change."""
+"""Text about coverage: figures of the result and of the start design, with their change.
+
+Figures are the objective and the metrics, such as mean coverage.
+"""
 
 from __future__ import annotations
 
@@ -31,7 +34,7 @@ SHOWN_AS_TILES = ("mean_coverage", "p05_coverage", "time_to_98_s")  # besides th
 
 @dataclass(frozen=True)
 class Figure:
-    """A figure of the result in its stored unit, with its value at the start and the change."""
+    """A figure of the result in its stored unit, its value for the start design and the change."""
 
     name: str
     label: Label
@@ -43,7 +46,7 @@ class Figure:
 def figures(result: Result, start: Result | None) -> list[Figure]:
     """Return the figures of a result: its objective, then its metrics.
 
-    Metrics of zones, and a metric that is the objective itself, are left out.
+    Metrics of zones are left out, and so is a metric that is the objective itself.
     """
     label = objective_label(result.objective_name)
     before = None if start is None else start.objective
@@ -62,7 +65,7 @@ def figures(result: Result, start: Result | None) -> list[Figure]:
 
 
 def change(after: Estimate, before: Estimate, result: Result, start: Result) -> Estimate:
-    """Return `after` - `before`, a figure of the result and of its start, with its interval.
+    """Return `after` - `before` with its interval: the change of a figure from start to result.
 
     Replicas are compared pair by pair if both results have the same seeds, else as independent.
     """
@@ -74,7 +77,7 @@ def change(after: Estimate, before: Estimate, result: Result, start: Result) -> 
 
 
 def tiles(shown: Sequence[Figure]) -> Tiles:
-    """Return the objective and the main metrics as large numbers for the head of a report."""
+    """Return the objective and the main metrics as tiles: large numbers at the head of a report."""
     chosen = [shown[0], *(one for one in shown[1:] if one.name in SHOWN_AS_TILES)]
     return Tiles(
         [
@@ -97,7 +100,8 @@ def coverage_section(
     and over time.
 
     Args:
-        of: results by name: the start, if there is one, then the result.
+        shown: figures for the table.
+        of: results by name: first the start design's, if there is one, then the result itself.
         scenes: parts in three dimensions, by the name of their result.
     """
     *_, result = of.values()
@@ -156,7 +160,7 @@ def _compared(shown: Sequence[Figure]) -> Table:
 
 
 def _standing(changed: Estimate) -> str:
-    """Return "exact" for a change without noise, "yes" for one beyond its interval, else "no"."""
+    """Return if a change is real: "exact" without noise, "yes" beyond its interval, else "no"."""
     if changed.half_width == 0.0 and not changed.in_words:
         return "exact"
     return "yes" if abs(changed.value) > changed.half_width else "no"
@@ -175,7 +179,8 @@ def _over_time(curves: Mapping[str, Sequence[CoverageAtTime]], treatment_time: f
 def _windows(field: FieldRecord) -> tuple[Sentence, Fold]:
     """Return a sentence on the areas, called windows, in which coverage is measured, and a table.
 
-    The table has the metrics of coverage in windows of twice the radius. It is collapsed at first.
+    The table has the metrics of coverage in windows of twice the radius. It is hidden until the
+    reader opens it.
     """
     text = (
         f"Coverage is the share dented in a window of {plain(field.gauge_mm2)} mm² round each "

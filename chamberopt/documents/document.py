@@ -32,10 +32,10 @@ class Items:
 
 @dataclass(frozen=True)
 class Table:
-    """A table whose first column heads its row.
+    """A table. The first cell of each row names the row.
 
     head: names of the columns. Empty for a table of names and values.
-    numbers: True if the other columns hold numbers, which are aligned to the right.
+    numbers: True if all columns but the first hold numbers, which are aligned to the right.
     """
 
     caption: str
@@ -45,7 +45,7 @@ class Table:
 
 
 def values(caption: str, rows: Mapping[str, str]) -> Table:
-    """Return a table of names and values."""
+    """Return a table with two columns, names and values."""
     return Table(caption, (), [*rows.items()], numbers=False)
 
 
@@ -54,7 +54,7 @@ class Chart:
     """A chart with its caption.
 
     name: name that is unique in the document.
-    tooltips: texts that appear at the markers of a line, by the line's id (gid) in the figure.
+    tooltips: texts that appear over the points of a curve, by the curve's id (gid) in the figure.
     """
 
     name: str
@@ -65,7 +65,7 @@ class Chart:
 
 @dataclass(frozen=True)
 class Tile:
-    """A main figure of a result as text, with its value at the start of a study."""
+    """A number of a result to show large, as text, with its value for a study's start design."""
 
     label: str
     value: str
@@ -74,7 +74,7 @@ class Tile:
 
 @dataclass(frozen=True)
 class Tiles:
-    """The main figures of a result, shown large beside one another."""
+    """The main numbers of a result (tiles), shown large beside one another."""
 
     tiles: Sequence[Tile]
 
@@ -89,7 +89,7 @@ class TextFile:
 
 @dataclass(frozen=True)
 class PartView:
-    """A 3D view of parts in their chambers. They stand side by side and turn together."""
+    """A 3D view of parts in their chambers, side by side. The reader turns all of them together."""
 
     scenes: Sequence[PartScene]
 
@@ -103,7 +103,7 @@ class Beside:
 
 @dataclass(frozen=True)
 class Fold:
-    """Blocks that are hidden until the reader opens their title. `printed` shows them on paper."""
+    """Blocks that are hidden until the reader opens their title, and on paper unless `printed`."""
 
     title: str
     content: Sequence[Block]
@@ -115,7 +115,7 @@ Block: TypeAlias = Sentence | Items | Table | Chart | Tiles | TextFile | PartVie
 
 @dataclass(frozen=True)
 class Section:
-    """Blocks below a title. The section that holds the answer is emphasised."""
+    """Blocks below a title. The section with the document's answer is emphasised."""
 
     title: str
     content: Sequence[Block]
@@ -126,8 +126,8 @@ class Section:
 class AnswerLine:
     """A sentence that qualifies the answer of a result, such as a limit that is not met.
 
-    about: subject of the sentence. "best" is the result itself.
-    warns: True if a limit is not certainly met, or for a caution about the calibration.
+    about: subject of the sentence, such as the name of a zone. "best" is the result itself.
+    warns: True if the sentence is a warning, e.g. that a limit is not certainly met.
     """
 
     about: Literal["zone", "best", "start", "other", "calibration"]
@@ -140,7 +140,7 @@ class Document:
     """The whole report of a result.
 
     answer: the answer in one sentence.
-    answer_lines: further sentences that belong to the answer.
+    answer_lines: further sentences that qualify the answer.
     """
 
     name: str

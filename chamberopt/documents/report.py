@@ -1,4 +1,4 @@
-"""Compose the report of a result as a document, which a printer turns into a page."""
+"""Compose the report of a result as a document, which printers/ turns into an HTML page."""
 
 from __future__ import annotations
 
@@ -115,7 +115,7 @@ def report(result: Result) -> Document:
 
 
 def notes_of(result: Result) -> list[str]:
-    """Return the notes of a result: those of the study, if it is one, then of the simulation."""
+    """Return the notes on a result: of its study, if it is a study, then of its simulation."""
     return [*(result.study.notes if result.study else ()), *result.notes]
 
 
@@ -142,7 +142,7 @@ def _accuracy_and_cost(result: Result, trials: Sequence[Mapping[str, object]]) -
 
 
 def _accuracy(result: Result) -> dict[str, str]:
-    """Return rows on the intervals of the main figures and on the replicas behind them."""
+    """Return rows (name, text) on the intervals of the main figures and the number of replicas."""
     objective, mean = objective_label(result.objective_name), metric_label("mean_coverage")
     record, field = result.record, result.record.field
     needed = field.simulated_s_needed.p05_times_intensity
@@ -168,7 +168,10 @@ def _accuracy(result: Result) -> dict[str, str]:
 
 
 def _cost_of_answer(result: Result) -> dict[str, str]:
-    """Return rows on simulated time, collisions and run time of the result's own simulation."""
+    """Return rows (name and text) on simulated time, collisions and run time of the simulation.
+
+    For a study, this is the simulation of its best design.
+    """
     record, collisions = result.record, result.record.collisions
     kinds = [
         f"{_count(collisions[name])} {kind}"
@@ -183,7 +186,7 @@ def _cost_of_answer(result: Result) -> dict[str, str]:
 
 
 def _cost_of_study(study: StudyRecord, trials: Sequence[Mapping[str, object]]) -> dict[str, str]:
-    """Return rows with the numbers of the study's evaluations, and the run time of all."""
+    """Return rows (name, text) on the numbers of a study's evaluations and their run time."""
     return {
         "in the search": _count(study.evaluations),
         "of these not simulated": _count(study.failed),
@@ -199,7 +202,7 @@ def _count(number: float) -> str:
 
 
 def _effects(result: Result) -> Section:
-    """Return the section on optional physical effects: their settings and pilot estimates."""
+    """Return the section on optional physical effects: which are simulated, and pilot estimates."""
     effects = result.design.effects.model_dump(mode="json", exclude={"auto"})
     switched = {name: _effect_text(name, value) for name, value in effects.items()}
     in_result = values("In this result", switched)

@@ -1,4 +1,4 @@
-"""Compose a process sheet: what an operator sets, expects and measures, from a result."""
+"""Compose a process sheet of a result: what an operator sets, expects and measures."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ TIME = "time_to_98_s"
 def cautions(result: Result) -> Iterator[str]:
     """Yield warnings for the operator.
 
-    They tell how the simulation differs from the machine, and which goals are not reached.
+    The warnings say how the simulation differs from the machine, and which goals are not reached.
     """
     yield from _time(result)
     if result.design.effects.friction is None:
@@ -118,7 +118,7 @@ def process_sheet(result: Result, face_mm: tuple[float, ...]) -> Document:
 def setting_tables(result: Result, face_mm: tuple[float, ...]) -> list[Table]:
     """Return tables on the chamber and its settings, expected figures and allowed tolerances.
 
-    A row without a name holds a sentence.
+    A row with an empty name holds a sentence.
 
     Args:
         face_mm: size of the sonotrode's face [mm].
@@ -184,7 +184,10 @@ def _chamber(result: Result) -> Iterator[Row]:
 
 
 def _key_row(key: str, value: Any) -> Row:
-    """Return the name and the text of a chamber's value. The unit moves from name to text."""
+    """Return the name and the text of a chamber's value, with the unit in the text.
+
+    In `key`, the unit is the end of the name, e.g. "height_mm".
+    """
     start, _, end = key.rpartition("_")
     unit = UNITS.get(end, "")
     name = start if unit else key
@@ -235,12 +238,12 @@ def _shot(result: Result) -> Iterator[Row]:
 
 
 def _weighed_g(result: Result) -> float:
-    """Return the mass of all balls together [g], for their whole number."""
+    """Return the mass of the simulated balls together [g]. Their number is whole."""
     return 1e3 * result.design.shot.ball_mass * result.design.shot.count
 
 
 def _expected(result: Result) -> Iterator[Row]:
-    """Yield rows with the peening time and the expected figures.
+    """Yield rows (name, text) with the peening time and the expected coverage etc.
 
     Without a calibration, a row says why there is no intensity in mmA.
     """
@@ -259,16 +262,16 @@ def _expected(result: Result) -> Iterator[Row]:
 
 
 def _zones(result: Result) -> Iterator[Row]:
-    """Yield a sentence for each zone. Zones with limits that are not met come first."""
+    """Yield a row with a sentence for each zone. Zones with limits that are not met come first."""
     lines = [one for one in answer_lines(result) if one.about == "zone"]
     lines.sort(key=lambda line: not line.warns)
     yield from _first([("", one.text) for one in lines], "zones")
 
 
 def _tolerances(result: Result) -> Iterator[Row]:
-    """Yield rows with the tolerance range of each number.
+    """Yield rows with the tolerance range of each number of the design that has a tolerance.
 
-    If the result simulated the tolerances, rows say what they cost.
+    If the tolerances were simulated, further rows give their effect on coverage etc.
     """
     box = tolerance_box(result.design)
     ranges = [
@@ -345,9 +348,9 @@ def _checks(result: Result) -> Iterator[Row]:
 
 
 def calibrated_to(result: Result) -> Iterator[Sentence]:
-    """Yield a sentence on the measurements that the machine was calibrated by.
+    """Yield a sentence on the measurements by which the machine was calibrated.
 
-    It also names the missing kinds of measurement.
+    The sentence also names the kinds of measurement that are missing.
     """
     calibration = result.design.calibration
     kinds = {misfit.kind for misfit in calibration.misfits} if calibration else set()
@@ -364,7 +367,10 @@ def _restitution(law: Any) -> str:
 
 
 def _first(rows: Sequence[Row], what: str, most: int = MOST_ROWS) -> Iterator[Row]:
-    """Yield the first rows, and a sentence with the number of the others if there are any."""
+    """Yield at most `most` rows, then a sentence with the number of the rows left out, if any.
+
+    `what` names the rows in the sentence.
+    """
     yield from rows[:most]
     if (more := len(rows) - most) > 0:
         yield "", f"{more} more {what if more > 1 else what.removesuffix('s')} in the report."

@@ -1,4 +1,4 @@
-"""Text about a study: its question, its search, its front, and the influence of parameters."""
+"""Text about a study: its question, search and Pareto front, and the influence of parameters."""
 
 from __future__ import annotations
 
@@ -48,9 +48,9 @@ NO_CONSTRAINTS = "There were no constraints."
 
 
 def question_section(result: Result) -> Section:
-    """Return the section that says what was asked.
+    """Return the section that states the question which the result answers.
 
-    A simulation asks for the coverage in one chamber, a study for the best chamber.
+    The question of a simulation is the coverage in one chamber. A study asks for the best chamber.
     """
     design, study = result.design, result.study
     part, area = design.part.mesh_path.name, exposed_target(result)
@@ -85,7 +85,7 @@ def question_section(result: Result) -> Section:
 
 
 def exposed_target(result: Result) -> str:
-    """Return the area and the reachable share of a target, or "" for a target outside."""
+    """Return a text with the area and reachable share of a target inside the chamber, else ""."""
     area = result.record.chamber.target_exposed_area_mm2
     share = per_cent(result.record.field.reachable_share)
     return f"{plain(area)} mm² in the chamber; the shot can reach {share} of it" if area else ""
@@ -134,7 +134,7 @@ def front_section(study: StudyRecord) -> Section | None:
 def search_section(result: Result, trials: Sequence[Mapping[str, Any]]) -> Section | None:
     """Return the section with every evaluation in its order and the reasons for failed ones.
 
-    None without evaluations.
+    Return None if no evaluations are given.
     """
     if not trials:
         return None
@@ -167,10 +167,12 @@ def _evaluated(row: Mapping[str, Any], label: Label) -> EvaluatedCandidate:
 class Influence:
     """The influence of a parameter on the objective, by the study's model of all evaluations.
 
-    curve: the model along the parameter, in the unit of the label.
-    loss: cost of moving the parameter alone from its best value to the worst within its bounds.
+    curve: the model's objective against the parameter, in the unit of `label`.
+    loss: loss of objective if this parameter alone moves from its best value to the worst value
+        within its bounds.
     half_width: half-width of the loss. None if the loss may be larger than stated.
-    surely: certain cost of moving the parameter to any value. 0 if all intervals reach zero.
+    surely: largest loss that is certain for a value of the parameter. 0 if the interval of each
+        loss contains zero.
     label: label of the objective.
     """
 
@@ -233,7 +235,7 @@ def influence_section(study: StudyRecord, label: Label) -> Section:
 
 
 def influences(study: StudyRecord, label: Label) -> list[Influence]:
-    """Return the influence of each parameter on the objective, the most important first.
+    """Return the influence of each parameter on the objective, the most influential first.
 
     The list is empty if the study has no model of its evaluations.
 
@@ -272,7 +274,7 @@ def _influence(name: str, model: ModelRecord, label: Label) -> Influence:
 
 
 def influence_sentences(study: StudyRecord, rows: Sequence[Influence], label: Label) -> list[str]:
-    """Return sentences on the influence of the parameters by the study's model.
+    """Return sentences on the influence of the parameters on the objective, by the study's model.
 
     If the study has no model, a sentence gives the reason.
     """

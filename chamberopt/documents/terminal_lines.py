@@ -1,4 +1,4 @@
-"""Lines for a terminal about a simulation, a study or a sweep, with one figure on each line."""
+"""Lines for a terminal about a simulation, a study or a sweep, a line for each figure."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ if TYPE_CHECKING:
 
 
 def estimate_line(name: str, estimate: Estimate) -> str:
-    """Return a line with a figure's name, its estimate and its interval."""
+    """Return a line with the name of a metric or objective, its estimate and interval."""
     return f"{name:34}{estimate_text(estimate)}"
 
 
 def evaluation_lines(evaluation: Evaluation) -> list[str]:
     """Return a line for the objective and each metric, with their 95 % intervals.
 
-    The last line gives the area of the windows in which coverage is measured.
+    The last line gives the area of the windows, the discs in which coverage is measured.
     """
     rows = {evaluation.objective_name: evaluation.objective, **evaluation.metrics}
     lines = [estimate_line(name, estimate) for name, estimate in rows.items()]
@@ -60,7 +60,7 @@ def replicas_text(design: Design) -> str:
 
 
 def study_lines(result: StudyResult) -> list[str]:
-    """Return lines with parameters and figures of a study's start and best, its gain and effort."""
+    """Return lines on a study: start and best design with parameters and figures, gain, effort."""
     study, start, best = result.study, result.start, result.best
     lines = [f"{'parameter':34}{'start':>12}{'best':>12}"]
     for name in study.vary:
@@ -90,7 +90,7 @@ def study_lines(result: StudyResult) -> list[str]:
 
 
 def sweep_lines(result: SweepResult) -> list[str]:
-    """Return lines with the effort of a sweep, and its best candidate with its figures."""
+    """Return lines with a sweep's number of candidates and run time, and its best candidate."""
     study, best = result.study, result.best
     effort = replicas_text(study.at_search_accuracy(study.design))
     lines = [f"{len(result.trials)} candidates in {result.seconds:.0f} s, {effort} each"]

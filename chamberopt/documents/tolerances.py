@@ -1,7 +1,8 @@
-"""Text about the tolerances of a design.
+"""Text about the tolerances of a design: how far coverage etc. may be off if its numbers are off.
 
-Every interval of a ToleratedFigure is a column, here and in the CSV table. COLUMNS has the words of
-those that have better words than their names.
+A ToleratedFigure has several values with intervals, such as its 5 % quantile. Each is a column of
+the tables here and of the CSV table. COLUMNS has the headings. A value without an entry has its own
+name as heading.
 """
 
 from __future__ import annotations
@@ -28,7 +29,10 @@ ON_SHEET = "almen_intensity", "mean_coverage"  # beside the figure of the worst 
 
 
 class Column(NamedTuple):
-    """The words for an interval of a figure, in three places; empty where it is left out."""
+    """The headings of a value in the report, on the terminal and on the process sheet.
+
+    An empty heading leaves the value out.
+    """
 
     page: str
     terminal: str
@@ -47,7 +51,7 @@ COLUMNS = {
 
 
 def _columns(found: ToleranceResult) -> dict[str, Column]:
-    """Return the words for each interval that a figure has, by the names of the intervals."""
+    """Return the headings of each value of the figures, by the name of the value, such as "q05"."""
     names = dict.fromkeys(name for one in found.figures.values() for name in one.intervals)
     return COLUMNS | {name: Column(name, name, name) for name in names if name not in COLUMNS}
 
@@ -55,7 +59,7 @@ def _columns(found: ToleranceResult) -> dict[str, Column]:
 def _labelled(found: ToleranceResult) -> list[tuple[Label, ToleratedFigure]]:
     """Return each figure over the tolerances with its label.
 
-    The figure that is lowest in the worst corner comes first.
+    The first figure is the figure by which the worst corner of the tolerances was chosen.
     """
     names = sorted(found.figures, key=lambda name: name != found.worst_for)
     return [(metric_label(name), found.figures[name]) for name in names]
@@ -114,7 +118,7 @@ def _panel(label: Label, figure: ToleratedFigure) -> TornadoPanel:
 
 
 def sheet_rows(found: ToleranceResult) -> Iterator[tuple[str, str]]:
-    """Yield rows of the process sheet: what the tolerances do to the most important figures."""
+    """Yield rows (name, text) of the process sheet: the main figures over all tolerances."""
     wanted = [metric_label(name) for name in ON_SHEET]
     first, *others = _labelled(found)
     shown = {name: column.sheet for name, column in _columns(found).items() if column.sheet}
@@ -125,7 +129,7 @@ def sheet_rows(found: ToleranceResult) -> Iterator[tuple[str, str]]:
 
 
 def table_rows(result: Result) -> Iterator[dict[str, object]]:
-    """Yield a row of the CSV table for each figure and toleranced number.
+    """Yield the rows of the CSV table: one row per pair of a figure and a number with a tolerance.
 
     Raises InputError for a result without tolerances.
     """
@@ -148,7 +152,8 @@ def table_rows(result: Result) -> Iterator[dict[str, object]]:
 def tolerance_lines(found: ToleranceResult) -> list[str]:
     """Return lines for a terminal about the tolerances of a design.
 
-    They give the figures over all tolerances, the worst corner and the effect of each tolerance.
+    The lines give the figures over all tolerances, in the worst corner, and the effect of each
+    tolerance.
     """
     shown = {name: column.terminal for name, column in _columns(found).items() if column.terminal}
     rows = [["over the tolerances", *shown.values()]]

@@ -1,4 +1,4 @@
-"""Write numbers of the report as text, and name each metric and objective with its unit."""
+"""Write numbers as text, and give each metric and objective a name and a unit."""
 
 from __future__ import annotations
 
@@ -13,12 +13,13 @@ from chamberopt.coverage.metrics import OBJECTIVES, find_metric, parse_objective
 
 @dataclass(frozen=True)
 class Label:
-    """How a metric or an objective is named and shown.
+    """The name, unit and scale by which texts show a metric or an objective.
 
     Args:
         text: name in plain words.
         unit: unit of the number shown.
-        factor: number shown over number stored. Negative for an objective that falls with a metric.
+        factor: shown number divided by stored number, e.g. 100 for per cent. Negative if the
+            objective is a negative multiple of a metric.
         meaning: explanation, if the text needs any.
     """
 
@@ -38,23 +39,23 @@ class Label:
         return f"{self.text} [{self.unit}]" if self.unit else self.text
 
     def format(self, estimate: Estimate, sign: bool = False) -> str:
-        """Return an estimate as text with its interval, in the unit shown and with that unit."""
+        """Return an estimate as text with its interval and its unit, e.g. "98.1 ± 0.4 %"."""
         return number_text.typeset(
             number_text.estimate_text(estimate, self.factor, self.unit, sign)
         )
 
     def number(self, estimate: Estimate, sign: bool = False) -> str:
-        """Return an estimate as text with its interval, in the unit shown but without its name."""
+        """Return an estimate as text with its interval, without the name of its unit."""
         return number_text.typeset(number_text.estimate_text(estimate, self.factor, sign=sign))
 
     def scale(self, estimate: Estimate) -> Estimate:
-        """Convert an estimate from the stored unit to the unit shown."""
+        """Convert an estimate from its stored unit to the unit of this label."""
         value, half_width = self.factor * estimate.value, abs(self.factor) * estimate.half_width
         return Estimate(value, half_width, in_words=estimate.in_words)
 
 
 def metric_label(name: str) -> Label:
-    """Return the label of a metric by its name. Shares of the surface are shown in per cent."""
+    """Return the label of the metric `name`. Shares of the surface are shown in per cent."""
     metric = find_metric(name)
     if metric is None:
         return Label(name.replace("_", " "))
@@ -64,9 +65,9 @@ def metric_label(name: str) -> Label:
 
 
 def objective_label(name: str) -> Label:
-    """Return the label of an objective by its name.
+    """Return the label of the objective `name`.
 
-    If the objective is a multiple of a single metric, this is the metric's label.
+    If the objective is a multiple of a single metric, its label has the metric's text and unit.
     """
     try:
         objective = parse_objective(name)
@@ -102,7 +103,7 @@ def _sum_text(terms: Mapping[str, float]) -> str:
 def plain(value: float | str, digits: int = 4) -> str:
     """Return a number as text with `digits` significant digits.
 
-    Numbers of usual size have no exponent.
+    Only very large and very small numbers have an exponent.
     """
     return number_text.typeset_plain(value, digits)
 

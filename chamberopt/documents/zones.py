@@ -1,4 +1,4 @@
-"""Text about zones: their figures, and whether they meet their limits."""
+"""Text about zones, named regions of the part: coverage etc. in them, and their limits."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ SIGNS = {"min": "≥", "max": "≤"}
 def limit_text(limit: ZoneLimit) -> str:
     """Return a limit of a zone as text, e.g. "coverage_min = 0.98".
 
-    The lower end of a band of allowed values is "intensity_mmA ≥ 0.1".
+    For a limit with a least and a largest value, the text of the least is "intensity_mmA ≥ 0.1".
     """
     sides = dict(LIMITED[limit.key])
     sign = "=" if len(sides) == 1 else SIGNS[sides[limit.metric.rpartition(".")[2]]]
@@ -48,7 +48,7 @@ def zone_lines(result: Result) -> list[AnswerLine]:
 def zones_section(result: Result) -> Section | None:
     """Return the section with the figures of all zones, and whether they meet their limits.
 
-    None for a part without zones.
+    Return None for a part without zones.
     """
     zones = result.record.zones
     if not zones:
@@ -88,6 +88,6 @@ def _limit_label(limit: ZoneLimit) -> Label:
 
 
 def _of_zone(name: str) -> Label:
-    """Return the label of a metric, with "the zone" in place of "the target"."""
+    """Return the label of the metric `name`, with "the zone" for "the target" in its text."""
     label = metric_label(name)
     return replace(label, text=label.text.replace("the target", "the zone"))

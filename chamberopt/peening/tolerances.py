@@ -1,18 +1,24 @@
-"""The figures of a design over the box of its tolerances, to first order from 1 + k paired runs.
+"""Find how far the figures of a design, such as mean coverage, may be off within its tolerances.
+
+The box of the tolerances holds all values that they allow. 1 + k runs are simulated on the same
+seeds: a run of the design, and for each of its k toleranced numbers a run with that number changed.
+The figures in the box follow from the runs to first order.
 
 Notation
-    x_i    a number with a tolerance; any value from low to high is as likely  (ToleratedNumber)
+    x_i    a number with a tolerance; all values from low to high are as likely  (ToleratedNumber)
     u_i    change of x_i: ln(x_i / nominal) where the number is positive, x_i - nominal otherwise
-    L      a figure on its scale, see responses.py
+    L      a figure on a scale (e.g. logarithmic) on which it changes linearly, see responses.py
     g_i    dL/du_i, from a run in which x_i alone is changed
     L(u) = L(0) + sum of g_i u_i
 
-The slope of a quantile of L over g_i is the mean of u_i where L has this quantile, because the
-share of the box below the quantile stays. So a quantile is a weighted sum of the runs, and has an
-interval like any other sum. An effect that drowns in noise counts with its estimate, which makes
-the box look wider rather than narrower.
+If g_i changes, a quantile of L changes by the mean of u_i over the points of the box where L equals
+the quantile, because the share of the box below the quantile stays the same. A quantile is
+therefore a weighted sum of the runs, and its interval is that of the sum. An effect within the
+noise counts with its estimate, which makes the spread over the box look too wide rather than too
+narrow.
 
-A further run in the worst corner, on the same seeds, shows whether first order is enough.
+A further run on the same seeds, with all numbers in the worst corner of the box, shows whether
+first order is enough.
 """
 
 from __future__ import annotations
@@ -72,7 +78,8 @@ SAMPLE_EXPONENT = 12  # the box has 2^12 points
 class ToleratedNumber:
     """A number of a design that has a tolerance, with its range and the changed design to simulate.
 
-    low, nominal, high: least, designed and largest value in the unit of the design file.
+    low, high: least and largest allowed value, in the unit of the design file.
+    nominal: value in the design.
     """
 
     name: str
@@ -83,15 +90,16 @@ class ToleratedNumber:
     step: float  # u of this change; for the shot's mass, of its whole balls
 
     def moved(self, value: float) -> float:
-        """Return by how much a value of this number differs from the nominal one.
+        """Return by how much a value of this number differs from the nominal value.
 
-        That is the logarithm of their ratio where the range is positive, else their difference.
+        If all values of the range are positive, this is the logarithm of value / nominal, else it
+        is value - nominal.
         """
         return _moved(self.nominal, self.low, value)
 
 
 def plan_tolerances(design: Design) -> tuple[ToleratedNumber, ...]:
-    """Return the numbers of a design that have tolerances, each with the change to simulate.
+    """Return the numbers of a design that have tolerances, each with the change that is simulated.
 
     Raises InputError if no number has a tolerance, or if the design cannot have the least or the
     largest value that a tolerance allows.
@@ -107,8 +115,8 @@ def plan_tolerances(design: Design) -> tuple[ToleratedNumber, ...]:
 def effective_move(design: Design, number: ToleratedNumber) -> float:
     """Return by how much a number in a design differs from its nominal value.
 
-    For the shot's mass, the mass of the whole balls counts. The difference is measured as by
-    `ToleratedNumber.moved`: the logarithm of the ratio where the range is positive.
+    The difference is measured as in `ToleratedNumber.moved`. The number of balls is whole, so the
+    mass of the shot is the mass of these balls.
     """
     if number.name != MASS:
         return number.moved(design.value(number.name))
@@ -116,10 +124,9 @@ def effective_move(design: Design, number: ToleratedNumber) -> float:
 
 
 def box_points(numbers: tuple[ToleratedNumber, ...]) -> np.ndarray:
-    """Return changes (n, k) of all numbers at points spread evenly over their tolerances.
+    """Return changes (n, k) of the k numbers at n points spread evenly over their tolerances.
 
-    A change is the logarithm of a number's ratio to its nominal value where its range is positive,
-    else the difference of both.
+    A change is measured as in `ToleratedNumber.moved`.
     """
     from scipy.stats.qmc import Sobol
 
@@ -133,9 +140,9 @@ def box_points(numbers: tuple[ToleratedNumber, ...]) -> np.ndarray:
 
 
 def ball_notes(design: Design, numbers: tuple[ToleratedNumber, ...]) -> list[str]:
-    """Return a note with the number of whole balls at the least and largest tolerated shot mass.
+    """Return a note that gives the whole number of balls at the least and largest mass of the shot.
 
-    The list is empty where the shot's mass has no tolerance.
+    The list is empty if the shot's mass has no tolerance.
     """
     for one in numbers:
         if one.name == MASS:
@@ -149,7 +156,11 @@ def ball_notes(design: Design, numbers: tuple[ToleratedNumber, ...]) -> list[str
 
 
 def _planned(design: Design, name: str, low: float, high: float) -> ToleratedNumber:
-    """Plan the widest change of a number that the design allows, to the wider side if possible."""
+    """Plan the change of a number for its run: the widest that the design allows.
+
+    A change towards the wider side of the tolerance is tried first. The change may exceed the
+    tolerance (see STRETCH), so that it stands out from the noise.
+    """
     nominal = design.value(name)
     logarithmic = _is_logarithmic(nominal, low)
     sides = sorted((_moved(nominal, low, end) for end in (low, high)), key=abs)
@@ -178,7 +189,7 @@ def _moved(nominal: float, low: float, value: float) -> float:
 
 
 def _is_logarithmic(nominal: float, low: float) -> bool:
-    """Return whether changes of a number are measured as logarithms of its ratio to nominal."""
+    """Return True if changes of a number are ln(value / nominal), False if value - nominal."""
     return nominal > 0.0 and low > 0.0
 
 
@@ -198,10 +209,10 @@ def simulate_tolerances(
     progress: Progress | None = None,
     analytic: bool = False,
 ) -> tuple[Evaluation, ToleranceResult]:
-    """Simulate a design, and what its tolerances do to its figures; return both.
+    """Simulate a design, and the effect of its tolerances on its figures. Return both results.
 
     Args:
-        analytic: whether the chamber has its exact shape in the simulation, instead of a mesh.
+        analytic: True to simulate the exact cylinder, box or prism instead of the chamber's mesh.
     Raises:
         InputError: the design has no tolerances, or cannot have a value that they allow.
         sim_core.SimulationError: a run must stop.
@@ -229,7 +240,7 @@ def simulate_tolerances(
 
 @contextmanager
 def _run_named(number: ToleratedNumber) -> Iterator[None]:
-    """Add to the message of an error in which run it happened: the changed number and its value."""
+    """Add a note to an error of the `with` block: the changed number of the run, and its value."""
     try:
         yield
     except Exception as error:
@@ -245,12 +256,13 @@ def find_tolerances(
 ) -> ToleranceResult:
     """Simulate each change of a number, then the worst corner, and return all figures over the box.
 
-    The box holds all values that the tolerances allow. The worst corner is that in which coverage,
-    or the rate of impacts where no coverage is resolved, is lowest to first order.
+    The box holds all values that the tolerances allow. The worst corner is the corner of the box
+    with the lowest value, to first order, of the first figure in DECIDING (coverage, then rate of
+    impacts) that is known in all runs.
 
     Args:
         nominal: evaluation of the design as it is.
-        evaluate: evaluates a changed design in the replicas and on the seeds of `nominal`.
+        evaluate: function that simulates a changed design on the seeds of `nominal`.
     """
     changed = {}
     for one in numbers:
@@ -332,15 +344,17 @@ def _result(
 
 
 class _Figure:
-    """One figure in all runs, on the scale on which it responds nearly in a straight line."""
+    """One figure (e.g. mean coverage) in all runs, on a scale on which it is nearly linear."""
 
     def __init__(
         self, name: str, numbers: tuple[ToleratedNumber, ...], runs: dict[str, Estimate]
     ) -> None:
-        """Bring the figure of each run to its scale, and find its slope by each number.
+        """Convert the figure of each run to its scale, and find the slope along each number.
 
         Args:
-            runs: the figure of the nominal design, and of the run in which each number is changed.
+            name: name of the figure.
+            runs: the figure in each run: the nominal design's under NOMINAL, the others under the
+                name of the changed number.
         """
         metric, self._scale = find_metric(name), scale_of(name)
         if name.rpartition(".")[2] == "time_to_98_s" and TREATMENT_TIME in runs:
@@ -356,9 +370,9 @@ class _Figure:
         self.slopes = np.array([(self._on[x.name].value - at_nominal) / x.step for x in numbers])
 
     def over_the_box(self) -> ToleratedFigure:
-        """Return quantiles, extremes and effects of the figure over the box of tolerances.
+        """Return the figure's quantiles, extremes and effects of the numbers, over the tolerances.
 
-        The values in the worst corner are left out.
+        The box holds all values that the tolerances allow. Values in its worst corner are left out.
         """
         ends = np.array([[x.moved(x.low), x.moved(x.high)] for x in self._numbers])
         points = box_points(self._numbers)
@@ -388,13 +402,13 @@ class _Figure:
     def with_corner(
         self, found: ToleratedFigure, u: np.ndarray, simulated: Estimate, confidence: float
     ) -> ToleratedFigure:
-        """Add to a figure its values in the worst corner: by first order, and as simulated.
+        """Return `found` with two values in the worst corner: to first order, and as simulated.
 
         Args:
             found: the figure over the box of tolerances.
-            u: changes of the numbers in the corner, (k,).
+            u: changes of the numbers from nominal to the corner, shape (k,).
             simulated: the figure as simulated in the corner.
-            confidence: confidence with which both values must differ to disagree.
+            confidence: confidence with which the two values must differ to count as disagreeing.
         """
         predicted = self._at(u)
         there, shown = on_scale(simulated, self._scale), self._back(predicted)
@@ -410,20 +424,20 @@ class _Figure:
         return found.model_copy(update={"corner": corner})
 
     def _at(self, u: np.ndarray) -> Estimate:
-        """Return the figure on its scale after changes u (k,) of the numbers, to first order."""
+        """Return the figure on its scale after changes u (k,) of the k numbers, to first order."""
         shares = [float(one) / x.step for one, x in zip(u, self._numbers, strict=True)]
         weights = {x.name: share for x, share in zip(self._numbers, shares, strict=True)}
         return combine(self._on, {NOMINAL: 1.0 - sum(shares), **weights})
 
     def _change(self, number: int, u: float) -> Estimate:
-        """Return the change of the figure when only one number changes.
+        """Return the change of the figure, in its own unit, when only one number changes.
 
-        Its error comes from the change on the scale, and from the value on the scale where the
-        change starts.
+        The error of this change has two sources: the error of the change on the scale, and the
+        error of the nominal value on the scale, from which the change starts.
 
         Args:
             number: position of the number.
-            u: change of the number.
+            u: change of the number, as from `ToleratedNumber.moved`.
         """
         x, nominal = self._numbers[number], self._on[NOMINAL]
         share, changed = u / x.step, self._on[x.name]
@@ -448,7 +462,7 @@ class _Figure:
         )
 
     def _possible(self, value: Estimate) -> Estimate:
-        """Return the figure from its value on the scale, limited to values that it can have."""
+        """Convert a value on the scale back to the figure, limited to its possible values."""
         found = self._back(value)
         return replace(found, value=min(max(found.value, self._range[0]), self._range[1]))
 
@@ -459,9 +473,9 @@ class _Figure:
 def _resolved(
     name: str, nominal: Evaluation, changed: Mapping[str, Evaluation]
 ) -> dict[str, Estimate]:
-    """Return the estimate of a figure in each run.
+    """Return the estimate of the figure `name` in each run, by the name of the run.
 
-    Return nothing where a run does not resolve the figure, or where the figure has no scatter.
+    Return an empty table if the figure is unknown or too noisy in a run, or has no scatter in any.
     """
     runs = {NOMINAL: nominal, **changed}
     figures = {run: one.metrics[name] for run, one in runs.items() if name in one.metrics}

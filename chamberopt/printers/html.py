@@ -1,6 +1,6 @@
 """Turn the blocks of a document into HTML.
 
-All text is escaped, because names of files may hold markup.
+All text is escaped, because file names and other texts may contain HTML tags.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ def section(printed: Section, view: Callable[[Sequence[PartScene]], str]) -> str
     """Return the HTML of a section with its title.
 
     Args:
-        view: function that gives the HTML of parts in 3D.
+        view: function that returns the HTML of parts in 3D.
     """
     kind = "answer" if printed.is_answer else ""
     content = "".join(block(one, view) for one in printed.content)
@@ -57,10 +57,10 @@ def section(printed: Section, view: Callable[[Sequence[PartScene]], str]) -> str
 
 
 def block(printed: Block, view: Callable[[Sequence[PartScene]], str]) -> str:
-    """Return the HTML of a block of a section.
+    """Return the HTML of a block (paragraph, table, chart etc.) of a section.
 
     Args:
-        view: function that gives the HTML of parts in 3D.
+        view: function that returns the HTML of parts in 3D.
     """
     match printed:
         case Sentence():
@@ -126,7 +126,7 @@ def _chart(printed: Chart) -> str:
 def embedded_json(value: object, name: str) -> str:
     """Return a script element with the id `name` that holds a value as JSON.
 
-    No text in the value can end the element.
+    A "</script>" in the value is escaped, so it cannot end the element.
     """
     inside = json.dumps(value, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
     return f'<script type="application/json" id="{text(name)}">{inside}</script>'

@@ -12,7 +12,7 @@ from chamberopt.documents.document import Chart, Document, PartView
 
 
 def json_values(document: Document) -> dict[str, Any]:
-    """Return all texts of a document as JSON values, with remarks on its parts in 3D."""
+    """Return all texts of a document as JSON values, with remarks on its 3D views of parts."""
     values: dict[str, Any] = _values(document)
     remarks = [remark for scene in document.scenes for remark in scene.remarks]
     return {**values, "remarks": remarks}

@@ -35,7 +35,7 @@ HELP = (
 
 @dataclass(frozen=True)
 class PageFile:
-    """A kind of file that may be replaced, such as a report.
+    """A kind of output file, such as a report.
 
     A new file may replace an older file of the same kind, but no other file.
 
@@ -79,7 +79,7 @@ def write_report(result: str | Path, path: str | Path | None = None) -> tuple[Pa
 
 
 def write_part_page(results: Sequence[Path], path: Path) -> list[str]:
-    """Write a page with parts in three dimensions. They stand side by side and turn together.
+    """Write a page with the parts of results in 3D, side by side. They turn together.
 
     Returns:
         Remarks, e.g. on triangles that were left out.
@@ -128,9 +128,10 @@ def _scenes(loaded: Sequence[Result]) -> tuple[list[str], list[PartScene]]:
 
 
 def _unique_names(folders: Sequence[Path]) -> list[str]:
-    """Return a name for each folder: its own name, or with its parent if that is not unique.
+    """Return a name for each folder: its own name, or PARENT/NAME for all folders.
 
-    The parent is also added if a name is "start", the start of a study.
+    PARENT/NAME is used if two folders have the same name or if a folder is named "start", which is
+    the folder of a study's first design.
     """
     names = [folder.name for folder in folders]
     unique = len(set(names)) == len(names) and START not in names
@@ -138,10 +139,9 @@ def _unique_names(folders: Sequence[Path]) -> list[str]:
 
 
 def require_free_page(path: str | Path, file: PageFile = REPORT_FILE) -> Path:
-    """Return the path of a page to write.
+    """Return `path`, to which a page may be written.
 
-    Raises InputError if its ending is wrong, or if it holds anything but an older file of the kind
-    `file`.
+    Raises InputError if the path has a wrong ending, or if a file there is not of the kind `file`.
     """
     path, first = Path(path), file.endings[0]
     remedy = f"give another name (--out FILE{first})"
@@ -162,7 +162,7 @@ def require_free_page(path: str | Path, file: PageFile = REPORT_FILE) -> Path:
 
 
 def viewer(scenes: Sequence[PartScene]) -> str:
-    """Return the HTML of parts in 3D and of their controls. part.js draws the parts."""
+    """Return the HTML in which the page's script part.js draws parts in 3D, with their controls."""
     drawn = [scene.data for scene in scenes if scene.data]
     remarks = "".join(
         html.paragraph(remark, "soft") for scene in scenes for remark in scene.remarks
@@ -223,7 +223,7 @@ def write_page(path: Path, title: str, body: str, scenes: Sequence[PartScene]) -
 
 
 def _content(drawn: Sequence[dict[str, object]]) -> dict[str, object]:
-    """Return the data for part.js: parts in 3D, the quantities they show, and their colours."""
+    """Return the data for the script part.js: parts in 3D, quantities to show, and colours."""
     quantities = quantities_in_all(drawn)
     scales = {name: hex_colours(name) for name in {one["colours"] for one in quantities}}
     return {"quantities": quantities, "scenes": drawn, "scales": scales}

@@ -45,13 +45,13 @@ MOST_LINES = 4  # lines of a text; a longer text ends in an ellipsis
 
 
 class Writer:
-    """Write text on a page at the top left corner of its place [mm].
+    """A writer of texts and tables on a page. A position [mm] is the top left corner of a text.
 
-    Without axes it writes nothing and only measures heights.
+    A Writer without axes writes nothing and only measures heights.
     """
 
     def __init__(self, axes: Axes | None, size: float) -> None:
-        """Prepare to write letters of this size [pt]."""
+        """Prepare to write letters of `size` [pt] on `axes`."""
         self.axes, self.size = axes, size
 
     @property
@@ -81,7 +81,7 @@ class Writer:
     def values(self, table: Table, x: float, top: float, width: float) -> float:
         """Write a table of names and values and return the height of its bottom on the page [mm].
 
-        A value without a name takes the whole width.
+        A value with an empty name takes the whole width.
         """
         y = self.write(table.caption, x, top, width, bold=True) - 0.1 * self.line
         self.rule(x, y, width)
@@ -112,7 +112,7 @@ class Writer:
         return top - max(sum(heights[:split]), sum(heights[split:]))
 
     def table(self, table: Table, top: float) -> float:
-        """Write a table with a head over the whole page and return its bottom [mm]."""
+        """Write a table with its head, as wide as the page. Return the bottom's height [mm]."""
         y = top
         for number, row in enumerate([table.head, *table.rows]):
             x, ends = MARGIN, []
@@ -131,9 +131,9 @@ class Writer:
 
 
 def broken(text: str, width: float, size: float, bold: bool = False) -> list[str]:
-    """Return a text broken into lines no wider than `width` [mm]. Wider words are cut.
+    """Return a text broken into lines no wider than `width` [mm]. A wider word is cut.
 
-    A number stays on a line with its interval and unit. A letter that the font lacks becomes "?".
+    A number stays on a line with its interval and unit. A letter not in the font becomes "?".
     """
     lines, line = [], ""
     known = "".join(one if ord(one) in _letters(bold) else "?" for one in " ".join(text.split()))
@@ -171,7 +171,7 @@ def text_width(text: str, size: float, bold: bool = False) -> float:
 
 @cache
 def _width_over_size(text: str, bold: bool) -> float:
-    """Return the width of a line of text over the size of its letters, the same for all sizes."""
+    """Return the width of a line of text divided by the size of its letters [mm/pt]."""
     from matplotlib.textpath import TextToPath
 
     font = _font(bold)
@@ -215,9 +215,9 @@ def write_sheet(result: str | Path, path: str | Path | None = None) -> tuple[Pat
 
 
 def draw_sheet(sheet: Document, chamber: Chamber) -> Figure:
-    """Return a document of one section on one page, as a figure.
+    """Return a process sheet, a document of one section, as a figure of one page.
 
-    It has the heading, a drawing of the chamber, the content, and lines for signatures.
+    The page has a heading, a drawing of the chamber, the content, and lines for signatures.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -254,7 +254,7 @@ def _heading(axes: Axes, title: str, sheet: Document) -> float:
 
 
 def _content(write: Writer, content: Sequence[Block], top: float) -> float:
-    """Write tables of names and values in two columns, and below them all else.
+    """Write tables of names and values in two columns, and the other blocks below these tables.
 
     Returns:
         Height of the bottom of the content [mm].

@@ -1,1 +1,1 @@
-"""Write results folders, read them back, compare them, and simulate their replicas again."""
+"""Write results folders, read them, compare them, and simulate the replicas of a result again."""

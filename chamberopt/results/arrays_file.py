@@ -1,6 +1,7 @@
-"""Write and read arrays.npz, which has a result's chamber as it was simulated, and its fields.
+"""Write and read arrays.npz: the simulated chamber of a result, and the coverage of its part.
 
-A finished result reads only arrays.npz and hits.npz, never again the files that its design names.
+A finished result is read from result.json, arrays.npz and hits.npz. The files that its design names
+are not read again.
 The surfaces in .vtp and .stl files beside it are for other programs.
 """
 
@@ -40,11 +41,11 @@ ROUNDING = 1e-6  # of single precision
 
 @dataclass(frozen=True)
 class ResultArrays:
-    """The chamber of a result with the part in it, and the fields on the part.
+    """The chamber of a result with its part, and coverage and other values on the part's surface.
 
     elements: values of each triangle of the part, by name, shape (m,). Unknown values are NaN.
-    display: fields at the vertices of a mesh to draw. Each triangle of this mesh lies in a triangle
-        of the part.
+    display: a finer mesh of the part to draw, with values at its vertices. Each triangle of this
+        mesh lies in a triangle of the part.
     """
 
     chamber: Chamber
@@ -58,21 +59,23 @@ class ResultArrays:
 
     @property
     def field(self) -> Surface:
-        """The mesh to draw [mm] with the field at its points."""
+        """The mesh of the part to draw [mm], with coverage and other values at its vertices."""
         return field_surface(self.display, self.elements)
 
     @property
     def cavity(self) -> Surface:
-        """The closed cavity [mm]."""
+        """The closed surface round the air in the chamber [mm]."""
         return cavity_surface(self.chamber)
 
 
 class Rule(NamedTuple):
-    """What an array of the file must be.
+    """The type, shape and bounds that an array in arrays.npz must have.
 
-    kinds: names of the types that it may have.
-    shape: its lengths. The first array with a named length sets it.
-    low, high: its bounds, both allowed. A named length allows numbers below it.
+    kinds: names of the allowed types, e.g. "float32 float64".
+    shape: lengths of the axes, e.g. "points 3". All arrays with the same named length ("points")
+        must agree in it.
+    low, high: least and largest allowed value. If `high` is a named length, values must be below
+        that length.
     unknown: True if values may be NaN.
     """
 
@@ -125,7 +128,13 @@ def _file_rules(place: str, points: str, faces: str) -> dict[str, Rule]:
 
 
 def _value_rules(place: str, rows: str, always: Sequence[str] = ()) -> dict[str, Rule]:
-    """Return rules for columns of values. Columns in `always` have no NaN."""
+    """Return a rule for each column in VALUES, by the array's name "place.column".
+
+    Args:
+        place: first part of the names of the arrays, such as "elements".
+        rows: name of the length that all columns share, such as "triangles".
+        always: names of the columns that must not have NaN.
+    """
     return {
         f"{place}.{name}": Rule(FLOAT, rows, *bounds, unknown=name not in always)
         for name, bounds in VALUES.items()
@@ -179,7 +188,7 @@ def load_result_arrays(result: Result) -> ResultArrays:
 
 
 def load_chamber(result: Result) -> Chamber:
-    """Return the cavity, part and target of a result. Raise InputError if its file changed."""
+    """Return the chamber of a result. Raise InputError if arrays.npz is damaged or was changed."""
     return load_result_arrays(result).chamber
 
 
@@ -204,7 +213,7 @@ def read_result_arrays(path: Path) -> ResultArrays:
 
 
 def _require_sound(arrays: ResultArrays) -> None:
-    """Raise ValueError unless the content of an arrays.npz is of its types, and fits together."""
+    """Raise ValueError unless values of arrays.npz have their types and agree with each other."""
     if not is_of_type(arrays, ResultArrays):
         raise ValueError("a value is of another type than is written here")
     _require_rules(dict(_named_arrays(arrays)))
@@ -213,7 +222,7 @@ def _require_sound(arrays: ResultArrays) -> None:
 
 
 def _named_arrays(value: Any, name: str = "") -> Iterator[tuple[str, np.ndarray]]:
-    """Yield all arrays in a record, each with the names that lead to it, joined by dots."""
+    """Yield each array in a nested record with its dotted name, as "chamber.part.area"."""
     if isinstance(value, np.ndarray):
         yield name, value
     inner = value if isinstance(value, dict) else {}
@@ -224,7 +233,7 @@ def _named_arrays(value: Any, name: str = "") -> Iterator[tuple[str, np.ndarray]
 
 
 def _require_rules(arrays: Mapping[str, np.ndarray]) -> None:
-    """Raise ValueError unless each array is as its rule says, and all needed arrays are there."""
+    """Raise ValueError unless all NEEDED arrays are there and each obeys its rule in RULES."""
     if missing := [name for name in NEEDED if name not in arrays]:
         raise ValueError(f"without {missing[0]}")
     rest = dict(arrays)
@@ -237,7 +246,10 @@ def _require_rules(arrays: Mapping[str, np.ndarray]) -> None:
 
 
 def _require_array(name: str, array: np.ndarray, rule: Rule, lengths: dict[str, int]) -> None:
-    """Raise ValueError unless an array is as its rule says. Add its new lengths."""
+    """Raise ValueError unless an array obeys its rule.
+
+    `lengths` has the named lengths of earlier arrays. New lengths of this array are added to it.
+    """
     if array.dtype not in map(np.dtype, rule.kinds.split()):
         raise ValueError(f"{name} is of type {array.dtype}")
     wanted = rule.shape.split()
@@ -254,7 +266,7 @@ def _require_array(name: str, array: np.ndarray, rule: Rule, lengths: dict[str, 
 
 
 def _require_chamber(chamber: Chamber) -> None:
-    """Raise ValueError unless a chamber has its surfaces and units, and a volume."""
+    """Raise ValueError unless a chamber has a part, a sonotrode, known units and a volume."""
     part = chamber.part
     if part.file is None:
         raise ValueError("without its part")
@@ -270,7 +282,11 @@ def _require_chamber(chamber: Chamber) -> None:
 
 
 def _require_known(arrays: ResultArrays) -> None:
-    """Raise ValueError unless fields are known wherever shot can reach the part and its target."""
+    """Raise ValueError if coverage is unknown at a point of the part that balls can reach.
+
+    Also raise ValueError if the values and the chamber have different targets, element numbers or
+    exposed areas, or if no exposed triangle is in the target.
+    """
     elements, shown, mesh = arrays.elements, arrays.display.fields, arrays.display.mesh
     part, area = arrays.chamber.part, 1e6 * arrays.chamber.exposed_area
     same = {"target": part.target, "element": part.elements, "exposed_area_mm2": area}

@@ -34,7 +34,7 @@ def write_record(path: Path, record: Table) -> None:
 
 
 class ArcHeight(Table):
-    """The arc height of a virtual strip after a multiple of the saturation time."""
+    """The arc height of a virtual Almen strip after a multiple of its saturation time."""
 
     times_saturation: float
     time_s: float
@@ -44,7 +44,7 @@ class ArcHeight(Table):
 
 
 class KirkFitRecord(Table):
-    """A saturation curve fitted to the five arc heights: its constants a, b and c and its result.
+    """A saturation curve fitted to five arc heights of a strip: constants a, b, c and intensity.
 
     The formula is in peening/kirk_fit.py.
     """
@@ -71,7 +71,7 @@ class StripRecord(Table):
         type: type of the strip.
         place: where in the chamber the strip lies.
         calibrated: True if the arc heights come from a calibrated model.
-        fits: fitted saturation curves by their number of parameters.
+        fits: fitted saturation curves, by the number of their parameters.
     """
 
     format: int
@@ -135,7 +135,9 @@ def strip_record(strip: VirtualStrip) -> StripRecord:
 
 
 class ParameterRecord(Table):
-    """A calibrated parameter: mean and standard deviation of its logarithm before and after."""
+    """A calibrated parameter: mean and standard deviation of its logarithm, before and after
+    the calibration.
+    """
 
     log_mean_before: float
     log_sd_before: float
@@ -147,7 +149,7 @@ class MisfitRecord(Table):
     """The misfit between the model and all measurements of one kind.
 
     Args:
-        chi2: sum of squared deviations, each over its standard deviation.
+        chi2: sum of squared deviations, each divided by its standard deviation before squaring.
         values: number of measured values.
         error_scale: factor by which the stated errors were widened to explain the misfit.
         explained: True if no widening was needed.
@@ -173,7 +175,7 @@ class MeasuredRecord(Table):
 
 
 class PredictionRecord(Table):
-    """A predicted figure of the design, with standard deviations of its logarithm.
+    """A figure that the model predicts for the design, with standard deviations of its logarithm.
 
     Args:
         log_sd_before: before the calibration.
@@ -213,7 +215,7 @@ class CalibrationRecord(Table):
 def calibration_record(
     found: Calibrated, predictions: list[Prediction], notes: list[str]
 ) -> CalibrationRecord:
-    """Return the content of calibration.json for a calibration and the figures it predicts."""
+    """Return the content of calibration.json: a calibration and its predictions."""
     posterior, prior = found.posterior, found.posterior.prior
     sd = [found.table.log_sd(name) for name in prior.names]
     return CalibrationRecord(
@@ -264,14 +266,14 @@ def calibration_record(
 
 
 class ReferenceRecord(Table):
-    """The settings of an accuracy study's reference run, with which all other runs are compared."""
+    """The settings of the reference, a run with which an accuracy study compares its others."""
 
     text: str
     settings: dict[str, Any]
 
 
 class ErrorLawRecord(Table):
-    """The fitted curve error = scale · cost^-power. An infinite half-width of `power` is null."""
+    """The fitted curve error = scale · cost^-power. `power_half_width`: null if infinite."""
 
     scale: float
     power: float
@@ -291,7 +293,7 @@ class HalvingRecord(Table):
 
 
 class RecommendationRecord(Table):
-    """The recommended settings for one wanted accuracy. 0 replicas if it cannot be reached."""
+    """The recommended settings for one wanted accuracy. `replicas`: 0 if it cannot be reached."""
 
     accuracy: float
     settings: dict[str, Any]
@@ -302,9 +304,9 @@ class RecommendationRecord(Table):
 
 
 class ConvergenceRecord(Table):
-    """The content of accuracy.json: how the error of the figures falls with the simulation's cost.
+    """The content of accuracy.json: how the error of coverage falls with the simulation's cost.
 
-    Each row holds the settings and errors of one run, or of a number of replicas of one run.
+    Each row holds the settings and the errors of a simulation, or of some of its replicas.
     """
 
     format: int
@@ -320,7 +322,9 @@ class ConvergenceRecord(Table):
 
 
 class DifferenceRecord(Table):
-    """A figure of a later candidate minus that of the first, and what would prove the difference.
+    """A figure of a later candidate minus the same figure of the first candidate, with the number
+    of replicas that would prove the difference.
+
 
     Args:
         paired: True if replicas were compared pair by pair on the same seeds.
@@ -339,7 +343,7 @@ class DifferenceRecord(Table):
 
 
 class HistogramRecord(Table):
-    """A histogram with common bins: for each candidate, the share of its values in each bin."""
+    """Histograms with common bins: for each candidate, the share of its values in each bin."""
 
     unit: str
     edges: list[float]
@@ -361,9 +365,9 @@ class DistributionsRecord(Table):
 
 
 class LocalDifferenceRecord(Table):
-    """Shares of the target's area where a later candidate covers more or less than the first.
+    """Shares of the target where a later candidate has more or less coverage than the first.
 
-    Only differences beyond their 95 % interval count.
+    A point of the target counts only if its difference exceeds the 95 % interval.
     """
 
     share_more: float
@@ -372,7 +376,7 @@ class LocalDifferenceRecord(Table):
 
 
 class ComparisonRecord(Table):
-    """The content of compare.json: figures of candidates, and their differences to the first."""
+    """The content of compare.json: figures of candidates and differences from the first."""
 
     results: list[str]
     labels: list[str]
@@ -393,7 +397,7 @@ def comparison_record(
     Args:
         comparison: figures and their differences.
         spread: histograms over the target.
-        local: coverage of each later candidate minus that of the first, place by place.
+        local: coverage of each later candidate minus coverage of the first, at each vertex.
     """
     return ComparisonRecord(
         results=[str(result.folder) for result in comparison.results],

@@ -27,20 +27,22 @@ MAX_POSITIONS = 10_000_000  # balls × frames × trail; 480 MB together with the
 
 @dataclass(frozen=True)
 class FlightFrames:
-    """Where balls, sonotrodes and part of one replica are at evenly spaced times (frames).
+    """Positions of balls, sonotrodes and part in one replica at evenly spaced times, called frames.
 
     Times count from the end of the replica's warm-up, as in its impact log.
 
     time: time of each frame [s], shape (f,).
     balls: centres of the balls [m], shape (f, n, 3).
-    trail: centres at k times since the previous frame [m], shape (f, k, n, 3). NaN in frame 0.
+    trail: centres of the balls at k times from the previous frame on [m], shape (f, k, n, 3). NaN
+        in frame 0, which has no previous frame.
     diameter: diameters of the balls [m], shape (n,).
-    sonotrodes: displacement of each vibrating face by its tag [m], shape (f, 3). Empty for the
-        motion "random_phase", in which every ball meets a phase of its own.
+    sonotrodes: displacement of each vibrating face [m], shape (f, 3), by the tag of its triangles.
+        Empty for the motion "random_phase", in which the phase of each collision is random.
     amplitude: largest amplitude of all sonotrodes [m].
     part_angle: rotation of the part [rad], shape (f,).
     part_axis: point [m] and direction of the rotation axis. None if the part stands still.
-    dents, impacts: dents and impacts on the part within the time shown, in the part's frame.
+    dents, impacts: dents and impacts on the part from the first to the last frame, in coordinates
+        fixed to the part.
     """
 
     time: np.ndarray
@@ -70,8 +72,8 @@ def simulate_flight(
         start: time of the first frame after the warm-up [s].
         span: time from the first to the last frame [s].
         frames: number of frames.
-        trail: positions of each ball recorded per frame, with the position in the frame itself.
-        progress: function that sim_core.simulate calls.
+        trail: recorded positions of each ball from one frame to the next.
+        progress: function that is called with the simulated time [s], warm-up included.
 
     Raises:
         InputError: the frames lie outside the recorded time, or there are too many.
@@ -141,7 +143,7 @@ def require_simulated(
     """Raise InputError if frames are outside a replica's recorded time, or if there are too many.
 
     Args:
-        scene: the replica.
+        scene: simulator's input for the replica.
         start: time of the first frame after the warm-up [s].
         span: time from the first to the last frame [s].
         frames: number of frames.

@@ -1,4 +1,6 @@
-"""Simulate the replicas of a result again to get their impacts.
+"""Simulate the replicas of a result again to get the impacts on its part.
+
+Replicas are simulations of one design with different seeds.
 
 A result does not store its impact logs. The same design, chamber and seed give the same impacts to
 the last bit. A command that needs impacts therefore simulates the replicas again. It compares the
@@ -42,8 +44,8 @@ class ReplicaImpacts:
     """Impacts on the part in one replica, in order of time.
 
     number: number of the replica, from 0.
-    log: log of the simulator; its triangles are numbered as in the chamber.
-    part_triangle: triangle that was hit, numbered as in part.vtp, int32, shape (n,).
+    log: the impacts; each names its triangle by the number in the chamber's mesh.
+    part_triangle: the same triangle by its number in part.vtp, int32, shape (n,).
     """
 
     number: int
@@ -66,11 +68,11 @@ def simulate_impacts(
         result: result of a simulation or study.
         rebuilt: chamber of the result, from rebuild_chamber.
         executor: executor that runs the replicas.
-        replicas: number of replicas, from the first; None for all.
+        replicas: number of replicas, beginning with the first; None for all.
         progress: called after each replica.
 
     Raises:
-        InputError: the new impacts or their speeds differ from those of the result. It is raised
+        InputError: the new impacts or their speeds differ from hits.npz of the result. It is raised
             after the last replica, and only if all replicas were simulated.
     """
     design, chamber = result.design, rebuilt.chamber
@@ -94,7 +96,7 @@ def simulate_impacts(
 def replica_count(result: Result, replicas: int | None) -> int:
     """Return `replicas`, or the number of all replicas of the result if it is None.
 
-    Raises InputError if `replicas` is below 1 or above the number of the result.
+    Raises InputError if `replicas` is below 1 or above the result's number of replicas.
     """
     there = result.record.replicas
     if replicas is not None and not 1 <= replicas <= there:
@@ -107,13 +109,13 @@ def simulate_dents(
 ) -> Dents:
     """Simulate a replica for `time` [s] and return its dents on the part.
 
-    The time may exceed the recorded time.
+    The time counts from the end of the warm-up. It may exceed the time that the result simulated.
 
     Args:
-        progress: function that sim_core.simulate calls.
+        progress: function that is called with the simulated time [s], warm-up included.
 
     Raises:
-        InputError: the time is above MAX_SIMULATED_TREATMENT.
+        InputError: the time is not above 0, or is above MAX_SIMULATED_TREATMENT.
         sim_core.SimulationError: the simulation had to stop.
     """
     from sim_core import simulate
@@ -134,9 +136,9 @@ def require_dent_time(time: float) -> None:
 
 
 def simulation_seconds(replica: RebuiltReplica, time: float) -> float:
-    """Estimate how many seconds a simulation of `time` seconds of a replica will run.
+    """Estimate the computing time [s] to simulate `time` seconds of a replica.
 
-    The estimate comes from a short trial run.
+    The estimate comes from a short trial simulation.
     """
     from sim_core import simulate
 
@@ -151,7 +153,7 @@ def simulation_seconds(replica: RebuiltReplica, time: float) -> float:
 def dented_share(dents: Dents, chamber: Chamber) -> float:
     """Return the share of the target's area inside dents, from sample points on the target.
 
-    A dent covers only surface that faces it.
+    A dent covers only surface whose normal is near the dent's own.
     """
     from chamberopt.coverage.field.smooth_faces import Places
     from chamberopt.coverage.field.windows import Windows
@@ -174,7 +176,7 @@ def dented_share(dents: Dents, chamber: Chamber) -> float:
 def _replicas_ahead(result: Result) -> int:
     """Return how many replicas may be simulated before the caller asks for their impacts.
 
-    This is one per core, fewer if the impact logs would fill the memory.
+    The number is the number of cores, or less if the impact logs would fill the memory.
     """
     impacts = float(load_result_arrays(result).elements["impacts"].sum()) / result.record.replicas
     return max(0, min(core_count(), int(MAX_IMPACTS_IN_MEMORY / max(impacts, 1.0)) - 1))

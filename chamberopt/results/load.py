@@ -1,4 +1,4 @@
-"""Read results folders."""
+"""Read results folders, which simulations, studies and sweeps write."""
 
 from __future__ import annotations
 
@@ -49,8 +49,8 @@ RESTORE = "restore the folder from where it came, or simulate again"
 class Result:
     """A results folder that has been read.
 
-    design: the simulated design. For a study it is the best design, with its confirmed figures.
-    record: the content of result.json.
+    design: the simulated design. For a study it is the best design.
+    record: the content of result.json, with the figures of `design`.
     """
 
     folder: Path
@@ -59,7 +59,7 @@ class Result:
 
     @property
     def study(self) -> StudyRecord | None:
-        """What result.json says about the study. None if the result is of a simulation."""
+        """The key `study` of result.json. None if the result is of a simulation."""
         return self.record.study
 
     @property
@@ -72,7 +72,7 @@ class Result:
 
     @cached_property
     def metrics(self) -> dict[str, Estimate]:
-        """The metrics that this version of the program knows, by name."""
+        """The result's metrics (mean coverage etc.) by name, as far as this version knows them."""
         return {name: one for name, one in self.record.metrics.items() if find_metric(name)}
 
     @property
@@ -86,12 +86,12 @@ class Result:
 
     @property
     def gauge_mm2(self) -> float:
-        """Area [mm²] of the windows in which coverage is measured."""
+        """Area [mm²] of the windows, the discs of the surface in which coverage is measured."""
         return self.design.process.accuracy.gauge_mm2
 
     @property
     def resolves_places(self) -> bool:
-        """True if enough dents were simulated to tell the coverage of single places."""
+        """True if enough dents were simulated to tell coverage at single points of the part."""
         field = self.record.field
         return field.dents_in_median_window >= (field.dents_needed.p05_times_intensity or 0.0)
 
@@ -141,7 +141,7 @@ def load_result(path: str | Path) -> Result:
 
 
 def load_start(study: Result) -> Result:
-    """Return the result of the design with which a study began, from its folder `start`."""
+    """Return the result of the design with which a study began, from the study's folder `start`."""
     with _damage_explained(study.folder / START):
         return load_result(require_plain_folder(study.folder / START, RESTORE))
 
@@ -195,7 +195,7 @@ def file_sha256(path: Path) -> str:
 def summary(evaluation: Evaluation | Result) -> str:
     """Return a line of text with the objective, and with mean and standard deviation of coverage.
 
-    Each figure has its interval.
+    Each of these numbers has its interval.
     """
     mean, spread = (evaluation.metrics[name] for name in ("mean_coverage", "std_coverage"))
     name = evaluation.objective_name.replace("_", " ")
@@ -206,7 +206,7 @@ def summary(evaluation: Evaluation | Result) -> str:
 
 @contextmanager
 def _damage_explained(file: Path) -> Iterator[None]:
-    """Turn errors in the enclosed code, which reads a result.json, into InputError."""
+    """Turn errors of the `with` block, which reads a result.json, into InputError."""
     try:
         yield
     except OSError as error:

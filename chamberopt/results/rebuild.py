@@ -1,4 +1,4 @@
-"""Rebuild the replicas of a result so that they can be simulated again bit for bit."""
+"""Rebuild the replicas of a result so that simulating them again gives the same bits."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class RebuiltReplica:
         return self.result.design
 
     def on_chamber(self, impacts: ImpactLog) -> ImpactLog:
-        """Convert impacts on an analytical cavity to impacts on the triangles of the chamber.
+        """Assign impacts, which may be on an analytical cavity, to triangles of the chamber's mesh.
 
         Raises:
             InputError: an impact on the part within the recorded time is not in hits.npz of the
@@ -103,9 +103,9 @@ def rebuild_replica(result: Result, number: int = 0) -> RebuiltReplica:
 
 
 def _identity(triangle: np.ndarray, speed: np.ndarray) -> np.ndarray:
-    """Return a number for each impact, shape (n,) int64, from its triangle and its speed's bits.
+    """Return an integer for each impact, shape (n,), from its triangle and the bits of its speed.
 
-    Two impacts have the same number only if both agree.
+    Two impacts have the same integer only if triangle and speed are the same.
     """
     bits = speed.astype(np.float32).view(np.int32).astype(np.int64)
     return np.asarray((triangle.astype(np.int64) << 32) + bits)

@@ -1,6 +1,6 @@
 """Define the typed content of result.json, the record of a result.
 
-Writers and readers of result.json share the fields of these classes. A results folder may come from
+Code that writes result.json and code that reads it share these classes. A folder may come from
 another person, and its digests only prove that it is complete. The type of every value is therefore
 checked before any value is used.
 """
@@ -50,7 +50,7 @@ else:
 
 
 def _with_units(metrics: dict[str, Estimate]) -> dict[str, dict[str, object]]:
-    """Return metrics as JSON values, each with its unit."""
+    """Return metrics by name as JSON values, each with its unit."""
 
     def unit(name: str) -> str:
         metric = find_metric(name)
@@ -60,7 +60,7 @@ def _with_units(metrics: dict[str, Estimate]) -> dict[str, dict[str, object]]:
 
 
 class Objective(Table):
-    """The objective: the figure that a study maximises."""
+    """The objective: the metric, or sum of metrics, that a study maximises, with its estimate."""
 
     name: str
     estimate: WholeEstimate
@@ -135,7 +135,7 @@ class ChamberRecord(Table):
     """Volume, target and mesh of the chamber that was simulated.
 
     pieces_in_air: number of pieces of the part that reach no wall.
-    facets_left: True if the coarse facets of the part's file were not divided.
+    facets_left: True if coarse triangles in place of a curved surface decide the coverage.
     """
 
     volume_mm3: Positive
@@ -153,7 +153,7 @@ class AdviceRecord(Table):
         on: True if it should be simulated.
         verdict: the advice in a few words.
         said: the advice as one text.
-        changes: change of each figure by the effect.
+        changes: change of each figure, such as mean coverage, if the effect is simulated.
     """
 
     effect: str
@@ -164,17 +164,17 @@ class AdviceRecord(Table):
 
 
 class SliceRecord(Table):
-    """How a study's fitted model of the score depends on one parameter, at the best design.
+    """How the score of a design depends on one parameter, by the model fitted to a study.
 
     Args:
-        flat: range or texts of the parameter for which the score loses no more than noise.
+        flat: range (or texts) of the parameter in which the loss of score is within the noise.
         choices: allowed texts, for a parameter that is a choice.
         share_of_variance: share of the score's variance that this parameter explains.
         values: values of the parameter at which the curves are given.
         mean: score at each value, with the other parameters as in the best design.
         half_width: half-width of the score's interval at each value.
         main_effect: score at each value, averaged over the other parameters.
-        or_worse: True where the model knows only that the score is no better than the mean.
+        or_worse: True at values where `mean` is only an upper limit of the score.
     """
 
     flat: Ends
@@ -215,7 +215,7 @@ class FrontPoint(CandidatePoint):
 
 
 class ViolationRecord(Table):
-    """A limit that is certainly or possibly violated: the figure, and the violation in words."""
+    """A constraint that a candidate violates, certainly or possibly: its figure and a text."""
 
     figure: str
     text: str
@@ -271,7 +271,7 @@ class StudyRecord(Table):
 
     @property
     def on_bounds(self) -> list[str]:
-        """Names of the parameters whose best value lies on a bound of the search."""
+        """Names of the parameters whose value in the best design lies on a bound of the search."""
         return [
             name for name, ends in self.vary.items() if bound_at(self.best.parameters[name], ends)
         ]
@@ -287,7 +287,7 @@ class StudyRecord(Table):
 
 
 class ResultRecord(Table):
-    """The keys that every result.json has."""
+    """The keys that each result.json has, of a simulation, a study or a sweep."""
 
     kind: Literal["simulation", "study", "sweep"]
     format: int
@@ -307,7 +307,7 @@ class ResultRecord(Table):
 
 
 class SweepFacts(Table):
-    """What a sweep varied, how many candidates it simulated, and its best candidate."""
+    """The facts of a sweep: varied parameters, number of candidates, best candidate."""
 
     objective: str
     vary: dict[str, Ends]
@@ -323,7 +323,7 @@ class SweepFacts(Table):
 
 
 class SweepRecord(ResultRecord):
-    """The content of a sweep's result.json. The program reads only its digests again."""
+    """The content of a sweep's result.json. Only its digests are read again."""
 
     sweep: SweepFacts
 

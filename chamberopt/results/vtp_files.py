@@ -1,10 +1,8 @@
 """Make the surfaces of a result, and write them for ParaView and other programs.
 
-No code here reads them back.
-
 part.vtp: the part in its own triangles, with a value for each triangle.
-coverage.vtp: the same surface in triangles that suit the field, with a value for each corner.
-chamber.vtp: the closed cavity.
+coverage.vtp: the same surface in finer triangles, with coverage etc. at each vertex.
+chamber.vtp: the cavity, which is the closed surface round the air in the chamber.
 """
 
 from __future__ import annotations
@@ -49,18 +47,21 @@ def pyvista() -> ModuleType:
 
 
 def part_surface(part: Part, values: dict[str, np.ndarray]) -> Surface:
-    """Return the part, posed in the chamber [mm], with columns of values for its triangles."""
+    """Return the part's surface where it stands in the chamber [mm].
+
+    `values` has values for each triangle, by name.
+    """
     return _surface(part.vertices, part.triangles, values)
 
 
 def field_surface(display: DisplayField, values: dict[str, np.ndarray]) -> Surface:
-    """Return the mesh to draw of a part [mm], with fields at its vertices as point data.
+    """Return the mesh that is drawn of a part [mm], with coverage and other values at its vertices.
 
-    The cell data are the number of the part's triangle (triangle) and its values in the columns
-    OF_ELEMENT, with zones also ZONE.
+    Each of its triangles has the number of the part's triangle in which it lies (`triangle`) and
+    some values of that triangle: the columns OF_ELEMENT and, if the part has zones, ZONE.
 
     Args:
-        values: columns with a value for each triangle of the part.
+        values: values for each triangle of the part, by name.
     """
     mesh = display.mesh
     columns = OF_ELEMENT | ({ZONE: ZONE} if ZONE in values else {})
@@ -72,11 +73,12 @@ def field_surface(display: DisplayField, values: dict[str, np.ndarray]) -> Surfa
 
 
 def cavity_surface(chamber: Chamber) -> Surface:
-    """Return the closed cavity [mm] with cell data.
+    """Return the closed cavity [mm] with these values for each triangle.
 
-    tag: 0 part, 1 sonotrode, 2 wall, 3 and more further sonotrodes.
-    source: triangle of the part, -1 elsewhere.
-    fitting: number of the hole or deflector, -1 elsewhere. Only chambers with fittings have it.
+    tag: surface to which it belongs: 0 part, 1 sonotrode, 2 wall, 3 and more further sonotrodes.
+    source: number of the same triangle in the part, -1 off the part.
+    fitting: number of the hole or deflector (fitting) to which it belongs, -1 for none. Only
+        chambers with fittings have this value.
     """
     fields = {"tag": chamber.tags, "source": chamber.source}
     if chamber.fitting is not None:
@@ -85,7 +87,7 @@ def cavity_surface(chamber: Chamber) -> Surface:
 
 
 def write_coverage(folder: Path, part: Surface, field: Surface) -> None:
-    """Write the part as part.vtp, and its mesh to draw as coverage.vtp."""
+    """Write the part as part.vtp, and `field`, the finer mesh with coverage, as coverage.vtp."""
     save_surface(folder / PART, part)
     save_surface(folder / COVERAGE, field)
 

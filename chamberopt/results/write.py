@@ -1,4 +1,4 @@
-"""Write the data files of a result. Every file appears whole or not at all."""
+"""Write the data files of a result. A file that cannot be completed does not appear."""
 
 from __future__ import annotations
 
@@ -76,8 +76,8 @@ def write_study(
 
     run_study has written design.toml, study.toml and history.jsonl. write_study adds best.toml,
     history.csv and, for two objectives, pareto.csv. It adds coverage.vtp, part.vtp, hits.npz,
-    arrays.npz, chamber.stl and chamber.vtp of the best design. The folder start/ is the results
-    folder of the start, confirmed on the same seeds.
+    arrays.npz, chamber.stl and chamber.vtp of the best design. The folder start/ is the
+    results folder of the design with which the study began, simulated on the same seeds.
 
     Returns:
         The study's record, which `write_result` writes.
@@ -95,7 +95,7 @@ def write_sweep(folder: Path, sweep: SweepResult) -> SweepRecord:
     """Add the data files of a finished sweep to its folder and return its record.
 
     run_sweep has written design.toml, study.toml and history.jsonl. write_sweep adds history.csv
-    and, if a candidate is feasible, best.toml.
+    and, if a candidate meets the constraints, best.toml.
     """
     write_text(folder / "history.csv", trials_as_csv(read_trials(folder)))
     if sweep.best is not None:
@@ -106,8 +106,8 @@ def write_sweep(folder: Path, sweep: SweepResult) -> SweepRecord:
 def best_row_note(sweep: SweepResult) -> str:
     """Return a note on a sweep's best candidate.
 
-    It says that the candidate's figures are too good, or why there is none if no candidate meets
-    the constraints.
+    It says that the best candidate's figures are too good, because it is partly the luckiest. If no
+    candidate meets the constraints, it says so.
     """
     if sweep.best is None:
         return (
@@ -132,7 +132,7 @@ def write_result(
     Args:
         folder: folder of the result.
         record: record from write_simulation, write_study or write_sweep.
-        advice: reasons for the effects, if the design left their choice to the program.
+        advice: reasons for the physical effects, if the design left their choice to the program.
         warned: warnings of `chamberopt check`; None if it was not run.
     """
     more: dict[str, Any] = {"files": data_digests(folder)}
@@ -173,7 +173,7 @@ def data_digests(folder: Path) -> dict[str, str]:
 def _write_candidate(folder: Path, candidate: CandidateResult, **more: Any) -> CandidateRecord:
     """Write the surfaces and impacts of a simulated design into a folder.
 
-    Return its record for result.json, with the further keys `more`.
+    Return the record for result.json, with the further keys `more`.
     """
     design, chamber, evaluation = candidate.design, candidate.chamber, candidate.evaluation
     arrays = ResultArrays(chamber, candidate.element_values, candidate.display)
@@ -222,7 +222,7 @@ def _write_candidate(folder: Path, candidate: CandidateResult, **more: Any) -> C
 def _about_zones(design: Design, chamber: Chamber, evaluation: Evaluation) -> list[ZoneRecord]:
     """Return the records of the part's zones, with their limits and whether they are met.
 
-    The figures of zones are among the metrics.
+    Coverage of the zones is not in these records but among the metrics.
     """
     judged = judge_zones(design, evaluation.metrics)
     return [
@@ -240,7 +240,7 @@ def _about_zones(design: Design, chamber: Chamber, evaluation: Evaluation) -> li
 def _about_field(design: Design, evaluation: Evaluation) -> FieldRecord:
     """Return the record of the windows in which coverage is measured.
 
-    It also holds the figures in windows of twice the width.
+    Windows are discs of the surface. The record also has metrics from windows of twice the width.
     """
     found = evaluation.resolution
     return FieldRecord(
@@ -329,7 +329,7 @@ def _about_model(found: Sensitivity) -> ModelRecord:
 
 
 def _about_front(result: StudyResult) -> list[FrontPoint]:
-    """Return the points of the Pareto front that were confirmed, best first objective first."""
+    """Return the confirmed points of the Pareto front, largest first objective first."""
     names = result.study.objective.goals
     points = pareto.pareto_points(result)
     front = [one for one in points if one.on_front and one.stage == "confirm"]

@@ -1,7 +1,7 @@
 """Run a sweep: evaluate candidates on a grid, or spread evenly, over the bounds of a study.
 
-Each candidate is one task: a worker builds its chamber, simulates its replicas and returns the
-figures.
+Each candidate is one task of a worker process, which builds the candidate's chamber, simulates its
+replicas and returns its figures (coverage etc.).
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ MAX_CANDIDATES = 100_000
 
 @dataclass(frozen=True)
 class SweepPlan:
-    """The candidates that a sweep evaluates: a grid, or evenly spread points."""
+    """The candidates that a sweep evaluates: points on a grid, or points spread evenly (Sobol)."""
 
     method: str  # "grid" or "sobol"
     count: int  # values of each parameter, or number of points
@@ -49,13 +49,13 @@ class SweepPlan:
     seed: int | None  # of the points; None for a grid
 
     def as_json(self) -> dict[str, object]:
-        """Return the plan without its points, which follow from it, as plain JSON values."""
+        """Return method, count and seed as JSON values. The points follow from these values."""
         return {"method": self.method, "count": self.count, "seed": self.seed}
 
 
 @dataclass(frozen=True)
 class SweepResult:
-    """The result of a sweep: its trials in the order of the plan, and their wall-clock time [s]."""
+    """The result of a sweep: its trials in the order of the plan, and their total run time [s]."""
 
     study: Study
     plan: SweepPlan
@@ -67,8 +67,9 @@ class SweepResult:
     def best(self) -> Trial | None:
         """The feasible candidate with the largest objective; None if no candidate is feasible.
 
-        It is partly the luckiest one. A candidate whose objective is not resolved counts only where
-        there is no other.
+        A candidate is feasible if it meets the constraints. The best candidate is partly the
+        luckiest in the noise. A candidate with an unresolved objective is chosen only if all
+        objectives are unresolved.
         """
         feasible = [trial for trial in self.trials if trial.feasible]
         resolved = [one for one in feasible if one.objective and one.objective.has_number]
@@ -80,7 +81,7 @@ def plan_sweep(
 ) -> SweepPlan:
     """Plan a sweep of `grid` values of each parameter, bounds included, or `sobol` points in all.
 
-    `seed` is that of the Sobol points, by default the study's optimizer.seed. Raises InputError
+    `seed` scrambles the Sobol points, by default the study's optimizer.seed. Raises InputError
     unless exactly one of grid and sobol is given, or if a number is out of range.
 
     Source: the Sobol points are scrambled as in A. B. Owen, "Scrambling Sobol' and
@@ -136,16 +137,16 @@ def run_sweep(
     progress: Progress | None = None,
     simulator: Simulator | None = None,
 ) -> SweepResult:
-    """Evaluate every candidate of a plan, with the accuracy and the seeds of a search.
+    """Evaluate every candidate of a plan, with the same accuracy and seeds as in a search.
 
-    A candidate that fails is a row with its reason.
+    A candidate that fails has a row in the log with the reason.
 
     Args:
         study: the study of the folder, with its effects resolved.
-        folder: if this very sweep was interrupted in it, it is resumed. It receives design.toml,
-            study.toml and history.jsonl, whose rows are in the order of the plan for any number of
-            workers.
-        simulator: replaces the simulation; it is sent to the workers.
+        folder: folder for design.toml, study.toml and history.jsonl. A sweep that was interrupted
+            in it is resumed. The rows of history.jsonl are in the order of the plan for any number
+            of workers.
+        simulator: function to use in place of the simulation; it is sent to the workers.
     Raises:
         InputError: all candidates fail.
     """
@@ -177,14 +178,15 @@ def evaluate_point(
 ) -> Outcome:
     """Evaluate one candidate of a sweep on one worker.
 
-    Return its evaluation without the impacts, which are large, or an InputError with the reason why
-    there is none.
+    Return the evaluation without its impacts, which are large. If the candidate fails, return an
+    InputError with the reason.
 
     Args:
         number: number of the candidate.
-        point: its point in the unit cube, (d,).
-        target: which triangles of the part are the target, (m,) bool; None if the design says it.
-        simulator: replaces the simulation.
+        point: the candidate's parameters as a point in the unit cube, shape (d,).
+        target: True for triangles of the part in the target, shape (m,) bool; None to select the
+            target by the design.
+        simulator: function to use in place of the simulation.
     """
     evaluator = CandidateEvaluator(
         study, simulator or ChamberSimulator(study, SerialExecutor(), target)

@@ -1,4 +1,8 @@
-"""The folder of a study while it runs: inputs, effects, trials and confirmed evaluations."""
+"""The folder of a study while it runs: its inputs, effects, trials and confirmed evaluations.
+
+A trial is an evaluated candidate, and a row of the log history.jsonl. From the trials, an
+interrupted study is resumed without evaluating them again.
+"""
 
 from __future__ import annotations
 
@@ -49,8 +53,8 @@ if TYPE_CHECKING:
 class RecordedTrials:
     """The trials that a study's log held when the study was opened.
 
-    A last line of the log that a crash cut off is removed. Raises InputError if a row is damaged or
-    does not belong to this study.
+    The constructor repairs the log: a last line that a crash cut off is removed. Raises InputError
+    if a row of the log is damaged or does not belong to this study.
     """
 
     def __init__(self, log: JsonLines, study: Study) -> None:
@@ -61,10 +65,10 @@ class RecordedTrials:
         self.trials = [self._trial(number, row) for number, row in enumerate(log.rows())]
 
     def find(self, number: int, stage: str, point: Sequence[float]) -> Trial | None:
-        """Return the recorded trial of a candidate, or None if the record has no more trials.
+        """Return the recorded trial with this number, or None if the log has fewer trials.
 
-        Raises InputError if the record has another candidate at this number, even if its point
-        differs by no more than a bit.
+        Raises InputError if that trial is of another stage or another point in the unit cube, even
+        if the points differ only by a bit.
         """
         if number >= len(self.trials):
             return None
@@ -78,7 +82,7 @@ class RecordedTrials:
         return trial
 
     def require_end(self, number: int) -> None:
-        """Raise InputError if there are more trials than the finished study asked for."""
+        """Raise InputError if the log has more than the `number` trials of the finished study."""
         if len(self.trials) > number:
             raise self._mismatch(number, "the study has ended before this row")
 
@@ -94,8 +98,8 @@ class RecordedTrials:
     def _is_possible(self, trial: Trial) -> bool:
         """Return whether a trial can belong to this study.
 
-        It must have all figures of the study, or have failed and not be the start, which never
-        fails.
+        The trial must have all objectives and metrics of the study, or have failed. The first
+        trial of the search, which is the start design, cannot have failed.
         """
         if not trial.goals:
             return trial.number > 0 or trial.stage != "search"
@@ -117,7 +121,7 @@ class RecordedTrials:
 
 
 def _exact(point: Sequence[float]) -> str:
-    """Return the numbers of a point as a text that is different for different numbers."""
+    """Return the numbers of a point as text with all digits, so that different points differ."""
     return "[" + ", ".join(repr(float(share)) for share in point) + "]"
 
 
@@ -130,8 +134,8 @@ MAX_DIFFERENCES = 12  # in one message
 def study_inputs(study: Study, plan: Mapping[str, object] | None = None) -> dict[str, object]:
     """Return everything that the trials of a study depend on, as plain JSON values.
 
-    A file that the design names, such as the part's mesh, is stored as its name and the sha256 of
-    its content, so that it may be moved.
+    A file that the design names, such as the part's mesh, is given by its name and the sha256 of
+    its content, without its folder, so that the file may be moved.
 
     Args:
         plan: the plan of a sweep; None for a search.
@@ -147,7 +151,7 @@ def study_inputs(study: Study, plan: Mapping[str, object] | None = None) -> dict
 def require_same_inputs(
     folder: Path, before: Mapping[str, object], now: Mapping[str, object]
 ) -> None:
-    """Raise InputError if the study in the folder was begun with other inputs."""
+    """Raise InputError if the inputs with which the study began, `before`, differ from `now`."""
     title = f"{folder}: the study in this folder began otherwise:"
     remedy = "to resume it, restore these inputs; to run the new study, give another folder (--out)"
     _require_same(before, now, title, remedy)
@@ -164,9 +168,9 @@ def require_same_files(design: Design, before: Mapping[str, Any], folder: Path) 
 def _require_same(
     before: Mapping[str, object], now: Mapping[str, object], title: str, remedy: str
 ) -> None:
-    """Raise InputError if two tables differ, with a list of the differences.
+    """Raise InputError if two tables differ. The message lists the differences.
 
-    It reads such as `study.design.shot.mass_g: was 5.0, is 6.0`.
+    A difference reads e.g. `study.design.shot.mass_g: was 5.0, is 6.0`.
 
     Args:
         title: first line of the message.
@@ -202,7 +206,7 @@ def _flatten(value: object, prefix: str = "") -> dict[str, object]:
     """Return the values of nested tables by dotted name, such as "shot.mass_g".
 
     Args:
-        prefix: dotted name of the value itself; "" for the outermost table.
+        prefix: dotted name of `value`; "" for the outermost table.
     """
     if not isinstance(value, Mapping) or not value:
         return {prefix: value}
@@ -230,8 +234,8 @@ def open_study_folder(
     """Open the folder of a study, and keep other processes from writing to it meanwhile.
 
     Args:
-        folder: new, empty, or where this very study was begun.
-        plan: the plan of a sweep.
+        folder: new, empty, or the folder in which this very study was begun.
+        plan: the plan of a sweep; None for a search.
     Raises:
         InputError: the folder holds something else, another process writes to it, or the study,
             the part or the program have changed since the study began.
@@ -245,19 +249,19 @@ def open_study_folder(
 
 
 def is_study_folder(folder: Path) -> bool:
-    """Return whether a study was begun in the folder; it may be finished or not."""
+    """Return True if a study was begun in the folder, whether or not it is finished."""
     return (folder / INPUTS).is_file()
 
 
 def is_finished(folder: Path) -> bool:
-    """Return whether the study of the folder is finished: its result, written last, is there."""
+    """Return True if the study of the folder is finished, i.e. if its result.json is there."""
     return (folder / RESULT).is_file()
 
 
 class StudyFolder:
     """The folder of a study that runs: its inputs, its trials and its confirmed evaluations.
 
-    `recorded` are the trials that it held when it was opened by `open_study_folder`.
+    recorded: the trials that the folder held when `open_study_folder` opened it.
     """
 
     def __init__(self, study: Study, path: Path, plan: Mapping[str, object] | None = None) -> None:
@@ -278,18 +282,18 @@ class StudyFolder:
 
     @property
     def begun(self) -> bool:
-        """Whether the folder has a trial log, from which the study is resumed."""
+        """True if the folder has a trial log, so that the study can be resumed."""
         return self._history.path.exists()
 
     @property
     def seconds(self) -> float:
-        """Wall-clock time of all evaluations of the study [s], those before interruptions too."""
+        """Wall-clock time of all evaluations of the study [s], also before interruptions."""
         return sum(read_seconds(self.path).values())
 
     def begin(self) -> None:
-        """Write what the study's trials depend on to the folder, before the first trial.
+        """Write the inputs on which the trials depend to the folder, before the first trial.
 
-        Inputs of an earlier run that has no trials yet are replaced.
+        If an earlier run wrote inputs but no trial, its inputs are replaced.
         """
         remove_leftovers(self.path)
         path = self.path / INPUTS
@@ -302,9 +306,10 @@ class StudyFolder:
     def with_effects_resolved(
         self, resolve: Callable[[Design], tuple[Design, list[Advice]]]
     ) -> tuple[Study, list[Advice]]:
-        """Return the study with physical effects chosen in place of "auto", and why they were.
+        """Return the study with its optional physical effects chosen, and the reasons (advice).
 
-        The study stays as it is, without advice, if its design does not ask for "auto".
+        If the design does not leave effects to the program ("auto"), the study is returned as it
+        is, without advice.
 
         Args:
             resolve: function that chooses the effects of a design by pilot runs. It is called once
@@ -333,9 +338,9 @@ class StudyFolder:
         return self.study.model_copy(update={"design": resolved}), advice
 
     def evaluation(self, trial: Trial) -> Evaluation:
-        """Return the evaluation of a recorded trial of the confirmation, from its file.
+        """Return the stored evaluation of a recorded trial that confirms a candidate.
 
-        Raises InputError if the figures in the file are not those of the trial.
+        Raises InputError if the file and the trial have different figures.
         """
         path = self._evaluation_path(trial.number)
         found = load_evaluation(path)
@@ -356,11 +361,11 @@ class StudyFolder:
     ) -> None:
         """Write a trial as one row of the log.
 
-        The evaluation of a trial of the stage "confirm" goes to a file of its own, if the trial was
-        simulated. Row and file are on the disk when this method returns.
+        If the trial is of the stage "confirm" and did not fail, its evaluation is written to a
+        separate file. Row and file are on the disk when this method returns.
 
         Raises:
-            OSError: they cannot be written.
+            OSError: row or file cannot be written.
             InputError: a file that the design names has changed since the study began.
         """
         require_same_files(self.study.design, self._inputs, self.path)

@@ -1,7 +1,8 @@
-"""Append-only trial log: one row for each evaluation, on the disk before another takes its place.
+"""The trial log history.jsonl: a row is appended for each evaluated candidate (trial) of a study.
 
-Two runs of one study write the same history.jsonl, byte for byte; run times are kept in a separate
-file, timings.jsonl.
+The row is on the disk before the next evaluation starts in its place. Running a study twice writes
+the same history.jsonl, byte for byte. Run times differ, so they are in a separate file,
+timings.jsonl.
 """
 
 import json
@@ -40,11 +41,11 @@ class Trial:
 
     @property
     def objective(self) -> Estimate | None:
-        """The first objective; None when the evaluation failed."""
+        """The estimate of the first objective; None if the evaluation failed."""
         return self.goals[0] if self.goals else None
 
     def row(self) -> dict[str, object]:
-        """Return the trial as a row of plain JSON values, which reads back to the same bits."""
+        """Return the trial as JSON values, from which `from_row` restores the same bits."""
         objective = self.objective
         interval = (objective or Estimate(math.nan, math.nan)).interval_json()
         return {
@@ -67,7 +68,7 @@ class Trial:
 
     @classmethod
     def from_row(cls, row: Mapping[str, Any]) -> Self:
-        """Return the trial of a row of the log.
+        """Return the trial that a row of the log holds.
 
         Raises one of the errors in DAMAGED if the row is not exactly as it was written.
         """
@@ -98,19 +99,20 @@ class Trial:
 class JsonLines:
     """A file of JSON rows, one in each line, that only grows.
 
-    Surviving a power cut means that each row is forced to the disk, which takes milliseconds.
+    Args:
+        survives_power_cut: force each row to the disk at once, which takes milliseconds.
     """
 
     def __init__(self, path: Path, survives_power_cut: bool = True) -> None:
         self.path, self._survives_power_cut = path, survives_power_cut
 
     def append(self, row: Mapping[str, object]) -> None:
-        """Write a row; if OSError is raised, e.g. by a full disk, the file is unchanged."""
+        """Append a row. If OSError is raised, e.g. by a full disk, the file is unchanged."""
         line = (json.dumps(row, allow_nan=False) + "\n").encode()
         append_bytes(self.path, line, self._survives_power_cut)
 
     def rows(self) -> list[dict[str, object]]:
-        """Return all rows in order, without a last line that a crash cut off.
+        """Return all rows in order. A last line that a crash cut off is left out.
 
         Raises InputError if a row is damaged.
         """
@@ -119,19 +121,19 @@ class JsonLines:
     def repair(self) -> None:
         """Remove a last line that a crash cut off, so that the next row begins a new line.
 
-        A second name of the file, such as a backup's, keeps what it has.
+        The content under a second name of the file (hard link), such as a backup, stays as it is.
         """
         _, whole, cut_off = self._read()
         if cut_off or (whole and self.path.lstat().st_nlink > 1):
             write_bytes(self.path, whole)
 
     def damaged(self, line: int) -> InputError:
-        """Return the error that says that a line is damaged; lines are counted from 1."""
+        """Return an InputError which says that line `line`, counted from 1, is damaged."""
         text = "damaged row; restore the file or run the study in a new folder"
         return InputError(f"{self.path}:{line}: {text}")
 
     def _read(self) -> tuple[list[dict[str, object]], bytes, bytes]:
-        """Return the rows, the bytes of their lines, and those of a last line that was cut off."""
+        """Return the rows, the bytes of their lines, and the bytes of a cut-off last line."""
         try:
             content = read_file(self.path)
         except FileNotFoundError:
@@ -155,7 +157,7 @@ class JsonLines:
 def read_trials(folder: Path) -> list[dict[str, object]]:
     """Return all rows of a study's trial log in order, each with the seconds of its evaluation.
 
-    The seconds are None where they are unknown.
+    The number of seconds is None if it is unknown.
     """
     path = folder / HISTORY
     if not path.is_file():
@@ -171,7 +173,7 @@ def read_trials(folder: Path) -> list[dict[str, object]]:
 
 
 def read_seconds(folder: Path) -> dict[int, float]:
-    """Return the wall-clock time [s] of each evaluation in a study's folder, by its number."""
+    """Return the wall-clock time [s] of each evaluation in a study's folder, by trial number."""
     log, seconds = JsonLines(folder / TIMINGS), {}
     for line, row in enumerate(log.rows(), start=1):
         number, time = row.get("number"), row.get("seconds")
@@ -184,8 +186,8 @@ def read_seconds(folder: Path) -> dict[int, float]:
 def trials_as_csv(rows: list[dict[str, Any]]) -> str:
     """Return the rows of a trial log as CSV text, with a column for each parameter and metric.
 
-    NAME_pm is the half-width of NAME, empty where words such as "never" stand in the place of the
-    number. A failed evaluation has no metrics.
+    The column NAME_pm is the half-width of the column NAME. It is empty if words such as "never"
+    stand for the number. A failed evaluation has no metrics.
     """
     lines = []
     for row in rows:
@@ -202,9 +204,9 @@ def trials_as_csv(rows: list[dict[str, Any]]) -> str:
 
 
 def _cells(interval: Mapping[str, object]) -> tuple[object, object]:
-    """Return the two cells of a figure in a table: its value and half-width.
+    """Return the two cells of an estimate in a table: its value and half-width.
 
-    If words such as "never" stand for the figure, return these words and None.
+    If words such as "never" stand for the value, return these words and None.
     """
     if "in_words" in interval:
         return interval["in_words"], None

@@ -1,1 +1,1 @@
-"""Take a design to a saved result in one call. Nothing here prints on the terminal."""
+"""Workflows that compute a result and save it in one call. They print nothing on the terminal."""

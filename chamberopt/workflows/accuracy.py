@@ -1,4 +1,7 @@
-"""Run a convergence study and save it: a table (.csv), the record as JSON, a picture."""
+"""Run a convergence study and save it as a table (.csv), as JSON and as a picture.
+
+The study measures how the error of coverage etc. falls with the computing time of a simulation.
+"""
 
 from __future__ import annotations
 
@@ -35,7 +38,7 @@ if TYPE_CHECKING:
 def measure_accuracy(
     design: Design, budget_s: float, folder: Path, executor: Executor, teller: Teller
 ) -> ConvergenceStudy:
-    """Run a convergence study for about a budget of CPU seconds, and save it in an empty folder."""
+    """Run a convergence study of about `budget_s` CPU seconds, and save it in an empty folder."""
 
     def compile_it(one: Design, chamber: Chamber) -> None:
         teller.compile(one, chamber, None)
@@ -85,7 +88,7 @@ def _recommendation(advice: Recommendation) -> RecommendationRecord:
 
 
 def rows(study: ConvergenceStudy) -> list[dict[str, object]]:
-    """Return the rows of accuracy.csv: one for each run, and one for each number of replicas.
+    """Return the rows of accuracy.csv: a row for each simulation and each number of its replicas.
 
     A value is None where its column does not apply.
     """

@@ -1,4 +1,4 @@
-"""Calibrate a machine and save it: machine.toml for designs, text, JSON and a picture."""
+"""Calibrate the model to a machine and save machine.toml for designs, text, JSON and a picture."""
 
 from __future__ import annotations
 
@@ -42,7 +42,8 @@ def calibrate_machine(
     """Calibrate the model to measurements, and save the machine in a new or empty folder.
 
     Args:
-        measured, designs: as load_measured returns them.
+        measured: the measurements, from load_measured.
+        designs: the designs that were measured, by name, from load_measured.
 
     Returns:
         The calibration, and the lines of calibration.txt.
@@ -59,7 +60,7 @@ def calibrate_machine(
 
 
 def save_calibration(folder: Path, found: Calibrated) -> list[str]:
-    """Write machine.toml, design.toml and calibration.txt, .png and .json into a folder.
+    """Write machine.toml, design.toml and calibration.txt, .png and .json of a calibration.
 
     Returns:
         The lines of calibration.txt.

@@ -1,4 +1,4 @@
-"""Read the candidates of the command `compare`, and simulate those that are designs."""
+"""Read the candidates of the command `compare`, and simulate the candidates without a result."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Candidate:
         path: path as given.
         design: the design to compare.
         result: the result in the folder; None for a design.
-        missing: whether the design has to be simulated.
+        missing: True if the design has to be simulated.
         chamber: the chamber of a design that has to be simulated.
     """
 
@@ -61,7 +61,7 @@ def read_candidates(
     Args:
         paths: design files and results folders.
         treatment_time_s: peening time of all candidates. A result with another time is marked as
-            missing, so that it is simulated again.
+            `missing`, so that it is simulated again.
 
     Raises:
         InputError: a candidate cannot be read, built or compared with the first.
@@ -99,9 +99,9 @@ def simulate_missing(
 
     Return the result of each candidate, and remarks for the user.
 
-    Designs are simulated with seed, stream and number of replicas of the first candidate. Results
-    of another treatment time keep their own settings. New results are written to folders inside
-    `folder`.
+    Designs are simulated with seed, random stream and number of replicas of the first candidate. A
+    result that is simulated again for another treatment time keeps its own seed and replicas. New
+    results are written to folders inside `folder`.
     """
     results: list[Result] = []
     remarks: list[str] = []
@@ -177,9 +177,9 @@ def _with_treatment_time(one: Candidate, seconds: float) -> Candidate:
 
 
 def _named(path: Path) -> Path:
-    """Return the path by which a candidate is named.
+    """Return the path from which a candidate's label is made.
 
-    This is a design's path without .toml, or the folder of a result.
+    It is a design's path without .toml, or the folder of a result.
     """
     if path.suffix == ".toml":
         return path.with_suffix("")

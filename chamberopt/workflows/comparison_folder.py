@@ -1,4 +1,4 @@
-"""Write the folder of a comparison."""
+"""Compare candidates and write the folder of the comparison: text, JSON and pictures."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def compare_candidates(
 
     Args:
         paths: design files, which are simulated, and results folders.
-        open_workers: begins the executor; called only if a candidate has to be simulated.
+        open_workers: starts the executor; called only if a candidate has to be simulated.
         treatment_time_s: peening time of all candidates; results of another time are simulated
             again.
 
@@ -92,7 +92,10 @@ def write_comparison(folder: str | Path, comparison: Comparison) -> list[str]:
 
 
 def comparison_picture(picture: str | Path, comparison: Comparison) -> str | None:
-    """Draw the parts side by side on one colour scale. Return why there is no image, or None."""
+    """Draw the compared parts side by side on one colour scale.
+
+    Return the reason if no image could be drawn, else None.
+    """
     titles = [
         f"{label}\n{summary(result)}"
         for label, result in zip(comparison.labels, comparison.results, strict=True)
@@ -103,9 +106,9 @@ def comparison_picture(picture: str | Path, comparison: Comparison) -> str | Non
 def _draw_differences(
     folder: Path, comparison: Comparison, local: list[LocalDifference]
 ) -> str | None:
-    """Write difference.vtp and draw it: coverage of later candidates minus that of the first.
+    """Write and draw the coverage of later candidates minus coverage of the first (difference.vtp).
 
-    Return why there is no image, or None.
+    Return the reason if no image could be drawn, else None.
     """
     first, *later = comparison.labels
     start, columns = comparison.results[0].folder, [(one.value, one.real) for one in local]

@@ -30,10 +30,10 @@ Found = TypeVar("Found", StudyResult, SweepResult)
 
 @dataclass(frozen=True)
 class Ended(Generic[Found]):
-    """A study or a sweep that has ended and was saved.
+    """A study or a sweep that has ended, with its result, which was saved.
 
     chamber: chamber of the study's design.
-    advice: reasons for the optional effects, if the design left their choice to the program.
+    advice: reasons for the optional physical effects, if the design left them to the program.
     remarks: remarks for the user, such as why a picture was skipped.
     """
 
@@ -52,8 +52,8 @@ def optimise_study(
         stop: called before each evaluation. If it returns True, KeyboardInterrupt is raised.
 
     Raises:
-        InputError: the start cannot be simulated, no candidate meets the constraints, or one needs
-            more memory than there is.
+        InputError: the start cannot be simulated, no candidate meets the constraints, or the memory
+            is too small for a candidate.
     """
     with teller.step("building the chamber"):
         chamber = build_chamber(folder.study.design)
@@ -81,10 +81,10 @@ def sweep_study(
     Args:
         workers: number of worker processes, by default one per core. Fewer are started if not all
             fit into memory.
-        cluster: --cluster of the command line, for workers of a cluster instead.
+        cluster: value of the option --cluster, to use workers of a cluster instead.
 
     Raises:
-        InputError: no candidate can be simulated, or one needs more memory than there is.
+        InputError: no candidate can be simulated, or a candidate needs more memory than there is.
     """
     with teller.step("building the chamber"):
         chamber = build_chamber(folder.study.design)
@@ -112,7 +112,10 @@ def read_sweep(folder: StudyFolder, plan: SweepPlan) -> SweepResult:
 def _prepare(
     folder: StudyFolder, chamber: Chamber, executor: Executor, teller: Teller
 ) -> tuple[Study, list[Advice]]:
-    """Return the study of a folder with its effects chosen, and why. Compile the simulator."""
+    """Choose the physical effects that the study's design leaves open, and compile the simulator.
+
+    Return the study with these effects, and the reasons for them.
+    """
     study, advice = folder.with_effects_resolved(
         lambda design: resolve_effects(design, chamber, executor, teller)
     )
@@ -125,7 +128,7 @@ def _prepare(
 def _candidates_at_once(study: Study, chamber: Chamber, teller: Teller) -> int:
     """Return how many candidates of a batch fit into memory at once.
 
-    Raises InputError if not even one fits.
+    Raises InputError if not even one candidate fits.
     """
     settings = study.optimizer
     replicas = settings.confirm_replicas * 2 ** (settings.confirm_rounds - 1)
@@ -141,9 +144,9 @@ def _candidates_at_once(study: Study, chamber: Chamber, teller: Teller) -> int:
 def _workers_that_fit(
     study: Study, chamber: Chamber, wanted: int | None, teller: Teller
 ) -> int | None:
-    """Return the number of worker processes to start: as many as wanted and fit into memory.
+    """Return how many of the `wanted` worker processes fit into memory. None means one per core.
 
-    Raises InputError if not even one fits.
+    Raises InputError if not even one process fits.
     """
     design = study.at_search_accuracy(study.design)
     each = PROCESS + evaluation_bytes(design, chamber, most_replicas(design))

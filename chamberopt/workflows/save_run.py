@@ -43,12 +43,12 @@ def save_simulation(
 
     Args:
         folder: new or empty folder.
-        design: the simulated design, with its effects chosen.
+        design: the simulated design, with its optional physical effects chosen.
         chamber: chamber of the design.
         evaluation: evaluation of the design.
-        advice: reasons for the effects, if the design left their choice to the program.
+        advice: reasons for the physical effects, if the design left their choice to the program.
         warned: warnings of `chamberopt check`; None if it was not run.
-        tolerances: effect of the design's tolerances, if it was simulated.
+        tolerances: effect of the design's tolerances; None if it was not simulated.
 
     Returns:
         Remarks for the user, such as why a picture was skipped.
@@ -68,7 +68,7 @@ def save_study(
 ) -> list[str]:
     """Complete the folder of a finished study.
 
-    Adds the data files of best design and start, and the pictures coverage.png (the best design),
+    Adds the data files of the best and the start design, and coverage.png (of the best),
     before_after.png, convergence.png, slices.png (if a model could be fitted) and pareto.png (for
     two objectives). result.json is written last. A study that is stopped while it is being saved
     therefore counts as unfinished, and is saved again when it is resumed.
@@ -76,7 +76,7 @@ def save_study(
     Args:
         folder: folder of the study.
         study_result: result of the study.
-        advice: reasons for the effects, if the design left their choice to the program.
+        advice: reasons for the physical effects, if the design left their choice to the program.
         warned: warnings of `chamberopt check` on the best design; None if it was not run.
 
     Returns:
@@ -102,7 +102,8 @@ def save_study(
 def save_sweep(folder: str | Path, sweep: SweepResult) -> list[str]:
     """Complete the folder of a finished sweep and return remarks for the user.
 
-    Adds history.csv, best.toml (if a candidate is feasible), map.png and, last, result.json.
+    Adds history.csv, best.toml (if a candidate meets the constraints), map.png and, last,
+    result.json.
     """
     folder = Path(folder)
     record = write_sweep(folder, sweep)
@@ -112,7 +113,7 @@ def save_sweep(folder: str | Path, sweep: SweepResult) -> list[str]:
 
 
 def _draw_diagrams(folder: Path, study_result: StudyResult) -> None:
-    """Draw convergence.png, slices.png and pareto.png of a study, as far as it has their data."""
+    """Draw convergence.png, slices.png and pareto.png of a study, if their data are there."""
     convergence_picture(folder / "convergence.png", study_result)
     if study_result.sensitivity:
         slices_picture(folder / "slices.png", study_result, study_result.sensitivity)

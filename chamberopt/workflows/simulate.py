@@ -1,7 +1,7 @@
 """Simulate a design into a folder. Python users and the command line share this workflow.
 
-The workflow reports its steps to a Teller. The Teller of this module is silent. The command line
-has a Teller that prints.
+The workflow reports its steps to an object, a Teller. The class of this module is silent. The
+command line has a subclass that prints.
 """
 
 from __future__ import annotations
@@ -36,16 +36,17 @@ if TYPE_CHECKING:
 class Teller:
     """The object to which a workflow reports its steps.
 
-    This class passes on only the progress of counted steps. The command line has one that prints.
+    This class reports nothing but the progress of counted steps, to the function that it was given.
+    The command line has a subclass that prints.
     """
 
     def __init__(self, progress: Progress | None = None) -> None:
         self._progress = progress
 
     def step(self, what: str, total: int | None = None) -> AbstractContextManager[Progress]:
-        """Return a context for a step of the workflow.
+        """Return a `with` context for a step of the workflow.
 
-        Entering it gives the function to call with the step's progress.
+        The context yields the function to call with the step's progress.
 
         Args:
             what: name of the step.
@@ -65,16 +66,17 @@ class Teller:
         """Return warnings on the design. This class does not check it and returns None.
 
         Args:
-            which: name of the design where there are several, such as " of the best design".
+            which: name of the design for the warnings if there are several designs, such as
+                " of the best design".
         """
         return None
 
     def tell(self, text: str) -> None:
-        """Tell the user a sentence. This class drops it."""
+        """Tell the user a sentence. This class ignores it."""
 
 
 def _uncounted(done: int, total: int, best: float | None) -> None:
-    """Do nothing with the progress of a step, where nobody listens."""
+    """Ignore the progress of a step. This is the Teller's function if none was given."""
 
 
 @dataclass(frozen=True)
@@ -97,8 +99,8 @@ class SimulationSettings:
 class Simulated:
     """A design that was simulated and saved.
 
-    design: the design with its effects chosen.
-    advice: reasons for the effects, if the design left their choice to the program.
+    design: the design with its optional physical effects chosen.
+    advice: reasons for these effects, if the design left their choice to the program.
     remarks: remarks for the user, such as why a picture was skipped.
     """
 
@@ -151,7 +153,7 @@ def simulate_design(
 def resolve_effects(
     design: Design, chamber: Chamber, executor: Executor, teller: Teller
 ) -> tuple[Design, list[Advice]]:
-    """Choose the optional physical effects that the design leaves to the program, by pilot runs.
+    """Choose the optional physical effects that a design leaves open, by pilot simulations.
 
     Return the design with the chosen effects, and the reasons.
     """

@@ -1,4 +1,4 @@
-"""Peen a virtual strip and save it: a table (.csv), the record as JSON, a picture."""
+"""Peen a virtual Almen strip and save it as a table (.csv), as JSON and as a picture."""
 
 from __future__ import annotations
 
@@ -25,11 +25,13 @@ if TYPE_CHECKING:
 
 
 class StripPlace(NamedTuple):
-    """The kind of a strip and its place.
+    """The type and size of an Almen strip and its place in the chamber.
 
     Attributes:
-        at: "lid", where the strip closes the chamber in place of the part, or a zone of the part.
-        distance_mm: from the sonotrode to a strip in the lid; None: as to the part.
+        at: "lid" for a strip that closes the chamber in place of the part, or the name of a zone of
+            the part.
+        distance_mm: distance from the sonotrode to a strip in the lid. None for the part's own
+            distance.
     """
 
     type: StripType = "A"
@@ -41,10 +43,10 @@ class StripPlace(NamedTuple):
 def peen_strip_in(
     design: Design, place: StripPlace, folder: Path, executor: Executor, teller: Teller
 ) -> tuple[VirtualStrip, list[Advice]]:
-    """Peen a strip in place of the part, and save it in a new or empty folder.
+    """Peen an Almen strip in place of the part, and save it in a new or empty folder.
 
     Returns:
-        The peened strip, and the reasons for effects that the design left to the program.
+        The peened strip, and the reasons for physical effects that the design left to the program.
     """
     with whole_or_nothing(folder):
         with teller.step("building the chamber"):

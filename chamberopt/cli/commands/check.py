@@ -1,4 +1,4 @@
-"""The command `check`: show what is in a design or study file, and which effects it needs."""
+"""The command `check`: show the content of a design or study, and the physical effects it needs."""
 
 from __future__ import annotations
 

@@ -48,10 +48,10 @@ def edit(
 
 
 def _trusted(path: Path, trusted: bool) -> bool:
-    """Return True if the design may run a Python file as its chamber's shape.
+    """Return True if the design may run a Python file that makes its chamber's shape.
 
     The user is asked unless `trusted` is True. Raises InputError if the design is wrong, or if it
-    has such a shape and the user does not allow it.
+    has such a shape and the user does not allow that.
     """
     from chamberopt.common.toml_fields import read_toml
     from chamberopt.page.edited_file import EditedFile, custom_shape

@@ -94,9 +94,9 @@ def export(
 def _files(
     formats: dict[str, ExportFormat], out: Path | None, name: str
 ) -> Iterator[dict[str, Path]]:
-    """Yield the path to write for each format.
+    """Yield the path of the file to write, by the name of each format.
 
-    It is --out itself if that names a file, else a file in a new folder.
+    The path is `out` (option --out) if `out` names a file, else a file in a new folder.
     """
     from chamberopt.common.files import check_new_file, claim_file, whole_or_nothing
 

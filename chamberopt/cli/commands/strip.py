@@ -98,9 +98,9 @@ def _size(disc_mm: float | None, size_mm: tuple[float, float] | None) -> StripSi
 
 
 def _require_zone(at: str, design: Design, of_lids: Mapping[str, object]) -> None:
-    """Raise InputError if the design lacks the zone `at`.
+    """Raise InputError if the design lacks the zone `at`, in which a strip is to stand.
 
-    It is also raised if an option is given that holds only for a strip on the chamber's lid.
+    Also raise InputError if an option of `of_lids` is given, which is only for a strip in the lid.
     """
     from chamberopt.design.zones import LID
 

@@ -1,1 +1,1 @@
-"""Compare candidates: their figures, and their coverage at each place of the target."""
+"""Compare candidates: their figures, and their coverage at each point of the target."""

@@ -1,4 +1,7 @@
-"""Compare results: the different values of their designs, and the differences of their figures."""
+"""Compare results: values in which their designs differ, and differences of their figures.
+
+Figures are the objective and the metrics of a result, such as mean coverage.
+"""
 
 from __future__ import annotations
 
@@ -53,7 +56,10 @@ def require_same_time(paths: Sequence[Path], designs: Sequence[Design]) -> None:
 
 
 def require_same_gauge(paths: Sequence[Path], designs: Sequence[Design]) -> None:
-    """Raise InputError if coverage is measured in windows of different areas."""
+    """Raise InputError if designs have different areas of the windows.
+
+    Windows are the discs of the surface in which dents are counted for coverage.
+    """
     first = designs[0].process.accuracy.gauge_mm2
     for path, design in zip(paths, designs, strict=True):
         gauge = design.process.accuracy.gauge_mm2
@@ -81,9 +87,9 @@ def require_same_machine(paths: Sequence[Path], designs: Sequence[Design]) -> No
 def require_same_part(
     paths: Sequence[Path], designs: Sequence[Design], meshes: Sequence[tuple[str, str]]
 ) -> None:
-    """Raise InputError if a part, unit or target differs from the first candidate's.
+    """Raise InputError if a candidate has another part file, unit or target than the first.
 
-    Poses of the part may differ.
+    The part may stand in the chamber in different poses.
 
     Args:
         paths: paths of the candidates.
@@ -137,8 +143,8 @@ class Comparison:
         results: the results.
         labels: short names of the results.
         parameters: design values that differ, by dotted name, with a value for each result.
-        metrics: the objective, then every metric, with an Estimate for each result.
-        differences: each later result minus the first, by metric.
+        metrics: the objective, then every metric, by name, with an Estimate for each result.
+        differences: by metric, a difference for each later result: its value minus the first's.
         confidence: confidence of the interval of each difference. It is chosen so that all
             intervals of a figure hold together with 95 %.
     """
@@ -217,7 +223,7 @@ def _difference(name: str, first: Result, other: Result, confidence: float) -> D
 
 
 def _metal(design: Design) -> tuple[object, ...]:
-    """Return a key that is equal for results with the same part material, ball density and sizes.
+    """Return the part material and the density and sizes of the balls, to be compared.
 
     Such results share the error of the dent size, so it cancels in their difference.
     """
@@ -253,8 +259,8 @@ def _differing_values(results: Sequence[Result]) -> dict[str, tuple[object, ...]
 def _design_values(result: Result) -> dict[str, Any]:
     """Return all values of a result's design by dotted name.
 
-    The number of replicas, the digest of a custom shape and whether the cavity is analytical are
-    added from the result.
+    Three values are added from the result: the number of replicas, the digest of a custom shape,
+    and whether the cavity is analytical.
     """
     values = _flattened(result.design.model_dump(mode="json", exclude={"part": {"mesh", "unit"}}))
     for name in STOPPING_RULES:

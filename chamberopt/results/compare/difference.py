@@ -1,4 +1,4 @@
-"""Subtract a figure of two candidates, and find how many replicas would prove the difference."""
+"""Compute the difference of a figure between two candidates, and the replicas to prove it."""
 
 from __future__ import annotations
 
@@ -32,11 +32,11 @@ class Difference:
         half_width: half-width of its interval.
         paired: True if replicas were compared pair by pair on the same seeds. False if the samples
             were compared as independent (Welch).
-        time_ratio: `replicas` over the number of simulated replicas.
+        time_ratio: `replicas` divided by the number of replicas that were simulated.
         replicas: number of replicas of the later candidate that would show the difference if it is
             as large as it looks. `replicas` and `time_ratio` are None if the difference is real or
             0, or if the ratio exceeds MAX_TIME_RATIO.
-        in_words: text in place of the number, if a figure is not a number.
+        in_words: text in place of the difference, if one of the two figures has no number.
     """
 
     value: float
@@ -53,12 +53,14 @@ class Difference:
 
     @property
     def estimate(self) -> Estimate:
-        """The difference as an Estimate: its value, and its half-width or why it has none."""
+        """The difference as an Estimate: value and half-width, or words in place of them."""
         return Estimate(self.value, self.half_width, in_words=self.in_words)
 
 
 def confidence_of_each(comparisons: int) -> float:
-    """Return the confidence of each of several intervals so that all hold together with 95 %.
+    """Return the confidence that each of `comparisons` intervals needs.
+
+    With this confidence, all intervals hold at the same time with 95 %.
 
     Source: Bonferroni's inequality, O. J. Dunn, "Multiple comparisons among means",
     J. Am. Stat. Assoc. 56 (1961) 52.
@@ -98,9 +100,9 @@ def difference(
 
 
 def _paired_half_width(gap: Estimate, confidence: float) -> Callable[[float], float]:
-    """Return a function that predicts the half-width of a paired difference.
+    """Return a function that predicts the half-width of a difference from pairs of replicas.
 
-    Its argument is the number of pairs over the present number of pairs.
+    The function's argument is the future number of pairs divided by the present number.
     """
     count, deviation = len(gap.pseudovalues), float(np.std(gap.pseudovalues, ddof=1))
     return lambda ratio: (
@@ -111,7 +113,10 @@ def _paired_half_width(gap: Estimate, confidence: float) -> Callable[[float], fl
 def _smallest_number(half_width: Callable[[float], float], count: int, gap: float) -> int | None:
     """Return the smallest number of replicas above `count` with a half-width below `gap`.
 
-    None if MAX_TIME_RATIO * count replicas are not enough.
+    Return None if MAX_TIME_RATIO * count replicas are not enough.
+
+    Args:
+        half_width: function from a number of replicas to the half-width.
     """
     low, high = count, MAX_TIME_RATIO * count
     if half_width(high) >= gap:

@@ -77,9 +77,12 @@ def _coverage_histogram(candidates: Sequence[TargetSurface]) -> Histogram:
 
 
 def _impact_histogram(unit: str, edges: np.ndarray, columns: Sequence[np.ndarray]) -> Histogram:
-    """Return a histogram of each column of impact values, in shares of its number of impacts.
+    """Return a histogram of impact values for each candidate, in shares of its number of impacts.
 
     Values beyond the last edge count in the last bin.
+
+    Args:
+        columns: values of all impacts, an array for each candidate.
     """
     shares = [
         np.histogram(np.minimum(one, edges[-1]), edges)[0] / max(1, len(one)) for one in columns

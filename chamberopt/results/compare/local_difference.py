@@ -1,4 +1,7 @@
-"""Subtract the coverage of two candidates at each place of the target."""
+"""Subtract the coverage of two candidates at each point of the target.
+
+Coverage at a point is the dented share of a window, a disc of the surface round the point.
+"""
 
 from __future__ import annotations
 
@@ -34,7 +37,7 @@ class TargetSurface:
         coverage: coverage from 0 to 1, shape (v,). 0 at vertices out of reach.
         interval: width of the 95 % interval of coverage, shape (v,). 0 at vertices out of reach.
         resolved: True at vertices with enough dents, and at vertices out of reach, shape (v,).
-        window_radius: radius of the windows [mm].
+        window_radius: radius of the windows, the discs in which coverage is measured [mm].
         dents: number of simulated dents in the median window.
         hits: single impacts on the target.
     """
@@ -52,7 +55,7 @@ class TargetSurface:
     hits: Hits
 
     def at(self, other: TargetSurface) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return this result's coverage, interval and `resolved` at the vertices of another.
+        """Return this result's coverage, interval and `resolved` at the vertices of another result.
 
         Each value is a mean over this result's nearest vertices with a similar normal, weighted by
         inverse distance.
@@ -125,15 +128,15 @@ MAX_RADIUS_SHARE = 0.06
 
 @dataclass(frozen=True)
 class LocalDifference:
-    """Coverage of a later candidate minus coverage of the first, at places of the target.
+    """Coverage of a later candidate minus coverage of the first, at vertices on the target.
 
     Args:
         value: the difference, -1 to 1, at the vertices of the first candidate's field, shape (v,).
-        radius: radius of the discs over which both are averaged [mm]. 0 without averaging.
+        radius: radius of the discs over which both coverages are averaged [mm]. 0 for no averaging.
         real: True where the difference exceeds its 95 % interval, shape (v,) bool. Each interval
-            holds for a single place, so by chance a place in twenty exceeds its interval.
-        more: share of the target's area with really more coverage in the later candidate.
-        less: share of the target's area with really less coverage in the later candidate.
+            holds for a single vertex, so by chance a vertex in twenty exceeds its interval.
+        more: share of the target's area where `real` is True and the later candidate has more.
+        less: share of the target's area where `real` is True and the later candidate has less.
     """
 
     value: np.ndarray
@@ -146,10 +149,11 @@ class LocalDifference:
 def local_difference(first: TargetSurface, other: TargetSurface) -> LocalDifference:
     """Return coverage of `other` minus coverage of `first`, two results with the same target.
 
-    Both coverages are averaged over the same discs, wide enough for DENTS dents. The interval of
-    the difference follows from the intervals of the two coverages, which assume independent dents.
-    The average of windows of radius l over a disc of radius R scatters as a window of radius
-    sqrt(l² + R²). At places with too few dents in a result, no difference is real.
+    Both coverages are averaged over the same discs, wide enough to hold about DENTS dents, up to a
+    share of the target's size. The interval of the difference follows from the intervals of the
+    two coverages, which assume independent dents. Averaging narrows it: the mean coverage of
+    windows of radius l over a disc of radius R scatters like the coverage of one window of radius
+    sqrt(l² + R²). Where a result has too few dents, no difference counts as real.
 
     Source: G. Y. Zou and A. Donner, "Construction of confidence limits about effect measures",
     Statistics in Medicine 27 (2008) 1693.
@@ -170,7 +174,7 @@ def local_difference(first: TargetSurface, other: TargetSurface) -> LocalDiffere
 def _averages(surface: TargetSurface, radius: float) -> Callable[[np.ndarray], np.ndarray]:
     """Return a function that averages values, shape (v,), over a disc round each vertex.
 
-    Vertices with another direction of the normal are left out. The radius is in mm.
+    Vertices in the disc whose normal has another direction are left out. `radius` is in mm.
     """
     if radius == 0.0:
         return np.asarray
