@@ -39,6 +39,7 @@ from chamberopt.results.load import START, load_start, load_trials
 if TYPE_CHECKING:
     from chamberopt.results.load import Result
     from chamberopt.results.records import AdviceRecord, StudyRecord
+    from chamberopt.search.trial_log import Trial
 
 SUBTITLES = {
     "study": "Report of a study: the best chamber found",
@@ -133,7 +134,7 @@ def _subtitle(result: Result) -> str:
     )
 
 
-def _accuracy_and_cost(result: Result, trials: Sequence[Mapping[str, object]]) -> Section:
+def _accuracy_and_cost(result: Result, trials: Sequence[Trial]) -> Section:
     accuracy = values("How accurate it is", _accuracy(result))
     cost = [values("What the answer cost", _cost_of_answer(result))]
     if result.study:
@@ -185,14 +186,14 @@ def _cost_of_answer(result: Result) -> dict[str, str]:
     }
 
 
-def _cost_of_study(study: StudyRecord, trials: Sequence[Mapping[str, object]]) -> dict[str, str]:
-    """Return rows (name, text) on the numbers of a study's evaluations and their run time."""
+def _cost_of_study(study: StudyRecord, trials: Sequence[Trial]) -> dict[str, str]:
+    """Return rows with the numbers of the study's evaluations, and the run time of all."""
     return {
         "in the search": _count(study.evaluations),
         "of these not simulated": _count(study.failed),
         "of these given up after a few replicas": _count(study.given_up),
         "of these miss a constraint": _count(study.missing_a_constraint),
-        "confirmations": _count(sum(row["stage"] == "confirm" for row in trials)),
+        "confirmations": _count(sum(one.stage == "confirm" for one in trials)),
         "run time of all": f"{plain(study.seconds, 3)} s",
     }
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from chamberopt.common.estimate import Estimate
+from chamberopt.common.estimate import Estimate, finite_or_none
 from chamberopt.common.files import read_file
 from chamberopt.documents.document import (
     Beside,
@@ -43,6 +43,7 @@ from chamberopt.search.study_folder import STUDY
 if TYPE_CHECKING:
     from chamberopt.results.load import Result
     from chamberopt.results.records import ModelRecord, StudyRecord
+    from chamberopt.search.trial_log import Trial
 
 NO_CONSTRAINTS = "There were no constraints."
 
@@ -131,7 +132,7 @@ def front_section(study: StudyRecord) -> Section | None:
     return Section("Two objectives", [Sentence(text), Table("The Pareto front", head, rows)])
 
 
-def search_section(result: Result, trials: Sequence[Mapping[str, Any]]) -> Section | None:
+def search_section(result: Result, trials: Sequence[Trial]) -> Section | None:
     """Return the section with every evaluation in its order and the reasons for failed ones.
 
     Return None if no evaluations are given.
@@ -139,14 +140,14 @@ def search_section(result: Result, trials: Sequence[Mapping[str, Any]]) -> Secti
     if not trials:
         return None
     label = objective_label(result.objective_name)
-    candidates = [_evaluated(row, label) for row in trials]
+    candidates = [_evaluated(one, label) for one in trials]
     figure, tooltips = convergence_figure(candidates, label.with_unit, label.factor < 0.0)
     caption = (
         "The objective of every evaluation in its order. The answer rests on the last ones, which "
         "ran on fresh seeds. Point at a mark to see its parameters."
     )
     content: list[Block] = [Chart("convergence", figure, caption, tooltips)]
-    failed = [(str(row["number"] + 1), row["reason"]) for row in trials if row["reason"]]
+    failed = [(str(one.number + 1), one.reason) for one in trials if one.reason]
     if failed:
         title = f"Evaluations not simulated, or that missed a constraint: {len(failed)}"
         reasons = Table("", ("evaluation", "reason"), failed, numbers=False)
@@ -154,13 +155,12 @@ def search_section(result: Result, trials: Sequence[Mapping[str, Any]]) -> Secti
     return Section("How the search went", content)
 
 
-def _evaluated(row: Mapping[str, Any], label: Label) -> EvaluatedCandidate:
-    objective = None
-    if row["objective"] is not None:
-        objective = label.scale(Estimate(row["objective"], row["half_width"] or 0.0))
-    return EvaluatedCandidate(
-        row["number"] + 1, row["stage"], objective, bool(row["feasible"]), row["parameters"]
-    )
+def _evaluated(one: Trial, label: Label) -> EvaluatedCandidate:
+    objective = one.objective
+    if objective is not None:
+        half_width = finite_or_none(objective.half_width) or 0.0
+        objective = label.scale(Estimate(objective.value, half_width))
+    return EvaluatedCandidate(one.number + 1, one.stage, objective, one.feasible, one.parameters)
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from pathlib import Path
 from chamberopt.common.files import csv_text, write_text
 from chamberopt.documents.tolerances import table_rows
 from chamberopt.results.load import load_result, load_trials
-from chamberopt.search.trial_log import trials_as_csv
+from chamberopt.search.trial_log import read_seconds, trials_as_csv
 
 
 def write_study_table(folder: Path, file: Path) -> None:
@@ -18,7 +18,7 @@ def write_study_table(folder: Path, file: Path) -> None:
     Raises:
         InputError: there are no evaluations.
     """
-    write_text(file, trials_as_csv(load_trials(folder)))
+    write_text(file, trials_as_csv(load_trials(folder), read_seconds(folder)))
 
 
 def write_tolerance_table(folder: Path, file: Path) -> None:

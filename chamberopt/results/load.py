@@ -27,7 +27,7 @@ from chamberopt.results.records import (
     StudyRecord,
     read_record,
 )
-from chamberopt.search.trial_log import HISTORY, TIMINGS, read_trials
+from chamberopt.search.trial_log import HISTORY, TIMINGS, Trial, read_trials
 
 if TYPE_CHECKING:
     from chamberopt.simulation.evaluation import Evaluation
@@ -146,8 +146,8 @@ def load_start(study: Result) -> Result:
         return load_result(require_plain_folder(study.folder / START, RESTORE))
 
 
-def load_trials(folder: Path) -> list[dict[str, object]]:
-    """Return the rows of the trial log of a study or sweep, which need not be finished.
+def load_trials(folder: Path) -> list[Trial]:
+    """Return the trials of a study or sweep, which need not be finished.
 
     Raises:
         InputError: the folder has no trial log, or a file of a finished study was changed.

@@ -44,7 +44,7 @@ from chamberopt.results.records import (
 from chamberopt.results.vtp_files import write_chamber, write_coverage
 from chamberopt.search import pareto
 from chamberopt.search.study.constraints import judge_zones
-from chamberopt.search.trial_log import read_trials, trials_as_csv
+from chamberopt.search.trial_log import read_seconds, trials_as_csv
 from chamberopt.simulation.field_values import CandidateResult
 
 if TYPE_CHECKING:
@@ -83,7 +83,7 @@ def write_study(
         The study's record, which `write_result` writes.
     """
     save_design(best.design, folder / "best.toml")
-    write_text(folder / "history.csv", trials_as_csv(read_trials(folder)))
+    write_text(folder / "history.csv", trials_as_csv(study_result.trials, read_seconds(folder)))
     own = make_folder(folder / START)
     write_result(own, write_simulation(own, start))
     if study_result.study.objective.pareto:
@@ -97,7 +97,7 @@ def write_sweep(folder: Path, sweep: SweepResult) -> SweepRecord:
     run_sweep has written design.toml, study.toml and history.jsonl. write_sweep adds history.csv
     and, if a candidate meets the constraints, best.toml.
     """
-    write_text(folder / "history.csv", trials_as_csv(read_trials(folder)))
+    write_text(folder / "history.csv", trials_as_csv(sweep.trials, read_seconds(folder)))
     if sweep.best is not None:
         save_design(sweep.study.design.changed(sweep.best.parameters), folder / "best.toml")
     return _about_sweep(sweep)

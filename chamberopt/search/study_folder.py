@@ -34,7 +34,7 @@ from chamberopt.common.versions import program_versions
 from chamberopt.coverage.metrics import metric_names
 from chamberopt.design.design import Design
 from chamberopt.search.study.parameters import ParameterSpace
-from chamberopt.search.trial_log import DAMAGED, HISTORY, TIMINGS, JsonLines, Trial, read_seconds
+from chamberopt.search.trial_log import HISTORY, TIMINGS, JsonLines, Trial, read_seconds, trials_of
 from chamberopt.simulation.advice import Advice
 from chamberopt.simulation.evaluation import Evaluation, load_evaluation, save_evaluation
 
@@ -62,7 +62,11 @@ class RecordedTrials:
         self._space = ParameterSpace(study.design, study.vary)
         self._metrics = set(metric_names(study.design))
         log.repair()
-        self.trials = [self._trial(number, row) for number, row in enumerate(log.rows())]
+        self.trials: list[Trial] = []
+        for number, trial in enumerate(trials_of(log)):
+            if trial.number != number or not self._is_possible(trial):
+                raise log.damaged(number + 1)
+            self.trials.append(trial)
 
     def find(self, number: int, stage: str, point: Sequence[float]) -> Trial | None:
         """Return the recorded trial with this number, or None if the log has fewer trials.
@@ -85,15 +89,6 @@ class RecordedTrials:
         """Raise InputError if the log has more than the `number` trials of the finished study."""
         if len(self.trials) > number:
             raise self._mismatch(number, "the study has ended before this row")
-
-    def _trial(self, number: int, row: dict[str, object]) -> Trial:
-        try:
-            trial = Trial.from_row(row)
-            if trial.number != number or not self._is_possible(trial):
-                raise ValueError
-        except DAMAGED:
-            raise self._log.damaged(number + 1) from None
-        return trial
 
     def _is_possible(self, trial: Trial) -> bool:
         """Return whether a trial can belong to this study.

@@ -7,13 +7,13 @@ timings.jsonl.
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self
 
 from chamberopt.common.errors import InputError
-from chamberopt.common.estimate import Estimate
+from chamberopt.common.estimate import Estimate, finite_or_none
 from chamberopt.common.files import append_bytes, csv_text, read_file, write_bytes
 from chamberopt.common.limits import parse_json
 
@@ -77,8 +77,9 @@ class Trial:
             stage=str(row["stage"]),
             point=tuple(float(share) for share in row["point"]),
             parameters={
-                name: value if isinstance(value, str) else float(value)
+                name: value  # a whole number stays one, as its file has it
                 for name, value in row["parameters"].items()
+                if isinstance(value, str) or value == float(value)
             },
             goals=tuple(Estimate.from_json(one) for one in row["goals"]),
             metrics={
@@ -154,22 +155,21 @@ class JsonLines:
         return rows, content.removesuffix(incomplete), incomplete
 
 
-def read_trials(folder: Path) -> list[dict[str, object]]:
-    """Return all rows of a study's trial log in order, each with the seconds of its evaluation.
-
-    The number of seconds is None if it is unknown.
-    """
+def read_trials(folder: Path) -> list[Trial]:
+    """Return all trials of a study's log in order."""
     path = folder / HISTORY
     if not path.is_file():
         raise InputError(f"{path}: is not there; give a study's results folder")
-    seconds, log = read_seconds(folder), JsonLines(path)
-    rows = log.rows()
-    for number, row in enumerate(rows):
+    return list(trials_of(JsonLines(path)))
+
+
+def trials_of(log: JsonLines) -> Iterator[Trial]:
+    """Yield the trials of a log in order. Raises InputError if a row is damaged."""
+    for line, row in enumerate(log.rows(), start=1):
         try:
-            Trial.from_row(row)
+            yield Trial.from_row(row)
         except DAMAGED:
-            raise log.damaged(number + 1) from None
-    return [{**row, "seconds": seconds.get(number)} for number, row in enumerate(rows)]
+            raise log.damaged(line) from None
 
 
 def read_seconds(folder: Path) -> dict[int, float]:
@@ -183,31 +183,33 @@ def read_seconds(folder: Path) -> dict[int, float]:
     return seconds
 
 
-def trials_as_csv(rows: list[dict[str, Any]]) -> str:
-    """Return the rows of a trial log as CSV text, with a column for each parameter and metric.
+def trials_as_csv(trials: Iterable[Trial], seconds: Mapping[int, float]) -> str:
+    """Return trials as CSV text, with a column for each parameter and metric.
 
-    The column NAME_pm is the half-width of the column NAME. It is empty if words such as "never"
-    stand for the number. A failed evaluation has no metrics.
+    NAME_pm is the half-width of NAME, empty where words such as "never" stand in the place of the
+    number. A failed evaluation has no metrics.
+
+    Args:
+        seconds: wall-clock time [s] of each evaluation, by its number.
     """
     lines = []
-    for row in rows:
-        line = {"number": row["number"] + 1, "stage": row["stage"]}  # as pictures count
-        line |= row["parameters"]
-        objective = row["goals"][0] if row["goals"] else {"value": None, "half_width": None}
-        line["objective"], line["half_width"] = _cells(objective)
-        for key in ("score", "feasible", "reason", "seconds"):
-            line[key] = row[key]
-        for name, metric in row["metrics"].items():
+    for one in trials:
+        number = one.number + 1  # as pictures count
+        line: dict[str, object] = {"number": number, "stage": one.stage, **one.parameters}
+        line["objective"], line["half_width"] = _cells(one.objective)
+        line |= {"score": one.score, "feasible": one.feasible, "reason": one.reason}
+        line["seconds"] = seconds.get(one.number)
+        for name, metric in one.metrics.items():
             line[name], line[f"{name}_pm"] = _cells(metric)
         lines.append(line)
     return csv_text(lines)
 
 
-def _cells(interval: Mapping[str, object]) -> tuple[object, object]:
-    """Return the two cells of an estimate in a table: its value and half-width.
+def _cells(figure: Estimate | None) -> tuple[object, object]:
+    """Return the two cells of a figure in a table: its value and half-width.
 
     If words such as "never" stand for the value, return these words and None.
     """
-    if "in_words" in interval:
-        return interval["in_words"], None
-    return interval["value"], interval["half_width"]
+    if figure is None or figure.in_words:
+        return figure and figure.in_words, None
+    return finite_or_none(figure.value), finite_or_none(figure.half_width)

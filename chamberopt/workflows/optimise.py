@@ -104,8 +104,7 @@ def read_sweep(folder: StudyFolder, plan: SweepPlan) -> SweepResult:
 
     Raises InputError if a file of the sweep was changed.
     """
-    load_trials(folder.path)
-    trials = tuple(folder.recorded.trials)
+    trials = tuple(load_trials(folder.path))
     return SweepResult(folder.study, plan, folder.path, trials, folder.seconds)
 
 

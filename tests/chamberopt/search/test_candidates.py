@@ -43,11 +43,10 @@ def test_the_plainly_bad_get_few_replicas_and_close_calls_more(tmp_path: Path) -
     result = run_bowl(
         tmp_path, simulator, {"first_replicas": 4, "confirm_rounds": 3, "evaluations": 12}
     )
-    rows = read_trials(tmp_path)
-    assert {row["replicas"] for row in rows if row["stage"] == "search"} == {4, 8}
+    searched = [one for one in read_trials(tmp_path) if one.stage == "search"]
+    assert {one.replicas for one in searched} == {4, 8}
     bar = max(t.objective.low for t in result.trials if t.stage == "search")
-    few = [row for row in rows if row["stage"] == "search" and row["replicas"] == 4]
-    assert all(row["objective"] < bar for row in few)
+    assert all(one.objective.value < bar for one in searched if one.replicas == 4)
     confirmed = [replicas for stream, replicas in asked if stream == "confirm"]
     assert confirmed[:3] == [4, 4, 4]
     assert 8 in confirmed

@@ -79,7 +79,7 @@ def test_a_search_with_texts_is_resumed(searched: StudyResult, tmp_path: Path) -
 
 
 def test_tables_charts_and_sentences_have_the_texts(searched: StudyResult, tmp_path: Path) -> None:
-    assert ",shot.material," in (table := trials_as_csv(read_trials(searched.folder)))
+    assert ",shot.material," in (table := trials_as_csv(read_trials(searched.folder), {}))
     assert ",silicon_nitride,3.0," in table
     found = searched.sensitivity
     assert found is not None

@@ -114,7 +114,7 @@ def test_a_candidate_that_cannot_be_built_is_a_penalty_with_a_reason(tmp_path: P
         t.reason == "chamber.height_mm: too high for this test" and not t.feasible for t in failed
     )
     assert hill(shares(result.best.design)) > PEAK - 0.02
-    trials_as_csv(read_trials(tmp_path))  # rows without metrics are rows
+    trials_as_csv(read_trials(tmp_path), {})  # rows without metrics are rows
 
 
 def test_constraints_hold_for_the_answer(tmp_path: Path) -> None:
@@ -190,11 +190,11 @@ def test_a_flat_function_gains_nothing(tmp_path: Path) -> None:
 def test_history_is_whole_rows_as_they_end(tmp_path: Path) -> None:
     result = run(study(evaluations=8), tmp_path, analytic(0.01))
     rows = read_trials(tmp_path)
-    assert [row["number"] for row in rows] == list(range(len(rows)))
-    assert rows[0]["parameters"] == {name: GEAR.value(name) for name in BOUNDS}
-    assert set(rows[0]["metrics"]) == set(metric_names(GEAR))
-    assert rows[3]["objective"] == result.trials[3].objective.value
-    table = trials_as_csv(rows).splitlines()
+    assert [one.number for one in rows] == list(range(len(rows)))
+    assert rows[0].parameters == {name: GEAR.value(name) for name in BOUNDS}
+    assert set(rows[0].metrics) == set(metric_names(GEAR))
+    assert rows[3].objective == result.trials[3].objective
+    table = trials_as_csv(rows, {}).splitlines()
     assert len(table) == len(rows) + 1
     assert table[0].startswith("number,stage,chamber.height_mm,")
     # A torn last line, left by a crash, is not a row; damage before it is said.
@@ -359,13 +359,13 @@ def test_a_corner_of_the_bounds_that_is_no_design_is_a_penalty_with_the_reason(
     settings = {"evaluations": 24, "confirm": 1, "confirm_replicas": 8, "first_replicas": 0}
     result = run(Study(design=GEAR, vary=vary, optimizer=settings), tmp_path, simulator)
     rows = read_trials(tmp_path)
-    failed = [row for row in rows if row["objective"] is None]
-    assert any(why in row["reason"] for row in failed)
+    failed = [one for one in rows if one.objective is None]
+    assert any(why in one.reason for one in failed)
     assert all(
-        row["reason"] and not row["feasible"] and row["score"] == rows[0]["score"] - FAILURE_PENALTY
-        for row in failed
+        one.reason and not one.feasible and one.score == rows[0].score - FAILURE_PENALTY
+        for one in failed
     )
-    searched = [row for row in rows if row["stage"] == "search"]
+    searched = [one for one in rows if one.stage == "search"]
     assert len(searched) - min(len(failed), 24) == 24  # so many failures cost nothing
     assert result.best.feasible
 

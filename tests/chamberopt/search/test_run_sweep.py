@@ -49,11 +49,7 @@ def small_study() -> Study:
 
 
 def rows(folder: Path) -> list[dict]:
-    """A history without the clock."""
-    return [
-        {name: value for name, value in row.items() if name != "seconds"}
-        for row in read_trials(folder)
-    ]
+    return [trial.row() for trial in read_trials(folder)]
 
 
 def test_a_grid_has_the_bounds_and_every_combination() -> None:
@@ -118,7 +114,7 @@ def test_a_failed_candidate_is_a_row_and_the_best_is_the_best_feasible(tmp_path:
     ] * 5  # a constraint, at last the shot
     assert sweep.trials[8].reason == "shot: 10 g do not fit"
     assert sweep.best is sweep.trials[3]
-    assert [row["number"] for row in read_trials(tmp_path)] == list(range(9))
+    assert [one.number for one in read_trials(tmp_path)] == list(range(9))
 
 
 def test_when_all_fail_the_reason_is_said(tmp_path: Path) -> None:
@@ -231,7 +227,7 @@ def test_from_python_it_is_the_same(tmp_path: Path) -> None:
     found = chamberopt.sweep(*asked, sobol=2, workers=1, progress=lambda *now: seen.append(now))
     assert seen == [(1, 2, seen[0][2]), (2, 2, found.best.score)]
     assert main(["sweep", str(question), "--sobol", "2", "--out", str(tmp_path / "command")]) == 0
-    assert rows(tmp_path / "python") == [trial.row() for trial in found.trials]
+    assert tuple(read_trials(tmp_path / "python")) == found.trials
     history = [(tmp_path / name / "history.jsonl").read_bytes() for name in ("python", "command")]
     assert history[0] == history[1]
     assert result_of("python") == result_of("command")

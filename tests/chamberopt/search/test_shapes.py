@@ -106,7 +106,7 @@ def test_the_best_shape_is_found_with_its_own_numbers(
     assert best.value("shot.mass_g") == pytest.approx(4.0, abs=0.7)
     assert {t.parameters["chamber.shape"] for t in searched.trials} == {"cylinder", "prism", "box"}
     assert searched.trials[0].parameters["chamber.across_mm"] == NONE
-    assert f",{NONE}," in trials_as_csv(read_trials(searched.folder))
+    assert f",{NONE}," in trials_as_csv(read_trials(searched.folder), {})
     found = searched.sensitivity
     assert found is not None
     assert {one.name for one in found.slices} == {
