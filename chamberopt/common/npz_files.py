@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import io
 import json
+import lzma
+import tokenize
 import zipfile
 import zlib
 from collections.abc import Sequence
@@ -23,10 +25,11 @@ from chamberopt.common.errors import InputError
 from chamberopt.common.files import new_file, open_plain, write_bytes
 from chamberopt.common.limits import ANY_SHRINKAGE_BYTES, MAX_SHRINKAGE, require_text
 
-# Errors that reading a damaged file can raise.
+# Errors that zipfile, NumPy's parser of headers and our own readers raise for a damaged file.
 UNREADABLE = (
-    OSError, ValueError, KeyError, TypeError, AttributeError, EOFError, MemoryError,
-    RecursionError, NotImplementedError, zipfile.BadZipFile, zlib.error,
+    ArithmeticError, AttributeError, EOFError, LookupError, MemoryError, OSError, RuntimeError,
+    SyntaxError, TypeError, ValueError, lzma.LZMAError, tokenize.TokenError, zipfile.BadZipFile,
+    zlib.error,
 )  # fmt: skip
 Record = TypeVar("Record")
 

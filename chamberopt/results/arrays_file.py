@@ -183,8 +183,18 @@ def save_result_arrays(folder: Path, arrays: ResultArrays) -> None:
 
 
 def load_result_arrays(result: Result) -> ResultArrays:
-    """Return the arrays of a result. Raise InputError if the file is damaged or was changed."""
-    return read_result_arrays(result.path(ARRAYS_FILE))
+    """Return the arrays of a result.
+
+    Raises InputError if the file is damaged, was changed or is of another part.
+    """
+    path = result.path(ARRAYS_FILE)
+    arrays = read_result_arrays(path)
+    part = arrays.chamber.part
+    if part.sha256 != result.record.part_sha256 or set(part.zones) != {
+        one.name for one in result.design.zones
+    }:
+        raise InputError(f"{path}: of another part or other zones than result.json; {REMEDY}")
+    return arrays
 
 
 def load_chamber(result: Result) -> Chamber:

@@ -108,6 +108,18 @@ def test_a_damaged_or_missing_hits_file_is_refused(tmp_path: Path) -> None:
             load_hits(path)
 
 
+def test_rows_whose_differences_overflow_are_refused(tmp_path: Path) -> None:
+    """They would pass a check of the differences, and NumPy would read beyond its arrays."""
+    path, most = tmp_path / "hits.npz", np.iinfo(np.int64).max
+    save_hits(path, sort_hits_by_triangle([hits_of(np.random.default_rng(1), np.array([3, 4]))], 2))
+    with np.load(path) as file:
+        arrays = dict(file)
+    for first in ([0, 2**62, most, 5 - most, -(2**62), 7], [0, most, 7], [0, -1, 7]):
+        np.savez(path, **{**arrays, "first": np.array(first)})
+        with pytest.raises(InputError, match="first goes down"):
+            load_hits(path)
+
+
 def test_hits_of_another_result_are_refused(tmp_path: Path) -> None:
     hits = sort_hits_by_triangle([hits_of(np.random.default_rng(3), np.array([3, 4]))], 2)
     save_hits(tmp_path / "hits.npz", hits)

@@ -1,5 +1,7 @@
 """Chamber and fields come back bit for bit, and a file that would mislead is refused."""
 
+import struct
+import zipfile
 from dataclasses import fields, is_dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -14,10 +16,13 @@ from chamberopt.design.load import load_design
 from chamberopt.results.arrays_file import (
     ARRAYS_FILE,
     ResultArrays,
+    load_result_arrays,
     read_result_arrays,
     save_result_arrays,
 )
-from tests.helpers.results.arrays import plain_arrays
+from chamberopt.results.load import load_result
+from tests.helpers.results.arrays import change_arrays, plain_arrays
+from tests.helpers.results.report_folders import simulated
 from tests.helpers.synthetic import DESIGNS, plate_design
 
 PLATE = build_chamber(plate_design())
@@ -203,3 +208,48 @@ def test_files_that_hold_no_arrays_are_refused(tmp_path: Path) -> None:
     np.savez_compressed(path, tree=np.zeros(200_000_000, dtype=np.uint8))
     with pytest.raises(InputError, match="unpacks to 200 MB"):
         read_result_arrays(path)
+
+
+@pytest.mark.parametrize(
+    "header",
+    [
+        "{'descr': '<f8', 'fortran_order': False, 'shape': (3",
+        "{'descr': '<f8', 'fortran_order': False, 'shape': (" + "9" * 30 + ",)}",
+        "{'descr': (), 'fortran_order': False, 'shape': (3,)}",
+        "  {'descr': '<f8',\n 'fortran_order': False, 'shape': (3,)}",
+    ],
+)
+def test_headers_that_numpy_cannot_read_are_refused(header: str, tmp_path: Path) -> None:
+    path = tmp_path / ARRAYS_FILE
+    text = header.encode().ljust(117) + b"\n"
+    with zipfile.ZipFile(path, "w") as file:
+        file.writestr("tree.npy", b"\x93NUMPY\x01\x00" + struct.pack("<H", len(text)) + text)
+    with pytest.raises(InputError, match=r"arrays\.npz: damaged"):
+        read_result_arrays(path)
+
+
+def test_encrypted_and_unknown_packing_is_refused(tmp_path: Path) -> None:
+    path = stored(ARRAYS, tmp_path)
+    whole = bytearray(path.read_bytes())
+    local, central = whole.index(b"PK\x03\x04"), whole.index(b"PK\x01\x02")
+    for places, value in (((local + 6, central + 8), 1), ((local + 8, central + 10), 14)):
+        damaged = bytearray(whole)
+        for place in places:
+            damaged[place] = value
+        path.write_bytes(damaged)
+        with pytest.raises(InputError, match=r"arrays\.npz: damaged"):
+            read_result_arrays(path)
+
+
+def test_arrays_of_another_part_are_refused(tmp_path: Path) -> None:
+    """Digests are right: whoever exchanged the file has written them anew."""
+    folder, chamber = simulated(tmp_path / "plate")
+    part = chamber.part
+    assert load_result_arrays(load_result(folder)).part.n_cells == len(part.triangles)
+    for wrong in (
+        replace(chamber, part=replace(part, sha256="0" * 64)),
+        replace(chamber, part=replace(part, zones={"root": part.target})),
+    ):
+        change_arrays(folder, lambda one, wrong=wrong: replace(one, chamber=wrong))
+        with pytest.raises(InputError, match="of another part or other zones"):
+            load_result_arrays(load_result(folder))
