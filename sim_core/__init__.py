@@ -38,6 +38,7 @@ from sim_core.effects.restitution import (
     TabulatedRestitution,
     restitution_at,
 )
+from sim_core.effects.roughness import Roughness
 from sim_core.effects.surface.surface_effects import SurfaceEffects, surface_effects
 from sim_core.effects.vibration import Vibration
 from sim_core.errors import SceneError, SimulationError
@@ -75,6 +76,7 @@ __all__ = [
     "Resting",
     "Restitution",
     "RestitutionLaw",
+    "Roughness",
     "Scene",
     "SceneError",
     "SimulationError",

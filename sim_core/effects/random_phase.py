@@ -10,10 +10,7 @@ in. The phase at contact is not uniform, because a rising face is met more often
 while the ball is within reach of the face, so that a second impact finds the face's motion
 continued.
 
-Each random phase is drawn as a hash of the seed, the ball and the number of draws for this ball. No
-state is shared, and the same scene gives the same bits on any thread.
-
-Source: C. Wellons, "Prospecting for hash functions" (2018), 32 bits, multipliers below 2^31.
+Draws are those of numerics/random_draws.py: the same scene gives the same bits on any thread.
 """
 
 from typing import NamedTuple
@@ -23,14 +20,13 @@ import numpy as np
 from sim_core.effects.vibration import Wave
 from sim_core.errors import SceneError
 from sim_core.numerics.jit import inlined, jit
+from sim_core.numerics.random_draws import SEEDS, draw_word
 from sim_core.numerics.roots import first_approach
 from sim_core.numerics.vec3 import Flight, Vec3, dot
 
 # A ball this far [m] above the band that the face moves in is out of reach. A smaller distance
 # would be rounding in a chamber a kilometre wide.
 CLEAR = 1e-9
-SEEDS = 2**32
-WORD = SEEDS - 1
 TURN = 2.0 * np.pi
 
 
@@ -67,7 +63,9 @@ def checked_random_phase(random_phase: RandomPhase | None, sonotrodes: int) -> R
         return None
     seed = random_phase.seed
     if not isinstance(seed, (int, np.integer)) or not 0 <= seed < SEEDS:
-        raise SceneError(f"random_phase.seed is {seed!r}: give a whole number from 0 to {WORD}")
+        raise SceneError(
+            f"random_phase.seed is {seed!r}: give a whole number from 0 to {SEEDS - 1}"
+        )
     if sonotrodes == 0:
         raise SceneError(
             "physics.random_phase is given without physics.vibration: nothing has a phase; "
@@ -103,21 +101,9 @@ def new_random_phase_state(
 
 
 @jit
-def hash_word(x: int) -> int:
-    """Return a 32-bit number that looks random, always the same for the same 32-bit number ``x``.
-
-    Every product of the computation fits in an int64.
-    """
-    x = ((x ^ (x >> 15)) * 0x2C1B3C6D) & WORD
-    x = ((x ^ (x >> 12)) * 0x297A2D39) & WORD
-    return x ^ (x >> 15)
-
-
-@jit
 def draw_phase(seed: int, ball: int, draw: int) -> float:
-    """Return a random phase [rad], uniform in [0, 2π): the ``draw``-th draw of a ball."""
-    mixed = hash_word(hash_word(hash_word(seed) ^ int(ball)) ^ (int(draw) & WORD))
-    return TURN * (mixed / SEEDS)
+    """Return a random phase [rad], uniform in [0, 2π), from seed, ball and number of the draw."""
+    return TURN * (draw_word(seed, ball, draw) / SEEDS)
 
 
 @inlined

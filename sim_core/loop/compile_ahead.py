@@ -80,7 +80,7 @@ def compile_simulator(
     tags = np.full(len(triangles), next(tag for tag in range(3) if tag not in shaken))
     for height, tag in enumerate(shaken):  # floor and ceiling
         tags[(vertices[triangles][:, :, 2] == height).all(axis=1)] = tag
-    for law in (physics.restitution, physics.friction):
+    for law in (physics.restitution, physics.friction, physics.roughness):
         if law is not None:
             tags = np.minimum(tags, len(law.surfaces) - 1)
     if physics.part_rotation is not None:
@@ -134,7 +134,7 @@ def _with_a_turning_box(
     assert turn is not None
     shaken = [one.tag for one in physics.vibrations]
     still = next(tag for tag in range(4) if tag not in (turn.tag, *shaken))
-    for name in ("restitution", "friction"):
+    for name in ("restitution", "friction", "roughness"):
         law = getattr(physics, name)
         if law is not None:
             wider = law._replace(surfaces=[law.surfaces[0]] * max(4, len(law.surfaces)))

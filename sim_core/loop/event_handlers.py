@@ -44,6 +44,7 @@ from sim_core.effects.part_rotation import (
 )
 from sim_core.effects.random_phase import wave_of_ball
 from sim_core.effects.restitution import RestitutionState
+from sim_core.effects.roughness import MOST_HITS, RoughnessState, touched_facet
 from sim_core.effects.sonotrodes import wave_of_face
 from sim_core.effects.surface.surface_effects import apply_surface_effects
 from sim_core.effects.vibration import surface_velocity
@@ -63,7 +64,7 @@ from sim_core.loop.state import BALLS, SONOTRODE, WALLS, SimulationState
 from sim_core.motion import BallEvent, BallState, change_velocity, free_fall_position, state_under
 from sim_core.numerics.jit import inlined
 from sim_core.numerics.periodic_sides import nearest_image
-from sim_core.numerics.vec3 import Flight, Touch, Vec3, dot, sub
+from sim_core.numerics.vec3 import Flight, Touch, Vec3, add_scaled, dot, sub
 
 # Number of events of one ball in one window after which contact mode holds it still. The ball is
 # held again after as many further events.
@@ -75,6 +76,7 @@ def _resolve_contact(
     rotation: RotationState | None,
     state: SimulationState,
     event: BallEvent,
+    mean: Touch,
     touch: Touch,
     law: RestitutionState | None,
     approach: float,
@@ -83,9 +85,11 @@ def _resolve_contact(
 
     Args:
         rotation: rotation of the part, if the surface belongs to a turning part.
-        touch: the contact in the frame of the surface.
+        mean: the contact with the mean plane, in the frame of the surface.
+        touch: the contact with the touched facet of a rough surface; the same as ``mean`` on a
+            smooth one.
         law: restitution law of the surface.
-        approach: normal speed before the hit [m/s].
+        approach: speed along the normal of ``touch`` before the hit [m/s].
     """
     change = surface_velocity_change(touch.away, touch.relative, law, touch.tag)
     change = _in_room(rotation, change, event.time)
@@ -99,7 +103,40 @@ def _resolve_contact(
     change = apply_surface_effects(
         state.surface_effects, event.ball, event.time_since_start, in_room, change
     )
-    return leave_cylinder_wall(state.obstacles.cylinder, touch.kind, away, relative, change)
+    away = _in_room(rotation, mean.away, event.time)
+    mean = Touch(away, relative, mean.tag, mean.kind)
+    change = _until_it_leaves(state.roughness, state, event, mean, law, change)
+    return leave_cylinder_wall(state.obstacles.cylinder, mean.kind, away, relative, change)
+
+
+@inlined
+def _until_it_leaves(
+    roughness: RoughnessState | None,
+    state: SimulationState,
+    event: BallEvent,
+    mean: Touch,
+    law: RestitutionState | None,
+    change: Vec3,
+) -> Vec3:
+    """Return ``change`` [m/s] and the changes by further facets that a ball hits before it leaves.
+
+    ``mean``: the contact with the mean plane, in the room's frame.
+    """
+    if roughness is None:
+        return change
+    for hits in range(1, MOST_HITS + 1):
+        velocity = add_scaled(mean.relative, 1.0, change)
+        if dot(mean.away, velocity) > 0.0:
+            return change
+        touch = Touch(mean.away, velocity, mean.tag, mean.kind)
+        if hits < MOST_HITS:
+            touch = touched_facet(roughness, event.ball, touch)
+        push = surface_velocity_change(touch.away, velocity, law, touch.tag)
+        push = add_surface_friction(
+            state.friction_state, event.ball, event.time, touch.away, velocity, push, touch.tag
+        )
+        change = add_scaled(change, 1.0, push)
+    return change
 
 
 @inlined
@@ -167,10 +204,11 @@ def hit_surface(state: SimulationState, event: BallEvent) -> Impact:
         law = still_surface_restitution(state.contact, state.restitution)
     triangle = int(np.int64(tree.triangles[obstacle, side]))
     tag = int(np.int64(obstacles.tags[triangle]))
-    approach = -dot(away, relative) / math.sqrt(dot(away, away))
+    mean = Touch(away, relative, tag, kind)
+    touch = mean if landed != BOUNCES else touched_facet(state.roughness, ball, mean)
+    approach = -dot(touch.away, relative) / math.sqrt(dot(touch.away, touch.away))
     if landed == BOUNCES:
-        touch = Touch(away, relative, tag, kind)
-        change = _resolve_contact(None, state, event, touch, law, approach)
+        change = _resolve_contact(None, state, event, mean, touch, law, approach)
         deflect(state.contact, state.motion, event, here, change)
     if landed == ROLLS:
         return no_impact()
@@ -203,9 +241,10 @@ def hit_part(
     relative = slip_velocity(rotation, seen, away, event.time)
     triangle = int(np.int64(tree.triangles[row, side]))
     tag = int(np.int64(state.obstacles.tags[triangle]))
-    approach = -dot(away, relative) / math.sqrt(dot(away, away))
-    touch = Touch(away, relative, tag, tree.kinds[row])
-    change = _resolve_contact(rotation, state, event, touch, state.restitution, approach)
+    mean = Touch(away, relative, tag, tree.kinds[row])
+    touch = touched_facet(state.roughness, event.ball, mean)
+    approach = -dot(touch.away, relative) / math.sqrt(dot(touch.away, touch.away))
+    change = _resolve_contact(rotation, state, event, mean, touch, state.restitution, approach)
     push_ball(state.contact, state.motion, event, here, change)
     state.counts[WALLS] += 1
     return Impact(tag, triangle, sub(seen.position, away), seen.position, relative, approach)

@@ -16,6 +16,7 @@ from sim_core.effects.gravity import checked_gravity, gravity_acceleration
 from sim_core.effects.part_rotation import angle_at, checked_axis, new_rotation_state
 from sim_core.effects.random_phase import checked_random_phase, new_random_phase_state
 from sim_core.effects.restitution import checked_restitution
+from sim_core.effects.roughness import checked_roughness, new_roughness_state
 from sim_core.effects.sonotrodes import clock_window, new_waves
 from sim_core.effects.vibration import checked_waves
 from sim_core.errors import SceneError, SimulationError
@@ -218,6 +219,7 @@ class Simulation:
             random_phase=new_random_phase_state(
                 random_phase, wave, vibrating, 0.5 * balls.diameters
             ),
+            roughness=new_roughness_state(checked_roughness(physics.roughness, tags), len(motion)),
             drag=new_drag_state(checked_drag(physics.drag), balls.diameters, balls.densities),
             sizes=new_ball_sizes(balls, obstacles.roots),
             waves=sonotrodes,

@@ -12,6 +12,7 @@ from sim_core.effects.gravity import Gravity
 from sim_core.effects.part_rotation import RotationState
 from sim_core.effects.random_phase import RandomPhaseState
 from sim_core.effects.restitution import RestitutionState
+from sim_core.effects.roughness import RoughnessState
 from sim_core.effects.sonotrodes import SonotrodeWaves
 from sim_core.effects.surface.surface_effects import SurfaceEffects
 from sim_core.effects.vibration import Wave
@@ -75,6 +76,7 @@ class SimulationState(NamedTuple):
     friction_state: FrictionState | None
     surface_effects: SurfaceEffects
     random_phase: RandomPhaseState | None
+    roughness: RoughnessState | None
     drag: DragState | None
     sizes: BallSizes | None
     waves: SonotrodeWaves | None

@@ -14,6 +14,7 @@ from sim_core.effects.gravity import Gravity
 from sim_core.effects.part_rotation import PartRotation
 from sim_core.effects.random_phase import RandomPhase
 from sim_core.effects.restitution import Restitution
+from sim_core.effects.roughness import Roughness
 from sim_core.effects.surface.surface_effects import SurfaceEffects
 from sim_core.effects.vibration import Vibration
 
@@ -38,6 +39,7 @@ class Physics(NamedTuple):
         part_rotation: rotation of one part.
         friction: friction of surfaces and balls, with spin.
         random_phase: random phase of the vibration, for each ball.
+        roughness: roughness of surfaces.
         ball_collisions: collisions of balls. With None, balls fly through each other.
         drag: drag of still air.
         surface: further effects of hits on surfaces.
@@ -55,6 +57,7 @@ class Physics(NamedTuple):
     part_rotation: PartRotation | None = None
     friction: Friction | None = None
     random_phase: RandomPhase | None = None
+    roughness: Roughness | None = None
     ball_collisions: BallCollisions | None = BallCollisions()
     drag: Drag | None = None
     surface: SurfaceEffects = SurfaceEffects()

@@ -12,6 +12,7 @@ from sim_core.effects.gravity import checked_gravity
 from sim_core.effects.part_rotation import PartRotation, checked_axis
 from sim_core.effects.random_phase import RandomPhase, checked_random_phase
 from sim_core.effects.restitution import Restitution, checked_restitution
+from sim_core.effects.roughness import Roughness, checked_roughness
 from sim_core.effects.vibration import checked_waves
 from sim_core.errors import SceneError
 from sim_core.geometry.analytic import AnalyticCavity
@@ -51,6 +52,7 @@ EFFECT_TYPES = {
     "ball_collisions": BallCollisions,
     "drag": Drag,
     "friction": Friction,
+    "roughness": Roughness,
 }
 
 
@@ -146,6 +148,7 @@ class Scene:
                 "balls.spins are given without physics.friction, where spins have no effect: "
                 "give a Friction, or no spins"
             )
+        checked_roughness(self.physics.roughness, tag_count)
         checked_drag(self.physics.drag)
         random_phase = checked_random_phase(self.physics.random_phase, len(vibrations))
         if random_phase is not None and self.start_time > 0.0:
