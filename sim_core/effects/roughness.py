@@ -38,8 +38,8 @@ from sim_core.numerics.jit import inlined, jit
 from sim_core.numerics.random_draws import SEEDS, uniform
 from sim_core.numerics.vec3 import Touch, Vec3, add_scaled, cross, dot, scaled
 
-# Hits of a ball on facets in the same instant. With slopes of 5 degrees, one hit in 30 is followed
-# by a second, and one in 1000 by a third.
+# Hits of a ball on facets in the same instant. In an isotropic gas on slopes of 5 degrees, one hit
+# in 300 is followed by a second, and one in 10,000 by a third.
 MOST_HITS = 8
 MAX_SLOPE = 0.5  # 27 degrees; facets of steeper surfaces hide one another
 # Largest a for which slopes are drawn. Balls at a smaller angle are drawn as at this angle.

@@ -104,13 +104,13 @@ def test_no_ball_is_thrown_into_the_wall_and_none_gains_energy(
             np.testing.assert_allclose(energy, 1.0, rtol=1e-12)
 
 
-def gas(slope: float, seconds: float, **effects: object) -> SimulationResult:
+def gas(slope: float, seconds: float) -> SimulationResult:
     """Balls of one speed in a rough cube that lose nothing."""
     rng, cube = np.random.default_rng(5), box((0.05, 0.05, 0.05))
     places = pack_balls(cube, 300, np.full(300, 3e-3), rng)
     velocity = rng.normal(size=(300, 3))
     velocity *= SPEED / np.linalg.norm(velocity, axis=1)[:, None]
-    physics = Physics(roughness=Roughness((slope,) * 3, 2), ball_collisions=None, **effects)
+    physics = Physics(roughness=Roughness((slope,) * 3, 2), ball_collisions=None)
     return simulate(Scene(cube, Balls(places, velocity, 3e-3), physics, seconds, 0.2))
 
 
