@@ -78,7 +78,7 @@ def meet(
     elif not slow:
         change = pair_velocity_change(apart, closing, restitution)
         change = add_pair_friction(
-            contact.friction_state, one.ball, two.ball, one.time, apart, closing, change
+            contact.friction_state, None, one.ball, two.ball, one.time, apart, closing, change
         )
         impart(contact, motion, one, first, change)
         impart(contact, motion, two, second, scaled(-1.0, change))
@@ -128,6 +128,7 @@ def _land_on_ball(
     if touch_down(contact, motion, event, obstacle, bend, at, normal) == BOUNCES:
         change = add_surface_friction(
             contact.friction_state,
+            None,
             ball,
             event.time,
             normal,

@@ -52,7 +52,7 @@ class FrictionState(NamedTuple):
     surfaces: np.ndarray  # (mu, beta0) of each surface, shape (tags, 2)
     mu: float  # coefficient of friction of ball on ball
     beta0: float  # coefficient of tangential restitution of ball on ball
-    radius: float  # radius of the balls [m]
+    radius: float  # radius of the balls [m]; not used for balls of several sizes
     mu_of_rows: np.ndarray  # mu of each obstacle that a ball can stand on, shape (obstacles,)
     spins: np.ndarray  # spins at time 0 [rad/s], shape (n, 3)
     twists: np.ndarray  # constant change of the spin while in contact [rad/s²], shape (n, 3)

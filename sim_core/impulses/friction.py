@@ -8,6 +8,7 @@ the sphere's spin by -5/(2R) n x j.
 import math
 
 from sim_core.effects.friction import OF_BALLS, FrictionState, friction_of, spin_at
+from sim_core.geometry.ball_sizes import BallSizes, radius_of_ball, share_by_mass
 from sim_core.numerics.jit import inlined, jit
 from sim_core.numerics.vec3 import Vec3, add_scaled, cross, dot, scaled, sub
 
@@ -20,6 +21,7 @@ ALONE, PAIR = 1.0, 0.5  # m_eff over m
 @inlined
 def add_surface_friction(
     friction: FrictionState | None,
+    sizes: BallSizes | None,
     ball: int,
     time: float,
     away: Vec3,
@@ -31,6 +33,7 @@ def add_surface_friction(
 
     Args:
         friction: None without the effect.
+        sizes: None if all balls are alike.
         ball: number of the ball.
         time: time since the start of the present time window [s].
         away: any vector along the normal, from the surface to the ball, in the room's frame.
@@ -41,16 +44,17 @@ def add_surface_friction(
     """
     if friction is None:
         return change
-    normal = _unit(away)
-    slip = add_scaled(relative, -friction.radius, cross(spin_at(friction, ball, time), normal))
+    normal, radius = _unit(away), radius_of_ball(sizes, friction.radius, ball)
+    slip = add_scaled(relative, -radius, cross(spin_at(friction, ball, time), normal))
     tangential = _tangential_change(slip, normal, change, friction_of(friction, tag), ALONE)
-    _add_spin(friction, ball, normal, tangential)
+    _add_spin(friction, ball, radius, normal, tangential)
     return add_scaled(change, 1.0, tangential)
 
 
 @inlined
 def add_pair_friction(
     friction: FrictionState | None,
+    sizes: BallSizes | None,
     one: int,
     two: int,
     time: float,
@@ -60,10 +64,13 @@ def add_pair_friction(
 ) -> Vec3:
     """Return ``change`` [m/s] plus friction, for the first of two balls. Change both spins.
 
-    The second ball has minus the returned velocity change.
+    The second ball has minus the returned velocity change. For balls of unequal mass both changes
+    are what they would be at equal masses, as in geometry/ball_sizes.py. The spins are those of the
+    true masses.
 
     Args:
         friction: None without the effect.
+        sizes: None if all balls are alike.
         one: number of the first ball.
         two: number of the second ball.
         time: time since the start of the present time window [s].
@@ -74,13 +81,16 @@ def add_pair_friction(
     if friction is None:
         return change
     normal = _unit(apart)
-    spin = add_scaled(spin_at(friction, one, time), 1.0, spin_at(friction, two, time))
-    slip = add_scaled(closing, -friction.radius, cross(spin, normal))
+    radius_one = radius_of_ball(sizes, friction.radius, one)
+    radius_two = radius_of_ball(sizes, friction.radius, two)
+    ratio = radius_two / radius_one
+    spin = add_scaled(spin_at(friction, one, time), ratio, spin_at(friction, two, time))
+    slip = add_scaled(closing, -radius_one, cross(spin, normal))
     # change of the second ball
     tangential = _tangential_change(slip, normal, change, friction_of(friction, OF_BALLS), PAIR)
     # the opposite change on the opposite side gives the first ball the same spin
-    _add_spin(friction, one, normal, tangential)
-    _add_spin(friction, two, normal, tangential)
+    _add_spin(friction, one, radius_one, normal, share_by_mass(sizes, one, two, tangential))
+    _add_spin(friction, two, radius_two, normal, share_by_mass(sizes, two, one, tangential))
     return sub(change, tangential)
 
 
@@ -112,11 +122,14 @@ def _tangential_change(
 
 
 @jit
-def _add_spin(friction: FrictionState, ball: int, normal: Vec3, tangential: Vec3) -> None:
+def _add_spin(
+    friction: FrictionState, ball: int, radius: float, normal: Vec3, tangential: Vec3
+) -> None:
     """Change a ball's spin by a hit that adds ``tangential`` [m/s] to its velocity.
 
-    ``normal``: unit vector from the touched point to the ball's centre.
+    ``radius``: radius of the ball [m]. ``normal``: unit vector from the touched point to the ball's
+    centre.
     """
     torque = cross(normal, tangential)
     for axis in range(3):
-        friction.spins[ball, axis] -= 2.5 / friction.radius * torque[axis]
+        friction.spins[ball, axis] -= 2.5 / radius * torque[axis]

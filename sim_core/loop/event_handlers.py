@@ -97,7 +97,7 @@ def _resolve_contact(
     away = _in_room(rotation, touch.away, event.time)
     relative = _in_room(rotation, touch.relative, event.time)
     change = add_surface_friction(
-        state.friction_state, event.ball, event.time, away, relative, change, touch.tag
+        state.friction_state, state.sizes, event.ball, event.time, away, relative, change, touch.tag
     )
     in_room = Touch(away, relative, touch.tag, touch.kind)
     change = apply_surface_effects(
@@ -133,7 +133,14 @@ def _until_it_leaves(
             touch = touched_facet(roughness, event.ball, touch)
         push = surface_velocity_change(touch.away, velocity, law, touch.tag)
         push = add_surface_friction(
-            state.friction_state, event.ball, event.time, touch.away, velocity, push, touch.tag
+            state.friction_state,
+            state.sizes,
+            event.ball,
+            event.time,
+            touch.away,
+            velocity,
+            push,
+            touch.tag,
         )
         change = add_scaled(change, 1.0, push)
     return change
@@ -280,7 +287,7 @@ def collide(
     )
     change = pair_velocity_change(apart, closing, state.restitution)
     change = add_pair_friction(
-        state.friction_state, one.ball, two.ball, time, apart, closing, change
+        state.friction_state, state.sizes, one.ball, two.ball, time, apart, closing, change
     )
     back = Vec3(-change.x, -change.y, -change.z)
     change_velocity(motion, one.ball, time, share_by_mass(state.sizes, one.ball, two.ball, change))

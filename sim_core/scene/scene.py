@@ -132,7 +132,7 @@ class Scene:
                     f"rest.on_vibrating is True, and physics.{name} is given: not supported "
                     f"together yet; leave one of them out"
                 )
-        for name in ("rest", "part_rotation", "friction"):
+        for name in ("rest", "part_rotation"):
             if getattr(self.physics, name) is not None and not self.balls.alike:
                 raise SceneError(
                     f"physics.{name} is given, and balls of several sizes or densities: not "

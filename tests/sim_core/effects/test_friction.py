@@ -311,3 +311,85 @@ def test_spins_are_checked() -> None:
         Balls(places, places, DIAMETER, spins=np.array([[0.0, 1e12, 0.0]]))
     still = Scene(ROOM, Balls(places, np.zeros((1, 3)), DIAMETER), physics(0.3, 0.2), 1e-3)
     np.testing.assert_array_equal(simulate(still).balls.spins, np.zeros((1, 3)))
+
+
+DIAMETERS, DENSITIES = np.array([2e-3, 5e-3]), np.array([15_000.0, 3_850.0])
+
+
+@pytest.mark.parametrize(("mu", "beta0", "e"), LAWS)
+def test_two_unequal_balls_keep_both_momenta_and_lose_what_the_closed_form_says(
+    mu: float, beta0: float, e: float
+) -> None:
+    rng, radii = np.random.default_rng(3), 0.5 * DIAMETERS
+    mass = DENSITIES * np.pi / 6.0 * DIAMETERS**3
+    reduced, inertia = mass.prod() / mass.sum(), 0.4 * mass * radii**2
+    for _ in range(5):
+        n = rng.normal(size=3)
+        n /= np.linalg.norm(n)
+        closing = -1.5 * n + rng.normal(0.0, 0.3, 3)
+        w = rng.normal(0.0, 500.0, (2, 3))
+        v = np.stack([np.zeros(3), closing]) + rng.normal(0.0, 0.3, 3)
+        touch = np.array([[0.025] * 3, 0.025 + radii.sum() * n])
+        when = 1e-4
+        start = Balls(touch - when * v, v, DIAMETERS, DENSITIES, spins=w)
+        end = simulate(Scene(ROOM, start, physics(mu, beta0, e), 2.0 * when, record=())).balls
+        assert start.spins is not None
+        assert end.spins is not None
+        slip = closing - np.cross(radii @ w, n)
+        slip -= slip @ n * n
+        into = -closing @ n
+        # Walton's impulse with the reduced mass: walton() gives it per mass
+        rub = reduced * walton(slip, into, 1.0, mu, beta0, e)
+        impulse = reduced * (1.0 + e) * into * n + rub
+        np.testing.assert_allclose(
+            end.velocities, v + np.outer([-1.0, 1.0], impulse) / mass[:, None], atol=1e-11
+        )
+        turned = -np.cross(n, rub) * (radii / inertia)[:, None]
+        np.testing.assert_allclose(end.spins, w + turned, atol=1e-8)
+        np.testing.assert_allclose(momentum(end), momentum(start), atol=1e-18)
+        turning = [
+            mass @ np.cross(b.positions, b.velocities) + inertia @ b.spins  # type: ignore[operator]
+            for b in (start, end)
+        ]
+        np.testing.assert_allclose(turning[1], turning[0], atol=1e-16)
+        size, pass_by = np.linalg.norm(rub), np.linalg.norm(slip)
+        lost = 0.5 * reduced * (1.0 - e**2) * into**2 + size * pass_by - 1.75 * size**2 / reduced
+        assert energy(start) - energy(end) == pytest.approx(lost, rel=1e-8)
+
+
+def test_balls_of_two_sizes_spin_off_a_floor_as_walton_says() -> None:
+    v, w, n = np.array([1.0, -0.4, -2.0]), np.array([300.0, 900.0, -200.0]), np.array([0, 0, 1.0])
+    radii = 0.5 * DIAMETERS
+    places = [[0.02, 0.02, radii[0] + 0.001], [0.03, 0.03, radii[1] + 0.001]]
+    start = Balls(places, [v, v], DIAMETERS, DENSITIES, spins=[w, w])  # type: ignore[arg-type]
+    end = simulate(Scene(ROOM, start, physics(0.05, 0.3, 0.9), 0.001, record=())).balls
+    assert end.spins is not None
+    for k, r in enumerate(radii):
+        slip = v + np.cross(w, -r * n)
+        slip -= slip @ n * n
+        kick = walton(slip, 2.0, 1.0, 0.05, 0.3, 0.9)
+        np.testing.assert_allclose(end.velocities[k], [*(v + kick)[:2], 1.8], atol=1e-12)
+        np.testing.assert_allclose(
+            end.spins[k], w + np.cross(-r * n, kick) / (0.4 * r**2), atol=1e-9
+        )
+
+
+def test_a_mixed_gas_of_perfectly_rough_balls_shares_energy_with_its_spins() -> None:
+    """beta0 = 1 keeps the energy; every degree of freedom of every size has the same share."""
+    rng, room = np.random.default_rng(8), box((0.03, 0.03, 0.03))
+    sizes = np.repeat(DIAMETERS, [150, 20])
+    density = np.repeat(DENSITIES, [150, 20])
+    places = pack_balls(room, len(sizes), sizes, rng)
+    start = Balls(places, rng.normal(0.0, 2.0, places.shape), sizes, density)
+    frames = np.linspace(1.0, 8.0, 400)
+    run = simulate(Scene(room, start, physics(HUGE, 1.0), 8.0, record=()), frames)
+    assert energy(run.balls) == pytest.approx(energy(start), rel=1e-9)
+    assert run.frames.spins is not None
+    moving = 0.5 * start.masses[:, None] * run.frames.velocities**2
+    inertia = 0.1 * start.masses * sizes**2
+    spinning = 0.5 * inertia[:, None] * run.frames.spins**2
+    share = energy(start) / (6 * len(sizes))
+    for big in (False, True):
+        own = (sizes == DIAMETERS[1]) == big
+        for kind in (moving, spinning):
+            assert kind[:, own].mean() == pytest.approx(share, rel=0.05)
