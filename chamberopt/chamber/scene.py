@@ -115,6 +115,7 @@ def scene_physics(
     phase: float = 0.0,
     turn_phase: float = 0.0,
     phase_seed: int = 0,
+    roughness_seed: int = 0,
     axis: Axis | None = None,
 ) -> Physics:
     """Return the simulator's effects for a design in its chamber's mesh or analytical cavity.
@@ -125,6 +126,7 @@ def scene_physics(
         axis: axis of a turning part: a point [m] and a direction, in the chamber's frame.
         phase, turn_phase: phases of the sonotrode and of a turning part at the start [rad].
         phase_seed: for motion = "random_phase", the seed of each ball's phase.
+        roughness_seed: seed of the facets of rough surfaces.
     """
     import sim_core
 
@@ -139,10 +141,14 @@ def scene_physics(
     laws = [materials.part, materials.sonotrode, materials.wall]
     laws += [materials.sonotrode] * len(design.sonotrodes)
     surfaces, balls = tuple(law.restitution for law in laws), materials.shot.restitution
-    accuracy, friction = design.process.accuracy, None
+    accuracy, friction, roughness = design.process.accuracy, None, None
     if effects.friction is not None:
         of_surfaces = (effects.friction.surfaces,) * len(surfaces)
         friction = sim_core.Friction(of_surfaces, effects.friction.balls)
+    if effects.roughness is not None:
+        part, sonotrode, wall = effects.roughness.slopes
+        slopes = (part, sonotrode, wall, *[sonotrode] * len(design.sonotrodes))
+        roughness = sim_core.Roughness(slopes, roughness_seed)
     return sim_core.Physics(
         gravity=sim_core.Gravity() if effects.gravity else None,
         restitution=sim_core.Restitution(surfaces, balls, accuracy.elastic_below),
@@ -150,6 +156,7 @@ def scene_physics(
         part_rotation=part_rotation(design, axis, turn_phase),
         rest=sim_core.Rest() if balls_can_rest(design, mesh) else None,
         friction=friction,
+        roughness=roughness,
         drag=sim_core.Drag(piece=accuracy.drag_step) if effects.drag else None,
         surface=sim_core.surface_effects(**effects.of_surfaces),
         ball_collisions=sim_core.BallCollisions() if effects.ball_collisions else None,
@@ -195,10 +202,12 @@ def build_scene(
         raise InputError(f"shot: {error}; {remedy}") from None
     velocities = start_velocities(rng, len(positions), sonotrode.peak_speed)
     phase_seed = int(rng.integers(2**32)) if sonotrode.motion == "random_phase" else 0
+    roughness_seed = int(rng.integers(2**32)) if design.effects.roughness is not None else 0
+    effects = scene_physics(design, mesh, phase, turn_phase, phase_seed, roughness_seed, axis)
     return Scene(
         mesh=mesh,
         balls=Balls(positions, velocities, diameter, shot.density),
-        physics=scene_physics(design, mesh, phase, turn_phase, phase_seed, axis),
+        physics=effects,
         duration=design.process.recorded_time,
         warmup=design.process.accuracy.warmup_time,
         record=(TAG_PART,),

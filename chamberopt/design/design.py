@@ -139,7 +139,7 @@ class Design(FileTable):
         yield from tolerance_problems(self, dict(toml_errors.numeric_fields(self)))
         yield from zone_problems(self.zones, self.calibration)
         yield from calibration_problems(self)
-        for effect in ("rest", "part_turn", "friction"):
+        for effect in ("rest", "part_turn"):
             if self.shot.mix is not None and getattr(self.effects, effect):
                 text = "given beside shot.mix: not supported together yet"
                 yield Problem(f"effects.{effect}", text)

@@ -85,6 +85,28 @@ class FrictionTable(FileTable):
         return self.mu if mu is None else mu, self.beta0 if beta0 is None else beta0
 
 
+class RoughnessTable(FileTable):
+    """Roughness of the surfaces that balls hit: the rms slope of a profile, one number or several.
+
+    A dented face has slopes: a dent of diameter d by a ball of diameter D has an rms slope of
+    d / (2 D), 4 degrees for dents of 0.4 mm by balls of 3 mm. Only slopes over lengths of a contact
+    or more count, tenths of a millimetre: Rdq of a profile that is filtered so.
+    """
+
+    slope_deg: float = quantity(0, 25, "degrees", "rms slope of all surfaces; peened faces: 2 to 5")
+    part_deg: float | None = quantity(0, 25, "degrees", "of the part, if not the same", None)
+    sonotrode_deg: float | None = quantity(0, 25, "degrees", "of sonotrodes, likewise", None)
+    wall_deg: float | None = quantity(0, 25, "degrees", "of walls and lid, likewise", None)
+
+    @property
+    def slopes(self) -> tuple[float, float, float]:
+        """Rms slopes [-] of part, sonotrodes and walls."""
+        own = (self.part_deg, self.sonotrode_deg, self.wall_deg)
+        degrees = (self.slope_deg if one is None else one for one in own)
+        part, sonotrode, wall = (math.tan(math.radians(one)) for one in degrees)
+        return part, sonotrode, wall
+
+
 class SurfaceEffectTable(FileTable):
     """Base class of a table in [effects] that adds a further effect of hits on surfaces.
 
@@ -112,6 +134,10 @@ class Effects(FileTable):
     friction: FrictionTable | None = Field(
         default=None,
         description="balls slip and spin: { mu = 0.3, beta0 = 0.2 }; absent: smooth, no rotation",
+    )
+    roughness: RoughnessTable | None = Field(
+        default=None,
+        description="facets throw balls aside: { slope_deg = 3 }; absent: perfectly smooth faces",
     )
     rest: bool | None = Field(
         default=None,

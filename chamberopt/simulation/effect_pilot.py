@@ -228,8 +228,6 @@ def _switchable(design: Design, chamber: Chamber) -> list[str]:
     def can_be_switched(effect: str) -> bool:
         if effect == "rest":
             return balls_can_rest(design.changed({"effects.rest": None}), chamber_mesh(chamber))
-        if effect == "friction":
-            return design.shot.mix is None  # not supported together
         return effect != "ball_collisions" or design.shot.count > 1
 
     return [effect for effect in SWITCHED if can_be_switched(effect)]

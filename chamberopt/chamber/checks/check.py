@@ -271,8 +271,6 @@ def friction_notes(design: Design) -> list[str]:
         "give yours, e.g. effects.friction = { mu = 0.3, beta0 = 0.2 }; chamberopt check --pilot "
         "measures it"
     )
-    if design.shot.mix is not None:
-        remedy = "it is not supported beside shot.mix yet"
     return [
         "without effects.friction the balls are smooth: in a cylinder, any mu from 0.1 to 0.5 made "
         f"the shot slower by 22 to 47 % (docs/physics.md); {remedy}"
