@@ -39,9 +39,9 @@ class Physics(NamedTuple):
         part_rotation: rotation of one part.
         friction: friction of surfaces and balls, with spin.
         random_phase: random phase of the vibration, for each ball.
-        roughness: roughness of surfaces.
         ball_collisions: collisions of balls. With None, balls fly through each other.
         drag: drag of still air.
+        roughness: slopes of rough surfaces, at which balls bounce off facets.
         surface: further effects of hits on surfaces.
 
     Example:
@@ -57,9 +57,9 @@ class Physics(NamedTuple):
     part_rotation: PartRotation | None = None
     friction: Friction | None = None
     random_phase: RandomPhase | None = None
-    roughness: Roughness | None = None
     ball_collisions: BallCollisions | None = BallCollisions()
     drag: Drag | None = None
+    roughness: Roughness | None = None
     surface: SurfaceEffects = SurfaceEffects()
 
     @property

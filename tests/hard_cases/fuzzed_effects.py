@@ -16,6 +16,7 @@ from sim_core import (
     RandomPhase,
     Rest,
     Restitution,
+    Roughness,
     Vibration,
 )
 from sim_core.effects.drag import MIN_PIECE
@@ -27,14 +28,19 @@ SIZES = "sizes"  # beside the fields of Physics: balls of several diameters and 
 SONOTRODES = "sonotrodes"  # the same: a lid that vibrates as well as the floor
 LAWFUL = "gravity restitution ball_collisions"  # of a chamber that is of this world
 FEW = (
-    f"{LAWFUL} vibration rest friction drag",
-    f"{LAWFUL} vibration random_phase drag {SIZES}",
+    f"{LAWFUL} vibration rest friction drag roughness",
+    f"{LAWFUL} vibration random_phase friction drag roughness {SIZES}",
     f"{LAWFUL} vibration rest friction part_rotation",
     "gravity restitution vibration random_phase rest friction drag part_rotation",
     f"{LAWFUL} vibration rest {SONOTRODES}",
 )
 MANY = (
     *FEW,
+    f"{LAWFUL} vibration rest friction drag",
+    f"{LAWFUL} vibration random_phase drag {SIZES}",
+    f"{LAWFUL} vibration rest friction part_rotation roughness",
+    f"{LAWFUL} vibration roughness {SONOTRODES}",
+    "ball_collisions roughness",
     f"{LAWFUL} vibration random_phase rest friction drag part_rotation",
     f"{LAWFUL} vibration",
     f"{LAWFUL} vibration rest",
@@ -63,8 +69,9 @@ class Strengths(NamedTuple):
     ``weight``: g wide / speed²; ``restitution``: e; ``elastic_below`` [speeds]; ``swing``:
     [diameters] of the floor, ``beat``: the face's peak speed; ``tip``: the part's speed at its tip,
     ``to_and_fro``: it swings; ``rough``: mu and beta0 of balls that start spinning, once for
-    surfaces, once for balls; ``slowing``: share of the air's deceleration that takes all of the
-    speed on one width; ``spread``: smallest over largest diameter.
+    surfaces, once for balls; ``slope``: rms slope of the surfaces; ``slowing``: share of the air's
+    deceleration that takes all of the speed on one width; ``spread``: smallest over largest
+    diameter.
     """
 
     weight: float
@@ -75,6 +82,7 @@ class Strengths(NamedTuple):
     tip: float
     to_and_fro: bool
     rough: tuple[tuple[float, float], tuple[float, float]]
+    slope: float
     slowing: float
     spread: float
 
@@ -99,6 +107,7 @@ def strengths() -> st.SearchStrategy[Strengths]:
         tip=st.just(0.0) | powers(-2.0, 1.0),
         to_and_fro=st.booleans(),
         rough=st.tuples(rough, rough),
+        slope=st.just(0.0) | powers(-3.0, -0.31),
         slowing=powers(-4.0, 0.5),
         spread=st.floats(0.2, 1.0),
     )
@@ -138,6 +147,7 @@ def physics_of(
         RandomPhase(seed),
         BallCollisions(),
         Drag(air, air * speed * diameter / 1e4, max(0.1 * wide / speed, MIN_PIECE)),
+        Roughness((much.slope,) * TAGS, seed),
     )
     return Physics(
         **{name: effect if name in effects else None for name, effect in present._asdict().items()}

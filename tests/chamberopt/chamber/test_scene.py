@@ -1,5 +1,6 @@
 """The scene of a replica is reproducible, packed low, and has the sonotrode's speed scale."""
 
+import math
 from typing import get_args
 
 import numpy as np
@@ -11,7 +12,7 @@ from chamberopt.chamber.scene import build_scene, chamber_mesh, start_velocities
 from chamberopt.common.errors import InputError
 from chamberopt.design.effects import Effects, FrictionTable, SurfaceEffectTable
 from chamberopt.design.load import load_design
-from chamberopt.design.shapes import TAG_PART, TAG_SONOTRODE
+from chamberopt.design.shapes import TAG_PART, TAG_SONOTRODE, TAG_WALL
 from chamberopt.design.shot import ShotSize
 from sim_core import Drag, Rest, SurfaceEffects, TabulatedRestitution
 from sim_core.effects.restitution import ELASTIC_BELOW
@@ -121,6 +122,20 @@ def test_effects_that_are_asked_for_are_in_the_scene(design, mesh) -> None:
     assert asked.physics.random_phase is not None
     assert asked.physics.random_phase != other.physics.random_phase
     np.testing.assert_array_equal(asked.balls.velocities, plain.balls.velocities)
+
+
+def test_slopes_are_those_of_part_sonotrode_and_walls(design, mesh) -> None:
+    rough = {"effects.roughness": {"slope_deg": 3.0, "part_deg": 5.0, "wall_deg": 0.0}}
+    one, same, other = (build_scene(design.changed(rough), mesh, seed) for seed in (1, 1, 2))
+    plain = build_scene(design, mesh, 1)
+    assert plain.physics.roughness is None
+    assert one.physics.roughness is not None
+    slopes = dict(zip((TAG_PART, TAG_SONOTRODE, TAG_WALL), (5.0, 3.0, 0.0), strict=True))
+    for tag, degrees in slopes.items():
+        assert one.physics.roughness.surfaces[tag] == math.tan(math.radians(degrees))
+    assert one.physics.roughness == same.physics.roughness
+    assert one.physics.roughness != other.physics.roughness
+    np.testing.assert_array_equal(one.balls.velocities, plain.balls.velocities)
 
 
 def test_numerical_tolerances_are_what_the_design_says(design, mesh) -> None:
