@@ -5,7 +5,17 @@ from typing import NamedTuple
 import numpy as np
 
 from benchmarks.scenes import PART, PHYSICS, scene
-from sim_core import Balls, Drag, Friction, PartRotation, Physics, RandomPhase, Rest, Scene
+from sim_core import (
+    Balls,
+    Drag,
+    Friction,
+    PartRotation,
+    Physics,
+    RandomPhase,
+    Rest,
+    Roughness,
+    Scene,
+)
 
 NAME = "gear-200-10k"
 STEEL = (0.3, 0.2)  # mu and beta0, of every surface
@@ -41,6 +51,9 @@ EFFECTS = {
         PHYSICS,
         PHYSICS._replace(friction=Friction((STEEL,) * 3, STEEL)),
         ("friction", "friction_state"),
+    ),
+    "roughness": Effect(
+        PHYSICS, PHYSICS._replace(roughness=Roughness((0.05,) * 3)), ("roughness",)
     ),
     "drag": Effect(PHYSICS, PHYSICS._replace(drag=Drag()), ("drag",)),
     "rest": Effect(PHYSICS, PHYSICS._replace(rest=Rest()), ("contact",)),
