@@ -21,6 +21,7 @@ from sim_core import (
     RandomPhase,
     Rest,
     Restitution,
+    Roughness,
     Scene,
     Vibration,
 )
@@ -40,6 +41,7 @@ KEPT = {
     "friction": ("friction_state", "FrictionState"),
     "random_phase": ("random_phase", "RandomPhaseState"),
     "drag": ("drag", "DragState"),
+    "roughness": ("roughness", "RoughnessState"),
     "ball_collisions": ("neighbours", "NeighbourFilter"),
 }
 STEEL = (0.9, 1.0)
@@ -52,6 +54,7 @@ PRESENT = {
     "friction": Friction(((0.3, 0.2),) * 3, (0.3, 0.2)),
     "random_phase": RandomPhase(1),
     "drag": Drag(),
+    "roughness": Roughness((0.1,) * 3),
     "ball_collisions": BallCollisions(),
 }
 NEEDS = {"rest": "gravity", "random_phase": "vibration"}
@@ -131,6 +134,7 @@ def test_the_machine_code_of_a_bare_scene_knows_no_effect(bare: dict[str, list[s
         "contact.ball_on_ball.meet",
         "effects.part_rotation.relative_flight",
         "effects.restitution.restitution_law",
+        "effects.roughness._facet",
         "impulses.friction._tangential_change",
         "loop.neighbours.next_meeting",
     ):
