@@ -89,7 +89,9 @@ def test_a_design_without_friction_says_what_that_means(gear: tuple[Design, Cham
     assert not notes("auto")  # pilot runs decide
     mix = [{"diameter_mm": 1.5, "share": 0.5}, {"diameter_mm": 1.4, "share": 0.5}]
     mixed = design.changed({"shot.diameter_mm": None, "shot.mix": mix})
-    assert "not supported beside shot.mix" in notes({"rest": False}, mixed)[0]
+    assert notes({"rest": False}, mixed) == [said]
+    friction = {"mu": 0.3, "beta0": 0.2}
+    assert not notes({"rest": False, "friction": friction}, mixed)
 
 
 def test_slopes_are_a_note_and_no_warning() -> None:
