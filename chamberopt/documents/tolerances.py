@@ -137,14 +137,16 @@ def table_rows(result: Result) -> Iterator[dict[str, object]]:
     if not found:
         remedy = "simulate a design that has [tolerances] with --tolerances"
         raise InputError(f"{result.folder}: this result is without tolerances; {remedy}")
+    columns = _columns(found)
     for figure_name, figure in found.figures.items():
         for number, ends in figure.effects.items():
             box = found.box[number]
             row: dict[str, object] = {"figure": figure_name, "number": number}
             row |= {"low": box.low, "high": box.high}
             changes = {"change_at_low": ends.low, "change_at_high": ends.high}
-            for name in (*changes, *_columns(found)):
-                one: Estimate | None = {**changes, **figure.intervals}.get(name)
+            known: dict[str, Estimate] = changes | figure.intervals
+            for name in (*changes, *columns):
+                one = known.get(name)
                 row |= {name: one and one.value, f"{name}_half_width": one and one.half_width}
             yield row
 

@@ -20,7 +20,7 @@ import numpy as np
 from sim_core.effects.vibration import Wave
 from sim_core.errors import SceneError
 from sim_core.numerics.jit import inlined, jit
-from sim_core.numerics.random_draws import SEEDS, draw_word
+from sim_core.numerics.random_draws import SEEDS, checked_seed, draw_word
 from sim_core.numerics.roots import first_approach
 from sim_core.numerics.vec3 import Flight, Vec3, dot
 
@@ -61,11 +61,7 @@ def checked_random_phase(random_phase: RandomPhase | None, sonotrodes: int) -> R
     """
     if random_phase is None:
         return None
-    seed = random_phase.seed
-    if not isinstance(seed, (int, np.integer)) or not 0 <= seed < SEEDS:
-        raise SceneError(
-            f"random_phase.seed is {seed!r}: give a whole number from 0 to {SEEDS - 1}"
-        )
+    seed = checked_seed("random_phase.seed", random_phase.seed)
     if sonotrodes == 0:
         raise SceneError(
             "physics.random_phase is given without physics.vibration: nothing has a phase; "
@@ -76,7 +72,7 @@ def checked_random_phase(random_phase: RandomPhase | None, sonotrodes: int) -> R
             f"physics.random_phase is given, and {sonotrodes} vibrating surfaces: not supported "
             "together yet; give one vibration, or leave random_phase out"
         )
-    return RandomPhase(int(seed))
+    return RandomPhase(seed)
 
 
 def new_random_phase_state(

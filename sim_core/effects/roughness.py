@@ -33,9 +33,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sim_core.errors import SceneError
+from sim_core.errors import SceneError, number
 from sim_core.numerics.jit import inlined, jit
-from sim_core.numerics.random_draws import SEEDS, uniform
+from sim_core.numerics.random_draws import checked_seed, uniform
 from sim_core.numerics.vec3 import Touch, Vec3, add_scaled, cross, dot, scaled
 
 # Hits of a ball on facets in the same instant. In an isotropic gas on slopes of 5 degrees, one hit
@@ -77,20 +77,19 @@ def checked_roughness(roughness: Roughness | None, tags: int) -> Roughness | Non
     """
     if roughness is None:
         return None
-    slopes, seed = np.array(roughness.surfaces, dtype=np.float64).reshape(-1), roughness.seed
-    if len(slopes) < tags:
+    given = np.array(roughness.surfaces, dtype=object).ravel()
+    if len(given) < tags:
         raise SceneError(
-            f"roughness.surfaces has {len(slopes)} values, but the mesh has tags up to {tags - 1}: "
+            f"roughness.surfaces has {len(given)} values, but the mesh has tags up to {tags - 1}: "
             "give one slope for each tag"
         )
+    slopes = [number(f"roughness.surfaces[{tag}]", one) for tag, one in enumerate(given)]
     for tag, slope in enumerate(slopes):
         if not 0.0 <= slope <= MAX_SLOPE:
             raise SceneError(
                 f"roughness.surfaces[{tag}] is {slope}: it must lie in [0, {MAX_SLOPE:g}]"
             )
-    if not isinstance(seed, (int, np.integer)) or not 0 <= seed < SEEDS:
-        raise SceneError(f"roughness.seed is {seed!r}: give a whole number from 0 to {SEEDS - 1}")
-    return Roughness(slopes, int(seed))
+    return Roughness(np.array(slopes), checked_seed("roughness.seed", roughness.seed))
 
 
 def new_roughness_state(roughness: Roughness | None, balls: int) -> RoughnessState | None:

@@ -5,10 +5,26 @@ No state is shared, so the same scene gives the same bits on any thread.
 Source: C. Wellons, "Prospecting for hash functions" (2018), 32 bits, multipliers below 2^31.
 """
 
+import numpy as np
+
+from sim_core.errors import SceneError
 from sim_core.numerics.jit import jit
 
 SEEDS = 2**32
 WORD = SEEDS - 1
+
+
+def checked_seed(name: str, seed: object) -> int:
+    """Return the seed of random draws as a plain int.
+
+    ``name``: name of the field in messages.
+
+    Raises:
+        SceneError: unless the seed is a whole number from 0 to 2**32 - 1.
+    """
+    if not isinstance(seed, (int, np.integer)) or not 0 <= seed < SEEDS:
+        raise SceneError(f"{name} is {seed!r}: give a whole number from 0 to {SEEDS - 1}")
+    return int(seed)
 
 
 @jit

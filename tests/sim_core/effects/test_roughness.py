@@ -181,6 +181,7 @@ def test_the_same_seed_gives_the_same_bits_on_any_thread() -> None:
         (Roughness((0.1, -0.1, 0.1)), r"roughness.surfaces\[1\]"),
         (Roughness((0.1, 0.1, 0.6)), r"roughness.surfaces\[2\]"),
         (Roughness((0.1, math.nan, 0.1)), r"roughness.surfaces\[1\]"),
+        (Roughness((0.1, "smooth", 0.1)), r"roughness.surfaces\[1\]"),  # type: ignore[arg-type]
         (Roughness((0.1,) * 3, -1), "roughness.seed"),
         (Roughness((0.1,) * 3, 2**32), "roughness.seed"),
         ((0.1,) * 3, "physics.roughness"),
