@@ -143,8 +143,9 @@ def scene_physics(
     surfaces, balls = tuple(law.restitution for law in laws), materials.shot.restitution
     accuracy, friction, roughness = design.process.accuracy, None, None
     if effects.friction is not None:
-        of_surfaces = (effects.friction.surfaces,) * len(surfaces)
-        friction = sim_core.Friction(of_surfaces, effects.friction.balls)
+        of_part, of_sonotrode, of_wall = effects.friction.surfaces
+        pairs = (of_part, of_sonotrode, of_wall, *[of_sonotrode] * len(design.sonotrodes))
+        friction = sim_core.Friction(pairs, effects.friction.balls)
     if effects.roughness is not None:
         part, sonotrode, wall = effects.roughness.slopes
         slopes = (part, sonotrode, wall, *[sonotrode] * len(design.sonotrodes))

@@ -246,7 +246,7 @@ def with_measured_values(design: Any) -> Any:
     }
     friction = effects.friction
     if friction is not None:
-        friction = _times(friction, {"mu": one.factor("mu"), "mu_balls": one.factor("mu")})
+        friction = _times(friction, dict.fromkeys(friction.COEFFICIENTS, one.factor("mu")))
     return design.model_copy(
         update={
             "sonotrode": _times(design.sonotrode, moving),

@@ -26,7 +26,7 @@ from chamberopt.design.calibration import (
     with_measured_values,
 )
 from chamberopt.design.effects import Effects
-from chamberopt.design.materials import Materials, with_numbers
+from chamberopt.design.materials import Materials, with_friction, with_numbers
 from chamberopt.design.part import PartTable
 from chamberopt.design.process import Process
 from chamberopt.design.shapes import SHAPES, ChamberTable
@@ -117,13 +117,21 @@ class Design(FileTable):
 
     @pydantic.model_validator(mode="before")
     @classmethod
-    def _look_up_metals(cls, data: Any) -> object:
-        """Replace names of metals by the catalogue's numbers, so that results hold the numbers."""
+    def _look_up_metals(cls, data: Any, info: ValidationInfo) -> object:
+        """Replace names of metals by the catalogue's numbers, so that results hold the numbers.
+
+        Friction and roughness that a file does not give are those of the catalogue for these
+        metals. A result that does not have them was simulated without.
+        """
         if (materials := _table(data, "materials")) is None:
             return data
         shot = data.get("shot")
         of_shot = shot.get if isinstance(shot, Mapping) else partial(getattr, shot)
-        return {**data, "materials": with_numbers(materials, of_shot("material", None))}
+        material = of_shot("material", None)
+        numbers = with_numbers(materials, material)
+        is_record = bool((info.context or {}).get("recorded"))
+        effects = with_friction(data.get("effects", {}), numbers, material, is_record)
+        return {**data, "materials": numbers, "effects": effects}
 
     @pydantic.field_validator("effects", mode="before")
     @classmethod

@@ -2,12 +2,20 @@
 
 import math
 from collections.abc import Iterator
+from typing import ClassVar
 
-from pydantic import Field
+from pydantic import Field, ValidationInfo, field_validator
 
-from chamberopt.common.toml_errors import Problem
+from chamberopt.common.toml_errors import CrossCheckError, Problem
 from chamberopt.common.toml_fields import Triple, list_field, quantity
+from chamberopt.design.materials import CATALOGUE, NONE, treatments
 from chamberopt.design.table_base import FileTable, Metres
+
+FRICTION_FORM = f'"{CATALOGUE}", "{NONE}", or a table, e.g. {{ mu = 0.2, beta0 = 0.2 }}'
+ROUGHNESS_FORM = (
+    ", ".join(f'"{one.name}"' for one in treatments())
+    + f', "{NONE}", or a table, e.g. {{ slope_deg = 3 }}'
+)
 
 
 class PartTurn(FileTable):
@@ -63,6 +71,11 @@ class FrictionTable(FileTable):
     mu is the coefficient of friction and beta0 the tangential restitution of Walton's model.
     """
 
+    # Names of the coefficients, for calibrations and ranges that know them to a common factor.
+    COEFFICIENTS: ClassVar[tuple[str, ...]] = (
+        "mu", "mu_part", "mu_sonotrode", "mu_wall", "mu_balls",
+    )  # fmt: skip
+
     mu: float = quantity(0, 10, "", "coefficient of friction; 0 is smooth, metals: tenths")
     beta0: float = quantity(
         -1,
@@ -70,13 +83,24 @@ class FrictionTable(FileTable):
         "",
         "tangential restitution of a sticking impact: minus the slip after over the slip before",
     )
+    mu_part: float | None = quantity(0, 10, "", "mu on the part, if not the same", None)
+    mu_sonotrode: float | None = quantity(0, 10, "", "mu on sonotrodes, likewise", None)
+    mu_wall: float | None = quantity(0, 10, "", "mu on walls and lid, likewise", None)
     mu_balls: float | None = quantity(0, 10, "", "mu of ball on ball, if not the same", None)
     beta0_balls: float | None = quantity(-1, 1, "", "beta0 of ball on ball, if not the same", None)
+    pairs: str | None = Field(
+        default=None,
+        description="materials for which the catalogue gave these numbers; written by the program, "
+        "which looks them up anew for others",
+    )
 
     @property
-    def surfaces(self) -> tuple[float, float]:
-        """Friction coefficient mu and tangential restitution beta0 of a ball on a surface."""
-        return self.mu, self.beta0
+    def surfaces(self) -> tuple[tuple[float, float], ...]:
+        """Friction coefficient mu and tangential restitution beta0 of a ball on the part, on
+        sonotrodes and on walls.
+        """
+        own = (self.mu_part, self.mu_sonotrode, self.mu_wall)
+        return tuple((self.mu if one is None else one, self.beta0) for one in own)
 
     @property
     def balls(self) -> tuple[float, float]:
@@ -120,7 +144,11 @@ class SurfaceEffectTable(FileTable):
 
 
 class Effects(FileTable):
-    """The effects that act on the shot. An effect that is not listed here is not simulated."""
+    """The effects that act on the shot.
+
+    Friction and roughness that a design file leaves out are those of the catalogue
+    (materials/friction.py). Another effect that it leaves out is not simulated.
+    """
 
     auto: bool = Field(
         default=False,
@@ -133,11 +161,15 @@ class Effects(FileTable):
     )
     friction: FrictionTable | None = Field(
         default=None,
-        description="balls slip and spin: { mu = 0.3, beta0 = 0.2 }; absent: smooth, no rotation",
+        description="balls slip and spin: { mu = 0.2, beta0 = 0.2 }; absent: by the catalogue, for "
+        "the metals of [materials]",
+        json_schema_extra={"form": FRICTION_FORM},
     )
     roughness: RoughnessTable | None = Field(
         default=None,
-        description="facets throw balls aside: { slope_deg = 3 }; absent: perfectly smooth faces",
+        description="facets throw balls aside: { slope_deg = 3 }; absent: as of peened faces, none "
+        "without friction",
+        json_schema_extra={"form": ROUGHNESS_FORM},
     )
     rest: bool | None = Field(
         default=None,
@@ -156,6 +188,17 @@ class Effects(FileTable):
         """Return the numbers of each SurfaceEffectTable, in SI units, by name of the effect."""
         tables = {name: getattr(self, name) for name in type(self).model_fields}
         return {k: v.parameters for k, v in tables.items() if isinstance(v, SurfaceEffectTable)}
+
+    @field_validator("friction", "roughness", mode="before")
+    @classmethod
+    def _accept_none(cls, given: object, info: ValidationInfo) -> object:
+        """Accept the text "none", and refuse texts that the catalogue does not know."""
+        if not isinstance(given, str):
+            return given
+        if given == NONE:
+            return None
+        form = FRICTION_FORM if info.field_name == "friction" else ROUGHNESS_FORM
+        raise CrossCheckError([Problem("", f"given {given!r}; allowed: {form}")])
 
     def _problems(self) -> Iterator[Problem]:
         if self.rest and not self.gravity:

@@ -9,7 +9,10 @@ from chamberopt.common.errors import InputError
 from chamberopt.common.files import write_text
 from chamberopt.common.toml_fields import read_toml
 from chamberopt.design.design import Design, validate
+from chamberopt.design.materials import NONE
 from chamberopt.design.shapes.base import is_custom
+
+OFF_BY_NAME = ("friction", "roughness")  # effects that are on if a file does not give them
 
 __all__ = ["Design", "load_design", "read_toml", "save_design"]
 
@@ -31,7 +34,10 @@ def save_design(design: Design, path: str | Path) -> None:
     import tomlkit
 
     path = Path(path)
-    data = with_paths_from(path.resolve().parent, _without_none(design.model_dump()))
+    values = design.model_dump()
+    for effect in OFF_BY_NAME:
+        values["effects"][effect] = values["effects"][effect] or NONE
+    data = with_paths_from(path.resolve().parent, _without_none(values))
     header = "# A complete candidate chamber, written by chamberopt.\n"
     header += "# Units are in the names; amplitude_um is zero-to-peak, "
     header += "amplitude_pv_um peak-to-valley.\n\n"

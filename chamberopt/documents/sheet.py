@@ -38,9 +38,9 @@ def cautions(result: Result) -> Iterator[str]:
     yield from _time(result)
     if result.design.effects.friction is None:
         yield (
-            "Simulated without friction. With it the shot was 22 to 47 % slower in a cylinder (mu "
-            "0.1 to 0.5), and coverage takes longer: rely on these times only once the coverage "
-            "measured first agrees."
+            "Simulated without friction, as asked. With it the shot was 22 to 47 % slower in a "
+            "cylinder (mu 0.1 to 0.5), and coverage takes longer: rely on these times only once "
+            "the coverage measured first agrees."
         )
     if result.record.chamber.facets_left:
         yield (

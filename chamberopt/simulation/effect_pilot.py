@@ -24,6 +24,7 @@ from chamberopt.chamber.scene import balls_can_rest, chamber_mesh
 from chamberopt.common.estimate import Estimate, estimate
 from chamberopt.coverage.coverage_from_impacts import coverage_from_dent_density
 from chamberopt.coverage.metrics import exposed_target
+from chamberopt.design.materials import CATALOGUE, USUAL, treatment
 from chamberopt.simulation.advice import Advice, verdict_on
 from chamberopt.simulation.evaluate import require_figures
 from chamberopt.simulation.replicas import ReplicaSetting, simulate_replicas
@@ -47,9 +48,6 @@ REPLICAS = 8
 IMPACTS = 300_000
 FIRST_TIME = 0.05  # s of each replica, to find how often the target is hit
 MAX_TIME = 20.0  # s of each replica
-# Friction of a pilot run that switches it on: mu of dry metal, and beta0 between none and the 0.43
-# and 0.44 that S. Foerster, M. Louge, H. Chang and K. Allia, Phys. Fluids 6 (1994) 1108, measured.
-ASSUMED_FRICTION = {"mu": 0.3, "beta0": 0.2}
 ACCURACY = 0.01  # smaller changes do not matter
 
 
@@ -57,7 +55,8 @@ ACCURACY = 0.01  # smaller changes do not matter
 SWITCHED = {
     "gravity": (True, False),
     "ball_collisions": (True, False),
-    "friction": (ASSUMED_FRICTION, None),
+    "friction": (CATALOGUE, None),
+    "roughness": (USUAL, None),
     "drag": (True, False),
     "rest": (True, False),
 }
@@ -215,11 +214,20 @@ def _reason(effect: str, design: Design, chamber: Chamber) -> str:
             f"an impact without slip turns {dimensionless.MAX_SPIN_SHARE:.0%} of the sideways "
             "speed into spin"
         ),
+        "roughness": (
+            f"facets turn a ball aside by {_turned_aside(design):.2g}°, twice their rms slope"
+        ),
         "drag": (
             f"{dimensionless.drag_loss(design, chamber):.2g} of the speed is lost on the way up"
         ),
         "rest": "a surface that does not move faces up, so balls can lie on it",
     }[effect]
+
+
+def _turned_aside(design: Design) -> float:
+    """Return the angle [degrees] by which facets of the usual or the given slope turn a ball."""
+    rough = design.effects.roughness
+    return 2.0 * (treatment(USUAL).slope_deg if rough is None else rough.slope_deg)
 
 
 def _switchable(design: Design, chamber: Chamber) -> list[str]:

@@ -267,13 +267,10 @@ def friction_notes(design: Design) -> list[str]:
     """
     if design.effects.friction is not None or design.effects.auto:
         return []
-    remedy = (
-        "give yours, e.g. effects.friction = { mu = 0.3, beta0 = 0.2 }; chamberopt check --pilot "
-        "measures it"
-    )
+    remedy = 'effects.friction = "catalogue" takes that of the metals'
     return [
-        "without effects.friction the balls are smooth: in a cylinder, any mu from 0.1 to 0.5 made "
-        f"the shot slower by 22 to 47 % (docs/physics.md); {remedy}"
+        'effects.friction is "none", so the balls are smooth: in a cylinder, any mu from 0.1 to '
+        f"0.5 made the shot slower by 22 to 47 % (docs/physics.md); {remedy}"
     ]
 
 

@@ -33,7 +33,7 @@ from chamberopt.common.errors import InputError, UnreadableError
 from chamberopt.common.progress import step
 from chamberopt.common.toml_fields import MAX_COORDINATE_MM, allowed_range
 from chamberopt.design.design import Design, validate
-from chamberopt.design.materials import alloy, ball, balls
+from chamberopt.design.materials import CATALOGUE, USUAL, alloy, ball, balls
 from chamberopt.design.shape_surface import TAG_SONOTRODE
 from chamberopt.design.shapes.base import ParametricChamber
 from chamberopt.design.shot import ShotTable
@@ -260,7 +260,7 @@ def propose(
         "sonotrode": {"frequency_khz": FREQUENCY_KHZ, "amplitude_um": AMPLITUDE_UM},
         "shot": {"mass_g": 1.0, "diameter_mm": round(1e3 * diameter, 4), "material": shot},
         "materials": {"part": part_alloy, "wall": WALL, "sonotrode": SONOTRODE},
-        "effects": {"gravity": True},
+        "effects": {"gravity": True, "friction": CATALOGUE, "roughness": USUAL},
         "process": {"treatment_time_s": TREATMENT_S, "seed": 1},
         "process.accuracy": {
             "replicas": 8,
@@ -279,7 +279,8 @@ def propose(
         "materials.part": "C0 and v0 are computed: to be calibrated"
         if wanted.alloy
         else "NOT KNOWN, a guess: chamberopt materials lists alloys",
-        "effects.gravity": "friction is left out: chamberopt check says what it would change",
+        "effects.friction": "mu of these balls on these metals, dry: chamberopt materials",
+        "effects.roughness": "rms slope of faces that shot has dented",
         "process.treatment_time_s": "a start: the report has coverage over time",
         "process.accuracy.objective_half_width": "replicas are added until it is this sure",
     }

@@ -1,8 +1,11 @@
-"""The commands `materials` and `shot`: list the known alloys, and balls as they are sold."""
+"""The commands `materials` and `shot`: list the known alloys, and balls as they are sold.
+
+`materials` lists friction and slopes of faces too.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from textwrap import wrap
 from typing import TYPE_CHECKING
 
@@ -19,21 +22,31 @@ UNITS = {"density_kg_m3": "kg/m³", "E_GPa": "E GPa", "poisson": "nu", "hardness
 
 @app.command
 def materials(name: str | None = None, /, *, json: Json = False) -> None:
-    """List the alloys that [materials] of a design may name, and the restitution on each.
+    """List the alloys that [materials] of a design may name, and restitution and friction on each.
 
     Parameters
     ----------
     name
         One alloy, by any of its names; all of them if it is left out.
     """
-    from chamberopt.design.materials import DEFAULT_C0, alloy, alloys, balls, computed_v0
+    from chamberopt.design.materials import (
+        DEFAULT_C0,
+        alloy,
+        alloys,
+        balls,
+        computed_v0,
+        friction_pairs,
+        treatments,
+    )
 
     listed = alloys() if name is None else (alloy(name),)
     hard = [ball for ball in balls() if ball.hardness_HB is not None]
     speeds = {one.name: {ball.name: computed_v0(ball, one) for ball in hard} for one in listed}
     if json:
         rows = [one.model_dump() | {"C0": DEFAULT_C0, "v0_m_s": speeds[one.name]} for one in listed]
-        print_json({"alloys": rows})
+        pairs = [one.model_dump() for one in friction_pairs()]
+        slopes = [one.model_dump() for one in treatments()]
+        print_json({"alloys": rows, "friction": pairs, "treatments": slopes})
         return
     head, lines = ["", *UNITS.values(), *(f"v0 {ball.also[0]}" for ball in hard)], []
     for one in listed:
@@ -45,6 +58,7 @@ def materials(name: str | None = None, /, *, json: Json = False) -> None:
         f"v0 [m/s] of these balls: e = C0 for v < v0, C0 (v / v0)^(-1/4) above, C0 = {DEFAULT_C0};",
         "by Johnson's formula from E, HB and the ball's density: to calibrate (docs/physics.md)",
         "",
+        *_friction({one.metal for one in listed}),
         *_sources(listed),
     ])  # fmt: skip
 
@@ -79,6 +93,38 @@ def shot(name: str | None = None, /, *, json: Json = False) -> None:
     limits = [[one.name, *map(_text, (one.ball_um, one.form_um, one.lot_um))] for one in grades()]
     tolerances = Table("", ("ISO 3290-1, µm", "one ball", "form", "lot"), limits)
     show([Table("", head, table), *lines, "", tolerances, "", *_sources(listed)])
+
+
+def _friction(metals: Iterable[str]) -> Iterator[Table | str]:
+    """Yield tables of the friction of balls on these metals, and of the slopes of faces."""
+    from chamberopt.design.materials import friction_pairs, treatments
+
+    metals = {*metals, "any", "balls"}
+    shown = [one for one in friction_pairs() if one.metal in metals]
+    lines = [
+        [
+            f"{one.ball} on {one.metal}",
+            f"{one.mu:g}",
+            " to ".join(map(_text, one.mu_range)),
+            f"{one.beta0:g}",
+            one.sure,
+        ]
+        for one in shown
+    ]
+    yield Table("", ("friction, dry", "mu", "mu may be", "beta0", "how sure"), lines)
+    yield from ("", 'effects.friction = "catalogue" takes these, "any" where no other fits.', "")
+    slopes = [
+        [one.name, f"{one.slope_deg:g}", " to ".join(map(_text, one.slope_range))]
+        for one in treatments()
+    ]
+    yield Table("", ("effects.roughness", "rms slope, degrees", "may be"), slopes)
+    yield ""
+    for name, source in sorted({(one.ball + " on " + one.metal, one.source) for one in shown}):
+        yield name
+        yield from _wrapped(source)
+    for one in treatments():
+        yield one.name
+        yield from _wrapped(one.source)
 
 
 def _sources(listed: Sequence[Alloy | Ball]) -> list[str]:

@@ -10,12 +10,24 @@ from chamberopt.design.materials.catalogue import (
     find,
     grades,
 )
+from chamberopt.design.materials.friction import (
+    CATALOGUE,
+    NONE,
+    USUAL,
+    friction_pairs,
+    treatment,
+    treatments,
+    with_friction,
+)
 from chamberopt.design.materials.named_metals import DEFAULT_C0, computed_v0, with_numbers
 from chamberopt.design.materials.tables import Materials, PartMaterial, RestitutionTable
 
 __all__ = [
     "BRINELL_TO_PASCAL",
+    "CATALOGUE",
     "DEFAULT_C0",
+    "NONE",
+    "USUAL",
     "Materials",
     "PartMaterial",
     "RestitutionTable",
@@ -26,6 +38,10 @@ __all__ = [
     "balls",
     "computed_v0",
     "find",
+    "friction_pairs",
     "grades",
+    "treatment",
+    "treatments",
+    "with_friction",
     "with_numbers",
 ]

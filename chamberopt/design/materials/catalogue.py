@@ -82,6 +82,7 @@ class Named(FileTable):
 class Alloy(Named):
     """A metal of parts, walls and sonotrodes, in one condition."""
 
+    metal: str = Field(description="its base metal, for friction")
     hardness_HB: float = quantity(5, 1000, "HB", "Brinell hardness of the surface")  # noqa: N815
     yield_MPa: float | None = quantity(10, 5000, "MPa", "yield strength", None)  # noqa: N815
     tensile_MPa: float | None = quantity(10, 5000, "MPa", "tensile strength", None)  # noqa: N815
@@ -120,19 +121,19 @@ Solid = TypeVar("Solid", bound=Named)
 @cache
 def alloys() -> tuple[Alloy, ...]:
     """Return all alloys of the catalogue. The alloys of one base metal are together."""
-    return _read("alloys.toml", _Alloys).alloy
+    return read_catalogue("alloys.toml", _Alloys).alloy
 
 
 @cache
 def balls() -> tuple[Ball, ...]:
     """Return all materials of balls in the catalogue."""
-    return _read("balls.toml", _Balls).ball
+    return read_catalogue("balls.toml", _Balls).ball
 
 
 @cache
 def grades() -> tuple[Grade, ...]:
     """Return the tolerances of all grades of balls, the finest first."""
-    return _read("balls.toml", _Balls).grade
+    return read_catalogue("balls.toml", _Balls).grade
 
 
 def find(name: object, among: Iterable[Solid]) -> Solid | None:
@@ -188,6 +189,7 @@ def _plain(name: str) -> str:
     return re.sub(r"[\W_]", "", name).casefold()
 
 
-def _read(file: str, kind: type[File]) -> File:
+def read_catalogue(file: str, kind: type[File]) -> File:
+    """Return the tables of a file of the catalogue, in the folder of this module."""
     path = Path(__file__).with_name(file)
     return kind.model_validate(tomllib.loads(read_file(path, follow=True).decode()))

@@ -80,12 +80,17 @@ def test_friction_is_what_the_design_says_or_absent(design, mesh) -> None:
         effects = design.effects.model_copy(update={"friction": FrictionTable(**said)})
         return build_scene(design.model_copy(update={"effects": effects}), mesh, 1).physics.friction
 
-    assert build_scene(design, mesh, 1).physics.friction is None
+    smooth = design.changed({"effects.friction": "none", "effects.roughness": "none"})
+    assert build_scene(smooth, mesh, 1).physics.friction is None
     assert friction(mu=0.3, beta0=0.2) == (((0.3, 0.2),) * 3, (0.3, 0.2))
     assert friction(mu=0.3, beta0=0.2, mu_balls=0.1, beta0_balls=-0.5) == (
         ((0.3, 0.2),) * 3,
         (0.1, -0.5),
     )
+    own = {"mu_part": 0.1, "mu_sonotrode": 0.4, "mu_wall": 0.0}
+    by_tag = dict(zip((TAG_PART, TAG_SONOTRODE, TAG_WALL), own.values(), strict=True))
+    surfaces = friction(mu=0.3, beta0=0.2, **own).surfaces
+    assert {tag: surfaces[tag] for tag in by_tag} == {k: (mu, 0.2) for k, mu in by_tag.items()}
 
 
 def test_contact_mode_is_on_where_a_ball_can_lie_still(design, mesh) -> None:
@@ -127,7 +132,7 @@ def test_effects_that_are_asked_for_are_in_the_scene(design, mesh) -> None:
 def test_slopes_are_those_of_part_sonotrode_and_walls(design, mesh) -> None:
     rough = {"effects.roughness": {"slope_deg": 3.0, "part_deg": 5.0, "wall_deg": 0.0}}
     one, same, other = (build_scene(design.changed(rough), mesh, seed) for seed in (1, 1, 2))
-    plain = build_scene(design, mesh, 1)
+    plain = build_scene(design.changed({"effects.roughness": "none"}), mesh, 1)
     assert plain.physics.roughness is None
     assert one.physics.roughness is not None
     slopes = dict(zip((TAG_PART, TAG_SONOTRODE, TAG_WALL), (5.0, 3.0, 0.0), strict=True))

@@ -27,6 +27,9 @@ UNSET = (
     "materials.part.tensile_MPa",
     "materials.wall.hardness_HB",
     "materials.sonotrode.hardness_HB",
+    *(f"effects.friction.mu_{name}" for name in ("part", "sonotrode", "wall", "balls")),
+    "effects.friction.beta0_balls",
+    *(f"effects.roughness.{name}_deg" for name in ("part", "sonotrode", "wall")),
     *(f"materials.{name}.exponent" for name in ("shot", "wall", "sonotrode", "part")),
 )  # numbers that a design need not have
 TABLES = """

@@ -8,8 +8,19 @@ import pytest
 from chamberopt.cli import main
 from chamberopt.common.errors import InputError
 from chamberopt.design.calibration import scaled_restitution
+from chamberopt.design.design import validate
 from chamberopt.design.load import Design, load_design, save_design
-from chamberopt.design.materials import alloy, alloys, ball, ball_sizes, balls, computed_v0, grades
+from chamberopt.design.materials import (
+    alloy,
+    alloys,
+    ball,
+    ball_sizes,
+    balls,
+    computed_v0,
+    friction_pairs,
+    grades,
+    treatments,
+)
 
 TABLES = """
 [part]
@@ -177,3 +188,72 @@ def test_the_catalogue_is_printed(capsys: pytest.CaptureFixture[str]) -> None:
     assert "0.4, 0.5, 0.6" in capsys.readouterr().out
     assert main(["materials", "Ti65"]) == 2
     assert "did you mean 'Ti64'?" in capsys.readouterr().err
+
+
+class TestFriction:
+    """Friction and slopes that a design does not give are the catalogue's."""
+
+    def test_each_pair_lies_in_its_range_and_says_how_sure_it_is(self) -> None:
+        names = {one.name for one in balls()} | {"any"}
+        metals = {one.metal for one in alloys()} | {"any", "balls"}
+        for one in friction_pairs():
+            low, high = one.mu_range
+            assert 0.0 < low <= one.mu <= high
+            assert one.ball in names
+            assert one.metal in metals
+            assert one.sure
+            assert one.source
+        for face in treatments():
+            low, high = face.slope_range
+            assert low <= face.slope_deg <= high
+            assert face.source
+
+    def test_the_default_is_that_of_the_metals(self, tmp_path: Path) -> None:
+        effects = design(tmp_path).effects
+        assert effects.friction is not None
+        part, sonotrode, wall = effects.friction.surfaces
+        pairs = {(one.ball, one.metal): one for one in friction_pairs()}
+        assert part == wall == (pairs["steel", "steel"].mu, pairs["steel", "steel"].beta0)
+        assert sonotrode[0] == pairs["steel", "titanium"].mu
+        assert effects.roughness is not None
+        assert effects.roughness.slope_deg == treatments()[0].slope_deg
+
+    def test_other_metals_have_other_friction_and_given_numbers_stay(self, tmp_path: Path) -> None:
+        one = design(tmp_path)
+        titanium = one.changed({"materials.part": "Ti-6Al-4V"}).effects.friction
+        assert titanium is not None
+        assert titanium.mu_part == titanium.mu_sonotrode
+        mine = one.changed({"effects.friction.mu": 0.15})
+        assert mine.effects.friction is not None
+        assert mine.effects.friction.mu == 0.15
+        own = {"mu": 0.1, "beta0": 0.0}
+        kept = one.changed({"effects.friction": own}).changed({"materials.part": "Ti-6Al-4V"})
+        assert kept.effects.friction is not None
+        assert kept.effects.friction.mu_part is None
+
+    def test_none_is_none_also_in_its_file(self, tmp_path: Path) -> None:
+        change = ("[process]", '[effects]\nfriction = "none"\n[process]')
+        smooth = design(tmp_path, change)
+        assert (smooth.effects.friction, smooth.effects.roughness) == (None, None)
+        for one in (smooth, smooth.changed({"effects.friction": "catalogue"})):
+            save_design(one, tmp_path / "saved.toml")
+            assert load_design(tmp_path / "saved.toml") == one
+        only_rough = design(
+            tmp_path, (change[0], change[1].replace("none", 'none"\nroughness = "ground'))
+        )
+        assert only_rough.effects.roughness is not None
+        assert only_rough.effects.roughness.slope_deg == 1.0
+
+    def test_a_result_of_before_was_simulated_without(self, tmp_path: Path) -> None:
+        data = design(tmp_path).model_dump()
+        data["effects"] = {"gravity": True}
+        effects = validate(Design, data, recorded=True).effects
+        assert (effects.friction, effects.roughness) == (None, None)
+
+    @pytest.mark.parametrize("key", ["friction", "roughness"])
+    def test_an_unknown_word_is_refused_with_those_allowed(self, tmp_path: Path, key: str) -> None:
+        change = ("[process]", f'[effects]\n{key} = "smooth"\n[process]')
+        with pytest.raises(
+            InputError, match=rf"effects\.{key}: given 'smooth'; allowed: .*\"none\""
+        ):
+            design(tmp_path, change)

@@ -110,15 +110,17 @@ def test_each_effect_is_switched_alone_and_the_most_important_comes_first(
     asked = pretend(
         {"gravity": 0.05, "ball_collisions": -0.5, "friction": -0.3, "drag": -0.001}, monkeypatch
     )
-    order = advise(PLATE, CHAMBER, SerialExecutor())
+    smooth = PLATE.changed({"effects.friction": "none"})
+    order = advise(smooth, CHAMBER, SerialExecutor())
     said = {one.effect: one for one in order}
-    assert [one.effect for one in order] == ["ball_collisions", "friction", "gravity", "drag"]
-    assert [one.on for one in order] == [True, False, True, False]
-    assert [one.verdict for one in order] == ["matters"] * 3 + ["makes no difference"]
+    names = [one.effect for one in order]
+    assert names == ["ball_collisions", "friction", "gravity", "drag", "roughness"]
+    assert [one.on for one in order] == [True, False, True, False, True]
+    assert [one.verdict for one in order] == ["matters"] * 3 + ["makes no difference"] * 2
     assert said["friction"].changes["mean normal speed"].value == pytest.approx(-0.3)
     assert said["gravity"].changes["mean normal speed"].value == pytest.approx(0.05)
-    changed = [design.effects for design in asked if design.effects != PLATE.effects]
-    assert len(changed) == 4
+    changed = [design.effects for design in asked if design.effects != smooth.effects]
+    assert len(changed) == 5
     assert all(design.process.accuracy.objective_half_width is None for design in asked)
 
 
@@ -156,7 +158,7 @@ def test_auto_keeps_what_matters_and_says_why(monkeypatch: pytest.MonkeyPatch) -
         False,
     )
     assert effects.friction is not None
-    assert len(why) == 4
+    assert len(why) == 5
     assert with_effects_resolved(PLATE, CHAMBER, SerialExecutor()) == (PLATE, [])
 
 

@@ -82,14 +82,15 @@ def test_a_design_without_friction_says_what_that_means(gear: tuple[Design, Cham
         found = described(design.changed({"effects": effects}), chamber)["notes"]
         return [text for text in found if "friction" in text]
 
-    (said,) = notes({})
-    assert "without effects.friction the balls are smooth" in said
-    assert "give yours, e.g. effects.friction = { mu" in said
+    assert not notes({})  # the catalogue has it
+    (said,) = notes({"friction": "none"})
+    assert "so the balls are smooth" in said
+    assert 'effects.friction = "catalogue"' in said
     assert not notes({"friction": {"mu": 0.3, "beta0": 0.2}})
     assert not notes("auto")  # pilot runs decide
     mix = [{"diameter_mm": 1.5, "share": 0.5}, {"diameter_mm": 1.4, "share": 0.5}]
     mixed = design.changed({"shot.diameter_mm": None, "shot.mix": mix})
-    assert notes({"rest": False}, mixed) == [said]
+    assert notes({"rest": False, "friction": "none"}, mixed) == [said]
     friction = {"mu": 0.3, "beta0": 0.2}
     assert not notes({"rest": False, "friction": friction}, mixed)
 
