@@ -9,10 +9,8 @@ from chamberopt.common.errors import InputError
 from chamberopt.common.files import write_text
 from chamberopt.common.toml_fields import read_toml
 from chamberopt.design.design import Design, validate
-from chamberopt.design.materials import NONE
+from chamberopt.design.materials import BY_NAME, NONE
 from chamberopt.design.shapes.base import is_custom
-
-OFF_BY_NAME = ("friction", "roughness")  # effects that are on if a file does not give them
 
 __all__ = ["Design", "load_design", "read_toml", "save_design"]
 
@@ -35,7 +33,7 @@ def save_design(design: Design, path: str | Path) -> None:
 
     path = Path(path)
     values = design.model_dump()
-    for effect in OFF_BY_NAME:
+    for effect in BY_NAME:
         values["effects"][effect] = values["effects"][effect] or NONE
     data = with_paths_from(path.resolve().parent, _without_none(values))
     header = "# A complete candidate chamber, written by chamberopt.\n"

@@ -19,6 +19,7 @@ from chamberopt.common.limits import MAX_TEXT_BYTES
 from chamberopt.common.toml_errors import numeric_fields, text_choices
 from chamberopt.common.toml_fields import read_toml
 from chamberopt.design.design import Design, validate
+from chamberopt.design.materials import BY_NAME
 from chamberopt.design.shapes.base import is_custom
 
 # New values of keys by their dotted names, in the file's units; None takes a key out of the file.
@@ -133,10 +134,13 @@ class EditedFile:
     def is_fixed(self, name: str) -> bool:
         """Return True if a number cannot be edited because its table is given by a name.
 
-        For example, the name of a metal stands for the table of its numbers.
+        For example, the name of a metal stands for the table of its numbers. A file without friction
+        has it by name too.
         """
         inner: Any = tomllib.loads(self.text)
         for step in name.split(".")[:-1]:
+            if step in BY_NAME and isinstance(inner, dict) and step not in inner:
+                return True
             inner = inner.get(step, {}) if isinstance(inner, dict) else {}
             if isinstance(inner, str):
                 return True

@@ -11,6 +11,7 @@ from chamberopt.design.materials.catalogue import (
     grades,
 )
 from chamberopt.design.materials.friction import (
+    BY_NAME,
     CATALOGUE,
     NONE,
     USUAL,
@@ -24,6 +25,7 @@ from chamberopt.design.materials.tables import Materials, PartMaterial, Restitut
 
 __all__ = [
     "BRINELL_TO_PASCAL",
+    "BY_NAME",
     "CATALOGUE",
     "DEFAULT_C0",
     "NONE",

@@ -18,6 +18,7 @@ from chamberopt.design.materials.catalogue import alloys, balls, find, read_cata
 from chamberopt.design.table_base import FileTable
 
 CATALOGUE, NONE, USUAL = "catalogue", "none", "peened"
+BY_NAME = ("friction", "roughness")  # effects that a file has by name if it does not give them
 ANY, LIKE = "any", "balls"  # any ball or metal, and a ball against its like
 
 
