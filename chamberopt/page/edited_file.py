@@ -134,8 +134,8 @@ class EditedFile:
     def is_fixed(self, name: str) -> bool:
         """Return True if a number cannot be edited because its table is given by a name.
 
-        For example, the name of a metal stands for the table of its numbers. A file without friction
-        has it by name too.
+        For example, the name of a metal stands for the table of its numbers. Friction that the file
+        does not give is given by a name too.
         """
         inner: Any = tomllib.loads(self.text)
         for step in name.split(".")[:-1]:

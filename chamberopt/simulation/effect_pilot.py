@@ -211,8 +211,8 @@ def _reason(effect: str, design: Design, chamber: Chamber) -> str:
             f"mean free path {dimensionless.free_path(design, chamber):.2g} chamber heights"
         ),
         "friction": (
-            f"an impact without slip turns {dimensionless.MAX_SPIN_SHARE:.0%} of the sideways "
-            "speed into spin"
+            f"{_of_catalogue(design)}an impact without slip turns "
+            f"{dimensionless.MAX_SPIN_SHARE:.0%} of the sideways speed into spin"
         ),
         "roughness": (
             f"facets turn a ball aside by {_turned_aside(design):.2g}°, twice their rms slope"
@@ -222,6 +222,12 @@ def _reason(effect: str, design: Design, chamber: Chamber) -> str:
         ),
         "rest": "a surface that does not move faces up, so balls can lie on it",
     }[effect]
+
+
+def _of_catalogue(design: Design) -> str:
+    """Return the materials for which the catalogue gave friction; "" if it did not."""
+    friction = design.effects.friction
+    return f"by the catalogue for {friction.pairs}; " if friction and friction.pairs else ""
 
 
 def _turned_aside(design: Design) -> float:

@@ -95,6 +95,7 @@ def test_numbers_of_a_catalogues_metal_are_shown_and_not_changed(file: EditedFil
     rows = {row["name"]: row for row in design_fields(file)}
     assert rows["materials.wall.C0"]["fixed"]
     assert not rows["materials.part.C0"]["fixed"]
+    assert rows["effects.friction.mu"]["fixed"]  # absent from the file: the catalogue's
     with pytest.raises(InputError, match=r"materials\.wall: given '42CrMo4'"):
         file.save({"materials.wall.C0": 0.8})
 
