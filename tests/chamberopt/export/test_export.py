@@ -70,6 +70,7 @@ def design(place: Path) -> Design:
         "offset_mm": (1.5, -2.0),
         "target": {"reachable": True},
     }
+    data["effects"]["roughness"] = None  # so that the surface tells the normal of each hit
     data["process"]["accuracy"] |= {"replicas": 3, "simulated_time_s": 0.2, "warmup_time_s": 0.01}
     return Design.model_validate(data)
 
