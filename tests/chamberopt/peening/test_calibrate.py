@@ -17,7 +17,7 @@ from chamberopt.common.executor import SerialExecutor
 from chamberopt.coverage.dents import dent_diameter
 from chamberopt.coverage.part_impacts import Hits
 from chamberopt.design.calibration import Parameter, calibrated_strip
-from chamberopt.design.design import validate
+from chamberopt.design.design import Design, validate
 from chamberopt.design.load import load_design, save_design
 from chamberopt.documents.calibration import calibration_lines
 from chamberopt.peening.calibrate import Calibrated, calibrate, prepare
@@ -29,6 +29,12 @@ from chamberopt.peening.setups import DropModel, Setup, exact_calibration
 from chamberopt.peening.strip import StripSize, strip_cells
 from chamberopt.workflows.calibrate import save_calibration
 from tests.helpers.synthetic import plate_design
+
+
+def smooth_plate() -> Design:
+    """The shipped plate without friction, of which the known functions know nothing."""
+    return plate_design().changed({"effects.friction": "none", "effects.roughness": "none"})
+
 
 TRUTH: dict[Parameter, float] = {
     "amplitude": -0.08, "C0": 0.02, "v0": -0.6, "hardness": 0.15, "K": math.log(22.0), "beta": 0.3,
@@ -65,8 +71,8 @@ def known_impacts(
 def shop(folder: Path, strips: bool = True, noise: float = 1.0) -> dict[str, Any]:
     """What a shop with the parameters TRUTH measures on the shipped plate."""
     rng = np.random.default_rng(5)
-    save_design(plate_design(), folder / "plate.toml")
-    design = plate_design()
+    save_design(smooth_plate(), folder / "plate.toml")
+    design = smooth_plate()
     data: dict[str, Any] = {"design": "plate.toml"}
     for number, amplitude in enumerate((20.0, 30.0)):
         set_up = design.changed({"sonotrode.amplitude_um": amplitude})
@@ -97,7 +103,7 @@ def shop(folder: Path, strips: bool = True, noise: float = 1.0) -> dict[str, Any
 def _chamber() -> Any:
     from chamberopt.chamber.build import build_chamber
 
-    return build_chamber(plate_design())
+    return build_chamber(smooth_plate())
 
 
 def calibrated(folder: Path, data: dict[str, Any]) -> Calibrated:
@@ -128,7 +134,7 @@ def test_hidden_parameters_are_found_within_their_deviations(found: Calibrated) 
 
 
 def test_figures_of_the_design_are_predicted(found: Calibrated) -> None:
-    truth = Setup(plate_design(), _chamber(), ("amplitude", "C0", "v0"))
+    truth = Setup(smooth_plate(), _chamber(), ("amplitude", "C0", "v0"))
     seen = [
         PartProbe(("rate",), truth.target, truth.area)
         .read(known_impacts(truth, TRUTH, SerialExecutor(), seed)).at(0.0)[0]
@@ -150,7 +156,7 @@ def test_the_result_is_a_machine_that_designs_can_name(found: Calibrated, tmp_pa
         "calibration.json", "calibration.png", "calibration.txt", "design.toml", "machine.toml",
     }  # fmt: skip
     (tmp_path / "own.toml").write_text(
-        'calibration = "machine.toml"\n' + _text(tmp_path, plate_design()), encoding="utf-8"
+        'calibration = "machine.toml"\n' + _text(tmp_path, smooth_plate()), encoding="utf-8"
     )
     design = load_design(tmp_path / "own.toml")
     assert design.calibration == found.table
@@ -232,7 +238,7 @@ def test_a_surface_is_exact_for_straight_lines_and_averages_noise() -> None:
     ("speed", "expected"), [(0.1, 0.91 * 1.02), (3.0, 0.91 * 1.02 * (3.0 / (2 * 0.17)) ** -0.25)]
 )  # fmt: skip
 def test_a_drop_s_restitution_is_the_law_s(speed: float, expected: float) -> None:
-    drop = DropModel(plate_design().materials.part, speed)
+    drop = DropModel(smooth_plate().materials.part, speed)
     found = drop({"C0": math.log(1.02), "v0": math.log(2.0)})
     assert math.exp(found.values[0]) == pytest.approx(expected)
 
@@ -268,7 +274,7 @@ def test_a_drop_s_restitution_is_the_law_s(speed: float, expected: float) -> Non
 def test_a_wrong_file_is_refused_before_any_work(
     change: dict[str, Any], message: str, tmp_path: Path
 ) -> None:
-    save_design(plate_design(), tmp_path / "plate.toml")
+    save_design(smooth_plate(), tmp_path / "plate.toml")
     drop = {"surface": "part", "speed_m_s": 3.0, "restitution": 0.5}
     data = {"design": "plate.toml", "drop": [drop]} | change
     path = tmp_path / "measured.toml"
@@ -287,15 +293,15 @@ def test_the_example_of_the_docs_is_a_usable_file() -> None:
 
 
 def test_a_design_in_the_place_of_measurements_is_one_clear_error(tmp_path: Path) -> None:
-    save_design(plate_design(), tmp_path / "plate.toml")
+    save_design(smooth_plate(), tmp_path / "plate.toml")
     with pytest.raises(InputError, match="this is a design file") as error:
         load_measured(tmp_path / "plate.toml")
     assert len(str(error.value).splitlines()) == 1
 
 
 def test_shot_of_two_materials_is_refused(tmp_path: Path) -> None:
-    save_design(plate_design(), tmp_path / "plate.toml")
-    save_design(plate_design().changed({"shot.material": "zirconia"}), tmp_path / "zirconia.toml")
+    save_design(smooth_plate(), tmp_path / "plate.toml")
+    save_design(smooth_plate().changed({"shot.material": "zirconia"}), tmp_path / "zirconia.toml")
     drop = {"surface": "part", "speed_m_s": 3.0, "restitution": 0.5, "design": "zirconia.toml"}
     path = tmp_path / "measured.toml"
     path.write_text(tomlkit.dumps({"design": "plate.toml", "drop": [drop]}), encoding="utf-8")

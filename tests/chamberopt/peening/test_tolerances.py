@@ -226,6 +226,7 @@ def test_a_short_real_run() -> None:
     """The nominal run is that of `evaluate`, and another peening time is not simulated."""
     short = {"simulated_time_s": 0.3, "warmup_time_s": 0.05, "replicas": 3, "points": 1000}
     values = {f"process__accuracy__{name}": value for name, value in short.items()}
+    values["process__treatment_time_s"] = 2.5
     design = tolerated({"amplitude_um": 2, "process.treatment_time_s": "4 %"}, **values)
     chamber, done = build_chamber(design), []
     nominal, found = simulate_tolerances(
@@ -234,10 +235,10 @@ def test_a_short_real_run() -> None:
     assert nominal.metrics == evaluate(design, chamber, SerialExecutor()).metrics
     assert len(done) == 9  # nominal, amplitude and the worst corner
     assert done[-1] == (9, 9, None)
-    assert found.corner == {"sonotrode.amplitude_um": 23.0, "process.treatment_time_s": 4.8}
+    assert found.corner == {"sonotrode.amplitude_um": 23.0, "process.treatment_time_s": 2.4}
     low = found.figures["mean_coverage"].effects["process.treatment_time_s"].low
     runs = Variations(design, chamber, SerialExecutor(), RunsProgress(None, 1))
-    changed = design.changed({"process.treatment_time_s": 4.8})
+    changed = design.changed({"process.treatment_time_s": 2.4})
     at_low = runs.run(changed, replicas=runs.known.replicas)
     gap = at_low.metrics["mean_coverage"].value - nominal.metrics["mean_coverage"].value
     assert low.value == pytest.approx(gap, abs=1e-4)

@@ -135,7 +135,7 @@ def test_evaluate_gives_the_same_numbers_on_any_number_of_workers() -> None:
     design = plate_design(
         process__accuracy__simulated_time_s=0.02, process__accuracy__warmup_time_s=0.02,
         process__accuracy__replicas=4,
-    )  # fmt: skip
+    ).changed({"effects.friction": "none"})  # fmt: skip
     chamber = build_chamber(design)
     seen: list[tuple[int, int, float | None]] = []
     serial = evaluate(design, chamber, SerialExecutor(), lambda *args: seen.append(args))
@@ -153,7 +153,7 @@ def test_evaluate_gives_the_same_numbers_on_any_number_of_workers() -> None:
     assert serial.simulated_time == pytest.approx(0.08)
     assert serial.collisions["total"] > impacts
     assert any("process.accuracy.simulated_time_s" in note for note in serial.notes)
-    assert sum(note.startswith("without effects.friction") for note in serial.notes) == 1
+    assert sum(note.startswith('effects.friction is "none"') for note in serial.notes) == 1
     # Replicas there are, are added to: the same as all at once.
     known = ReplicaSet()
     few = evaluate(design, chamber, SerialExecutor(), plan=ReplicaPlan(3), known=known)
