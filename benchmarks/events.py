@@ -78,7 +78,7 @@ def _queries(tree, scratch, motion, gravity, wave, overlap, time, length, repeat
             here = state_under(motion, ball, time, acceleration)
             flight = Flight(here.position, here.velocity, acceleration)
             delay, obstacle = first_contact(
-                None, None, None, -1, tree, scratch, flight, wave, None, overlap, time, length
+                None, None, None, -1, tree, scratch, flight, wave, None, None, overlap, time, length
             )
             if obstacle >= 0:
                 total += delay

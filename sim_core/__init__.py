@@ -40,7 +40,7 @@ from sim_core.effects.restitution import (
 )
 from sim_core.effects.roughness import Roughness
 from sim_core.effects.surface.surface_effects import SurfaceEffects, surface_effects
-from sim_core.effects.vibration import Vibration
+from sim_core.effects.vibration import AmplitudeProfile, Vibration
 from sim_core.errors import SceneError, SimulationError
 from sim_core.geometry.analytic import AnalyticCavity, cylinder_cavity, periodic_box, prism_cavity
 from sim_core.geometry.closest_point import ClosestPoints, closest_points
@@ -51,12 +51,14 @@ from sim_core.loop.compile_ahead import compile_simulator, is_compiled
 from sim_core.loop.impact_log import CollisionLog, ImpactLog
 from sim_core.loop.simulate import Collisions, SimulationResult, simulate
 from sim_core.numerics.jit import jit, user_cache
+from sim_core.scene.bent_faces import require_profiles
 from sim_core.scene.frames import Energies, Frames, energies
 from sim_core.scene.packing import pack_balls
 from sim_core.scene.physics import BallCollisions, Physics
 from sim_core.scene.scene import Scene, require_free_rotation
 
 __all__ = [
+    "AmplitudeProfile",
     "AnalyticCavity",
     "BallCollisions",
     "Balls",
@@ -99,6 +101,7 @@ __all__ = [
     "periodic_box",
     "prism_cavity",
     "require_free_rotation",
+    "require_profiles",
     "restitution_at",
     "simulate",
     "surface_effects",

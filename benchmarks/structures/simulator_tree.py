@@ -49,6 +49,7 @@ def nearest(eight, ball, fall, length):  # type: ignore[no-untyped-def]
     """
     flight = Flight(ball.position, ball.velocity, fall)
     delay, row = first_contact(
-        None, None, None, -1, eight.tree, eight.scratch, flight, None, None, eight.seam, 0.0, length
+        *(None, None, None, -1, eight.tree, eight.scratch, flight),
+        *(None, None, None, eight.seam, 0.0, length),
     )
     return delay, int(eight.tree.triangles[row, 0]) if row >= 0 else -1

@@ -13,6 +13,7 @@ from sim_core.detect.ball_sonotrode import (
     within_moved_borders,
 )
 from sim_core.detect.ball_triangle import capsule_delay, face_delay
+from sim_core.effects.amplitude_profile import FaceProfiles
 from sim_core.effects.contact_mode import ContactState
 from sim_core.effects.sonotrodes import SonotrodeWaves, same_sonotrode, wave_of_face
 from sim_core.effects.vibration import Wave
@@ -117,6 +118,7 @@ def first_contact(
     ball: Flight,
     wave: Wave | None,
     waves: SonotrodeWaves | None,
+    profiles: FaceProfiles | None,
     face_overlap: float,
     time: float,
     length: float,
@@ -135,6 +137,7 @@ def first_contact(
         ball: the ball's flight from now on, with its own acceleration.
         wave: vibration of the only sonotrode, or of the slowest one.
         waves: vibrations of several sonotrodes.
+        profiles: amplitude over the faces of sonotrodes that bend.
         face_overlap: overlap of neighbouring faces [m].
         time: time since the start of the present time window [s]. The phase of a sonotrode depends
             on it.
@@ -186,6 +189,7 @@ def first_contact(
                         tree,
                         waves,
                         last,
+                        profiles,
                         plane_row,
                         ball,
                         radius,
@@ -198,11 +202,11 @@ def first_contact(
                         best, found = later, face
                 plane_row = row
                 plane_delay = vibrating_plane_delay(
-                    tree.numbers, row, ball, radius, own, time, best
+                    tree.numbers, row, ball, radius, own, profiles, time, best
                 )
             delay = plane_delay
             if delay <= best and not within_moved_borders(
-                tree.numbers, row, ball, face_overlap, own, time, delay
+                tree.numbers, row, ball, face_overlap, own, profiles, time, delay
             ):
                 delay = NEVER
         if out_of_reach(contact, tree, number, ball.position, row):
@@ -213,7 +217,17 @@ def first_contact(
     if plane_row >= 0 and plane_delay < best:  # the ball met the last plane beside its faces
         last = wave_of_face(waves, wave, plane_row)
         later, face = find_later_contact(
-            tree, waves, last, plane_row, ball, radius, face_overlap, time, plane_delay, best
+            tree,
+            waves,
+            last,
+            profiles,
+            plane_row,
+            ball,
+            radius,
+            face_overlap,
+            time,
+            plane_delay,
+            best,
         )
         if face >= 0:
             return later, face

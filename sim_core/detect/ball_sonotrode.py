@@ -4,14 +4,16 @@ import math
 
 import numpy as np
 
+from sim_core.detect.ball_bent_face import BentGap, first_bent_approach, next_bent_approach
 from sim_core.detect.ball_triangle import HALF, face_normal, within_borders
+from sim_core.effects.amplitude_profile import FaceProfiles, wave_at
 from sim_core.effects.sonotrodes import SonotrodeWaves, same_sonotrode
 from sim_core.effects.vibration import Wave
 from sim_core.geometry.bvh import Tree
 from sim_core.geometry.obstacles import VIBRATING_FACE, same_plane
 from sim_core.numerics.jit import jit
 from sim_core.numerics.roots import NEVER, WaveGap, first_wave_approach, next_wave_approach
-from sim_core.numerics.vec3 import Flight, add_scaled, dot, position_after
+from sim_core.numerics.vec3 import Flight, Vec3, add_scaled, dot, position_after
 
 
 @jit
@@ -21,6 +23,7 @@ def vibrating_plane_delay(
     ball: Flight,
     radius: float,
     wave: Wave | None,
+    profiles: FaceProfiles | None,
     time: float,
     limit: float,
 ) -> float:
@@ -29,10 +32,34 @@ def vibrating_plane_delay(
     A contact with the plane beside the face counts too. The result is NEVER if there is no contact
     within ``limit`` [s], or no vibration.
     ``time``: time since the start of the present time window [s].
+    ``profiles``: amplitude over the faces; None if all are rigid.
     """
     if wave is None:
         return NEVER
-    return first_wave_approach(_plane_gap(numbers, row, ball, wave, time), limit, HALF * radius)
+    gap = _plane_gap(numbers, row, ball, wave, time)
+    if profiles is None:
+        return first_wave_approach(gap, limit, HALF * radius)
+    bent = BentGap(gap, profiles, row, wave.axis, ball)
+    return first_bent_approach(bent, 0.0, limit, HALF * radius)
+
+
+@jit
+def _next_approach(
+    profiles: FaceProfiles | None,
+    gap: WaveGap,
+    row: int,
+    axis: Vec3,
+    ball: Flight,
+    span: tuple[float, float],
+    depth: float,
+) -> float:
+    """Return the next time at which a ball that met a plane comes down on it again, or NEVER.
+
+    ``span``: time at which the ball met the plane, and end of the search [s].
+    """
+    if profiles is None:
+        return next_wave_approach(gap, span[0], span[1], depth)
+    return next_bent_approach(BentGap(gap, profiles, row, axis, ball), span[0], span[1], depth)
 
 
 @jit
@@ -60,14 +87,17 @@ def within_moved_borders(
     ball: Flight,
     face_overlap: float,
     wave: Wave | None,
+    profiles: FaceProfiles | None,
     time: float,
     delay: float,
 ) -> bool:
     """Return True if a ball lies over a vibrating face, not beside it, after ``delay`` [s]."""
     if wave is None:
         return False
-    shift = wave.amplitude * math.sin(wave.omega * (time + delay) + wave.phase)
-    at = add_scaled(position_after(ball, delay), -shift, wave.axis)
+    position = position_after(ball, delay)
+    here = wave_at(profiles, wave, row, position)
+    shift = here.amplitude * math.sin(here.omega * (time + delay) + here.phase)
+    at = add_scaled(position, -shift, here.axis)
     return within_borders(numbers, row, at, face_overlap)
 
 
@@ -76,6 +106,7 @@ def find_later_contact(
     tree: Tree,
     waves: SonotrodeWaves | None,
     wave: Wave | None,
+    profiles: FaceProfiles | None,
     row: int,
     ball: Flight,
     radius: float,
@@ -93,6 +124,7 @@ def find_later_contact(
         tree: tree of the obstacles.
         waves: waves of several sonotrodes.
         wave: wave of the face.
+        profiles: amplitude over the faces; None if all are rigid.
         row: number of a face in the plane.
         ball: the ball's flight from ``time`` on.
         radius: radius of the ball [m].
@@ -108,7 +140,8 @@ def find_later_contact(
         return NEVER, -1
     gap = _plane_gap(tree.numbers, row, ball, wave, time)
     while True:
-        delay = next_wave_approach(gap, delay, limit, HALF * radius)
+        span = (delay, limit)
+        delay = _next_approach(profiles, gap, row, wave.axis, ball, span, HALF * radius)
         if delay >= limit:
             return NEVER, -1
         for face in range(len(tree.kinds)):
@@ -116,6 +149,8 @@ def find_later_contact(
                 tree.kinds[face] == VIBRATING_FACE
                 and same_plane(tree.numbers, row, face)
                 and same_sonotrode(waves, row, face)
-                and within_moved_borders(tree.numbers, face, ball, face_overlap, wave, time, delay)
+                and within_moved_borders(
+                    tree.numbers, face, ball, face_overlap, wave, profiles, time, delay
+                )
             ):
                 return delay, face

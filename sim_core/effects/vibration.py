@@ -1,4 +1,6 @@
-"""Vibration of the sonotrode: one tagged surface moves to and fro as a rigid body.
+"""Vibration of the sonotrode: one tagged surface moves to and fro.
+
+It moves as a rigid body, or bends with a profile of amplitude_profile.py.
 
 Notation:
     u(t) = A sin(omega t + phase): displacement along the axis [m]
@@ -21,6 +23,19 @@ from sim_core.numerics.vec3 import Vec3, scaled
 MAX_FREQUENCY = 1e9  # Hz: generators have 1e5 at most; the search at 1e300 would not end
 
 
+class AmplitudeProfile(NamedTuple):
+    """Amplitude over a face that bends: the share of the vibration's amplitude at each place.
+
+    Args:
+        points: pairs of distance [m] and share, from 0 to 1, in ascending order. The first distance
+            is 0 and the last one is that of the face's rim, or more.
+        middle: point [m] from which distances count, across the axis of the vibration.
+    """
+
+    points: tuple[tuple[float, float], ...]
+    middle: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+
 class Vibration(NamedTuple):
     """Harmonic motion of one surface along a fixed axis.
 
@@ -30,6 +45,7 @@ class Vibration(NamedTuple):
         frequency: frequency [Hz].
         phase: phase at time 0 [rad].
         axis: direction of the motion.
+        profile: amplitude over the face, in shares of ``amplitude``; None for a rigid face.
     """
 
     tag: int
@@ -37,6 +53,7 @@ class Vibration(NamedTuple):
     frequency: float
     phase: float = 0.0
     axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    profile: AmplitudeProfile | None = None
 
     @property
     def peak_speed(self) -> float:

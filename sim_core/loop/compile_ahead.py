@@ -11,6 +11,7 @@ import numpy as np
 
 from sim_core.balls import Balls
 from sim_core.effects.sonotrodes import carry_phases
+from sim_core.effects.vibration import AmplitudeProfile
 from sim_core.geometry.analytic import cylinder_cavity
 from sim_core.geometry.mesh import TriangleMesh
 from sim_core.loop.simulate import simulate
@@ -37,6 +38,8 @@ def _marker(physics: Physics, balls: int, alike: bool, cylinder: bool) -> Path:
         kind.append("sonotrodes")
     if physics.rest is not None and physics.rest.on_vibrating:
         kind.append("riding")
+    if any(one.profile is not None for one in physics.vibrations):
+        kind.append("bending")
     return CACHE_FOLDER / "-".join(["compiled", *present, *kind, *["bore"] * cylinder])
 
 
@@ -68,6 +71,7 @@ def compile_simulator(
         Duration of the compilation [s].
     """
     start = time.perf_counter()
+    physics = _with_profiles_of_a_cube(physics)
     if len(physics.vibrations) > 2:
         # more sonotrodes use the same machine code
         physics = physics._replace(vibration=physics.vibrations[:2])
@@ -107,6 +111,16 @@ def compile_simulator(
         with contextlib.suppress(OSError):  # such as a full disk
             _marker(physics, balls, alike, cylinder).touch()
     return time.perf_counter() - start
+
+
+def _with_profiles_of_a_cube(physics: Physics) -> Physics:
+    """Return the effects with profiles for a face of the cube in which code is compiled, if any."""
+    if all(one.profile is None for one in physics.vibrations):
+        return physics
+    even = AmplitudeProfile(((0.0, 1.0), (2.0, 1.0)))
+    up = (0.0, 0.0, 1.0)
+    each = (one._replace(profile=even, axis=up) for one in physics.vibrations)
+    return physics._replace(vibration=tuple(each))
 
 
 @contextlib.contextmanager

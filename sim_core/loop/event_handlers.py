@@ -23,6 +23,7 @@ from sim_core.contact.riding import go_on_riding, is_of_plane, stick
 from sim_core.detect.ball_cylinder import normal_at
 from sim_core.detect.ball_sonotrode import within_moved_borders
 from sim_core.detect.ball_triangle import away_from_capsule, face_normal, nearer_neighbour
+from sim_core.effects.amplitude_profile import bent_normal, wave_at
 from sim_core.effects.contact_mode import (
     ASLEEP,
     BOUNCES,
@@ -203,6 +204,10 @@ def hit_surface(state: SimulationState, event: BallEvent) -> Impact:
         wave = wave_of_face(
             state.waves, wave_of_ball(state.random_phase, state.wave, ball), obstacle
         )
+        away = bent_normal(
+            state.profiles, wave, obstacle, here.position, event.time, away
+        )
+        wave = wave_at(state.profiles, wave, obstacle, here.position)
         relative = sub(relative, surface_velocity(wave, event.time))
         landed = stick(state.contact, tree, state.motion, event, obstacle, here)
         law = vibrating_restitution(state.contact, state.restitution)
@@ -331,7 +336,7 @@ def _face_under(ride: Ride | None, state: SimulationState, event: BallEvent, at:
         row = int(np.int64(last)) if k < 0 else k  # most likely the ball is still on the same face
         if is_of_plane(ride, tree, last, row):
             wave = wave_of_face(ride.waves, ride.wave, row)
-            if within_moved_borders(tree.numbers, row, flight, overlap, wave, event.time, 0.0):
+            if within_moved_borders(tree.numbers, row, flight, overlap, wave, None, event.time, 0.0):
                 return row
     return -1
 

@@ -361,6 +361,7 @@ def _predict_wall(state: SimulationState, ball: int, time: float) -> None:
         flight,
         wave,
         state.waves,
+        state.profiles,
         face_overlap,
         time,
         length,

@@ -9,6 +9,7 @@ import numpy as np
 from sim_core.balls import Balls
 from sim_core.contact.resting_balls import Resting, resting
 from sim_core.detect.ball_mesh import new_scratch
+from sim_core.effects.amplitude_profile import new_face_profiles
 from sim_core.effects.contact_mode import checked_rest, new_contact_state, new_ride
 from sim_core.effects.drag import checked_drag, new_drag_state
 from sim_core.effects.friction import FrictionState, checked_friction, new_friction_state
@@ -223,6 +224,7 @@ class Simulation:
             drag=new_drag_state(checked_drag(physics.drag), balls.diameters, balls.densities),
             sizes=new_ball_sizes(balls, obstacles.roots),
             waves=sonotrodes,
+            profiles=new_face_profiles(vibrations, obstacle_tags, self.centre),
             collision_buffer=new_collision_buffer(scene.record_collisions),
             sides=new_periodic_sides(periods_of(scene.mesh)),
         )

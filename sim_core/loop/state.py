@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sim_core.detect.ball_mesh import Scratch
+from sim_core.effects.amplitude_profile import FaceProfiles
 from sim_core.effects.contact_mode import ContactState
 from sim_core.effects.drag import DragState
 from sim_core.effects.friction import FrictionState
@@ -80,5 +81,6 @@ class SimulationState(NamedTuple):
     drag: DragState | None
     sizes: BallSizes | None
     waves: SonotrodeWaves | None
+    profiles: FaceProfiles | None
     collision_buffer: CollisionBuffer | None
     sides: PeriodicSides | None

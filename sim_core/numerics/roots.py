@@ -161,7 +161,7 @@ def _concave_approach(w: WaveGap, start: float, end: float) -> float:
 
 
 @jit
-def _time_to_band(w: WaveGap, depth: float) -> float:
+def time_to_band(w: WaveGap, depth: float) -> float:
     """Return the earliest time [s] at which the ball reaches the band in which the face moves.
 
     Inside the band this is now, time 0, unless the ball leaves the band faster than the face ever
@@ -189,7 +189,7 @@ def first_wave_approach(w: WaveGap, limit: float, depth: float) -> float:
     has at most one approach, and Newton started from the safe side can neither miss it nor come
     early.
     """
-    s = _time_to_band(w, depth)
+    s = time_to_band(w, depth)
     if s >= limit:
         return NEVER
     strength = w.amplitude * w.omega * w.omega
@@ -231,14 +231,14 @@ def next_wave_approach(w: WaveGap, s: float, limit: float, depth: float) -> floa
     """
     # seen from behind the face, the ball comes out where the gap with its sign changed closes
     behind = WaveGap(-w.c, -w.b, -w.a, w.amplitude, w.omega, w.theta + math.pi)
-    out = s + first_wave_approach(_shifted(behind, s), limit - s, math.inf)
+    out = s + first_wave_approach(shifted(behind, s), limit - s, math.inf)
     if out >= limit:
         return NEVER
-    return out + first_wave_approach(_shifted(w, out), limit - out, depth)
+    return out + first_wave_approach(shifted(w, out), limit - out, depth)
 
 
 @jit
-def _shifted(w: WaveGap, s: float) -> WaveGap:
+def shifted(w: WaveGap, s: float) -> WaveGap:
     """Return the same gap as a function of the time since ``s``."""
     height, rate = w.c + s * (w.b + w.a * s), w.b + 2.0 * w.a * s
     return WaveGap(height, rate, w.a, w.amplitude, w.omega, w.theta + w.omega * s)

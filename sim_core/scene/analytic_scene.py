@@ -3,6 +3,7 @@
 import numpy as np
 
 from sim_core.balls import Balls
+from sim_core.effects.amplitude_profile import shares_at
 from sim_core.effects.vibration import Vibration
 from sim_core.errors import SceneError
 from sim_core.geometry.analytic import CEILING, FLOOR, AnalyticCavity
@@ -64,7 +65,8 @@ def require_clear(
     amplitude = 0.0
     for vibration in vibrations:
         amplitude = vibration.amplitude
-        gap[:, FLOOR] -= amplitude * np.sin(vibration.phase) * np.sign(vibration.axis[2])
+        swing = amplitude * np.sin(vibration.phase) * np.sign(vibration.axis[2])
+        gap[:, FLOOR] -= swing * shares_at(vibration, balls.positions)
     over = gap - radii[:, None]
     ball, surface = (int(k) for k in np.unravel_index(over.argmin(), over.shape))
     where = f"ball {ball} at {balls.positions[ball].tolist()} m"

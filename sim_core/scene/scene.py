@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sim_core.balls import Balls
+from sim_core.effects.amplitude_profile import shares_at
 from sim_core.effects.contact_mode import Rest, checked_rest
 from sim_core.effects.drag import Drag, checked_drag
 from sim_core.effects.friction import Friction, checked_friction
@@ -20,6 +21,7 @@ from sim_core.geometry.mesh import TriangleMesh, connected_components, normals_t
 from sim_core.geometry.turning_part import require_free_axis
 from sim_core.numerics.computed_once import computed_once
 from sim_core.scene.analytic_scene import require_clear, require_supported
+from sim_core.scene.bent_faces import require_profiles
 from sim_core.scene.invariants import (
     beneath_mean_plane,
     clearance,
@@ -132,6 +134,11 @@ class Scene:
                     f"rest.on_vibrating is True, and physics.{name} is given: not supported "
                     f"together yet; leave one of them out"
                 )
+        if rest is not None and rest.on_vibrating and any(one.profile for one in vibrations):
+            raise SceneError(
+                "rest.on_vibrating is True, and a vibration has a profile: not supported together "
+                "yet; leave one of them out"
+            )
         for name in ("rest", "part_rotation"):
             if getattr(self.physics, name) is not None and not self.balls.alike:
                 raise SceneError(
@@ -175,6 +182,7 @@ class Scene:
         for one in vibrations:
             if one.tag not in tags:
                 raise SceneError(f"vibration.tag is {one.tag}, but the mesh has tags {tags}")
+        require_profiles(self.mesh, vibrations)
         if isinstance(self.mesh, AnalyticCavity):
             require_supported(self.mesh, self.physics)
 
@@ -252,8 +260,12 @@ class Scene:
         balls = self.balls
         for vibration in self.physics_at_start.vibrations:
             vibrating = near.tags == vibration.tag
-            near.corners[vibrating] += np.sin(vibration.phase) * vibration.peak
-            gap = clearance(near.corners[vibrating], balls.positions, balls.radius)
+            swing = np.sin(vibration.phase) * vibration.peak
+            near.corners[vibrating] += swing
+            # where a bent face moves less, the ball is further from the face by the rest
+            less = 1.0 - shares_at(vibration, balls.positions)
+            positions = balls.positions + less[:, None] * swing
+            gap = clearance(near.corners[vibrating], positions, balls.radius)
             gap -= 0.5 * balls.diameters
             worst = int(gap.argmin())
             if gap[worst] < -TOUCH:

@@ -138,7 +138,7 @@ def _vibrating_planes(
             waves[i, 0], waves[i, 1], waves[i, 2], Vec3(waves[i, 3], waves[i, 4], waves[i, 5])
         )
         found[i] = vibrating_plane_delay(
-            planes, i, _ball(flights, i), radius, wave, times[i], limits[i]
+            planes, i, _ball(flights, i), radius, wave, None, times[i], limits[i]
         )
 
 
@@ -157,5 +157,5 @@ def _contacts(
     for i in range(len(lengths)):
         ball = _ball(flights, i)
         found[i], obstacles[i] = first_contact(
-            None, None, None, -1, tree, scratch, ball, wave, None, face_overlap, time, lengths[i]
+            None, None, None, -1, tree, scratch, ball, wave, None, None, face_overlap, time, lengths[i]
         )

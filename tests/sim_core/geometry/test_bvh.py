@@ -73,7 +73,7 @@ def test_the_walk_finds_what_testing_every_obstacle_finds() -> None:
         length = float(rng.uniform(0.001, 0.02))
         overlap = face_overlap_of(RADIUS)
         found = first_contact(
-            None, None, None, -1, tree, scratch, ball, None, None, overlap, 0.0, length
+            None, None, None, -1, tree, scratch, ball, *(None,) * 3, overlap, 0.0, length
         )
         assert found == all_obstacles(tree, ball, length)
         hits += found[1] >= 0

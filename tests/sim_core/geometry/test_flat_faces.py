@@ -76,7 +76,7 @@ def test_contacts_with_a_flat_are_those_with_its_triangles(
         one, two = (
             first_contact(
                 *(None, None, None, -1, surfaces.tree, scratch, ball),
-                *(None, None, surfaces.face_overlap, 0.0, 0.1),
+                *(None, None, None, surfaces.face_overlap, 0.0, 0.1),
             )
             for surfaces in (merged, split)
         )
