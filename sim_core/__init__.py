@@ -26,6 +26,7 @@ Example: steel balls in a box whose floor vibrates, with the impacts on the ceil
 
 from sim_core.balls import Balls
 from sim_core.contact.resting_balls import Resting, can_rest
+from sim_core.effects.amplitude_profile import rms_share
 from sim_core.effects.contact_mode import Rest
 from sim_core.effects.drag import Drag, drag_coefficient
 from sim_core.effects.friction import Friction
@@ -103,6 +104,7 @@ __all__ = [
     "require_free_rotation",
     "require_profiles",
     "restitution_at",
+    "rms_share",
     "simulate",
     "surface_effects",
     "user_cache",

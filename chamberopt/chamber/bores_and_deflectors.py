@@ -209,7 +209,7 @@ def cavity_solid(
         cavity = _with_bore(cavity, _bore_of_hole(cavity, hole, k))
     for k, one in enumerate(design.sonotrodes):
         at, axis, tag = np.array(one.at), np.array(one.direction), further_sonotrode_tag(k)
-        well = Bore(f"sonotrodes.{k}", at, axis, one.diameter, tag, one.amplitude)
+        well = Bore(f"sonotrodes.{k}", at, axis, one.diameter, tag, one.largest_amplitude)
         cavity = _with_bore(cavity, well)
     return _without_deflectors(cavity, design, deflectors) if deflectors else cavity
 
@@ -219,9 +219,9 @@ def swept_faces(design: Design, cavity: CavitySolid) -> list[tuple[str, Solid]]:
     surface = cavity.body.surface()
     tags, sweeps = cavity.trace(surface).tags, []
     for name, tag, axis, amplitude in (
-        ("sonotrode", TAG_SONOTRODE, (0.0, 0.0, 1.0), design.sonotrode.amplitude),
+        ("sonotrode", TAG_SONOTRODE, (0.0, 0.0, 1.0), design.sonotrode.largest_amplitude),
         *(
-            (f"sonotrodes.{k}", further_sonotrode_tag(k), one.direction, one.amplitude)
+            (f"sonotrodes.{k}", further_sonotrode_tag(k), one.direction, one.largest_amplitude)
             for k, one in enumerate(design.sonotrodes)
         ),
     ):

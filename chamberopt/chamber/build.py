@@ -202,7 +202,7 @@ def _refuse_misplaced_part(part: Part, shape: ShapeSurface, design: Design) -> N
 
     The error is also raised if the part is drawn with its chamber and no ball fits under the part.
     """
-    distance, amplitude = design.chamber.sonotrode_distance, design.sonotrode.amplitude
+    distance, amplitude = design.chamber.sonotrode_distance, design.sonotrode.largest_amplitude
     if distance <= amplitude:
         drawn = design.chamber.sonotrode_distance_mm is None
         remedy = "give one, or check the groups in [chamber]" if drawn else "raise it"

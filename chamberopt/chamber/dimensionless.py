@@ -1,6 +1,7 @@
 """Dimensionless numbers that estimate how much an effect matters, before anything is simulated.
 
-V   peak speed of the sonotrode, 2 pi f A [m/s], the scale of the shot's speed
+V   peak speed of the sonotrode, 2 pi f A [m/s], the scale of the shot's speed; its rms over a face
+    that bends
 H   height of the chamber [m]
 d   ball diameter [m]
 g   standard gravity [m/s²]
@@ -26,7 +27,7 @@ def gravity_speed_change(design: Design, chamber: Chamber) -> float:
 
     It is g H / V² for gravity g, height H and peak speed V of the sonotrode.
     """
-    return STANDARD_GRAVITY * chamber.height / design.sonotrode.peak_speed**2
+    return STANDARD_GRAVITY * chamber.height / design.sonotrode.rms_peak_speed**2
 
 
 def free_path(design: Design, chamber: Chamber) -> float:
@@ -56,7 +57,7 @@ def drag_loss(design: Design, chamber: Chamber) -> float:
     from sim_core import Drag, drag_coefficient
 
     air, shot = Drag(), design.shot
-    reynolds = air.density * design.sonotrode.peak_speed * shot.diameter / air.viscosity
+    reynolds = air.density * design.sonotrode.rms_peak_speed * shot.diameter / air.viscosity
     loss_per_metre = (
         0.75 * drag_coefficient(reynolds) * air.density / (shot.density * shot.diameter)
     )

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from chamberopt.common.errors import InputError
+from chamberopt.common.toml_fields import metres
 from chamberopt.design.shape_surface import TAG_PART, TAG_SONOTRODE, further_sonotrode_tag
 
 # A prediction compares a ball with every other ball. It takes about 40 µs for 20,000 balls, and
@@ -77,6 +78,23 @@ def require_turnable(design: Design, mesh: TriangleMesh, axis: Axis | None) -> N
             raise InputError(f"effects.part_turn: {error}") from None
 
 
+def require_measured_faces(design: Design, mesh: TriangleMesh | AnalyticCavity) -> None:
+    """Raise InputError for an amplitude_profile that its sonotrode's face cannot have.
+
+    The face goes on beyond the last point, or the profile is steeper than any sonotrode.
+    """
+    from sim_core import SceneError, require_profiles
+
+    moving = vibrations(design, 0.0)
+    try:
+        require_profiles(mesh, moving if isinstance(moving, tuple) else (moving,))
+    except SceneError as error:
+        faces = {"sonotrode": design.sonotrode}
+        faces |= {f"sonotrodes.{k}": one for k, one in enumerate(design.sonotrodes)}
+        bent = [f"{name}.amplitude_profile" for name, one in faces.items() if one.amplitude_profile]
+        raise InputError(f"{' or '.join(bent)}: {error}") from None
+
+
 def balls_can_rest(design: Design, mesh: TriangleMesh | AnalyticCavity) -> bool:
     """True if balls can lie still: as effects.rest says or, if the design does not give it, if a
     surface that does not move faces up.
@@ -101,11 +119,16 @@ def vibrations(design: Design, phase: float) -> Vibration | tuple[Vibration, ...
     """
     from sim_core import Vibration
 
-    first = Vibration(TAG_SONOTRODE, design.sonotrode.amplitude, design.sonotrode.frequency, phase)
+    floor = design.sonotrode
+    first = Vibration(TAG_SONOTRODE, floor.largest_amplitude, floor.frequency, phase)
+    if floor.amplitude_profile is not None:
+        x, y = floor.amplitude_profile.middle_mm
+        first = first._replace(profile=floor.amplitude_profile.simulated(metres((x, y, 0.0))))
     further = []
     for k, one in enumerate(design.sonotrodes):
-        motion = one.amplitude, one.frequency, phase + one.phase, one.direction
-        further.append(Vibration(further_sonotrode_tag(k), *motion))
+        motion = one.largest_amplitude, one.frequency, phase + one.phase, one.direction
+        profile = one.amplitude_profile and one.amplitude_profile.simulated(one.at)
+        further.append(Vibration(further_sonotrode_tag(k), *motion, profile))
     return (first, *further) if further else first
 
 
@@ -171,7 +194,7 @@ def build_scene(
     """Return the scene of one simulation. Equal arguments give bit-identical scenes.
 
     The shot starts packed low in the chamber, with random velocities of the rms speed 2 pi f A, the
-    peak speed of the sonotrode. The warm-up then has to remove only the effect of the arrangement,
+    peak speed of the sonotrode (its rms over a face that bends). The warm-up then has to remove only the effect of the arrangement,
     and need not change the shot's energy by orders of magnitude. The phases of the sonotrode and of
     a turning part are random, because a turn of the part may take longer than the simulation.
 
@@ -187,11 +210,12 @@ def build_scene(
     design = design.simulated
     if not isinstance(mesh, AnalyticCavity):
         require_turnable(design, mesh, axis)
+    require_measured_faces(design, mesh)
     rng = np.random.default_rng(seed)
     sonotrode, shot = design.sonotrode, design.shot
     phase = rng.uniform(0.0, 2.0 * np.pi)
     turn_phase = 0.0 if design.effects.part_turn is None else rng.uniform(0.0, 2.0 * np.pi)
-    clearance = max(one.amplitude for one in (sonotrode, *design.sonotrodes))
+    clearance = max(one.largest_amplitude for one in (sonotrode, *design.sonotrodes))
     diameter, turn = np.array(shot.diameters), part_rotation(design, axis, turn_phase)
     try:
         # floor = 0: no balls in a well below the sonotrode's face
@@ -201,7 +225,7 @@ def build_scene(
     except SceneError as error:
         remedy = "see shot.mass_g, shot.diameter_mm and [chamber]"
         raise InputError(f"shot: {error}; {remedy}") from None
-    velocities = start_velocities(rng, len(positions), sonotrode.peak_speed)
+    velocities = start_velocities(rng, len(positions), sonotrode.rms_peak_speed)
     phase_seed = int(rng.integers(2**32)) if sonotrode.motion == "random_phase" else 0
     roughness_seed = int(rng.integers(2**32)) if design.effects.roughness is not None else 0
     effects = scene_physics(design, mesh, phase, turn_phase, phase_seed, roughness_seed, axis)

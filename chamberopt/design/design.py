@@ -162,7 +162,8 @@ class Design(FileTable):
 
     def _size_problems(self) -> Iterator[Problem]:
         """Yield a problem for each part, ball or sonotrode that does not fit into the chamber."""
-        chamber, amplitude_um = self.chamber, self.sonotrode.zero_to_peak_um
+        chamber, sonotrode = self.chamber, self.sonotrode
+        amplitude_um = sonotrode.zero_to_peak_um * sonotrode.largest_share
         distance, widths = chamber.sonotrode_distance_mm, chamber.widths_mm()
         if distance is None:  # the drawn distance is known only once the set-up's file is read
             distance = math.inf

@@ -2,14 +2,99 @@
 
 import math
 from collections.abc import Iterator
-from typing import Literal
+from itertools import pairwise
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Field
 
 from chamberopt.common.toml_errors import Problem
-from chamberopt.common.toml_fields import Direction, Position, quantity
+from chamberopt.common.toml_fields import (
+    Direction,
+    Pair,
+    Position,
+    Several,
+    Shift,
+    list_field,
+    quantity,
+)
 from chamberopt.design.shapes.hole_and_deflector_tables import PlacedBore
 from chamberopt.design.table_base import SI, FileTable
+
+if TYPE_CHECKING:
+    from sim_core import AmplitudeProfile
+
+MAX_POINTS = 50  # points of a profile
+MAX_SHARE = 2.0
+POINTS = (
+    "pairs [mm from the middle, share], from 0 to the rim, e.g. [[0, 1], [20, 0.97], [35, 0.9]]"
+)
+
+
+class AmplitudeProfileTable(FileTable):
+    """Amplitude over the face of a sonotrode, which bends, as shares of its given amplitude.
+
+    The share is 1 where the given amplitude was measured, usually in the middle of the face.
+    """
+
+    share_at_mm: Annotated[Several[Pair], Field(max_length=MAX_POINTS)] = list_field(
+        POINTS, "measured share of the amplitude, at distances from the middle"
+    )
+    middle_mm: Shift = list_field(
+        "two numbers [x, y] in mm", "middle of the floor's face, in the chamber's frame", (0.0, 0.0)
+    )
+
+    def _problems(self) -> Iterator[Problem]:
+        if len(self.share_at_mm) < 2:
+            text = f"given {len(self.share_at_mm)} points; allowed: two or more {POINTS}"
+            yield Problem("share_at_mm", text)
+            return
+        for i, (distance, share) in enumerate(self.share_at_mm):
+            if not 0.0 <= share <= MAX_SHARE:
+                text = f"given {share:g}; allowed: a share from 0 to {MAX_SHARE:g}"
+                yield Problem(f"share_at_mm.{i}.1", text)
+            if not 0.0 <= distance <= 1000.0:
+                text = f"given {distance:g}; allowed: 0 to 1000 mm"
+                yield Problem(f"share_at_mm.{i}.0", text)
+        if self.share_at_mm[0][0] != 0.0:
+            text = f"given {self.share_at_mm[0][0]:g}; the first point is the middle, at 0 mm"
+            yield Problem("share_at_mm.0.0", text)
+        for i, ((nearer, _), (further, _)) in enumerate(pairwise(self.share_at_mm), start=1):
+            if further <= nearer:
+                text = f"given {further:g} after {nearer:g} mm; give each distance once, in order"
+                yield Problem(f"share_at_mm.{i}.0", text)
+        if self.largest <= 0.0:
+            yield Problem("share_at_mm", "given no share above 0: the face would stand still")
+
+    @property
+    def largest(self) -> float:
+        """Largest share of the given amplitude."""
+        return max(share for _, share in self.share_at_mm)
+
+    def simulated(self, middle: tuple[float, float, float]) -> AmplitudeProfile:
+        """Return the profile in the form that the simulator takes, in shares of the largest one.
+
+        ``middle``: middle of the face [m].
+        """
+        from sim_core import AmplitudeProfile
+
+        points = ((1e-3 * far, share / self.largest) for far, share in self.share_at_mm)
+        return AmplitudeProfile(tuple(points), middle)
+
+    @property
+    def rms(self) -> float:
+        """Rms share of the given amplitude over the disc to the last point."""
+        from sim_core import rms_share
+
+        return self.largest * rms_share(self.simulated((0.0, 0.0, 0.0)))
+
+    @property
+    def in_words(self) -> str:
+        """Return the profile in words, such as 1.00 in the middle to 0.90 at 35 mm, rms 0.95."""
+        (_, middle), (rim, last) = self.share_at_mm[0], self.share_at_mm[-1]
+        extreme = "" if self.largest <= max(middle, last) else f", at most {self.largest:.2f}"
+        return (
+            f"{middle:.2f} in the middle to {last:.2f} at {rim:g} mm{extreme}, rms {self.rms:.2f}"
+        )
 
 
 class VibratingFace(FileTable):
@@ -24,6 +109,12 @@ class VibratingFace(FileTable):
     )
     amplitude_pv_um: float | None = quantity(
         0.2, 1000, "µm", "peak-to-valley, as the trade says: twice zero-to-peak", None
+    )
+
+    amplitude_profile: AmplitudeProfileTable | None = Field(
+        default=None,
+        description="amplitude over the face: { share_at_mm = [[0, 1], [35, 0.9]] }; absent: the "
+        "same everywhere",
     )
 
     frequency = SI("frequency_khz", 1e3, "Frequency [Hz]")
@@ -53,13 +144,37 @@ class VibratingFace(FileTable):
 
     @property
     def amplitude(self) -> float:
-        """Zero-to-peak amplitude [m]."""
+        """Zero-to-peak amplitude [m]; with a profile, where the share is 1."""
         return self.zero_to_peak_um * 1e-6
 
     @property
     def peak_speed(self) -> float:
-        """Return the largest speed of the face [m/s], 2 pi times frequency times amplitude."""
+        """Return the largest speed of the face [m/s], 2 pi times frequency times amplitude.
+
+        With a profile it is that of places where the share is 1.
+        """
         return 2.0 * math.pi * self.frequency * self.amplitude
+
+    @property
+    def largest_share(self) -> float:
+        """Return the largest share of the amplitude on the face; 1 without a profile."""
+        return 1.0 if self.amplitude_profile is None else self.amplitude_profile.largest
+
+    @property
+    def largest_amplitude(self) -> float:
+        """Return the zero-to-peak amplitude [m] of the place that moves most."""
+        return self.amplitude * self.largest_share
+
+    @property
+    def is_centred(self) -> bool:
+        """Return True if the amplitude depends on the distance from the chamber's axis alone."""
+        return self.amplitude_profile is None or not any(self.amplitude_profile.middle_mm)
+
+    @property
+    def rms_peak_speed(self) -> float:
+        """Return the rms over the face of the peak speed [m/s], the scale of the shot's speed."""
+        profile = self.amplitude_profile
+        return self.peak_speed if profile is None else self.peak_speed * profile.rms
 
 
 class Sonotrode(VibratingFace):
@@ -80,6 +195,13 @@ class FurtherSonotrode(PlacedBore, VibratingFace):
     phase_deg: float = quantity(
         -360, 360, "degrees", "ahead of the first sonotrode, at the same frequency", 0.0
     )
+
+    def _problems(self) -> Iterator[Problem]:
+        yield from super()._problems()
+        profile = self.amplitude_profile
+        if profile is not None and any(profile.middle_mm):
+            text = "given for a further sonotrode, whose middle is at_mm; leave it out"
+            yield Problem("amplitude_profile.middle_mm", text)
 
     @property
     def phase(self) -> float:

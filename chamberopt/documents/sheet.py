@@ -209,6 +209,8 @@ def _sonotrode(result: Result, face_mm: tuple[float, ...]) -> Iterator[Row]:
     yield "frequency", f"{plain(design.sonotrode.frequency_khz)} kHz"
     yield "amplitude", _amplitude(design.sonotrode)
     yield "peak speed of the face", f"{plain(design.sonotrode.peak_speed, 3)} m/s"
+    if design.sonotrode.amplitude_profile is not None:
+        yield "amplitude over the face", design.sonotrode.amplitude_profile.in_words
     if design.calibration is not None:
         factor = plain(design.calibration.factor("amplitude"), 3)
         yield "calibrated to", f"{factor} times the amplitude that is set"

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from chamberopt.chamber.analytic import cavity_note
-from chamberopt.chamber.checks.check import friction_notes
+from chamberopt.chamber.checks.check import amplitude_notes, friction_notes
 from chamberopt.chamber.checks.fillets import facet_warnings
 from chamberopt.chamber.scene import chamber_mesh
 from chamberopt.common.estimate import Estimate
@@ -198,6 +198,7 @@ class _Run:
             notes=(
                 *((cavity_note(self.cavity),) if self.cavity else ()),
                 *friction_notes(design),
+                *amplitude_notes(design),
                 *reach_notes(field.reach),
                 *facet_warnings(self.chamber.part, min(design.shot.diameters), field.reach.share),
                 *_symmetry_note(field.alike),
@@ -258,7 +259,8 @@ def window_setting(design: Design, chamber: Chamber) -> WindowSetting:
     require_target(chamber)
     design = design.simulated
     material, shot = design.materials.part, design.shot
-    fastest = max(one.peak_speed for one in (design.sonotrode, *design.sonotrodes)) * MAX_SPEED
+    faces = (design.sonotrode, *design.sonotrodes)
+    fastest = max(one.peak_speed * one.largest_share for one in faces) * MAX_SPEED
     fastest = max(fastest, 2.0 * material.yield_speed)
     # With a table of restitution a slower impact may leave a wider dent than the fastest.
     speeds = np.linspace(0.0, fastest, SPEEDS)
@@ -269,7 +271,9 @@ def window_setting(design: Design, chamber: Chamber) -> WindowSetting:
         points=accuracy.points,
         ball=min(shot.diameters),
         largest_dent=float(dents.max()),
-        symmetric=design.effects.part_turn is None and not design.sonotrodes,
+        symmetric=design.effects.part_turn is None
+        and not design.sonotrodes
+        and design.sonotrode.is_centred,
     )
     require_wide_gauge(chamber, setting)
     return setting

@@ -32,14 +32,7 @@ from sim_core.numerics.roots import (
     shifted,
     time_to_band,
 )
-from sim_core.numerics.vec3 import (
-    Flight,
-    Vec3,
-    add_scaled,
-    dot,
-    position_after,
-    velocity_after,
-)
+from sim_core.numerics.vec3 import Flight, Vec3, add_scaled, dot, position_after, velocity_after
 
 # rad: phase by which a search goes on where a step is lost in rounding; the face moves by less
 # than 1e-13 m meanwhile
@@ -114,9 +107,7 @@ def first_bent_approach(g: BentGap, start: float, limit: float, depth: float) ->
     # a rigid face that reaches as high, and is as fast as the bent face is where the ball is
     top = largest * w.amplitude
     fastest = w.omega + steep * speed / largest
-    s = start + time_to_band(
-        shifted(WaveGap(w.c, w.b, w.a, top, fastest, w.theta), start), depth
-    )
+    s = start + time_to_band(shifted(WaveGap(w.c, w.b, w.a, top, fastest, w.theta), start), depth)
     bound = largest * w.omega * w.omega + steep * (2.0 * speed * w.omega + pull)
     bend = w.a - 0.5 * w.amplitude * (bound + bent * speed * speed)
     while s < limit:

@@ -208,6 +208,19 @@ def shares_at(vibration: Vibration, points: np.ndarray) -> np.ndarray:
     return np.asarray(c[0] + x * (c[1] + x * (c[2] + x * c[3])))
 
 
+def rms_share(profile: AmplitudeProfile) -> float:
+    """Return the rms of the share over the disc round the middle to the last point.
+
+    f² is a polynomial of degree 6 in q, for which Gauss's rule of four points is exact.
+    """
+    start, pieces = _pieces(profile)
+    width, c = np.diff(start[:-1]), pieces[:-2].T
+    nodes, weights = np.polynomial.legendre.leggauss(4)
+    x = 0.5 * (1.0 + nodes[:, None]) * width
+    share = c[0] + x * (c[1] + x * (c[2] + x * c[3]))
+    return math.sqrt(float((0.5 * weights @ share**2) @ width) / float(start[-2]))
+
+
 @jit
 def share_and_slope(
     profiles: FaceProfiles, face: int, axis: Vec3, position: Vec3
@@ -234,9 +247,7 @@ def share_and_slope(
 
 
 @inlined
-def wave_at(
-    profiles: FaceProfiles | None, wave: AnyWave, face: int, position: Vec3
-) -> AnyWave:
+def wave_at(profiles: FaceProfiles | None, wave: AnyWave, face: int, position: Vec3) -> AnyWave:
     """Return the vibration of a face at the place under a ball.
 
     ``wave``: vibration of the face where the share is 1. ``position``: the ball's centre [m].

@@ -204,9 +204,7 @@ def hit_surface(state: SimulationState, event: BallEvent) -> Impact:
         wave = wave_of_face(
             state.waves, wave_of_ball(state.random_phase, state.wave, ball), obstacle
         )
-        away = bent_normal(
-            state.profiles, wave, obstacle, here.position, event.time, away
-        )
+        away = bent_normal(state.profiles, wave, obstacle, here.position, event.time, away)
         wave = wave_at(state.profiles, wave, obstacle, here.position)
         relative = sub(relative, surface_velocity(wave, event.time))
         landed = stick(state.contact, tree, state.motion, event, obstacle, here)
@@ -336,7 +334,9 @@ def _face_under(ride: Ride | None, state: SimulationState, event: BallEvent, at:
         row = int(np.int64(last)) if k < 0 else k  # most likely the ball is still on the same face
         if is_of_plane(ride, tree, last, row):
             wave = wave_of_face(ride.waves, ride.wave, row)
-            if within_moved_borders(tree.numbers, row, flight, overlap, wave, None, event.time, 0.0):
+            if within_moved_borders(
+                tree.numbers, row, flight, overlap, wave, None, event.time, 0.0
+            ):
                 return row
     return -1
 

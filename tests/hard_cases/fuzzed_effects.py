@@ -7,6 +7,7 @@ import numpy as np
 from hypothesis import strategies as st
 
 from sim_core import (
+    AmplitudeProfile,
     BallCollisions,
     Drag,
     Friction,
@@ -26,10 +27,11 @@ from tests.helpers.scenes.turning_parts import PART
 
 SIZES = "sizes"  # beside the fields of Physics: balls of several diameters and densities
 SONOTRODES = "sonotrodes"  # the same: a lid that vibrates as well as the floor
+BENT = "bent"  # the same: the floor, and the lid if it vibrates, move least at the rim
 LAWFUL = "gravity restitution ball_collisions"  # of a chamber that is of this world
 FEW = (
     f"{LAWFUL} vibration rest friction drag roughness",
-    f"{LAWFUL} vibration random_phase friction drag roughness {SIZES}",
+    f"{LAWFUL} vibration random_phase friction drag roughness {SIZES} {BENT}",
     f"{LAWFUL} vibration rest friction part_rotation",
     "gravity restitution vibration random_phase rest friction drag part_rotation",
     f"{LAWFUL} vibration rest {SONOTRODES}",
@@ -40,6 +42,8 @@ MANY = (
     f"{LAWFUL} vibration random_phase drag {SIZES}",
     f"{LAWFUL} vibration rest friction part_rotation roughness",
     f"{LAWFUL} vibration roughness {SONOTRODES}",
+    f"{LAWFUL} vibration rest {SONOTRODES} {BENT}",
+    f"{LAWFUL} vibration rest friction part_rotation {BENT}",
     "ball_collisions roughness",
     f"{LAWFUL} vibration random_phase rest friction drag part_rotation",
     f"{LAWFUL} vibration",
@@ -69,7 +73,8 @@ class Strengths(NamedTuple):
     ``weight``: g wide / speed²; ``restitution``: e; ``elastic_below`` [speeds]; ``swing``:
     [diameters] of the floor, ``beat``: the face's peak speed; ``tip``: the part's speed at its tip,
     ``to_and_fro``: it swings; ``rough``: mu and beta0 of balls that start spinning, once for
-    surfaces, once for balls; ``slope``: rms slope of the surfaces; ``slowing``: share of the air's
+    surfaces, once for balls; ``slope``: rms slope of the surfaces; ``fall``: of the
+    amplitude from the middle of a bent face to its rim; ``slowing``: share of the air's
     deceleration that takes all of the speed on one width; ``spread``: smallest over largest
     diameter.
     """
@@ -83,6 +88,7 @@ class Strengths(NamedTuple):
     to_and_fro: bool
     rough: tuple[tuple[float, float], tuple[float, float]]
     slope: float
+    fall: float
     slowing: float
     spread: float
 
@@ -108,6 +114,7 @@ def strengths() -> st.SearchStrategy[Strengths]:
         to_and_fro=st.booleans(),
         rough=st.tuples(rough, rough),
         slope=st.just(0.0) | powers(-3.0, -0.31),
+        fall=st.just(0.0) | st.floats(0.0, 1.0),
         slowing=powers(-4.0, 0.5),
         spread=st.floats(0.2, 1.0),
     )
@@ -137,6 +144,11 @@ def physics_of(
         FLOOR, amplitude, much.beat * speed / (math.tau * amplitude) if amplitude else 20e3
     )
     lid = Vibration(LID, 0.7 * amplitude, 0.83 * floor.frequency, 1.0, (0.0, 0.0, -1.0))
+    if BENT in effects:
+        fall = min(much.fall, 0.002 * wide / amplitude) if amplitude else much.fall
+        points = ((0.0, 1.0), (0.5 * wide, 1.0 - 0.5 * fall), (2.0 * wide, 1.0 - fall))
+        profile = AmplitudeProfile(points, tuple((middle + 0.1 * wide).tolist()))
+        floor, lid = floor._replace(profile=profile), lid._replace(profile=profile)
     present = Physics(
         Gravity(z=-much.weight * speed**2 / wide),
         Restitution((law,) * TAGS, law, much.elastic_below * speed),

@@ -12,7 +12,7 @@ from typing import Any, get_args, get_type_hints
 
 import numpy as np
 
-from sim_core import Balls, Physics, Scene, TriangleMesh
+from sim_core import AmplitudeProfile, Balls, Physics, Scene, TriangleMesh
 
 FOLDER = Path(__file__).parent / "saved"
 # Names in files saved before they were renamed.
@@ -75,4 +75,6 @@ def _effect(hint: Any, numbers: dict[str, Any] | list[dict[str, Any]] | None) ->
 
 
 def _tuples(value: Any) -> Any:
+    if isinstance(value, dict):  # the only effect within an effect
+        return AmplitudeProfile(**{name: _tuples(part) for name, part in value.items()})
     return tuple(_tuples(part) for part in value) if isinstance(value, list) else value

@@ -165,6 +165,7 @@ def notes(design: Design, chamber: Chamber) -> list[str]:
         *chamber.notes,
         *_place_notes(design),
         *friction_notes(design),
+        *amplitude_notes(design),
         *(ledge.message for ledge in find_ledges(design, chamber) if not ledge.level),
     ]
 
@@ -274,6 +275,17 @@ def friction_notes(design: Design) -> list[str]:
     ]
 
 
+def amplitude_notes(design: Design) -> list[str]:
+    """Return a note on the amplitude over the face of each sonotrode that bends."""
+    faces = [("", design.sonotrode)]
+    faces += [(f" of sonotrodes.{k}", one) for k, one in enumerate(design.sonotrodes)]
+    return [
+        f"amplitude over the face{name}: {one.amplitude_profile.in_words}"
+        for name, one in faces
+        if one.amplitude_profile is not None
+    ]
+
+
 def _reach_facts(reach: Reach, chamber: Chamber) -> Facts:
     """Return area and share of the target and of the part that the smallest balls can touch."""
     size = areas(chamber.vertices, chamber.triangles)
@@ -368,7 +380,7 @@ def _sonotrode_warnings(design: Design, mesh: TriangleMesh, line: Axis | None) -
     Args:
         line: axis of a turning part: a point [m] and a direction.
     """
-    amplitude, ball = design.sonotrode.amplitude, design.shot.diameter
+    amplitude, ball = design.sonotrode.largest_amplitude, design.shot.diameter
     remedy = "raise chamber.sonotrode_distance_mm"
     clear, turn = sonotrode_clearance(mesh), design.effects.part_turn
     if clear < MIN_AMPLITUDES * amplitude:

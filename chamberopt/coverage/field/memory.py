@@ -38,7 +38,7 @@ def evaluation_bytes(design: Design, chamber: Chamber, replicas: int) -> float:
     of_points = OF_POINT * (fields - 1) + OF_POINT_AT_WORK
     of_points += OF_POINT_IN_BATCH * min(replicas, BATCHES)
     windows = float(chamber.part.area[target].sum()) / accuracy.gauge
-    on_area = design.shot.count / chamber.volume * design.sonotrode.peak_speed / 4.0
+    on_area = design.shot.count / chamber.volume * design.sonotrode.rms_peak_speed / 4.0
     on_area *= design.process.recorded_time
     walls = float(areas(chamber.vertices, chamber.triangles).sum())
     return (

@@ -11,6 +11,7 @@ from sim_core.detect.ball_ball import pair_delay
 from sim_core.detect.ball_mesh import Scratch, first_contact, new_scratch
 from sim_core.detect.ball_sonotrode import vibrating_plane_delay
 from sim_core.detect.ball_triangle import capsule_delay, face_delay
+from sim_core.effects.amplitude_profile import FaceProfiles
 from sim_core.effects.vibration import Wave
 from sim_core.geometry.bvh import Tree
 from sim_core.geometry.obstacle_set import ObstacleSet
@@ -50,12 +51,13 @@ def vibrating_planes(
     times: np.ndarray,
     radius: float,
     limits: np.ndarray,
+    profiles: FaceProfiles | None = None,
 ) -> np.ndarray:
     """Contact of each flight with its vibrating plane: ``planes`` (n, 20) as obstacles hold them,
     ``waves`` (n, 6) amplitude, omega, phase and axis, ``times`` (n,) now, ``limits`` (n,) [s].
     """
     found = np.empty(len(times))
-    _vibrating_planes(planes, waves, flights, times, radius, limits, found)
+    _vibrating_planes(planes, waves, profiles, flights, times, radius, limits, found)
     return found
 
 
@@ -127,6 +129,7 @@ def _meetings(apart: np.ndarray, closing: np.ndarray, reach: np.ndarray, found: 
 def _vibrating_planes(
     planes: np.ndarray,
     waves: np.ndarray,
+    profiles: FaceProfiles | None,
     flights: np.ndarray,
     times: np.ndarray,
     radius: float,
@@ -138,7 +141,7 @@ def _vibrating_planes(
             waves[i, 0], waves[i, 1], waves[i, 2], Vec3(waves[i, 3], waves[i, 4], waves[i, 5])
         )
         found[i] = vibrating_plane_delay(
-            planes, i, _ball(flights, i), radius, wave, None, times[i], limits[i]
+            planes, i, _ball(flights, i), radius, wave, profiles, times[i], limits[i]
         )
 
 
@@ -157,5 +160,17 @@ def _contacts(
     for i in range(len(lengths)):
         ball = _ball(flights, i)
         found[i], obstacles[i] = first_contact(
-            None, None, None, -1, tree, scratch, ball, wave, None, None, face_overlap, time, lengths[i]
+            None,
+            None,
+            None,
+            -1,
+            tree,
+            scratch,
+            ball,
+            wave,
+            None,
+            None,
+            face_overlap,
+            time,
+            lengths[i],
         )

@@ -302,6 +302,17 @@ def check_meetings(
     return contact_errors(found, limit, gap, dot(pair.at(end), pair.velocity), late)
 
 
+class BentShare(NamedTuple):
+    """Share of the amplitude along n flights over faces that bend.
+
+    ``along(i, t)``: share and its rate [1/s] on the flights ``i`` at the times ``t`` [s];
+    ``bounds``: of the share, of its rate [1/s] and of its second derivative [1/s²], on all flights.
+    """
+
+    along: Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
+    bounds: tuple[np.ndarray, np.ndarray, np.ndarray]
+
+
 def check_waves(
     planes: np.ndarray,
     waves: np.ndarray,
@@ -310,8 +321,11 @@ def check_waves(
     radius: float,
     limits: np.ndarray,
     found: np.ndarray,
+    share: BentShare | None = None,
 ) -> ContactErrors:
     """Contacts with vibrating planes; arguments as contact_calls.waving_planes.
+
+    ``share``: share of the amplitude along each flight, if the planes bend.
 
     The gap bends by no more than a known curvature, so its value and rate in the middle of a
     stretch of time bound both all over it. A stretch that is open, or rises, holds no contact; one
@@ -323,17 +337,19 @@ def check_waves(
     swing = waves[:, 0].astype(Long) * dot(normal, columns(waves[:, 3:6]))
     omega = waves[:, 1].astype(Long)
     theta = omega * times + waves[:, 2]
-    bend = 2 * np.abs(height[2]) + np.abs(swing) * omega**2
+    most_share, most_rate, most_bend = (1.0, 0.0, 0.0) if share is None else share.bounds
+    bend = omega**2 * most_share + 2 * omega * most_rate + most_bend
+    bend = 2 * np.abs(height[2]) + np.abs(swing) * bend
 
     def gap(i: np.ndarray, t: np.ndarray) -> np.ndarray:
-        return value([c[i] for c in height], t) - swing[i] * np.sin(omega[i] * t + theta[i])
+        f = 1.0 if share is None else share.along(i, t)[0]
+        return value([c[i] for c in height], t) - swing[i] * f * np.sin(omega[i] * t + theta[i])
 
     def rate(i: np.ndarray, t: np.ndarray) -> np.ndarray:
-        return (
-            height[1][i]
-            + 2 * height[2][i] * t
-            - swing[i] * omega[i] * np.cos(omega[i] * t + theta[i])
-        )
+        f, change = (1.0, 0.0) if share is None else share.along(i, t)
+        angle = omega[i] * t + theta[i]
+        lift = f * omega[i] * np.cos(angle) + change * np.sin(angle)
+        return height[1][i] + 2 * height[2][i] * t - swing[i] * lift
 
     everyone = np.arange(len(found))
     end = end_of(found, limits)
@@ -343,7 +359,8 @@ def check_waves(
         start <= -BEHIND * radius
     )  # counts from the top of its flight on, if that is in front of the crests
     top = np.clip(-height[1] / np.where(height[2] < 0.0, 2 * height[2], -np.inf), 0.0, end)
-    out = value(height, top) > np.abs(swing) + SURELY
+    crest = np.abs(swing) * most_share
+    out = value(height, top) > crest + SURELY
     start = np.where(behind, 0.0, start)
     i = np.flatnonzero(~behind | out)
     low, high = np.where(behind, top, 0.0)[i], end[i]
@@ -353,7 +370,7 @@ def check_waves(
         above = (
             value(h, middle)
             - half * (np.abs(h[1] + 2 * h[2] * middle) + half * np.abs(h[2]))
-            - np.abs(swing[i])
+            - crest[i]
         )
         maybe = above <= 0.0  # below the crests somewhere
         i, low, high, middle, half = (x[maybe] for x in (i, low, high, middle, half))

@@ -90,6 +90,15 @@ def test_every_effect_is_in_the_table() -> None:
     assert set(KEPT) == set(PRESENT) == set(Physics._fields) - {"surface"}
 
 
+def test_a_rigid_face_has_no_profile(bare: dict[str, list[str]]) -> None:
+    """A profile is part of a vibration, so the loop keeps it under its own name."""
+    assert (
+        Simulation(bare_scene(BARE._replace(vibration=Vibration(0, 1e-6, 2e4)))).state.profiles
+        is None
+    )
+    assert not any("FaceProfiles(" in types for kinds in bare.values() for types in kinds)
+
+
 def test_further_effects_of_surfaces_are_absent_unless_given() -> None:
     """Each is a field of one record, so the loop keeps it under its own name."""
     assert set(SurfaceEffects._fields) == set(MAKERS)
@@ -132,6 +141,8 @@ def test_the_machine_code_of_a_bare_scene_knows_no_effect(bare: dict[str, list[s
         "numerics.roots.first_wave_approach",
         "contact.landing_and_lift_off.touch_down",
         "contact.ball_on_ball.meet",
+        "detect.ball_bent_face.first_bent_approach",
+        "effects.amplitude_profile.share_and_slope",
         "effects.part_rotation.relative_flight",
         "effects.restitution.restitution_law",
         "effects.roughness._facet",
