@@ -194,9 +194,10 @@ def build_scene(
     """Return the scene of one simulation. Equal arguments give bit-identical scenes.
 
     The shot starts packed low in the chamber, with random velocities of the rms speed 2 pi f A, the
-    peak speed of the sonotrode (its rms over a face that bends). The warm-up then has to remove only the effect of the arrangement,
-    and need not change the shot's energy by orders of magnitude. The phases of the sonotrode and of
-    a turning part are random, because a turn of the part may take longer than the simulation.
+    peak speed of the sonotrode; of a face that bends it is the rms over the face. The warm-up then
+    has to remove only the effect of the arrangement, and need not change the shot's energy by
+    orders of magnitude. The phases of the sonotrode and of a turning part are random, because a
+    turn of the part may take longer than the simulation.
 
     Args:
         seed: random seed of the simulation.
