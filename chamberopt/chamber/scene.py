@@ -83,16 +83,15 @@ def require_measured_faces(design: Design, mesh: TriangleMesh | AnalyticCavity) 
 
     The face goes on beyond the last point, or the profile is steeper than any sonotrode.
     """
-    from sim_core import SceneError, require_profiles
+    from sim_core import SceneError, Vibration, require_profiles
 
     moving = vibrations(design, 0.0)
+    further = [f"sonotrodes.{k}" for k in range(len(design.sonotrodes))]
+    names = tuple(f"{name}.amplitude_profile" for name in ("sonotrode", *further))
     try:
-        require_profiles(mesh, moving if isinstance(moving, tuple) else (moving,))
+        require_profiles(mesh, (moving,) if isinstance(moving, Vibration) else moving, names)
     except SceneError as error:
-        faces = {"sonotrode": design.sonotrode}
-        faces |= {f"sonotrodes.{k}": one for k, one in enumerate(design.sonotrodes)}
-        bent = [f"{name}.amplitude_profile" for name, one in faces.items() if one.amplitude_profile]
-        raise InputError(f"{' or '.join(bent)}: {error}") from None
+        raise InputError(str(error)) from None
 
 
 def balls_can_rest(design: Design, mesh: TriangleMesh | AnalyticCavity) -> bool:
@@ -127,8 +126,10 @@ def vibrations(design: Design, phase: float) -> Vibration | tuple[Vibration, ...
     further = []
     for k, one in enumerate(design.sonotrodes):
         motion = one.largest_amplitude, one.frequency, phase + one.phase, one.direction
-        profile = one.amplitude_profile and one.amplitude_profile.simulated(one.at)
-        further.append(Vibration(further_sonotrode_tag(k), *motion, profile))
+        moving = Vibration(further_sonotrode_tag(k), *motion)
+        if one.amplitude_profile is not None:
+            moving = moving._replace(profile=one.amplitude_profile.simulated(one.at))
+        further.append(moving)
     return (first, *further) if further else first
 
 

@@ -1,5 +1,7 @@
 """Sonotrodes of a design: the chamber's floor, and further sonotrodes in its walls."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Iterator
 from itertools import pairwise

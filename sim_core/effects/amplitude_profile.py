@@ -56,32 +56,30 @@ class FaceProfiles(NamedTuple):
 def check_profile(which: str, vibration: Vibration) -> None:
     """Raise SceneError for a profile with numbers out of range, or on a face that leans too much.
 
-    ``which``: name of the vibration in messages.
+    ``which``: name of the profile in messages.
     """
     profile = vibration.profile
     if profile is None:
         return
     if not isinstance(profile, AmplitudeProfile):
-        raise SceneError(f"{which}.profile is {profile!r}: give an AmplitudeProfile, or None")
+        raise SceneError(f"{which} is {profile!r}: give an AmplitudeProfile, or None")
     for k, (distance, share) in enumerate(profile.points):
-        here = f"{which}.profile.points[{k}]"
+        here = f"{which}.points[{k}]"
         if not 0.0 <= number(here, distance) < math.inf:
             raise SceneError(f"{here} is at {distance} m: it must be 0 or more")
         if not 0.0 <= number(here, share) <= 1.0:
             raise SceneError(f"{here} has the share {share}: it must lie in [0, 1]")
     distances = [distance for distance, _ in profile.points]
     if len(distances) < 2 or distances[0] != 0.0:
-        raise SceneError(
-            f"{which}.profile.points are at {distances} m: give two or more, the first at 0"
-        )
+        raise SceneError(f"{which}.points are at {distances} m: give two or more, the first at 0")
     if any(b * b <= a * a for a, b in pairwise(distances)):
-        raise SceneError(f"{which}.profile.points are at {distances} m: give them in order")
+        raise SceneError(f"{which}.points are at {distances} m: give them in order")
     if not all(math.isfinite(x) for x in profile.middle):
-        raise SceneError(f"{which}.profile.middle is {profile.middle} m: it must be finite")
+        raise SceneError(f"{which}.middle is {profile.middle} m: it must be finite")
     lean = float(vibration.amplitude) * _bounds(*_pieces(profile))[1]
     if not lean <= MOST_LEAN:
         raise SceneError(
-            f"{which}.profile: the face would lean by up to {lean:.2g}, more than {MOST_LEAN:g}, "
+            f"{which}: the face would lean by up to {lean:.2g}, more than {MOST_LEAN:g}, "
             "where its amplitude changes most; no sonotrode bends so much, give shares that "
             "change less from point to point"
         )

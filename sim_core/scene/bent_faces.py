@@ -15,15 +15,18 @@ BEYOND = 1e-9  # share of the last distance: a rim that is further out by less i
 
 
 def require_profiles(
-    mesh: TriangleMesh | AnalyticCavity, vibrations: tuple[Vibration, ...]
+    mesh: TriangleMesh | AnalyticCavity,
+    vibrations: tuple[Vibration, ...],
+    names: tuple[str, ...] = (),
 ) -> None:
     """Raise SceneError for a profile with wrong numbers, or that does not fit its face.
 
     It must be known to the rim of the face, which moves along its own normal, and not in a periodic
-    box.
+    box. ``names``: names of the profiles in messages.
     """
     for k, one in enumerate(vibrations):
-        which = "vibration" if len(vibrations) == 1 else f"vibration[{k}]"
+        which = "vibration.profile" if len(vibrations) == 1 else f"vibration[{k}].profile"
+        which = names[k] if names else which
         check_profile(which, one)
         if one.profile is not None:
             _require_measured(mesh, one, one.profile, which)
@@ -37,7 +40,7 @@ def _require_measured(
     if isinstance(mesh, AnalyticCavity):
         if mesh.periodic:
             raise SceneError(
-                f"{which}.profile is not supported in a periodic box, whose floor has no middle; "
+                f"{which} is not supported in a periodic box, whose floor has no middle; "
                 "leave it out"
             )
         points, beyond = _floor(mesh)
@@ -47,7 +50,7 @@ def _require_measured(
         askew = np.linalg.norm(np.cross(normals, axis), axis=1)[doubled > 0.0].max(initial=0.0)
         if askew > ASKEW:
             raise SceneError(
-                f"{which}.profile is given, and the face moves askew, {askew:.2g} rad from its "
+                f"{which} is given, and the face moves askew, {askew:.2g} rad from its "
                 "normal: not supported together; let axis be the face's normal"
             )
         points, beyond = corners.reshape(-1, 3), 0.0
@@ -56,7 +59,7 @@ def _require_measured(
     last = float(profile.points[-1][0])
     if rim > last * (1.0 + BEYOND):
         raise SceneError(
-            f"{which}.profile ends at {last:.6g} m from its middle, and the face goes on to "
+            f"{which} ends at {last:.6g} m from its middle, and the face goes on to "
             f"{rim:.6g} m: give a share for the rim"
         )
 

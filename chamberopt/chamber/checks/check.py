@@ -277,7 +277,7 @@ def friction_notes(design: Design) -> list[str]:
 
 def amplitude_notes(design: Design) -> list[str]:
     """Return a note on the amplitude over the face of each sonotrode that bends."""
-    faces = [("", design.sonotrode)]
+    faces: list[tuple[str, VibratingFace]] = [("", design.sonotrode)]
     faces += [(f" of sonotrodes.{k}", one) for k, one in enumerate(design.sonotrodes)]
     return [
         f"amplitude over the face{name}: {one.amplitude_profile.in_words}"

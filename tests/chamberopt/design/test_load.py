@@ -19,6 +19,8 @@ DESIGNS = sorted((ROOT / "designs").glob("*.toml"))
 STUDIES = sorted((ROOT / "studies").glob("*.toml"))
 UNSET = (
     "sonotrode.amplitude_pv_um",
+    "sonotrode.amplitude_profile.middle_mm.0",
+    "sonotrode.amplitude_profile.middle_mm.1",
     "shot.density_kg_m3",
     "process.accuracy.objective_half_width",
     "part.target.element_mm",

@@ -1,0 +1,112 @@
+"""Amplitude over a sonotrode's face in a design: numbers, words, scene and refusals."""
+
+import numpy as np
+import pytest
+
+from chamberopt.chamber.build import build_chamber
+from chamberopt.chamber.checks.check import amplitude_notes
+from chamberopt.chamber.scene import build_scene, chamber_mesh
+from chamberopt.common.errors import InputError
+from chamberopt.design.load import load_design, save_design
+from sim_core import Vibration
+from sim_core.effects.amplitude_profile import shares_at
+from tests.helpers.synthetic import plate_design
+
+FALLING = [[0.0, 1.2], [20.0, 1.1], [60.0, 0.9]]
+
+
+@pytest.fixture(scope="module")
+def rigid():
+    return plate_design()
+
+
+@pytest.fixture(scope="module")
+def mesh(rigid):
+    return chamber_mesh(build_chamber(rigid))
+
+
+def bent(design, points=FALLING, **more):
+    return design.changed({"sonotrode.amplitude_profile": {"share_at_mm": points, **more}})
+
+
+def test_without_a_profile_the_sonotrode_is_a_rigid_piston(rigid, mesh) -> None:
+    scene = build_scene(rigid, mesh, 1)
+    assert scene.physics.vibration.profile is None
+    assert rigid.sonotrode.largest_amplitude == rigid.sonotrode.amplitude
+    assert rigid.sonotrode.rms_peak_speed == rigid.sonotrode.peak_speed
+    assert amplitude_notes(rigid) == []
+
+
+def test_the_scene_has_the_amplitude_of_each_place(rigid, mesh) -> None:
+    design = bent(rigid)
+    vibration = build_scene(design, mesh, 1).physics.vibration
+    places = np.array([[0.0, 0.0, 0.0], [0.02, 0.0, 0.01], [0.0, -0.06, 0.0]])
+    amplitude = vibration.amplitude * shares_at(vibration, places)
+    np.testing.assert_allclose(
+        amplitude, rigid.sonotrode.amplitude * np.array([1.2, 1.1, 0.9]), rtol=1e-12
+    )
+    assert isinstance(vibration, Vibration)
+
+
+def test_the_shot_starts_at_the_rms_speed_of_the_face(rigid, mesh) -> None:
+    design = bent(rigid)
+    rms = design.sonotrode.amplitude_profile.rms
+    assert 0.9 < rms < 1.05
+    one, other = (build_scene(each, mesh, 1).balls.velocities for each in (design, rigid))
+    np.testing.assert_allclose(one, rms * other, rtol=1e-12)
+    even = bent(rigid, [[0.0, 0.8], [60.0, 0.8]])
+    assert even.sonotrode.amplitude_profile.rms == pytest.approx(0.8)
+
+
+def test_one_line_says_what_the_amplitude_does(rigid) -> None:
+    assert amplitude_notes(bent(rigid, [[0.0, 1.0], [30.0, 0.97], [60.0, 0.9]])) == [
+        "amplitude over the face: 1.00 in the middle to 0.90 at 60 mm, rms 0.95"
+    ]
+    (text,) = amplitude_notes(bent(rigid, [[0.0, 0.9], [30.0, 1.1], [60.0, 1.0]]))
+    assert ", at most 1.10, rms " in text
+
+
+def test_a_saved_design_has_its_profile(rigid, tmp_path) -> None:
+    design = bent(rigid, middle_mm=[1.0, -2.0])
+    path = tmp_path / "design.toml"
+    save_design(design, path)
+    assert load_design(path).sonotrode == design.sonotrode
+    assert not design.sonotrode.is_centred
+    assert bent(rigid).sonotrode.is_centred
+
+
+@pytest.mark.parametrize(
+    ("points", "message"),
+    [
+        ([[0.0, 1.0]], "share_at_mm: given 1 points; allowed: two or more pairs"),
+        ([[1.0, 1.0], [60.0, 0.9]], "share_at_mm.0.0: given 1; the first point is the middle"),
+        ([[0.0, 1.0], [60.0, 2.5]], "share_at_mm.1.1: given 2.5; allowed: a share from 0 to 2"),
+        ([[0.0, 1.0], [60.0, 0.9], [50.0, 0.9]], "given 50 after 60 mm; give each distance once"),
+        ([[0.0, 0.0], [60.0, 0.0]], "given no share above 0: the face would stand still"),
+    ],
+)
+def test_wrong_profiles_are_refused(rigid, points, message) -> None:
+    with pytest.raises(InputError, match=r"sonotrode.amplitude_profile.*") as error:
+        bent(rigid, points)
+    assert message in str(error.value)
+
+
+def test_a_profile_must_reach_the_rim_and_bend_as_metal_does(rigid, mesh) -> None:
+    short = r"^sonotrode.amplitude_profile ends at 0.02 m from its middle, and the face goes on to"
+    with pytest.raises(InputError, match=short):
+        build_scene(bent(rigid, [[0.0, 1.0], [20.0, 0.9]]), mesh, 1)
+    with pytest.raises(InputError, match=r"sonotrode.amplitude_profile: .* would lean by up to"):
+        build_scene(bent(rigid, [[0.0, 2.0], [0.5, 0.0], [60.0, 0.0]]), mesh, 1)
+
+
+def test_a_further_sonotrode_bends_about_its_own_middle(rigid) -> None:
+    face = {
+        "at_mm": [20.0, 0.0, 30.0], "axis": [-1.0, 0.0, 0.0], "diameter_mm": 10.0,
+        "frequency_khz": 20.0, "amplitude_um": 20.0,
+    }  # fmt: skip
+    profile = {"share_at_mm": [[0.0, 1.0], [5.0, 0.9]]}
+    design = rigid.changed({"sonotrodes": [{**face, "amplitude_profile": profile}]})
+    assert amplitude_notes(design)[0].startswith("amplitude over the face of sonotrodes.0: 1.00")
+    profile = {**profile, "middle_mm": [1.0, 0.0]}
+    with pytest.raises(InputError, match=r"amplitude_profile.middle_mm: given for a further"):
+        rigid.changed({"sonotrodes": [{**face, "amplitude_profile": profile}]})
