@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
     from chamberopt.chamber.part import Axis, Part
     from chamberopt.design.load import Design
+    from chamberopt.design.sonotrode import VibratingFace
     from sim_core import TriangleMesh
 
 # Share of the free volume above which the balls move as a dense bed rather than as a gas. Few balls
