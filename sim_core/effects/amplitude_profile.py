@@ -16,8 +16,8 @@ Notation:
 
 Between the points f is the monotone cubic of Fritsch and Butland in q: it goes through the points,
 rises or falls as they do, and has no kink, in the middle of the face neither. Beyond the last point
-it levels off over a piece as long as the last one. No face goes on there, but the plane of the face
-does, in which a ball beside the face is followed.
+it levels off over a piece as long as the last one. No face goes on there but for corners of the rim
+(scene/bent_faces.py), and its plane, in which a ball beside the face is followed.
 
 Source: F. N. Fritsch & J. Butland, SIAM J. Sci. Stat. Comput. 5 (1984) 300, equation 5; C. Moler,
 Numerical Computing with MATLAB (SIAM 2004), section 3.6, for the slopes at both ends.

@@ -99,6 +99,12 @@ def test_a_profile_must_reach_the_rim_and_bend_as_metal_does(rigid, mesh) -> Non
         build_scene(bent(rigid, [[0.0, 2.0], [0.5, 0.0], [60.0, 0.0]]), mesh, 1)
 
 
+def test_the_nominal_radius_reaches_the_rim(rigid, mesh) -> None:
+    """The rim is a polygon whose corners are a little further out."""
+    nominal = 0.5 * rigid.chamber.diameter_mm
+    build_scene(bent(rigid, [[0.0, 1.0], [nominal, 0.9]]), mesh, 1)
+
+
 def test_a_further_sonotrode_bends_about_its_own_middle(rigid) -> None:
     face = {
         "at_mm": [20.0, 0.0, 30.0], "axis": [-1.0, 0.0, 0.0], "diameter_mm": 10.0,
