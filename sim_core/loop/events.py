@@ -50,6 +50,7 @@ from sim_core.loop.neighbours import (
     speed_limit,
 )
 from sim_core.loop.state import SEARCHES, STALE, SimulationState
+from sim_core.loop.stays import note_hit, note_meeting
 from sim_core.motion import BallEvent, shift_motion, state_under
 from sim_core.numerics import profiler
 from sim_core.numerics.jit import inlined, jit
@@ -130,6 +131,7 @@ def advance(state: SimulationState) -> tuple[int, int]:
         elif kind == MEETING:
             _log_meeting(state.collision_buffer, state, event, partner)
             collide(state.contact, state, event, partner)
+            note_meeting(state.stays, ball, partner)
         elif kind == SURFACE:
             if queue.obstacle[ball] < len(state.obstacles.tree.kinds):
                 impact = hit_surface(state, event)
@@ -155,6 +157,8 @@ def advance(state: SimulationState) -> tuple[int, int]:
                 wake_if_it_moves(state.contact, queue, state.motion, event)
         # 4 log
         log_impact(buffer, event, clock.origin, impact, state.obstacles.lookup)
+        recorded = buffer.record[impact.tag]
+        note_hit(state.stays, state.sizes, state.contact, event, impact, recorded)
         if kind == SURFACE and not (
             _speed_squared(state, ball) <= speed_limit(state.neighbours) ** 2
         ):

@@ -40,6 +40,7 @@ from sim_core.loop.impact_log import (
 from sim_core.loop.jam_message import jam_message
 from sim_core.loop.neighbours import NeighbourFilter, new_neighbour_filter
 from sim_core.loop.state import Clock, SimulationState
+from sim_core.loop.stays import Trapped, begin_anew, new_stays, trapped
 from sim_core.motion import WINDOW
 from sim_core.numerics.computed_once import computed_once
 from sim_core.numerics.periodic_sides import new_periodic_sides
@@ -82,6 +83,7 @@ class SimulationResult:
     balls: the balls at the end.
     collisions: numbers of hits, collisions and other events.
     resting: the balls that lie still at the end.
+    trapped: the balls that hopped on one spot or sat in a gap for some of the recorded time.
     frames: the balls at the requested times.
     ball_collisions: collisions of balls with one another; None unless Scene.record_collisions is
         True.
@@ -92,6 +94,7 @@ class SimulationResult:
     balls: Balls
     collisions: Collisions
     resting: Resting
+    trapped: Trapped
     frames: Frames
     ball_collisions: CollisionLog | None
     time: float
@@ -119,6 +122,7 @@ def simulate(
     times = _checked_frames(frames, scene)
     run = Simulation(scene, progress)
     run.play(scene.warmup, record=False)
+    begin_anew(run.state.stays)
     end = scene.warmup + scene.duration
     noted = run.play(end, record=True, frames=scene.warmup + times)
     balls, state = run.balls(), run.state
@@ -128,6 +132,7 @@ def simulate(
         balls=balls,
         collisions=Collisions(*(int(n) for n in state.counts)),
         resting=still,
+        trapped=trapped(state.stays, 0.5 * balls.diameters, run.centre),
         frames=frames_of(times, noted, balls),
         ball_collisions=joined(run.meetings, scene.mesh) if run.meetings else None,
         time=scene.start_time + end,
@@ -212,6 +217,7 @@ class Simulation:
             rotation=new_rotation_state(physics.part_rotation, self.centre),
             clock=Clock(np.zeros(2), window, 0.0, scene.warmup),
             buffer=new_impact_buffer(np.zeros(MAX_TAGS, dtype=np.bool_)),
+            stays=new_stays(len(motion), balls.radius, gravity, waves),
             counts=np.zeros(5, dtype=np.int64),
             profiler=None,
             contact=contact,

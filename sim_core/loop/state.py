@@ -22,6 +22,7 @@ from sim_core.geometry.obstacle_set import ObstacleSet
 from sim_core.loop.event_queue import EventQueue
 from sim_core.loop.impact_log import CollisionBuffer, ImpactBuffer
 from sim_core.loop.neighbours import NeighbourFilter
+from sim_core.loop.stays import Stays
 from sim_core.numerics.periodic_sides import PeriodicSides
 from sim_core.numerics.profiler import Profiler
 
@@ -53,6 +54,7 @@ class SimulationState(NamedTuple):
     motion: base position [m], where the straight path is at time 0 of the clock, and velocity
         [m/s] of each ball in the free-fall frame, (n, 6).
     neighbours: filter that finds balls that can meet; None if balls do not collide.
+    stays: balls that hop on one spot or sit in a gap.
     counts: numbers of hits on walls, on balls and on the sonotrode, of searches for a surface,
         and of meetings that were dropped, (5,) int64.
     collision_buffer: collisions of balls not yet in the log; None unless they are logged.
@@ -71,6 +73,7 @@ class SimulationState(NamedTuple):
     rotation: RotationState | None
     clock: Clock
     buffer: ImpactBuffer
+    stays: Stays
     counts: np.ndarray
     profiler: Profiler | None
     contact: ContactState | None
