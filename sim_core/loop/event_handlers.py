@@ -223,7 +223,7 @@ def hit_surface(state: SimulationState, event: BallEvent) -> Impact:
     if landed == ROLLS:
         return no_impact()
     state.counts[SONOTRODE if kind == VIBRATING_FACE else WALLS] += 1
-    return Impact(tag, triangle, touched, here.position, relative, approach)
+    return Impact(tag, triangle, touched, here.position, relative, approach, away)
 
 
 @inlined
@@ -257,7 +257,8 @@ def hit_part(
     change = _resolve_contact(rotation, state, event, mean, touch, state.restitution, approach)
     push_ball(state.contact, state.motion, event, here, change)
     state.counts[WALLS] += 1
-    return Impact(tag, triangle, sub(seen.position, away), seen.position, relative, approach)
+    touched = sub(seen.position, away)
+    return Impact(tag, triangle, touched, seen.position, relative, approach, away)
 
 
 @inlined

@@ -28,6 +28,7 @@ class Impact(NamedTuple):
     position: position of the ball's centre [m].
     velocity: velocity of the ball relative to the surface, before the hit [m/s].
     normal_speed: normal component of this velocity [m/s].
+    away: any vector along the mean surface's normal, from the surface to the ball.
     """
 
     tag: int
@@ -36,6 +37,7 @@ class Impact(NamedTuple):
     position: Vec3
     velocity: Vec3
     normal_speed: float
+    away: Vec3
 
 
 class ImpactBuffer(NamedTuple):
@@ -78,7 +80,7 @@ def new_impact_buffer(record: np.ndarray) -> ImpactBuffer:
 def no_impact() -> Impact:
     """Return an Impact with normal speed 0, for an event that is not a hit on a surface."""
     zero = Vec3(0.0, 0.0, 0.0)
-    return Impact(0, 0, zero, zero, zero, 0.0)
+    return Impact(0, 0, zero, zero, zero, 0.0, zero)
 
 
 @inlined

@@ -1,14 +1,17 @@
 """Balls that hop on one spot or sit in a gap: series of hits on surfaces that lead nowhere.
 
-A stay is a series of MIN_HITS or more successive hits of a ball on surfaces, over MIN_TIME or more,
-that all lie within a ball's radius of the first one sideways, while the ball hits surfaces more
-often than other balls. In a stay the ball is *jammed* if it also stays within a ball's radius in
-height and hits, on average, at less than SLOW of the sonotrode's peak speed. Otherwise it is
-*locked*: it hops up and down on one spot.
+A series holds the successive hits of a ball on surfaces that lie within a ball's radius of its
+first hit sideways, and during which the ball hits surfaces more often than other balls. In a series
+of MIN_HITS or more the ball is
 
-Sideways means across gravity, or, without gravity, across the motion of the sonotrode. A ball that
-lands to lie still, slide or roll is in no stay: contact mode tells of it. On a turning part a hit
-lies where it is on the part.
+- *jammed* if all hits also lie within a ball's radius in height, they come from surfaces that face
+  each other, and they are slow: below SLOW of the sonotrode's peak speed on average;
+- *locked*, which means that it hops on one spot, if it is not jammed and the series lasts for
+  MIN_TIME or more.
+
+Sideways means across gravity, or, without gravity, across the motion of the sonotrode. A series
+also ends when the ball lands to lie still, slide or roll, of which contact mode tells. Hops that
+end like this are not those of a locked ball. On a turning part a hit lies where it is on the part.
 """
 
 import math
@@ -24,15 +27,18 @@ from sim_core.geometry.ball_sizes import BallSizes, radius_of_ball
 from sim_core.loop.impact_log import Impact
 from sim_core.motion import BallEvent
 from sim_core.numerics.jit import inlined, jit
-from sim_core.numerics.vec3 import Vec3, dot, set_vec3, sub, vec3_at
+from sim_core.numerics.vec3 import Vec3, add_scaled, dot, scaled, set_vec3, sub, vec3_at
 
-# A ball of a healthy gas makes so many hits within its radius sideways with a chance of some 1e-5,
-# and in a low chamber, where hits follow fast, so long with as small a one.
+# A ball that flies freely makes so many hits within its radius sideways with a chance of some 1e-5,
+# and in a low chamber, where hits follow fast, so long with as small a chance.
 MIN_HITS = 10
 MIN_TIME = 0.1  # s
 # Share of the sonotrode's peak speed. The shot's hits have about that speed. A ball in a gap just
 # narrower than itself has a hundredth of it.
 SLOW = 0.1
+# Length of the mean of unit normals, below which surfaces face each other. It is 1 for a single
+# plane, and smaller than this for a gap from 0.87 of the ball's width on.
+FACING = 0.5
 LOCKED, JAMMED = 0, 1  # kinds of stays, places in Stays.time and Stays.recorded
 
 
@@ -46,12 +52,13 @@ class Stays(NamedTuple):
     began, last: times of the first and last hit [s since the start], (n,).
     rise: largest difference in height from the first hit [m], (n,).
     speed: sum of the normal speeds of the hits [m/s], (n,).
+    normal: sum of the unit normals of the hits, (n, 3).
     hits: number of the hits, (n,) int32. 0 if there is no series.
     logged: number of those on recorded surfaces, (n,) int32.
     meetings: number of collisions with balls during the series, (n,) int32.
-    time: duration of past stays of each kind, LOCKED and JAMMED [s], (n, 2).
-    recorded: number of the hits on recorded surfaces in past stays of each kind, (n, 2) int64.
-    spot: position of the ball's centre at the start of its latest stay [m], (n, 3).
+    time: time for which each ball was LOCKED and JAMMED in past series [s], (n, 2).
+    recorded: number of the hits on recorded surfaces in this time, (n, 2) int64.
+    spot: position of the ball's centre at the start of the latest of these series [m], (n, 3).
     """
 
     axis: Vec3
@@ -62,6 +69,7 @@ class Stays(NamedTuple):
     last: np.ndarray
     rise: np.ndarray
     speed: np.ndarray
+    normal: np.ndarray
     hits: np.ndarray
     logged: np.ndarray
     meetings: np.ndarray
@@ -97,7 +105,7 @@ class Trapped:
 def new_stays(
     balls: int, radius: float, gravity: Gravity | None, waves: tuple[Wave, ...]
 ) -> Stays:
-    """Return the stays of balls that have not hit anything yet.
+    """Return the series of balls that have not hit anything yet.
 
     Args:
         balls: number of the balls.
@@ -124,6 +132,7 @@ def new_stays(
         last=real(),
         rise=real(),
         speed=real(),
+        normal=np.zeros((balls, 3)),
         hits=whole(),
         logged=whole(),
         meetings=whole(),
@@ -151,28 +160,38 @@ def note_hit(
     ball = event.ball
     if not impact.normal_speed > 0.0:
         return
-    if not is_flying(contact, ball):
-        stays.hits[ball] = 0
-        return
     away = sub(impact.position, vec3_at(stays.place, ball))
     height = dot(away, stays.axis)
     radius = radius_of_ball(sizes, stays.radius, ball)
-    if stays.hits[ball] == 0 or dot(away, away) - height * height > radius * radius:
+    landed = not is_flying(contact, ball)
+    if landed or dot(away, away) - height * height > radius * radius:
         if stays.hits[ball] >= MIN_HITS:
-            end_stay(stays, radius, ball)
-        set_vec3(stays.place, ball, impact.position)
-        stays.began[ball] = event.time_since_start
-        stays.rise[ball] = 0.0
-        stays.speed[ball] = 0.0
+            end_series(stays, radius, ball, landed)
         stays.hits[ball] = 0
-        stays.logged[ball] = 0
-        stays.meetings[ball] = 0
+    if landed:
+        return
+    if stays.hits[ball] == 0:
+        _begin_series(stays, event, impact.position)
         height = 0.0
+    normal = scaled(1.0 / math.sqrt(dot(impact.away, impact.away)), impact.away)
+    set_vec3(stays.normal, ball, add_scaled(normal, 1.0, vec3_at(stays.normal, ball)))
     stays.last[ball] = event.time_since_start
     stays.rise[ball] = max(stays.rise[ball], abs(height))
     stays.speed[ball] += impact.normal_speed
     stays.hits[ball] += 1
     stays.logged[ball] += recorded
+
+
+@inlined
+def _begin_series(stays: Stays, event: BallEvent, position: Vec3) -> None:
+    ball, zero = event.ball, Vec3(0.0, 0.0, 0.0)
+    set_vec3(stays.place, ball, position)
+    set_vec3(stays.normal, ball, zero)
+    stays.began[ball] = event.time_since_start
+    stays.rise[ball] = 0.0
+    stays.speed[ball] = 0.0
+    stays.logged[ball] = 0
+    stays.meetings[ball] = 0
 
 
 @inlined
@@ -183,16 +202,25 @@ def note_meeting(stays: Stays, one: int, two: int) -> None:
 
 
 @jit
-def end_stay(stays: Stays, radius: float, ball: int) -> bool:
-    """Add a ball's series of hits to its past stays if it was a stay. Return True if it was.
+def end_series(stays: Stays, radius: float, ball: int, landed: bool) -> bool:
+    """Add a ball's series of hits to the time for which it was locked or jammed.
 
-    ``radius``: radius of the ball [m].
+    Args:
+        radius: radius of the ball [m].
+        landed: True if the series ends because the ball lands.
+
+    Returns: False if the ball was neither locked nor jammed.
     """
     hits, lasted = stays.hits[ball], stays.last[ball] - stays.began[ball]
-    if hits < MIN_HITS or lasted < MIN_TIME or hits <= stays.meetings[ball]:
+    if hits < MIN_HITS or hits <= stays.meetings[ball]:
         return False
-    slow = stays.speed[ball] < stays.slow * hits
-    kind = JAMMED if slow and stays.rise[ball] < radius else LOCKED
+    normal = vec3_at(stays.normal, ball)
+    faces = dot(normal, normal) < (FACING * hits) ** 2
+    kind = LOCKED
+    if faces and stays.rise[ball] < radius and stays.speed[ball] < stays.slow * hits:
+        kind = JAMMED
+    elif landed or lasted < MIN_TIME:
+        return False
     stays.time[ball, kind] += lasted
     stays.recorded[ball, kind] += stays.logged[ball]
     set_vec3(stays.spot, ball, vec3_at(stays.place, ball))
@@ -200,19 +228,19 @@ def end_stay(stays: Stays, radius: float, ball: int) -> bool:
 
 
 def begin_anew(stays: Stays) -> None:
-    """Forget all series and past stays, as recording begins now."""
+    """Forget all series so far, as recording begins now."""
     for column in (stays.hits, stays.time, stays.recorded):
         column[:] = 0
 
 
 def trapped(stays: Stays, radii: np.ndarray, middle: np.ndarray) -> Trapped:
-    """End all stays, and return the balls that were in one since the recording began.
+    """End all series, and return the balls that were locked or jammed since recording began.
 
     Args:
         radii: radius of each ball [m], (n,).
         middle: middle of the mesh [m], (3,).
     """
-    at_end = np.array([end_stay(stays, float(radii[k]), k) for k in range(len(radii))], np.bool_)
+    at_end = np.array([end_series(stays, float(r), k, False) for k, r in enumerate(radii)], bool)
     stays.hits[:] = 0
     balls = np.flatnonzero(stays.time.any(axis=1))
     (locked, jammed), (locked_hits, jammed_hits) = stays.time[balls].T, stays.recorded[balls].T
