@@ -50,8 +50,8 @@ from sim_core.geometry.sonotrode_border import largest_amplitude
 from sim_core.geometry.triangle_lookup import find_triangles
 from sim_core.loop.compile_ahead import compile_simulator, is_compiled
 from sim_core.loop.impact_log import CollisionLog, ImpactLog
-from sim_core.loop.stays import Trapped
 from sim_core.loop.simulate import Collisions, SimulationResult, simulate
+from sim_core.loop.stays import Trapped
 from sim_core.numerics.jit import jit, user_cache
 from sim_core.scene.bent_faces import require_profiles
 from sim_core.scene.frames import Energies, Frames, energies

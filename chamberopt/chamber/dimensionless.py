@@ -12,6 +12,8 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
     from chamberopt.design.load import Design
@@ -62,3 +64,18 @@ def drag_loss(design: Design, chamber: Chamber) -> float:
         0.75 * drag_coefficient(reynolds) * air.density / (shot.density * shot.diameter)
     )
     return loss_per_metre * chamber.height
+
+
+def drag_change(design: Design, chamber: Chamber) -> float:
+    """Return about how much air drag changes the shot's steady speed, as a share of it.
+
+    Each flight loses drag_loss of the speed, and each hit 1 - e. The shot's speed is steady where
+    the sonotrode makes up for both, so that a small further loss lowers it by drag_loss / (1 - e).
+    e is that of the most elastic surface at the sonotrode's peak speed. It is infinite for e = 1.
+    """
+    from sim_core import restitution_at
+
+    materials, speed = design.materials, np.array([design.sonotrode.peak_speed])
+    laws = [one.restitution for one in (materials.part, materials.sonotrode, materials.wall)]
+    lost = 1.0 - max(float(restitution_at(speed, law)[0]) for law in laws)
+    return drag_loss(design, chamber) / lost if lost > 0.0 else math.inf

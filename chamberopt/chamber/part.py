@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from chamberopt.common.errors import InputError
+from chamberopt.common.number_text import plain
 from chamberopt.geometry.faces import Faces
 from chamberopt.geometry.meshes.part_mesh import PartMesh, read_part_cached, select_triangles
 from chamberopt.geometry.remesh import remesh, triangle_quality
@@ -384,8 +385,9 @@ def _remeshed(found: _Simulated, target: np.ndarray, size: float) -> _Simulated:
     if count > MAX_ELEMENTS:
         fits = 1e3 * size * np.sqrt(count / MAX_ELEMENTS)
         raise InputError(
-            f"part.target.element_mm: given {1e3 * size:g}, which makes some {1e-6 * count:.3g} "
-            f"million triangles of the target's {1e6 * area:.4g} mm²; give at least {fits:.2g}"
+            f"part.target.element_mm: given {1e3 * size:g}, which makes some "
+            f"{plain(1e-6 * count, 3)} million triangles of the target's {plain(1e6 * area)} mm²; "
+            f"give at least {plain(fits, 2)}"
         )
     vertices, triangles, source = remesh(
         mesh.vertices, mesh.triangles, target, target.astype(np.int64), size

@@ -59,6 +59,21 @@ def plain(value: float | str, digits: int = 4) -> str:
     return text.rstrip("0").rstrip(".") if "." in text else text
 
 
+def percent(share: float, sign: bool = False) -> str:
+    """Return a share as text in per cent with two digits, such as "48 %" or "0.24 %".
+
+    Shares from 99.5 % on have the decimals that tell them from all.
+
+    Args:
+        sign: True to put a plus before positive shares.
+    """
+    value = 100.0 * share
+    text = plain(value, 2)
+    if 99.5 <= value < 100.0:
+        text = plain(min(value, 99.9), 3)
+    return f"{'+' if sign and share > ZERO_TOLERANCE else ''}{text} %"
+
+
 def with_interval(value: float, half_width: float, unit: str = "", sign: bool = False) -> str:
     """Return a value with its half-width as text such as "0.809 ± 0.004 mm".
 

@@ -35,6 +35,7 @@ from chamberopt.documents.wording import metric_label, objective_label, plain
 from chamberopt.documents.zones import zones_section
 from chamberopt.pictures.part3d import part_scene
 from chamberopt.results.load import START, load_start, load_trials
+from chamberopt.simulation.advice import unit_of_change
 
 if TYPE_CHECKING:
     from chamberopt.results.load import Result
@@ -221,7 +222,10 @@ def _advice(pilot: Sequence[AdviceRecord]) -> Iterator[Block]:
         (
             one.effect,
             one.verdict,
-            *(typeset(estimate_text(by, 100.0, "%", sign=True)) for by in one.changes.values()),
+            *(
+                typeset(estimate_text(by, 100.0, unit_of_change(name), sign=True))
+                for name, by in one.changes.items()
+            ),
         )
         for one in pilot
     ]

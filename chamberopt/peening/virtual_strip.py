@@ -38,7 +38,8 @@ from chamberopt.peening.strip import (
 )
 from chamberopt.peening.strip_holder import HOLDER_FILE, strip_design
 from chamberopt.simulation.replicas import Replica, ReplicaSetting, simulate_replicas
-from chamberopt.simulation.resting_balls import bouncing_notes, resting_notes
+from chamberopt.simulation.resting_balls import resting_notes
+from chamberopt.simulation.trapped_balls import trapped_notes
 from chamberopt.simulation.variations import RunsProgress
 
 if TYPE_CHECKING:
@@ -209,7 +210,7 @@ def peen_strip(
             FITS,
             *_few_dents(dents),
             *resting_notes([one.resting for one in replicas if one.resting], len(replicas)),
-            *bouncing_notes([one.bouncing_share for one in replicas]),
+            *trapped_notes([one.trapped for one in replicas], design.effects.roughness is not None),
         ),
     )
 

@@ -145,6 +145,22 @@ class ChamberRecord(Table):
     facets_left: bool
 
 
+class TrappedRecord(Table):
+    """Balls that hopped on one spot (locked) or rattled in a gap (jammed), as means over replicas.
+
+    Args:
+        locked_time, jammed_time: share of the balls times recorded time.
+        locked_impacts, jammed_impacts: share of the impacts on the part.
+        locked_at_end: share of the balls that hopped on one spot at the end.
+    """
+
+    locked_time: Share
+    locked_impacts: Share
+    locked_at_end: Share
+    jammed_time: Share
+    jammed_impacts: Share
+
+
 class AdviceRecord(Table):
     """Whether pilot runs advise to simulate an optional physical effect, and the reason.
 
@@ -346,6 +362,7 @@ class CandidateRecord(ResultRecord):
     simulated_time_s: Positive
     collisions: dict[str, Count]
     timings_s: dict[str, Positive]
+    trapped: TrappedRecord | None = None  # None if not known
     chamber: ChamberRecord
     design: dict[str, Any]
     part_sha256: Digest

@@ -37,6 +37,7 @@ from chamberopt.results.records import (
     StudyRecord,
     SweepFacts,
     SweepRecord,
+    TrappedRecord,
     ViolationRecord,
     ZoneLimit,
     ZoneRecord,
@@ -202,6 +203,7 @@ def _write_candidate(folder: Path, candidate: CandidateResult, **more: Any) -> C
         simulated_time_s=evaluation.simulated_time,
         collisions=evaluation.collisions,
         timings_s={step: round(seconds, 3) for step, seconds in evaluation.timings.items()},
+        trapped=TrappedRecord(**evaluation.trapped) if evaluation.trapped else None,
         chamber=ChamberRecord(
             volume_mm3=chamber.volume * 1e9,
             target_exposed_area_mm2=float(chamber.exposed_area[target].sum() * 1e6),

@@ -1,9 +1,19 @@
-"""Advice on one physical effect of a design, from the changes that pilot runs found."""
+"""Advice on one physical effect of a design, from the changes that it makes.
+
+Pilot runs find these changes, or an estimate bounds them.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 from chamberopt.common.estimate import Estimate
+from chamberopt.common.number_text import estimate_text, percent
+
+MEASURED = SPEED, NEARER, FARTHER = (
+    "mean normal speed",
+    "coverage of the target's half nearer to the sonotrode",
+    "coverage of its farther half",
+)
 
 
 @dataclass(frozen=True)
@@ -17,6 +27,7 @@ class Advice:
     # speed changes by a share of itself, a coverage by a difference.
     changes: dict[str, Estimate]
     accuracy: float  # changes below do not matter
+    estimated: bool = False  # whether the changes are bounds by an estimate, without a pilot run
 
     @property
     def verdict(self) -> str:
@@ -29,8 +40,7 @@ class Advice:
     def __str__(self) -> str:
         """Return the advice as a sentence for the user."""
         name, largest = max(self.changes.items(), key=lambda item: abs(item[1].value))
-        change = f"{100 * largest.value:+.2g} ± {100 * largest.half_width:.1g} %"
-        at = f"at {100 * self.accuracy:g} %"
+        at = f"at {percent(self.accuracy)}"
         advice = {
             ("matters", True): "needed",
             ("matters", False): "switch it on",
@@ -40,10 +50,20 @@ class Advice:
             ("undecided", False): f"not decided {at}: on is the safe side",
         }[self.verdict, self.on]
         state = "on" if self.on else "off"
-        return (
-            f"{self.effect} is {state}: {advice} "
-            f"({self.reason}; pilot runs: it changes the {name} by {change})"
-        )
+        if self.estimated:
+            found = (
+                f"by this estimate speed and coverage change by less than "
+                f"{percent(largest.half_width)}, so that no pilot run was made"
+            )
+        else:
+            change = estimate_text(largest, 100.0, unit_of_change(name), sign=True)
+            found = f"pilot runs: it changes the {name} by {change}"
+        return f"{self.effect} is {state}: {advice} ({self.reason}; {found})"
+
+
+def unit_of_change(name: str) -> str:
+    """Return the unit of a change, times 100, of a figure in MEASURED."""
+    return "% of itself" if name == SPEED else "percentage points"
 
 
 def verdict_on(changes: Mapping[str, Estimate], accuracy: float) -> str:

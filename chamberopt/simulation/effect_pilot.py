@@ -5,6 +5,9 @@ compares figures that a short run measures without bias: the mean normal speed o
 target, and the dented area per second on the nearer and on the farther half of the target, seen
 from the sonotrode. A dented area is shown as the coverage that it would give if spread evenly.
 
+An effect that an estimate shows to be far too small to matter has no runs: air drag on balls of
+some millimetres.
+
 The pilot advises and changes nothing. Only a design with effects = "auto" leaves the choice to it
 (with_effects_resolved).
 """
@@ -22,10 +25,11 @@ import numpy as np
 from chamberopt.chamber import dimensionless
 from chamberopt.chamber.scene import balls_can_rest, chamber_mesh
 from chamberopt.common.estimate import Estimate, estimate
+from chamberopt.common.number_text import percent, plain
 from chamberopt.coverage.coverage_from_impacts import coverage_from_dent_density
 from chamberopt.coverage.metrics import exposed_target
 from chamberopt.design.materials import CATALOGUE, USUAL, treatment
-from chamberopt.simulation.advice import Advice, verdict_on
+from chamberopt.simulation.advice import FARTHER, MEASURED, NEARER, SPEED, Advice, verdict_on
 from chamberopt.simulation.evaluate import require_figures
 from chamberopt.simulation.replicas import ReplicaSetting, simulate_replicas
 from chamberopt.simulation.variations import RunsProgress
@@ -38,11 +42,6 @@ if TYPE_CHECKING:
 
 Prepare = Callable[["Design"], None]
 
-MEASURED = SPEED, NEARER, FARTHER = (
-    "mean normal speed",
-    "coverage of the target's half nearer to the sonotrode",
-    "coverage of its farther half",
-)
 REPLICAS = 8
 # Impacts on the target in all replicas together, for an error of about 0.5 % of speed and dents.
 IMPACTS = 300_000
@@ -132,8 +131,10 @@ class _Pilot:
         require_figures(design, chamber, self.mesh)
         self.effects = _switchable(design, chamber)
         self.time = FIRST_TIME
+        bounds = {effect: _bound(effect, design, chamber) for effect in self.effects}
+        self.bounds = {effect: one for effect, one in bounds.items() if one <= ACCURACY}
         # A short run for the time, a run without a change, and a run for each effect.
-        self.runs = RunsProgress(self.progress, 2 + len(self.effects))
+        self.runs = RunsProgress(self.progress, 2 + len(self.effects) - len(self.bounds))
         target = exposed_target(chamber)
         hits = sum(int(target[one.triangle].sum()) for one in self._simulate({})[1])
         self.time = float(np.clip(FIRST_TIME * IMPACTS / max(hits, 1), FIRST_TIME, MAX_TIME))
@@ -144,9 +145,13 @@ class _Pilot:
         advice = []
         for effect in self.effects:
             is_on = _is_on(effect, self.design, self.chamber)
+            reason = _reason(effect, self.design, self.chamber)
+            if effect in self.bounds:
+                changes = dict.fromkeys(MEASURED, Estimate(0.0, self.bounds[effect]))
+                advice.append(Advice(effect, is_on, reason, changes, ACCURACY, estimated=True))
+                continue
             other = self.measure({effect: not is_on})
             with_it, without = (self.unchanged, other) if is_on else (other, self.unchanged)
-            reason = _reason(effect, self.design, self.chamber)
             advice.append(Advice(effect, is_on, reason, _changes(with_it, without), ACCURACY))
         return sorted(advice, key=lambda one: -one.largest_change)
 
@@ -182,6 +187,11 @@ class _Pilot:
         return variant, [one.hits for one in replicas]
 
 
+def _bound(effect: str, design: Design, chamber: Chamber) -> float:
+    """Return the largest change that an effect can make, by an estimate; infinite without one."""
+    return dimensionless.drag_change(design, chamber) if effect == "drag" else math.inf
+
+
 def _is_on(effect: str, design: Design, chamber: Chamber) -> bool:
     if effect == "rest":
         return balls_can_rest(design, chamber_mesh(chamber))
@@ -205,10 +215,11 @@ def groups(design: Design, chamber: Chamber) -> list[dict[str, object]]:
 
 def _reason(effect: str, design: Design, chamber: Chamber) -> str:
     """Return in words how important an effect is, by a dimensionless group such as g H / V²."""
+    loss = dimensionless.drag_loss(design, chamber)
     return {
-        "gravity": f"g H / V² = {dimensionless.gravity_speed_change(design, chamber):.2g}",
+        "gravity": f"g H / V² = {plain(dimensionless.gravity_speed_change(design, chamber), 2)}",
         "ball_collisions": (
-            f"mean free path {dimensionless.free_path(design, chamber):.2g} chamber heights"
+            f"mean free path {plain(dimensionless.free_path(design, chamber), 2)} chamber heights"
         ),
         "friction": (
             f"{_of_catalogue(design)}an impact without slip turns "
@@ -217,9 +228,7 @@ def _reason(effect: str, design: Design, chamber: Chamber) -> str:
         "roughness": (
             f"facets turn a ball aside by {_turned_aside(design):.2g}°, twice their rms slope"
         ),
-        "drag": (
-            f"{dimensionless.drag_loss(design, chamber):.2g} of the speed is lost on the way up"
-        ),
+        "drag": f"{percent(loss)} of the speed is lost on the way up",
         "rest": "a surface that does not move faces up, so balls can lie on it",
     }[effect]
 

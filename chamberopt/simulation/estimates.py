@@ -24,7 +24,7 @@ import numpy as np
 from chamberopt.chamber.build import TARGET
 from chamberopt.chamber.checks.gaps import MIN_MISSED_SHARE
 from chamberopt.common.estimate import Estimate, estimate, shared_half_width, sum_of_shared
-from chamberopt.common.number_text import share_in_words
+from chamberopt.common.number_text import plain, share_in_words
 from chamberopt.coverage.compression import compression_estimate
 from chamberopt.coverage.coverage_from_impacts import (
     Prints,
@@ -314,7 +314,7 @@ def resolution_notes(found: Resolution, surface: str = TARGET) -> tuple[str, ...
             "raise process.accuracy.simulated_time_s or replicas, or process.accuracy.gauge_mm2",
         )
     needs = [
-        f"{what} {needed:.3g} (about {found.time_for(needed):.2g} s of all replicas)"
+        f"{what} {plain(needed, 3)} (about {plain(found.time_for(needed), 2)} s of all replicas)"
         for what, needed, there in (
             ("mean and standard deviation take", found.needed_for_mean, found.has_mean),
             ("5th percentile, times and intensity take", found.needed_for_places, found.has_places),
@@ -323,7 +323,7 @@ def resolution_notes(found: Resolution, surface: str = TARGET) -> tuple[str, ...
     ]
     return (
         f"the median window of {surface} has {found.dents:.1f} dents after "
-        f"{found.simulated_time:.3g} s: {', '.join(needs)}; raise "
+        f"{plain(found.simulated_time, 3)} s: {', '.join(needs)}; raise "
         "process.accuracy.simulated_time_s or replicas, or process.accuracy.gauge_mm2",
     )
 
@@ -336,9 +336,9 @@ def strength_notes(
     if saturation.in_words != NOT_RESOLVED or not resolution.has_places or not saturation.value:
         return ()
     return (
-        f"on {surface} a strip would saturate after {saturation.value:.2g} s or more, by dents of "
-        f"which the {resolution.simulated_time:.3g} s of all replicas hold too few: strength and "
-        "saturation take twice that time or more; raise process.accuracy.simulated_time_s or "
+        f"on {surface} a strip would saturate after {plain(saturation.value, 2)} s or more, by dents "
+        f"of which the {plain(resolution.simulated_time, 3)} s of all replicas hold too few: strength "
+        "and saturation take twice that time or more; raise process.accuracy.simulated_time_s or "
         "replicas",
     )
 

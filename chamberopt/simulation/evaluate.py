@@ -46,7 +46,8 @@ from chamberopt.simulation.replicas import (
     run_in_order,
     simulate_replica,
 )
-from chamberopt.simulation.resting_balls import bouncing_notes, resting_notes
+from chamberopt.simulation.resting_balls import resting_notes
+from chamberopt.simulation.trapped_balls import trapped_notes, trapped_shares
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
@@ -208,12 +209,15 @@ class _Run:
                 *zone_notes,
                 *stress_notes(design.materials.part),
                 *resting_notes([one.resting for one in replicas if one.resting], done),
-                *bouncing_notes([one.bouncing_share for one in replicas]),
+                *trapped_notes(
+                    [one.trapped for one in replicas], design.effects.roughness is not None
+                ),
             ),
             zones={name: one.field.reachable for name, one in zones.items()},
             stream=plan.stream,
             stopped_by=stopped_by,
             analytic=self.cavity is not None,
+            trapped=trapped_shares([one.trapped for one in replicas]),
         )
 
 

@@ -17,6 +17,7 @@ from chamberopt.coverage.coverage_intervals import Resolution
 from chamberopt.coverage.field.symmetry import MAX_COPIES
 from chamberopt.coverage.metrics import METRICS, find_metric
 from chamberopt.coverage.part_impacts import Hits, require_impacts
+from chamberopt.simulation.trapped_balls import SHARES as TRAPPED_SHARES
 
 REMEDY = "restore the file or run the study in a new folder"
 
@@ -46,6 +47,9 @@ class Evaluation:
     alike: int = 1
     # Share of each zone that a ball can touch, by its name.
     zones: dict[str, float] = field(default_factory=dict)
+    # Shares of locked and of jammed balls, by the names in trapped_balls.py. Empty if they are
+    # not known.
+    trapped: dict[str, float] = field(default_factory=dict)
     analytic: bool = False  # whether it ran in an exact cavity instead of the chamber's mesh
 
 
@@ -88,7 +92,7 @@ def _require_sound(found: Evaluation) -> None:
     known = [
         found.objective.value, found.reachable, found.crease_share, found.simulated_time,
         needed.dents, needed.needed_for_mean, needed.needed_for_places, needed.simulated_time,
-        *found.timings.values(), *found.collisions.values(),
+        *found.timings.values(), *found.collisions.values(), *found.trapped.values(),
         *(one.bias for one in estimates),
         *(x for one in estimates for x in (*one.pseudovalues, *one.shared)),
     ]  # fmt: skip
@@ -98,6 +102,10 @@ def _require_sound(found: Evaluation) -> None:
         raise ValueError("it has no simulated time, or no replicas")
     if not 1 <= found.alike <= MAX_COPIES:
         raise ValueError(f"{found.alike} places alike")
+    if found.trapped and found.trapped.keys() != set(TRAPPED_SHARES):
+        raise ValueError("shares of trapped balls are missing")
+    if not all(0.0 <= share <= 1.0 for share in found.trapped.values()):
+        raise ValueError("a share of trapped balls is not from 0 to 1")
     if any(one.half_width < 0.0 for one in estimates):
         raise ValueError("an interval is negative")
     if len(found.hits) != found.replicas:

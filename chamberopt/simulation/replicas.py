@@ -16,7 +16,8 @@ from chamberopt.chamber.scene import build_scene
 from chamberopt.common.errors import WorkerLostError
 from chamberopt.common.executor import share
 from chamberopt.coverage.part_impacts import Hits, hits_on_part
-from chamberopt.simulation.resting_balls import RestingBalls, bouncing_share, find_resting_balls
+from chamberopt.simulation.resting_balls import RestingBalls, find_resting_balls
+from chamberopt.simulation.trapped_balls import TrappedBalls, find_trapped_balls
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
@@ -49,7 +50,7 @@ class Replica:
 
     collisions: dict[str, int]  # number of collisions of each kind
     resting: RestingBalls | None  # the balls at rest at its end; None if there are none
-    bouncing_share: float  # share of the balls that bounce on one spot at its end
+    trapped: TrappedBalls  # balls that hopped on one spot or rattled in a gap
     hits: Hits
 
 
@@ -152,7 +153,7 @@ def next_replica_count(done: int, half_width: float, wanted: float, maximum: int
 
 
 def simulate_replica(setting: ReplicaSetting, seed: int) -> Replica:
-    """Simulate one replica with this seed, and return its balls at rest and impacts on the part."""
+    """Simulate one replica with this seed, and return its balls and its impacts on the part."""
     design, chamber, mesh = setting
     result = simulate_seed(design, chamber, mesh, seed)
     impacts, part_turns = result.impacts, design.effects.part_turn is not None
@@ -164,7 +165,7 @@ def simulate_replica(setting: ReplicaSetting, seed: int) -> Replica:
         resting=find_resting_balls(
             result.resting, len(result.balls), design.shot.diameter, chamber, part_turns
         ),
-        bouncing_share=bouncing_share(result.balls.velocities),
+        trapped=find_trapped_balls(result, design.process.recorded_time, chamber, part_turns),
         hits=hits_on_part(impacts, chamber, design),
     )
 

@@ -1,4 +1,4 @@
-"""Write notes on balls that no longer peen when a replica ends: at rest, or bouncing on one spot.
+"""Write notes on balls that lie still when a replica ends, and so no longer peen.
 
 The notes name surfaces and positions in the terms of a chamber's designer, who can make room there.
 """
@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from chamberopt.chamber.checks.place_names import around, surface_names
+from chamberopt.common.number_text import percent
 from chamberopt.design.shape_surface import TAG_PART
 from chamberopt.geometry.triangles import closest_on_each, connected_pieces
 
@@ -24,10 +25,6 @@ CONTACT_GAP = 2e-5  # m, at most between a ball at rest and the surface that hol
 PLACE_DISTANCE = 3.0  # ball diameters: balls nearer to each other lie in one place
 MAX_PLACES = 3  # places named in a note, those places first that have most balls
 ON_BALLS = ""  # kind of a ball that only other balls carry
-# Share of its speed below which the sideways speed of a ball leaves it on its spot for thousands
-# of impacts.
-MAX_SIDEWAYS = 1e-6
-MIN_BOUNCING_SHARE = 0.1  # share of the shot from which on there is a note
 
 
 @dataclass(frozen=True)
@@ -66,34 +63,6 @@ def find_resting_balls(
     )
 
 
-def bouncing_share(velocities: np.ndarray) -> float:
-    """Return the share of the balls that move straight up or down, and so bounce on one spot.
-
-    Args:
-        velocities: velocities of the balls [m/s], (n, 3).
-    """
-    sideways = np.hypot(velocities[:, 0], velocities[:, 1])
-    speed = np.linalg.norm(velocities, axis=1)
-    return float(((sideways < MAX_SIDEWAYS * speed) & (speed > 0.0)).mean())
-
-
-def bouncing_notes(shares: Sequence[float]) -> tuple[str, ...]:
-    """Return a note if many balls bounce on one spot in the end, as between ideal parallel faces.
-
-    Args:
-        shares: share of bouncing balls in each replica.
-    """
-    large = [share for share in shares if share > MIN_BOUNCING_SHARE]
-    if not large:
-        return ()
-    return (
-        f"in {len(large)} of {len(shares)} replicas up to {_percent(max(large))} of the shot ends "
-        "bouncing straight up and down, each ball on its spot: between parallel faces friction "
-        "takes all sideways speed, which rough faces would give back; shorten "
-        "process.accuracy.simulated_time_s, or do not trust where the dents are",
-    )
-
-
 def resting_notes(resting: Sequence[RestingBalls], replicas: int) -> tuple[str, ...]:
     """Return a note on all replicas in which balls came to rest, or nothing if there are none.
 
@@ -107,13 +76,9 @@ def resting_notes(resting: Sequence[RestingBalls], replicas: int) -> tuple[str, 
     worst = max(resting, key=lambda one: one.share)
     return (
         f"balls came to rest in {len(resting)} of {replicas} replicas and no longer peen: at the "
-        f"end {_percent(mean)} of the shot, on average over all replicas; in the worst one, "
+        f"end {percent(mean)} of the shot, on average over all replicas; in the worst one, "
         f"{worst.line}",
     )
-
-
-def _percent(share: float) -> str:
-    return f"{100.0 * share:.2g} %"
 
 
 def _kind(
@@ -132,19 +97,20 @@ def _kind(
     under = resting.triangles[i][resting.triangles[i] >= 0]
     if resting.jammed[i]:
         known = chamber.tags != TAG_PART if part_turns else np.ones(len(chamber.tags), dtype=bool)
-        near = _triangles_near(chamber, np.flatnonzero(known), resting.position[i], reach)
+        near = triangles_near(chamber, np.flatnonzero(known), resting.position[i], reach)
         under = np.union1d(under, near)
     names = sorted(set(surfaces[under]))
     if not resting.jammed[i]:
-        return ON_BALLS if not names else _join("on", names)
+        return ON_BALLS if not names else join_names("on", names)
     if not names and not part_turns:
         return "jammed among other balls"
     if len(names) < 2:  # one surface alone cannot jam a ball
         names.append("other balls or the part" if part_turns else "other balls")
-    return f"jammed {_join('among', names)}"
+    return f"jammed {join_names('among', names)}"
 
 
-def _join(preposition: str, names: list[str]) -> str:
+def join_names(preposition: str, names: list[str]) -> str:
+    """Return names of surfaces as text: "on the wall" or "between the part and the wall"."""
     return (
         f"{preposition} {names[0]}"
         if len(names) == 1
@@ -152,7 +118,7 @@ def _join(preposition: str, names: list[str]) -> str:
     )
 
 
-def _triangles_near(
+def triangles_near(
     chamber: Chamber, triangles: np.ndarray, position: np.ndarray, reach: float
 ) -> np.ndarray:
     """Return the numbers of the given triangles that are within `reach` [m] of a position (3,)."""

@@ -102,9 +102,7 @@ class Trapped:
         return len(self.ball)
 
 
-def new_stays(
-    balls: int, radius: float, gravity: Gravity | None, waves: tuple[Wave, ...]
-) -> Stays:
+def new_stays(balls: int, radius: float, gravity: Gravity | None, waves: tuple[Wave, ...]) -> Stays:
     """Return the series of balls that have not hit anything yet.
 
     Args:

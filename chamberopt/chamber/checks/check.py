@@ -21,6 +21,7 @@ from chamberopt.chamber.part import turning_axis
 from chamberopt.chamber.reach import Reach, find_reach, reached_part_share
 from chamberopt.chamber.replica_seed import replica_seed
 from chamberopt.chamber.scene import build_scene, chamber_mesh, require_ball_count, require_turnable
+from chamberopt.common.number_text import plain
 from chamberopt.design.shape_surface import TAG_PART, TAG_SONOTRODE, TAG_WALL, is_sonotrode
 from chamberopt.design.tolerances import require_tolerances, tolerance_box
 from chamberopt.geometry.triangles import areas, edge_keys, sides_of, tetrahedron_volumes
@@ -229,15 +230,15 @@ def first_warnings(design: Design, chamber: Chamber, mesh: TriangleMesh) -> list
     path = free_path(design, chamber)
     if not design.effects.ball_collisions and path < MIN_FREE_PATH:
         texts.append(
-            f"effects.ball_collisions is false, though a ball would meet another every {path:.2g} "
-            "chamber heights: they fly through each other; switch it on"
+            f"effects.ball_collisions is false, though a ball would meet another every "
+            f"{plain(path, 2)} chamber heights: they fly through each other; switch it on"
         )
     turn = design.effects.part_turn
     recorded = design.process.accuracy.replicas * design.process.recorded_time
     if turn is not None and turn.rpm != 0.0 and recorded < turn.period:
         texts.append(
-            f"the part takes {turn.period:.3g} s to turn once, but the replicas together last "
-            f"only {recorded:.3g} s: coverage is that of some of its positions; raise "
+            f"the part takes {plain(turn.period, 3)} s to turn once, but the replicas together "
+            f"last only {plain(recorded, 3)} s: coverage is that of some of its positions; raise "
             "process.accuracy.simulated_time_s or replicas"
         )
     texts += calibration_warnings(design)

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 from chamberopt.common import memory
 from chamberopt.common.errors import InputError
+from chamberopt.common.number_text import plain
 from chamberopt.coverage.field.target_field import MAX_PIECES, PIECES_PER_WINDOW
 from chamberopt.geometry.triangles import areas
 
@@ -64,9 +65,9 @@ def how_many_fit(most: int, each: float, common: float = 0.0) -> int:
     if math.isinf(room):
         return most
     if common + each > room:
+        taken, there = plain(1e-9 * (common + each), 2), plain(1e-9 * room, 2)
         raise InputError(
-            f"process.accuracy.points: this takes about {1e-9 * (common + each):.2g} GB of memory, "
-            f"and {1e-9 * room:.2g} GB, half of what is free, may be taken; give fewer points, "
-            "shorter replicas (simulated_time_s) or a larger gauge_mm2, or end other programs"
+            f"process.accuracy.points: this takes about {taken} GB of memory, and {there} GB, half "
+            "of what is free, may be taken; give fewer points, shorter replicas (simulated_time_s) or a larger gauge_mm2, or end other programs"
         )
     return max(1, min(most, int((room - common) / each)))

@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from chamberopt.common.errors import InputError
+from chamberopt.common.number_text import plain
 from chamberopt.coverage.field.crease_bands import (
     CreaseBand,
     CreasePieces,
@@ -250,7 +251,7 @@ def require_wide_gauge(chamber: Chamber, setting: WindowSetting) -> None:
         least = 1e6 * gauge * wanted / MAX_PIECES
         raise InputError(
             f"process.accuracy.gauge_mm2: given {1e6 * gauge:g}, too small for a target of "
-            f"{1e6 * area:.4g} mm²; give at least {least:.2g}"
+            f"{plain(1e6 * area)} mm²; give at least {plain(least, 2)}"
         )
 
 
@@ -260,8 +261,8 @@ def require_narrow_gauge(chamber: Chamber, setting: WindowSetting) -> None:
     if gauge * MIN_WINDOWS > area:
         raise InputError(
             f"process.accuracy.gauge_mm2: given {1e6 * gauge:g}, so wide that a target of "
-            f"{1e6 * area:.4g} mm² has fewer than {MIN_WINDOWS:g} windows side by side; give at "
-            f"most {1e6 * area / MIN_WINDOWS:.4g}"
+            f"{plain(1e6 * area)} mm² has fewer than {MIN_WINDOWS:g} windows side by side; give at "
+            f"most {plain(1e6 * area / MIN_WINDOWS)}"
         )
 
 

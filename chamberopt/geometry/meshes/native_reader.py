@@ -18,6 +18,7 @@ from chamberopt.common.child import Child, ChildLostError
 from chamberopt.common.errors import InputError
 from chamberopt.common.files import private_folder, write_bytes
 from chamberopt.common.limits import limit_cpu_time, limit_memory, raise_cpu_time
+from chamberopt.common.number_text import plain
 
 # Seconds of computing time. STEP files took 0.5 to 1 s up to 0.5 MB, and large files took 1.4 to
 # 4.5 s for each MB (docs/trust.md). A slow machine may take thrice as long, and the limits are ten
@@ -73,8 +74,8 @@ def read_in_child(reader: NativeReader, path: Path, content: bytes, *arguments: 
 
 def _too_long(seconds: float, content: bytes) -> str:
     return (
-        f"its reader took longer than a sound file of {1e-6 * len(content):.2g} MB does (at least "
-        f"{seconds:.0f} s of computing time): it is damaged, or finer than it need be; export it "
+        f"its reader took longer than a sound file of {plain(1e-6 * len(content), 2)} MB does "
+        f"(at least {seconds:.0f} s of computing time): it is damaged, or finer than it need be; export it "
         f"again, or allow more by the environment variable {VARIABLE} (seconds)"
     )
 
