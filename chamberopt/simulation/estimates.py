@@ -335,10 +335,11 @@ def strength_notes(
     saturation = metrics["saturation_time_s"]
     if saturation.in_words != NOT_RESOLVED or not resolution.has_places or not saturation.value:
         return ()
+    seconds = plain(resolution.simulated_time, 3)
     return (
-        f"on {surface} a strip would saturate after {plain(saturation.value, 2)} s or more, by dents "
-        f"of which the {plain(resolution.simulated_time, 3)} s of all replicas hold too few: strength "
-        "and saturation take twice that time or more; raise process.accuracy.simulated_time_s or "
+        f"on {surface} a strip would saturate after {plain(saturation.value, 2)} s or more, by "
+        f"dents of which the {seconds} s of all replicas hold too few: strength and "
+        "saturation take twice that time or more; raise process.accuracy.simulated_time_s or "
         "replicas",
     )
 

@@ -1,7 +1,7 @@
 """Write notes on balls that hop on one spot or rattle in a gap while impacts are recorded.
 
-Their impacts are in the figures, although they dent one spot again and again. Definitions of *locked*
-and *jammed* balls are in sim_core/loop/stays.py.
+Their impacts are in the figures, although they dent one spot again and again. What *locked*
+and *jammed* mean is defined in sim_core/loop/stays.py.
 """
 
 from __future__ import annotations

@@ -63,7 +63,7 @@ from sim_core.numerics.vec3 import Flight, add_scaled, sub
 DONE = 0  # the clock has come to clock.stop
 BUFFER_FULL = 1  # the buffers of impacts and collisions must be emptied
 TOO_MANY_EVENTS = 2  # one ball has too many events in one window: it is jammed
-TOO_FAST = 3  # a ball is faster than the neighbour filter allows for
+TOO_FAST = 3  # a ball is faster than the neighbour filter allows for, or than MAX_SPEED
 HAS_LEFT = 4  # a ball is outside the chamber's bounding box
 
 # s. Longest arc searched at once. Its chord is off by g PIECE²/8 = 0.12 mm, so boxes stay tight.

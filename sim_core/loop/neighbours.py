@@ -56,7 +56,9 @@ ROUNDINGS = 16.0 * float(np.finfo(np.float32).eps)
 # Share of the square of the largest number in a distance². The distance² is a sum of three squares,
 # each up to (3.5 + 3.5)² times as large, with a dozen roundings.
 SQUARE_ROUNDINGS = 16.0 * ROUNDINGS
-MAX_FINITE_SPEED = 1e150  # m/s: the square of this speed is finite
+# m/s: no shot comes near it. A ball that does gains speed without end, and its contacts are found
+# ever less exactly.
+MAX_SPEED = 1e6
 TINY = 1e-30  # replaces a velocity component of zero, whose inverse would be infinite
 
 
@@ -160,10 +162,10 @@ def follow(neighbours: NeighbourFilter | None, motion: np.ndarray, ball: int, ti
 def speed_limit(neighbours: NeighbourFilter | None) -> float:
     """Return the speed [m/s] up to which the filter's allowance for rounding holds.
 
-    Without a filter return 1e150, which stands for any speed.
+    Without a filter return MAX_SPEED.
     """
     if neighbours is None:
-        return MAX_FINITE_SPEED
+        return MAX_SPEED
     return neighbours.max_speed
 
 

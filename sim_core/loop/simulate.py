@@ -38,9 +38,9 @@ from sim_core.loop.impact_log import (
     new_impact_buffer,
 )
 from sim_core.loop.jam_message import jam_message
-from sim_core.loop.neighbours import NeighbourFilter, new_neighbour_filter
+from sim_core.loop.neighbours import MAX_SPEED, NeighbourFilter, new_neighbour_filter
 from sim_core.loop.state import Clock, SimulationState
-from sim_core.loop.stays import Trapped, begin_anew, new_stays, trapped
+from sim_core.loop.stays import Trapped, begin_anew, is_on_one_side, new_stays, trapped
 from sim_core.motion import WINDOW
 from sim_core.numerics.computed_once import computed_once
 from sim_core.numerics.periodic_sides import new_periodic_sides
@@ -314,13 +314,19 @@ class Simulation:
                     raise SimulationError(
                         f"ball {ball}: its velocity is not a number any more; {self._when()}"
                     )
-                neighbours = self._new_filter(self.state, 4.0 * speed)
+                top = float(np.linalg.norm(fast, axis=-1).max())
+                if top > MAX_SPEED:
+                    raise SimulationError(
+                        f"a ball has {top:.2g} m/s, {self._when()}: no shot is faster than "
+                        f"{MAX_SPEED:g} m/s. Look at amplitude and frequency of the vibration, or "
+                        "for a gap in which an elastic ball gains speed at each hit"
+                    )
+                neighbours = self._new_filter(self.state, min(4.0 * speed, MAX_SPEED))
                 self.state = self.state._replace(neighbours=neighbours)
             elif status == TOO_MANY_EVENTS:
-                positions = self._positions_and_velocities()[0]
-                raise SimulationError(
-                    jam_message(self.scene, self._corners(), positions, ball, self._when())
-                )
+                positions, one_side = self.balls().positions, is_on_one_side(self.state.stays, ball)
+                how = self._corners(), positions, ball, one_side, self._when()
+                raise SimulationError(jam_message(self.scene, *how))
             elif status == HAS_LEFT:
                 raise self._left(ball)
 

@@ -225,6 +225,13 @@ def end_series(stays: Stays, radius: float, ball: int, landed: bool) -> bool:
     return True
 
 
+def is_on_one_side(stays: Stays, ball: int) -> bool:
+    """Return True if a ball's present series of hits is on surfaces of which none faces another."""
+    hits = int(stays.hits[ball])
+    normal = float(np.linalg.norm(stays.normal[ball]))
+    return hits > max(MIN_HITS, int(stays.meetings[ball])) and normal >= FACING * hits
+
+
 def begin_anew(stays: Stays) -> None:
     """Forget all series so far, as recording begins now."""
     for column in (stays.hits, stays.time, stays.recorded):

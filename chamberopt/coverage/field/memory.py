@@ -68,6 +68,7 @@ def how_many_fit(most: int, each: float, common: float = 0.0) -> int:
         taken, there = plain(1e-9 * (common + each), 2), plain(1e-9 * room, 2)
         raise InputError(
             f"process.accuracy.points: this takes about {taken} GB of memory, and {there} GB, half "
-            "of what is free, may be taken; give fewer points, shorter replicas (simulated_time_s) or a larger gauge_mm2, or end other programs"
+            "of what is free, may be taken; give fewer points, shorter replicas "
+            "(simulated_time_s) or a larger gauge_mm2, or end other programs"
         )
     return max(1, min(most, int((room - common) / each)))

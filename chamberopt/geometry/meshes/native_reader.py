@@ -75,8 +75,8 @@ def read_in_child(reader: NativeReader, path: Path, content: bytes, *arguments: 
 def _too_long(seconds: float, content: bytes) -> str:
     return (
         f"its reader took longer than a sound file of {plain(1e-6 * len(content), 2)} MB does "
-        f"(at least {seconds:.0f} s of computing time): it is damaged, or finer than it need be; export it "
-        f"again, or allow more by the environment variable {VARIABLE} (seconds)"
+        f"(at least {seconds:.0f} s of computing time): it is damaged, or finer than it need "
+        f"be; export it again, or allow more by the environment variable {VARIABLE} (seconds)"
     )
 
 
