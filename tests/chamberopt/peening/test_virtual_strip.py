@@ -25,7 +25,7 @@ from chamberopt.peening.strip import StripSize, strip_cells
 from chamberopt.peening.virtual_strip import VirtualStrip, peen_strip, strip_in_lid
 from chamberopt.simulation.replicas import Replica, ReplicaSetting
 from tests.chamberopt.peening.test_strip import STRIP, hits_at, middles
-from tests.helpers.synthetic import machine_values, plate_design
+from tests.helpers.synthetic import NOT_TRAPPED, machine_values, plate_design
 
 DISC = StripSize(40e-3, 40e-3, is_disc=True)
 SHORT = plate_design(
@@ -43,7 +43,7 @@ def known(setting: ReplicaSetting, *_: object) -> list[Replica]:
     design = setting.design
     more = design.simulated.sonotrode.amplitude_um / SHORT.sonotrode.amplitude_um
     hits = hits_at(middles(DISC, round(HITS * more)))
-    return [Replica({}, None, 0.0, hits)] * design.process.accuracy.replicas
+    return [Replica({}, None, NOT_TRAPPED, hits)] * design.process.accuracy.replicas
 
 
 def peened(folder: Path, strip_type: Any = "A", **sds: float) -> VirtualStrip:
@@ -135,7 +135,7 @@ def test_what_a_simulation_must_show_of_a_calibration_is_in_the_interval(tmp_pat
 def test_a_shot_that_leaves_no_dent_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    slow = Replica({}, None, 0.0, hits_at(middles(DISC, 3), 1.0))
+    slow = Replica({}, None, NOT_TRAPPED, hits_at(middles(DISC, 3), 1.0))
     monkeypatch.setattr(virtual_strip, "simulate_replicas", lambda *_: [slow] * 3)
     with pytest.raises(
         InputError, match=r"no dent .*1 m/s, .*begin at 1\.2 m/s; raise the amplitude"

@@ -120,8 +120,31 @@ def test_each_effect_is_switched_alone_and_the_most_important_comes_first(
     assert said["friction"].changes["mean normal speed"].value == pytest.approx(-0.3)
     assert said["gravity"].changes["mean normal speed"].value == pytest.approx(0.05)
     changed = [design.effects for design in asked if design.effects != smooth.effects]
-    assert len(changed) == 5
+    assert len(changed) == 4  # drag is decided by its estimate
+    assert said["drag"].estimated
+    assert "no pilot run was made" in str(said["drag"])
+    assert all(abs(one.value) + one.half_width < 0.01 for one in said["drag"].changes.values())
     assert all(design.process.accuracy.objective_half_width is None for design in asked)
+
+
+def test_drag_is_measured_where_the_estimate_leaves_it_open(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Small balls lose more of their speed in the air than the accuracy of the advice."""
+    small = PLATE.changed({"shot.diameter_mm": 0.3, "shot.mass_g": 0.01})
+    assert dimensionless.drag_change(PLATE, CHAMBER) < 0.002
+    assert dimensionless.drag_change(small, CHAMBER) > effect_pilot.ACCURACY
+    pretend({"drag": -0.05}, monkeypatch)
+    said = {one.effect: one for one in advise(small, CHAMBER, SerialExecutor())}
+    assert not said["drag"].estimated
+    assert said["drag"].verdict == "matters"
+
+
+def test_a_change_names_its_unit() -> None:
+    """A speed changes by a share of itself, a coverage by a difference."""
+    for name, unit in zip(MEASURED, ("% of itself", *["percentage points"] * 2), strict=True):
+        one = Advice("friction", True, "because", {name: Estimate(0.075, 0.009)}, 0.01)
+        assert f"it changes the {name} by +7.5 ± 0.9 {unit})" in str(one)
 
 
 def test_a_target_of_two_triangles_has_figures_too(

@@ -4,21 +4,11 @@ import numpy as np
 import pytest
 import trimesh
 
-from chamberopt.chamber.build import Chamber, build_chamber
+from chamberopt.chamber.build import Chamber
 from chamberopt.chamber.part import Part
-from chamberopt.chamber.replica_seed import replica_seed
-from chamberopt.chamber.scene import build_scene, chamber_mesh
-from chamberopt.design.effects import FrictionTable
-from chamberopt.simulation.resting_balls import (
-    RestingBalls,
-    bouncing_notes,
-    bouncing_share,
-    find_resting_balls,
-    resting_notes,
-)
-from sim_core import Resting, simulate
+from chamberopt.simulation.resting_balls import RestingBalls, find_resting_balls, resting_notes
+from sim_core import Resting
 from tests.helpers.scenes.cavities import box_around
-from tests.helpers.synthetic import plate_design
 
 BALL = 3e-3  # m
 NOBODY = [-1, -1, -1, -1]
@@ -125,22 +115,3 @@ def test_one_note_on_all_replicas() -> None:
         "balls came to rest in 3 of 8 replicas and no longer peen: at the end 7.5 % of the shot, "
         "on average over all replicas; in the worst one, many",
     )
-
-
-def test_shot_that_bounces_on_the_spot_is_said() -> None:
-    velocities = np.array([[0.0, 0.0, 5.0], [1e-9, 0.0, -4.0], [1.0, 0.0, 3.0], [0.0, 0.0, 0.0]])
-    assert bouncing_share(velocities) == 0.5
-    (note,) = bouncing_notes([0.0, 0.5, 0.2])
-    assert "in 2 of 3 replicas up to 50 %" in note
-    assert bouncing_notes([0.0, 0.05]) == ()
-
-
-def test_between_parallel_plates_friction_leaves_a_ball_no_sideways_speed() -> None:
-    """What the note is about; without friction its sideways speed lasts."""
-    plate = plate_design(process__accuracy__simulated_time_s=5.0)
-    plate = plate.changed({"shot.mass_g": 1e3 * plate.shot.ball_mass})
-    chamber = build_chamber(plate)
-    rubs = plate.effects.model_copy(update={"friction": FrictionTable(mu=0.3, beta0=0.2)})
-    for design, caught in ((plate, 0.0), (plate.model_copy(update={"effects": rubs}), 1.0)):
-        end = simulate(build_scene(design, chamber_mesh(chamber), replica_seed(1, 0))).balls
-        assert bouncing_share(end.velocities) == caught

@@ -75,10 +75,8 @@ def test_nothing_is_kept_of_pairs_and_overlaps_are_no_error() -> None:
     assert run.state.queue.meetings is None
     assert len(run.state.queue.wall_time) == 3
     run.play(0.1, record=False)
-    assert touching(run.scene, ROOM.corners, in_one_place.positions, 0) == (
-        "",
-        False,
-    )  # a jam is not of those
+    # a jam is not of those
+    assert touching(run.scene, ROOM.corners, in_one_place.positions, 0) == ([], False)
     with pytest.raises(SceneError, match="overlap"):
         Scene(ROOM, in_one_place, Physics(), 1.0)
 

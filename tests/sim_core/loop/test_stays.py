@@ -1,0 +1,115 @@
+"""Balls that hop on one spot or rattle in a gap are told from those that fly, and that lie still."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import trimesh
+
+from sim_core import (
+    Balls,
+    Friction,
+    Gravity,
+    Physics,
+    Restitution,
+    Scene,
+    TriangleMesh,
+    Vibration,
+    pack_balls,
+    simulate,
+)
+from sim_core.loop.stays import MIN_HITS, end_series, new_stays
+from tests.helpers.scenes.cavities import CEILING, FLOOR, SIDES, box_around, cylinder
+from tests.helpers.scenes.contact_mode import ROOM, physics, shot
+
+DIAMETER = 3e-3
+LAW = (0.91, 1.0, 0.0)
+SHAKING = Vibration(FLOOR, 25e-6, 20e3, 1.0)
+SECONDS = 2.0
+
+
+def shaken_cylinder(count: int, mu: float | None, subdivisions: int = 0) -> Scene:
+    """Balls over a vibrating floor, under a flat lid 40 mm above it, with and without friction."""
+    mesh, rng = cylinder(0.035, 0.04, 64, subdivisions), np.random.default_rng(1)
+    places = pack_balls(mesh, count, DIAMETER, rng, SHAKING.amplitude)
+    balls = Balls(places, rng.normal(0.0, 2.0, places.shape), DIAMETER)
+    rubs = None if mu is None else Friction(((mu, 0.0),) * 3, (mu, 0.0))
+    effects = Physics(Gravity(), Restitution((LAW,) * 3, LAW), SHAKING, friction=rubs)
+    return Scene(mesh, balls, effects, SECONDS, record=(CEILING,))
+
+
+@pytest.mark.parametrize("subdivisions", [0, 1])
+def test_few_balls_with_friction_end_hopping_on_one_spot(subdivisions: int) -> None:
+    """Smooth parallel faces take all sideways speed: benchmarks/friction.py has it of 15 balls."""
+    result = simulate(shaken_cylinder(15, 0.2, subdivisions))
+    found = result.trapped
+    assert len(found) == 15
+    assert found.at_end.all()
+    assert found.locked.sum() > 0.7 * 15 * SECONDS
+    assert (found.locked <= SECONDS).all()
+    assert not found.jammed.any()
+    # Few impacts are none of the hops, those before the sideways speed is gone.
+    assert 0.7 * len(result.impacts) < found.locked_hits.sum() <= len(result.impacts)
+    last = [result.impacts.position[result.impacts.ball == k][-1] for k in found.ball]
+    sideways = (found.position - np.array(last))[:, :2]
+    assert (np.hypot(*sideways.T) < 0.5 * DIAMETER).all()
+
+
+def test_no_ball_of_a_gas_is_trapped() -> None:
+    assert len(simulate(shaken_cylinder(40, None)).trapped) == 0
+
+
+def test_balls_that_come_to_lie_still_are_not_trapped() -> None:
+    """They bounce on one spot of a still floor, ever lower, until they land."""
+    places = [[0.005, 0.005, 0.03], [0.015, 0.015, 0.02], [0.005, 0.015, 0.01]]
+    result = simulate(Scene(ROOM, shot(places), physics(0.9), 8.0))
+    assert len(result.resting) == 3
+    assert len(result.impacts) > 3 * MIN_HITS
+    assert len(result.trapped) == 0
+
+
+def groove(subdivisions: int) -> Scene:
+    """A ball above a groove between two blocks that is 2 % narrower than the ball, and a floor that
+    vibrates far below.
+    """
+    blocks = [trimesh.creation.box((6e-3, 4e-3, 4e-3)) for _ in range(2)]
+    for side, block in zip((-1.0, 1.0), blocks, strict=True):
+        block.apply_translation([0.0, side * (2e-3 + 0.49 * DIAMETER), 0.0])
+    blocks = [block.subdivide() if subdivisions else block for block in blocks]
+    mesh = box_around(trimesh.util.concatenate(blocks), 10e-3)
+    heights = mesh.vertices[mesh.triangles][:, :, 2]
+    tags = np.where((heights == heights.min()).all(axis=1), FLOOR, mesh.tags)
+    above = np.array([[0.0, 0.0, 2e-3 + 0.6 * DIAMETER]])
+    ball = Balls(above, np.zeros((1, 3)), DIAMETER)
+    effects = Physics(Gravity(), Restitution((LAW,) * 3, LAW), SHAKING)
+    room = TriangleMesh(mesh.vertices, mesh.triangles, tags)
+    assert set(tags.tolist()) == {CEILING, FLOOR, SIDES}
+    return Scene(room, ball, effects, 1.0, record=(CEILING,))
+
+
+@pytest.mark.parametrize("subdivisions", [0, 1])
+def test_a_ball_in_a_groove_hardly_narrower_than_itself_is_jammed(subdivisions: int) -> None:
+    scene = groove(subdivisions)
+    result = simulate(scene)
+    found = result.trapped
+    assert found.ball.tolist() == [0]
+    assert found.at_end.all()
+    assert found.jammed[0] > 0.5
+    assert found.locked[0] == 0.0
+    assert found.jammed_hits[0] > 0.9 * len(result.impacts)
+    away = found.position[0] - scene.balls.positions[0]
+    assert np.hypot(*away[:2]) < 0.5 * DIAMETER
+
+
+def test_what_came_before_the_recording_does_not_count() -> None:
+    scene = groove(0)
+    later = simulate(replace(scene, warmup=0.5, duration=0.25)).trapped
+    assert 0.0 < later.jammed[0] <= 0.25
+
+
+def test_a_ball_that_other_balls_keep_in_place_is_not_trapped() -> None:
+    """As in a dense layer: it hits its neighbours more often than the floor."""
+    for meetings, is_trapped in ((MIN_HITS, True), (3 * MIN_HITS, False)):
+        stays = new_stays(1, 0.5 * DIAMETER, Gravity(), ())
+        stays.hits[0], stays.meetings[0], stays.last[0] = 2 * MIN_HITS, meetings, 1.0
+        assert end_series(stays, stays.radius, 0, False) is is_trapped
