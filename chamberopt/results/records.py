@@ -146,19 +146,19 @@ class ChamberRecord(Table):
 
 
 class TrappedRecord(Table):
-    """Balls that hopped on one spot (locked) or rattled in a gap (jammed), as means over replicas.
+    """Balls that hopped on one spot or rattled in a gap, as means over the replicas.
 
     Args:
-        locked_time, jammed_time: share of the balls times recorded time.
-        locked_impacts, jammed_impacts: share of the impacts on the part.
-        locked_at_end: share of the balls that hopped on one spot at the end.
+        hopping_time, rattling_time: share of the balls times recorded time.
+        hopping_impacts, rattling_impacts: share of the impacts on the part.
+        hopping_at_end: share of the balls that hopped on one spot at the end.
     """
 
-    locked_time: Share
-    locked_impacts: Share
-    locked_at_end: Share
-    jammed_time: Share
-    jammed_impacts: Share
+    hopping_time: Share
+    hopping_impacts: Share
+    hopping_at_end: Share
+    rattling_time: Share
+    rattling_impacts: Share
 
 
 class AdviceRecord(Table):

@@ -47,7 +47,7 @@ class Evaluation:
     alike: int = 1
     # Share of each zone that a ball can touch, by its name.
     zones: dict[str, float] = field(default_factory=dict)
-    # Shares of locked and of jammed balls, by the names in trapped_balls.py. Empty if they are
+    # Shares of hopping and of rattling balls, by the names in trapped_balls.py. Empty if they are
     # not known.
     trapped: dict[str, float] = field(default_factory=dict)
     analytic: bool = False  # whether it ran in an exact cavity instead of the chamber's mesh

@@ -4,14 +4,13 @@ A series holds the successive hits of a ball on surfaces that lie within a ball'
 first hit sideways, and during which the ball hits surfaces more often than other balls. In a series
 of MIN_HITS or more the ball is
 
-- *jammed* if all hits also lie within a ball's radius in height, they come from surfaces that face
-  each other, and they are slow: below SLOW of the sonotrode's peak speed on average;
-- *locked*, which means that it hops on one spot, if it is not jammed and the series lasts for
-  MIN_TIME or more.
+- *rattling* in a gap, if all hits also lie within a ball's radius in height, they come from surfaces
+  that face each other, and they are slow: below SLOW of the sonotrode's peak speed on average;
+- *hopping* on one spot, if it is not rattling and the series lasts for MIN_TIME or more.
 
 Sideways means across gravity, or, without gravity, across the motion of the sonotrode. A series
 also ends when the ball lands to lie still, slide or roll, of which contact mode tells. Hops that
-end like this are not those of a locked ball. On a turning part a hit lies where it is on the part.
+end like this are not those of a hopping ball. On a turning part a hit lies where it is on the part.
 """
 
 import math
@@ -39,7 +38,7 @@ SLOW = 0.1
 # Length of the mean of unit normals, below which surfaces face each other. It is 1 for a single
 # plane, and smaller than this for a gap from 0.87 of the ball's width on.
 FACING = 0.5
-LOCKED, JAMMED = 0, 1  # kinds of stays, places in Stays.time and Stays.recorded
+HOPPING, RATTLING = 0, 1  # kinds of stays, places in Stays.time and Stays.recorded
 
 
 class Stays(NamedTuple):
@@ -47,7 +46,7 @@ class Stays(NamedTuple):
 
     axis: unit vector of height.
     radius: radius of balls that are all alike [m].
-    slow: mean normal speed [m/s] below which a ball is jammed.
+    slow: mean normal speed [m/s] below which a ball is rattling.
     place: position of the ball's centre at the first hit of the series [m], (n, 3).
     began, last: times of the first and last hit [s since the start], (n,).
     rise: largest difference in height from the first hit [m], (n,).
@@ -56,7 +55,7 @@ class Stays(NamedTuple):
     hits: number of the hits, (n,) int32. 0 if there is no series.
     logged: number of those on recorded surfaces, (n,) int32.
     meetings: number of collisions with balls during the series, (n,) int32.
-    time: time for which each ball was LOCKED and JAMMED in past series [s], (n, 2).
+    time: time for which each ball was HOPPING and RATTLING in past series [s], (n, 2).
     recorded: number of the hits on recorded surfaces in this time, (n, 2) int64.
     spot: position of the ball's centre at the start of the latest of these series [m], (n, 3).
     """
@@ -83,18 +82,18 @@ class Trapped:
     """The k balls that hopped on one spot, or sat in a gap, for some of the recorded time.
 
     ball: numbers of the balls, (k,).
-    locked: time for which each of them hopped on one spot [s], (k,).
-    jammed: time for which it sat in a gap [s], (k,).
-    locked_hits, jammed_hits: number of its hits on the recorded surfaces in this time, (k,).
+    hopping: time for which each of them hopped on one spot [s], (k,).
+    rattling: time for which it sat in a gap [s], (k,).
+    hopping_hits, rattling_hits: number of its hits on the recorded surfaces in this time, (k,).
     at_end: True if it did so at the end, (k,) bool.
     position: position of its centre when it began to do so for the last time [m], (k, 3).
     """
 
     ball: np.ndarray
-    locked: np.ndarray
-    jammed: np.ndarray
-    locked_hits: np.ndarray
-    jammed_hits: np.ndarray
+    hopping: np.ndarray
+    rattling: np.ndarray
+    hopping_hits: np.ndarray
+    rattling_hits: np.ndarray
     at_end: np.ndarray
     position: np.ndarray
 
@@ -201,22 +200,22 @@ def note_meeting(stays: Stays, one: int, two: int) -> None:
 
 @jit
 def end_series(stays: Stays, radius: float, ball: int, landed: bool) -> bool:
-    """Add a ball's series of hits to the time for which it was locked or jammed.
+    """Add a ball's series of hits to the time for which it was hopping or rattling.
 
     Args:
         radius: radius of the ball [m].
         landed: True if the series ends because the ball lands.
 
-    Returns: False if the ball was neither locked nor jammed.
+    Returns: False if the ball was neither hopping nor rattling.
     """
     hits, lasted = stays.hits[ball], stays.last[ball] - stays.began[ball]
     if hits < MIN_HITS or hits <= stays.meetings[ball]:
         return False
     normal = vec3_at(stays.normal, ball)
     faces = dot(normal, normal) < (FACING * hits) ** 2
-    kind = LOCKED
+    kind = HOPPING
     if faces and stays.rise[ball] < radius and stays.speed[ball] < stays.slow * hits:
-        kind = JAMMED
+        kind = RATTLING
     elif landed or lasted < MIN_TIME:
         return False
     stays.time[ball, kind] += lasted
@@ -239,7 +238,7 @@ def begin_anew(stays: Stays) -> None:
 
 
 def trapped(stays: Stays, radii: np.ndarray, middle: np.ndarray) -> Trapped:
-    """End all series, and return the balls that were locked or jammed since recording began.
+    """End all series, and return the balls that were hopping or rattling since recording began.
 
     Args:
         radii: radius of each ball [m], (n,).
@@ -248,6 +247,9 @@ def trapped(stays: Stays, radii: np.ndarray, middle: np.ndarray) -> Trapped:
     at_end = np.array([end_series(stays, float(r), k, False) for k, r in enumerate(radii)], bool)
     stays.hits[:] = 0
     balls = np.flatnonzero(stays.time.any(axis=1))
-    (locked, jammed), (locked_hits, jammed_hits) = stays.time[balls].T, stays.recorded[balls].T
+    (hopping, rattling), (hopping_hits, rattling_hits) = (
+        stays.time[balls].T,
+        stays.recorded[balls].T,
+    )
     position = stays.spot[balls] + middle
-    return Trapped(balls, locked, jammed, locked_hits, jammed_hits, at_end[balls], position)
+    return Trapped(balls, hopping, rattling, hopping_hits, rattling_hits, at_end[balls], position)

@@ -41,15 +41,15 @@ def test_all_balls_of_few_end_hopping_and_the_note_says_so() -> None:
 
     setting = setting._replace(design=plate.model_copy(update={"effects": rubs}))
     found = simulate_replica(setting, replica_seed(1, 0)).trapped
-    assert found.locked_at_end == 1.0
-    assert 0.9 < found.locked_time <= 1.0
-    assert 0.9 < found.locked_impacts <= 1.0
-    assert found.jammed_time == 0.0
+    assert found.hopping_at_end == 1.0
+    assert 0.9 < found.hopping_time <= 1.0
+    assert 0.9 < found.hopping_impacts <= 1.0
+    assert found.rattling_time == 0.0
     (note,) = trapped_notes([found], rough=False)
     assert "in 1 of 1 replicas balls hopped up and down on one spot" in note
     assert "at the end all balls did" in note
     assert "effects.roughness" in note
-    assert TrappedRecord(**trapped_shares([found])).locked_at_end == 1.0
+    assert TrappedRecord(**trapped_shares([found])).hopping_at_end == 1.0
 
 
 @pytest.fixture(scope="module")
@@ -70,23 +70,23 @@ def result(impacts: int, trapped: Trapped) -> Any:
     )
 
 
-def test_a_jammed_ball_is_counted_and_its_gap_named(chamber: Chamber) -> None:
+def test_a_rattling_ball_is_counted_and_its_gap_named(chamber: Chamber) -> None:
     two = Trapped(
         ball=np.array([3, 7]),
-        locked=np.array([0.0, 0.5]),
-        jammed=np.array([1.0, 0.0]),
-        locked_hits=np.array([0, 30]),
-        jammed_hits=np.array([480, 0]),
+        hopping=np.array([0.0, 0.5]),
+        rattling=np.array([1.0, 0.0]),
+        hopping_hits=np.array([0, 30]),
+        rattling_hits=np.array([480, 0]),
         at_end=np.array([True, False]),
         position=np.array([[8.485e-3, 0.0, 0.0], [0.0, 0.0, 8e-3]]),
     )
     found = find_trapped_balls(result(1000, two), 2.0, chamber, part_turns=False)
     assert found == TrappedBalls(
-        locked_time=0.025,
-        locked_impacts=0.03,
-        locked_at_end=0.0,
-        jammed_time=0.05,
-        jammed_impacts=0.48,
+        hopping_time=0.025,
+        hopping_impacts=0.03,
+        hopping_at_end=0.0,
+        rattling_time=0.05,
+        rattling_impacts=0.48,
         place="between the part's side and the wall, around (8.5, 0.0, 0.0) mm",
     )
     hops, rattles = trapped_notes([found, NOT_TRAPPED, found], rough=True)

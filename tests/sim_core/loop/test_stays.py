@@ -1,4 +1,4 @@
-"""Balls that hop on one spot or rattle in a gap are told from those that fly, and that lie still."""
+"""Balls that hop on one spot or rattle in a gap are told from those that fly or lie still."""
 
 from dataclasses import replace
 
@@ -45,11 +45,11 @@ def test_few_balls_with_friction_end_hopping_on_one_spot(subdivisions: int) -> N
     found = result.trapped
     assert len(found) == 15
     assert found.at_end.all()
-    assert found.locked.sum() > 0.7 * 15 * SECONDS
-    assert (found.locked <= SECONDS).all()
-    assert not found.jammed.any()
+    assert found.hopping.sum() > 0.7 * 15 * SECONDS
+    assert (found.hopping <= SECONDS).all()
+    assert not found.rattling.any()
     # Few impacts are none of the hops, those before the sideways speed is gone.
-    assert 0.7 * len(result.impacts) < found.locked_hits.sum() <= len(result.impacts)
+    assert 0.7 * len(result.impacts) < found.hopping_hits.sum() <= len(result.impacts)
     last = [result.impacts.position[result.impacts.ball == k][-1] for k in found.ball]
     sideways = (found.position - np.array(last))[:, :2]
     assert (np.hypot(*sideways.T) < 0.5 * DIAMETER).all()
@@ -88,15 +88,15 @@ def groove(subdivisions: int) -> Scene:
 
 
 @pytest.mark.parametrize("subdivisions", [0, 1])
-def test_a_ball_in_a_groove_hardly_narrower_than_itself_is_jammed(subdivisions: int) -> None:
+def test_a_ball_in_a_groove_hardly_narrower_than_itself_rattles(subdivisions: int) -> None:
     scene = groove(subdivisions)
     result = simulate(scene)
     found = result.trapped
     assert found.ball.tolist() == [0]
     assert found.at_end.all()
-    assert found.jammed[0] > 0.5
-    assert found.locked[0] == 0.0
-    assert found.jammed_hits[0] > 0.9 * len(result.impacts)
+    assert found.rattling[0] > 0.5
+    assert found.hopping[0] == 0.0
+    assert found.rattling_hits[0] > 0.9 * len(result.impacts)
     away = found.position[0] - scene.balls.positions[0]
     assert np.hypot(*away[:2]) < 0.5 * DIAMETER
 
@@ -104,7 +104,7 @@ def test_a_ball_in_a_groove_hardly_narrower_than_itself_is_jammed(subdivisions: 
 def test_what_came_before_the_recording_does_not_count() -> None:
     scene = groove(0)
     later = simulate(replace(scene, warmup=0.5, duration=0.25)).trapped
-    assert 0.0 < later.jammed[0] <= 0.25
+    assert 0.0 < later.rattling[0] <= 0.25
 
 
 def test_a_ball_that_other_balls_keep_in_place_is_not_trapped() -> None:
