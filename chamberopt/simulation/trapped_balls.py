@@ -74,7 +74,7 @@ def find_trapped_balls(
 
 
 def _place(result: SimulationResult, chamber: Chamber, part_turns: bool) -> str:
-    """Return the surfaces and the position of the rattling ball that hits most often; "" for none."""
+    """Return surfaces and position of the rattling ball that hits most often; "" for none."""
     found = result.trapped
     if not found.rattling.any():
         return ""
@@ -123,9 +123,9 @@ def trapped_notes(found: Sequence[TrappedBalls], rough: bool) -> tuple[str, ...]
         worst = max(found, key=lambda one: (one.rattling_impacts, one.rattling_time))
         notes.append(
             f"in {some} of {len(found)} replicas balls sat in a gap hardly narrower or wider than "
-            f"themselves: {percent(mean['rattling_impacts'])} of the impacts on the part are their "
-            f"rattling, in {percent(mean['rattling_time'])} of the shot's time, e.g. {worst.place}; "
-            "their slow impacts lower the mean speed; give another shot.diameter_mm than the gap, "
+            f"themselves: {percent(mean['rattling_impacts'])} of the impacts on the part are "
+            f"their rattling, in {percent(mean['rattling_time'])} of the shot's time, e.g. "
+            f"{worst.place}; their slow impacts lower the mean speed; give another shot.diameter_mm than the gap, "
             "or close it"
         )
     return tuple(notes)
