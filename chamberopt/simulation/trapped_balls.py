@@ -125,8 +125,8 @@ def trapped_notes(found: Sequence[TrappedBalls], rough: bool) -> tuple[str, ...]
             f"in {some} of {len(found)} replicas balls sat in a gap hardly narrower or wider than "
             f"themselves: {percent(mean['rattling_impacts'])} of the impacts on the part are "
             f"their rattling, in {percent(mean['rattling_time'])} of the shot's time, e.g. "
-            f"{worst.place}; their slow impacts lower the mean speed; give another shot.diameter_mm than the gap, "
-            "or close it"
+            f"{worst.place}; their slow impacts lower the mean speed; give another "
+            "shot.diameter_mm than the gap, or close it"
         )
     return tuple(notes)
 

@@ -4,8 +4,8 @@ A series holds the successive hits of a ball on surfaces that lie within a ball'
 first hit sideways, and during which the ball hits surfaces more often than other balls. In a series
 of MIN_HITS or more the ball is
 
-- *rattling* in a gap, if all hits also lie within a ball's radius in height, they come from surfaces
-  that face each other, and they are slow: below SLOW of the sonotrode's peak speed on average;
+- *rattling* in a gap, if all hits also lie within a ball's radius in height, come from surfaces that
+  face each other, and are slow: below SLOW of the sonotrode's peak speed on average;
 - *hopping* on one spot, if it is not rattling and the series lasts for MIN_TIME or more.
 
 Sideways means across gravity, or, without gravity, across the motion of the sonotrode. A series
@@ -247,9 +247,5 @@ def trapped(stays: Stays, radii: np.ndarray, middle: np.ndarray) -> Trapped:
     at_end = np.array([end_series(stays, float(r), k, False) for k, r in enumerate(radii)], bool)
     stays.hits[:] = 0
     balls = np.flatnonzero(stays.time.any(axis=1))
-    (hopping, rattling), (hopping_hits, rattling_hits) = (
-        stays.time[balls].T,
-        stays.recorded[balls].T,
-    )
-    position = stays.spot[balls] + middle
-    return Trapped(balls, hopping, rattling, hopping_hits, rattling_hits, at_end[balls], position)
+    time, hits, position = stays.time[balls], stays.recorded[balls], stays.spot[balls] + middle
+    return Trapped(balls, *time.T, *hits.T, at_end[balls], position)
