@@ -4,8 +4,8 @@ A series holds the successive hits of a ball on surfaces that lie within a ball'
 first hit sideways, and during which the ball hits surfaces more often than other balls. In a series
 of MIN_HITS or more the ball is
 
-- *rattling* in a gap, if all hits also lie within a ball's radius in height, come from surfaces that
-  face each other, and are slow: below SLOW of the sonotrode's peak speed on average;
+- *rattling* in a gap, if all hits also lie within a ball's radius in height, come from surfaces
+  that face each other, and are slow: below SLOW of the sonotrode's peak speed on average;
 - *hopping* on one spot, if it is not rattling and the series lasts for MIN_TIME or more.
 
 Sideways means across gravity, or, without gravity, across the motion of the sonotrode. A series
