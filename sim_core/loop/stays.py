@@ -247,5 +247,13 @@ def trapped(stays: Stays, radii: np.ndarray, middle: np.ndarray) -> Trapped:
     at_end = np.array([end_series(stays, float(r), k, False) for k, r in enumerate(radii)], bool)
     stays.hits[:] = 0
     balls = np.flatnonzero(stays.time.any(axis=1))
-    time, hits, position = stays.time[balls], stays.recorded[balls], stays.spot[balls] + middle
-    return Trapped(balls, *time.T, *hits.T, at_end[balls], position)
+    time, hits = stays.time[balls], stays.recorded[balls]
+    return Trapped(
+        ball=balls,
+        hopping=time[:, HOPPING],
+        rattling=time[:, RATTLING],
+        hopping_hits=hits[:, HOPPING],
+        rattling_hits=hits[:, RATTLING],
+        at_end=at_end[balls],
+        position=stays.spot[balls] + middle,
+    )
