@@ -8,6 +8,7 @@ from benchmarks.scenes import PART, PHYSICS, scene
 from sim_core import (
     Balls,
     Drag,
+    Flexure,
     Friction,
     PartRotation,
     Physics,
@@ -54,6 +55,11 @@ EFFECTS = {
     ),
     "roughness": Effect(
         PHYSICS, PHYSICS._replace(roughness=Roughness((0.05,) * 3)), ("roughness",)
+    ),
+    "flexure": Effect(
+        PHYSICS,
+        PHYSICS._replace(flexure=Flexure(np.full(len(scene(NAME).mesh.triangles), 0.01), 1e11)),
+        ("flexure",),
     ),
     "drag": Effect(PHYSICS, PHYSICS._replace(drag=Drag()), ("drag",)),
     "rest": Effect(PHYSICS, PHYSICS._replace(rest=Rest()), ("contact",)),

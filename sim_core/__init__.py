@@ -29,6 +29,7 @@ from sim_core.contact.resting_balls import Resting, can_rest
 from sim_core.effects.amplitude_profile import rms_share
 from sim_core.effects.contact_mode import Rest
 from sim_core.effects.drag import Drag, drag_coefficient
+from sim_core.effects.flexure import Flexure, plate_mobility, zener_parameter, zener_restitution
 from sim_core.effects.friction import Friction
 from sim_core.effects.gravity import Gravity
 from sim_core.effects.part_rotation import PartRotation
@@ -69,6 +70,7 @@ __all__ = [
     "Collisions",
     "Drag",
     "Energies",
+    "Flexure",
     "Frames",
     "Friction",
     "Gravity",
@@ -102,6 +104,7 @@ __all__ = [
     "largest_amplitude",
     "pack_balls",
     "periodic_box",
+    "plate_mobility",
     "prism_cavity",
     "require_free_rotation",
     "require_profiles",
@@ -110,4 +113,6 @@ __all__ = [
     "simulate",
     "surface_effects",
     "user_cache",
+    "zener_parameter",
+    "zener_restitution",
 ]

@@ -130,9 +130,8 @@ def _facet(roughness: RoughnessState, ball: int, touch: Touch) -> Touch:
     s_2 = slope * _normals(roughness, ball)[0]
     away = add_scaled(normal, s_1, first)
     away = add_scaled(away, s_2, cross(normal, first))
-    return Touch(
-        scaled(1.0 / math.sqrt(dot(away, away)), away), touch.relative, touch.tag, touch.kind
-    )
+    facet = scaled(1.0 / math.sqrt(dot(away, away)), away)
+    return Touch(facet, touch.relative, touch.tag, touch.kind, touch.triangle)
 
 
 @jit

@@ -1,7 +1,7 @@
 """Velocity changes at a collision without friction.
 
 The normal relative velocity is reversed and multiplied by e, the coefficient of restitution from
-effects/restitution.py. The tangential velocity is kept. Two equal balls keep their momentum here,
+effects/restitution.py and, on thin parts, effects/flexure.py. The tangential velocity is kept. Two equal balls keep their momentum here,
 and geometry/ball_sizes.py corrects the change for unequal balls.
 
 A ball that circles in a cylinder and loses the last of its normal speed to restitution would hit
@@ -12,11 +12,12 @@ force, m v²/R on average. The sides of a mesh are flat and need no such angle.
 
 import math
 
+from sim_core.effects.flexure import FlexureState, restitution_with_flexure
 from sim_core.effects.restitution import RestitutionState, ball_restitution, surface_restitution
 from sim_core.geometry.analytic import CylinderAxis
 from sim_core.geometry.obstacles import CYLINDER_WALL
 from sim_core.numerics.jit import jit
-from sim_core.numerics.vec3 import Vec3, add_scaled, dot, scaled
+from sim_core.numerics.vec3 import Touch, Vec3, add_scaled, dot, scaled
 
 # Smallest angle [rad] at which a ball leaves a cylinder wall: the ball moves R angle²/2 = 0.2 nm
 # away. A ball of 5 m/s hits the wall a million times a second, a hundredth of the rate that counts
@@ -51,21 +52,24 @@ def pair_velocity_change(apart: Vec3, closing: Vec3, restitution: RestitutionSta
 
 @jit
 def surface_velocity_change(
-    away: Vec3, relative: Vec3, restitution: RestitutionState | None, tag: int
+    touch: Touch, restitution: RestitutionState | None, flexure: FlexureState | None, ball: int
 ) -> Vec3:
     """Return the velocity change [m/s] of a ball that hits a surface; zero if it moves away.
 
     Args:
-        away: any vector along the normal, from the surface to the ball.
-        relative: the ball's velocity minus the surface's [m/s].
+        touch: the contact between ball and surface.
         restitution: None for an elastic ball.
-        tag: tag of the surface.
+        flexure: flexure of thin parts; None for rigid surfaces.
+        ball: number of the ball.
     """
-    rate = dot(away, relative)
+    away = touch.away
+    rate = dot(away, touch.relative)
     if rate >= 0.0:
         return Vec3(0.0, 0.0, 0.0)
     square = dot(away, away)
-    e = surface_restitution(restitution, tag, -rate / math.sqrt(square))
+    speed = -rate / math.sqrt(square)
+    e = surface_restitution(restitution, touch.tag, speed)
+    e = restitution_with_flexure(flexure, restitution, ball, touch.triangle, speed, e)
     return scaled(-(1.0 + e) * rate / square, away)
 
 

@@ -89,6 +89,9 @@ def compile_simulator(
             tags = np.minimum(tags, len(law.surfaces) - 1)
     if physics.part_rotation is not None:
         physics, vertices, triangles, tags = _with_a_turning_box(physics, vertices, triangles, tags)
+    if physics.flexure is not None:
+        rigid = np.zeros(3 if cylinder else len(triangles))
+        physics = physics._replace(flexure=physics.flexure._replace(mobility=rigid))
     side = math.ceil(MIN_BALLS ** (1 / 3)) if balls >= MIN_BALLS else 2
     places = np.stack(np.meshgrid(*[np.linspace(0.1, 0.9, side)] * 3), axis=-1).reshape(-1, 3)
     diameter = 0.05 if alike else np.linspace(0.04, 0.05, len(places)).round(2)

@@ -37,6 +37,7 @@ from sim_core.effects.contact_mode import (
     still_surface_restitution,
     vibrating_restitution,
 )
+from sim_core.effects.flexure import FlexureState
 from sim_core.effects.part_rotation import (
     RotationState,
     relative_flight,
@@ -51,6 +52,7 @@ from sim_core.effects.surface.surface_effects import apply_surface_effects
 from sim_core.effects.vibration import surface_velocity
 from sim_core.geometry.ball_sizes import share_by_mass
 from sim_core.geometry.obstacles import CAPSULE, VIBRATING_FACE
+from sim_core.geometry.triangle_lookup import find_triangle
 from sim_core.geometry.turning_part import PartTree
 from sim_core.impulses.collision import (
     leave_cylinder_wall,
@@ -92,7 +94,7 @@ def _resolve_contact(
         law: restitution law of the surface.
         approach: speed along the normal of ``touch`` before the hit [m/s].
     """
-    change = surface_velocity_change(touch.away, touch.relative, law, touch.tag)
+    change = surface_velocity_change(touch, law, state.flexure, event.ball)
     change = _in_room(rotation, change, event.time)
     change = _constrained(rotation, state, event, touch, approach, change)
     away = _in_room(rotation, touch.away, event.time)
@@ -100,12 +102,12 @@ def _resolve_contact(
     change = add_surface_friction(
         state.friction_state, state.sizes, event.ball, event.time, away, relative, change, touch.tag
     )
-    in_room = Touch(away, relative, touch.tag, touch.kind)
+    in_room = Touch(away, relative, touch.tag, touch.kind, touch.triangle)
     change = apply_surface_effects(
         state.surface_effects, event.ball, event.time_since_start, in_room, change
     )
     away = _in_room(rotation, mean.away, event.time)
-    mean = Touch(away, relative, mean.tag, mean.kind)
+    mean = Touch(away, relative, mean.tag, mean.kind, mean.triangle)
     change = _until_it_leaves(state.roughness, state, event, mean, law, change)
     return leave_cylinder_wall(state.obstacles.cylinder, mean.kind, away, relative, change)
 
@@ -129,10 +131,10 @@ def _until_it_leaves(
         velocity = add_scaled(mean.relative, 1.0, change)
         if dot(mean.away, velocity) > 0.0:
             return change
-        touch = Touch(mean.away, velocity, mean.tag, mean.kind)
+        touch = Touch(mean.away, velocity, mean.tag, mean.kind, mean.triangle)
         if hits < MOST_HITS:
             touch = touched_facet(roughness, event.ball, touch)
-        push = surface_velocity_change(touch.away, velocity, law, touch.tag)
+        push = surface_velocity_change(touch, law, state.flexure, event.ball)
         push = add_surface_friction(
             state.friction_state,
             state.sizes,
@@ -179,6 +181,21 @@ def _here(state: SimulationState, event: BallEvent) -> BallState:
 
 
 @inlined
+def _hit_triangle(
+    flexure: FlexureState | None, state: SimulationState, tag: int, triangle: int, touched: Vec3
+) -> int:
+    """Return the triangle that is hit, where a part may be thin there; else ``triangle``.
+
+    ``triangle``: any triangle of the flat face that is hit, at ``touched`` [m].
+    """
+    if flexure is None:
+        return triangle
+    if not flexure.bends[tag]:
+        return triangle
+    return find_triangle(state.obstacles.lookup, triangle, touched)
+
+
+@inlined
 def hit_surface(state: SimulationState, event: BallEvent) -> Impact:
     """Resolve a hit on a still or vibrating surface: change the velocity and count the hit.
 
@@ -214,7 +231,8 @@ def hit_surface(state: SimulationState, event: BallEvent) -> Impact:
         law = still_surface_restitution(state.contact, state.restitution)
     triangle = int(np.int64(tree.triangles[obstacle, side]))
     tag = int(np.int64(obstacles.tags[triangle]))
-    mean = Touch(away, relative, tag, kind)
+    hit = _hit_triangle(state.flexure, state, tag, triangle, touched)
+    mean = Touch(away, relative, tag, kind, hit)
     touch = mean if landed != BOUNCES else touched_facet(state.roughness, ball, mean)
     approach = -dot(touch.away, relative) / math.sqrt(dot(touch.away, touch.away))
     if landed == BOUNCES:
@@ -251,13 +269,14 @@ def hit_part(
     relative = slip_velocity(rotation, seen, away, event.time)
     triangle = int(np.int64(tree.triangles[row, side]))
     tag = int(np.int64(state.obstacles.tags[triangle]))
-    mean = Touch(away, relative, tag, tree.kinds[row])
+    touched = sub(seen.position, away)
+    hit = _hit_triangle(state.flexure, state, tag, triangle, touched)
+    mean = Touch(away, relative, tag, tree.kinds[row], hit)
     touch = touched_facet(state.roughness, event.ball, mean)
     approach = -dot(touch.away, relative) / math.sqrt(dot(touch.away, touch.away))
     change = _resolve_contact(rotation, state, event, mean, touch, state.restitution, approach)
     push_ball(state.contact, state.motion, event, here, change)
     state.counts[WALLS] += 1
-    touched = sub(seen.position, away)
     return Impact(tag, triangle, touched, seen.position, relative, approach, away)
 
 

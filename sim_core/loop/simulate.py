@@ -12,6 +12,7 @@ from sim_core.detect.ball_mesh import new_scratch
 from sim_core.effects.amplitude_profile import new_face_profiles
 from sim_core.effects.contact_mode import checked_rest, new_contact_state, new_ride
 from sim_core.effects.drag import checked_drag, new_drag_state
+from sim_core.effects.flexure import checked_flexure, new_flexure_state
 from sim_core.effects.friction import FrictionState, checked_friction, new_friction_state
 from sim_core.effects.gravity import checked_gravity, gravity_acceleration
 from sim_core.effects.part_rotation import angle_at, checked_axis, new_rotation_state
@@ -227,6 +228,9 @@ class Simulation:
                 random_phase, wave, vibrating, 0.5 * balls.diameters
             ),
             roughness=new_roughness_state(checked_roughness(physics.roughness, tags), len(motion)),
+            flexure=new_flexure_state(
+                checked_flexure(physics.flexure, len(scene.mesh.tags)), balls, scene.mesh.tags
+            ),
             drag=new_drag_state(checked_drag(physics.drag), balls.diameters, balls.densities),
             sizes=new_ball_sizes(balls, obstacles.roots),
             waves=sonotrodes,

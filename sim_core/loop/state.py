@@ -8,6 +8,7 @@ from sim_core.detect.ball_mesh import Scratch
 from sim_core.effects.amplitude_profile import FaceProfiles
 from sim_core.effects.contact_mode import ContactState
 from sim_core.effects.drag import DragState
+from sim_core.effects.flexure import FlexureState
 from sim_core.effects.friction import FrictionState
 from sim_core.effects.gravity import Gravity
 from sim_core.effects.part_rotation import RotationState
@@ -81,6 +82,7 @@ class SimulationState(NamedTuple):
     surface_effects: SurfaceEffects
     random_phase: RandomPhaseState | None
     roughness: RoughnessState | None
+    flexure: FlexureState | None
     drag: DragState | None
     sizes: BallSizes | None
     waves: SonotrodeWaves | None

@@ -30,12 +30,14 @@ class Touch(NamedTuple):
     relative: velocity of the ball minus the velocity of the surface, before the hit [m/s].
     tag: tag of the surface.
     kind: kind of the obstacle: FACE, CAPSULE, VIBRATING_FACE or CYLINDER_WALL.
+    triangle: triangle of the surface. Of a flat face it is any one, unless parts are thin.
     """
 
     away: Vec3
     relative: Vec3
     tag: int
     kind: int
+    triangle: int
 
 
 @jit

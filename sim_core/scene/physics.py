@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 from sim_core.effects.contact_mode import Rest
 from sim_core.effects.drag import Drag
+from sim_core.effects.flexure import Flexure
 from sim_core.effects.friction import Friction
 from sim_core.effects.gravity import Gravity
 from sim_core.effects.part_rotation import PartRotation
@@ -42,6 +43,7 @@ class Physics(NamedTuple):
         ball_collisions: collisions of balls. With None, balls fly through each other.
         drag: drag of still air.
         roughness: slopes of rough surfaces, at which balls bounce off facets.
+        flexure: flexure of thin parts, which lowers restitution.
         surface: further effects of hits on surfaces.
 
     Example:
@@ -60,6 +62,7 @@ class Physics(NamedTuple):
     ball_collisions: BallCollisions | None = BallCollisions()
     drag: Drag | None = None
     roughness: Roughness | None = None
+    flexure: Flexure | None = None
     surface: SurfaceEffects = SurfaceEffects()
 
     @property

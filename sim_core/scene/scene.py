@@ -8,6 +8,7 @@ from sim_core.balls import Balls
 from sim_core.effects.amplitude_profile import shares_at
 from sim_core.effects.contact_mode import Rest, checked_rest
 from sim_core.effects.drag import Drag, checked_drag
+from sim_core.effects.flexure import Flexure, checked_flexure
 from sim_core.effects.friction import Friction, checked_friction
 from sim_core.effects.gravity import checked_gravity
 from sim_core.effects.part_rotation import PartRotation, checked_axis
@@ -55,6 +56,7 @@ EFFECT_TYPES = {
     "drag": Drag,
     "friction": Friction,
     "roughness": Roughness,
+    "flexure": Flexure,
 }
 
 
@@ -156,6 +158,12 @@ class Scene:
                 "give a Friction, or no spins"
             )
         checked_roughness(self.physics.roughness, tag_count)
+        checked_flexure(self.physics.flexure, len(self.mesh.tags))
+        if self.physics.flexure is not None and self.physics.restitution is None:
+            raise SceneError(
+                "physics.flexure is given without physics.restitution, which it lowers: give a "
+                "Restitution too"
+            )
         checked_drag(self.physics.drag)
         random_phase = checked_random_phase(self.physics.random_phase, len(vibrations))
         if random_phase is not None and self.start_time > 0.0:

@@ -95,10 +95,7 @@ def chamber_of(plan: Plan) -> Chamber:
     if SONOTRODES in plan.effects:
         tags[(vertices[triangles][:, :, 2] == vertices[:, 2].max()).all(axis=1)] = LID
     mesh = TriangleMesh(plan.wide * (vertices + plan.far), triangles, tags)
-    middle = np.full(3, plan.wide * plan.far)
-    physics = physics_of(
-        plan.effects, plan.much, plan.wide, plan.speed, diameter, middle, plan.seed
-    )
+    physics = physics_of(plan.effects, plan.much, plan.wide, plan.speed, diameter, mesh, plan.seed)
     size: float | np.ndarray = diameter
     density: float | np.ndarray = 7800.0
     if SIZES in plan.effects:

@@ -10,6 +10,7 @@ from sim_core import (
     AmplitudeProfile,
     BallCollisions,
     Drag,
+    Flexure,
     Friction,
     Gravity,
     PartRotation,
@@ -18,7 +19,9 @@ from sim_core import (
     Rest,
     Restitution,
     Roughness,
+    TriangleMesh,
     Vibration,
+    zener_parameter,
 )
 from sim_core.effects.drag import MIN_PIECE
 from tests.hard_cases.outcome import CONSTANT
@@ -30,9 +33,9 @@ SONOTRODES = "sonotrodes"  # the same: a lid that vibrates as well as the floor
 BENT = "bent"  # the same: the floor, and the lid if it vibrates, move least at the rim
 LAWFUL = "gravity restitution ball_collisions"  # of a chamber that is of this world
 FEW = (
-    f"{LAWFUL} vibration rest friction drag roughness",
-    f"{LAWFUL} vibration random_phase friction drag roughness {SIZES} {BENT}",
-    f"{LAWFUL} vibration rest friction part_rotation",
+    f"{LAWFUL} vibration rest friction drag roughness flexure",
+    f"{LAWFUL} vibration random_phase friction drag roughness flexure {SIZES} {BENT}",
+    f"{LAWFUL} vibration rest friction part_rotation flexure",
     "gravity restitution vibration random_phase rest friction drag part_rotation",
     f"{LAWFUL} vibration rest {SONOTRODES}",
 )
@@ -41,7 +44,7 @@ MANY = (
     f"{LAWFUL} vibration rest friction drag",
     f"{LAWFUL} vibration random_phase drag {SIZES}",
     f"{LAWFUL} vibration rest friction part_rotation roughness",
-    f"{LAWFUL} vibration roughness {SONOTRODES}",
+    f"{LAWFUL} vibration roughness flexure {SONOTRODES}",
     f"{LAWFUL} vibration rest {SONOTRODES} {BENT}",
     f"{LAWFUL} vibration rest friction part_rotation {BENT}",
     "ball_collisions roughness",
@@ -63,6 +66,7 @@ MANY = (
 )
 RESTITUTIONS = (0.0, 1e-9, 0.05, 0.5, 0.9, 1.0 - 1e-12, 1.0)
 TAGS = 4
+MODULUS = 1e11  # Pa, of the contact
 LID = 3
 
 
@@ -74,7 +78,8 @@ class Strengths(NamedTuple):
     [diameters] of the floor, ``beat``: the face's peak speed; ``tip``: the part's speed at its tip,
     ``to_and_fro``: it swings; ``rough``: mu and beta0 of balls that start spinning, once for
     surfaces, once for balls; ``slope``: rms slope of the surfaces; ``fall``: of the
-    amplitude from the middle of a bent face to its rim; ``slowing``: share of the air's
+    amplitude from the middle of a bent face to its rim; ``give``: Zener's parameter at the
+    shot's speed; ``slowing``: share of the air's
     deceleration that takes all of the speed on one width; ``spread``: smallest over largest
     diameter.
     """
@@ -89,6 +94,7 @@ class Strengths(NamedTuple):
     rough: tuple[tuple[float, float], tuple[float, float]]
     slope: float
     fall: float
+    give: float
     slowing: float
     spread: float
 
@@ -115,6 +121,7 @@ def strengths() -> st.SearchStrategy[Strengths]:
         rough=st.tuples(rough, rough),
         slope=st.just(0.0) | powers(-3.0, -0.31),
         fall=st.just(0.0) | st.floats(0.0, 1.0),
+        give=st.just(0.0) | powers(-3.0, 1.0),
         slowing=powers(-4.0, 0.5),
         spread=st.floats(0.2, 1.0),
     )
@@ -126,12 +133,13 @@ def physics_of(
     wide: float,
     speed: float,
     diameter: float,
-    middle: np.ndarray,
+    mesh: TriangleMesh,
     seed: int,
 ) -> Physics:
-    """The effects named, for a chamber ``wide`` [m] about ``middle`` (3,) [m] and shot of so much
+    """The effects named, for a chamber ``wide`` [m] with its ``mesh``, and shot of so much
     ``speed`` [m/s].
     """
+    middle = mesh.middle
     law = (much.restitution, CONSTANT if much.restitution == 1.0 else speed)
     amplitude = much.swing * diameter
     rate = much.tip * speed / (0.3 * wide)  # rad/s
@@ -149,6 +157,10 @@ def physics_of(
         points = ((0.0, 1.0), (0.5 * wide, 1.0 - 0.5 * fall), (2.0 * wide, 1.0 - fall))
         profile = AmplitudeProfile(points, tuple((middle + 0.1 * wide).tolist()))
         floor, lid = floor._replace(profile=profile), lid._replace(profile=profile)
+    # Every other triangle is thin.
+    mass = 7800.0 * math.pi / 6.0 * diameter**3
+    unit = zener_parameter(1.0, MODULUS, 0.5 * diameter, mass, speed)
+    mobility = np.where(np.arange(len(mesh.triangles)) % 2, much.give / unit, 0.0)
     present = Physics(
         Gravity(z=-much.weight * speed**2 / wide),
         Restitution((law,) * TAGS, law, much.elastic_below * speed),
@@ -160,6 +172,7 @@ def physics_of(
         BallCollisions(),
         Drag(air, air * speed * diameter / 1e4, max(0.1 * wide / speed, MIN_PIECE)),
         Roughness((much.slope,) * TAGS, seed),
+        Flexure(mobility, MODULUS),
     )
     return Physics(
         **{name: effect if name in effects else None for name, effect in present._asdict().items()}

@@ -14,6 +14,7 @@ from sim_core import (
     BallCollisions,
     Balls,
     Drag,
+    Flexure,
     Friction,
     Gravity,
     PartRotation,
@@ -42,6 +43,7 @@ KEPT = {
     "random_phase": ("random_phase", "RandomPhaseState"),
     "drag": ("drag", "DragState"),
     "roughness": ("roughness", "RoughnessState"),
+    "flexure": ("flexure", "FlexureState"),
     "ball_collisions": ("neighbours", "NeighbourFilter"),
 }
 STEEL = (0.9, 1.0)
@@ -55,9 +57,10 @@ PRESENT = {
     "random_phase": RandomPhase(1),
     "drag": Drag(),
     "roughness": Roughness((0.1,) * 3),
+    "flexure": Flexure(np.zeros(12), 1e11),
     "ball_collisions": BallCollisions(),
 }
-NEEDS = {"rest": "gravity", "random_phase": "vibration"}
+NEEDS = {"rest": "gravity", "flexure": "restitution", "random_phase": "vibration"}
 BARE = Physics(ball_collisions=None)
 
 
@@ -146,6 +149,7 @@ def test_the_machine_code_of_a_bare_scene_knows_no_effect(bare: dict[str, list[s
         "effects.part_rotation.relative_flight",
         "effects.restitution.restitution_law",
         "effects.roughness._facet",
+        "effects.flexure._zener",
         "impulses.friction._tangential_change",
         "loop.neighbours.next_meeting",
     ):
