@@ -47,6 +47,7 @@ from sim_core.errors import SceneError, SimulationError
 from sim_core.geometry.analytic import AnalyticCavity, cylinder_cavity, periodic_box, prism_cavity
 from sim_core.geometry.closest_point import ClosestPoints, closest_points
 from sim_core.geometry.mesh import TriangleMesh
+from sim_core.geometry.ray_length import ray_lengths
 from sim_core.geometry.sonotrode_border import largest_amplitude
 from sim_core.geometry.triangle_lookup import find_triangles
 from sim_core.loop.compile_ahead import compile_simulator, is_compiled
@@ -106,6 +107,7 @@ __all__ = [
     "periodic_box",
     "plate_mobility",
     "prism_cavity",
+    "ray_lengths",
     "require_free_rotation",
     "require_profiles",
     "restitution_at",

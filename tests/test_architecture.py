@@ -17,18 +17,18 @@ ORDER = {
         "common geometry design chamber coverage simulation peening search results pictures "
         "documents printers viewer workflows export page api cli __main__"
     ),
-    "chamberopt/geometry": "triangles faces+solids+remesh meshes slivers+smoothing",
+    "chamberopt/geometry": "triangles faces+solids+remesh+thickness meshes slivers+smoothing",
     "chamberopt/geometry/smoothing": "rounds normals divide smooth part",
     "chamberopt/geometry/meshes": "surface_error native_reader+units+raw_mesh+self_intersection "
     "healing+elements+step_tessellation abaqus+gmsh+nastran+obj+ply+step+stl+threemf+vtk formats "
     "part_mesh",
     "chamberopt/design": (
         "shape_surface+table_base materials shapes effects+part+process+shot+sonotrode "
-        "almen_strip+calibration+tolerances+zones design load"
+        "almen_strip+calibration+flexure+tolerances+zones design load"
     ),
     "chamberopt/chamber": (
-        "replica_seed bores_and_deflectors part reach+largest_ball build dimensionless scene "
-        "analytic checks propose"
+        "replica_seed bores_and_deflectors thin_part part reach+largest_ball build dimensionless "
+        "scene analytic checks propose"
     ),
     "chamberopt/coverage": "dents part_impacts+metrics field coverage_from_impacts "
     "percentile coverage_intervals strength strength_intervals compression",

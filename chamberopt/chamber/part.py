@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from chamberopt.chamber.thin_part import thickness_to_simulate
 from chamberopt.common.errors import InputError
 from chamberopt.common.number_text import plain
 from chamberopt.geometry.faces import Faces
@@ -137,6 +138,9 @@ class Part:
     normals: np.ndarray | None = None
     hollow: np.ndarray | None = None  # largest hollow curvature of that surface [1/m], (m,)
     smoothing: SmoothingFacts | None = None  # None where there is nothing to smooth
+    # Thickness of each triangle [m], (m,) float32; inf where it is no thin plate. None if the part
+    # counts as rigid everywhere.
+    thickness: np.ndarray | None = None
 
     @property
     def corner_normals(self) -> np.ndarray:
@@ -208,6 +212,11 @@ def posed_part(design: Design) -> tuple[Part, list[str]]:
     mesh, origin = found.mesh, found.origin
     turn, shift = _pose(given, mesh.vertices, design)
     vertices = snap_to_grid(mesh.vertices @ turn.T + shift)
+    thickness, thin_notes = None, []
+    if not _is_wall(design):
+        chosen = {"the target": target[origin]}
+        chosen |= {f"zone {name}": zone[origin] for name, zone in zones.items()}
+        thickness, thin_notes = thickness_to_simulate(design, mesh, chosen)
     part = Part(
         vertices=vertices,
         triangles=mesh.triangles,
@@ -227,8 +236,9 @@ def posed_part(design: Design) -> tuple[Part, list[str]]:
         normals=None if found.normals is None else (found.normals @ turn.T).astype(np.float32),
         hollow=None if found.hollow is None else found.hollow.astype(np.float32),
         smoothing=found.facts,
+        thickness=thickness,
     )
-    return part, [*mesh.notes, *_smoothing_notes(part)]
+    return part, [*mesh.notes, *_smoothing_notes(part), *thin_notes]
 
 
 def _smoothing_notes(part: Part) -> list[str]:

@@ -18,7 +18,15 @@ if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
     from chamberopt.chamber.part import Axis
     from chamberopt.design.load import Design
-    from sim_core import AnalyticCavity, PartRotation, Physics, Scene, TriangleMesh, Vibration
+    from sim_core import (
+        AnalyticCavity,
+        Flexure,
+        PartRotation,
+        Physics,
+        Scene,
+        TriangleMesh,
+        Vibration,
+    )
 
 
 def start_velocities(rng: np.random.Generator, count: int, rms_speed: float) -> np.ndarray:
@@ -190,7 +198,11 @@ def scene_physics(
 
 
 def build_scene(
-    design: Design, mesh: TriangleMesh | AnalyticCavity, seed: int, axis: Axis | None = None
+    design: Design,
+    mesh: TriangleMesh | AnalyticCavity,
+    seed: int,
+    axis: Axis | None = None,
+    flexure: Flexure | None = None,
 ) -> Scene:
     """Return the scene of one simulation. Equal arguments give bit-identical scenes.
 
@@ -203,6 +215,7 @@ def build_scene(
     Args:
         seed: random seed of the simulation.
         axis: axis of a turning part: a point [m] and a direction, in the chamber's frame.
+        flexure: flexure of the mesh's surfaces where the part is thin.
     Raises:
         InputError: the shot does not fit or has too many balls, or the part cannot turn.
     """
@@ -234,7 +247,7 @@ def build_scene(
     return Scene(
         mesh=mesh,
         balls=Balls(positions, velocities, diameter, shot.density),
-        physics=effects,
+        physics=effects._replace(flexure=flexure),
         duration=design.process.recorded_time,
         warmup=design.process.accuracy.warmup_time,
         record=(TAG_PART,),

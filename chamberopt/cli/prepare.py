@@ -30,11 +30,13 @@ def compile_with_message(
     from chamberopt.chamber.part import turning_axis
     from chamberopt.chamber.replica_seed import replica_seed
     from chamberopt.chamber.scene import build_scene, chamber_mesh
+    from chamberopt.chamber.thin_part import flexure_of_surfaces
     from chamberopt.common.progress import step
 
     room, seed = cavity or chamber_mesh(chamber), replica_seed(design.process.seed, 0)
     with step("placing the shot"):
-        scene = build_scene(design, room, seed, turning_axis(design, chamber.part))
+        flexure = flexure_of_surfaces(design, chamber, room)
+        scene = build_scene(design, room, seed, turning_axis(design, chamber.part), flexure)
     is_cylinder = cavity is not None and cavity.radius is not None
     variant = scene.physics, design.shot.count, design.shot.mix is None, is_cylinder
     if sim_core.is_compiled(*variant):

@@ -27,6 +27,7 @@ from chamberopt.design.calibration import (
 )
 from chamberopt.design.effects import Effects
 from chamberopt.design.materials import Materials, with_friction, with_numbers
+from chamberopt.design.flexure import flexure_problems
 from chamberopt.design.part import PartTable
 from chamberopt.design.process import Process
 from chamberopt.design.shapes import SHAPES, ChamberTable
@@ -147,6 +148,7 @@ class Design(FileTable):
         yield from tolerance_problems(self, dict(toml_errors.numeric_fields(self)))
         yield from zone_problems(self.zones, self.calibration)
         yield from calibration_problems(self)
+        yield from flexure_problems(self)
         for effect in ("rest", "part_turn"):
             if self.shot.mix is not None and getattr(self.effects, effect):
                 text = "given beside shot.mix: not supported together yet"

@@ -131,6 +131,36 @@ class RoughnessTable(FileTable):
         return part, sonotrode, wall
 
 
+class FlexureTable(FileTable):
+    """Flexure of thin parts, by Zener's theory, and the elasticity of part and balls.
+
+    The elasticity is that of the alloy and of the balls in the catalogue unless it is given.
+    """
+
+    on: bool = Field(
+        default=True, description="false: parts are rigid however thin; short: flexure = false"
+    )
+    part_E_GPa: float | None = quantity(  # noqa: N815
+        1, 1500, "GPa", "Young's modulus of the part, if not the alloy's", None
+    )
+    part_poisson: float | None = quantity(0, 0.5, "", "Poisson's ratio of the part, likewise", None)
+    part_density_kg_m3: float | None = quantity(
+        500, 25000, "kg/m³", "density of the part, likewise", None
+    )
+    shot_E_GPa: float | None = quantity(  # noqa: N815
+        1, 1500, "GPa", "Young's modulus of the balls, if not the material's", None
+    )
+    shot_poisson: float | None = quantity(0, 0.5, "", "Poisson's ratio of the balls", None)
+
+    def _problems(self) -> Iterator[Problem]:
+        for which in ("part_", "shot_"):
+            keys = [key for key in type(self).model_fields if key.startswith(which)]
+            given = [key for key in keys if getattr(self, key) is not None]
+            for key in keys if given else ():
+                if key not in given:
+                    yield Problem(key, f"missing beside {given[0]}; give {' and '.join(keys)}")
+
+
 class SurfaceEffectTable(FileTable):
     """Base class of a table in [effects] that adds a further effect of hits on surfaces.
 
@@ -171,6 +201,11 @@ class Effects(FileTable):
         "without friction",
         json_schema_extra={"form": ROUGHNESS_FORM},
     )
+    flexure: FlexureTable | None = Field(
+        default=None,
+        description="thin parts take energy from balls: true, false, or a table with E and density "
+        "of part and balls; absent: where the part is so thin that it matters",
+    )
     rest: bool | None = Field(
         default=None,
         description="balls slide and lie still on surfaces that neither vibrate nor turn; absent: "
@@ -182,6 +217,11 @@ class Effects(FileTable):
     ball_collisions: bool = Field(
         default=True, description="false: balls fly through each other; for very little shot"
     )
+
+    @field_validator("flexure", mode="before")
+    @classmethod
+    def _accept_on_and_off(cls, given: object) -> object:
+        return {"on": given} if isinstance(given, bool) else given
 
     @property
     def of_surfaces(self) -> dict[str, dict[str, float]]:

@@ -155,6 +155,7 @@ RULES: dict[str, Rule] = {
     f"{PART}.zones.*": Rule("bool", "triangles", *MARK),
     f"{PART}.normals": Rule("float32", "triangles 3 3", -STEEPEST, STEEPEST),
     f"{PART}.hollow": Rule("float32", "triangles", -STEEPEST, STEEPEST),
+    f"{PART}.thickness": Rule("float32", "triangles", 0.0, np.inf),
     f"{FILE}.rotation": Rule("float64", "3 3", *METRES),
     f"{FILE}.shift": Rule("float64", "3", *METRES),
     **_file_rules(f"{FILE}.simulated", "points", "triangles"),

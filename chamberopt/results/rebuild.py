@@ -11,6 +11,7 @@ from chamberopt.chamber.analytic import analytic_cavity, impacts_on_chamber
 from chamberopt.chamber.part import turning_axis
 from chamberopt.chamber.replica_seed import replica_seed
 from chamberopt.chamber.scene import build_scene, chamber_mesh
+from chamberopt.chamber.thin_part import flexure_of_surfaces
 from chamberopt.common.errors import InputError
 from chamberopt.coverage.part_impacts import HITS_FILE, load_hits
 from chamberopt.results.arrays_file import load_chamber
@@ -98,7 +99,8 @@ def rebuild_replica(result: Result, number: int = 0) -> RebuiltReplica:
     rebuilt, (seed, stream) = rebuild_chamber(result), result.seeds
     mesh = rebuilt.cavity or chamber_mesh(rebuilt.chamber)
     axis = turning_axis(result.design, rebuilt.chamber.part)
-    scene = build_scene(result.design, mesh, replica_seed(seed, number, stream), axis)
+    flexure = flexure_of_surfaces(result.design, rebuilt.chamber, mesh)
+    scene = build_scene(result.design, mesh, replica_seed(seed, number, stream), axis, flexure)
     return RebuiltReplica(result, rebuilt.chamber, rebuilt.cavity, scene)
 
 

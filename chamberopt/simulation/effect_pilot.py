@@ -24,6 +24,7 @@ import numpy as np
 
 from chamberopt.chamber import dimensionless
 from chamberopt.chamber.scene import balls_can_rest, chamber_mesh
+from chamberopt.chamber.thin_part import flexure_of_surfaces, mean_factor
 from chamberopt.common.estimate import Estimate, estimate
 from chamberopt.common.number_text import percent, plain
 from chamberopt.coverage.coverage_from_impacts import coverage_from_dent_density
@@ -58,6 +59,7 @@ SWITCHED = {
     "roughness": (USUAL, None),
     "drag": (True, False),
     "rest": (True, False),
+    "flexure": (True, False),
 }
 
 
@@ -195,6 +197,8 @@ def _bound(effect: str, design: Design, chamber: Chamber) -> float:
 def _is_on(effect: str, design: Design, chamber: Chamber) -> bool:
     if effect == "rest":
         return balls_can_rest(design, chamber_mesh(chamber))
+    if effect == "flexure":
+        return flexure_of_surfaces(design, chamber, chamber_mesh(chamber)) is not None
     return bool(getattr(design.effects, effect))
 
 
@@ -230,6 +234,11 @@ def _reason(effect: str, design: Design, chamber: Chamber) -> str:
         ),
         "drag": f"{percent(loss)} of the speed is lost on the way up",
         "rest": "a surface that does not move faces up, so balls can lie on it",
+        "flexure": (
+            f"it lowers the restitution to {mean_factor(design, chamber):.2f} times on the target"
+            if effect == "flexure"
+            else ""
+        ),
     }[effect]
 
 
@@ -251,6 +260,8 @@ def _switchable(design: Design, chamber: Chamber) -> list[str]:
     def can_be_switched(effect: str) -> bool:
         if effect == "rest":
             return balls_can_rest(design.changed({"effects.rest": None}), chamber_mesh(chamber))
+        if effect == "flexure":
+            return chamber.part.thickness is not None
         return effect != "ball_collisions" or design.shot.count > 1
 
     return [effect for effect in SWITCHED if can_be_switched(effect)]
@@ -260,9 +271,11 @@ def _switched(design: Design, effects: Mapping[str, bool]) -> Design:
     values: dict[str, Any] = {"effects.auto": False}
     for effect, on in effects.items():
         value_on, value_off = SWITCHED[effect]
-        values[f"effects.{effect}"] = (
-            (getattr(design.effects, effect) or value_on) if on else value_off
-        )
+        given = getattr(design.effects, effect)
+        if effect == "flexure" and given is not None:
+            given = given.model_copy(update={"on": on})
+            value_off = given
+        values[f"effects.{effect}"] = (given or value_on) if on else value_off
     if not values.get("effects.gravity", design.effects.gravity):
         values["effects.rest"] = None  # without gravity nothing lies still
     return design.changed(values)

@@ -13,6 +13,7 @@ from chamberopt.chamber.analytic import impacts_on_chamber
 from chamberopt.chamber.part import turning_axis
 from chamberopt.chamber.replica_seed import replica_seed
 from chamberopt.chamber.scene import build_scene
+from chamberopt.chamber.thin_part import flexure_of_surfaces
 from chamberopt.common.errors import WorkerLostError
 from chamberopt.common.executor import share
 from chamberopt.coverage.part_impacts import Hits, hits_on_part
@@ -179,7 +180,8 @@ def simulate_seed(
     """
     from sim_core import TriangleMesh, simulate
 
-    result = simulate(build_scene(design, mesh, seed, turning_axis(design, chamber.part)))
+    axis, flexure = turning_axis(design, chamber.part), flexure_of_surfaces(design, chamber, mesh)
+    result = simulate(build_scene(design, mesh, seed, axis, flexure))
     if isinstance(mesh, TriangleMesh):
         return result
     return replace(result, impacts=impacts_on_chamber(result.impacts, chamber))

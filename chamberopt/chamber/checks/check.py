@@ -22,6 +22,7 @@ from chamberopt.chamber.reach import Reach, find_reach, reached_part_share
 from chamberopt.chamber.replica_seed import replica_seed
 from chamberopt.chamber.scene import build_scene, chamber_mesh, require_ball_count, require_turnable
 from chamberopt.common.number_text import plain
+from chamberopt.chamber.thin_part import flexure_of_surfaces
 from chamberopt.design.shape_surface import TAG_PART, TAG_SONOTRODE, TAG_WALL, is_sonotrode
 from chamberopt.design.tolerances import require_tolerances, tolerance_box
 from chamberopt.geometry.triangles import areas, edge_keys, sides_of, tetrahedron_volumes
@@ -59,7 +60,8 @@ def describe(design: Design, chamber: Chamber, reach: Reach | None = None) -> di
     axis = turning_axis(design, chamber.part)
     require_turnable(design, reach.mesh, axis)
     if not design.effects.auto:  # a scene is built to see if the shot fits
-        build_scene(design, reach.mesh, replica_seed(design.process.seed, 0), axis)
+        flexure = flexure_of_surfaces(design, chamber, reach.mesh)
+        build_scene(design, reach.mesh, replica_seed(design.process.seed, 0), axis, flexure)
     process = design.process
     accuracy = process.accuracy
     simulated = accuracy.replicas * (process.recorded_time + accuracy.warmup_time)
