@@ -212,7 +212,8 @@ def posed_part(design: Design) -> tuple[Part, list[str]]:
     mesh, origin = found.mesh, found.origin
     turn, shift = _pose(given, mesh.vertices, design)
     vertices = snap_to_grid(mesh.vertices @ turn.T + shift)
-    thickness, thin_notes = None, []
+    thickness: np.ndarray | None = None
+    thin_notes: list[str] = []
     if not _is_wall(design):
         chosen = {"the target": target[origin]}
         chosen |= {f"zone {name}": zone[origin] for name, zone in zones.items()}

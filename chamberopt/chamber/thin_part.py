@@ -32,6 +32,7 @@ from chamberopt.geometry.thickness import (
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
+    from chamberopt.chamber.part import Part
     from chamberopt.design.design import Design
     from chamberopt.geometry.meshes.part_mesh import PartMesh
     from sim_core import AnalyticCavity, Flexure, TriangleMesh
@@ -127,13 +128,49 @@ def thin_target(design: Design, samples: Samples, chosen: np.ndarray) -> ThinTar
     )
 
 
-def mean_factor(design: Design, chamber: Chamber) -> float:
-    """Return the mean of Zener's restitution over the target of a chamber whose part is thin."""
-    metals, thickness = plate_metals(design), chamber.part.thickness
-    assert metals is not None
-    assert thickness is not None
+def softness_of_part(design: Design, part: Part) -> np.ndarray | None:
+    """Return the restitution of each triangle over that of a rigid part, (m,), for a picture.
+
+    It is Zener's e of the largest ball at the sonotrode's peak speed; None for a rigid part.
+    """
+    metals = plate_metals(design)
+    if part.thickness is None or metals is None:
+        return None
+    return zener_factor(design, metals, part.thickness)
+
+
+def mean_softness(design: Design, chamber: Chamber) -> float:
+    """Return the mean of softness_of_part over the target in the chamber; 1 for a rigid part."""
+    softness = softness_of_part(design, chamber.part)
     area = chamber.exposed_area * chamber.part.target
-    return float(area @ zener_factor(design, metals, thickness) / area.sum())
+    return 1.0 if softness is None else float(area @ softness / area.sum())
+
+
+def flexure_facts(design: Design, chamber: Chamber) -> dict[str, dict[str, object]]:
+    """Return facts on the thickness of the target where flexure is simulated; none elsewhere.
+
+    Shares are of the target's area in the chamber.
+    """
+    softness, thickness = softness_of_part(design, chamber.part), chamber.part.thickness
+    if softness is None or thickness is None:
+        return {}
+    area = chamber.exposed_area * chamber.part.target
+    order = np.argsort(thickness)
+    below = np.cumsum(area[order]) / area.sum()
+    places = {"thinnest_mm": 0.01, "median_mm": 0.5}  # by shares of the area that are thinner
+    found = {name: thickness[order][np.searchsorted(below, at)] for name, at in places.items()}
+    return {
+        "flexure": {
+            **{
+                k: float(f"{1e3 * h:.3g}") if np.isfinite(h) else "no plate"
+                for k, h in found.items()
+            },
+            "lowers_restitution_on_share": float(
+                f"{area[softness < 1.0 - LOSS].sum() / area.sum():.3g}"
+            ),
+            "restitution_times": float(f"{mean_softness(design, chamber):.3g}"),
+        }
+    }
 
 
 def _ball(design: Design) -> tuple[float, float]:
@@ -162,7 +199,7 @@ def zener_factor(design: Design, metals: PlateMetals, thickness: np.ndarray) -> 
 
 
 def wave_length(design: Design, metals: PlateMetals, thickness: np.ndarray) -> np.ndarray:
-    """Return the length l of the module docstring [m] at the sonotrode's peak speed, (k,)."""
+    """Return the length l of the notation above [m] at the sonotrode's peak speed, (k,)."""
     radius, mass = _ball(design)
     stiffness = 4.0 / 3.0 * metals.contact_modulus * math.sqrt(radius)
     contact = HERTZ * (mass / stiffness) ** 0.4 * design.sonotrode.peak_speed**-0.2
@@ -193,8 +230,8 @@ def _note(design: Design, name: str, thin: ThinTarget) -> str:
 
 def _unknown_note(name: str, share: float) -> str:
     return (
-        f"{share:.0%} of {name} is thinner than a ball, and balls lose energy to its flexure. It is "
-        f"left out because the metal is not known: {REMEDY}"
+        f"{share:.0%} of {name} is thinner than a ball, and balls lose energy to its flexure, "
+        f"which is left out because the metal is not known: {REMEDY}"
     )
 
 

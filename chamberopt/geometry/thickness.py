@@ -23,15 +23,16 @@ import numpy as np
 from chamberopt.geometry.triangles import areas, count_up, unit_normals, unit_vectors
 
 SPACING = 0.5  # of sample points, over the length of the smoothing
-MAX_SAMPLES = 40_000
+MAX_SAMPLES = 20_000
 CONE_DEG = 20.0  # between the normal and the rays about it
 RAYS = 6  # about the normal
 NEIGHBOURS = 16  # of a sample point at most; SPACING makes about 12
 DISC = 2.0  # thicknesses; a border nearer than this to all places of a thin region makes it a rib
 SAME_SIDE = 0.7  # cosine between the normals of places on one side of a plate: 45 degrees
 BECOMES_THICK = 2.0  # times the thickness: there a plate ends
-RIM = 1.5  # of a disc's radius
-MAX_PAIRS = 64  # second points of a pair for each first one, about
+RIM = 2.0  # discs' radii; a corner of a plate is 1.4 from the middle of the last disc in it
+MAX_PAIRS = 400  # second points of a pair for each first one, about
+AT_ONCE = 4000  # first points of pairs, which take 40 MB
 # Plane fractions of the most even sequence of points in a square, by M. Roberts (2018).
 EVEN = np.array([0.7548776662466927, 0.5698402909980532])
 
@@ -155,12 +156,12 @@ def _in_plate(samples: Samples) -> np.ndarray:
     radius = DISC * samples.thickness
     inside = border_distance(samples, radius) > radius  # the middle of such a disc
     found = inside.copy()
-    for one, two, away in _pairs(samples, 2.0 * radius):
-        # The rim counts as in the disc, up to the spacing of points and the slope of a wedge.
+    for one, two, away in _pairs(samples, 1.1 * RIM * radius):
+        # The disc around ``two`` counts as RIM times as wide, so that it fills corners.
         own = inside[two] & (away <= RIM * radius[two])
         own &= np.einsum("ij,ij->i", samples.normal[one], samples.normal[two]) > SAME_SIDE
         found[one[own]] = True
-    return found & np.isfinite(samples.thickness)
+    return np.asarray(found & np.isfinite(samples.thickness))
 
 
 def border_distance(samples: Samples, radius: np.ndarray) -> np.ndarray:
@@ -195,13 +196,15 @@ def _pairs(
     if not len(finite):
         return
     order = np.random.default_rng(0).permutation(len(samples.place))
-    step = np.floor(np.log2(radius[finite] / radius[finite].min())).astype(np.int64)
+    step = np.floor(np.log(radius[finite] / radius[finite].min()) / np.log(1.5)).astype(np.int64)
     for k in np.unique(step):
         rows = finite[step == k]
         widest = float(radius[rows].max())
         every = max(1, int(np.pi * (widest / samples.spacing) ** 2 / MAX_PAIRS))
         others = np.sort(order[::every])
-        found = KDTree(samples.place[rows]).sparse_distance_matrix(
-            KDTree(samples.place[others]), widest, output_type="coo_matrix"
-        )
-        yield rows[found.row], others[found.col], found.data
+        tree = KDTree(samples.place[others])
+        for some in np.array_split(rows, 1 + len(rows) // AT_ONCE):
+            found = KDTree(samples.place[some]).sparse_distance_matrix(
+                tree, widest, output_type="coo_matrix"
+            )
+            yield some[found.row], others[found.col], found.data

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -9,12 +10,12 @@ import numpy as np
 
 from chamberopt.pictures.actors import FAULT, GREY, NO_RENDER, SONOTRODE, add_edges
 from chamberopt.pictures.camera import cells_of, near_directions, near_views, pushed_back, seen_area
-from chamberopt.pictures.charts.colours import BLUE, OUTSIDE
+from chamberopt.pictures.charts.colours import BLUE, ORANGE, OUTSIDE, PURPLE, SKY, YELLOW
 from chamberopt.pictures.panels import BORDER, SIZE, choose_views, near_panels, part_panels
 from chamberopt.pictures.picture_page import Panel, Row, write_page
 from chamberopt.pictures.subprocess_drawing import draw_in_subprocess, picture_path
 from chamberopt.pictures.view import render_view
-from chamberopt.results.vtp_files import MM, cavity_surface, pyvista, size_text
+from chamberopt.results.vtp_files import MM, Surface, cavity_surface, pyvista, size_text
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
@@ -26,6 +27,17 @@ COLOURS = {
     MARKED: (BLUE, "target"),
     MISSED: (FAULT, "target that hardly a ball can touch"),
     BEYOND: (OUTSIDE, "target outside the chamber"),
+}
+# Restitution of a thin part over that of a rigid one, by bands, and their colours.
+BANDS = (0.5, 0.7, 0.9, 0.98)
+SOFTER = "times the restitution of a rigid part, where the target is thin"
+BAND_COLOURS = {
+    PLAIN: (GREY, "not in the target"),
+    1: (PURPLE, f"below 0.5 {SOFTER}"),
+    2: (ORANGE, "0.5 to 0.7"),
+    3: (YELLOW, "0.7 to 0.9"),
+    4: (SKY, "0.9 to 0.98"),
+    5: (BLUE, "target that is stiff: 0.98 and more"),
 }
 ALL = 0.999  # share of the target's area from which it is wholly in the chamber
 OPPOSITE = np.array([(1.0, -1.6, 0.7), (-1.0, 1.6, -0.7)])
@@ -39,6 +51,7 @@ def draw_part(
     edges: np.ndarray | None = None,
     missed: np.ndarray | None = None,
     chamber: Chamber | None = None,
+    softness: np.ndarray | None = None,
 ) -> str | None:
     """Draw a part with its target in its chamber, or with its faults.
 
@@ -50,6 +63,8 @@ def draw_part(
         edges: lines drawn red and visible through the part [m], shape (k, 2, 3).
         missed: which triangles of the target balls can hardly touch, shape (n,).
         chamber: the chamber, drawn as glass round the part in a further view, with dimensions.
+        softness: restitution of the part over that of a rigid one, shape (n,), where it is thin.
+            A second row of views shows it on the target.
     Returns:
         None, or one line that says why there is no picture.
     Raises:
@@ -60,39 +75,80 @@ def draw_part(
     marked, missed = (none if chosen is None else chosen for chosen in (marked, missed))
     edges = np.zeros((0, 2, 3)) if edges is None else edges
     job = {"title": title, "corners": corners * MM, "marked": marked & ~missed, "missed": missed,
-           "edges": edges * MM, "chamber": chamber}  # fmt: skip
+           "edges": edges * MM, "chamber": chamber, "softness": softness}  # fmt: skip
     return draw_in_subprocess(render_part, job, path)
 
 
 def render_part(job: dict[str, Any]) -> None:
     """Draw the picture of draw_part; this runs in a child process."""
-    corners, marked, missed, edges = (
-        job[name] for name in ("corners", "marked", "missed", "edges")
+    marked, missed, edges, softness = (
+        job[name] for name in ("marked", "missed", "edges", "softness")
     )
+    kinds = np.select([missed, marked], [MISSED, MARKED], PLAIN)
+    part, shown = _coloured(job, kinds)
+    legend = [COLOURS[k] for k in np.unique(np.concatenate([kind for _, kind in shown]))]
+    legend = [(SONOTRODE, "sonotrode"), *legend] if job["chamber"] is not None else legend
+    legend = legend if not len(edges) else [(FAULT, "what the message tells of")]
+    rows = [Row(job["title"], _panels(job, part, shown, COLOURS))]
+    if softness is not None:
+        bands = np.where(marked | missed, 1 + np.searchsorted(BANDS, softness, "right"), PLAIN)
+        part, shown = _coloured(job, bands, beyond=False)
+        rows.append(Row(f"{job['title']}: flexure", _panels(job, part, shown, BAND_COLOURS)))
+        legend += [BAND_COLOURS[k] for k in np.unique(bands) if k != PLAIN]
+    write_page(job["picture"], rows, legend, remarks=[f"part {size_text(part)}"])
+
+
+def _coloured(
+    job: dict[str, Any], kinds: np.ndarray, beyond: bool = True
+) -> tuple[Surface, list[tuple[Surface, np.ndarray]]]:
+    """Return the part, and the surfaces to draw over one another with the kind of each triangle.
+
+    Args:
+        kinds: kind of each triangle of the part, shape (n,), PLAIN outside the target.
+        beyond: True to mark what of the target is outside the chamber.
+    """
+    corners = job["corners"]
     part = pyvista().PolyData.from_regular_faces(
         corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3)
     )
-    chamber = None if job["chamber"] is None else cavity_surface(job["chamber"])
-    kinds = np.select([missed, marked], [MISSED, MARKED], PLAIN)
-    shown = [(part, kinds)]
-    if chamber is not None:  # surface inside the chamber is drawn over the part
-        source = np.asarray(chamber["source"])
-        inside, own = cells_of(chamber, source >= 0), kinds[source[source >= 0]]
-        inside = pyvista().PolyData.from_regular_faces(  # with its normals out of the part
-            inside.points, np.asarray(inside.regular_faces)[:, ::-1]
-        )
-        whole, there = (
-            cells_of(one, kind != PLAIN).area for one, kind in ((part, kinds), (inside, own))
-        )
-        beyond = BEYOND if there < ALL * whole else MARKED
-        shown = [(part, np.where(kinds == PLAIN, PLAIN, beyond)), (inside, own)]
+    if job["chamber"] is None:
+        return part, [(part, kinds)]
+    chamber = cavity_surface(job["chamber"])
+    # surface inside the chamber is drawn over the part
+    source = np.asarray(chamber["source"])
+    inside, own = cells_of(chamber, source >= 0), kinds[source[source >= 0]]
+    inside = pyvista().PolyData.from_regular_faces(  # with its normals out of the part
+        inside.points, np.asarray(inside.regular_faces)[:, ::-1]
+    )
+    whole, there = (
+        cells_of(one, kind != PLAIN).area for one, kind in ((part, kinds), (inside, own))
+    )
+    outside = kinds
+    if beyond:
+        outside = np.where(kinds == PLAIN, PLAIN, BEYOND if there < ALL * whole else MARKED)
+    return part, [(part, outside), (inside, own)]
+
+
+def _panels(
+    job: dict[str, Any],
+    part: Surface,
+    shown: list[tuple[Surface, np.ndarray]],
+    colours: Mapping[int, tuple[str, str]],
+) -> list[Panel]:
+    """Return the views of a part whose triangles have colours by their kinds.
+
+    Args:
+        shown: surfaces to draw over one another, with the kind of each triangle.
+        colours: colour and meaning of each kind.
+    """
+    edges = job["edges"]
     lines = pyvista().line_segments_from_points(edges.reshape(-1, 3)) if len(edges) else None
 
     def add(plotter: Any) -> None:
         for level, (surface, kind) in enumerate(shown):
             for k in np.unique(kind):
                 actor = plotter.add_mesh(
-                    cells_of(surface, kind == k), color=COLOURS[k][0], ambient=0.45, diffuse=0.6,
+                    cells_of(surface, kind == k), color=colours[k][0], ambient=0.45, diffuse=0.6,
                     opacity=1.0 if lines is None else 0.35, **NO_RENDER,
                 )  # fmt: skip
                 if level == 0:
@@ -106,18 +162,12 @@ def render_part(job: dict[str, Any]) -> None:
     target, rest = cells_of(surface, kind != PLAIN), [part]
     if not target.n_cells:  # the part has faults, or lies outside the chamber
         points = np.concatenate([part.points, edges.reshape(-1, 3)])
-        panels = [
+        return [
             Panel(render_view(add, eye, points, SIZE, BORDER), caption)
             for eye, caption in zip(OPPOSITE, ("from one side", "from the other"), strict=True)
         ]
-    elif chamber is None:
+    if job["chamber"] is None:
         eyes = near_directions(target)
-        panels = near_panels(add, target, part, near_views(seen_area(target, rest, eyes), eyes))
-    else:
-        panels = part_panels(add, target, part, chamber, choose_views([(target, part)], [chamber]))
-    legend = [COLOURS[k] for k in np.unique(np.concatenate([kind for _, kind in shown]))]
-    legend = [(SONOTRODE, "sonotrode"), *legend] if chamber is not None else legend
-    legend = legend if lines is None else [(FAULT, "what the message tells of")]
-    write_page(
-        job["picture"], [Row(job["title"], panels)], legend, remarks=[f"part {size_text(part)}"]
-    )
+        return near_panels(add, target, part, near_views(seen_area(target, rest, eyes), eyes))
+    chamber = cavity_surface(job["chamber"])
+    return part_panels(add, target, part, chamber, choose_views([(target, part)], [chamber]))

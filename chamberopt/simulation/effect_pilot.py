@@ -24,7 +24,7 @@ import numpy as np
 
 from chamberopt.chamber import dimensionless
 from chamberopt.chamber.scene import balls_can_rest, chamber_mesh
-from chamberopt.chamber.thin_part import flexure_of_surfaces, mean_factor
+from chamberopt.chamber.thin_part import flexure_of_surfaces, mean_softness
 from chamberopt.common.estimate import Estimate, estimate
 from chamberopt.common.number_text import percent, plain
 from chamberopt.coverage.coverage_from_impacts import coverage_from_dent_density
@@ -234,11 +234,7 @@ def _reason(effect: str, design: Design, chamber: Chamber) -> str:
         ),
         "drag": f"{percent(loss)} of the speed is lost on the way up",
         "rest": "a surface that does not move faces up, so balls can lie on it",
-        "flexure": (
-            f"it lowers the restitution to {mean_factor(design, chamber):.2f} times on the target"
-            if effect == "flexure"
-            else ""
-        ),
+        "flexure": f"thin parts: {mean_softness(design, chamber):.2f} times the restitution",
     }[effect]
 
 

@@ -82,7 +82,8 @@ def plate_mobility(
         modulus: E / (1 - nu²) of the plate [Pa].
         density: of the plate [kg/m³].
     """
-    return math.sqrt(3.0) / (4.0 * math.sqrt(modulus * density) * np.square(thickness))
+    plate: float | np.ndarray = 4.0 * math.sqrt(modulus * density / 3.0) * np.square(thickness)
+    return 1.0 / plate
 
 
 def zener_parameter(
@@ -96,12 +97,14 @@ def zener_parameter(
         radius, mass: of the ball [m], [kg].
         speed: of the ball along the normal [m/s].
     """
-    return mobility * _inertia(radius, mass, modulus) * speed**EXPONENT
+    parameter: float | np.ndarray = mobility * _inertia(radius, mass, modulus) * speed**EXPONENT
+    return parameter
 
 
 def zener_restitution(parameter: float | np.ndarray) -> np.ndarray:
     """Return Zener's restitution [-] for values of his parameter lambda, of any shape."""
-    return np.interp(parameter, np.linspace(0.0, MOST, POINTS), zener_curve())
+    grid = np.linspace(0.0, MOST, POINTS)
+    return np.asarray(np.interp(parameter, grid, zener_curve()))
 
 
 def _inertia(
@@ -121,7 +124,8 @@ def zener_curve() -> np.ndarray:
 
     def rates(state: np.ndarray) -> np.ndarray:
         root = np.sqrt(np.maximum(state[0], 0.0))
-        return np.stack([state[1], -(root**3) - 1.5 * parameter * root * state[1]])
+        force, its_rate = root**3, 1.5 * root * state[1]
+        return np.asarray([state[1], -force - parameter * its_rate])
 
     state = np.stack([np.zeros(POINTS), np.ones(POINTS)])
     while (state[0] >= 0.0).any():
@@ -130,7 +134,7 @@ def zener_curve() -> np.ndarray:
         three = rates(state + 0.5 * STEP * two)
         four = rates(state + STEP * three)
         state = state + STEP / 6.0 * (one + 2.0 * two + 2.0 * three + four)
-    curve = np.minimum(-state[1], 1.0)
+    curve: np.ndarray = np.minimum(-state[1], 1.0)
     curve[0] = 1.0  # exact, so that rigid triangles of a thin part are rigid to the bit
     curve.flags.writeable = False
     return curve

@@ -21,8 +21,8 @@ from chamberopt.chamber.part import turning_axis
 from chamberopt.chamber.reach import Reach, find_reach, reached_part_share
 from chamberopt.chamber.replica_seed import replica_seed
 from chamberopt.chamber.scene import build_scene, chamber_mesh, require_ball_count, require_turnable
+from chamberopt.chamber.thin_part import flexure_facts, flexure_of_surfaces
 from chamberopt.common.number_text import plain
-from chamberopt.chamber.thin_part import flexure_of_surfaces
 from chamberopt.design.shape_surface import TAG_PART, TAG_SONOTRODE, TAG_WALL, is_sonotrode
 from chamberopt.design.tolerances import require_tolerances, tolerance_box
 from chamberopt.geometry.triangles import areas, edge_keys, sides_of, tetrahedron_volumes
@@ -69,6 +69,7 @@ def describe(design: Design, chamber: Chamber, reach: Reach | None = None) -> di
         **with_clearance(first_facts(design, chamber), reach.mesh),
         **_zone_facts(reach, chamber),
         **_turn_facts(design, chamber.part),
+        **flexure_facts(design, chamber),
         "materials": {name: law.in_words for name, law in design.materials},
         "reach": _reach_facts(reach, chamber),
         **_tolerance_facts(design),

@@ -14,6 +14,7 @@ from chamberopt.cli.prepare import advise_effects
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
     from chamberopt.chamber.reach import Reach
+    from chamberopt.design.load import Design
 
 
 @app.command
@@ -85,7 +86,7 @@ def _check(file: Path, pilot: bool, screenshot: Path | None, json: bool, out: Pa
         facts = describe(design, chamber, reach)
     if screenshot is not None:
         with step("drawing"):
-            draw_target(chamber, reach, screenshot)
+            draw_target(chamber, reach, screenshot, design)
     if isinstance(loaded, Study):
         facts["vary"] = {
             name: {"values": list(varied.texts), "start": setting(design, name)}
@@ -109,13 +110,20 @@ def _check(file: Path, pilot: bool, screenshot: Path | None, json: bool, out: Pa
         print_json(facts)
 
 
-def draw_target(chamber: Chamber, reach: Reach, screenshot: Path) -> None:
-    """Draw the part with its target, and mark triangles of the target that are out of reach."""
+def draw_target(
+    chamber: Chamber, reach: Reach, screenshot: Path, design: Design | None = None
+) -> None:
+    """Draw the part with its target, and mark triangles of the target that are out of reach.
+
+    Where the part is thin, further views show how soft it is.
+    """
     from chamberopt.chamber.reach import reached_part_share
+    from chamberopt.chamber.thin_part import softness_of_part
     from chamberopt.pictures.part import draw_part
 
     part = chamber.part
     missed = part.target & (reached_part_share(reach, chamber.source, len(part.triangles)) <= 0.5)
     corners = part.vertices[part.triangles]
-    remark = draw_part(corners, part.name, screenshot, part.target, missed=missed, chamber=chamber)
+    softness = None if design is None else softness_of_part(design, part)
+    remark = draw_part(corners, part.name, screenshot, part.target, None, missed, chamber, softness)
     print_remarks([remark or f"picture in {screenshot}"])
