@@ -5,11 +5,7 @@ import pytest
 import trimesh
 from manifold3d import CrossSection
 
-from chamberopt.geometry.thickness import (
-    border_distance,
-    measure_thickness,
-    thickness_of_triangles,
-)
+from chamberopt.geometry.thickness import border_distance, measure_thickness, thickness_of_triangles
 
 BALL = 2e-3  # m, the length of the smoothing
 

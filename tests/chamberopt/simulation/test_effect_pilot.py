@@ -1,6 +1,7 @@
 """Dimensionless groups, advice from pilot runs, and the choice of effects = "auto"."""
 
 import math
+import re
 from concurrent.futures import Executor
 from dataclasses import replace
 from pathlib import Path
@@ -19,13 +20,13 @@ from chamberopt.common.estimate import Estimate
 from chamberopt.common.executor import SerialExecutor, local_executor
 from chamberopt.coverage.metrics import exposed_target
 from chamberopt.design.design import validate
-from chamberopt.design.load import Design
+from chamberopt.design.load import Design, load_design
 from chamberopt.results.write import advice_record
 from chamberopt.simulation import effect_pilot
 from chamberopt.simulation.advice import Advice
 from chamberopt.simulation.effect_pilot import MEASURED, advise, with_effects_resolved
 from chamberopt.simulation.replicas import ReplicaSetting
-from tests.helpers.synthetic import dents_at, plate_design
+from tests.helpers.synthetic import DESIGNS, dents_at, plate_design
 
 PLATE = plate_design()
 CHAMBER = build_chamber(PLATE)
@@ -52,6 +53,35 @@ def test_groups_are_what_their_formulas_say() -> None:
     big = plate_design(shot__diameter_mm=8)  # Re above 1000: C_d is 0.44
     expected = 0.75 * 0.44 * 1.204 / 7800 * CHAMBER.height / 8e-3
     assert dimensionless.drag_loss(big, CHAMBER) == pytest.approx(expected, rel=1e-6)
+
+
+def test_flexure_is_switched_only_where_a_part_is_thin() -> None:
+    """The numbers that a design gives for it stay when it is switched off and on."""
+    named = {row["effect"] for row in effect_pilot.groups(PLATE, CHAMBER)}
+    assert "flexure" not in named
+    metals = {
+        "part_E_GPa": 210.0,
+        "part_poisson": 0.3,
+        "part_density_kg_m3": 7800.0,
+        "shot_E_GPa": 210.0,
+        "shot_poisson": 0.3,
+    }
+    thickness = np.full(len(CHAMBER.part.triangles), 2e-3, dtype=np.float32)
+    thin = replace(CHAMBER, part=replace(CHAMBER.part, thickness=thickness))
+    design = PLATE.changed({"effects.flexure": metals})
+    (row,) = (row for row in effect_pilot.groups(design, thin) if row["effect"] == "flexure")
+    assert row["on"] is True
+    assert re.fullmatch(r"flexure is on: thin parts: 0\.8\d times the restitution", row["said"])
+    for on in (False, True):
+        switched = effect_pilot._switched(design, {"flexure": on})
+        assert switched.effects.flexure is not None
+        assert switched.effects.flexure.model_dump() == metals | {"on": on}
+        row = next(r for r in effect_pilot.groups(switched, thin) if r["effect"] == "flexure")
+        assert row["on"] is on
+    named_metals = load_design(DESIGNS / "blade.toml")
+    off = effect_pilot._switched(named_metals, {"flexure": False}).effects.flexure
+    assert off is not None
+    assert not off.on
 
 
 @pytest.mark.parametrize(
