@@ -28,7 +28,7 @@ ORDER = {
     ),
     "chamberopt/chamber": (
         "replica_seed bores_and_deflectors thin_part part reach+largest_ball build dimensionless "
-        "scene analytic checks propose"
+        "flexure+scene analytic checks propose"
     ),
     "chamberopt/coverage": "dents part_impacts+metrics field coverage_from_impacts "
     "percentile coverage_intervals strength strength_intervals compression",

@@ -22,20 +22,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from chamberopt.design.flexure import REMEDY, PlateMetals, plate_metals
-from chamberopt.design.shape_surface import TAG_PART
 from chamberopt.geometry.thickness import (
     Samples,
     border_distance,
-    measure_thickness,
+    measure_depth,
+    only_plates,
     thickness_of_triangles,
 )
 
 if TYPE_CHECKING:
-    from chamberopt.chamber.build import Chamber
-    from chamberopt.chamber.part import Part
     from chamberopt.design.design import Design
     from chamberopt.geometry.meshes.part_mesh import PartMesh
-    from sim_core import AnalyticCavity, Flexure, TriangleMesh
 
 LOSS = 0.02  # of the restitution; C0 of a metal is known no better
 SHARE = 0.01  # of the area of the target or a zone
@@ -64,13 +61,18 @@ class ThinTarget:
 
 
 @lru_cache(maxsize=4)
-def _measured(mesh: PartMesh, ball: float) -> tuple[Samples, np.ndarray]:
-    """Return the sample points of a part, and the thickness of its triangles [m], (m,) float32.
+def _depths(mesh: PartMesh, ball: float) -> Samples:
+    """Return points over a part with the depth of material under each, for this diameter [m]."""
+    return measure_depth(mesh.vertices, mesh.triangles, ball, REACH * ball)
 
-    Args:
-        ball: diameter of the largest ball [m].
+
+@lru_cache(maxsize=4)
+def _plates(mesh: PartMesh, ball: float) -> tuple[Samples, np.ndarray]:
+    """Return the points of _depths that are of plates, and the thickness of the triangles [m].
+
+    The thickness has the shape (m,), float32.
     """
-    samples = measure_thickness(mesh.vertices, mesh.triangles, ball, REACH * ball)
+    samples = only_plates(_depths(mesh, ball))
     thickness = thickness_of_triangles(samples, mesh.vertices, mesh.triangles, ball)
     return samples, thickness.astype(np.float32)
 
@@ -91,7 +93,9 @@ def thickness_to_simulate(
     if given is not None and not given.on:
         return None, []
     ball = design.shot.diameter
-    samples, thickness = _measured(mesh, ball)
+    if given is None and not _may_be_thin(design, metals, mesh, chosen):
+        return None, []
+    samples, thickness = _plates(mesh, ball)
     if not np.isfinite(thickness).any():
         return None, [_thick_note()] if given is not None else []
     name, target = next(iter(chosen.items()))
@@ -103,6 +107,18 @@ def thickness_to_simulate(
     if given is None and max(one.lowered for one in found.values()) <= SHARE:
         return None, []
     return thickness, [_note(design, one, thin) for one, thin in found.items() if thin.lowered]
+
+
+def _may_be_thin(
+    design: Design, metals: PlateMetals | None, mesh: PartMesh, chosen: Mapping[str, np.ndarray]
+) -> bool:
+    """Return False for a part that is thick all over, which spares the search for plates."""
+    samples = _depths(mesh, design.shot.diameter)
+    thin = samples.thickness < UNKNOWN * design.shot.diameter
+    if metals is not None:
+        thin = zener_factor(design, metals, samples.thickness) < 1.0 - LOSS
+    shares = [thin[rows[samples.triangle]] for rows in chosen.values()]
+    return any(bool(len(one)) and float(one.mean()) > SHARE for one in shares)
 
 
 def thin_target(design: Design, samples: Samples, chosen: np.ndarray) -> ThinTarget:
@@ -126,51 +142,6 @@ def thin_target(design: Design, samples: Samples, chosen: np.ndarray) -> ThinTar
         lowered=float(thin.mean()),
         near_edge=float(near.sum() / max(thin.sum(), 1)),
     )
-
-
-def softness_of_part(design: Design, part: Part) -> np.ndarray | None:
-    """Return the restitution of each triangle over that of a rigid part, (m,), for a picture.
-
-    It is Zener's e of the largest ball at the sonotrode's peak speed; None for a rigid part.
-    """
-    metals = plate_metals(design)
-    if part.thickness is None or metals is None:
-        return None
-    return zener_factor(design, metals, part.thickness)
-
-
-def mean_softness(design: Design, chamber: Chamber) -> float:
-    """Return the mean of softness_of_part over the target in the chamber; 1 for a rigid part."""
-    softness = softness_of_part(design, chamber.part)
-    area = chamber.exposed_area * chamber.part.target
-    return 1.0 if softness is None else float(area @ softness / area.sum())
-
-
-def flexure_facts(design: Design, chamber: Chamber) -> dict[str, dict[str, object]]:
-    """Return facts on the thickness of the target where flexure is simulated; none elsewhere.
-
-    Shares are of the target's area in the chamber.
-    """
-    softness, thickness = softness_of_part(design, chamber.part), chamber.part.thickness
-    if softness is None or thickness is None:
-        return {}
-    area = chamber.exposed_area * chamber.part.target
-    order = np.argsort(thickness)
-    below = np.cumsum(area[order]) / area.sum()
-    places = {"thinnest_mm": 0.01, "median_mm": 0.5}  # by shares of the area that are thinner
-    found = {name: thickness[order][np.searchsorted(below, at)] for name, at in places.items()}
-    return {
-        "flexure": {
-            **{
-                k: float(f"{1e3 * h:.3g}") if np.isfinite(h) else "no plate"
-                for k, h in found.items()
-            },
-            "lowers_restitution_on_share": float(
-                f"{area[softness < 1.0 - LOSS].sum() / area.sum():.3g}"
-            ),
-            "restitution_times": float(f"{mean_softness(design, chamber):.3g}"),
-        }
-    }
 
 
 def _ball(design: Design) -> tuple[float, float]:
@@ -237,29 +208,3 @@ def _unknown_note(name: str, share: float) -> str:
 
 def _thick_note() -> str:
     return "effects.flexure is given, but the part is no thin plate anywhere: nothing is left out"
-
-
-def flexure_of_surfaces(
-    design: Design, chamber: Chamber, mesh: TriangleMesh | AnalyticCavity
-) -> Flexure | None:
-    """Return the flexure of the surfaces of a scene; None if the part counts as rigid.
-
-    In an analytical cavity, whose ceiling is the part, the ceiling has its mean mobility.
-
-    Args:
-        mesh: mesh of the chamber, or its analytical cavity.
-    """
-    from sim_core import AnalyticCavity, Flexure
-
-    given, metals = design.effects.flexure, plate_metals(design)
-    thickness = chamber.part.thickness
-    if thickness is None or metals is None or (given is not None and not given.on):
-        return None
-    of_part = mobility(metals, thickness)
-    if isinstance(mesh, AnalyticCavity):
-        area = chamber.exposed_area
-        of_surfaces = np.where(mesh.tags == TAG_PART, area @ of_part / area.sum(), 0.0)
-    else:
-        # a source of -1, off the part, reads the appended 0
-        of_surfaces = np.append(of_part, 0.0)[chamber.source]
-    return Flexure(of_surfaces, metals.contact_modulus)

@@ -27,10 +27,10 @@ def compile_with_message(
         InputError: the shot does not fit, or the part cannot turn. It is raised early.
     """
     import sim_core
+    from chamberopt.chamber.flexure import flexure_of_surfaces
     from chamberopt.chamber.part import turning_axis
     from chamberopt.chamber.replica_seed import replica_seed
     from chamberopt.chamber.scene import build_scene, chamber_mesh
-    from chamberopt.chamber.thin_part import flexure_of_surfaces
     from chamberopt.common.progress import step
 
     room, seed = cavity or chamber_mesh(chamber), replica_seed(design.process.seed, 0)

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, NamedTuple
+from typing import Any, NamedTuple
 
 from chamberopt.common.toml_errors import Problem
 from chamberopt.design.materials import alloys, balls, find
 from chamberopt.design.materials.catalogue import Elastic
-
-if TYPE_CHECKING:
-    from chamberopt.design.design import Design
 
 REMEDY = (
     "name an alloy in materials.part and a shot.material, or give effects.flexure with E_GPa, "
@@ -31,8 +28,8 @@ class PlateMetals(NamedTuple):
         return 1.0 / (self.part.compliance + self.shot.compliance)
 
 
-def plate_metals(design: Design) -> PlateMetals | None:
-    """Return the elasticity of part and balls: as given, or by their names in the catalogue.
+def plate_metals(design: Any) -> PlateMetals | None:
+    """Return the elasticity of part and balls of a Design: as given, or by their catalogue names.
 
     Return None if either is not known.
     """
@@ -51,8 +48,8 @@ def plate_metals(design: Design) -> PlateMetals | None:
     return None if of_part is None or of_shot is None else PlateMetals(*of_part, of_shot)
 
 
-def flexure_problems(design: Design) -> Iterator[Problem]:
-    """Yield a problem if flexure is asked for and the elasticity of part or balls is not known."""
+def flexure_problems(design: Any) -> Iterator[Problem]:
+    """Yield a problem if a Design asks for flexure, and part or balls have unknown elasticity."""
     given = design.effects.flexure
     if given is not None and given.on and plate_metals(design) is None:
         yield Problem("effects.flexure", f"given, but the metal is not known; {REMEDY}")

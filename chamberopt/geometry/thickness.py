@@ -47,10 +47,12 @@ class Samples(NamedTuple):
     spacing: float  # [m]; each point stands for its square
 
 
-def measure_thickness(
+def measure_depth(
     vertices: np.ndarray, triangles: np.ndarray, length: float, reach: float
 ) -> Samples:
-    """Return points spread over a closed surface, with the thickness of the plate at each.
+    """Return points spread over a closed surface, with the thickness of the part at each.
+
+    Teeth and ribs are still among them: `only_plates` leaves these out.
 
     Args:
         vertices, triangles: the surface [m], normals outwards.
@@ -59,8 +61,12 @@ def measure_thickness(
     """
     samples = _spread(vertices, triangles, length)
     depth = _depth(vertices[triangles], samples, reach)
-    smooth = _smoothed(samples._replace(thickness=depth), length)
-    return smooth._replace(thickness=np.where(_in_plate(smooth), smooth.thickness, np.inf))
+    return _smoothed(samples._replace(thickness=depth), length)
+
+
+def only_plates(samples: Samples) -> Samples:
+    """Return the points with an infinite thickness where the part is no plate."""
+    return samples._replace(thickness=np.where(_in_plate(samples), samples.thickness, np.inf))
 
 
 def thickness_of_triangles(
@@ -71,7 +77,7 @@ def thickness_of_triangles(
     A triangle has the thickness h whose h⁻² is the mean over its area, as for a ball that may hit
     it anywhere.
 
-    The arguments are those of measure_thickness, and what it returned.
+    The arguments are those of measure_depth, and its points.
     """
     inverse = 1.0 / np.square(samples.thickness)
     count = np.bincount(samples.triangle, minlength=len(triangles))

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from chamberopt.chamber.analytic import analytic_cavity, impacts_on_chamber
+from chamberopt.chamber.flexure import flexure_of_surfaces
 from chamberopt.chamber.part import turning_axis
 from chamberopt.chamber.replica_seed import replica_seed
 from chamberopt.chamber.scene import build_scene, chamber_mesh
-from chamberopt.chamber.thin_part import flexure_of_surfaces
 from chamberopt.common.errors import InputError
 from chamberopt.coverage.part_impacts import HITS_FILE, load_hits
 from chamberopt.results.arrays_file import load_chamber

@@ -23,8 +23,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from chamberopt.chamber import dimensionless
+from chamberopt.chamber.flexure import flexure_of_surfaces, mean_softness
 from chamberopt.chamber.scene import balls_can_rest, chamber_mesh
-from chamberopt.chamber.thin_part import flexure_of_surfaces, mean_softness
 from chamberopt.common.estimate import Estimate, estimate
 from chamberopt.common.number_text import percent, plain
 from chamberopt.coverage.coverage_from_impacts import coverage_from_dent_density

@@ -10,10 +10,10 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 from chamberopt.chamber.analytic import impacts_on_chamber
+from chamberopt.chamber.flexure import flexure_of_surfaces
 from chamberopt.chamber.part import turning_axis
 from chamberopt.chamber.replica_seed import replica_seed
 from chamberopt.chamber.scene import build_scene
-from chamberopt.chamber.thin_part import flexure_of_surfaces
 from chamberopt.common.errors import WorkerLostError
 from chamberopt.common.executor import share
 from chamberopt.coverage.part_impacts import Hits, hits_on_part

@@ -17,11 +17,11 @@ from chamberopt.chamber.checks.gaps import (
 )
 from chamberopt.chamber.checks.place_names import CEILING, SIDE_WALL, surface_names
 from chamberopt.chamber.dimensionless import free_path
+from chamberopt.chamber.flexure import flexure_facts, flexure_of_surfaces
 from chamberopt.chamber.part import turning_axis
 from chamberopt.chamber.reach import Reach, find_reach, reached_part_share
 from chamberopt.chamber.replica_seed import replica_seed
 from chamberopt.chamber.scene import build_scene, chamber_mesh, require_ball_count, require_turnable
-from chamberopt.chamber.thin_part import flexure_facts, flexure_of_surfaces
 from chamberopt.common.number_text import plain
 from chamberopt.design.shape_surface import TAG_PART, TAG_SONOTRODE, TAG_WALL, is_sonotrode
 from chamberopt.design.tolerances import require_tolerances, tolerance_box

@@ -117,8 +117,8 @@ def draw_target(
 
     Where the part is thin, further views show how soft it is.
     """
+    from chamberopt.chamber.flexure import softness_of_part
     from chamberopt.chamber.reach import reached_part_share
-    from chamberopt.chamber.thin_part import softness_of_part
     from chamberopt.pictures.part import draw_part
 
     part = chamber.part

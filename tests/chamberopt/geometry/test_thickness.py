@@ -5,7 +5,12 @@ import pytest
 import trimesh
 from manifold3d import CrossSection
 
-from chamberopt.geometry.thickness import border_distance, measure_thickness, thickness_of_triangles
+from chamberopt.geometry.thickness import (
+    border_distance,
+    measure_depth,
+    only_plates,
+    thickness_of_triangles,
+)
 
 BALL = 2e-3  # m, the length of the smoothing
 
@@ -13,7 +18,7 @@ BALL = 2e-3  # m, the length of the smoothing
 def thickness(body: trimesh.Trimesh, reach: float = 10e-3) -> np.ndarray:
     """Thickness of each triangle of a body [mm]."""
     vertices, triangles = np.asarray(body.vertices), np.asarray(body.faces)
-    samples = measure_thickness(vertices, triangles, BALL, reach)
+    samples = only_plates(measure_depth(vertices, triangles, BALL, reach))
     return 1e3 * thickness_of_triangles(samples, vertices, triangles, BALL)
 
 
@@ -97,7 +102,7 @@ def test_a_fin_is_a_plate_but_a_tooth_is_none() -> None:
 
 def test_borders_are_as_far_as_the_edges() -> None:
     body = split(trimesh.creation.box((0.04, 0.03, 0.0015)), 2)
-    samples = measure_thickness(body.vertices, body.faces, BALL, 10e-3)
+    samples = only_plates(measure_depth(body.vertices, body.faces, BALL, 10e-3))
     radius = np.where(np.isfinite(samples.thickness), 5e-3, np.inf)
     found = border_distance(samples, radius)
     edge = np.min([0.02, 0.015] - np.abs(samples.place[:, :2]), axis=1)

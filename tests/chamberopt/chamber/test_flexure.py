@@ -8,8 +8,8 @@ import pytest
 
 from chamberopt.chamber.analytic import analytic_cavity
 from chamberopt.chamber.build import Chamber, build_chamber
+from chamberopt.chamber.flexure import flexure_facts, flexure_of_surfaces, softness_of_part
 from chamberopt.chamber.scene import build_scene, chamber_mesh
-from chamberopt.chamber.thin_part import flexure_facts, flexure_of_surfaces, softness_of_part
 from chamberopt.common.errors import InputError
 from chamberopt.design.design import Design
 from chamberopt.design.flexure import plate_metals
