@@ -187,15 +187,15 @@ def mobility(metals: PlateMetals, thickness: np.ndarray) -> np.ndarray:
 
 
 def _note(design: Design, name: str, thin: ThinTarget) -> str:
-    middle = f"{1e3 * thin.median:.2g} mm in the middle"
+    median = f"median {1e3 * thin.median:.2g} mm"
     if not math.isfinite(thin.median):
-        middle = "half of it is no plate, or thick"
+        median = "half of it thick, or no plate"
     return (
-        f"{name} is thin ({1e3 * thin.thinnest:.2g} mm at the thinnest, {middle}): flexure lowers "
-        f"the restitution by more than {LOSS:.0%} on {thin.lowered:.0%} of it, to "
-        f"{thin.restitution:.2f} times in the middle at {design.sonotrode.peak_speed:.2g} m/s; "
-        f"{thin.near_edge:.0%} of that is so near to an edge that the theory is rough there "
-        "(docs/physics.md); effects.flexure = false leaves it out"
+        f"{name} is thin (thinnest {1e3 * thin.thinnest:.2g} mm, {median}): flexure lowers the "
+        f"restitution by more than {LOSS:.0%} on {thin.lowered:.0%} of it, at the median to "
+        f"{thin.restitution:.2f} times at {design.sonotrode.peak_speed:.2g} m/s (Zener 1941); "
+        f"{thin.near_edge:.0%} of that is so near to an edge that the theory is rough there, and "
+        "dents are a few per cent too wide (docs/physics.md); effects.flexure = false leaves it out"
     )
 
 

@@ -74,6 +74,7 @@ def strip_design(
     data["chamber"]["sonotrode_distance_mm"] = float(distance)
     data["materials"]["part"] = strip_material(design.shot).model_dump()
     data["effects"]["part_turn"] = None
+    data["effects"]["flexure"] = False  # the strip is held down on a thick block
     for of_the_part in ("zones", "tolerances"):
         data.pop(of_the_part, None)
     return validate(Design, data)

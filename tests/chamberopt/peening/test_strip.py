@@ -206,10 +206,13 @@ def test_a_shop_s_points_saturate_where_they_were_published_to() -> None:
 )
 def test_the_strip_closes_the_chamber(chamber: dict, size: str, tmp_path: Path) -> None:
     """The whole strip faces the shot, at the part's distance, and the lid leaves no gap."""
+    metals = dict(part_E_GPa=114, part_poisson=0.3, part_density_kg_m3=4430)
     data = DESIGN.model_dump() | {
-        "chamber": {"height_mm": 40.0, "sonotrode_distance_mm": 25.0, **chamber}
+        "chamber": {"height_mm": 40.0, "sonotrode_distance_mm": 25.0, **chamber},
+        "effects": {"flexure": metals | {"shot_E_GPa": 210, "shot_poisson": 0.3}},  # of the part
     }
     design = strip_design(validate(Design, data), SIZES[size], tmp_path)
+    assert not design.effects.flexure.on
     assert (tmp_path / HOLDER_FILE).is_file()
     assert design.materials.part == STRIP
     built = build_chamber(design)
