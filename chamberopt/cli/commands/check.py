@@ -125,5 +125,6 @@ def draw_target(
     missed = part.target & (reached_part_share(reach, chamber.source, len(part.triangles)) <= 0.5)
     corners = part.vertices[part.triangles]
     softness = None if design is None else softness_of_part(design, part)
-    remark = draw_part(corners, part.name, screenshot, part.target, None, missed, chamber, softness)
+    more = {"missed": missed, "softness": softness}
+    remark = draw_part(corners, part.name, screenshot, part.target, chamber=chamber, **more)
     print_remarks([remark or f"picture in {screenshot}"])

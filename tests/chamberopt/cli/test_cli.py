@@ -378,9 +378,9 @@ class TestCheck:
         drawn: list[tuple[str, int, int, int]] = []
         none = np.zeros(0)
 
-        def draw(
-            corners, title: str, picture, marked=none, edges=none, missed=none, chamber=None
-        ) -> None:  # type: ignore[no-untyped-def]
+        def draw(  # type: ignore[no-untyped-def]
+            corners, title: str, picture, marked=none, edges=none, missed=none, chamber=None, **_
+        ) -> None:
             drawn.append((title, int(marked.sum()), len(edges), int(missed.sum())))
 
         monkeypatch.setattr("chamberopt.pictures.part.draw_part", draw)
