@@ -239,10 +239,14 @@ def _advice(pilot: Sequence[AdviceRecord]) -> Iterator[Block]:
 
 
 def _effect_text(name: str, value: object) -> str:
+    if name == "flexure" and isinstance(value, Mapping) and not value["on"]:
+        return "off"
     if isinstance(value, Mapping):
         return ", ".join(f"{key} = {_text(one)}" for key, one in value.items() if one is not None)
     if name == "rest" and value is None:
         return "on where a still surface faces up"
+    if name == "flexure" and value is None:
+        return "on where the part is thin"
     return "on" if value else "off"
 
 
