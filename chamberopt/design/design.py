@@ -26,8 +26,8 @@ from chamberopt.design.calibration import (
     with_measured_values,
 )
 from chamberopt.design.effects import Effects
-from chamberopt.design.materials import Materials, with_friction, with_numbers
 from chamberopt.design.flexure import flexure_problems
+from chamberopt.design.materials import Materials, with_friction, with_numbers
 from chamberopt.design.part import PartTable
 from chamberopt.design.process import Process
 from chamberopt.design.shapes import SHAPES, ChamberTable
