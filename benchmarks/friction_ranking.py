@@ -31,7 +31,6 @@ from chamberopt.simulation.evaluate import evaluate
 DESIGNS = Path(__file__).parents[1] / "designs"
 BETA0, SLOPE = 0.2, {"slope_deg": 3.0}
 SMOOTH: dict[str, Any] = {"effects.friction": "none", "effects.roughness": "none"}
-OBJECTIVE = "uniform_coverage"
 KEYS = ("chamber.height_mm", "chamber.sonotrode_distance_mm", "shot.mass_g")
 PAIR = {"start": (45.0, 15.0, 5.0), "best": (32.0, 21.1, 10.0)}  # by KEYS
 BOUNDS = ((28.0, 60.0), (4.0, 25.0), (2.0, 10.0))  # of gear chambers, by KEYS
@@ -62,10 +61,9 @@ def figures(design: Design, workers: ThreadPoolExecutor) -> Figures:
     """Simulate a design and return its figures."""
     found = evaluate(design, build_chamber(design), workers)
     dents = np.concatenate([one.dent for one in found.hits])
-    metrics = found.metrics
     return Figures(
-        metrics[OBJECTIVE],
-        metrics["mean_coverage"],
+        found.objective,
+        found.metrics["mean_coverage"],
         int((dents > 0.0).sum()),
         float(np.pi / 4.0 * (dents.astype(float) ** 2).sum()),
     )
