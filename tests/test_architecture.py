@@ -24,7 +24,7 @@ ORDER = {
     "part_mesh",
     "chamberopt/design": (
         "shape_surface+table_base materials shapes effects+part+process+shot+sonotrode "
-        "almen_strip+calibration+flexure+tolerances+zones design load"
+        "almen_strip+calibration+flexure+ranges+tolerances+zones design load"
     ),
     "chamberopt/chamber": (
         "replica_seed bores_and_deflectors thin_part part reach+largest_ball build dimensionless "
@@ -35,8 +35,8 @@ ORDER = {
     "chamberopt/simulation": "resting_balls trapped_balls replicas evaluation estimates evaluate "
     "time_curve field_values variations advice effect_pilot error_law convergence recommendation",
     "chamberopt/peening": "strip+calibration_errors kirk_fit+strip_holder responses "
-    "tolerance_result tolerances measured probes virtual_strip posterior setups calibrate "
-    "next_measurement",
+    "tolerance_result range_result tolerances+ranges measured probes virtual_strip posterior setups "
+    "calibrate next_measurement",
     "chamberopt/search": "study+optimiser trial_log study_folder "
     "sensitivity+observe+candidate judge ask_and_tell run_study pareto+run_sweep",
     "chamberopt/results": (

@@ -30,6 +30,7 @@ from chamberopt.design.flexure import flexure_problems
 from chamberopt.design.materials import Materials, with_friction, with_numbers
 from chamberopt.design.part import PartTable
 from chamberopt.design.process import Process
+from chamberopt.design.ranges import Ranges
 from chamberopt.design.shapes import SHAPES, ChamberTable
 from chamberopt.design.shapes.base import is_custom
 from chamberopt.design.shapes.custom import RecordedShape, load_custom_shape
@@ -44,7 +45,7 @@ from chamberopt.design.zones import MAX_ZONES, Zone, zone_problems
 # Each further sonotrode has a tag below 255 and needs a cut through all walls before it.
 MAX_SONOTRODES = 50
 SHAPE = "chamber.shape"
-NOT_VARIED = ("calibration.", "zones.", "part.tessellation.")
+NOT_VARIED = ("calibration.", "zones.", "ranges.", "part.tessellation.")
 
 
 class Design(FileTable):
@@ -73,6 +74,9 @@ class Design(FileTable):
         max_length=MAX_NAMES,
         description="how far numbers of the design may lie off in production, by dotted name",
         json_schema_extra={"form": f"NAME = {TOLERANCE_FORM}"},
+    )
+    ranges: Ranges | None = Field(
+        default=None, description="how well numbers are known that are not calibrated"
     )
 
     @pydantic.model_validator(mode="wrap")
@@ -250,6 +254,8 @@ class Design(FileTable):
         """Return why a study cannot vary the number at a dotted name; an empty text if it can."""
         if name == SHAPE:
             return "a shape of your own, or one that is drawn; it cannot vary"
+        if name.startswith("ranges."):
+            return "how well a number is known, not a choice of the design; it cannot vary"
         if name.startswith("calibration."):
             return "what was measured, with errors that intervals hold already; it cannot vary"
         numbers = self.numbers()

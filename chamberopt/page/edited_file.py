@@ -233,7 +233,9 @@ def _table(value: dict[str, object]) -> object:
 
 # Tables without fields: their numbers are measured, or chosen by clicks on the part, or mesh the
 # part, which would become another part.
-NOT_SHOWN = ("calibration.", "part.target.", "zones.", "tolerances.", "part.tessellation.")
+NOT_SHOWN = (
+    "calibration.", "part.target.", "zones.", "tolerances.", "ranges.", "part.tessellation.",
+)  # fmt: skip
 
 
 def design_fields(file: EditedFile) -> list[dict[str, object]]:
