@@ -62,6 +62,7 @@ def simulate(
     *,
     analytic: bool = False,
     tolerances: bool = False,
+    ranges: bool = True,
     workers: int | None = None,
     progress: Progress | None = None,
 ) -> Result:
@@ -72,8 +73,11 @@ def simulate(
         analytic: use the exact cylinder, box or prism instead of its mesh, if the chamber is one.
         tolerances: also simulate the effect of the design's tolerances. The figures are in
             result.record.tolerances.
+        ranges: also simulate how far the figures may be off because friction etc. are not
+            calibrated, in as many replicas again. The figures are in result.record.ranges.
         workers: number of threads, by default one per core. It does not change the result.
-        progress: called as progress(done, total, None) after each replica.
+        progress: called as progress(done, total, None) after each replica. It counts those of the
+            ranges anew.
     Raises:
         InputError: the chamber cannot be built, has no room for the shot or is not analytic.
         sim_core.SimulationError: a simulation had to stop.
@@ -88,20 +92,27 @@ def simulate(
     if tolerances:
         plan_tolerances(design)
     with claim_folder(out) as folder, local_executor(workers) as executor:
-        settings = SimulationSettings(analytic, tolerances)
+        settings = SimulationSettings(analytic, tolerances, ranges)
         done = simulate_design(design, folder, executor, Teller(progress), settings)
     _warn([*map(str, done.advice), *done.remarks])
     return load_result(out)
 
 
 def optimise(
-    study: Study, out: str | Path, *, workers: int | None = None, progress: Progress | None = None
+    study: Study,
+    out: str | Path,
+    *,
+    ranges: bool = True,
+    workers: int | None = None,
+    progress: Progress | None = None,
 ) -> Result:
     """Run a study, write it to a folder, and return the confirmed result of its best design.
 
     Args:
         out: new or empty folder, or the folder of the same study. An interrupted study is resumed.
             The result of a finished study is only read.
+        ranges: also simulate whether the best design stays best where friction etc. are not
+            calibrated.
         workers: number of threads, by default one per core. It does not change the result.
         progress: called as progress(done, total, best) after each evaluation.
     Raises:
@@ -117,7 +128,7 @@ def optimise(
     _require("study", study, Study, "load_study")
     with open_study_folder(study, out) as folder, local_executor(workers) as executor:
         if not folder.finished:
-            done = optimise_study(folder, executor, Teller(progress))
+            done = optimise_study(folder, executor, Teller(progress), with_ranges=ranges)
             _warn([*map(str, done.advice), *done.remarks])
     return load_result(out)
 

@@ -35,8 +35,8 @@ ORDER = {
     "chamberopt/simulation": "resting_balls trapped_balls replicas evaluation estimates evaluate "
     "time_curve field_values variations advice effect_pilot error_law convergence recommendation",
     "chamberopt/peening": "strip+calibration_errors kirk_fit+strip_holder responses "
-    "tolerance_result range_result tolerances+ranges measured probes virtual_strip posterior setups "
-    "calibrate next_measurement",
+    "tolerance_result range_result tolerances+ranges measured probes virtual_strip posterior "
+    "setups calibrate next_measurement",
     "chamberopt/search": "study+optimiser trial_log study_folder "
     "sensitivity+observe+candidate judge ask_and_tell run_study pareto+run_sweep",
     "chamberopt/results": (

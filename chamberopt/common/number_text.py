@@ -90,15 +90,21 @@ def with_interval(value: float, half_width: float, unit: str = "", sign: bool = 
         return f"{plus}{plain(value)}{unit}"
     if not math.isfinite(half_width):
         return f"{plus}{plain(value)} ± not known{unit}"
-    # Two digits for half-widths from 1.0 to 2.9, one digit from 3 to 9. A negative number means
-    # tens, hundreds.
-    magnitude = math.floor(math.log10(half_width))
-    decimals = value_decimals = (1 if half_width / 10.0**magnitude < 2.95 else 0) - magnitude
+    decimals = value_decimals = _decimals(half_width)
     shown = 0.0 if abs(value) < ZERO_TOLERANCE else value
     if decimals < 0 and 0.0 < abs(shown) < 0.5 * 10.0**-decimals:
         # 4000 ± 500 000 says more than 0 ± 500 000.
         value_decimals = -math.floor(math.log10(abs(shown)))
     return f"{plus}{_rounded(shown, value_decimals)} ± {_rounded(half_width, decimals)}{unit}"
+
+
+def _decimals(half_width: float) -> int:
+    """Return the number of decimals of a value with this half-width; below 0 are tens, hundreds.
+
+    A half-width from 1.0 to 2.9 has two digits, from 3 to 9 one.
+    """
+    magnitude = math.floor(math.log10(half_width))
+    return (1 if half_width / 10.0**magnitude < 2.95 else 0) - magnitude
 
 
 def _rounded(value: float, decimals: int) -> str:
@@ -122,3 +128,18 @@ def typeset(text: str) -> str:
 
     text = re.sub(r"(?<![\d.,e])\d{5,}(?!e)", grouped, text).replace(" °", f"{THIN_SPACE}°")
     return re.sub(r"(?<!\w)-(?=\d)", "−", text)
+
+
+def range_text(low: float, high: float, unit: str = "") -> str:
+    """Return the ends of a range as text such as "0.70 to 0.83 s".
+
+    Both have the decimals that the half of their distance would have as an interval.
+    """
+    half_width = 0.5 * abs(high - low)
+    if not math.isfinite(half_width) or half_width < ZERO_TOLERANCE:
+        ends = [plain(low), plain(high)]
+    else:
+        decimals = _decimals(half_width)
+        ends = [_rounded(one, decimals) for one in (low, high)]
+    text = ends[0] if ends[0] == ends[1] else f"{ends[0]} to {ends[1]}"
+    return f"{text} {unit}".rstrip()

@@ -10,6 +10,7 @@ from chamberopt.coverage.coverage_intervals import NOT_RESOLVED
 from chamberopt.coverage.metrics import OBJECTIVES
 from chamberopt.documents.coverage import change
 from chamberopt.documents.document import AnswerLine
+from chamberopt.documents.ranges import range_answer
 from chamberopt.documents.wording import Label, metric_label, objective_label, plain
 from chamberopt.documents.zones import zone_lines
 from chamberopt.search.study.constraints import MET
@@ -73,7 +74,7 @@ def answer_lines(result: Result) -> list[AnswerLine]:
     The sentences say which limits of zones and constraints are met, and name doubts about the
     calibration.
     """
-    lines = [*zone_lines(result), *_constraint_lines(result)]
+    lines = [*range_answer(result), *zone_lines(result), *_constraint_lines(result)]
     calibration = result.design.calibration
     doubts = [*misfit_texts(calibration), calibration.not_mmA] if calibration else []
     return lines + [

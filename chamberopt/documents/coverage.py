@@ -21,6 +21,7 @@ from chamberopt.documents.document import (
     Tile,
     Tiles,
 )
+from chamberopt.documents.ranges import range_beside
 from chamberopt.documents.wording import Label, metric_label, objective_label, per_cent, plain
 from chamberopt.pictures.charts.coverage import coverage_over_time_figure, histogram_figure
 
@@ -34,13 +35,17 @@ SHOWN_AS_TILES = ("mean_coverage", "p05_coverage", "time_to_98_s")  # besides th
 
 @dataclass(frozen=True)
 class Figure:
-    """A figure of the result in its stored unit, its value for the start design and the change."""
+    """A figure of the result in its stored unit, its value for the start design and the change.
+
+    range_text: text of the result's range over what is not calibrated; "" if there is none.
+    """
 
     name: str
     label: Label
     result: Estimate
     start: Estimate | None = None
     change: Estimate | None = None
+    range_text: str = ""
 
 
 def figures(result: Result, start: Result | None) -> list[Figure]:
@@ -57,9 +62,14 @@ def figures(result: Result, start: Result | None) -> list[Figure]:
         if metric_label(name).text != label.text and "." not in name
     ]
     return [
-        Figure(name, label, after, before, change(after, before, result, start))
-        if start is not None and before is not None
-        else Figure(name, label, after)
+        Figure(
+            name,
+            label,
+            after,
+            before,
+            change(after, before, result, start) if start and before else None,
+            range_beside(result, name, label),
+        )
         for name, label, after, before in entries
     ]
 
@@ -140,7 +150,16 @@ def coverage_section(
 
 def _table(shown: Sequence[Figure]) -> Table:
     rows = [(one.label.with_unit, one.label.number(one.result)) for one in shown]
-    return Table("± 95 % intervals", ("", "with 95 % interval"), rows)
+    return _with_ranges(Table("± 95 % intervals", ("", "with 95 % interval"), rows), shown)
+
+
+def _with_ranges(table: Table, shown: Sequence[Figure]) -> Table:
+    """Return a table of figures with a last column for their ranges, if any has one."""
+    if not any(one.range_text for one in shown):
+        return table
+    ranges = {one.label.with_unit: one.range_text for one in shown}
+    rows = [(*row, ranges[row[0]]) for row in table.rows]
+    return Table(table.caption, (*table.head, "range, not calibrated"), rows)
 
 
 def _compared(shown: Sequence[Figure]) -> Table:
@@ -156,7 +175,7 @@ def _compared(shown: Sequence[Figure]) -> Table:
         for one in shown
         if one.start is not None and one.change is not None
     ]
-    return Table("± 95 % intervals", head, rows)
+    return _with_ranges(Table("± 95 % intervals", head, rows), shown)
 
 
 def _standing(changed: Estimate) -> str:

@@ -24,6 +24,7 @@ from chamberopt.documents.document import (
     TextFile,
     values,
 )
+from chamberopt.documents.ranges import groups_text, range_section
 from chamberopt.documents.study import (
     front_section,
     influence_section,
@@ -50,6 +51,7 @@ LIMITS_OF_INTERVALS = (
     "The intervals cover random variation between simulations only. They do not include errors in "
     "your restitution, friction and material data: calibrate those with your machine."
 )
+COUNTED_ONLY = "The intervals cover random variation between simulations only."
 LIMITS_OF_CALIBRATED = (
     "The intervals cover random variation between simulations, and what the calibration of the "
     "machine leaves open. They do not include what the model itself leaves out."
@@ -106,6 +108,7 @@ def report(result: Result) -> Document:
         influence_section(study, label) if study else None,
         coverage_section(shown, of, scenes),
         zones_section(result),
+        range_section(result),
         tolerance_section(result),
         _accuracy_and_cost(result, trials),
         _effects(result),
@@ -123,7 +126,11 @@ def notes_of(result: Result) -> list[str]:
 
 def limits_of_intervals(result: Result) -> str:
     """Return a sentence on errors that the intervals of a result do not cover."""
-    return LIMITS_OF_INTERVALS if result.design.calibration is None else LIMITS_OF_CALIBRATED
+    calibrated, ranges = result.design.calibration is not None, result.record.ranges
+    if ranges is None:
+        return LIMITS_OF_CALIBRATED if calibrated else LIMITS_OF_INTERVALS
+    text = LIMITS_OF_CALIBRATED if calibrated else COUNTED_ONLY
+    return f"{text} The ranges hold what is not calibrated: {groups_text(ranges)}."
 
 
 def _subtitle(result: Result) -> str:

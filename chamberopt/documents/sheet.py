@@ -15,6 +15,7 @@ from chamberopt.design.tolerances import tolerance_box
 from chamberopt.documents.answer import answer, answer_lines
 from chamberopt.documents.coverage import figures
 from chamberopt.documents.document import Block, Document, Section, Sentence, Table
+from chamberopt.documents.ranges import groups_text, slow_end_is_late, time_at_slow_end
 from chamberopt.documents.report import limits_of_intervals, notes_of, seed_text
 from chamberopt.documents.study import exposed_target
 from chamberopt.documents.tolerances import sheet_rows
@@ -58,7 +59,10 @@ def cautions(result: Result) -> Iterator[str]:
 def _time(result: Result) -> Iterator[str]:
     """Yield a sentence if the peening time is too short to cover the target, else nothing."""
     time, planned = result.metrics.get(TIME), result.design.process.treatment_time
-    if time is None or time.in_words == "not resolved" or time.value <= planned:
+    if time is None or time.in_words == "not resolved":
+        return
+    if time.value <= planned:
+        yield from _slow_time(result)
         return
     if time.in_words == "never":
         yield "95 % of the target's area is never 98 % covered, however long it is peened."
@@ -68,6 +72,17 @@ def _time(result: Result) -> Iterator[str]:
         f"The peening time of {plain(planned)} s is too short: 95 % of the target's area is 98 % "
         f"covered after {needed}."
     )
+
+
+def _slow_time(result: Result) -> Iterator[str]:
+    """Yield a sentence if the peening time is too short at the slow end of what is not known."""
+    found = result.record.ranges
+    if found and slow_end_is_late(result):
+        yield (
+            f"The peening time is enough as designed, but not at the slow end of what is not "
+            f"calibrated ({groups_text(found)}): there 95 % of the target's area is 98 % covered "
+            f"after: {time_at_slow_end(result)}."
+        )
 
 
 MOST_ROWS = 4  # rows of zones, tolerances or sizes of shot; the report has all rows
@@ -254,11 +269,14 @@ def _expected(result: Result) -> Iterator[Row]:
     hidden = "strength_um" if calibration and calibration.has_strips else ""
     for row in shown:
         if (row is shown[0] or row.name in EXPECTED) and row.name != hidden:
-            yield row.label.text, row.label.format(row.result)
+            text = row.label.format(row.result)
+            yield row.label.text, f"{text}; {row.range_text}" if row.range_text else text
+    if slow := time_at_slow_end(result):
+        yield f"{metric_label(TIME).text}, at the slow end", slow
     if reason := why_no_intensity(calibration):
         yield "", f"{reason[0].upper()}{reason[1:]}."
     for one in answer_lines(result):
-        if one.about in ("best", "calibration"):  # zones have their own block
+        if one.about in ("best", "calibration", "ranges"):  # zones have their own block
             yield "", one.text
     yield "", f"± 95 % intervals. {limits_of_intervals(result)}"
 

@@ -6,11 +6,13 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from chamberopt.common.number_text import estimate_text, plain
+from chamberopt.documents.ranges import at_ends_text, range_lines, range_texts
 from chamberopt.search.study.constraints import judge_zones
 
 if TYPE_CHECKING:
     from chamberopt.common.estimate import Estimate
     from chamberopt.design.load import Design
+    from chamberopt.peening.range_result import RangeResult, StudyRanges
     from chamberopt.search.run_study import StudyResult
     from chamberopt.search.run_sweep import SweepResult
     from chamberopt.simulation.evaluation import Evaluation
@@ -21,13 +23,18 @@ def estimate_line(name: str, estimate: Estimate) -> str:
     return f"{name:34}{estimate_text(estimate)}"
 
 
-def evaluation_lines(evaluation: Evaluation) -> list[str]:
+def evaluation_lines(evaluation: Evaluation, ranges: RangeResult | None = None) -> list[str]:
     """Return a line for the objective and each metric, with their 95 % intervals.
 
-    The last line gives the area of the windows, the discs in which coverage is measured.
+    Behind the interval stands the range of what is not calibrated, if it is given. The last line
+    gives the area of the windows, the discs in which coverage is measured.
     """
     rows = {evaluation.objective_name: evaluation.objective, **evaluation.metrics}
-    lines = [estimate_line(name, estimate) for name, estimate in rows.items()]
+    beside = range_texts(ranges)
+    lines = [
+        f"{estimate_line(name, one):56}{beside.get(name, '')}".rstrip()
+        for name, one in rows.items()
+    ]
     found = evaluation.resolution
     return [
         *lines,
@@ -59,20 +66,26 @@ def replicas_text(design: Design) -> str:
     return f"{accuracy.replicas} replicas of {design.process.recorded_time:g} s"
 
 
-def study_lines(result: StudyResult) -> list[str]:
-    """Return lines on a study: start and best design with parameters and figures, gain, effort."""
+def study_lines(result: StudyResult, ranges: StudyRanges | None = None) -> list[str]:
+    """Return lines on a study: start and best design with parameters and figures, gain, effort.
+
+    Args:
+        ranges: ranges of what is not calibrated; None if they were not simulated.
+    """
     study, start, best = result.study, result.start, result.best
     lines = [f"{'parameter':34}{'start':>12}{'best':>12}"]
     for name in study.vary:
         values = (f"{plain(one.parameters[name], 6):>12}" for one in (start, best))
         lines.append(f"{name:34}{''.join(values)}")
-    for title, one in (("start", start), ("best", best)):
+    of_both = (ranges.start, ranges.best) if ranges else (None, None)
+    for title, one, found in zip(("start", "best"), (start, best), of_both, strict=True):
         limits = zone_limit_lines(one.design, one.evaluation)
-        lines += ["", title, *evaluation_lines(one.evaluation), *limits]
+        lines += ["", title, *evaluation_lines(one.evaluation, found), *range_lines(found), *limits]
     verdict = "better than the start" if result.improved else "within the noise of the start"
     if result.gain.in_words:
         verdict = "the objective of the start or of the best design is not known"
     lines += ["", f"{estimate_line('gain', result.gain)}: {verdict}"]
+    lines += [at_ends_text(one) for one in ranges.rivals] if ranges else []
     if result.sensitivity:
         lines += ["", *result.sensitivity.sentences(), ""]
     if study.objective.pareto:

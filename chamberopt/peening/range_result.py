@@ -5,12 +5,12 @@ These are typed values as they are computed, recorded and read. documents/ranges
 
 from __future__ import annotations
 
-from typing import Literal, Self
+from typing import Literal, NamedTuple, Self
 
 from pydantic import model_validator
 
 from chamberopt.common.record_types import KnownInterval, Positive, Table
-from chamberopt.peening.tolerance_result import EffectEnds
+from chamberopt.peening.tolerance_result import EffectEnds, ToleranceResult
 
 NEVER_IN_WORDS = "never"
 
@@ -99,3 +99,18 @@ class RivalAtEnds(Table):
 
     rival: Literal["start", "runner-up"]
     gains: list[GainAtEnd]
+
+
+class Spreads(NamedTuple):
+    """What is told beside the figures of a design; None where it was not simulated."""
+
+    tolerances: ToleranceResult | None = None
+    ranges: RangeResult | None = None
+
+
+class StudyRanges(NamedTuple):
+    """Ranges of a study's best and start designs, and comparisons of the best at their ends."""
+
+    best: RangeResult
+    start: RangeResult
+    rivals: list[RivalAtEnds]

@@ -19,6 +19,10 @@ of d^2 is the square of the true change plus s^2. Both values of d come from equ
 that errors by few dents cancel in it. The scatter s is that of the n replicas, because the scatter
 of so few as r is hardly known.
 
+Percentiles over the area scatter much more than means. Where the number of dents changes alike
+everywhere they go with the mean dose, and so does the time to full coverage. Their change is that
+of the dose and, apart from it, what they change beside it. Noise is taken off each of the two.
+
 The groups are independent of one another, so their changes are added in quadrature: all groups are
 hardly at their worst ends at once. A figure that has no number at an end, such as a time that is
 never, has the range of its values at the ends.
@@ -27,10 +31,10 @@ never, has the range of its values at the ends.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 
@@ -62,6 +66,10 @@ LEAST_REPLICAS = 2  # at each end, and 1/2k of the design's own if that is more
 # Figures of single places are told at the ends from this number of dents in the median window on.
 # They take 25 for an interval of their own, but the errors by few dents cancel in changes.
 LEAST_DENTS = 5.0
+# Figures that go with the mean dose of dents, and the power of it, by Avrami's equation: where all
+# places get twice the dents, x doubles in 1 - exp(-x) and the time to 98 % halves.
+DOSE = "exposure"
+WITH_DOSE = {"p05_coverage": 1.0, "p95_coverage": 1.0, "p95_exposure": 1.0, "time_to_98_s": -1.0}
 
 
 @dataclass(frozen=True)
@@ -126,7 +134,18 @@ def simulate_ends(
     cavity = analytic_cavity(design, chamber) if whole.analytic else None
     of_all = RunsProgress(progress, 2 * len(groups), ended=-1)  # the design itself takes none
     runs = Variations(design, chamber, executor, of_all, plan, cavity, ReplicaSet(first))
-    ends = {name: (runs.run(low), runs.run(high)) for name, (low, high) in changed.items()}
+
+    def run(group: Unknown, end: Design, factor: float) -> Evaluation:
+        try:
+            return runs.run(end)
+        except Exception as error:
+            error.add_note(f"in the run with {factor:g} times {group.name}")
+            raise
+
+    ends = {}
+    for one in groups:
+        low, high = changed[one.name]
+        ends[one.name] = run(one, low, one.low), run(one, high, one.high)
     return EndRuns(groups, calibrated(design), whole, runs.nominal, ends)
 
 
@@ -198,40 +217,100 @@ def _ranged(name: str, runs: EndRuns) -> RangedFigure | None:
     known = _figure(runs.whole, name)
     if NEVER_IN_WORDS in (known.in_words, *(one.in_words for one in every)):
         return _between_ends(known, few, ends)
-    metric = find_metric(name)
-    scale = scale_of(name) if metric else IDENTITY
+    found = _changes_with_dose(name, runs) or _changes(name, runs)
+    metric, start = find_metric(name), found.start
+    highest = metric.highest if metric else highest_objective(name, runs.whole.reachable)
+    back = _BackFromScale(found.scale, metric.lowest if metric else -math.inf, highest)
+    # The most negative and the most positive change of each group, shape (k,), and its noise.
+    groups = np.arange(len(runs.groups))
+    sides = []
+    for at, sign in ((found.true.argmin(axis=1), -1.0), (found.true.argmax(axis=1), 1.0)):
+        change = sign * np.maximum(sign * found.true[groups, at], 0.0)
+        sides.append(back.end(start, change, found.half_width[groups, at], sign))
+    squares = np.minimum(found.true.min(axis=1), 0.0) ** 2
+    squares = squares + np.maximum(found.true.max(axis=1), 0.0) ** 2
+    whole = float(squares.sum())
+    rows = zip(ends, found.shown, found.half_width, strict=True)
+    return RangedFigure(
+        low=sides[0],
+        high=sides[1],
+        effects={
+            one: EffectEnds(
+                low=back.change(start, float(change[0]), float(noise[0])),
+                high=back.change(start, float(change[1]), float(noise[1])),
+            )
+            for one, change, noise in rows
+        },
+        shares={one: float(x) / whole for one, x in zip(ends, squares, strict=True)}
+        if whole
+        else {},
+    )
+
+
+class _Changes(NamedTuple):
+    """Changes of a figure at the ends of the groups, on its scale; arrays have the shape (k, 2).
+
+    start: place of the figure itself.
+    scatter: its pseudo-values over the replicas of the design, (g,).
+    shown: the changes.
+    true: the changes without what noise adds on average.
+    half_width: of their 95 % intervals.
+    """
+
+    scale: FigureScale
+    start: float
+    scatter: np.ndarray
+    shown: np.ndarray
+    true: np.ndarray
+    half_width: np.ndarray
+
+
+def _changes(name: str, runs: EndRuns) -> _Changes:
+    few, known = _figure(runs.few, name), _figure(runs.whole, name)
+    every = [few, *(_figure(end, name) for pair in runs.ends.values() for end in pair)]
+    scale = scale_of(name) if find_metric(name) else IDENTITY
     if on_scale(known, scale).in_words or not all(_has_place(scale, one.value) for one in every):
         scale = IDENTITY  # a share of 0 or of 1, for example, has no place on the other scale
     whole = on_scale(known, scale)
-    places = [scale.forward(one.value) for one in every]
-    highest = highest_objective(name, runs.whole.reachable) if not metric else metric.highest
-    lowest = metric.lowest if metric else -math.inf
-    changes = np.array(places[1:], dtype=float).reshape(-1, 2) - places[0]  # (k, 2)
+    places = np.array([scale.forward(one.value) for one in every])
     scatter = np.array(whole.pseudovalues)
-    error = runs.noise * float(scatter.std(ddof=1)) / math.sqrt(len(scatter))
-    half_width = student_quantile(len(scatter) - 1) * error
+    shown = places[1:].reshape(-1, 2) - places[0]
+    true, half_width = _without_noise(shown, scatter, runs.noise)
+    return _Changes(scale, whole.value, scatter, shown, true, half_width)
+
+
+def _changes_with_dose(name: str, runs: EndRuns) -> _Changes | None:
+    """Return the changes of a figure that goes with the dose; None for other figures.
+
+    They are those of the dose and, apart from these, what the figure changes beside them.
+    """
+    zone, _, metric = name.rpartition(".")
+    dose = f"{zone}.{DOSE}" if zone else DOSE
+    if metric not in WITH_DOSE or dose not in runs.whole.metrics:
+        return None
+    own, of_dose, power = _changes(name, runs), _changes(dose, runs), WITH_DOSE[metric]
+    if IDENTITY in (own.scale, of_dose.scale) or len(own.scatter) != len(of_dose.scatter):
+        return None
+    beside = own.shown - power * of_dose.shown
+    scatter = own.scatter - power * of_dose.scatter
+    true, half_width = _without_noise(beside, scatter, runs.noise)
+    shown = power * of_dose.shown + true
+    noise = np.hypot(of_dose.half_width, np.where(true == 0.0, 0.0, half_width))
+    return own._replace(shown=shown, true=power * of_dose.true + true, half_width=noise)
+
+
+def _without_noise(
+    changes: np.ndarray, scatter: np.ndarray, wider: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return changes (k, 2) without what noise adds, and half-widths of the changes (k, 2).
+
+    Args:
+        scatter: pseudo-values of the figure in all replicas, (g,).
+        wider: standard error of a change over that of the figure.
+    """
+    error = wider * float(scatter.std(ddof=1)) / math.sqrt(len(scatter))
     true = np.sign(changes) * np.sqrt(np.maximum(changes**2 - error**2, 0.0))
-    sides = np.minimum(true.min(axis=1), 0.0), np.maximum(true.max(axis=1), 0.0)  # (k,) each
-    back = _BackFromScale(scale, lowest, highest)
-    low, high = (back.end(whole.value, side, half_width) for side in sides)
-    squares = sides[0] ** 2 + sides[1] ** 2
-    whole_square = float(squares.sum())
-    return RangedFigure(
-        low=low,
-        high=high,
-        effects={
-            one: EffectEnds(
-                low=back.change(whole.value, float(at_low), half_width),
-                high=back.change(whole.value, float(at_high), half_width),
-            )
-            for one, (at_low, at_high) in zip(ends, changes, strict=True)
-        },
-        shares={
-            one: float(square) / whole_square for one, square in zip(ends, squares, strict=True)
-        }
-        if whole_square
-        else {},
-    )
+    return true, np.full_like(changes, student_quantile(len(scatter) - 1) * error)
 
 
 def _can_be_told(name: str, figure: Estimate, dents: float) -> bool:
@@ -269,10 +348,13 @@ class _BackFromScale:
         sides = (abs(self.value(place + one) - middle) for one in (-half_width, half_width))
         return Estimate(middle, max(sides))
 
-    def end(self, start: float, changes: np.ndarray, half_width: float) -> Estimate:
-        """Return the end of a range on the side of these changes (k,) of the groups."""
+    def end(
+        self, start: float, changes: np.ndarray, half_widths: np.ndarray, sign: float
+    ) -> Estimate:
+        """Return the end of a range on one side, by the changes (k,) of the groups to that side."""
         size = float(np.linalg.norm(changes))
-        return self.interval(start + math.copysign(size, float(changes.sum())), half_width)
+        noise = float(np.linalg.norm(changes * half_widths)) / size if size else 0.0
+        return self.interval(start + sign * size, noise or float(half_widths.max()))
 
     def change(self, start: float, change: float, half_width: float) -> Estimate:
         """Return the change of the figure that starts at a place on its scale."""

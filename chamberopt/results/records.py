@@ -24,6 +24,7 @@ from chamberopt.common.errors import InputError, first_wrong_value
 from chamberopt.common.estimate import Estimate
 from chamberopt.common.record_types import Interval, KnownInterval, Positive, Table, WholeEstimate
 from chamberopt.coverage.metrics import METRICS, find_metric, parse_objective
+from chamberopt.peening.range_result import RangeResult, RivalAtEnds
 from chamberopt.peening.tolerance_result import ToleranceResult
 from chamberopt.search.study.parameters import bound_at
 
@@ -283,6 +284,7 @@ class StudyRecord(Table):
     best: BestRecord
     start: StartRecord
     confirmed: list[ConfirmedRecord]
+    at_ends: list[RivalAtEnds] = Field(default_factory=list)  # of what is not calibrated
     seconds: Positive
 
     @property
@@ -370,6 +372,7 @@ class CandidateRecord(ResultRecord):
     shape_sha256: Digest | Literal[""] = ""
     study: StudyRecord | None = None
     tolerances: ToleranceResult | None = None
+    ranges: RangeResult | None = None  # None if nobody has simulated them
 
     _units = field_serializer("metrics")(_with_units)
 

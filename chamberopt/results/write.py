@@ -14,6 +14,7 @@ from chamberopt.common.versions import versions
 from chamberopt.coverage.metrics import exposed_target
 from chamberopt.coverage.part_impacts import HITS_FILE, save_hits, sort_hits_by_triangle
 from chamberopt.design.load import Design, save_design, with_paths_from
+from chamberopt.peening.range_result import Spreads
 from chamberopt.results.arrays_file import ResultArrays, save_result_arrays
 from chamberopt.results.load import START, content_sha256, file_sha256
 from chamberopt.results.records import (
@@ -52,7 +53,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from chamberopt.chamber.build import Chamber
-    from chamberopt.peening.tolerance_result import ToleranceResult
+    from chamberopt.peening.range_result import RivalAtEnds, StudyRanges
     from chamberopt.search.run_study import StudyResult
     from chamberopt.search.run_sweep import SweepResult
     from chamberopt.search.sensitivity import Sensitivity
@@ -60,18 +61,24 @@ if TYPE_CHECKING:
     from chamberopt.simulation.advice import Advice
     from chamberopt.simulation.evaluation import Evaluation
 
+NO_SPREADS = Spreads()
+
 
 def write_simulation(
-    folder: Path, candidate: CandidateResult, tolerances: ToleranceResult | None = None
+    folder: Path, candidate: CandidateResult, spreads: Spreads = NO_SPREADS
 ) -> CandidateRecord:
     """Write the data files of a simulation into an empty folder and return its record."""
     save_design(candidate.design, folder / "design.toml")
-    more = {"tolerances": tolerances} if tolerances else {}
+    more = {name: one for name, one in spreads._asdict().items() if one}
     return _write_candidate(folder, candidate, kind="simulation", **more)
 
 
 def write_study(
-    folder: Path, study_result: StudyResult, start: CandidateResult, best: CandidateResult
+    folder: Path,
+    study_result: StudyResult,
+    start: CandidateResult,
+    best: CandidateResult,
+    ranges: StudyRanges | None = None,
 ) -> CandidateRecord:
     """Add the data files of a finished study to its folder.
 
@@ -86,10 +93,12 @@ def write_study(
     save_design(best.design, folder / "best.toml")
     write_text(folder / "history.csv", trials_as_csv(study_result.trials, read_seconds(folder)))
     own = make_folder(folder / START)
-    write_result(own, write_simulation(own, start))
+    write_result(own, write_simulation(own, start, Spreads(ranges=ranges and ranges.start)))
     if study_result.study.objective.pareto:
         write_text(folder / "pareto.csv", pareto.as_csv(study_result))
-    return _write_candidate(folder, best, kind="study", study=study_record(study_result))
+    more = {"ranges": ranges.best} if ranges else {}
+    record = study_record(study_result, ranges.rivals if ranges else ())
+    return _write_candidate(folder, best, kind="study", study=record, **more)
 
 
 def write_sweep(folder: Path, sweep: SweepResult) -> SweepRecord:
@@ -263,8 +272,12 @@ def _about_field(design: Design, evaluation: Evaluation) -> FieldRecord:
     )
 
 
-def study_record(result: StudyResult) -> StudyRecord:
-    """Return the key `study` of result.json for a finished study."""
+def study_record(result: StudyResult, at_ends: Sequence[RivalAtEnds] = ()) -> StudyRecord:
+    """Return the key `study` of result.json for a finished study.
+
+    Args:
+        at_ends: comparisons of the best design with others at the ends of what is not calibrated.
+    """
     study, replicas = result.study, result.best.evaluation.replicas
     search = [trial for trial in result.trials if trial.stage == "search"]
     more: dict[str, Any] = {}
@@ -272,6 +285,8 @@ def study_record(result: StudyResult) -> StudyRecord:
         more["model"] = _about_model(result.sensitivity)
     if study.objective.pareto:
         more["front"] = _about_front(result)
+    if at_ends:
+        more["at_ends"] = list(at_ends)
     accuracy = Accuracies(
         search=_accuracy(study.at_search_accuracy(study.design)),
         confirm=_accuracy(study.design).model_copy(update={"replicas": replicas}),

@@ -13,6 +13,7 @@ from chamberopt.results.load import load_trials
 from chamberopt.search.run_study import StudyResult, run_study
 from chamberopt.search.run_sweep import SweepPlan, SweepResult, run_sweep
 from chamberopt.simulation.replicas import most_replicas
+from chamberopt.workflows.ranges import EndError, study_ranges
 from chamberopt.workflows.save_run import save_study, save_sweep
 from chamberopt.workflows.simulate import Teller, resolve_effects
 
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from concurrent.futures import Executor
 
     from chamberopt.chamber.build import Chamber
+    from chamberopt.peening.range_result import StudyRanges
     from chamberopt.search.study import Study
     from chamberopt.search.study_folder import StudyFolder
     from chamberopt.simulation.advice import Advice
@@ -35,21 +37,29 @@ class Ended(Generic[Found]):
     chamber: chamber of the study's design.
     advice: reasons for the optional physical effects, if the design left them to the program.
     remarks: remarks for the user, such as why a picture was skipped.
+    ranges: ranges of what is not calibrated, of a study; None if they were not simulated.
     """
 
     result: Found
     chamber: Chamber
     advice: list[Advice]
     remarks: list[str]
+    ranges: StudyRanges | None = None
 
 
 def optimise_study(
-    folder: StudyFolder, executor: Executor, teller: Teller, stop: Callable[[], bool] | None = None
+    folder: StudyFolder,
+    executor: Executor,
+    teller: Teller,
+    stop: Callable[[], bool] | None = None,
+    with_ranges: bool = False,
 ) -> Ended[StudyResult]:
     """Run or resume the study of a folder, and save its result there.
 
     Args:
         stop: called before each evaluation. If it returns True, KeyboardInterrupt is raised.
+        with_ranges: True to simulate start, best and runner-up at the ends of what is not
+            calibrated.
 
     Raises:
         InputError: the start cannot be simulated, no candidate meets the constraints, or the memory
@@ -61,12 +71,18 @@ def optimise_study(
     study, advice = _prepare(folder, chamber, executor, teller)
     with teller.step("evaluations", study.optimizer.evaluations) as progress:
         result = run_study(study, folder, executor, progress, stop=stop, at_once=at_once)
+    ranges, failed = None, []
+    if with_ranges:
+        try:
+            ranges = study_ranges(result, executor, teller)
+        except EndError as error:
+            failed = [str(error)]
     with teller.step("writing and drawing"):
         best = result.best.design
         found = build_chamber(best, result.target)
         warnings = teller.check(best, found, " of the best design")
-        remarks = save_study(folder.path, result, advice, warnings)
-    return Ended(result, chamber, advice, remarks)
+        remarks = failed + save_study(folder.path, result, advice, warnings, ranges)
+    return Ended(result, chamber, advice, remarks, ranges)
 
 
 def sweep_study(

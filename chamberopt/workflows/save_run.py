@@ -13,13 +13,19 @@ from chamberopt.pictures.charts.study import convergence_picture, pareto_picture
 from chamberopt.pictures.charts.sweep import sweep_map
 from chamberopt.pictures.coverage import draw_coverage
 from chamberopt.results.load import START, summary
-from chamberopt.results.write import write_result, write_simulation, write_study, write_sweep
+from chamberopt.results.write import (
+    NO_SPREADS,
+    write_result,
+    write_simulation,
+    write_study,
+    write_sweep,
+)
 from chamberopt.simulation.field_values import CandidateResult, complete_result
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
     from chamberopt.design.load import Design
-    from chamberopt.peening.tolerance_result import ToleranceResult
+    from chamberopt.peening.range_result import Spreads, StudyRanges
     from chamberopt.search.candidate import ConfirmedCandidate
     from chamberopt.search.run_study import StudyResult
     from chamberopt.search.run_sweep import SweepResult
@@ -34,7 +40,7 @@ def save_simulation(
     evaluation: Evaluation,
     advice: Sequence[Advice] = (),
     warned: Sequence[str] | None = None,
-    tolerances: ToleranceResult | None = None,
+    spreads: Spreads = NO_SPREADS,
 ) -> list[str]:
     """Save a simulation in a new or empty folder.
 
@@ -48,7 +54,7 @@ def save_simulation(
         evaluation: evaluation of the design.
         advice: reasons for the physical effects, if the design left their choice to the program.
         warned: warnings of `chamberopt check`; None if it was not run.
-        tolerances: effect of the design's tolerances; None if it was not simulated.
+        spreads: effect of the design's tolerances, and ranges of what is not calibrated.
 
     Returns:
         Remarks for the user, such as why a picture was skipped.
@@ -56,7 +62,7 @@ def save_simulation(
     folder = make_output_folder(folder)
     with whole_or_nothing(folder):  # a folder without result.json is of no use
         completed = complete_result(design, chamber, evaluation)
-        write_result(folder, write_simulation(folder, completed, tolerances), advice, warned)
+        write_result(folder, write_simulation(folder, completed, spreads), advice, warned)
     return _draw_coverage([folder], [evaluation], [folder.resolve().name], folder / "coverage.png")
 
 
@@ -65,6 +71,7 @@ def save_study(
     study_result: StudyResult,
     advice: Sequence[Advice] = (),
     warned: Sequence[str] | None = None,
+    ranges: StudyRanges | None = None,
 ) -> list[str]:
     """Complete the folder of a finished study.
 
@@ -78,6 +85,7 @@ def save_study(
         study_result: result of the study.
         advice: reasons for the physical effects, if the design left their choice to the program.
         warned: warnings of `chamberopt check` on the best design; None if it was not run.
+        ranges: ranges of what is not calibrated; None if they were not simulated.
 
     Returns:
         Remarks for the user, such as why a picture was skipped.
@@ -93,7 +101,7 @@ def save_study(
         results = threads.map(complete, (study_result.start, study_result.best))
         _draw_diagrams(folder, study_result)
         start, best = results
-        record = write_study(folder, study_result, start, best)
+        record = write_study(folder, study_result, start, best, ranges)
         remarks = _draw_start_and_best(folder, study_result, threads)
     write_result(folder, record, advice, warned)
     return remarks

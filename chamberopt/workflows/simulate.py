@@ -7,18 +7,21 @@ command line has a subclass that prints.
 from __future__ import annotations
 
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from chamberopt.chamber.analytic import analytic_cavity
 from chamberopt.chamber.build import build_chamber
 from chamberopt.coverage.field.memory import PROCESS, evaluation_bytes, how_many_fit
+from chamberopt.design.ranges import variants
 from chamberopt.peening.calibration_errors import evaluate_calibrated
+from chamberopt.peening.range_result import Spreads
 from chamberopt.peening.tolerances import simulate_tolerances
 from chamberopt.simulation.effect_pilot import with_effects_resolved
 from chamberopt.simulation.evaluate import ReplicaPlan
 from chamberopt.simulation.replicas import most_replicas
+from chamberopt.workflows.ranges import EndError, simulate_ranges
 from chamberopt.workflows.save_run import save_simulation
 
 if TYPE_CHECKING:
@@ -27,7 +30,6 @@ if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
     from chamberopt.common.progress import Progress
     from chamberopt.design.load import Design
-    from chamberopt.peening.tolerance_result import ToleranceResult
     from chamberopt.simulation.advice import Advice
     from chamberopt.simulation.evaluation import Evaluation
     from sim_core import AnalyticCavity
@@ -85,12 +87,14 @@ class SimulationSettings:
 
     analytic: use the exact cylinder, box or prism instead of its mesh, if the chamber is one.
     tolerances: also simulate the effect of the design's tolerances.
+    ranges: also simulate the ranges of what is not calibrated.
     plan: the replicas to simulate, by default those of the design.
     step: name of the step in which replicas are simulated.
     """
 
     analytic: bool = False
     tolerances: bool = False
+    ranges: bool = False
     plan: ReplicaPlan = field(default_factory=ReplicaPlan)
     step: str = "replicas"
 
@@ -101,13 +105,14 @@ class Simulated:
 
     design: the design with its optional physical effects chosen.
     advice: reasons for these effects, if the design left their choice to the program.
+    spreads: effect of the design's tolerances, and ranges of what is not calibrated.
     remarks: remarks for the user, such as why a picture was skipped.
     """
 
     design: Design
     chamber: Chamber
     evaluation: Evaluation
-    tolerances: ToleranceResult | None
+    spreads: Spreads
     advice: list[Advice]
     remarks: list[str]
 
@@ -137,17 +142,25 @@ def simulate_design(
             warnings = teller.check(design, chamber)
     cavity = analytic_cavity(design, chamber) if settings.analytic else None
     design, advice = resolve_effects(design, chamber, executor, teller)
+    if settings.ranges:
+        variants(design)  # before the work begins
     teller.compile(design, chamber, cavity)
-    found = None
+    found, ranges = None, None
     with teller.step(settings.step, design.process.accuracy.replicas) as progress:
         what = design, chamber, executor, progress
         if settings.tolerances:
             evaluation, found = simulate_tolerances(*what, settings.analytic)
         else:
             evaluation = evaluate_calibrated(*what, settings.plan, cavity)
+    if settings.ranges:
+        try:
+            ranges = simulate_ranges(design, chamber, evaluation, executor, teller)
+        except EndError as error:
+            evaluation = replace(evaluation, notes=(*evaluation.notes, str(error)))
+    spreads = Spreads(found, ranges)
     with teller.step("writing and drawing"):
-        remarks = save_simulation(folder, design, chamber, evaluation, advice, warnings, found)
-    return Simulated(design, chamber, evaluation, found, advice, remarks)
+        remarks = save_simulation(folder, design, chamber, evaluation, advice, warnings, spreads)
+    return Simulated(design, chamber, evaluation, spreads, advice, remarks)
 
 
 def resolve_effects(

@@ -16,6 +16,7 @@ def run(
     study: Path,
     /,
     *,
+    ranges: bool = True,
     workers: Workers = None,
     cluster: Cluster = None,
     json: Json = False,
@@ -30,6 +31,9 @@ def run(
     ----------
     study
         Study file (.toml).
+    ranges
+        At the end also simulate start, best and runner-up at the ends of what is not calibrated
+        (friction, v0, slopes of faces), and say whether the best stays best.
     """
     with Interrupt() as interrupt:
         from chamberopt.cli.teller import SearchTeller
@@ -52,7 +56,7 @@ def run(
             command = resume_command(study, folder.path)
             with resume_note(folder, command), open_executor(workers, cluster) as executor:
                 teller = SearchTeller(interrupt, f"to resume: {command}")
-                done = optimise_study(folder, executor, teller, lambda: interrupt.requested)
+                done = optimise_study(folder, executor, teller, lambda: interrupt.requested, ranges)
             result = done.result
             console.print_remarks(done.remarks)
             notes = [
@@ -62,7 +66,7 @@ def run(
                 *done.chamber.notes,
                 *result.best.evaluation.notes,
             ]
-            lines = [*study_lines(result), *note_lines(notes)]
+            lines = [*study_lines(result, done.ranges), *note_lines(notes)]
             console.print_result(lines, folder.path, json)
             if not json:
                 show, best = quoted("report", folder.path), folder.path / "best.toml"

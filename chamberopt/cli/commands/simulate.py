@@ -15,6 +15,7 @@ def simulate(
     *,
     analytic: bool = False,
     tolerances: bool = False,
+    ranges: bool = True,
     workers: Workers = None,
     cluster: Cluster = None,
     json: Json = False,
@@ -31,10 +32,14 @@ def simulate(
     tolerances
         Also simulate what the design's [tolerances] do: a further run for each, and one for the
         worst corner.
+    ranges
+        Also simulate the ends of what is not calibrated (friction, v0, slopes of faces), in as many
+        replicas again, and say how far the figures may be off by it.
     """
     from chamberopt.cli.teller import TerminalTeller
     from chamberopt.common.executor import open_executor
     from chamberopt.design.load import load_design
+    from chamberopt.documents.ranges import range_lines
     from chamberopt.documents.terminal_lines import evaluation_lines, note_lines, zone_limit_lines
     from chamberopt.documents.tolerances import tolerance_lines
     from chamberopt.peening.tolerances import plan_tolerances
@@ -49,12 +54,14 @@ def simulate(
         console.results_folder(out, design.stem) as folder,
         open_executor(workers, cluster) as executor,
     ):
-        settings = SimulationSettings(analytic, tolerances)
+        settings = SimulationSettings(analytic, tolerances, ranges)
         done = simulate_design(candidate, folder, executor, TerminalTeller(), settings)
     console.print_remarks(done.remarks)
     notes = note_lines([*map(str, done.advice), *done.chamber.notes, *done.evaluation.notes])
     limits = zone_limit_lines(done.design, done.evaluation)
-    lines = [*evaluation_lines(done.evaluation), *limits, *notes]
-    if done.tolerances:
-        lines += ["", *tolerance_lines(done.tolerances)]
+    found = done.spreads
+    lines = [*evaluation_lines(done.evaluation, found.ranges), *range_lines(found.ranges)]
+    lines += [*limits, *notes]
+    if found.tolerances:
+        lines += ["", *tolerance_lines(found.tolerances)]
     console.print_result(lines, folder, json)

@@ -20,6 +20,7 @@ from chamberopt.documents.tolerances import (
     tolerance_section,
 )
 from chamberopt.export.tables import write_tolerance_table
+from chamberopt.peening.range_result import Spreads
 from chamberopt.peening.tolerance_result import ToleratedFigure
 from chamberopt.peening.tolerances import find_tolerances, plan_tolerances
 from chamberopt.printers.report_page import write_report
@@ -47,7 +48,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         folder = tmp_path_factory.mktemp("tolerances") / "plate"
         nominal = evaluate(DESIGN)
         found = find_tolerances(DESIGN, plan_tolerances(DESIGN), nominal, evaluate)
-        save_simulation(folder, DESIGN, chamber, nominal, tolerances=found)
+        save_simulation(folder, DESIGN, chamber, nominal, spreads=Spreads(found))
         recorded = load_result(folder).record.tolerances
         assert recorded is not None
         assert recorded.figures.keys() == found.figures.keys()
