@@ -186,9 +186,13 @@ def _with(text: str, values: dict[str, str]) -> str:
 def patch_surroundings(patch: pytest.MonkeyPatch, sheets: list[Figure]) -> None:
     """Draw no pictures, work in this process alone, and keep the figures of sheets.
 
+    What is not calibrated is left out: tests/chamberopt/results/test_ranges.py has its words.
+
     The study of accuracy gets made-up replicas and CPU times: what it advises follows from these.
     """
     patch.setattr("chamberopt.workflows.save_run.draw_coverage", lambda *_: None)
+    patch.setattr("chamberopt.workflows.simulate.simulate_ranges", lambda *_: None)
+    patch.setattr("chamberopt.workflows.optimise.study_ranges", lambda *_: None)
     patch.setattr(comparison_folder, "draw_coverage", lambda *_: None)
     patch.setattr(comparison_folder, "draw_difference", lambda *_: None)
     patch.setattr(executor, "local_executor", lambda *_, **__: executor.ThreadExecutor(1))

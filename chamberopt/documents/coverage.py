@@ -21,7 +21,7 @@ from chamberopt.documents.document import (
     Tile,
     Tiles,
 )
-from chamberopt.documents.ranges import range_beside
+from chamberopt.documents.ranges import range_beside, with_its_unit
 from chamberopt.documents.wording import Label, metric_label, objective_label, per_cent, plain
 from chamberopt.pictures.charts.coverage import coverage_over_time_figure, histogram_figure
 
@@ -46,6 +46,11 @@ class Figure:
     start: Estimate | None = None
     change: Estimate | None = None
     range_text: str = ""
+
+    @property
+    def range_with_unit(self) -> str:
+        """The text of the range, with its unit if it ends in a number."""
+        return with_its_unit(self.label, self.range_text)
 
 
 def figures(result: Result, start: Result | None) -> list[Figure]:

@@ -100,7 +100,7 @@ def range_answer(result: Result) -> Iterator[AnswerLine]:
         text = f"Not calibrated: {_groups(found)}. Over their ranges the {label.text} "
         if figure.is_resolved:
             between = _of(label, figure)
-            text += f"is {between}{_unit(label, between)}; {_narrowed(figure)}."
+            text += f"is {with_its_unit(label, between)}; {_narrowed(figure)}."
         else:
             text += f"is as above: {_narrowed(figure)}."
         yield AnswerLine("ranges", text, False)
@@ -187,8 +187,9 @@ def _of(label: Label, figure: RangedFigure) -> str:
     return number_text.typeset(_text(label, figure))
 
 
-def _unit(label: Label, text: str) -> str:
-    return f" {label.unit}" if label.unit and text[-1].isdigit() else ""
+def with_its_unit(label: Label, text: str) -> str:
+    """Return the text of a range with the unit of its label, if it ends in a number."""
+    return f"{text} {label.unit}".rstrip() if text[-1:].isdigit() else text
 
 
 def _label(result: Result, name: str) -> Label:

@@ -269,8 +269,8 @@ def _expected(result: Result) -> Iterator[Row]:
     hidden = "strength_um" if calibration and calibration.has_strips else ""
     for row in shown:
         if (row is shown[0] or row.name in EXPECTED) and row.name != hidden:
-            text = row.label.format(row.result)
-            yield row.label.text, f"{text}; {row.range_text}" if row.range_text else text
+            more = f"; range {row.range_with_unit}" if row.range_text else ""
+            yield row.label.text, f"{row.label.format(row.result)}{more}"
     if slow := time_at_slow_end(result):
         yield f"{metric_label(TIME).text}, at the slow end", slow
     if reason := why_no_intensity(calibration):
