@@ -151,7 +151,7 @@ def time_at_slow_end(result: Result) -> str:
     if figure is None or not figure.is_resolved:
         return ""
     high = figure.high
-    return high.in_words or f"{number_text.typeset_plain(high.value, 2)} s"
+    return metric_label(TIME).format(high)
 
 
 def slow_end_is_late(result: Result) -> bool:

@@ -102,8 +102,8 @@ def test_noise_is_not_sold_as_knowledge() -> None:
 
 
 def test_the_truth_within_the_box_is_within_the_range() -> None:
-    """The sum of three numbers, each as likely anywhere in its range, exceeds the root of the sum of
-    their squared ends one time in twelve; the noise of the ends moves that by a little.
+    """The sum of three numbers, each as likely anywhere in its range, exceeds the root of the sum
+    of their squared ends one time in twelve; the noise of the ends moves that by a little.
     """
     rng = np.random.default_rng(5)
     factors = np.array([rng.uniform(*one[1:3], 2000) for one in GROUPS])
