@@ -39,6 +39,7 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 import numpy as np
 
 from chamberopt.chamber.analytic import analytic_cavity
+from chamberopt.chamber.scene import chamber_mesh
 from chamberopt.common.estimate import Estimate, student_quantile
 from chamberopt.coverage.metrics import find_metric, highest_objective
 from chamberopt.design.ranges import Unknown, calibrated, unknowns, variants
@@ -52,7 +53,7 @@ from chamberopt.peening.range_result import (
 )
 from chamberopt.peening.responses import IDENTITY, FigureScale, on_scale, scale_of
 from chamberopt.peening.tolerance_result import EffectEnds
-from chamberopt.simulation.evaluate import ReplicaPlan
+from chamberopt.simulation.evaluate import ReplicaPlan, prepare_target, window_setting
 from chamberopt.simulation.replicas import Replica, ReplicaSet
 from chamberopt.simulation.variations import RunsProgress, Variations
 
@@ -133,11 +134,15 @@ def simulate_ends(
     plan = ReplicaPlan(count, whole.stream, whole.objective_name)
     cavity = analytic_cavity(design, chamber) if whole.analytic else None
     of_all = RunsProgress(progress, 2 * len(groups), ended=-1)  # the design itself takes none
-    runs = Variations(design, chamber, executor, of_all, plan, cavity, ReplicaSet(first))
+    # The same points and windows serve all ends that do not change the size of dents.
+    windows = window_setting(design, chamber)
+    target = prepare_target(design, chamber, chamber_mesh(chamber))
+    runs = Variations(design, chamber, executor, of_all, plan, cavity, ReplicaSet(first, target))
 
     def run(group: Unknown, end: Design, factor: float) -> Evaluation:
         try:
-            return runs.run(end)
+            is_same = window_setting(end, chamber) == windows
+            return runs.run(end, target=target if is_same else None)
         except Exception as error:
             error.add_note(f"in the run with {factor:g} times {group.name}")
             raise

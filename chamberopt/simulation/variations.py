@@ -20,6 +20,7 @@ from chamberopt.simulation.replicas import Replica, ReplicaSet
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
     from chamberopt.common.progress import Progress
+    from chamberopt.coverage.field.target_field import TargetField
     from chamberopt.design.load import Design
     from chamberopt.simulation.evaluation import Evaluation
     from sim_core import AnalyticCavity
@@ -60,7 +61,11 @@ class Variations:
         self.nominal = evaluate(self.design, self.chamber, *how)
 
     def run(
-        self, design: Design, chamber: Chamber | None = None, replicas: Sequence[Replica] = ()
+        self,
+        design: Design,
+        chamber: Chamber | None = None,
+        replicas: Sequence[Replica] = (),
+        target: TargetField | None = None,
     ) -> Evaluation:
         """Evaluate a changed design.
 
@@ -70,9 +75,10 @@ class Variations:
             chamber: the chamber of the changed design; None if it is the chamber of the design
                 itself.
             replicas: replicas of the changed design that are known already, without a simulation.
+            target: the target of the changed design with its windows, if it is prepared already.
         """
         self.progress.ended += not replicas
-        nominal, known = self.nominal, ReplicaSet(list(replicas))
+        nominal, known = self.nominal, ReplicaSet(list(replicas), target)
         plan = ReplicaPlan(nominal.replicas, nominal.stream, nominal.objective_name)
         cavity = analytic_cavity(design, chamber) if self.cavity and chamber else self.cavity
         how = self.executor, self.progress, plan, cavity, known

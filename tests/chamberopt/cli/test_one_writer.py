@@ -32,7 +32,7 @@ def claimed(path: Path) -> AbstractContextManager[Path]:
 @pytest.mark.parametrize(
     ("command", "output"),
     [
-        ("simulate plate.toml --out out", "out"),
+        ("simulate plate.toml --no-ranges --out out", "out"),
         ("run s.toml --out out", "out"),
         ("sweep s.toml --grid 2 --out out", "out"),
         ("compare plate.toml plate.toml --out out", "out"),

@@ -540,7 +540,16 @@ def test_the_real_thing_killed_from_a_shell(tmp_path: Path) -> None:
     )
 
     def start(out: str) -> subprocess.Popen[bytes]:
-        command = [sys.executable, "-m", "chamberopt", "run", "small.toml", "--out", out]
+        command = [
+            sys.executable,
+            "-m",
+            "chamberopt",
+            "run",
+            "small.toml",
+            "--no-ranges",
+            "--out",
+            out,
+        ]
         return subprocess.Popen(
             command, cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
         )

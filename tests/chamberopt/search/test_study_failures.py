@@ -216,6 +216,7 @@ class TestCommandLine:
 
         self.at: dict[int, Callable[[], None]] = {}
         monkeypatch.setattr("chamberopt.search.run_study.ChamberSimulator", lambda *_: simulator)
+        monkeypatch.setattr("chamberopt.workflows.optimise.study_ranges", lambda *_: None)
         monkeypatch.setattr("chamberopt.cli.teller.compile_with_message", lambda *_: None)
         monkeypatch.setattr("chamberopt.pictures.coverage.draw_coverage", lambda *_: None)
         return done
