@@ -63,11 +63,10 @@ def cost_text(groups: Sequence[str], count: int, replicas: int, designs: int = 1
         designs: number of designs whose ranges are simulated.
     """
     more = 2 * len(groups) * count
-    each = "" if designs == 1 else f" for each of {designs} designs"
+    each = "" if designs == 1 else f" of each of {designs} designs"
     return (
-        f"{_list(groups)}: not calibrated, so both ends of their ranges are simulated too{each}: "
-        f"{more} more replicas of the size of the {replicas} of the figures, "
-        f"{more / replicas:.2g} times their work; --no-ranges leaves them out"
+        f"{_list(groups)}: not calibrated, so {more} more replicas{each} are simulated at both "
+        f"ends ({more / replicas:.2g} times the work of the figures); --no-ranges leaves them out"
     )
 
 
@@ -79,6 +78,8 @@ def at_ends_text(one: RivalAtEnds) -> str:
     groups = _list(dict.fromkeys(x.group for x in one.gains))
     if not worse and not unsure:
         return f"The best design stays better than {rival} at both ends of {groups}."
+    if len(unsure) == len(one.gains):
+        return f"Noise hides whether the best design or {rival} is better at the ends of {groups}."
     said = []
     if worse:
         said.append(f"{rival} is better at {_places((x.group, x.end) for x in worse)}")

@@ -122,7 +122,7 @@ def test_constraints_that_are_not_certainly_met_are_in_the_answer() -> None:
     design = SimpleNamespace(calibration=SimpleNamespace(misfits=[misfit], not_mmA=""))
     result: Any = SimpleNamespace(
         study=study,
-        record=SimpleNamespace(zones=zones),
+        record=SimpleNamespace(zones=zones, ranges=None),
         metrics={
             metric: Estimate(0.12, 0.03),
             "tip.mean_coverage": Estimate(0.9, 0.02),

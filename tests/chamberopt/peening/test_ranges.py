@@ -174,7 +174,7 @@ def test_the_best_of_a_study_is_ranked_at_both_ends() -> None:
     ends = better | {"v0": (better["v0"][0], rival.ends["friction"][1])}
     text = at_ends_text(best_at_ends(replace(best, ends=ends), rival, "runner-up"))
     assert "the runner-up is better at the high end of v0; the best design is better at" in text
-    assert "noise hides" in at_ends_text(best_at_ends(best, rival, "start"))
+    assert "Noise hides" in at_ends_text(best_at_ends(best, rival, "start"))
 
 
 SHORT = {

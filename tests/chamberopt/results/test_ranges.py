@@ -157,7 +157,7 @@ def test_a_study_says_whether_its_best_stays_best(
     monkeypatch.setattr("chamberopt.workflows.ranges.simulate_ends", ends)
     found = study_ranges(result, SerialExecutor(), teller)
     assert found is not None
-    assert told[0].startswith("v0: not calibrated, so both ends of their ranges are simulated too")
+    assert told[0].startswith("v0: not calibrated, so 4 more replicas of each of 2 designs are ")
     (rival,) = found.rivals
     assert (rival.rival, len(rival.gains)) == ("start", 2)
     gain = result.best.design.shot.mass_g - result.start.design.shot.mass_g
