@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -55,6 +56,7 @@ from chamberopt.geometry.triangles import (
 if TYPE_CHECKING:
     from chamberopt.design.load import Design
     from chamberopt.design.shape_surface import ShapeSurface
+    from sim_core import TriangleMesh
 
 # Rotation of a triangle by rounding [rad] that is worth a note. The facets of a round wall turn a
 # ball's path a hundred times as much.
@@ -83,6 +85,13 @@ class Chamber:
     def height(self) -> float:
         """Height of the cavity's highest point over the sonotrode [m]."""
         return float(self.vertices[:, 2].max())
+
+    @cached_property
+    def mesh(self) -> TriangleMesh:
+        """The surface in the simulator's form, whose search tree is built once."""
+        from sim_core import TriangleMesh
+
+        return TriangleMesh(self.vertices, self.triangles, self.tags)
 
     @property
     def pieces_in_air(self) -> int:

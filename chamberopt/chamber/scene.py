@@ -35,13 +35,8 @@ def start_velocities(rng: np.random.Generator, count: int, rms_speed: float) -> 
 
 
 def chamber_mesh(chamber: Chamber) -> TriangleMesh:
-    """Return the chamber's surface in the simulator's form.
-
-    Make it once for each chamber, because building its search tree takes time.
-    """
-    from sim_core import TriangleMesh
-
-    return TriangleMesh(chamber.vertices, chamber.triangles, chamber.tags)
+    """Return the chamber's surface in the simulator's form: the same at each call."""
+    return chamber.mesh
 
 
 def require_ball_count(design: Design) -> None:

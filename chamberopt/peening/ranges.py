@@ -134,15 +134,14 @@ def simulate_ends(
     plan = ReplicaPlan(count, whole.stream, whole.objective_name)
     cavity = analytic_cavity(design, chamber) if whole.analytic else None
     of_all = RunsProgress(progress, 2 * len(groups), ended=-1)  # the design itself takes none
-    # The same points and windows serve all ends that do not change the size of dents.
-    windows = window_setting(design, chamber)
+    # The chamber is the same at all ends, so that one target serves them all.
     target = prepare_target(design, chamber, chamber_mesh(chamber))
     runs = Variations(design, chamber, executor, of_all, plan, cavity, ReplicaSet(first, target))
 
     def run(group: Unknown, end: Design, factor: float) -> Evaluation:
         try:
-            is_same = window_setting(end, chamber) == windows
-            return runs.run(end, target=target if is_same else None)
+            largest_dent = window_setting(end, chamber).largest_dent
+            return runs.run(end, target=target.with_largest_dent(largest_dent))
         except Exception as error:
             error.add_note(f"in the run with {factor:g} times {group.name}")
             raise
@@ -296,7 +295,11 @@ def _changes_with_dose(name: str, runs: EndRuns) -> _Changes | None:
     own, of_dose, power = _changes(name, runs), _changes(dose, runs), WITH_DOSE[metric]
     if IDENTITY in (own.scale, of_dose.scale) or len(own.scatter) != len(of_dose.scatter):
         return None
-    beside = own.shown - power * of_dose.shown
+    # Too few dents tell nothing of single places: what a percentile seems to change beside the dose
+    # would be noise, without bound where the percentile is near 0.
+    few = [runs.few, *(end for pair in runs.ends.values() for end in pair)]
+    are_known = all(_figure(one, name).has_number for one in few)
+    beside = (own.shown - power * of_dose.shown) * are_known
     scatter = own.scatter - power * of_dose.scatter
     true, half_width = _without_noise(beside, scatter, runs.noise)
     shown = power * of_dose.shown + true

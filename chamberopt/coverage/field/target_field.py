@@ -124,6 +124,12 @@ class TargetField:
         """Radius of a window [m]."""
         return float(np.sqrt(self.setting.gauge / np.pi))
 
+    def with_largest_dent(self, diameter: float) -> TargetField:
+        """Return the field for dents up to another diameter [m], with the same points."""
+        if diameter == self.setting.largest_dent:
+            return self
+        return replace(self, setting=self.setting._replace(largest_dent=diameter))
+
     @cached_property
     def target_area(self) -> float:
         """Area of the target [m²]."""
