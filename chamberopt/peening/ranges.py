@@ -55,6 +55,7 @@ from chamberopt.peening.responses import IDENTITY, FigureScale, on_scale, scale_
 from chamberopt.peening.tolerance_result import EffectEnds
 from chamberopt.simulation.evaluate import ReplicaPlan, prepare_target, window_setting
 from chamberopt.simulation.replicas import Replica, ReplicaSet
+from chamberopt.simulation.trapped_balls import NOT_TRAPPED
 from chamberopt.simulation.variations import RunsProgress, Variations
 
 if TYPE_CHECKING:
@@ -130,7 +131,7 @@ def simulate_ends(
     if not groups:
         return None
     count = replicas or replicas_at_ends(whole.replicas, len(groups))
-    first = [Replica({}, None, 0.0, hits) for hits in whole.hits[:count]]
+    first = [Replica({}, None, NOT_TRAPPED, hits) for hits in whole.hits[:count]]
     plan = ReplicaPlan(count, whole.stream, whole.objective_name)
     cavity = analytic_cavity(design, chamber) if whole.analytic else None
     of_all = RunsProgress(progress, 2 * len(groups), ended=-1)  # the design itself takes none
