@@ -47,6 +47,7 @@ class TrappedBalls:
     place: str
 
 
+NOT_TRAPPED = TrappedBalls(0.0, 0.0, 0.0, 0.0, 0.0, "")  # in a replica of which nothing is known
 SHARES = tuple(one.name for one in fields(TrappedBalls) if one.name != "place")
 
 

@@ -26,12 +26,11 @@ from chamberopt.simulation.estimates import (
 )
 from chamberopt.simulation.evaluate import prepare_target, see_zones
 from chamberopt.simulation.evaluation import Evaluation
-from chamberopt.simulation.trapped_balls import TrappedBalls
 from sim_core import closest_points
 
 DESIGNS = Path(__file__).resolve().parents[2] / "designs"
 SPEED, ANGLE = 3.0, 70.0  # of all made-up impacts [m/s, degrees]
-NOT_TRAPPED = TrappedBalls(0.0, 0.0, 0.0, 0.0, 0.0, "")
+
 MANY_DENTS = Resolution(
     dents=100.0, needed_for_mean=3.0, needed_for_places=25.0, simulated_time=8.0
 )

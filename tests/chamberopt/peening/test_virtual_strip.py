@@ -24,8 +24,9 @@ from chamberopt.peening import virtual_strip
 from chamberopt.peening.strip import StripSize, strip_cells
 from chamberopt.peening.virtual_strip import VirtualStrip, peen_strip, strip_in_lid
 from chamberopt.simulation.replicas import Replica, ReplicaSetting
+from chamberopt.simulation.trapped_balls import NOT_TRAPPED
 from tests.chamberopt.peening.test_strip import STRIP, hits_at, middles
-from tests.helpers.synthetic import NOT_TRAPPED, machine_values, plate_design
+from tests.helpers.synthetic import machine_values, plate_design
 
 DISC = StripSize(40e-3, 40e-3, is_disc=True)
 SHORT = plate_design(
