@@ -466,7 +466,7 @@ class TestWhole:
         first = json.loads(out)
         assert (status, first["folder"]) == (0, str(Path("results/plate")))
         assert 0.0 < first["metrics"]["mean_coverage"]["value"] <= 1.0
-        assert first["ranges"]["groups"].keys() == {"v0"}
+        assert first["ranges"]["groups"].keys() == {"friction", "v0", "slopes"}
 
         # What was saved is the same design, gives the same bits without what is not calibrated,
         # and goes to the next free folder.
