@@ -3,11 +3,12 @@
     python benchmarks/friction_ranking.py [--chambers gear_pair|gear|flat ...] [--csv FILE]
 
 The first table has two chambers of the gear with several frictions, with smooth and with rough
-faces: coverage, dents and the time for as much dented area, beside those without friction. The
-second ranks eight chambers of the gear and 24 flat ones by uniform coverage without friction and
-with two values of mu and rough faces. A swap is a pair of chambers whose order is another one, with
-both differences beyond their 95 % intervals. The loss is what the best chamber without friction
-lacks, with friction, of the one that is best there.
+faces: coverage of the teeth, dents on the whole part, and the time for as much dented area, on the
+whole part and on the teeth, beside those without friction. The second ranks eight chambers of the
+gear and 24 flat ones by uniform coverage without friction and with two values of mu and rough
+faces. A swap is a pair of chambers whose order is another one, with both differences beyond their
+95 % intervals. The loss is what the best chamber without friction lacks, with friction, of the one
+that is best there.
 """
 
 import argparse
@@ -43,8 +44,9 @@ class Figures(NamedTuple):
 
     uniform: Estimate
     mean: Estimate
-    dents: int
-    dented: float  # area of all dents [m²]
+    dents: int  # on the whole part
+    dented: float  # area of all dents, on the whole part [m²]
+    exposure: float  # dented area per area of the target, as metrics have it
 
 
 def effects(mu: float, rough: bool) -> dict[str, Any]:
@@ -66,6 +68,7 @@ def figures(design: Design, workers: ThreadPoolExecutor) -> Figures:
         found.metrics["mean_coverage"],
         int((dents > 0.0).sum()),
         float(np.pi / 4.0 * (dents.astype(float) ** 2).sum()),
+        found.metrics["exposure"].value,
     )
 
 
@@ -88,6 +91,7 @@ def pair_rows(workers: ThreadPoolExecutor) -> Iterator[dict[str, Any]]:
                 "mean": f"{one.mean.value:.3f} ± {one.mean.half_width:.3f}",
                 "dents": round(one.dents / plain.dents, 3),
                 "time_for_the_same_area": round(plain.dented / one.dented, 3),
+                "on_the_target": round(plain.exposure / one.exposure, 3),
             }
 
 
