@@ -1,14 +1,14 @@
 """What friction changes in real chambers, and which conclusions of a study survive it.
 
-    python benchmarks/friction_ranking.py [--chambers gear_pair|gear|flat ...] [--csv FILE]
+    python benchmarks/friction_ranking.py [--chambers gear_pair|gear|flat|blade ...] [--csv FILE]
 
 The first table has two chambers of the gear with several frictions, with smooth and with rough
 faces: coverage of the teeth, dents on the whole part, and the time for as much dented area, on the
 whole part and on the teeth, beside those without friction. The second ranks eight chambers of the
-gear and 24 flat ones by uniform coverage without friction and with two values of mu and rough
-faces. A swap is a pair of chambers whose order is another one, with both differences beyond their
-95 % intervals. The loss is what the best chamber without friction lacks, with friction, of the one
-that is best there.
+gear, 24 flat ones and the three of the blade by uniform coverage, without friction and with two
+values of mu and rough faces. A swap is a pair of chambers whose order is another one, with both
+differences beyond their 95 % intervals. The loss is what the best chamber without friction lacks,
+with friction, of the one that is best there.
 """
 
 import argparse
@@ -118,6 +118,12 @@ def flat_chambers() -> Iterator[tuple[str, Design]]:
         yield f"flat {distance:g} mm, {balls} balls", plate.changed(values)
 
 
+def blade_chambers() -> Iterator[tuple[str, Design]]:
+    """Yield the shipped chambers of the blade, whose thin places bend with any friction."""
+    for name in ("blade", "blade_conformal", "blade_oblong"):
+        yield name, load_design(DESIGNS / f"{name}.toml").changed({"process.accuracy.replicas": 4})
+
+
 def ranking(
     kind: str, chambers: Iterator[tuple[str, Design]], workers: ThreadPoolExecutor
 ) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
@@ -171,7 +177,7 @@ def _swapped(one: list[Estimate], other: list[Estimate], k: int) -> bool:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    kinds = ("gear_pair", "gear", "flat")
+    kinds = ("gear_pair", "gear", "flat", "blade")
     parser.add_argument("--chambers", action="append", choices=kinds)
     parser.add_argument("--csv", help="beginning of the names of files in benchmarks/results")
     arguments = parser.parse_args()
@@ -182,7 +188,8 @@ def main() -> None:
             tables["gear_pair"] = list(pair_rows(workers))
             print_table(tables["gear_pair"])
         compared = []
-        for kind, chambers in (("gear", gear_chambers), ("flat", flat_chambers)):
+        ranked = {"gear": gear_chambers, "flat": flat_chambers, "blade": blade_chambers}
+        for kind, chambers in ranked.items():
             if kind in asked:
                 tables[kind], orders = ranking(kind, chambers(), workers)
                 compared += orders
