@@ -81,8 +81,9 @@ def test_the_shipped_plate_of_the_paper_is_the_chamber_of_the_page() -> None:
     )
     assert f"{1e6 * paper.sonotrode.amplitude:.2f} µm zero to peak" in page
     assert paper.process.treatment_time == PEENED
+    real = {"effects.friction": "catalogue", "effects.roughness": "peened"}  # the paper has none
     fitted = {"sonotrode.amplitude_um": 25.0, "process.treatment_time_s": 5.0}
-    assert paper.changed(fitted) == plate
+    assert paper.changed(fitted | real) == plate
 
 
 def test_a_quick_comparison_does_not_go_into_the_documentation() -> None:
