@@ -53,6 +53,7 @@ twice as long. A faster hit wakes a ball and the balls that stand on it.
 - ``resting_balls.py``: balls that lie still at the end.
 - ``loop/contact_neighbours.py``: pairs with a ball in contact, and waking a ball's neighbours.
 
-All balls of a scene with contact mode have the same size and mass. Impulses and forces are per unit
-mass.
+Impulses and forces are per unit mass of the ball on which they act. Balls may have several sizes
+and masses (``effects/ball_sizes.py``). In slow hits a ball that lies still is a surface also for a
+ball that is much heavier.
 """

@@ -7,8 +7,9 @@ still surface: friction holds it. This neglects an energy per mass below elastic
 hit between two moving balls is a single constrained impact: the velocity of a ball on supports
 changes only by the projection P(d) of an impulse along the unit vector d onto the directions that
 the supports leave free. The inverse mass of such a ball along d is therefore |P(d)|² in place of 1,
-and an elastic hit keeps the energy of the two balls together. Slow hits between moving balls have
-no friction.
+and an elastic hit keeps the energy of the two balls together. For balls of unequal mass the inverse
+masses and velocity changes are weighted as in effects/ball_sizes.py. Slow hits between moving balls
+have no friction.
 
 Source: B. Brogliato, Nonsmooth Mechanics (2016), section 5.2.
 """
@@ -21,6 +22,7 @@ from sim_core.contact.jamming import count_slow_hit
 from sim_core.contact.landing_and_lift_off import impart, touch_down
 from sim_core.contact.pushed_by_part import drop_pressed_balls, is_pressed, note_touch
 from sim_core.contact.supports import BLOCKED, SHORTEST_HOP, response
+from sim_core.effects.ball_sizes import least_share_by_mass, reach_of_pair, share_by_mass
 from sim_core.effects.contact_mode import ASLEEP, BOUNCES, ON_BALL, ContactState
 from sim_core.effects.friction import OF_BALLS, FrictionState
 from sim_core.effects.restitution import BALLS, RestitutionState, restitution_law
@@ -53,6 +55,7 @@ def meet(
 
     Returns: True if a ball that lay still has been moved, so that its neighbours must be woken.
     """
+    sizes = contact.sizes
     first = place(contact, motion, one.ball, one.time)
     second = place(contact, motion, two.ball, two.time)
     apart, closing = sub(second.position, first.position), sub(second.velocity, first.velocity)
@@ -78,16 +81,20 @@ def meet(
     elif not slow:
         change = pair_velocity_change(apart, closing, restitution)
         change = add_pair_friction(
-            contact.friction_state, None, one.ball, two.ball, one.time, apart, closing, change
+            contact.friction_state, sizes, one.ball, two.ball, one.time, apart, closing, change
         )
-        impart(contact, motion, one, first, change)
-        impart(contact, motion, two, second, scaled(-1.0, change))
+        opposite = scaled(-1.0, change)
+        impart(contact, motion, one, first, share_by_mass(sizes, one.ball, two.ball, change))
+        impart(contact, motion, two, second, share_by_mass(sizes, two.ball, one.ball, opposite))
     else:
         if pressed:
             drop_pressed_balls(contact, one.ball, back)
             drop_pressed_balls(contact, two.ball, normal)
         give_one, give_two = response(contact, one.ball, back), response(contact, two.ball, normal)
-        inverse_mass = max(dot(give_two, normal) - dot(give_one, normal), BLOCKED)
+        give_one = share_by_mass(sizes, one.ball, two.ball, give_one)
+        give_two = share_by_mass(sizes, two.ball, one.ball, give_two)
+        blocked = BLOCKED * least_share_by_mass(sizes, one.ball, two.ball)
+        inverse_mass = max(dot(give_two, normal) - dot(give_one, normal), blocked)
         press = _press(contact.friction_state, contact, one.ball, two.ball, normal)
         push = (approach + max(approach, SHORTEST_HOP * press, 2.0 * PARTING)) / inverse_mass
         impart(contact, motion, one, first, scaled(push, give_one))
@@ -124,11 +131,12 @@ def _land_on_ball(
     ball = event.ball
     if contact.mode[ball] >= ASLEEP:
         return
-    obstacle, bend = ON_BALL - other, 2.0 * contact.radius
+    sizes, obstacle = contact.sizes, ON_BALL - other
+    bend = reach_of_pair(sizes, contact.reach, ball, other)
     if touch_down(contact, motion, event, obstacle, bend, at, normal) == BOUNCES:
         change = add_surface_friction(
             contact.friction_state,
-            None,
+            sizes,
             ball,
             event.time,
             normal,

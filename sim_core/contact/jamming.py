@@ -9,6 +9,7 @@ import numpy as np
 from sim_core.contact.landing_and_lift_off import move_on
 from sim_core.contact.pushed_by_part import TOUCHING
 from sim_core.contact.supports import forget_left_support
+from sim_core.effects.ball_sizes import radius_of_ball
 from sim_core.effects.contact_mode import (
     ASLEEP,
     JAMMED,
@@ -95,4 +96,5 @@ def _is_elsewhere(contact: ContactState, places: np.ndarray, ball: int, position
     It has left if ``position`` is further from the noted position than a hundredth of its radius.
     """
     gone = sub(position, vec3_at(places, ball))
-    return dot(gone, gone) > (SAME_PLACE * contact.radius) ** 2
+    radius = radius_of_ball(contact.sizes, contact.radius, ball)
+    return dot(gone, gone) > (SAME_PLACE * radius) ** 2

@@ -25,6 +25,7 @@ from sim_core.contact.supports import (
     set_mode,
     support_normal,
 )
+from sim_core.effects.ball_sizes import radius_of_ball
 from sim_core.effects.contact_mode import (
     ASLEEP,
     BOUNCES,
@@ -183,13 +184,14 @@ def moved_off_edge(
         return at
     ball = event.ball
     distance = math.sqrt(dot(away, away))
-    if distance >= contact.radius:
+    radius = radius_of_ball(contact.sizes, contact.radius, ball)
+    if distance >= radius:
         return at
     free = onto_cone(contact.supports, ball, away)
     share = dot(free, free) / (distance * distance)  # share of a step along ``free`` that leads out
     if share < NO_WAY_OUT:
         return at
-    step = (contact.radius - distance) / (distance * share)
+    step = (radius - distance) / (distance * share)
     there = BallState(add_scaled(at.position, step, free), at.velocity)
     set_path(motion, ball, event.time, there, vec3_at(contact.acceleration, ball))
     return there
@@ -224,7 +226,9 @@ def land(
         return BOUNCES
     scale = 1.0 / math.sqrt(dot(away, away))
     normal = Vec3(scale * away.x, scale * away.y, scale * away.z)
-    bend = tree.radius if tree.kinds[obstacle] == CAPSULE else math.inf
+    bend = math.inf
+    if tree.kinds[obstacle] == CAPSULE:
+        bend = radius_of_ball(contact.sizes, tree.radius, event.ball)
     return touch_down(contact, motion, event, obstacle, bend, at, normal)
 
 

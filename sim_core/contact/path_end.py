@@ -18,6 +18,7 @@ from sim_core.contact.landing_and_lift_off import (
 )
 from sim_core.contact.riding import seen_from_face
 from sim_core.contact.supports import support_normal
+from sim_core.effects.ball_sizes import radius_of_ball
 from sim_core.effects.contact_mode import ASLEEP, FLYING, ContactState, Ride, Supports, rides
 from sim_core.effects.friction import FrictionState
 from sim_core.geometry.bvh import Tree
@@ -56,17 +57,18 @@ def out_of_reach(
     if rides(contact.ride, ball):
         return False  # the ball does not move along a still plane
     supports = contact.supports
+    radius = radius_of_ball(contact.sizes, tree.radius, ball)
     for support in range(supports.number[ball]):
         normal = support_normal(supports, ball, support)
         if supports.obstacles[ball, support] == obstacle or _lies_behind(
-            tree, obstacle, normal, position
+            tree, obstacle, normal, position, radius
         ):
             return True
     return False
 
 
 @jit
-def _lies_behind(tree: Tree, row: int, normal: Vec3, position: Vec3) -> bool:
+def _lies_behind(tree: Tree, row: int, normal: Vec3, position: Vec3, radius: float) -> bool:
     numbers = tree.numbers
     one = vec3_at(numbers, row)
     if tree.kinds[row] == FACE:
@@ -74,7 +76,7 @@ def _lies_behind(tree: Tree, row: int, normal: Vec3, position: Vec3) -> bool:
         return dot(turn, turn) < ONE_PLANE * ONE_PLANE and dot(normal, one) > 0.0
     if tree.kinds[row] == VIBRATING_FACE:
         return False
-    height = dot(normal, position) - tree.radius + BEHIND
+    height = dot(normal, position) - radius + BEHIND
     two = add_scaled(one, numbers[row, 6], Vec3(numbers[row, 3], numbers[row, 4], numbers[row, 5]))
     return dot(normal, one) <= height and dot(normal, two) <= height
 

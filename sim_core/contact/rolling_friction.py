@@ -2,7 +2,7 @@
 
 Notation, all per unit mass of the ball:
 
-R      radius of the ball [m]                                       friction_state.radius
+R      radius of the ball [m]                                       radius
 b      unit normal of the plane or groove that bears the load       Stand.normal
 h      distance of the centre from the points or line it touches    Stand.arm
 v, w   velocity [m/s] and spin [rad/s]                              velocity, spin
@@ -41,6 +41,7 @@ import math
 from typing import NamedTuple
 
 from sim_core.contact.supports import ROUNDING, drop_supports_along, onto_cone, support_normal
+from sim_core.effects.ball_sizes import radius_of_ball
 from sim_core.effects.contact_mode import ASLEEP, FLYING, ON_BALL, SLIDING, ContactState
 from sim_core.effects.friction import FrictionState, set_slip, set_spin, spin_at
 from sim_core.motion import BallEvent
@@ -125,12 +126,13 @@ def _rubbed(
     stand = _find_stand(friction_state, contact, ball, push)
     b, h = stand.normal, stand.arm
     spin = spin_at(friction_state, ball, time)
-    if h < friction_state.radius:
+    radius = radius_of_ball(contact.sizes, friction_state.radius, ball)
+    if h < radius:
         spin = scaled(dot(spin, stand.axis), stand.axis)
     slip = add_scaled(velocity, -h, cross(spin, b))
     slip = add_scaled(slip, -dot(slip, b), b)
     slip_speed = _size(slip)
-    inertia = 2.5 * (h / friction_state.radius) ** 2
+    inertia = 2.5 * (h / radius) ** 2
     needed = size / (1.0 + inertia)  # friction force that keeps the ball rolling
     if slip_speed < contact.capture and needed < stand.max_friction:
         # The ball rolls, or friction holds it.
@@ -176,7 +178,8 @@ def _find_stand(
 
     A ball on three supports cannot move, so that there is no friction.
     """
-    supports, radius = contact.supports, friction_state.radius
+    supports = contact.supports
+    radius = radius_of_ball(contact.sizes, friction_state.radius, ball)
     count = supports.number[ball]
     load = _size(push)
     for one in range(count):

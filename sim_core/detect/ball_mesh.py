@@ -14,11 +14,11 @@ from sim_core.detect.ball_sonotrode import (
 )
 from sim_core.detect.ball_triangle import capsule_delay, face_delay
 from sim_core.effects.amplitude_profile import FaceProfiles
+from sim_core.effects.ball_sizes import BallSizes, radius_of_ball, root_of_ball
 from sim_core.effects.contact_mode import ContactState
 from sim_core.effects.sonotrodes import SonotrodeWaves, same_sonotrode, wave_of_face
 from sim_core.effects.vibration import Wave
 from sim_core.geometry.analytic import CylinderAxis
-from sim_core.geometry.ball_sizes import BallSizes, radius_of_ball, root_of_ball
 from sim_core.geometry.bvh import STACK, Tree
 from sim_core.geometry.obstacles import CAPSULE, FACE, same_plane
 from sim_core.numerics.jit import inlined, jit

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from sim_core.effects.ball_sizes import BallSizes
 from sim_core.effects.friction import FrictionState
 from sim_core.effects.gravity import Gravity, gravity_acceleration
 from sim_core.effects.restitution import ELASTIC_BELOW, RestitutionState
@@ -117,7 +118,7 @@ class Ride(NamedTuple):
     """State of n balls that may move with a vibrating face.
 
     face: number of the obstacle that a ball rides on, -1 for none, (n,) int32.
-    height: distance of the face's plane at rest from the origin, plus a ball radius [m], (n,).
+    height: distance of the face's plane at rest from the origin, plus the ball's radius [m], (n,).
     until: end of the ball's present parabola along the face [s since the start of the present time
         window], (n,).
     wave: wave of the only sonotrode.
@@ -143,9 +144,11 @@ class ContactState(NamedTuple):
     stays_until: time before which the ball is not woken [s since the start], (n,).
     capture, resistance: as in Rest.
     elastic_below: speed [m/s] below which collisions of balls lose no speed.
-    radius: radius of every ball [m].
-    reach: distance of the centres at which two balls touch [m], 0 if balls never touch.
+    radius: radius of the largest balls [m].
+    reach: distance of the centres at which two of the largest balls touch [m], 0 if balls never
+        touch.
     ride: None unless balls stick to vibrating faces.
+    sizes: None if all balls are alike.
     """
 
     mode: np.ndarray
@@ -166,6 +169,7 @@ class ContactState(NamedTuple):
     gravity: Vec3
     friction_state: FrictionState | None
     ride: Ride | None = None
+    sizes: BallSizes | None = None
 
 
 def checked_rest(rest: Rest | None) -> Rest | None:
@@ -204,8 +208,9 @@ def new_contact_state(
     Args:
         rest: options of contact mode. Without them the result is None.
         balls: number of balls.
-        radius: radius of every ball [m].
-        reach: distance of the centres at which two balls touch [m], 0 if balls never touch.
+        radius: radius of the largest balls [m].
+        reach: distance of the centres at which two of the largest balls touch [m], 0 if balls never
+            touch.
         gravity: acceleration of the balls in flight.
         restitution: restitution of the scene.
         friction_state: friction and spins of the balls.

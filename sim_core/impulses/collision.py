@@ -2,7 +2,7 @@
 
 The normal relative velocity is reversed and multiplied by e, the coefficient of restitution from
 effects/restitution.py and, on thin parts, effects/flexure.py. The tangential velocity is kept. Two
-equal balls keep their momentum here, and geometry/ball_sizes.py corrects the change for unequal
+equal balls keep their momentum here, and effects/ball_sizes.py corrects the change for unequal
 balls.
 
 A ball that circles in a cylinder and loses the last of its normal speed to restitution would hit

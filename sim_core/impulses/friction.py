@@ -7,8 +7,8 @@ the sphere's spin by -5/(2R) n x j.
 
 import math
 
+from sim_core.effects.ball_sizes import BallSizes, radius_of_ball, share_by_mass
 from sim_core.effects.friction import OF_BALLS, FrictionState, friction_of, spin_at
-from sim_core.geometry.ball_sizes import BallSizes, radius_of_ball, share_by_mass
 from sim_core.numerics.jit import inlined, jit
 from sim_core.numerics.vec3 import Vec3, add_scaled, cross, dot, scaled, sub
 
@@ -65,7 +65,7 @@ def add_pair_friction(
     """Return ``change`` [m/s] plus friction, for the first of two balls. Change both spins.
 
     The second ball has minus the returned velocity change. For balls of unequal mass both changes
-    are what they would be at equal masses, as in geometry/ball_sizes.py. The spins are those of the
+    are what they would be at equal masses, as in effects/ball_sizes.py. The spins are those of the
     true masses.
 
     Args:

@@ -11,6 +11,7 @@ from sim_core.contact.ball_on_ball import place
 from sim_core.contact.landing_and_lift_off import WAKES
 from sim_core.contact.supports import drop_support, stands_on_ball
 from sim_core.detect.ball_ball import accelerated_pair_delay
+from sim_core.effects.ball_sizes import reach_of_pair
 from sim_core.effects.contact_mode import ASLEEP, FLYING, JAMMED, ON_BALL, ContactState
 from sim_core.loop.event_queue import EventQueue, schedule_now, search_wall_again
 from sim_core.loop.neighbours import NeighbourFilter, next_meeting
@@ -99,7 +100,8 @@ def _with_contact(
         there = place(contact, motion, other, time)
         apart, closing = sub(there.position, here.position), sub(there.velocity, here.velocity)
         relative = sub(vec3_at(contact.acceleration, other), own)
-        delay = accelerated_pair_delay(Flight(apart, closing, relative), contact.reach, best)
+        reach = reach_of_pair(contact.sizes, contact.reach, ball, other)
+        delay = accelerated_pair_delay(Flight(apart, closing, relative), reach, best)
         if delay < best or (delay == best and partner >= 0 and other < partner):
             best = delay
             partner = other
@@ -134,7 +136,7 @@ def wake_neighbours(
         other = int(np.int64(contact.contact_list.balls[k]))
         leans = stands_on_ball(contact.supports, other, ball)
         if not leans and other != ball and contact.mode[other] == JAMMED:
-            leans = _is_near(contact, motion, other, time, here)
+            leans = _is_near(contact, motion, other, ball, time, here)
         if leans:
             contact.wake_pending[other] = 1
             if contact.stays_until[other] > event.time_since_start:
@@ -147,11 +149,15 @@ def wake_neighbours(
 
 @jit
 def _is_near(
-    contact: ContactState, motion: np.ndarray, ball: int, time: float, position: Vec3
+    contact: ContactState, motion: np.ndarray, ball: int, other: int, time: float, position: Vec3
 ) -> bool:
-    """Return True if a ball is near enough to a ball at ``position`` [m] to hold it still."""
+    """Return True if a ball is near enough to the ball ``other`` to hold it still.
+
+    ``position``: position of the other ball [m].
+    """
     apart = sub(place(contact, motion, ball, time).position, position)
-    return dot(apart, apart) < (contact.reach + MAX_JAM_GAP) ** 2
+    reach = reach_of_pair(contact.sizes, contact.reach, ball, other)
+    return dot(apart, apart) < (reach + MAX_JAM_GAP) ** 2
 
 
 @jit
@@ -175,7 +181,7 @@ def count_neighbours(contact: ContactState, motion: np.ndarray, event: BallEvent
     here = place(contact, motion, ball, event.time).position
     count, numbers, moves = 0, 0, False
     for other in range(len(motion)):
-        if other != ball and _is_near(contact, motion, other, event.time, here):
+        if other != ball and _is_near(contact, motion, other, ball, event.time, here):
             count += 1
             numbers += other
             moves |= contact.mode[other] < ASLEEP

@@ -24,6 +24,7 @@ from sim_core.detect.ball_cylinder import normal_at
 from sim_core.detect.ball_sonotrode import within_moved_borders
 from sim_core.detect.ball_triangle import away_from_capsule, face_normal, nearer_neighbour
 from sim_core.effects.amplitude_profile import bent_normal, wave_at
+from sim_core.effects.ball_sizes import face_overlap_of_ball, share_by_mass
 from sim_core.effects.contact_mode import (
     ASLEEP,
     BOUNCES,
@@ -50,7 +51,6 @@ from sim_core.effects.roughness import MOST_HITS, RoughnessState, touched_facet
 from sim_core.effects.sonotrodes import wave_of_face
 from sim_core.effects.surface.surface_effects import apply_surface_effects
 from sim_core.effects.vibration import surface_velocity
-from sim_core.geometry.ball_sizes import share_by_mass
 from sim_core.geometry.obstacles import CAPSULE, VIBRATING_FACE
 from sim_core.geometry.triangle_lookup import find_triangle
 from sim_core.geometry.turning_part import PartTree
@@ -348,7 +348,8 @@ def _face_under(ride: Ride | None, state: SimulationState, event: BallEvent, at:
     """
     if ride is None:
         return -1
-    tree, overlap = state.obstacles.tree, state.obstacles.face_overlap
+    tree = state.obstacles.tree
+    overlap = face_overlap_of_ball(state.sizes, state.obstacles.face_overlap, event.ball)
     flight, last = Flight(at.position, at.velocity, at.velocity), ride.face[event.ball]
     for k in range(-1, len(tree.kinds)):
         row = int(np.int64(last)) if k < 0 else k  # most likely the ball is still on the same face

@@ -14,6 +14,7 @@ from sim_core.contact.path_end import end_of_path
 from sim_core.contact.riding import shift_contact
 from sim_core.detect.ball_mesh import first_contact
 from sim_core.detect.ball_turning_part import first_part_contact
+from sim_core.effects.ball_sizes import face_overlap_of_ball, radius_of_ball
 from sim_core.effects.contact_mode import ball_acceleration, is_flying, is_still
 from sim_core.effects.drag import shift_drag
 from sim_core.effects.friction import shift_spins
@@ -21,7 +22,6 @@ from sim_core.effects.part_rotation import shift_rotation, time_of_one_turn
 from sim_core.effects.random_phase import update_phase, wave_of_ball
 from sim_core.effects.sonotrodes import shift_phases
 from sim_core.effects.vibration import Wave
-from sim_core.geometry.ball_sizes import face_overlap_of_ball, radius_of_ball
 from sim_core.impulses.drag import apply_drag_piece, apply_drag_until, time_to_next_drag
 from sim_core.loop.contact_neighbours import first_meeting, hide, hide_all, wake_if_it_moves
 from sim_core.loop.event_handlers import (

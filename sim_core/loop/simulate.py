@@ -10,6 +10,7 @@ from sim_core.balls import Balls
 from sim_core.contact.resting_balls import Resting, resting
 from sim_core.detect.ball_mesh import new_scratch
 from sim_core.effects.amplitude_profile import new_face_profiles
+from sim_core.effects.ball_sizes import new_ball_sizes
 from sim_core.effects.contact_mode import checked_rest, new_contact_state, new_ride
 from sim_core.effects.drag import checked_drag, new_drag_state
 from sim_core.effects.flexure import checked_flexure, new_flexure_state
@@ -23,9 +24,9 @@ from sim_core.effects.sonotrodes import clock_window, new_waves
 from sim_core.effects.vibration import checked_waves
 from sim_core.errors import SceneError, SimulationError
 from sim_core.geometry.analytic import AnalyticCavity, periods_of
-from sim_core.geometry.ball_sizes import new_ball_sizes
 from sim_core.geometry.mesh import MAX_TAGS
 from sim_core.geometry.obstacle_set import build_obstacle_set
+from sim_core.geometry.obstacles import face_overlap_of
 from sim_core.impulses.drag import apply_drag_to_all
 from sim_core.loop.contact_neighbours import hide_all
 from sim_core.loop.event_queue import new_event_queue
@@ -193,6 +194,8 @@ class Simulation:
         collide = physics.ball_collisions is not None
         motion = np.concatenate([balls.positions - self.centre, balls.velocities], axis=1)
         friction_state = self._friction_state(tags, obstacle_tags)
+        overlaps = np.array([face_overlap_of(radius) for radius in radii])
+        sizes = new_ball_sizes(balls, obstacles.roots, overlaps)
         contact = new_contact_state(
             checked_rest(physics.rest),
             len(motion),
@@ -205,7 +208,7 @@ class Simulation:
         sonotrodes = new_waves(vibrations, waves, window, obstacle_tags)
         if contact is not None:
             ride = new_ride(physics.rest, len(motion), wave, sonotrodes)
-            contact = contact._replace(ride=ride)
+            contact = contact._replace(ride=ride, sizes=sizes)
         state = SimulationState(
             motion=motion,
             neighbours=None,
@@ -232,7 +235,7 @@ class Simulation:
                 checked_flexure(physics.flexure, len(scene.mesh.tags)), balls, scene.mesh.tags
             ),
             drag=new_drag_state(checked_drag(physics.drag), balls.diameters, balls.densities),
-            sizes=new_ball_sizes(balls, obstacles.roots),
+            sizes=sizes,
             waves=sonotrodes,
             profiles=new_face_profiles(vibrations, obstacle_tags, self.centre),
             collision_buffer=new_collision_buffer(scene.record_collisions),

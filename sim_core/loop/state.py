@@ -6,6 +6,7 @@ import numpy as np
 
 from sim_core.detect.ball_mesh import Scratch
 from sim_core.effects.amplitude_profile import FaceProfiles
+from sim_core.effects.ball_sizes import BallSizes
 from sim_core.effects.contact_mode import ContactState
 from sim_core.effects.drag import DragState
 from sim_core.effects.flexure import FlexureState
@@ -18,7 +19,6 @@ from sim_core.effects.roughness import RoughnessState
 from sim_core.effects.sonotrodes import SonotrodeWaves
 from sim_core.effects.surface.surface_effects import SurfaceEffects
 from sim_core.effects.vibration import Wave
-from sim_core.geometry.ball_sizes import BallSizes
 from sim_core.geometry.obstacle_set import ObstacleSet
 from sim_core.loop.event_queue import EventQueue
 from sim_core.loop.impact_log import CollisionBuffer, ImpactBuffer

@@ -141,12 +141,11 @@ class Scene:
                 "rest.on_vibrating is True, and a vibration has a profile: not supported together "
                 "yet; leave one of them out"
             )
-        for name in ("rest", "part_rotation"):
-            if getattr(self.physics, name) is not None and not self.balls.alike:
-                raise SceneError(
-                    f"physics.{name} is given, and balls of several sizes or densities: not "
-                    f"supported together yet; give one diameter and density, or leave {name} out"
-                )
+        if turn is not None and not self.balls.alike:
+            raise SceneError(
+                "physics.part_rotation is given, and balls of several sizes or densities: not "
+                "supported together yet; give one diameter and density, or leave it out"
+            )
         tag_count = int(self.mesh.tags.max()) + 1
         if self.physics.restitution is not None:
             checked_restitution(self.physics.restitution, tag_count)

@@ -245,7 +245,7 @@ def energy_above_floor(mesh: TriangleMesh, balls: Balls, physics: Physics) -> fl
     """
     each = 0.5 * (balls.velocities**2).sum(axis=1)
     if balls.spins is not None:
-        each += 0.2 * balls.radius**2 * (balls.spins**2).sum(axis=1)
+        each += 0.05 * balls.diameters**2 * (balls.spins**2).sum(axis=1)
     if physics.gravity is not None:
         down = np.array(physics.gravity)
         each += (mesh.vertices @ down).max() - balls.positions @ down

@@ -9,7 +9,7 @@ import numpy as np
 
 from sim_core import Balls, Gravity, Physics, Rest, Restitution, Scene, TriangleMesh, Vibration
 from sim_core.loop.simulate import Simulation
-from sim_core.scene.invariants import clearance, closest_pair, energy
+from sim_core.scene.invariants import clearance, energy, narrowest_gap
 from tests.helpers.scenes.cavities import box
 from tests.helpers.scenes.terrain import terrain
 
@@ -42,8 +42,9 @@ def film(
     for stop in np.linspace(0.0, until, pictures + 1)[1:]:
         run.play(float(stop), record=False)
         frames.append(run.balls())
-        assert clearance(mesh.corners, frames[-1].positions, DIAMETER).min() > R - TOUCH
-        assert len(balls) == 1 or closest_pair(frames[-1])[0] > DIAMETER - TOUCH
+        gap = clearance(mesh.corners, frames[-1].positions, 2.0 * balls.radius)
+        assert (gap - 0.5 * balls.diameters).min() > -TOUCH
+        assert narrowest_gap(frames[-1])[0] > -TOUCH
     return run, frames
 
 

@@ -9,7 +9,6 @@ from typing import NamedTuple
 import numpy as np
 
 from sim_core.balls import Balls
-from sim_core.geometry.obstacles import face_overlap_of
 from sim_core.numerics.jit import inlined
 from sim_core.numerics.vec3 import Vec3, scaled
 
@@ -24,17 +23,18 @@ class BallSizes(NamedTuple):
     mass: np.ndarray  # mass of each ball [kg], shape (n,)
 
 
-def new_ball_sizes(balls: Balls, roots: np.ndarray) -> BallSizes | None:
+def new_ball_sizes(balls: Balls, roots: np.ndarray, face_overlaps: np.ndarray) -> BallSizes | None:
     """Return the sizes and masses of the balls; None if all balls are alike.
 
-    ``roots``: nodes of the search tree where the obstacles for each size begin, (k,).
+    Args:
+        balls: the balls.
+        roots: nodes of the search tree where the obstacles for each size begin, (k,).
+        face_overlaps: overlap of neighbouring faces for each size [m], (k,).
     """
     if balls.alike:
         return None
     size = np.searchsorted(balls.sizes, balls.diameters).astype(np.int32)
-    radius = 0.5 * balls.sizes
-    overlap = np.array([face_overlap_of(float(r)) for r in radius])
-    return BallSizes(size, roots, radius, overlap, balls.masses)
+    return BallSizes(size, roots, 0.5 * balls.sizes, face_overlaps, balls.masses)
 
 
 @inlined
@@ -51,6 +51,19 @@ def radius_of_ball(sizes: BallSizes | None, radius: float, ball: int) -> float:
     if sizes is None:
         return radius
     return float(sizes.radius[sizes.size[ball]])
+
+
+@inlined
+def reach_of_pair(sizes: BallSizes | None, reach: float, ball: int, other: int) -> float:
+    """Return the distance of two centres at which the balls touch [m].
+
+    It is ``reach`` if all balls are alike, and 0, as ``reach`` is, if balls never touch.
+    """
+    if sizes is None:
+        return reach
+    if reach == 0.0:
+        return 0.0
+    return float(sizes.radius[sizes.size[ball]] + sizes.radius[sizes.size[other]])
 
 
 @inlined
@@ -75,3 +88,15 @@ def share_by_mass(sizes: BallSizes | None, ball: int, other: int, change: Vec3) 
     if sizes is None:
         return change
     return scaled(2.0 * sizes.mass[other] / (sizes.mass[ball] + sizes.mass[other]), change)
+
+
+@inlined
+def least_share_by_mass(sizes: BallSizes | None, ball: int, other: int) -> float:
+    """Return the smaller of the factors by which ``share_by_mass`` changes the two balls' speeds.
+
+    It is 1 for balls of equal mass.
+    """
+    if sizes is None:
+        return 1.0
+    one, two = sizes.mass[ball], sizes.mass[other]
+    return float(2.0 * min(one, two) / (one + two))
