@@ -21,6 +21,7 @@ from sim_core.detect.ball_triangle import (
     face_normal,
     within_borders,
 )
+from sim_core.effects.ball_sizes import BallSizes, part_root_of_ball, radius_of_ball
 from sim_core.effects.part_rotation import RotationState, jerk_bound, relative_flight
 from sim_core.geometry.bvh import Tree
 from sim_core.geometry.obstacles import CAPSULE
@@ -45,6 +46,8 @@ OVERLAP = 1e-8
 def first_part_contact(
     part: PartTree | None,
     rotation: RotationState | None,
+    sizes: BallSizes | None,
+    number: int,
     scratch: Scratch,
     ball: Flight,
     face_overlap: float,
@@ -58,6 +61,8 @@ def first_part_contact(
     Args:
         part: obstacles of the part.
         rotation: rotation of the part.
+        sizes: sizes of balls that are not all alike. Each size has its own obstacles.
+        number: number of the ball. It is unused if ``sizes`` is None.
         scratch: working arrays.
         ball: the ball's flight in the room from now on.
         face_overlap: overlap of neighbouring faces [m].
@@ -75,16 +80,17 @@ def first_part_contact(
     jerk = _jerk(part, rotation, ball, limit)
     if jerk < 0.0:
         return limit, known
+    radius = radius_of_ball(sizes, part.tree.radius, number)
     best = limit
     found = known
     begin = 0.0
     while begin < best:
         relative = relative_flight(rotation, flight_after(ball, begin), time + begin)
-        length = _piece(relative, jerk, best - begin, part.tree.radius)
+        length = _piece(relative, jerk, best - begin, radius)
         last = begin + length >= best
         end = best if last else begin + length
         aim_ray(scratch.ray, relative, length, jerk * length * length * length / 6.0)
-        scratch.nodes[0] = 0
+        scratch.nodes[0] = part_root_of_ball(sizes, number)
         scratch.times[0] = np.float32(0.0)
         depth = 1
         while depth > 0:
@@ -98,7 +104,17 @@ def first_part_contact(
                 continue
             row = -1 - code
             delay, sure = _obstacle_delay(
-                part.tree, row, rotation, ball, relative, face_overlap, time, begin, end, jerk
+                part.tree,
+                row,
+                rotation,
+                ball,
+                radius,
+                relative,
+                face_overlap,
+                time,
+                begin,
+                end,
+                jerk,
             )
             if delay < end:
                 end = delay
@@ -162,6 +178,7 @@ def _obstacle_delay(
     row: int,
     rotation: RotationState,
     ball: Flight,
+    radius: float,
     relative: Flight,
     face_overlap: float,
     time: float,
@@ -181,6 +198,7 @@ def _obstacle_delay(
         row: number of the obstacle.
         rotation: rotation of the part.
         ball: the ball's flight in the room from now on.
+        radius: radius of the ball [m].
         relative: the ball's flight in the part's frame at ``begin``.
         face_overlap: overlap of neighbouring faces [m].
         time: time since the start of the present time window [s].
@@ -188,7 +206,6 @@ def _obstacle_delay(
         end: end of the piece [s].
         jerk: bound on the third derivative of the path in the part's frame [m/s³].
     """
-    radius = tree.radius
     round_edge = tree.kinds[row] == CAPSULE
     normal = face_normal(tree.numbers, row)
     delay = begin

@@ -18,23 +18,28 @@ class BallSizes(NamedTuple):
 
     size: np.ndarray  # size number of each ball, shape (n,) int32
     root: np.ndarray  # node of the tree where each size's obstacles begin, shape (k,) int64
+    part_root: np.ndarray  # the same node of the turning part's tree, shape (k,) int64
     radius: np.ndarray  # radius of each size [m], shape (k,)
     face_overlap: np.ndarray  # overlap of neighbouring faces for each size [m], shape (k,)
     mass: np.ndarray  # mass of each ball [kg], shape (n,)
 
 
-def new_ball_sizes(balls: Balls, roots: np.ndarray, face_overlaps: np.ndarray) -> BallSizes | None:
+def new_ball_sizes(
+    balls: Balls, roots: np.ndarray, part_roots: np.ndarray, face_overlaps: np.ndarray
+) -> BallSizes | None:
     """Return the sizes and masses of the balls; None if all balls are alike.
 
     Args:
         balls: the balls.
         roots: nodes of the search tree where the obstacles for each size begin, (k,).
+        part_roots: the same nodes of the turning part's tree, (k,). They are not used without a
+            turning part.
         face_overlaps: overlap of neighbouring faces for each size [m], (k,).
     """
     if balls.alike:
         return None
     size = np.searchsorted(balls.sizes, balls.diameters).astype(np.int32)
-    return BallSizes(size, roots, 0.5 * balls.sizes, face_overlaps, balls.masses)
+    return BallSizes(size, roots, part_roots, 0.5 * balls.sizes, face_overlaps, balls.masses)
 
 
 @inlined
@@ -43,6 +48,14 @@ def root_of_ball(sizes: BallSizes | None, ball: int) -> int:
     if sizes is None:
         return 0
     return int(sizes.root[sizes.size[ball]])
+
+
+@inlined
+def part_root_of_ball(sizes: BallSizes | None, ball: int) -> int:
+    """Return the node of the turning part's tree where the obstacles for this ball begin."""
+    if sizes is None:
+        return 0
+    return int(sizes.part_root[sizes.size[ball]])
 
 
 @inlined

@@ -49,7 +49,7 @@ def build_obstacle_set(
 
     Args:
         mesh: the cavity.
-        radii: radii of the balls [m], ascending. A turning part allows only one radius.
+        radii: radii of the balls [m], ascending.
         vibrating_tags: tags of the surfaces that vibrate.
         amplitudes: zero-to-peak amplitude of each of ``vibrating_tags`` [m].
         axis: axis of the turning part.
@@ -68,15 +68,14 @@ def build_obstacle_set(
     surface = surface_triangles(mesh, vibrating_tags, amplitudes)
     lookup = build_lookup(surface.corners, surface.flat_faces, overlap)
     tables = [build_obstacle_table(surface, r) for r in radii]
-    if axis is None:
-        tree, roots = join_trees([build_tree(*pair) for pair in zip(tables, radii, strict=True)])
-        return ObstacleSet(tree, lookup, mesh.tags, overlap, None, roots, None, bounds)
-    (table,), (radius,) = tables, radii  # a turning part is not supported with several sizes
-    turns = part_rows(table, mesh, axis, radius)
-    part = build_part_tree(select_rows(table, turns), mesh, axis, radius)
-    tree = build_tree(select_rows(table, ~turns), radius)
-    root = np.zeros(1, dtype=np.int64)
-    return ObstacleSet(tree, lookup, mesh.tags, overlap, part, root, None, bounds)
+    part = None
+    if axis is not None:
+        turns = [part_rows(*pair, mesh, axis) for pair in zip(tables, radii, strict=True)]
+        own = [select_rows(table, rows) for table, rows in zip(tables, turns, strict=True)]
+        part = build_part_tree(own, radii, mesh, axis)
+        tables = [select_rows(table, ~rows) for table, rows in zip(tables, turns, strict=True)]
+    tree, roots = join_trees([build_tree(*pair) for pair in zip(tables, radii, strict=True)])
+    return ObstacleSet(tree, lookup, mesh.tags, overlap, part, roots, None, bounds)
 
 
 def _swept_bounds(

@@ -7,7 +7,7 @@ import numpy as np
 
 from sim_core.effects.part_rotation import RotationAxis
 from sim_core.errors import SceneError
-from sim_core.geometry.bvh import Tree, build_tree
+from sim_core.geometry.bvh import Tree, build_tree, join_trees
 from sim_core.geometry.mesh import TriangleMesh, connected_components, edge_partners
 from sim_core.geometry.obstacles import ObstacleTable
 from sim_core.numerics.computed_once import computed_once
@@ -26,6 +26,7 @@ class PartTree(NamedTuple):
     """Obstacles of the turning part at angle 0, relative to the mesh's middle."""
 
     tree: Tree  # the obstacles
+    roots: np.ndarray  # nodes where the obstacles for each ball radius begin, shape (k,) int64
     # least distance along the axis, from its point, at which a ball's centre can touch [m]
     low: float
     # largest distance along the axis, from its point, at which a ball's centre can touch [m]
@@ -34,7 +35,7 @@ class PartTree(NamedTuple):
 
 
 def part_rows(
-    table: ObstacleTable, mesh: TriangleMesh, axis: RotationAxis, radius: float
+    table: ObstacleTable, radius: float, mesh: TriangleMesh, axis: RotationAxis
 ) -> np.ndarray:
     """Tell which obstacles turn with the part, for balls of this radius [m].
 
@@ -61,6 +62,8 @@ def part_rows(
 def require_free_axis(mesh: TriangleMesh, axis: RotationAxis, radius: float) -> None:
     """Raise SceneError if the part cannot turn in its chamber, for balls of this radius [m].
 
+    With balls of several sizes the smallest radius decides.
+
     The line along which part and chamber are joined must stay in place up to MAX_OPENING of the
     radius. It is then a circle about the axis, as where a round shaft goes through a wall.
     Elsewhere no corner of the part may pass through a triangle of the chamber as it turns, and no
@@ -74,12 +77,19 @@ def require_free_axis(mesh: TriangleMesh, axis: RotationAxis, radius: float) -> 
 
 
 def build_part_tree(
-    table: ObstacleTable, mesh: TriangleMesh, axis: RotationAxis, radius: float
+    tables: list[ObstacleTable], radii: tuple[float, ...], mesh: TriangleMesh, axis: RotationAxis
 ) -> PartTree:
-    """Build the tree of the part's own obstacles for balls of this radius [m]."""
+    """Build the tree of the part's own obstacles, which each radius has for itself.
+
+    Args:
+        tables: obstacles of the part for balls of each radius.
+        radii: radii of the balls [m], ascending.
+        mesh: mesh of the chamber.
+        axis: axis of the part.
+    """
     place = _in_axis_frame(mesh.corners[mesh.tags == axis.tag].reshape(-1, 3), axis)
     height, across = place[:, 2], np.linalg.norm(place[:, :2], axis=1)
-    margin = 1.001 * radius  # the radius and the overlap of faces
+    margin = 1.001 * radii[-1]  # the largest radius and the overlap of faces
     # Boxes are padded for float32 rounding at the size of chamber and axis, not of the part,
     # because the part may be that far from a ball.
     furthest = (
@@ -87,9 +97,10 @@ def build_part_tree(
         + 2.0 * np.abs(np.array(axis.point) - mesh.middle).max()
     )
     pad = ROUNDINGS * np.finfo(np.float32).eps * furthest
-    tree = build_tree(table._replace(low=table.low - pad, high=table.high + pad), radius)
+    padded = [one._replace(low=one.low - pad, high=one.high + pad) for one in tables]
+    tree, roots = join_trees([build_tree(*pair) for pair in zip(padded, radii, strict=True)])
     low, high, reach = float(height.min()), float(height.max()), float(across.max())
-    return PartTree(tree, low - margin, high + margin, reach + margin)
+    return PartTree(tree, roots, low - margin, high + margin, reach + margin)
 
 
 def select_rows(table: ObstacleTable, rows: np.ndarray) -> ObstacleTable:

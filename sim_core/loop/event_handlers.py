@@ -24,7 +24,7 @@ from sim_core.detect.ball_cylinder import normal_at
 from sim_core.detect.ball_sonotrode import within_moved_borders
 from sim_core.detect.ball_triangle import away_from_capsule, face_normal, nearer_neighbour
 from sim_core.effects.amplitude_profile import bent_normal, wave_at
-from sim_core.effects.ball_sizes import face_overlap_of_ball, share_by_mass
+from sim_core.effects.ball_sizes import face_overlap_of_ball, radius_of_ball, share_by_mass
 from sim_core.effects.contact_mode import (
     ASLEEP,
     BOUNCES,
@@ -265,7 +265,8 @@ def hit_part(
         side = nearer_neighbour(tree.numbers, row, away)
     else:
         normal = face_normal(tree.numbers, row)
-        away = Vec3(tree.radius * normal.x, tree.radius * normal.y, tree.radius * normal.z)
+        radius = radius_of_ball(state.sizes, tree.radius, event.ball)
+        away = Vec3(radius * normal.x, radius * normal.y, radius * normal.z)
     relative = slip_velocity(rotation, seen, away, event.time)
     triangle = int(np.int64(tree.triangles[row, side]))
     tag = int(np.int64(state.obstacles.tags[triangle]))

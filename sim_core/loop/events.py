@@ -373,6 +373,8 @@ def _predict_wall(state: SimulationState, ball: int, time: float) -> None:
     delay, obstacle = first_part_contact(
         obstacles.part,
         state.rotation,
+        state.sizes,
+        ball,
         state.scratch,
         flight,
         face_overlap,

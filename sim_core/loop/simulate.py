@@ -195,7 +195,9 @@ class Simulation:
         motion = np.concatenate([balls.positions - self.centre, balls.velocities], axis=1)
         friction_state = self._friction_state(tags, obstacle_tags)
         overlaps = np.array([face_overlap_of(radius) for radius in radii])
-        sizes = new_ball_sizes(balls, obstacles.roots, overlaps)
+        roots = obstacles.roots
+        part_roots = roots if obstacles.part is None else obstacles.part.roots
+        sizes = new_ball_sizes(balls, roots, part_roots, overlaps)
         contact = new_contact_state(
             checked_rest(physics.rest),
             len(motion),

@@ -141,11 +141,6 @@ class Scene:
                 "rest.on_vibrating is True, and a vibration has a profile: not supported together "
                 "yet; leave one of them out"
             )
-        if turn is not None and not self.balls.alike:
-            raise SceneError(
-                "physics.part_rotation is given, and balls of several sizes or densities: not "
-                "supported together yet; give one diameter and density, or leave it out"
-            )
         tag_count = int(self.mesh.tags.max()) + 1
         if self.physics.restitution is not None:
             checked_restitution(self.physics.restitution, tag_count)
@@ -185,7 +180,7 @@ class Scene:
                     f"part_rotation.tag and vibration.tag are both {turn.tag}: "
                     "one surface cannot do both"
                 )
-            require_free_axis(self.mesh, axis, self.balls.radius)
+            require_free_axis(self.mesh, axis, 0.5 * float(self.balls.sizes[0]))
         for one in vibrations:
             if one.tag not in tags:
                 raise SceneError(f"vibration.tag is {one.tag}, but the mesh has tags {tags}")
@@ -299,7 +294,8 @@ class Scene:
 def require_free_rotation(mesh: TriangleMesh, turn: PartRotation, diameter: float) -> None:
     """Raise SceneError if a part cannot turn in its chamber, with balls of this diameter [m].
 
-    This is the part of a Scene's check that needs no balls. It covers numbers out of range too.
+    With balls of several sizes the smallest diameter decides. This is the part of a Scene's check
+    that needs no balls. It covers numbers out of range too.
     """
     axis = checked_axis(turn)
     assert axis is not None

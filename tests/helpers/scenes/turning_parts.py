@@ -79,7 +79,9 @@ def _search(  # type: ignore[no-untyped-def]
     limit,
 ):
     ball = Flight(position, velocity, gravity_acceleration(gravity))
-    return first_part_contact(part, rotation, scratch, ball, face_overlap, time, limit, -1, 0)
+    return first_part_contact(
+        part, rotation, None, 0, scratch, ball, face_overlap, time, limit, -1, 0
+    )
 
 
 class Rotor:

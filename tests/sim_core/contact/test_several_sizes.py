@@ -1,7 +1,7 @@
 """Balls of several sizes and densities that roll, lean on one another and lie still.
 
 All scenes have one combination of effects, so that it is compiled once: friction is there with
-coefficients of 0 where balls are smooth.
+coefficients of 0 where balls are smooth, and the ceiling is a part that turns by an angle of 0.
 """
 
 import math
@@ -13,6 +13,7 @@ from sim_core import (
     Balls,
     Friction,
     Gravity,
+    PartRotation,
     Physics,
     Rest,
     Restitution,
@@ -31,7 +32,7 @@ from tests.helpers.scenes.contact_mode import (
     rough_floor,
     slope,
 )
-from tests.helpers.scenes.terrain import profile, terrain
+from tests.helpers.scenes.terrain import CEILING, profile, terrain
 
 SMALL, LARGE = 1e-3, 2.5e-3  # m, radii
 
@@ -44,6 +45,7 @@ def physics(mu: float, e: float = 0.8, resistance: float = 0.0, tilt: float = 0.
         Restitution((law,) * TAGS, law),
         rest=Rest(CAPTURE, resistance),
         friction=Friction((rub,) * TAGS, rub),
+        part_rotation=PartRotation(CEILING, amplitude=0.0, frequency=1.0),
     )
 
 
@@ -188,7 +190,7 @@ def test_balls_that_never_meet_roll_and_rest_as_each_does_alone() -> None:
     together = simulate(Scene(room, shot(places, radii, 0.0, 0.0, (7800.0,) * 4), effects, 1.0))
     for ball in range(4):
         one = Balls(places[[ball]], np.zeros((1, 3)), 2.0 * radii[ball])
-        alone = simulate(Scene(room, one, effects, 1.0))
+        alone = simulate(Scene(room, one, effects._replace(part_rotation=None), 1.0))
         assert len(alone.resting) == (ball in together.resting.ball)
         for name in ("positions", "velocities", "spins"):
             np.testing.assert_array_equal(

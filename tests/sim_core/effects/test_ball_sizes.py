@@ -13,7 +13,6 @@ from sim_core import (
     Balls,
     Drag,
     Gravity,
-    PartRotation,
     Physics,
     RandomPhase,
     Restitution,
@@ -25,14 +24,7 @@ from sim_core import (
     simulate,
 )
 from sim_core.scene.invariants import clearance, contained, energy, momentum, narrowest_gap
-from tests.helpers.scenes.cavities import (
-    CEILING,
-    FLOOR,
-    box,
-    box_around,
-    cylinder,
-    uniform_restitution,
-)
+from tests.helpers.scenes.cavities import FLOOR, box, box_around, cylinder, uniform_restitution
 from tests.helpers.scenes.gas import SURE
 from tests.sim_core.loop.test_determinism import fingerprint
 
@@ -225,9 +217,3 @@ def test_a_mixed_ball_that_overlaps_is_named() -> None:
             Physics(),
             1.0,
         )
-
-
-def test_what_several_sizes_do_not_go_with_is_said() -> None:
-    room, physics = box((0.03, 0.03, 0.03)), Physics(part_rotation=PartRotation(CEILING, rpm=1.0))
-    with pytest.raises(SceneError, match=r"physics\.part_rotation is given, and balls of several"):
-        Scene(room, mixture(room, (1, 1, 1), 1), physics, 1.0)
