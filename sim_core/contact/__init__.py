@@ -44,6 +44,7 @@ twice as long. A faster hit wakes a ball and the balls that stand on it.
 - ``effects/contact_mode.py``: the options (Rest) and the state of all balls (ContactState).
 - ``supports.py``: supports of a ball, the projection on their cone, the list of balls in contact.
 - ``landing_and_lift_off.py``: capture by a surface, and the supports that a moving ball keeps.
+- ``cylinder_wall.py``: balls that hop along the wall of an exact cylinder, or lean on it.
 - ``riding.py``: balls that stick to a vibrating face, move with it, and are let go.
 - ``rolling_friction.py``: velocity and acceleration on supports, with resistance and friction.
 - ``path_end.py``: end of a path in contact: at the border of a face, off an edge, at a stop.

@@ -22,7 +22,7 @@ from sim_core.effects.ball_sizes import radius_of_ball
 from sim_core.effects.contact_mode import ASLEEP, FLYING, ContactState, Ride, Supports, rides
 from sim_core.effects.friction import FrictionState
 from sim_core.geometry.bvh import Tree
-from sim_core.geometry.obstacles import FACE, VIBRATING_FACE
+from sim_core.geometry.obstacles import CAPSULE, FACE
 from sim_core.motion import BallEvent
 from sim_core.numerics.jit import inlined, jit
 from sim_core.numerics.roots import NEVER, first_approach
@@ -74,7 +74,7 @@ def _lies_behind(tree: Tree, row: int, normal: Vec3, position: Vec3, radius: flo
     if tree.kinds[row] == FACE:
         turn = cross(normal, one)
         return dot(turn, turn) < ONE_PLANE * ONE_PLANE and dot(normal, one) > 0.0
-    if tree.kinds[row] == VIBRATING_FACE:
+    if tree.kinds[row] != CAPSULE:  # a vibrating face, or a cylinder wall
         return False
     height = dot(normal, position) - radius + BEHIND
     two = add_scaled(one, numbers[row, 6], Vec3(numbers[row, 3], numbers[row, 4], numbers[row, 5]))
@@ -126,8 +126,11 @@ def end_of_path(
             delay = _leaves_round(supports, ball, support, flight, no_line)
         elif tree.kinds[row] == FACE:
             delay = _leaves_face(tree.numbers, row, flight, OVER * face_overlap)
-        else:
+        elif tree.kinds[row] == CAPSULE:
             delay = _leaves_edge(supports, tree.numbers, ball, support, flight, OVER * face_overlap)
+        else:  # a cylinder wall
+            no_line = Vec3(0.0, 0.0, 0.0)
+            delay = _leaves_round(supports, ball, support, flight, no_line)
         if delay < best:
             best, end = delay, LEAVES_SUPPORT - support
     delay, turns = _brake_ends(contact.friction_state, contact, event, flight)

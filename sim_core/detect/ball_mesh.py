@@ -6,7 +6,7 @@ import numpy as np
 
 from sim_core.contact.path_end import out_of_reach
 from sim_core.contact.riding import moves_with_face
-from sim_core.detect.ball_cylinder import cylinder_delay, is_cylinder_wall
+from sim_core.detect.ball_cylinder import is_cylinder_wall, wall_delay
 from sim_core.detect.ball_sonotrode import (
     find_later_contact,
     vibrating_plane_delay,
@@ -174,7 +174,7 @@ def first_contact(
         elif kind == CAPSULE:
             delay = capsule_delay(tree.numbers, row, ball, radius, best)
         elif is_cylinder_wall(cylinder, kind):
-            delay = cylinder_delay(cylinder, tree.numbers, row, ball)
+            delay = wall_delay(cylinder, contact, tree.numbers, row, ball, best)
         elif moves_with_face(contact, tree, number, row):
             continue
         else:

@@ -8,7 +8,7 @@
 
 This is the first system of Badreddine et al., "CAD based simulation of ultrasonic shot peening".
 A convex cavity has no edge that a ball could hit, so its planes need no borders. All effects are
-simulated except contact mode and a turning part.
+simulated except a turning part.
 
 A box may be periodic along x, y or both: it has no sides there, and a ball that leaves it on one
 side comes in on the other (numerics/periodic_sides.py).

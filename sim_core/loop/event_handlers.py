@@ -9,13 +9,13 @@ import math
 import numpy as np
 
 from sim_core.contact.ball_on_ball import meet
+from sim_core.contact.cylinder_wall import hop_at_wall, land_on_surface
 from sim_core.contact.jamming import hold_still
 from sim_core.contact.landing_and_lift_off import (
     RECHECK,
     RIDE_ENDS,
     deflect,
     end_path,
-    land,
     moved_off_edge,
 )
 from sim_core.contact.pushed_by_part import constrained_change, push_ball
@@ -97,6 +97,9 @@ def _resolve_contact(
     change = surface_velocity_change(touch, law, state.flexure, event.ball)
     change = _in_room(rotation, change, event.time)
     change = _constrained(rotation, state, event, touch, approach, change)
+    change = hop_at_wall(
+        state.obstacles.cylinder, state.contact, event.ball, touch, approach, change
+    )
     away = _in_room(rotation, touch.away, event.time)
     relative = _in_room(rotation, touch.relative, event.time)
     change = add_surface_friction(
@@ -227,7 +230,9 @@ def hit_surface(state: SimulationState, event: BallEvent) -> Impact:
         landed = stick(state.contact, tree, state.motion, event, obstacle, here)
         law = vibrating_restitution(state.contact, state.restitution)
     else:
-        landed = land(state.contact, tree, state.motion, event, obstacle, here, away)
+        landed = land_on_surface(
+            state.contact, obstacles.cylinder, tree, state.motion, event, obstacle, here, away
+        )
         law = still_surface_restitution(state.contact, state.restitution)
     triangle = int(np.int64(tree.triangles[obstacle, side]))
     tag = int(np.int64(obstacles.tags[triangle]))

@@ -18,9 +18,14 @@ MIN_DIAMETERS = 3.0
 def require_supported(cavity: AnalyticCavity, physics: Physics) -> None:
     """Raise SceneError for effects that are not supported in an analytical cavity."""
     remedy = "leave it out, or give the cavity as a mesh"
-    for name in ("rest", "part_rotation"):
-        if getattr(physics, name) is not None:
-            raise SceneError(f"physics.{name} is not supported with an analytical cavity; {remedy}")
+    if physics.part_rotation is not None:
+        raise SceneError(
+            f"physics.part_rotation is not supported with an analytical cavity; {remedy}"
+        )
+    if physics.rest is not None and cavity.periodic:
+        raise SceneError(
+            "physics.rest is not supported in a periodic box; leave it out, or give the box walls"
+        )
     gravity = physics.gravity
     tilted = gravity is not None and (gravity[0] != 0.0 or gravity[1] != 0.0)
     if cavity.radius is not None and gravity is not None and tilted:

@@ -84,8 +84,8 @@ class Scene:
             a tag without restitution, or a vibrating or turning tag that the mesh lacks,
             a part that cannot turn,
             numbers out of range,
-            an analytical cavity with contact mode, a turning part, or, in a cylinder, gravity
-                across it.
+            an analytical cavity with a turning part, contact mode in a periodic box, or gravity
+                across a cylinder.
     """
 
     mesh: TriangleMesh | AnalyticCavity

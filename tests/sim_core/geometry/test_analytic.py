@@ -16,7 +16,6 @@ from sim_core import (
     PartRotation,
     Physics,
     RandomPhase,
-    Rest,
     Restitution,
     Scene,
     SceneError,
@@ -177,7 +176,6 @@ def test_a_start_in_overlap_of_rounding_going_in_is_no_contact() -> None:
 @pytest.mark.parametrize(
     ("room", "changes", "said"),
     [
-        (BOX, {"rest": Rest()}, "rest is not supported with an analytical cavity"),
         (
             BOX,
             {"part_rotation": PartRotation(0, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), 10.0)},

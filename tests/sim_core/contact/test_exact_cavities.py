@@ -1,0 +1,197 @@
+"""Balls that roll and rest in exact cavities: on planes as in a mesh, and beside a cylinder wall.
+
+Steel balls of 3 mm, with friction coefficients of 0 where balls are smooth.
+"""
+
+import math
+
+import numpy as np
+import pytest
+
+from sim_core import (
+    AnalyticCavity,
+    Balls,
+    Friction,
+    Gravity,
+    Physics,
+    Rest,
+    Restitution,
+    Scene,
+    SceneError,
+    cylinder_cavity,
+    pack_balls,
+    periodic_box,
+    prism_cavity,
+    simulate,
+)
+from sim_core.detect.ball_cylinder import accelerated_cylinder_delay, cylinder_delay
+from sim_core.effects.contact_mode import ASLEEP
+from sim_core.effects.gravity import STANDARD as G
+from sim_core.geometry.analytic import CylinderAxis
+from sim_core.geometry.obstacles import CYLINDER_WALL, NUMBERS
+from sim_core.loop.simulate import Simulation
+from sim_core.numerics.vec3 import Flight, Vec3
+from sim_core.scene.invariants import energy, narrowest_gap
+
+R = 1.5e-3  # m
+CAPTURE = 1e-3
+TOUCH = 1e-12  # m
+TAGS = (0, 1, 2)  # of floor, ceiling and sides
+FLOOR = 0  # number of the surface
+SQUARE = np.array([[0.0, 0.0], [0.3, 0.0], [0.3, 0.04], [0.0, 0.04]])
+BOX = prism_cavity(SQUARE, 0.0, 0.03, TAGS)
+WIDE = 0.02  # m, of the centres' circle in the cylinder
+CUP = cylinder_cavity(2.0 * (WIDE + R), 0.0, 0.06, TAGS)
+
+
+def physics(
+    floor: float,
+    wall: float,
+    e: float = 0.6,
+    resistance: float = 0.0,
+    tilt: tuple[float, float] = (0.0, 0.0),
+) -> Physics:
+    """With friction of these mu on the floor and on the wall, and gravity of these slopes."""
+    law, down = (e, 1e3), np.array([*tilt, -1.0])
+    down *= G / np.linalg.norm(down)
+    return Physics(
+        Gravity(*down.tolist()),
+        Restitution((law,) * 3, law),
+        rest=Rest(CAPTURE, resistance),
+        friction=Friction(((floor, 0.0), (0.0, 0.0), (wall, 0.0)), (floor, 0.0)),
+    )
+
+
+def shot(places: object, velocities: object = 0.0) -> Balls:
+    places = np.atleast_2d(np.array(places, dtype=float))
+    speeds = np.broadcast_to(np.array(velocities, dtype=float), places.shape)
+    return Balls(places, speeds, 2.0 * R, spins=np.zeros_like(places))
+
+
+@pytest.mark.parametrize("mu", [0.0, 0.05, 10.0])
+def test_on_a_tilted_floor_a_ball_slides_slips_or_rolls(mu: float) -> None:
+    """With g sin, with mu g cos against it, or with 5/7 of g sin."""
+    slope, until = 0.25, 0.2
+    start = [0.02, 0.02, R]
+    end = simulate(Scene(BOX, shot(start), physics(mu, 0.0, tilt=(slope, 0.0)), until)).balls
+    push, press = G * math.sin(math.atan(slope)), G * math.cos(math.atan(slope))
+    gain = 5.0 / 7.0 * push if 2.0 / 7.0 * push < mu * press else push - mu * press
+    np.testing.assert_allclose(end.velocities[0], [gain * until, 0.0, 0.0], rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(
+        end.positions[0] - start, [0.5 * gain * until**2, 0.0, 0.0], rtol=1e-9, atol=1e-12
+    )
+
+
+def test_in_a_tilted_box_balls_come_to_rest_in_the_corner_and_beside_it() -> None:
+    """The first lies in the corner of three planes, the second on two planes and on the first."""
+    effects = physics(0.2, 0.2, resistance=0.01, tilt=(-0.2, -0.1))
+    result = simulate(Scene(BOX, shot([[0.004, 0.004, 0.01], [0.02, 0.004, 0.01]]), effects, 3.0))
+    np.testing.assert_allclose(result.balls.positions, [[R, R, R], [3.0 * R, R, R]], atol=1e-9)
+    assert result.resting.ball.tolist() == [0, 1]
+    assert set(result.resting.triangles[0]) == {-1, FLOOR, 2, 5}  # the sides at y = 0 and at x = 0
+    assert 0 in result.resting.balls[1]
+
+
+@pytest.mark.parametrize("mu", [0.1, 0.4])
+def test_along_the_cylinder_wall_friction_slows_a_ball_until_it_rolls(mu: float) -> None:
+    """The wall presses with v²/R, so that 1/v grows by mu/R in each second, until the ball rolls on
+    the wall with 5/7 of its speed. The floor is smooth.
+    """
+    speed, start = 0.5, shot([WIDE, 0.0, R], [0.0, 0.5, 0.0])
+    rolls = 0.4 * WIDE / (mu * speed)
+    effects = physics(0.0, mu)
+    for until in (0.5 * rolls, 1.5 * rolls):
+        end = simulate(Scene(CUP, start, effects, until)).balls
+        expected = max(speed / (1.0 + mu * speed * until / WIDE), 5.0 / 7.0 * speed)
+        assert np.linalg.norm(end.velocities[0]) == pytest.approx(expected, rel=1e-3)
+        assert np.linalg.norm(end.positions[0, :2]) == pytest.approx(WIDE, abs=1e-8)
+        assert end.positions[0, 2] == pytest.approx(R, abs=TOUCH)
+
+
+def test_a_ball_that_leans_on_two_others_and_the_wall_lies_still() -> None:
+    """Where its distance from both is two radii, and from the axis the circle's radius."""
+    lower = np.array([WIDE - 1.2 * R, R, R])
+    height = R + math.sqrt(4.0 * R**2 - (1.2 * R) ** 2 - R**2)
+    places = [lower, lower * [1.0, -1.0, 1.0], [WIDE - 1e-6, 0.0, height + 1e-5]]
+    for mu in (0.0, 0.3):
+        result = simulate(Scene(CUP, shot(places), physics(mu, mu, resistance=0.01), 0.5))
+        assert result.resting.ball.tolist() == [0, 1, 2]
+        np.testing.assert_allclose(result.balls.positions[2], [WIDE, 0.0, height], atol=1e-8)
+        assert result.collisions.total < 20_000
+
+
+@pytest.mark.parametrize("room", [BOX, CUP, cylinder_cavity(0.009, 0.0, 0.06, TAGS)])
+def test_shot_settles_without_overlap_or_energy(room: AnalyticCavity) -> None:
+    """Most balls in the narrow cylinder lean on others and on the wall."""
+    rng, count = np.random.default_rng(2), 25 if room is not BOX else 12
+    places = pack_balls(room, count, 2.0 * R, rng)
+    effects = physics(0.3, 0.2, 0.6, 0.02)
+    run = Simulation(Scene(room, shot(places, rng.normal(0.0, 0.3, places.shape)), effects, 2.0))
+    before = math.inf
+    for stop in np.linspace(0.0, 2.0, 41)[1:]:
+        run.play(float(stop), record=False)
+        balls = run.balls()
+        assert (room.gaps(balls.positions) - R).min() > -TOUCH
+        assert narrowest_gap(balls)[0] > -TOUCH
+        now = energy(balls, Gravity()) / balls.ball_mass
+        assert now < before + 50 * CAPTURE**2
+        before = now
+    assert run.state.contact is not None
+    assert (run.state.contact.mode >= ASLEEP).sum() > 0.9 * count
+    rows, kinds = run.state.contact.supports.obstacles, run.state.obstacles.tree.kinds
+    on_wall = (kinds[rows[rows >= 0]] == CYLINDER_WALL).any()
+    assert on_wall == (room.radius is not None and room.radius < WIDE)
+    assert run.state.counts[:3].sum() < 400_000
+
+
+def test_an_accelerated_ball_meets_the_wall_at_the_first_root_of_the_quartic() -> None:
+    """Roots of |p + v s + a s²/2|² = 1 by the companion matrix."""
+    rng, numbers = np.random.default_rng(4), np.zeros((1, NUMBERS))
+    numbers[0, 3], axis, met = 1.0, CylinderAxis(0.0, 0.0), 0
+    for _ in range(400):
+        turn = rng.uniform(0.0, 2.0 * np.pi)
+        p = rng.choice([1.0, rng.uniform(0.0, 1.0)]) * np.array([np.cos(turn), np.sin(turn)])
+        v, a = rng.normal(size=2) * rng.choice([0.0, 1.0, 10.0]), rng.normal(size=2)
+        p *= min(1.0, 1.0 / np.linalg.norm(p))  # rounding: not beyond the wall
+        if p @ p > 0.999 and p @ v > -0.3 * np.linalg.norm(v) - 1e-9:
+            continue  # on the wall: only balls that leave it clearly
+        flight = Flight(Vec3(*p, 0.3), Vec3(*v, 1.0), Vec3(*a, -9.8))
+        delay = accelerated_cylinder_delay(axis, numbers, 0, flight, 5.0)
+        quartic = [0.25 * (a @ a), v @ a, v @ v + p @ a, 2.0 * (p @ v), p @ p - 1.0]
+        roots = np.roots(quartic)
+        real = np.sort(roots.real[(np.abs(roots.imag) < 1e-9) & (roots.real > 1e-7)])
+        first = next((s for s in real if np.polyval(np.polyder(quartic), s) > 0.0), math.inf)
+        if first < 5.0:
+            met += 1
+            assert delay == pytest.approx(first, abs=1e-9)
+            there = p + v * delay + 0.5 * a * delay**2
+            assert abs(np.linalg.norm(there) - 1.0) < 2e-13
+        else:
+            assert delay > 5.0
+    assert met > 150
+
+
+def test_without_acceleration_across_the_axis_the_wall_is_met_as_in_flight() -> None:
+    rng, numbers = np.random.default_rng(5), np.zeros((1, NUMBERS))
+    numbers[0, 3], axis = 1.0, CylinderAxis(0.0, 0.0)
+    for _ in range(100):
+        p, v = rng.uniform(-0.7, 0.7, 2), rng.normal(size=2)
+        flight = Flight(Vec3(*p, 0.3), Vec3(*v, 1.0), Vec3(0.0, 0.0, -9.8))
+        exact = cylinder_delay(axis, numbers, 0, flight)
+        assert accelerated_cylinder_delay(axis, numbers, 0, flight, 1e3) == exact
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_a_still_ball_at_the_wall_meets_it_where_it_is_pulled_to(side: float) -> None:
+    """Pulled against the wall it is in contact now, pulled away it comes to the other side."""
+    numbers, nothing = np.zeros((1, NUMBERS)), Vec3(0.0, 0.0, 0.0)
+    numbers[0, 3] = 1.0
+    flight = Flight(Vec3(1.0, 0.0, 0.0), nothing, Vec3(2.0 * side, 0.0, 0.0))
+    delay = accelerated_cylinder_delay(CylinderAxis(0.0, 0.0), numbers, 0, flight, 10.0)
+    assert delay == pytest.approx(0.0 if side > 0.0 else math.sqrt(2.0), abs=1e-12)
+
+
+def test_rest_in_a_periodic_box_is_refused() -> None:
+    room = periodic_box((0.0, 0.0, 0.0), (0.03, 0.03, 0.03), (0, 1))
+    with pytest.raises(SceneError, match=r"physics\.rest is not supported in a periodic box"):
+        Scene(room, shot([0.01, 0.01, 0.01]), physics(0.1, 0.1), 1.0)
