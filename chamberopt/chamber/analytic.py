@@ -36,15 +36,14 @@ def analytic_cavity(design: Design, chamber: Chamber) -> AnalyticCavity:
     In plan it is a true circle for the shape "cylinder" and a polygon for other shapes.
 
     Raises:
-        InputError: the chamber is not a cylinder, box or prism with the part as its lid, or an
-            effect of the design is not supported in an analytical cavity.
+        InputError: the chamber is not a cylinder, box or prism with the part as its lid, or the
+            part turns.
     """
     from sim_core import cylinder_cavity, prism_cavity
 
-    for name in ("part_turn", "rest"):
-        if getattr(design.effects, name):
-            why = "not supported with an analytical cavity"
-            raise InputError(f"effects.{name}: {why}; leave it out, or {REMEDY}")
+    if design.effects.part_turn is not None:
+        why = "not supported with an analytical cavity"
+        raise InputError(f"effects.part_turn: {why}; leave it out, or {REMEDY}")
     bottom, top = float(chamber.vertices[:, 2].min()), chamber.height
     _require_flat_or_upright(chamber, bottom, top)
     outline = _outline(chamber, bottom, top)

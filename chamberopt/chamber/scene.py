@@ -76,7 +76,7 @@ def require_turnable(design: Design, mesh: TriangleMesh, axis: Axis | None) -> N
     turn = part_rotation(design, axis)
     if turn is not None:
         try:
-            require_free_rotation(mesh, turn, design.shot.diameter)
+            require_free_rotation(mesh, turn, min(design.shot.diameters))
         except SceneError as error:
             raise InputError(f"effects.part_turn: {error}") from None
 
@@ -100,16 +100,18 @@ def require_measured_faces(design: Design, mesh: TriangleMesh | AnalyticCavity) 
 def balls_can_rest(design: Design, mesh: TriangleMesh | AnalyticCavity) -> bool:
     """True if balls can lie still: as effects.rest says or, if the design does not give it, if a
     surface that does not move faces up.
-    """
-    from sim_core import Gravity, can_rest
 
-    if design.effects.rest is not None:
+    In an analytical cavity balls stand on nothing but the sonotrode, whatever effects.rest says.
+    """
+    from sim_core import AnalyticCavity, Gravity, can_rest
+
+    if design.effects.rest is not None and not isinstance(mesh, AnalyticCavity):
         return design.effects.rest
     moving = [TAG_SONOTRODE, *(further_sonotrode_tag(k) for k in range(len(design.sonotrodes)))]
     if design.effects.part_turn is not None:
         moving.append(TAG_PART)
     gravity = Gravity() if design.effects.gravity else None
-    return design.shot.mix is None and can_rest(mesh, gravity, *moving)
+    return design.effects.rest is not False and can_rest(mesh, gravity, *moving)
 
 
 def vibrations(design: Design, phase: float) -> Vibration | tuple[Vibration, ...]:

@@ -153,10 +153,6 @@ class Design(FileTable):
         yield from zone_problems(self.zones, self.calibration)
         yield from calibration_problems(self)
         yield from flexure_problems(self)
-        for effect in ("rest", "part_turn"):
-            if self.shot.mix is not None and getattr(self.effects, effect):
-                text = "given beside shot.mix: not supported together yet"
-                yield Problem(f"effects.{effect}", text)
         if self.sonotrodes and self.sonotrode.motion == "random_phase":
             text = 'given "random_phase" beside sonotrodes: not supported together; leave it out'
             yield Problem("sonotrode.motion", text)

@@ -163,9 +163,7 @@ def simulate_replica(setting: ReplicaSetting, seed: int) -> Replica:
             kind: int(getattr(result.collisions, kind))
             for kind in ("walls", "balls", "sonotrode", "total")
         },
-        resting=find_resting_balls(
-            result.resting, len(result.balls), design.shot.diameter, chamber, part_turns
-        ),
+        resting=find_resting_balls(result.resting, design.shot.diameters, chamber, part_turns),
         trapped=find_trapped_balls(result, design.process.recorded_time, chamber, part_turns),
         hits=hits_on_part(impacts, chamber, design),
     )

@@ -36,23 +36,22 @@ class RestingBalls:
 
 
 def find_resting_balls(
-    resting: Resting, balls: int, diameter: float, chamber: Chamber, part_turns: bool
+    resting: Resting, diameters: Sequence[float], chamber: Chamber, part_turns: bool
 ) -> RestingBalls | None:
     """Describe the balls at rest at the end of a replica. Return None if there are none.
 
     Args:
         resting: the balls at rest, as the simulator reports them.
-        balls: number of all balls.
-        diameter: diameter of the balls [m].
+        diameters: diameter of each ball of the shot [m].
         part_turns: whether the part rotates. Its position at the end is then unknown, so that no
             ball is said to touch it.
     """
     if len(resting) == 0:
         return None
-    reach = 0.5 * diameter + CONTACT_GAP
-    surfaces = surface_names(chamber)
-    kinds = [_kind(resting, i, surfaces, chamber, reach, part_turns) for i in range(len(resting))]
-    places = _places(resting, _with_carriers(resting, kinds), diameter)
+    balls, surfaces = len(diameters), surface_names(chamber)
+    reach = [0.5 * diameters[ball] + CONTACT_GAP for ball in resting.ball]
+    kinds = [_kind(resting, i, surfaces, chamber, r, part_turns) for i, r in enumerate(reach)]
+    places = _places(resting, _with_carriers(resting, kinds), max(diameters))
     descriptions = [_describe(resting, members, kind) for kind, members in places[:MAX_PLACES]]
     others = sum(len(members) for _, members in places[MAX_PLACES:])
     descriptions += [f"{others} elsewhere"] if others else []
@@ -151,6 +150,7 @@ def _places(resting: Resting, kinds: list[str], diameter: float) -> list[tuple[s
 
     Args:
         kinds: what holds each ball, in words.
+        diameter: diameter of the largest balls [m].
     """
     from scipy.spatial import KDTree
 

@@ -35,12 +35,16 @@ LAWFUL = "gravity restitution ball_collisions"  # of a chamber that is of this w
 FEW = (
     f"{LAWFUL} vibration rest friction drag roughness flexure",
     f"{LAWFUL} vibration random_phase friction drag roughness flexure {SIZES} {BENT}",
-    f"{LAWFUL} vibration rest friction part_rotation flexure",
+    f"{LAWFUL} vibration rest friction part_rotation flexure {SIZES}",
     "gravity restitution vibration random_phase rest friction drag part_rotation",
     f"{LAWFUL} vibration rest {SONOTRODES}",
 )
 MANY = (
     *FEW,
+    f"{LAWFUL} vibration rest friction part_rotation",
+    f"{LAWFUL} vibration rest friction drag {SIZES}",
+    f"{LAWFUL} rest {SIZES}",
+    f"{LAWFUL} vibration roughness part_rotation {SIZES}",
     f"{LAWFUL} vibration rest friction drag",
     f"{LAWFUL} vibration random_phase drag {SIZES}",
     f"{LAWFUL} vibration rest friction part_rotation roughness",

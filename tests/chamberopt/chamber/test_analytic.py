@@ -8,6 +8,7 @@ import pytest
 from chamberopt.chamber.analytic import analytic_cavity, impacts_on_chamber
 from chamberopt.chamber.build import Chamber, build_chamber
 from chamberopt.chamber.part import Part
+from chamberopt.chamber.scene import scene_physics
 from chamberopt.common.errors import InputError
 from chamberopt.common.executor import local_executor
 from chamberopt.design.design import validate
@@ -107,13 +108,20 @@ def test_what_is_in_the_way_is_named() -> None:
         analytic_cavity(PLATE.changed({"chamber.diameter_mm": 60.0}), plate())
 
 
-@pytest.mark.parametrize(("name", "value"), [("rest", True), ("part_turn", {"rpm": 10.0})])
-def test_effects_that_need_triangles_are_refused(name: str, value: object) -> None:
-    effects = type(PLATE.effects).model_validate({name: value})
+def test_a_part_that_turns_is_refused() -> None:
+    effects = type(PLATE.effects).model_validate({"part_turn": {"rpm": 10.0}})
     with pytest.raises(
-        InputError, match=f"effects.{name}: not supported with an analytical cavity"
+        InputError, match=r"effects\.part_turn: not supported with an analytical cavity"
     ):
         analytic_cavity(PLATE.model_copy(update={"effects": effects}), plate())
+
+
+@pytest.mark.parametrize("rest", [None, False, True])
+def test_balls_stand_on_nothing_but_the_sonotrode(rest: bool | None) -> None:
+    """So contact mode is not simulated, whatever effects.rest says."""
+    design = PLATE.changed({"effects.rest": rest})
+    physics = scene_physics(design, analytic_cavity(design, plate()))
+    assert physics.rest is None
 
 
 def test_impacts_are_booked_on_the_triangle_under_them() -> None:

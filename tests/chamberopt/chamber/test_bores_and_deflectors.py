@@ -224,7 +224,7 @@ def test_a_ball_on_it_is_said_to_lie_there() -> None:
         np.zeros(1, int), np.zeros((1, 3)), np.zeros(1), on, np.full((1, 4), -1), np.zeros(1, bool)
     )
 
-    found = find_resting_balls(ball, 10, 2e-3, chamber, part_turns=False)
+    found = find_resting_balls(ball, [2e-3] * 10, chamber, part_turns=False)
 
     assert found is not None
     assert "1 on sonotrodes.0 at" in found.line

@@ -475,6 +475,8 @@ class TestWrongDesigns:
         save_design(load_design(design_file), again)
         assert load_design(again) == load_design(design_file)
         assert load_design(design_file).changed({"shot.mass_g": 4.0}).shot.mix == shot.mix
+        effects = {"effects.rest": True, "effects.part_turn": {"rpm": 30.0}}
+        assert load_design(design_file).changed(effects).effects.rest
 
     @pytest.mark.parametrize(
         ("mix", "said"),
@@ -489,10 +491,6 @@ class TestWrongDesigns:
             (
                 "mix = [{ diameter_mm = 3, share = 1.0 }]",
                 "shot.mix: given 1 sizes; allowed: 2 to 8",
-            ),
-            (
-                "MIX" + "[effects]\nrest = true\n",
-                "effects.rest: given beside shot.mix: not supported",
             ),
             (
                 "mix = [{ diameter_mm = 3, share = 0.5 }, { diameter_mm = 3, share = 0.5 }]",
@@ -511,11 +509,8 @@ class TestWrongDesigns:
     )
     def test_a_mix_that_is_wrong(self, design_file: Path, mix: str, said: str) -> None:
         fine = "mix = [{ diameter_mm = 2, share = 0.5 }, { diameter_mm = 3, share = 0.5 }]\n"
-        shot, _, effects = mix.replace("MIX", fine).partition("[effects]")
-        tables = TABLES.replace("diameter_mm = 3\n", shot + "\n") + (
-            f"[effects]{effects}" if effects else ""
-        )
-        design_file.write_text(tables, encoding="utf-8")
+        shot = mix.replace("MIX", fine)
+        design_file.write_text(TABLES.replace("diameter_mm = 3\n", shot + "\n"), encoding="utf-8")
         assert said in edited(design_file)
 
     @pytest.mark.parametrize(

@@ -55,7 +55,7 @@ def test_groups_say_how_many_on_what_and_where(chamber: Chamber) -> None:
         ([8.5, 0.0, 0.0], 0.2, -1, -1, True),
         ([-5.0, -5.0, -8.5], -0.1, floor, -1, False),
     )
-    found = find_resting_balls(balls, 200, BALL, chamber, part_turns=False)
+    found = find_resting_balls(balls, [BALL] * 200, chamber, part_turns=False)
     assert found is not None
     assert found.share == 0.025
     assert found.line == (
@@ -68,7 +68,7 @@ def test_groups_say_how_many_on_what_and_where(chamber: Chamber) -> None:
 
 def test_a_part_that_turns_is_elsewhere_by_then(chamber: Chamber) -> None:
     found = find_resting_balls(
-        resting(([8.5, 0.0, 0.0], 0.2, -1, -1, True)), 20, BALL, chamber, part_turns=True
+        resting(([8.5, 0.0, 0.0], 0.2, -1, -1, True)), [BALL] * 20, chamber, part_turns=True
     )
     assert found is not None
     assert (
@@ -81,7 +81,7 @@ def test_far_apart_is_two_places_and_the_smallest_are_counted_only(chamber: Cham
     ends = [([x, y, 5.5], 0.5, top, -1, False) for x in (-6.0, 6.0) for y in (-1.5, 1.5)]
     floor = triangle(chamber, 2, 2, -10e-3)
     corners = [([x, y, -8.5], 0.5, floor, -1, False) for x in (-8.0, 8.0) for y in (-8.0, 8.0)]
-    found = find_resting_balls(resting(*ends, *corners), 10, BALL, chamber, part_turns=False)
+    found = find_resting_balls(resting(*ends, *corners), [BALL] * 10, chamber, part_turns=False)
     assert found is not None
     assert found.line.count("2 on the part's upper side around") == 2
     assert found.line.endswith("; 3 elsewhere")
@@ -89,7 +89,7 @@ def test_far_apart_is_two_places_and_the_smallest_are_counted_only(chamber: Cham
 
 def test_between_other_balls_only(chamber: Chamber) -> None:
     found = find_resting_balls(
-        resting(([0.0, 0.0, 8.0], 0.2, -1, -1, True)), 20, BALL, chamber, part_turns=False
+        resting(([0.0, 0.0, 8.0], 0.2, -1, -1, True)), [BALL] * 20, chamber, part_turns=False
     )
     assert found is not None
     assert "1 jammed among other balls at" in found.line
@@ -103,7 +103,7 @@ def test_nothing_lies_still(chamber: Chamber) -> None:
         *(np.zeros((0, 4), int),) * 2,
         np.zeros(0, bool),
     )
-    assert find_resting_balls(nothing, 20, BALL, chamber, part_turns=False) is None
+    assert find_resting_balls(nothing, [BALL] * 20, chamber, part_turns=False) is None
 
 
 def test_one_note_on_all_replicas() -> None:
