@@ -1,13 +1,14 @@
 """Balls in contact mode at the wall of an exact upright cylinder.
 
 Gravity is along the axis, so that the wall never bears a ball alone. It can hold a ball that leans
-on other balls, or on a ball and the floor: such a ball has no way out and lies still, with the wall
-as one of its supports. A ball that moves never keeps the wall as a support, because its path would
-have to be curved. It hops along the wall, as it does without contact mode (impulses/collision.py).
+on other balls: such a ball has no way out and lies still, with the wall as one of its supports. The
+wall is not a support of a ball that moves, because the path would have to be curved. The ball hops
+along the wall, as it does without contact mode (impulses/collision.py).
 
 A ball that leans on others and is pressed against the wall would hit it infinitely often in finite
-time. Hits slower than Rest.capture therefore lose no speed there, and throw the ball back for
-SHORTEST_HOP or longer. What this adds to the energy per mass is less than capture²/2.
+time. Hits slower than Rest.capture therefore lose no speed there. They throw the ball back at the
+speed that its acceleration takes away in SHORTEST_HOP, but at no more than Rest.capture. What this
+adds to the energy per mass is less than capture²/2.
 
 Notation: n: unit normal of the wall, towards the ball. a: acceleration of the ball on its other
 supports [m/s²]; -n a presses it against the wall.

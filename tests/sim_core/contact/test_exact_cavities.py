@@ -120,28 +120,54 @@ def test_a_ball_that_leans_on_two_others_and_the_wall_lies_still() -> None:
         assert result.collisions.total < 20_000
 
 
+def watched(room: AnalyticCavity, balls: Balls, effects: Physics, pieces: int = 40) -> Simulation:
+    """Two seconds, in which no ball overlaps anything and the energy does not grow."""
+    run, before = Simulation(Scene(room, balls, effects, 2.0)), math.inf
+    for stop in np.linspace(0.0, 2.0, pieces + 1)[1:]:
+        run.play(float(stop), record=False)
+        now = run.balls()
+        assert (room.gaps(now.positions) - 0.5 * now.diameters[:, None]).min() > -TOUCH
+        assert narrowest_gap(now)[0] > -TOUCH
+        left = energy(now, effects.gravity) / float(now.masses.sum())
+        assert left < before + 50.0 * CAPTURE**2
+        before = left
+    return run
+
+
 @pytest.mark.parametrize("room", [BOX, CUP, cylinder_cavity(0.009, 0.0, 0.06, TAGS)])
 def test_shot_settles_without_overlap_or_energy(room: AnalyticCavity) -> None:
     """Most balls in the narrow cylinder lean on others and on the wall."""
     rng, count = np.random.default_rng(2), 25 if room is not BOX else 12
     places = pack_balls(room, count, 2.0 * R, rng)
-    effects = physics(0.3, 0.2, 0.6, 0.02)
-    run = Simulation(Scene(room, shot(places, rng.normal(0.0, 0.3, places.shape)), effects, 2.0))
-    before = math.inf
-    for stop in np.linspace(0.0, 2.0, 41)[1:]:
-        run.play(float(stop), record=False)
-        balls = run.balls()
-        assert (room.gaps(balls.positions) - R).min() > -TOUCH
-        assert narrowest_gap(balls)[0] > -TOUCH
-        now = energy(balls, Gravity()) / balls.ball_mass
-        assert now < before + 50 * CAPTURE**2
-        before = now
+    balls = shot(places, rng.normal(0.0, 0.3, places.shape))
+    run = watched(room, balls, physics(0.3, 0.2, 0.6, 0.02))
     assert run.state.contact is not None
     assert (run.state.contact.mode >= ASLEEP).sum() > 0.9 * count
     rows, kinds = run.state.contact.supports.obstacles, run.state.obstacles.tree.kinds
     on_wall = (kinds[rows[rows >= 0]] == CYLINDER_WALL).any()
     assert on_wall == (room.radius is not None and room.radius < WIDE)
     assert run.state.counts[:3].sum() < 400_000
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("seed", range(40))
+def test_any_shot_settles_in_any_exact_cavity(seed: int) -> None:
+    """Upright cylinders and prisms, these tilted too, and balls of one size or of two."""
+    rng, high = np.random.default_rng(seed), 0.08
+    wide, tilt = R * 10.0 ** rng.uniform(0.35, 1.0), (0.0, 0.0)
+    room = cylinder_cavity(2.0 * wide, 0.0, high, TAGS)
+    if seed % 2:
+        turns = 2.0 * np.pi * (np.arange(3 + seed % 7) + rng.uniform()) / (3 + seed % 7)
+        outline = 2.0 * wide * np.column_stack([np.cos(turns), np.sin(turns)])
+        room, tilt = prism_cavity(outline, 0.0, high, TAGS), tuple(rng.normal(0.0, 0.3, 2))
+    count = int(rng.integers(3, 25))
+    shares = rng.choice([0.5, 1.0], count) if seed % 4 > 1 else np.ones(count)
+    places = pack_balls(room, count, 2.0 * R * shares, rng)
+    mu, wall, e = rng.choice([0.0, 0.3, 3.0]), rng.choice([0.0, 0.3]), rng.choice([0.0, 0.6, 0.9])
+    speeds, still = rng.normal(0.0, 0.3, places.shape), np.zeros_like(places)
+    balls = Balls(places, speeds, 2.0 * R * shares, spins=still)
+    run = watched(room, balls, physics(mu, wall, e, rng.choice([0.0, 0.02]), tilt), 20)
+    assert run.state.counts[:3].sum() < 3_000_000
 
 
 def test_an_accelerated_ball_meets_the_wall_at_the_first_root_of_the_quartic() -> None:
