@@ -72,7 +72,7 @@ def land_on_surface(
     return landed
 
 
-@jit
+@inlined
 def _lean_on_wall(
     cylinder: CylinderAxis | None,
     contact: ContactState | None,
@@ -119,7 +119,7 @@ def _is_pressed(contact: ContactState, ball: int, normal: Vec3) -> bool:
     return dot(normal, vec3_at(contact.acceleration, ball)) < -PRESSED * weight
 
 
-@jit
+@inlined
 def hop_at_wall(
     cylinder: CylinderAxis | None,
     contact: ContactState | None,
