@@ -8,17 +8,16 @@ from pathlib import Path
 
 def with_and_without_jit(code: str) -> tuple[str, str]:
     """What the snippet prints with the JIT and without; it may import from tests."""
-    settings = (dict(os.environ), {**os.environ, "NUMBA_DISABLE_JIT": "1"})
-    here = Path(__file__).parents[2]
-    compiled, interpreted = (
-        subprocess.run(
-            [sys.executable, "-c", code],
-            cwd=here,
-            env=env,
-            check=True,
-            capture_output=True,
-            text=True,
-        )
-        for env in settings
-    )
-    return compiled.stdout, interpreted.stdout
+    return _printed(code, dict(os.environ)), without_jit(code)
+
+
+def without_jit(code: str) -> str:
+    """What the snippet prints without the JIT. Its AssertionError is a CalledProcessError here."""
+    return _printed(code, {**os.environ, "NUMBA_DISABLE_JIT": "1"})
+
+
+def _printed(code: str, env: dict[str, str]) -> str:
+    here, command = Path(__file__).parents[2], [sys.executable, "-c", code]
+    return subprocess.run(
+        command, cwd=here, env=env, check=True, capture_output=True, text=True
+    ).stdout

@@ -32,6 +32,7 @@ from sim_core.geometry.obstacles import CYLINDER_WALL, NUMBERS
 from sim_core.loop.simulate import Simulation
 from sim_core.numerics.vec3 import Flight, Vec3
 from sim_core.scene.invariants import energy, narrowest_gap
+from tests.helpers.jit_on_and_off import without_jit
 
 R = 1.5e-3  # m
 CAPTURE = 1e-3
@@ -92,9 +93,10 @@ def test_in_a_tilted_box_balls_come_to_rest_in_the_corner_and_beside_it() -> Non
     assert 0 in result.resting.balls[1]
 
 
-@pytest.mark.parametrize("mu", [0.1, 0.4])
-def test_along_the_cylinder_wall_friction_slows_a_ball_until_it_rolls(mu: float) -> None:
-    """The wall presses with v²/R, so that 1/v grows by mu/R in each second, until the ball rolls on
+def slide_along_the_wall(mu: float) -> None:
+    """Friction of the cylinder wall slows a ball until it rolls.
+
+    The wall presses with v²/R, so that 1/v grows by mu/R in each second, until the ball rolls on
     the wall with 5/7 of its speed. The floor is smooth.
     """
     speed, start = 0.5, shot([WIDE, 0.0, R], [0.0, 0.5, 0.0])
@@ -108,8 +110,8 @@ def test_along_the_cylinder_wall_friction_slows_a_ball_until_it_rolls(mu: float)
         assert end.positions[0, 2] == pytest.approx(R, abs=TOUCH)
 
 
-def test_a_ball_that_leans_on_two_others_and_the_wall_lies_still() -> None:
-    """Where its distance from both is two radii, and from the axis the circle's radius."""
+def lean_on_two_balls_and_the_wall() -> None:
+    """The ball lies still two radii from both others, and where the wall lets it be."""
     lower = np.array([WIDE - 1.2 * R, R, R])
     height = R + math.sqrt(4.0 * R**2 - (1.2 * R) ** 2 - R**2)
     places = [lower, lower * [1.0, -1.0, 1.0], [WIDE - 1e-6, 0.0, height + 1e-5]]
@@ -118,6 +120,21 @@ def test_a_ball_that_leans_on_two_others_and_the_wall_lies_still() -> None:
         assert result.resting.ball.tolist() == [0, 1, 2]
         np.testing.assert_allclose(result.balls.positions[2], [WIDE, 0.0, height], atol=1e-8)
         assert result.collisions.total < 20_000
+
+
+def test_beside_a_cylinder_wall_balls_slide_roll_and_rest() -> None:
+    """Without the JIT: compiling for a cylinder with contact mode takes longer."""
+    here = "tests.sim_core.contact.test_exact_cavities"
+    without_jit(
+        f"import {here} as t; t.slide_along_the_wall(0.4); t.lean_on_two_balls_and_the_wall()"
+    )
+
+
+@pytest.mark.long
+def test_beside_a_cylinder_wall_balls_slide_roll_and_rest_with_the_jit() -> None:
+    slide_along_the_wall(0.1)
+    slide_along_the_wall(0.4)
+    lean_on_two_balls_and_the_wall()
 
 
 def watched(room: AnalyticCavity, balls: Balls, effects: Physics, pieces: int = 40) -> Simulation:
@@ -134,7 +151,15 @@ def watched(room: AnalyticCavity, balls: Balls, effects: Physics, pieces: int = 
     return run
 
 
-@pytest.mark.parametrize("room", [BOX, CUP, cylinder_cavity(0.009, 0.0, 0.06, TAGS)])
+@pytest.mark.parametrize(
+    "room",
+    [
+        BOX,
+        pytest.param(CUP, marks=pytest.mark.long),
+        pytest.param(cylinder_cavity(0.009, 0.0, 0.06, TAGS), marks=pytest.mark.long),
+    ],
+    ids=["box", "cup", "tube"],
+)
 def test_shot_settles_without_overlap_or_energy(room: AnalyticCavity) -> None:
     """Most balls in the narrow cylinder lean on others and on the wall."""
     rng, count = np.random.default_rng(2), 25 if room is not BOX else 12
