@@ -8,13 +8,13 @@ import pytest
 
 from chamberopt.chamber.build import build_chamber
 from chamberopt.chamber.replica_seed import replica_seed
-from chamberopt.chamber.scene import build_scene, chamber_mesh, start_velocities
+from chamberopt.chamber.scene import balls_can_rest, build_scene, chamber_mesh, start_velocities
 from chamberopt.common.errors import InputError
 from chamberopt.design.effects import Effects, FrictionTable, SurfaceEffectTable
 from chamberopt.design.load import load_design
 from chamberopt.design.shapes import TAG_PART, TAG_SONOTRODE, TAG_WALL
 from chamberopt.design.shot import ShotSize
-from sim_core import Drag, Rest, SurfaceEffects, TabulatedRestitution
+from sim_core import Drag, Rest, SurfaceEffects, TabulatedRestitution, TriangleMesh
 from sim_core.effects.restitution import ELASTIC_BELOW
 from tests.helpers.synthetic import DESIGNS, plate_design
 
@@ -162,6 +162,18 @@ def test_a_mix_of_sizes_is_in_the_scene(design, mesh) -> None:
     np.testing.assert_array_equal(mixed.balls.diameters, shot.diameters)
     assert mixed.balls.masses.sum() == pytest.approx(design.shot.mass, rel=0.02)
     assert mixed.physics.rest is None
+
+
+@pytest.mark.parametrize("rest", [None, True, False])
+def test_a_mix_rests_where_balls_of_one_size_do(design, mesh, rest: bool | None) -> None:
+    """On a floor that does not vibrate, unless effects.rest says otherwise."""
+    still = TriangleMesh(mesh.vertices, mesh.triangles, np.full_like(mesh.tags, TAG_WALL))
+    sizes = [{"diameter_mm": 2.0, "share": 0.4}, {"diameter_mm": 3.0, "share": 0.6}]
+    one = design.changed({"effects.rest": rest})
+    mixed = one.changed({"shot.diameter_mm": None, "shot.mix": sizes})
+    for room in (mesh, still):
+        expected = room is still if rest is None else rest
+        assert balls_can_rest(one, room) == balls_can_rest(mixed, room) == expected
 
 
 def test_start_velocities_are_isotropic_maxwell() -> None:
