@@ -94,6 +94,8 @@ def accelerated_cylinder_delay(
                 return delay
             # The ball does not approach: go on until it could be as near as now.
             gap, rate = 0.0, max(rate, 0.0)
+        if left <= 0.0:
+            return NEVER
         if gap == 0.0 and bend > 0.0:  # the acceleration takes the ball off the wall
             step = min(0.5 * bend / (pull * fastest), left)
         else:

@@ -240,6 +240,7 @@ def test_a_still_ball_at_the_wall_meets_it_where_it_is_pulled_to(side: float) ->
     flight = Flight(Vec3(1.0, 0.0, 0.0), nothing, Vec3(2.0 * side, 0.0, 0.0))
     delay = accelerated_cylinder_delay(CylinderAxis(0.0, 0.0), numbers, 0, flight, 10.0)
     assert delay == pytest.approx(0.0 if side > 0.0 else math.sqrt(2.0), abs=1e-12)
+    assert accelerated_cylinder_delay(CylinderAxis(0.0, 0.0), numbers, 0, flight, 0.0) > 0.0
 
 
 def test_rest_in_a_periodic_box_is_refused() -> None:
