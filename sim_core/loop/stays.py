@@ -19,10 +19,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from sim_core.effects.ball_sizes import BallSizes, radius_of_ball
 from sim_core.effects.contact_mode import ContactState, is_flying
 from sim_core.effects.gravity import Gravity
 from sim_core.effects.vibration import Wave
-from sim_core.effects.ball_sizes import BallSizes, radius_of_ball
 from sim_core.loop.impact_log import Impact
 from sim_core.motion import BallEvent
 from sim_core.numerics.jit import inlined, jit
