@@ -22,8 +22,10 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from benchmarks.cases import (
     almen_strip,
     bouncing_ball,
+    contacts,
     gases,
     peening_cylinder,
+    rough_spheres,
     shaken_cell,
     shaken_layer,
 )
@@ -47,8 +49,13 @@ class Case(NamedTuple):
 
 CASES = {
     "bouncing_ball": Case(bouncing_ball.rows, bouncing_ball.picture),
+    "foerster": Case(contacts.foerster),
+    "incline": Case(contacts.incline),
     "elastic_gas": Case(gases.equation_of_state, gases.state_picture),
+    "binary_mixture": Case(gases.binary_mixture),
+    "rough_spheres": Case(rough_spheres.rows),
     "cooling_gas": Case(gases.haff, gases.haff_picture),
+    "cooling_exponents": Case(gases.cooling_exponents),
     "shaken_gas": Case(gases.shaken_gas),
     "shaken_cell": Case(shaken_cell.rows),
     "side_walls": Case(peening_cylinder.side_walls, peening_cylinder.side_walls_picture),

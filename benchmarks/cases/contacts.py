@@ -1,4 +1,4 @@
-"""Single contacts with friction: rebound off a plate and off another ball, and a ball on an incline.
+"""Single contacts with friction: rebound off a plate and another ball, and a ball on an incline.
 
 Notation:
     n: unit normal of the contact
