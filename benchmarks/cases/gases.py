@@ -353,4 +353,4 @@ def cooling_exponents() -> Iterator[Row]:
                       *mean_and_half_width(found[:, at] / theory[at]))  # fmt: skip
         fitted = np.array([decay(times, shares) for shares in found])
         yield Row("cooling exponents", name, "p of T ~ (1 + t/τ)^-p", power,
-                  abs(decay(times, theory) - power), *mean_and_half_width(fitted))  # fmt: skip
+                  round(abs(decay(times, theory) - power), 4), *mean_and_half_width(fitted))  # fmt: skip
