@@ -35,7 +35,7 @@ PER_SIDE, PACKING = 10, 0.02  # small and thin enough that no cluster or vortex 
 # out within 5 to 20.
 UNTIL_CONSTANT, MEASURED = 80, 80
 PIECE = 4.0  # collisions of a ball at the first speed, after which that speed is given back
-SEEDS = 6
+SEEDS = 16
 HUGE = 1e9  # mu: every hit sticks
 ELASTIC = (1.0, 1.0, 0.0)
 
