@@ -60,6 +60,7 @@ def monte_carlo(e: float, beta: float, seed: int) -> float:
     """
     rng, eta = np.random.default_rng(seed), Q * (1.0 + beta) / (2.0 * Q + 2.0)
     velocities, rims = rng.normal(size=(COPIES, 3)), np.zeros((COPIES, 3))  # rims: R w
+    velocities -= velocities.mean(axis=0)  # it is kept, and would outlast the temperature
     collisions, ratios = 0.0, []
     while collisions < UNTIL_CONSTANT + MEASURED:
         one, two = rng.permutation(COPIES).reshape(2, -1)
