@@ -25,6 +25,7 @@ from benchmarks.cases import (
     contacts,
     gases,
     peening_cylinder,
+    rough_spheres,
     shaken_cell,
     shaken_layer,
 )
@@ -52,6 +53,7 @@ CASES = {
     "incline": Case(contacts.incline),
     "elastic_gas": Case(gases.equation_of_state, gases.state_picture),
     "binary_mixture": Case(gases.binary_mixture),
+    "rough_spheres": Case(rough_spheres.rows),
     "cooling_gas": Case(gases.haff, gases.haff_picture),
     "cooling_exponents": Case(gases.cooling_exponents),
     "shaken_gas": Case(gases.shaken_gas),
