@@ -64,7 +64,7 @@ def walton(psi1: float, material: Material) -> float:
 
     Sticking turns psi1 into -beta0 psi1. Sliding takes 7/2 (1 + e) mu, for the impulse mu J changes
     the tangential velocity of the touching points by 1 + m R²/I = 7/2 times what it changes that
-    of the centres. Source: Foerster and others (1994), equations 5 to 8.
+    of the centres. Source: Foerster and others (1994).
     """
     slides = 3.5 * (1.0 + material.e) * material.mu
     sticks = (1.0 + material.beta0) * psi1
