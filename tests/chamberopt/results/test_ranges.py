@@ -29,7 +29,10 @@ from tests.helpers.results.digests import replace_result
 from tests.helpers.studies import run_in_folder
 from tests.helpers.synthetic import judged, plate_design, poisson_evaluation
 
-DESIGN = plate_design(process__accuracy__points=1000, process__treatment_time_s=60)
+# One group of numbers alone is not known: v0.
+DESIGN = plate_design(process__accuracy__points=1000, process__treatment_time_s=60).changed(
+    {"effects.friction": "none", "effects.roughness": "none"}
+)
 PER_MM2 = 60.0  # dents of the design itself
 
 
