@@ -69,6 +69,7 @@ def shot(places: object, velocities: object = 0.0) -> Balls:
     return Balls(places, speeds, 2.0 * R, spins=np.zeros_like(places))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("mu", [0.0, 0.05, 10.0])
 def test_on_a_tilted_floor_a_ball_slides_slips_or_rolls(mu: float) -> None:
     """With g sin, with mu g cos against it, or with 5/7 of g sin."""
@@ -83,6 +84,7 @@ def test_on_a_tilted_floor_a_ball_slides_slips_or_rolls(mu: float) -> None:
     )
 
 
+@pytest.mark.long
 def test_in_a_tilted_box_balls_come_to_rest_in_the_corner_and_beside_it() -> None:
     """The first lies in the corner of three planes, the second on two planes and on the first."""
     effects = physics(0.2, 0.2, resistance=0.01, tilt=(-0.2, -0.1))
@@ -151,6 +153,7 @@ def watched(room: AnalyticCavity, balls: Balls, effects: Physics, pieces: int = 
     return run
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "room",
     [

@@ -188,6 +188,7 @@ def test_rigid_triangles_change_no_bit_and_slow_hits_lose_nothing() -> None:
     assert (end(thin) != end(None)).any()
 
 
+@pytest.mark.long
 def test_a_turning_part_can_be_thin() -> None:
     """The ball meets the part's own triangle, whose speed is that of the axis: none here."""
     mesh = box_around(bar(), 0.05)

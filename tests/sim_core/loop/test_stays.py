@@ -59,6 +59,7 @@ def test_no_ball_of_a_gas_is_trapped() -> None:
     assert len(simulate(shaken_cylinder(40, None)).trapped) == 0
 
 
+@pytest.mark.long
 def test_balls_that_come_to_lie_still_are_not_trapped() -> None:
     """They bounce on one spot of a still floor, ever lower, until they land."""
     places = [[0.005, 0.005, 0.03], [0.015, 0.015, 0.02], [0.005, 0.015, 0.01]]

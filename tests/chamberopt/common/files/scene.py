@@ -16,7 +16,7 @@ from chamberopt.common.files import write_bytes
 from chamberopt.peening import calibration_errors
 from chamberopt.pictures import subprocess_drawing
 from chamberopt.search.run_study import ChamberSimulator
-from chamberopt.workflows import save_run
+from chamberopt.workflows import ranges, save_run
 from tests.hunt.base import write_base
 
 TINY = {"simulated_time_s": "0.02", "warmup_time_s": "0.001", "replicas": "3", "mass_g": "0.5"}
@@ -53,6 +53,8 @@ def remember_all() -> None:
     _remember(save_run, "build_chamber")
     _remember(save_run, "complete_result")
     _remember(calibration_errors, "evaluate_calibrated")
+    _remember(ranges, "build_chamber")
+    _remember(ranges, "simulate_ends")
     _remember(ChamberSimulator, "__call__")
     os.fsync = lambda _: None  # the disk is slow, and no power cut is tested
     check.warnings = lambda *_: []
