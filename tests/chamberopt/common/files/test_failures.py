@@ -111,7 +111,7 @@ def names(folder: Path, output: str) -> set[str]:
     return {one for one in found if not one.startswith(output)}
 
 
-@pytest.mark.parametrize("words", [SIMULATE, RUN, "save"])
+@pytest.mark.parametrize("words", [SIMULATE, pytest.param(RUN, marks=pytest.mark.long), "save"])
 def test_of_each_call(words: str, server: Server, scene: Path, tmp_path: Path) -> None:
     every_failure(server, scene, tmp_path, words, [])
 

@@ -150,7 +150,8 @@ def rain_on_slopes(turn: float, seed: int) -> np.ndarray:
     return np.column_stack([SIDE * away * along, HEIGHT * y, -SIDE * np.abs(away) * upward])
 
 
-@pytest.mark.parametrize("kind", ["ridge", pytest.param("valley", marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize("kind", ["ridge", "valley"])
 def test_no_figure_jumps_at_any_angle(kind: str) -> None:
     """The same dents on slopes that turn by more and more: figures move from one end to another."""
     angles = np.arange(28.0, 53.0) if kind == "ridge" else -np.arange(48.0, 73.0)
