@@ -34,6 +34,9 @@ from tests.helpers.scenes.contact_mode import (
 )
 from tests.helpers.scenes.terrain import CEILING, profile, terrain
 
+# Their set of effects takes half a minute to compile.
+pytestmark = pytest.mark.long
+
 SMALL, LARGE = 1e-3, 2.5e-3  # m, radii
 
 

@@ -17,6 +17,9 @@ from tests.sim_core.contact import test_several_sizes as contact
 from tests.sim_core.contact.test_pushed_by_part import HALF, WIDE, paddle
 from tests.sim_core.contact.test_several_sizes import LARGE, SMALL, shot
 
+# Their set of effects takes half a minute to compile.
+pytestmark = pytest.mark.long
+
 RADII = np.array([SMALL, LARGE])
 BAR_HALF = 2e-3  # m: half the bar's width
 TOUCH = 1e-12  # m
