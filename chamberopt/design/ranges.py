@@ -19,6 +19,7 @@ from typing import Any, NamedTuple
 from chamberopt.common.errors import InputError
 from chamberopt.common.toml_errors import Problem, numeric_fields
 from chamberopt.common.toml_fields import Pair, allowed_range, list_field
+from chamberopt.design.effects import FrictionTable
 from chamberopt.design.table_base import FileTable
 
 # The factors where a design gives none.
@@ -117,7 +118,7 @@ def _numbers(design: Any, group: str) -> Iterator[tuple[str, float]]:
     for name, _ in numeric_fields(design):
         table, _, key = name.rpartition(".")
         if group == "friction":
-            belongs = table.startswith("effects.friction") and key.startswith("mu")
+            belongs = table == "effects.friction" and key in FrictionTable.COEFFICIENTS
         elif group == "slopes":
             belongs = table.startswith("effects.roughness")
         else:

@@ -79,8 +79,7 @@ def friction_pair(ball: str | None, metal: str | None) -> FrictionPair:
         metal: base metal of the surface, "balls" for a ball against its like, None if not known.
     """
     known = {(one.ball, one.metal): one for one in friction_pairs()}
-    alike = "steel" if metal == LIKE and ball == "steel" else metal
-    wanted = ((ball, metal), (ball, alike), (ball, ANY), (ANY, ANY))
+    wanted = ((ball, metal), (ball, ANY), (ANY, ANY))
     return next(known[one] for one in wanted if one in known)
 
 
