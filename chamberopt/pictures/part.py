@@ -84,6 +84,8 @@ def render_part(job: dict[str, Any]) -> None:
     marked, missed, edges, softness = (
         job[name] for name in ("marked", "missed", "edges", "softness")
     )
+    if job["chamber"] is not None:
+        job = job | {"chamber": cavity_surface(job["chamber"])}
     kinds = np.select([missed, marked], [MISSED, MARKED], PLAIN)
     part, shown = _coloured(job, kinds)
     legend = [COLOURS[k] for k in np.unique(np.concatenate([kind for _, kind in shown]))]
@@ -113,7 +115,7 @@ def _coloured(
     )
     if job["chamber"] is None:
         return part, [(part, kinds)]
-    chamber = cavity_surface(job["chamber"])
+    chamber = job["chamber"]
     # surface inside the chamber is drawn over the part
     source = np.asarray(chamber["source"])
     inside, own = cells_of(chamber, source >= 0), kinds[source[source >= 0]]
@@ -169,5 +171,5 @@ def _panels(
     if job["chamber"] is None:
         eyes = near_directions(target)
         return near_panels(add, target, part, near_views(seen_area(target, rest, eyes), eyes))
-    chamber = cavity_surface(job["chamber"])
+    chamber = job["chamber"]
     return part_panels(add, target, part, chamber, choose_views([(target, part)], [chamber]))
