@@ -278,9 +278,9 @@ def influence_sentences(study: StudyRecord, rows: Sequence[Influence], label: La
 
     If the study has no model, a sentence gives the reason.
     """
-    model, count = study.model, study.evaluations
+    model, count = study.model, study.evaluations - study.failed
     if not model:
-        return [_reason_without_model(count, study.failed, len(study.vary))]
+        return [_reason_without_model(study.evaluations, study.failed, len(study.vary))]
     said, first = [], rows[0]
     if first.surely:
         said.append(
@@ -292,14 +292,15 @@ def influence_sentences(study: StudyRecord, rows: Sequence[Influence], label: La
         *others, last = uncertain
         listed = f"{', '.join(others)} and {last}" if others else last
         said.append(
-            f"{count} evaluations are too few to show an influence of {listed}: "
+            f"{count} simulated candidates are too few to show an influence of {listed}: "
             "the intervals reach zero."
         )
     if len(rows) > 1:
         said.append(_shares(rows))
     noise = with_unit(abs(label.factor) * model.noise, label.unit)
     said.append(
-        f"In its shaded range, each parameter alone loses no more than the noise, {noise}. "
+        f"In its shaded range, each parameter alone loses no more than the noise, {noise} (95 % "
+        "sure; a narrow range may only mean that few candidates lie near it). "
         f"Of all designs with every parameter in its range, {per_cent(model.together)} lose no "
         "more than that."
     )

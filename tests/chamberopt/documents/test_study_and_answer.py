@@ -69,7 +69,7 @@ def test_too_few_evaluations_are_reported() -> None:
     rows = influences(unsure, label)
     assert rows[0].surely == 0.0
     said = influence_sentences(unsure, rows, label)
-    assert "20 evaluations are too few to show an influence of x" in said[0]
+    assert "20 simulated candidates are too few to show an influence of x" in said[0]
     none = a_study(evaluations=3, failed=1)
     assert influences(none, label) == []
     assert influence_sentences(none, [], label) == [

@@ -109,3 +109,13 @@ def test_no_interval_is_given_where_scores_were_raised_for_the_model() -> None:
     assert sure[np.abs(share - 0.6) < 0.2].all()
     truth = np.where(share < 0.3, -5.0, 0.8 - (share - 0.6) ** 2)
     assert (np.abs(one.mean - truth)[sure] <= one.half_width[sure] + 0.02).mean() > 0.9
+
+
+def test_a_range_does_not_reach_where_nothing_was_tried() -> None:
+    """Candidates lie in a fifth of the bounds. Beyond, the model's mean returns to their mean."""
+    points = 0.4 + 0.2 * np.random.default_rng(1).random((20, 1))
+    scores = 0.8 - 10.0 * (points[:, 0] - 0.5) ** 2
+    space = ParameterSpace(GEAR, Study(design=GEAR, vary={"shot.mass_g": (1.0, 11.0)}).vary)
+    one = analyse(points, scores, space, {"shot.mass_g": 6.0}, noise=0.1).slices[0]
+    assert (one.mean[one.values < 4.0] > 0.7).all()
+    assert one.flat == pytest.approx((5.0, 7.0), abs=0.3)  # 10 (x - 0.5)² = 0.1 at 0.4 and 0.6
