@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
 MAX_POINTS = 50  # points of a profile
 MAX_SHARE = 2.0
+LEAST_LARGEST = 0.1  # of the shares: with less, amplitude_um is not that of the face
 POINTS = (
     "pairs [mm from the middle, share], from 0 to the rim, e.g. [[0, 1], [20, 0.97], [35, 0.9]]"
 )
@@ -64,8 +65,12 @@ class AmplitudeProfileTable(FileTable):
             if further <= nearer:
                 text = f"given {further:g} after {nearer:g} mm; give each distance once, in order"
                 yield Problem(f"share_at_mm.{i}.0", text)
-        if self.largest <= 0.0:
-            yield Problem("share_at_mm", "given no share above 0: the face would stand still")
+        if self.largest < LEAST_LARGEST:
+            text = (
+                f"given no share of {LEAST_LARGEST:g} or more, so the face would hardly move; the "
+                "share is 1 where the amplitude was measured"
+            )
+            yield Problem("share_at_mm", text)
 
     @property
     def largest(self) -> float:

@@ -82,7 +82,8 @@ def test_a_saved_design_has_its_profile(rigid, tmp_path) -> None:
         ([[1.0, 1.0], [60.0, 0.9]], "share_at_mm.0.0: given 1; the first point is the middle"),
         ([[0.0, 1.0], [60.0, 2.5]], "share_at_mm.1.1: given 2.5; allowed: a share from 0 to 2"),
         ([[0.0, 1.0], [60.0, 0.9], [50.0, 0.9]], "given 50 after 60 mm; give each distance once"),
-        ([[0.0, 0.0], [60.0, 0.0]], "given no share above 0: the face would stand still"),
+        ([[0.0, 0.0], [60.0, 0.0]], "given no share of 0.1 or more"),
+        ([[0.0, 1e-300], [60.0, 1e-300]], "given no share of 0.1 or more"),
     ],
 )
 def test_wrong_profiles_are_refused(rigid, points, message) -> None:
