@@ -234,7 +234,7 @@ def _reason(effect: str, design: Design, chamber: Chamber) -> str:
         ),
         "drag": f"{percent(loss)} of the speed is lost on the way up",
         "rest": "a surface that does not move faces up, so balls can lie on it",
-        "flexure": f"thin parts: {mean_softness(design, chamber):.2f} times the restitution",
+        "flexure": f"thin parts: {mean_softness(design, chamber):.2f} of the restitution, mean",
     }[effect]
 
 

@@ -71,7 +71,7 @@ def test_flexure_is_switched_only_where_a_part_is_thin() -> None:
     design = PLATE.changed({"effects.flexure": metals})
     (row,) = (row for row in effect_pilot.groups(design, thin) if row["effect"] == "flexure")
     assert row["on"] is True
-    assert re.fullmatch(r"flexure is on: thin parts: 0\.8\d times the restitution", row["said"])
+    assert re.fullmatch(r"flexure is on: thin parts: 0\.8\d of the restitution, mean", row["said"])
     for on in (False, True):
         switched = effect_pilot._switched(design, {"flexure": on})
         assert switched.effects.flexure is not None
