@@ -123,6 +123,8 @@ def range_section(result: Result) -> Section | None:
     )
     rows, ends = [], []
     for name, figure in found.figures.items():
+        if name != result.objective_name and name not in result.metrics:
+            continue  # a figure of another version, which this one does not know
         label = _label(result, name)
         rows.append(
             (

@@ -119,6 +119,18 @@ def test_a_result_without_ranges_says_nothing_of_them(folder: Path) -> None:
         (folder / "result.json").write_text(text)
 
 
+def test_a_figure_that_this_version_does_not_know_is_left_out_of_the_report(folder: Path) -> None:
+    data = json.loads((folder / "result.json").read_text())
+    text = json.dumps(data)
+    try:
+        figures = data["ranges"]["figures"]
+        figures["moon"] = figures["mean_coverage"]
+        replace_result(folder, data)
+        assert "moon" not in repr(report(load_result(folder)))
+    finally:
+        (folder / "result.json").write_text(text)
+
+
 @pytest.mark.parametrize(
     ("key", "wrong"),
     [("groups", {}), ("figures", {"mean_coverage": {}}), ("replicas", "2"), ("cost", -1.0)],
