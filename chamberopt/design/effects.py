@@ -16,6 +16,10 @@ ROUGHNESS_FORM = (
     ", ".join(f'"{one.name}"' for one in treatments())
     + f', "{NONE}", or a table, e.g. {{ slope_deg = 3 }}'
 )
+FLEXURE_FORM = (
+    "true, false, or a table, e.g. { part_E_GPa = 114, part_poisson = 0.34, "
+    "part_density_kg_m3 = 4430 }"
+)
 
 
 class PartTurn(FileTable):
@@ -203,8 +207,9 @@ class Effects(FileTable):
     )
     flexure: FlexureTable | None = Field(
         default=None,
-        description="thin parts take energy from balls: true, false, or a table with E and density "
-        "of part and balls; absent: where the part is so thin that it matters",
+        description="thin parts take energy from balls; the table has the elasticity of part and "
+        "balls; absent: where the part is so thin that it matters",
+        json_schema_extra={"form": FLEXURE_FORM},
     )
     rest: bool | None = Field(
         default=None,
