@@ -56,7 +56,7 @@ PRIORS: dict[Parameter, tuple[float, float]] = {
     "amplitude": (1.0, 0.10),
     "C0": (1.0, 0.04),
     "v0": (1.0, 0.70),
-    "mu": (1.0, 0.15),
+    "mu": (1.0, 0.30),
     "hardness": (1.0, 0.20),
     "K": (13.5, 0.90),
     "beta": (1.0, 0.40),

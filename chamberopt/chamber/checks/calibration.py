@@ -12,13 +12,22 @@ if TYPE_CHECKING:
 
 # No measurement of the machine has tried the model beyond these limits.
 AMPLITUDE_RANGE, DIAMETER_RANGE, DENSITY_RANGE = 1.3, 1.5, 1.05
+COUNTED_TWICE = (
+    "calibration: made without friction, so its C0 and v0 stand for what friction takes too, and "
+    'this design counts it twice: set effects.friction = "none" here, or calibrate with friction'
+)
+NOT_COUNTED = (
+    "calibration: made with friction, and this design has none: its shot is too fast; leave "
+    "effects.friction out"
+)
 
 
 def calibration_warnings(design: Design) -> list[str]:
     """Return warnings about a design for which its calibration may not hold.
 
-    A warning is about values of the design beyond the measured range, measurements that the
-    calibrated model does not explain, or Almen strips that were not measured or not whole.
+    A warning is about values of the design beyond the measured range, friction that was left out
+    of only one of the two, measurements that the calibrated model does not explain, or Almen strips
+    that were not measured or not whole.
     """
     one = design.calibration
     if one is None:
@@ -46,6 +55,8 @@ def calibration_warnings(design: Design) -> list[str]:
             f"calibration: made with balls of {one.ball_density_kg_m3:g} kg/m³, this design's have "
             f"{density:g}: another material has other constants; calibrate with this shot"
         )
+    if ("mu" in one.parameters) != (design.effects.friction is not None):
+        texts.append(COUNTED_TWICE if design.effects.friction else NOT_COUNTED)
     texts += misfit_texts(one)
     if one.not_mmA:
         texts.append(one.not_mmA)

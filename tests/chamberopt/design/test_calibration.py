@@ -165,4 +165,16 @@ def test_what_is_outside_the_calibration_is_said() -> None:
     for text, word in zip(found, ("40", "1.5 mm", "another material", "dents"), strict=True):
         assert word in text
     without = plate_design(calibration=machine_values(v0=1.0))
-    assert "no arc heights" in calibration_warnings(without)[0]
+    assert any("no arc heights" in text for text in calibration_warnings(without))
+
+
+def test_friction_in_only_one_of_design_and_calibration_is_said() -> None:
+    """Restitution that was fitted without friction stands for what friction takes as well."""
+    without, fitted = machine_values(v0=0.1), machine_values(v0=0.1, mu=0.1)
+    for own, calibration, word in (("catalogue", without, "counts it twice"),
+                                   ("none", fitted, "too fast"),
+                                   ("catalogue", fitted, ""), ("none", without, "")):  # fmt: skip
+        design = plate_design(calibration=calibration, effects__friction=own)
+        found = [text for text in calibration_warnings(design) if "friction" in text]
+        assert len(found) == (1 if word else 0)
+        assert all(word in text for text in found)
