@@ -47,8 +47,9 @@ def main() -> None:
         for number in range(MACHINES):
             values: dict[str, Any] = {"process.seed": 1000 + number}
             for group in unknowns(design):
-                factor = rng.uniform(group.low, group.high)
-                values |= {name: factor * value for name, value in group.numbers.items()}
+                place = rng.uniform()
+                for name, one in group.numbers.items():
+                    values[name] = one.low + place * (one.high - one.low)
             machines.append(evaluate(design.changed(values), chamber, executor))
         for seed in range(SEEDS):
             seeded = design.changed({"process.seed": seed})

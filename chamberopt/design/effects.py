@@ -121,10 +121,22 @@ class RoughnessTable(FileTable):
     or more count, tenths of a millimetre: Rdq of a profile that is filtered so.
     """
 
+    SLOPES: ClassVar[tuple[str, ...]] = ("slope_deg", "part_deg", "sonotrode_deg", "wall_deg")
+
     slope_deg: float = quantity(0, 25, "degrees", "rms slope of all surfaces; peened faces: 2 to 5")
     part_deg: float | None = quantity(0, 25, "degrees", "of the part, if not the same", None)
     sonotrode_deg: float | None = quantity(0, 25, "degrees", "of sonotrodes, likewise", None)
     wall_deg: float | None = quantity(0, 25, "degrees", "of walls and lid, likewise", None)
+    treatment: str | None = Field(
+        default=None,
+        description="treatment for which the catalogue gave slope_deg; written by the program",
+    )
+
+    def _problems(self) -> Iterator[Problem]:
+        names = [one.name for one in treatments()]
+        if self.treatment is not None and self.treatment not in names:
+            text = f"given {self.treatment!r}; allowed: {', '.join(names)}; or leave it out"
+            yield Problem("treatment", text)
 
     @property
     def slopes(self) -> tuple[float, float, float]:

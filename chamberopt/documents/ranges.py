@@ -136,12 +136,18 @@ def range_section(result: Result) -> Section | None:
         )
         changes = [end for one in names for end in _ends(label, figure, one)]
         ends.append((label.with_unit, *changes))
+    numbers = [
+        (name, *(plain(x, 3) for x in (one.value, one.low, one.high)))
+        for group in found.groups.values()
+        for name, one in group.items()
+    ]
     head = ("", "± 95 % of counting", "range", "most of it by")
     sides = [f"{WORDS.get(one, one)}, {end}" for one in names for end in ENDS.values()]
     content: list[Block] = [
         Sentence(text),
         Table("The figures and their ranges", head, rows),
         Table("Changes at the ends, ± 95 % noise of their runs", ("", *sides), ends),
+        Table("What is not calibrated", ("", "as designed", "low", "high"), numbers),
     ]
     content += [Sentence(one) for one in _left_out(found)]
     return Section("What is not calibrated", content)
@@ -209,14 +215,13 @@ def _ends(label: Label, figure: RangedFigure, group: str) -> tuple[str, str]:
 
 
 def _groups(found: RangeResult) -> str:
-    """Return the groups with their factors, such as "friction (0.5 to 1.5 times)"."""
-    return _list(
-        [
-            f"{WORDS.get(name, name)} ({plain(one.low)} to {plain(one.high)} times)"
-            for name, one in found.groups.items()
-        ],
-        {},
-    )
+    """Return the groups with their factors, such as "friction (0.48 to 1.6 times)"."""
+    words = []
+    for name, numbers in found.groups.items():
+        low = min(one.low / one.value for one in numbers.values())
+        high = max(one.high / one.value for one in numbers.values())
+        words.append(f"{WORDS.get(name, name)} ({plain(low, 3)} to {plain(high, 3)} times)")
+    return _list(words, {})
 
 
 def _most(figure: RangedFigure) -> str:

@@ -10,20 +10,10 @@ from typing import Literal, NamedTuple, Self
 from pydantic import model_validator
 
 from chamberopt.common.record_types import KnownInterval, Positive, Table
+from chamberopt.design.ranges import UnknownNumber
 from chamberopt.peening.tolerance_result import EffectEnds, ToleranceResult
 
 NEVER_IN_WORDS = "never"
-
-
-class UnknownGroup(Table):
-    """A group of numbers that is known to lie between two factors of the design's numbers.
-
-    numbers: the numbers as designed, by dotted name.
-    """
-
-    low: Positive
-    high: Positive
-    numbers: dict[str, int | float]
 
 
 class RangedFigure(Table):
@@ -60,7 +50,7 @@ class RangedFigure(Table):
 class RangeResult(Table):
     """Ranges of a design's figures over all groups of its numbers that are not calibrated.
 
-    groups: the groups, by name.
+    groups: the numbers of each group, by their dotted names.
     calibrated: names of the groups that the design's calibration has fitted. The intervals of the
         figures hold their errors.
     replicas: number of replicas at each end of a group.
@@ -69,7 +59,7 @@ class RangeResult(Table):
     not_resolved: names of the figures that the runs at the ends do not resolve.
     """
 
-    groups: dict[str, UnknownGroup]
+    groups: dict[str, dict[str, UnknownNumber]]
     calibrated: list[str]
     replicas: int
     cost: Positive
@@ -78,8 +68,8 @@ class RangeResult(Table):
 
     @model_validator(mode="after")
     def _is_of_its_groups(self) -> Self:
-        if not self.groups:
-            raise ValueError("groups: there are none")
+        if not self.groups or not all(self.groups.values()):
+            raise ValueError("groups: there are none, or one is empty")
         for name, one in self.figures.items():
             if set(one.effects) != set(self.groups) or not set(one.shares) <= set(self.groups):
                 raise ValueError(f"figures.{name}: other groups than those of the result")

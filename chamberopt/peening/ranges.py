@@ -1,7 +1,7 @@
 """Find how far the figures of a design may be off because of numbers that nobody has measured.
 
-Friction, yield speeds v0 and slopes of faces are groups of numbers (design/ranges.py), each between
-two factors of the design's numbers. Copies of the design with one group at its low or high end are
+Friction, yield speeds v0 and slopes of faces are groups of numbers (design/ranges.py), each number
+between two bounds. Copies of the design with one group at its low or high end are
 simulated in some replicas, with the seeds of the design's own first replicas. The range of a figure
 follows from its changes.
 
@@ -49,7 +49,6 @@ from chamberopt.peening.range_result import (
     RangedFigure,
     RangeResult,
     RivalAtEnds,
-    UnknownGroup,
 )
 from chamberopt.peening.responses import IDENTITY, FigureScale, on_scale, scale_of
 from chamberopt.peening.tolerance_result import EffectEnds
@@ -127,7 +126,7 @@ def simulate_ends(
     Raises:
         InputError: the design cannot have an end of a range.
     """
-    groups, changed = unknowns(design), variants(design)
+    groups, at_ends = unknowns(design), variants(design)
     if not groups:
         return None
     count = replicas or replicas_at_ends(whole.replicas, len(groups))
@@ -139,18 +138,18 @@ def simulate_ends(
     target = prepare_target(design, chamber, chamber_mesh(chamber))
     runs = Variations(design, chamber, executor, of_all, plan, cavity, ReplicaSet(first, target))
 
-    def run(group: Unknown, end: Design, factor: float) -> Evaluation:
+    def run(group: Unknown, changed: Design, end: str) -> Evaluation:
         try:
-            largest_dent = window_setting(end, chamber).largest_dent
-            return runs.run(end, target=target.with_largest_dent(largest_dent))
+            largest_dent = window_setting(changed, chamber).largest_dent
+            return runs.run(changed, target=target.with_largest_dent(largest_dent))
         except Exception as error:
-            error.add_note(f"in the run with {factor:g} times {group.name}")
+            error.add_note(f"in the run at the {end} end of {group.name}")
             raise
 
     ends = {}
     for one in groups:
-        low, high = changed[one.name]
-        ends[one.name] = run(one, low, one.low), run(one, high, one.high)
+        low, high = at_ends[one.name]
+        ends[one.name] = run(one, low, "low"), run(one, high, "high")
     return EndRuns(groups, calibrated(design), whole, runs.nominal, ends)
 
 
@@ -164,10 +163,7 @@ def find_ranges(runs: EndRuns) -> RangeResult:
     wanted = [name for name in names if _is_known(_figure(whole, name))]
     found = {name: _ranged(name, runs) for name in wanted}
     return RangeResult(
-        groups={
-            one.name: UnknownGroup(low=one.low, high=one.high, numbers=one.numbers)
-            for one in runs.groups
-        },
+        groups={one.name: one.numbers for one in runs.groups},
         calibrated=runs.calibrated,
         replicas=runs.few.replicas,
         cost=runs.cost,

@@ -20,6 +20,7 @@ from chamberopt.design.table_base import FileTable
 CATALOGUE, NONE, USUAL = "catalogue", "none", "peened"
 BY_NAME = ("friction", "roughness")  # effects that a file has by name if it does not give them
 ANY, LIKE = "any", "balls"  # any ball or metal, and a ball against its like
+FACES = ("part", "sonotrode", "wall")
 
 
 class FrictionPair(FileTable):
@@ -117,7 +118,9 @@ def with_friction(
         roughness = None
     elif isinstance(roughness, str):
         known = any(one.name == roughness for one in treatments())
-        roughness = {"slope_deg": treatment(roughness).slope_deg} if known else roughness
+        if known:
+            slope = treatment(roughness).slope_deg
+            roughness = {"slope_deg": slope, "treatment": roughness}
     return {**effects, "friction": friction, "roughness": roughness}
 
 
@@ -128,19 +131,32 @@ def catalogue_friction(materials: Mapping[str, object], material: object) -> dic
         materials: tables of [materials]; metals that they do not name are not known.
         material: shot.material.
     """
-    ball = find(material, balls())
-    name = None if ball is None else ball.name
-    metals = {key: _metal(materials.get(key)) for key in ("part", "sonotrode", "wall")}
-    pairs = {key: friction_pair(name, metal) for key, metal in metals.items()}
-    like = friction_pair(name, LIKE)
-    table: dict[str, object] = {"mu": pairs["wall"].mu, "beta0": pairs["part"].beta0}
-    table |= {f"mu_{key}": one.mu for key, one in pairs.items() if one.mu != pairs["wall"].mu}
-    if like.mu != pairs["wall"].mu:
-        table["mu_balls"] = like.mu
-    if like.beta0 != pairs["part"].beta0:
+    pairs = surface_pairs(materials, material)
+    wall, part, like = (pairs[f"mu_{key}"] for key in ("wall", "part", LIKE))
+    table: dict[str, object] = {"mu": wall.mu, "beta0": part.beta0}
+    table |= {key: one.mu for key, one in pairs.items() if one.mu != wall.mu}
+    if like.beta0 != part.beta0:
         table["beta0_balls"] = like.beta0
-    words = ", ".join(f"{key} {metal or 'unknown'}" for key, metal in metals.items())
-    return {**table, "pairs": f"{name or 'unknown'} on {words}"}
+    words = ", ".join(f"{key} {_metal(materials.get(key)) or 'unknown'}" for key in FACES)
+    return {**table, "pairs": f"{_ball(material) or 'unknown'} on {words}"}
+
+
+def surface_pairs(materials: Mapping[str, object], material: object) -> dict[str, FrictionPair]:
+    """Return the catalogue's friction on each surface and between balls, by its key in
+    effects.friction.
+
+    Args:
+        materials: tables of [materials]; metals that they do not name are not known.
+        material: shot.material.
+    """
+    ball = _ball(material)
+    pairs = {key: friction_pair(ball, _metal(materials.get(key))) for key in FACES}
+    return {f"mu_{key}": one for key, one in {**pairs, LIKE: friction_pair(ball, LIKE)}.items()}
+
+
+def _ball(material: object) -> str | None:
+    ball = find(material, balls())
+    return None if ball is None else ball.name
 
 
 def _metal(table: object) -> str | None:

@@ -9,7 +9,7 @@ import pytest
 from chamberopt.chamber.build import build_chamber
 from chamberopt.common.estimate import Estimate, estimate
 from chamberopt.common.executor import SerialExecutor
-from chamberopt.design.ranges import Unknown, unknowns
+from chamberopt.design.ranges import Unknown, UnknownNumber, unknowns
 from chamberopt.documents.ranges import at_ends_text
 from chamberopt.peening.range_result import RangeResult
 from chamberopt.peening.ranges import (
@@ -23,11 +23,11 @@ from chamberopt.simulation.evaluate import ReplicaPlan, evaluate
 from chamberopt.simulation.evaluation import Evaluation
 from tests.helpers.synthetic import judged, plate_design
 
-GROUPS = (
-    Unknown("friction", 0.5, 1.5, {"effects.friction.mu": 0.3}),
-    Unknown("v0", 0.5, 2.0, {"materials.wall.v0_m_s": 0.4}),
-    Unknown("slopes", 0.6, 1.7, {"effects.roughness.slope_deg": 3.0}),
-)
+FACTORS = {"friction": (0.5, 1.5), "v0": (0.5, 2.0), "slopes": (0.6, 1.7)}
+GROUPS = [
+    Unknown(name, {"number": UnknownNumber(value=1.0, low=low, high=high)})
+    for name, (low, high) in FACTORS.items()
+]
 POWERS = {"friction": -0.3, "v0": 0.4, "slopes": 0.2}
 DOSE, REPLICAS, FEW = 0.5, 24, 4
 NEVER = Estimate(1e6, 0.1, (1e6,) * FEW, in_words="never")
@@ -54,7 +54,7 @@ def evaluated(factors: Mapping[str, float], count: int, noise: Noise) -> Evaluat
 
 
 def runs_with(noise: Noise, few: int = FEW) -> EndRuns:
-    at = {one.name: [evaluated({one.name: f}, few, noise) for f in one[1:3]] for one in GROUPS}
+    at = {name: [evaluated({name: f}, few, noise) for f in ends] for name, ends in FACTORS.items()}
     ends = {name: (low, high) for name, (low, high) in at.items()}
     whole, first = evaluated({}, REPLICAS, noise), evaluated({}, few, noise)
     return EndRuns(GROUPS, [], whole, first, ends)
@@ -64,7 +64,7 @@ def test_changes_of_the_groups_add_in_quadrature() -> None:
     """All figures go with a power law of the factors, and the scales make straight lines of it."""
     runs = runs_with(lambda count: 1e-6 * even(count))
     found = find_ranges(runs)
-    changes = np.array([np.sort(POWERS[x.name] * np.log(x[1:3])) for x in GROUPS])
+    changes = np.array([np.sort(POWERS[name] * np.log(ends)) for name, ends in FACTORS.items()])
     low, high = -np.linalg.norm(changes[:, 0]), np.linalg.norm(changes[:, 1])
     exposure = found.figures["exposure"]
     assert exposure.low.value == pytest.approx(DOSE * np.exp(low))
@@ -106,7 +106,7 @@ def test_the_truth_within_the_box_is_within_the_range() -> None:
     of their squared ends one time in twelve; the noise of the ends moves that by a little.
     """
     rng = np.random.default_rng(5)
-    factors = np.array([rng.uniform(*one[1:3], 2000) for one in GROUPS])
+    factors = np.array([rng.uniform(*ends, 2000) for ends in FACTORS.values()])
     powers = np.array([*POWERS.values()])[:, None]
     truth = DOSE * np.prod(factors**powers, axis=0)
     for seed in range(5):
@@ -202,7 +202,7 @@ def test_a_short_real_run() -> None:
     (group,) = unknowns(design)
 
     def by_hand(factor: float, replicas: int = 2) -> Evaluation:
-        changed = design.changed({name: factor * x for name, x in group.numbers.items()})
+        changed = design.changed({name: factor * x.value for name, x in group.numbers.items()})
         return evaluate(changed, chamber, executor, plan=ReplicaPlan(replicas))
 
     for one, factor in zip(runs.ends["v0"], (0.5, 2.0), strict=True):

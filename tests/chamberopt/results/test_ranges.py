@@ -82,6 +82,8 @@ def test_the_report_says_the_range_beside_the_interval(folder: Path) -> None:
     low, high = (float(one) for one in row[2].split(" to "))
     assert (low, high) == pytest.approx((0.5 * 2.0 * low, 4.0 * low), rel=0.1)
     assert row[3] == "v0 100 %"
+    numbers = {one[0]: one[1:] for one in sections["What is not calibrated"].content[3].rows}
+    assert numbers["materials.wall.v0_m_s"] == ("0.44", "0.22", "0.88")
     assert "The ranges hold what is not calibrated: v0." in sections["The answer"].content[-1].text
 
 
