@@ -62,6 +62,14 @@ def flexure_facts(design: Design, chamber: Chamber) -> dict[str, dict[str, objec
     }
 
 
+def mobility_of_part(design: Design, part: Part) -> np.ndarray | None:
+    """Return the mobility of each triangle of a part [s/kg], (m,); None if it counts as rigid."""
+    given, metals = design.effects.flexure, plate_metals(design)
+    if part.thickness is None or metals is None or (given is not None and not given.on):
+        return None
+    return mobility(metals, part.thickness)
+
+
 def flexure_of_surfaces(
     design: Design, chamber: Chamber, mesh: TriangleMesh | AnalyticCavity
 ) -> Flexure | None:
@@ -74,11 +82,9 @@ def flexure_of_surfaces(
     """
     from sim_core import AnalyticCavity, Flexure
 
-    given, metals = design.effects.flexure, plate_metals(design)
-    thickness = chamber.part.thickness
-    if thickness is None or metals is None or (given is not None and not given.on):
+    metals, of_part = plate_metals(design), mobility_of_part(design, chamber.part)
+    if metals is None or of_part is None:
         return None
-    of_part = mobility(metals, thickness)
     if isinstance(mesh, AnalyticCavity):
         area = chamber.exposed_area
         of_surfaces = np.where(mesh.tags == TAG_PART, area @ of_part / area.sum(), 0.0)

@@ -40,7 +40,6 @@ REACH = 5.0  # thickest plate that is measured, in diameters of the largest ball
 # Lengths l between a hit and an edge, below which waves that come back change e by more than 0.05
 # to 0.1 (docs/physics.md).
 NEAR_EDGE = 1.5
-MUCH_TOO_WIDE = 0.6  # Zener's e below which dents are too wide by about 10 % (docs/physics.md)
 UNKNOWN = 1.0  # ball diameters; below, plates of any metal lower e by 5 % and more
 HERTZ = 3.218  # duration of the contact in units of (m / k)^(2/5) v^(-1/5)
 
@@ -195,15 +194,9 @@ def _note(design: Design, name: str, thin: ThinTarget) -> str:
         f"{name} is thin (thinnest {1e3 * thin.thinnest:.2g} mm, {median}): flexure lowers the "
         f"restitution by more than {LOSS:.0%} on {thin.lowered:.0%} of it, at the median to "
         f"{thin.restitution:.2f} times at {design.sonotrode.peak_speed:.2g} m/s (Zener 1941); "
-        f"{thin.near_edge:.0%} of that is so near to an edge that the theory is rough there, and "
-        f"dents are {_too_wide(thin.restitution)} too wide (docs/physics.md); "
-        "effects.flexure = false leaves it out"
+        f"{thin.near_edge:.0%} of that is so near to an edge that the theory is rough there; "
+        "dents are narrower by an estimate (docs/physics.md); effects.flexure = false leaves it out"
     )
-
-
-def _too_wide(restitution: float) -> str:
-    """Return by how much dents are too wide, at Zener's restitution, as in docs/physics.md."""
-    return "a few per cent" if restitution > MUCH_TOO_WIDE else "10% or more"
 
 
 def _unknown_note(name: str, share: float) -> str:

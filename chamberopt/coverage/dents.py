@@ -8,6 +8,8 @@ Notation
     B   Brinell hardness of the part [Pa]               (hardness)
     e   coefficient of restitution of ball on part at this speed
     v0  yield speed of the part [m/s]                   (yield_speed)
+    Y   mobility of the part where it is thin [s/kg]    (mobility)
+    F   largest force of the impact on a thick part [N]
 """
 
 from __future__ import annotations
@@ -17,6 +19,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from chamberopt.chamber.flexure import mobility_of_part
 from chamberopt.geometry.triangles import closest_on_each, unit_normals
 
 if TYPE_CHECKING:
@@ -41,7 +44,7 @@ class Dents:
 
 def dents_on_part(impacts: ImpactLog, chamber: Chamber, design: Design) -> Dents:
     """Return the dents that impacts leave on the part; none for impacts below the yield speed."""
-    diameter = dent_diameters(impacts, design)
+    diameter = dent_diameters(impacts, chamber, design)
     dents = np.flatnonzero((diameter > 0.0) & (chamber.source[impacts.triangle] >= 0))
     corners = chamber.vertices[chamber.triangles[impacts.triangle[dents]]]
     place = closest_on_each(corners, impacts.position[dents])
@@ -86,10 +89,49 @@ def ball_diameters(impacts: ImpactLog, design: Design) -> float | np.ndarray:
     return shot.diameter if shot.mix is None else np.array(shot.diameters)[impacts.ball]
 
 
-def dent_diameters(impacts: ImpactLog, design: Design) -> np.ndarray:
+def dent_diameters(impacts: ImpactLog, chamber: Chamber, design: Design) -> np.ndarray:
     """Return the diameter [m] of the dent that each impact would leave on the part, (n,)."""
     diameters, density = ball_diameters(impacts, design), design.shot.density
-    return dent_diameter(impacts.normal_speed, diameters, density, design.simulated.materials.part)
+    material, speed = design.simulated.materials.part, np.asarray(impacts.normal_speed)
+    dents = dent_diameter(speed, diameters, density, material)
+    of_part = mobility_of_part(design, chamber.part)
+    if of_part is None:
+        return dents
+    # a source of -1, off the part, reads the appended 0
+    mobility = np.append(of_part, 0.0)[chamber.source[impacts.triangle]]
+    factor = thin_part_factor(dents, speed, mobility, material.hardness)
+    return np.asarray(dents * factor)
+
+
+def thin_part_factor(
+    diameter: np.ndarray, normal_speed: np.ndarray, mobility: np.ndarray, hardness: float
+) -> np.ndarray:
+    """Return the diameter of dents on a thin part over that on a thick one, (n,).
+
+    A contact whose force F = K s grows linearly with the approach s, as that of a dent does, makes
+    a damped oscillation of Zener's equation, m s'' = -F - m Y F'. The largest s, and with it the
+    largest force, is exp(-zeta arccos(zeta) / sqrt(1 - zeta²)) of that on a thick part, for
+
+        zeta = Y (m K)^(1/2) / 2 = Y F / (2 v),    F = B pi d² / 4 = v (m K)^(1/2)
+
+    The square of the diameter goes with the force. The factor is 1 where the part is rigid.
+
+    Args:
+        diameter: d, of the dents on a thick part [m], (n,).
+        normal_speed: v [m/s], (n,).
+        mobility: Y, of the part at each dent [s/kg], (n,); 0 where it is rigid.
+        hardness: B, of the part [Pa].
+
+    Source: C. Zener, Phys. Rev. 59 (1941) 669, with this force; docs/physics.md says how exact.
+    """
+    force = 0.25 * np.pi * hardness * diameter**2
+    zeta = np.divide(0.5 * mobility * force, normal_speed, out=0.0 * force, where=force > 0.0)
+    angle = np.where(
+        zeta < 1.0, np.arccos(np.minimum(zeta, 1.0)), np.arccosh(np.maximum(zeta, 1.0))
+    )
+    root = np.sqrt(np.abs(1.0 - zeta**2))
+    ratio = np.divide(angle, root, out=np.ones_like(root), where=root > 0.0)
+    return np.asarray(np.exp(-0.5 * zeta * ratio))
 
 
 def impact_angle_deg(velocity: np.ndarray, normal_speed: np.ndarray) -> np.ndarray:

@@ -94,7 +94,7 @@ def hits_on_part(impacts: ImpactLog, chamber: Chamber, design: Design) -> Hits:
     columns = (
         speed,
         impact_angle_deg(np.asarray(impacts.velocity), speed),
-        dent_diameters(impacts, design),
+        dent_diameters(impacts, chamber, design),
         0.5 * mass * speed * speed,
     )
     return Hits(

@@ -144,7 +144,7 @@ def impact_rows(
 ) -> Iterator[ImpactRows]:
     """Yield the impacts of a replica in pieces of at most ROWS_AT_ONCE impacts."""
     ball = np.asarray(design.shot.diameters, dtype=float)
-    dents = dent_diameters(impacts.log, design)
+    dents = dent_diameters(impacts.log, chamber, design)
     for begin in range(0, len(impacts.log), ROWS_AT_ONCE):
         piece = np.arange(begin, min(begin + ROWS_AT_ONCE, len(impacts.log)))
         log = impacts.log.only(piece)
