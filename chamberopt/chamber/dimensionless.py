@@ -75,7 +75,7 @@ def drag_change(design: Design, chamber: Chamber) -> float:
     """
     from sim_core import restitution_at
 
-    materials, speed = design.materials, np.array([design.sonotrode.peak_speed])
+    materials, speed = design.materials, np.array([design.sonotrode.rms_peak_speed])
     laws = [one.restitution for one in (materials.part, materials.sonotrode, materials.wall)]
     lost = 1.0 - max(float(restitution_at(speed, law)[0]) for law in laws)
     return drag_loss(design, chamber) / lost if lost > 0.0 else math.inf

@@ -151,7 +151,8 @@ def _ball(design: Design) -> tuple[float, float]:
 
 
 def zener_factor(design: Design, metals: PlateMetals, thickness: np.ndarray) -> np.ndarray:
-    """Return Zener's restitution of the largest ball at the sonotrode's peak speed, (k,).
+    """Return Zener's restitution of the largest ball at the peak speed of the sonotrode's face,
+    (k,), its rms over the face.
 
     Args:
         thickness: of the part [m], (k,); inf where it is rigid.
@@ -164,7 +165,7 @@ def zener_factor(design: Design, metals: PlateMetals, thickness: np.ndarray) -> 
         metals.contact_modulus,
         radius,
         mass,
-        design.sonotrode.peak_speed,
+        design.sonotrode.rms_peak_speed,
     )
     return zener_restitution(parameter)
 
@@ -173,7 +174,7 @@ def wave_length(design: Design, metals: PlateMetals, thickness: np.ndarray) -> n
     """Return the length l of the notation above [m] at the sonotrode's peak speed, (k,)."""
     radius, mass = _ball(design)
     stiffness = 4.0 / 3.0 * metals.contact_modulus * math.sqrt(radius)
-    contact = HERTZ * (mass / stiffness) ** 0.4 * design.sonotrode.peak_speed**-0.2
+    contact = HERTZ * (mass / stiffness) ** 0.4 * design.sonotrode.rms_peak_speed**-0.2
     speed = math.sqrt(1.0 / (12.0 * metals.density * metals.part.compliance))
     return np.asarray(np.sqrt(speed * thickness * contact))
 
@@ -193,7 +194,7 @@ def _note(design: Design, name: str, thin: ThinTarget) -> str:
     return (
         f"{name} is thin (thinnest {1e3 * thin.thinnest:.2g} mm, {median}): flexure lowers the "
         f"restitution by more than {LOSS:.0%} on {thin.lowered:.0%} of it, at the median to "
-        f"{thin.restitution:.2f} times at {design.sonotrode.peak_speed:.2g} m/s (Zener 1941); "
+        f"{thin.restitution:.2f} times at {design.sonotrode.rms_peak_speed:.2g} m/s (Zener 1941); "
         f"{thin.near_edge:.0%} of that is so near to an edge that the theory is rough there; "
         "dents are narrower by an estimate (docs/physics.md); effects.flexure = false leaves it out"
     )

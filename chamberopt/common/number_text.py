@@ -59,6 +59,16 @@ def plain(value: float | str, digits: int = 4) -> str:
     return text.rstrip("0").rstrip(".") if "." in text else text
 
 
+def counted(count: float, noun: str) -> str:
+    """Return a number of things with two digits, such as "1 dent" or "27 dents".
+
+    >>> counted(1.04, "dent")
+    '1 dent'
+    """
+    number = plain(count, 2)
+    return f"{number} {noun}" if number == "1" else f"{number} {noun}s"
+
+
 def percent(share: float, sign: bool = False) -> str:
     """Return a share as text in per cent with two digits, such as "48 %" or "0.24 %".
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from chamberopt.common.estimate import Estimate, independent_difference, paired_difference
+from chamberopt.common.number_text import counted, typeset
 from chamberopt.documents.document import (
     Beside,
     Block,
@@ -206,10 +207,11 @@ def _windows(field: FieldRecord) -> tuple[Sentence, Fold]:
     The table has the metrics of coverage in windows of twice the radius. It is hidden until the
     reader opens it.
     """
+    dents = typeset(counted(field.dents_in_median_window, "simulated dent"))
     text = (
         f"Coverage is the share dented in a window of {plain(field.gauge_mm2)} mm² round each "
-        f"point of the target. The median window has {plain(field.dents_in_median_window, 2)} "
-        f"simulated dents. {per_cent(field.crease_share)} of the dented area is on sharp edges."
+        f"point of the target. The median window has {dents}. {per_cent(field.crease_share)} of "
+        "the dented area is on sharp edges."
     )
     labels = {name: metric_label(name) for name in field.double_gauge}
     wide = [

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
-from chamberopt.common.number_text import estimate_text, plain
+from chamberopt.common.number_text import counted, estimate_text, plain
 from chamberopt.documents.ranges import at_ends_text, range_lines, range_texts
 from chamberopt.search.study.constraints import judge_zones
 
@@ -39,7 +39,7 @@ def evaluation_lines(evaluation: Evaluation, ranges: RangeResult | None = None) 
     return [
         *lines,
         f"{'gauge_mm2':34}{plain(evaluation.gauge_mm2)}: area of the windows; the median window "
-        f"has {plain(found.dents, 2)} dents",
+        f"has {counted(found.dents, 'dent')}",
     ]
 
 

@@ -161,8 +161,9 @@ def draw_replay(
         None, or one line that says why there is no film.
     """
     slower = (len(flight.time) - 1) / (fps * (flight.time[-1] - flight.time[0]))
+    bent = " where it moves most, drawn rigid" if flight.bends else ""
     motion = (
-        f"± {1e6 * flight.amplitude:g} µm, to scale"
+        f"± {1e6 * flight.amplitude:g} µm{bent}, to scale"
         if flight.sonotrodes
         else "drawn still: each ball meets it at a phase of its own"
     )

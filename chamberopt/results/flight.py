@@ -39,6 +39,8 @@ class FlightFrames:
     sonotrodes: displacement of each vibrating face [m], shape (f, 3), by the tag of its triangles.
         Empty for the motion "random_phase", in which the phase of each collision is random.
     amplitude: largest amplitude of all sonotrodes [m].
+    bends: True if a sonotrode has an amplitude profile. Its displacement is that of the places that
+        move most.
     part_angle: rotation of the part [rad], shape (f,).
     part_axis: point [m] and direction of the rotation axis. None if the part stands still.
     dents, impacts: dents and impacts on the part from the first to the last frame, in coordinates
@@ -51,6 +53,7 @@ class FlightFrames:
     diameter: np.ndarray
     sonotrodes: dict[int, np.ndarray]
     amplitude: float
+    bends: bool
     part_angle: np.ndarray
     part_axis: tuple[np.ndarray, np.ndarray] | None
     dents: Dents
@@ -106,6 +109,7 @@ def simulate_flight(
         diameter=scene.balls.diameters,
         sonotrodes={one.tag: face_displacement(one, scene.warmup + time) for one in vibrations},
         amplitude=max((float(one.amplitude) for one in scene.physics.vibrations), default=0.0),
+        bends=any(one.profile is not None for one in scene.physics.vibrations),
         part_angle=rotation_angle(rotation, scene.warmup + time),
         part_axis=axis,
         dents=dents_on_part(impacts, replica.chamber, replica.design),

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from chamberopt.common.errors import InputError
+from chamberopt.common.number_text import counted
 from chamberopt.coverage.coverage_from_impacts import coverage_from_dent_density
 from chamberopt.coverage.part_impacts import HITS_FILE, HitsByTriangle, load_matching_hits
 from chamberopt.pictures.drawn_part import DrawnPart, colour_range
@@ -142,7 +143,7 @@ class OpenedResult:
             lines.append(f"{quantity.label}: {text}")
         lines.append(f"exposed area: {surface['exposed_area_mm2'][triangle]:.4g} mm²")
         impacts, dents = surface["impacts"][triangle], surface["dents"][triangle]
-        return [*lines, f"simulated: {impacts} impacts, {dents} dents"]
+        return [*lines, f"simulated: {counted(impacts, 'impact')}, {counted(dents, 'dent')}"]
 
     def _value(self, name: str, triangle: int, state: ViewState) -> float:
         """Return the mean of a quantity over a triangle of the part, in the quantity's unit."""

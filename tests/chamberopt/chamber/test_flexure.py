@@ -77,6 +77,17 @@ def test_the_scene_has_the_mobility_of_each_triangle(blade: Design, chamber: Cha
     np.testing.assert_allclose(softness[chamber.source[own]], zener_restitution(parameter))
 
 
+def test_a_face_that_bends_counts_with_its_rms_speed(blade: Design, chamber: Chamber) -> None:
+    profile = {"share_at_mm": [[0, 0.9], [40, 0.9]]}
+    even = blade.changed({"sonotrode.amplitude_profile": profile})
+    slower = blade.changed({"sonotrode.amplitude_um": 0.9 * blade.sonotrode.zero_to_peak_um})
+    found, expected = (softness_of_part(one, chamber.part) for one in (even, slower))
+    assert found is not None
+    assert expected is not None
+    np.testing.assert_allclose(found, expected)
+    assert (found >= softness_of_part(blade, chamber.part)).all()
+
+
 def test_thick_parts_are_rigid_by_themselves() -> None:
     """A plate of 10 mm loses less than 2 % of the restitution, and a gear's teeth are no plates."""
     for design in (plate_design(), load_design(DESIGNS / "gear.toml")):
