@@ -48,10 +48,12 @@ def materials(name: str | None = None, /, *, json: Json = False) -> None:
         slopes = [one.model_dump() for one in treatments()]
         print_json({"alloys": rows, "friction": pairs, "treatments": slopes})
         return
-    head, lines = ["", *UNITS.values(), *(f"v0 {ball.also[0]}" for ball in hard)], []
+    head = ["", *UNITS.values(), *(f"v0 {ball.also[0]}" for ball in hard), "HB, MPa read in"]
+    lines = []
     for one in listed:
         numbers = [getattr(one, key) for key in UNITS]
-        lines.append([one.name, *map(_text, (*numbers, *speeds[one.name].values()))])
+        speed = speeds[one.name].values()
+        lines.append([one.name, *map(_text, (*numbers, *speed)), one.kind])
     show([
         Table("", head, lines),
         "",
@@ -130,7 +132,7 @@ def _friction(metals: Iterable[str]) -> Iterator[Table | str]:
 def _sources(listed: Sequence[Alloy | Ball]) -> list[str]:
     lines = []
     for one in listed:
-        lines.append(f"{one.name} ({', '.join(one.also)}): {one.condition}")
+        lines.append(f"{one.name} ({', '.join(one.also)}): {one.condition}, {one.origin}")
         lines += _wrapped(one.source)
     return lines
 

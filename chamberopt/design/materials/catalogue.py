@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import TypeVar
+from typing import Literal, TypeVar
 
 from pydantic import Field
 
@@ -33,6 +33,15 @@ from chamberopt.design.table_base import FileTable
 # Source: K. L. Johnson, "Contact Mechanics", Cambridge 1985, section 11.5.
 
 BRINELL_TO_PASCAL = 9.81e6  # HB is kgf/mm²
+BY_HEART = "by heart"
+# What is said of numbers by the kind of text that they were read in.
+ORIGINS = {
+    "data sheet": "read in a maker's data sheet",
+    "standard": "read in a standard",
+    "handbook": "read in a handbook",
+    "supplier": "read at a supplier's",
+    BY_HEART: "by heart, not verified",
+}
 
 
 @dataclass(frozen=True)
@@ -72,7 +81,15 @@ class Named(FileTable):
     density_kg_m3: float = quantity(500, 25000, "kg/m³", "density")
     E_GPa: float = quantity(1, 1500, "GPa", "Young's modulus")
     poisson: float = quantity(0, 0.5, "", "Poisson's ratio")
+    kind: Literal["data sheet", "standard", "handbook", "supplier", "by heart"] = Field(
+        description="kind of text that hardness or strengths were read in"
+    )
     source: str = Field(description="what was read where; what is by heart is not verified")
+
+    @property
+    def origin(self) -> str:
+        """Return in words how hardness or strengths are known."""
+        return ORIGINS[self.kind]
 
     @property
     def elastic(self) -> Elastic:
