@@ -224,7 +224,8 @@ def make_texts(folder: Path) -> dict[str, str]:
             Path(kind).mkdir()
             found[f"{kind}/terminal.txt"] = "\n".join(map(terminal_text, commands))
             if sheets:
-                found[f"{kind}/{SHEET}"] = sheet_text(sheets.pop())
+                found[f"{kind}/{SHEET}"] = sheet_text(sheets)
+                sheets.clear()
             for path in sorted([*Path(kind).iterdir(), *Path(kind, "out").iterdir()]):
                 if text := file_text(path):
                     found[f"{kind}/{path.name}.txt"] = text
@@ -245,9 +246,10 @@ def terminal_text(command: str) -> str:
     return f"$ chamberopt {command}\n{output.getvalue()}--- stderr\n{errors.getvalue()}"
 
 
-def sheet_text(figure: Figure) -> str:
+def sheet_text(pages: list[Figure]) -> str:
     """Words of a sheet, however it breaks them into lines."""
-    words = " ".join(one.get_text() for axes in figure.axes for one in axes.texts)
+    texts = [one for page in pages for axes in page.axes for one in axes.texts]
+    words = " ".join(one.get_text() for one in texts)
     return textwrap.fill(masked(words), 100, break_on_hyphens=False) + "\n"
 
 

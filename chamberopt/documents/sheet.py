@@ -9,8 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from chamberopt.common.estimate import Estimate
-from chamberopt.common.number_text import estimate_text
+from chamberopt.common.number_text import estimate_text, percent
+from chamberopt.coverage.coverage_intervals import NOT_RESOLVED
 from chamberopt.design.calibration import why_no_intensity
+from chamberopt.design.materials import alloys, find
 from chamberopt.design.tolerances import tolerance_box
 from chamberopt.documents.answer import answer, answer_lines
 from chamberopt.documents.coverage import figures
@@ -24,11 +26,63 @@ from chamberopt.results.load import load_start
 
 if TYPE_CHECKING:
     from chamberopt.design.sonotrode import VibratingFace
+    from chamberopt.documents.coverage import Figure
     from chamberopt.results.load import Result
 
-# Cautions about the figures of a process sheet, in words for a workshop, shown before its warnings.
+# Why a process sheet must not be relied on as it stands (in red, above its drawing), and how the
+# simulation differs from the machine, in words for a workshop.
 
 TIME = "time_to_98_s"
+JAMMED = 0.01  # least share of the shot's time, or of the impacts, in gaps that is told in red
+
+
+def alarms(result: Result) -> Iterator[str]:
+    """Yield the reasons not to use the sheet as it stands.
+
+    They are figures that are not resolved, balls that jam, and a time that leaves the target bare.
+    """
+    unresolved = [row.label.text for row in _expected_figures(result) if _is_unresolved(row.result)]
+    if unresolved:
+        yield (
+            f"Too few dents were simulated to resolve: {', '.join(unresolved)}. Simulate with more "
+            "process.accuracy.replicas or a longer simulated_time_s before this is built."
+        )
+    trapped = result.record.trapped
+    if trapped and max(trapped.rattling_time, trapped.rattling_impacts) >= JAMMED:
+        yield (
+            f"Balls jam in gaps of their own size: {percent(trapped.rattling_time)} of the shot at "
+            f"any time, and {percent(trapped.rattling_impacts)} of the impacts on the part. The "
+            "report has the place: choose other balls, or close or widen the gap."
+        )
+    yield from _bare(result)
+
+
+def _is_unresolved(figure: Estimate) -> bool:
+    return figure.in_words == NOT_RESOLVED
+
+
+def _bare(result: Result) -> Iterator[str]:
+    """Yield a sentence if the peening time is too short to cover the target, else nothing."""
+    time, mean = result.metrics.get(TIME), result.metrics["mean_coverage"]
+    planned = result.design.process.treatment_time
+    if not mean.has_number or time is None:
+        return
+    if _is_unresolved(time):
+        if mean.high >= FULL:
+            return
+        needed = "when it is covered is not resolved"
+    elif time.in_words == "never":
+        needed = "95 % of its area is never 98 % covered, however long it is peened"
+    elif time.value > planned:
+        text = time.in_words or metric_label(TIME).format(time)
+        needed = f"95 % of its area is 98 % covered after {text}"
+    else:
+        return
+    bare = estimate_text(Estimate(1.0 - mean.value, mean.half_width), 100.0, "%")
+    yield (
+        f"The peening time is too short: {plain(planned)} s leave {bare} of the target bare; "
+        f"{needed}."
+    )
 
 
 def cautions(result: Result) -> Iterator[str]:
@@ -36,7 +90,7 @@ def cautions(result: Result) -> Iterator[str]:
 
     The warnings say how the simulation differs from the machine, and which goals are not reached.
     """
-    yield from _time(result)
+    yield from _slow_time(result)
     if result.design.effects.friction is None:
         yield (
             "Simulated without friction, as asked. With it the shot was 22 to 47 % slower in a "
@@ -56,27 +110,12 @@ def cautions(result: Result) -> Iterator[str]:
         )
 
 
-def _time(result: Result) -> Iterator[str]:
-    """Yield a sentence if the peening time is too short to cover the target, else nothing."""
-    time, planned = result.metrics.get(TIME), result.design.process.treatment_time
-    if time is None or time.in_words == "not resolved":
-        return
-    if time.value <= planned:
-        yield from _slow_time(result)
-        return
-    if time.in_words == "never":
-        yield "95 % of the target's area is never 98 % covered, however long it is peened."
-        return
-    needed = time.in_words or metric_label(TIME).format(time)
-    yield (
-        f"The peening time of {plain(planned)} s is too short: 95 % of the target's area is 98 % "
-        f"covered after {needed}."
-    )
-
-
 def _slow_time(result: Result) -> Iterator[str]:
-    """Yield a sentence if the peening time is too short at the slow end of what is not known."""
-    found = result.record.ranges
+    """Yield a sentence if the time is enough as designed, but not at the slow end of ranges."""
+    found, time = result.record.ranges, result.metrics.get(TIME)
+    planned = result.design.process.treatment_time
+    if time is None or _is_unresolved(time) or time.value > planned:
+        return
     if found and slow_end_is_late(result):
         yield (
             f"The peening time is enough as designed, but not at the slow end of what is not "
@@ -85,9 +124,11 @@ def _slow_time(result: Result) -> Iterator[str]:
         )
 
 
-MOST_ROWS = 4  # rows of zones, tolerances or sizes of shot; the report has all rows
+MOST_ROWS = 4  # sizes of shot, or further sonotrodes; the report has all of them
 MOST_KEYS = 8  # numbers of the chamber
-MOST_WARNINGS = 2
+FULL = 0.98  # mean coverage from which on the target counts as covered
+DIGEST = 12  # characters of the result's digest in the title block
+TO_FILL = ("drawing no.", "revision", "drawn by, date", "checked by, date", "set up by, date")
 UNITS = {"mm": "mm", "deg": "degrees", "um": "µm"}
 EXPECTED = (
     "mean_coverage",
@@ -114,42 +155,84 @@ Row = tuple[str, str]  # a name and its value, or "" and a sentence
 def process_sheet(result: Result, face_mm: tuple[float, ...]) -> Document:
     """Return the process sheet of a result as a document.
 
+    Its sections are the first page, with sentences of the kind "warning" for the top; tables that
+    may go on further pages; and the title block, where a name without a value is to be filled in.
+
     Args:
         face_mm: size of the sonotrode's face [mm].
     """
     record = result.record
     start = load_start(result) if result.study else None
     checks, calibrated = first_checks(result), calibrated_to(result)
-    content: list[Block] = [*setting_tables(result, face_mm), checks, *calibrated]
+    red = [Sentence(text, "warning") for text in alarms(result)]
+    content: list[Block] = [*red, *setting_tables(result, face_mm), checks, *calibrated]
+    name = f"{result.design.part.mesh_path.name}: {result.folder.resolve().name}"
+    block = Table("", (), [*title_block(result, name).items()], numbers=False)
     return Document(
-        f"{result.design.part.mesh_path.name}: {result.folder.resolve().name}",
+        name,
         f"{SHEETS_OF[record.kind]}; simulated {record.created[:10]}",
         answer(result, start),
         (),
-        [Section("Process sheet", content)],
+        [
+            Section("Process sheet", content),
+            Section("Limits and warnings", limit_tables(result)),
+            Section("Title block", [block]),
+        ],
     )
 
 
+def title_block(result: Result, name: str) -> dict[str, str]:
+    """Return the fields of the title block. Those without a value are for the shop to fill in."""
+    record = result.record
+    return {
+        "design": name,
+        "made with": f"chamberopt {record.versions['chamberopt']}",
+        "simulated": record.created[:10],
+        "result, sha256": record.sha256[:DIGEST],
+        **dict.fromkeys(TO_FILL, ""),
+    }
+
+
+def chamber_limits(result: Result) -> dict[str, tuple[float, float, float]]:
+    """Return value, least and largest value of each key of [chamber] that has a tolerance."""
+    box = tolerance_box(result.design)
+    return {
+        name.removeprefix("chamber."): (result.design.value(name), *ends)
+        for name, ends in box.items()
+        if name.startswith("chamber.")
+    }
+
+
 def setting_tables(result: Result, face_mm: tuple[float, ...]) -> list[Table]:
-    """Return tables on the chamber and its settings, expected figures and allowed tolerances.
+    """Return tables on the part, the chamber, its settings and the figures to expect.
 
     A row with an empty name holds a sentence.
 
     Args:
         face_mm: size of the sonotrode's face [mm].
     """
-    found = (
+    return _tables([
         ("Part and pose", _part(result)),
         ("Chamber", _chamber(result)),
         ("Sonotrode", _sonotrode(result, face_mm)),
         ("Shot", _shot(result)),
         ("Made with", _identity(result)),
         ("Peening, and what to expect", _expected(result)),
+    ])  # fmt: skip
+
+
+def limit_tables(result: Result) -> list[Table]:
+    """Return tables on limits, tolerances, and everything that the process is warned of."""
+    return _tables([
         ("Zones and limits", _zones(result)),
         ("Tolerances", _tolerances(result)),
         ("Not in these figures", (("", text) for text in cautions(result))),
         ("Warnings", _warnings(result)),
-    )
+    ])  # fmt: skip
+
+
+def _tables(found: Sequence[tuple[str, Iterator[Row]]]) -> list[Table]:
+    """Return tables of names and values, without those that have no row."""
     tables = [Table(title, (), [*rows], numbers=False) for title, rows in found]
     return [one for one in tables if one.rows]
 
@@ -157,8 +240,7 @@ def setting_tables(result: Result, face_mm: tuple[float, ...]) -> list[Table]:
 def _part(result: Result) -> Iterator[Row]:
     part, turn = result.design.part, result.design.effects.part_turn
     yield "part", part.mesh_path.name
-    metal = result.design.materials.part
-    yield "metal", f"{metal.alloy or 'not named'}, {plain(metal.hardness_HB)} HB"
+    yield "metal", _metal(result)
     if result.design.chamber.shape == "imported":
         yield "pose", "as drawn with its chamber"
     else:
@@ -170,8 +252,8 @@ def _part(result: Result) -> Iterator[Row]:
         yield "turned", ", then ".join(turns) or "as in its file"
         x, y = part.offset_mm
         yield "offset from the axis", f"x {plain(x)} mm, y {plain(y)} mm" if x or y else "none"
-        distance = result.design.chamber.sonotrode_distance_mm
-        yield "sonotrode to lowest point", f"{plain(distance)} mm"
+        text = f"{plain(result.design.chamber.sonotrode_distance_mm)} mm"
+        yield "sonotrode to lowest point", _limited(result, "chamber.sonotrode_distance_mm", text)
     if turn is not None:
         swing = (
             f"{plain(turn.angle_deg or 0.0)}° to each side at {plain(turn.frequency_hz or 0)} Hz"
@@ -183,13 +265,34 @@ def _part(result: Result) -> Iterator[Row]:
         yield "target", area
 
 
+def _metal(result: Result) -> str:
+    """Return the part's metal and hardness in words, and how surely the hardness is known."""
+    part = result.design.materials.part
+    text, alloy = f"{part.alloy or 'not named'}, {plain(part.hardness_HB)} HB", None
+    if part.alloy:
+        alloy = find(part.alloy, alloys())
+    if alloy is None or alloy.hardness_HB != part.hardness_HB:
+        return f"{text}, as given"
+    return f"{text}: the catalogue's, {alloy.origin}, for {alloy.condition}; measure yours"
+
+
+def _limited(result: Result, name: str, text: str) -> str:
+    """Return the text of a number of the design, with the range that its tolerance allows."""
+    ends = tolerance_box(result.design).get(name)
+    return text if ends is None else f"{text} ({' to '.join(map(plain, ends))})"
+
+
 def _chamber(result: Result) -> Iterator[Row]:
     table = result.design.chamber.model_dump(mode="json", exclude_none=True)
     yield "shape", PurePath(table.pop("shape")).name
     for key in ("sonotrode_distance_mm", "facets", "mesh", "unit"):
         table.pop(key, None)
     counted = {key: table.pop(key, ()) for key in ("holes", "deflectors")}
-    rows = [_key_row(key, value) for key, value in table.items() if value not in (0, 0.0, [])]
+    rows = []
+    for key, value in table.items():
+        if value not in (0, 0.0, []):
+            name, text = _key_row(key, value)
+            rows.append((name, _limited(result, f"chamber.{key}", text)))
     yield from _first(rows, "numbers", MOST_KEYS)
     for what, several in counted.items():
         if several:
@@ -251,7 +354,8 @@ def _shot(result: Result) -> Iterator[Row]:
         text = f"{count:,} of Ø {plain(1e3 * diameter)} mm"
         sizes.append(("balls", f"{text}, {plain(mass, 3)} g" if several else text))
     yield from _first(sizes, "sizes")
-    yield "mass of these balls", f"{plain(_weighed_g(result))} g (asked: {plain(shot.mass_g)} g)"
+    asked = _limited(result, "shot.mass_g", f"asked: {plain(shot.mass_g)} g")
+    yield "mass of these balls", f"{plain(_weighed_g(result))} g ({asked})"
 
 
 def _weighed_g(result: Result) -> float:
@@ -264,13 +368,12 @@ def _expected(result: Result) -> Iterator[Row]:
 
     Without a calibration, a row says why there is no intensity in mmA.
     """
-    yield "peening time", f"{plain(result.design.process.treatment_time)} s"
-    calibration, shown = result.design.calibration, figures(result, None)
-    hidden = "strength_um" if calibration and calibration.has_strips else ""
-    for row in shown:
-        if (row is shown[0] or row.name in EXPECTED) and row.name != hidden:
-            more = f"; range {row.range_with_unit}" if row.range_text else ""
-            yield row.label.text, f"{row.label.format(row.result)}{more}"
+    time = f"{plain(result.design.process.treatment_time)} s"
+    yield "peening time", _limited(result, "process.treatment_time_s", time)
+    calibration = result.design.calibration
+    for row in _expected_figures(result):
+        more = f"; range {row.range_with_unit}" if row.range_text else ""
+        yield row.label.text, f"{row.label.format(row.result)}{more}"
     if slow := time_at_slow_end(result):
         yield f"{metric_label(TIME).text}, at the slow end", slow
     if reason := why_no_intensity(calibration):
@@ -281,11 +384,20 @@ def _expected(result: Result) -> Iterator[Row]:
     yield "", f"± 95 % intervals. {limits_of_intervals(result)}"
 
 
+def _expected_figures(result: Result) -> list[Figure]:
+    """Return the figures that the sheet shows: the objective first, then those of EXPECTED."""
+    calibration, shown = result.design.calibration, figures(result, None)
+    hidden = "strength_um" if calibration and calibration.has_strips else ""
+    return [
+        row for row in shown if (row is shown[0] or row.name in EXPECTED) and row.name != hidden
+    ]
+
+
 def _zones(result: Result) -> Iterator[Row]:
     """Yield a row with a sentence for each zone. Zones with limits that are not met come first."""
     lines = [one for one in answer_lines(result) if one.about == "zone"]
     lines.sort(key=lambda line: not line.warns)
-    yield from _first([("", one.text) for one in lines], "zones")
+    yield from (("", one.text) for one in lines)
 
 
 def _tolerances(result: Result) -> Iterator[Row]:
@@ -294,11 +406,8 @@ def _tolerances(result: Result) -> Iterator[Row]:
     If the tolerances were simulated, further rows give their effect on coverage etc.
     """
     box = tolerance_box(result.design)
-    ranges = [
-        (name, f"{plain(low)} to {plain(high)}, as designed {plain(result.design.value(name))}")
-        for name, (low, high) in box.items()
-    ]
-    yield from _first(ranges, "tolerances")
+    for name, (low, high) in box.items():
+        yield name, f"{plain(low)} to {plain(high)}, as designed {plain(result.design.value(name))}"
     found = result.record.tolerances
     if not box:
         yield "", "The design has no [tolerances]: how far its numbers may be off is not known."
@@ -314,7 +423,7 @@ def _warnings(result: Result) -> Iterator[Row]:
         yield "", "The design was not checked: chamberopt check lists its warnings."
     elif not warnings:
         yield "", "There are none."
-    yield from _first([("", text) for text in warnings or ()], "warnings", MOST_WARNINGS)
+    yield from (("", text) for text in warnings or ())
     if notes_of(result):
         yield "", f"Notes in the report: {len(notes_of(result))}."
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,7 +14,14 @@ from chamberopt.common.number_text import typeset_plain as plain
 from chamberopt.design.shape_surface import TAG_PART, TAG_SONOTRODE, TAG_WALL
 from chamberopt.geometry.triangles import border_edges
 from chamberopt.pictures.charts.colours import BLACK, BLUE, DARK_GREY, ORANGE
-from chamberopt.pictures.section import SAME, cut, face_size_mm, inside
+from chamberopt.pictures.section import (
+    SAME,
+    SectionPlane,
+    cut,
+    face_size_mm,
+    inside,
+    section_planes,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -24,6 +33,7 @@ if TYPE_CHECKING:
 # All lengths are in mm on the page.
 
 Point = tuple[float, float]
+Limits = Mapping[str, tuple[float, float, float]]  # value, least and largest value [mm] by key
 SIZE, WIDTH = 7.0, 0.4  # pt, of the text and of the lines
 SHORT = 9.0  # mm: a shorter dimension has its arrows and its text outside
 STUB = 3.5  # mm, of arrows outside
@@ -129,75 +139,97 @@ class View:
         )
 
 
-def draw_chamber(axes: Axes, chamber: Chamber, left: float, top: float, size: Point) -> str:
-    """Draw section and plan of a chamber on a page, and return the scale, such as "1:2".
+def draw_chamber(
+    axes: Axes,
+    chamber: Chamber,
+    left: float,
+    top: float,
+    size: Point,
+    limits: Limits = MappingProxyType({}),
+) -> str:
+    """Draw sections and plan of a chamber on a page, and return what they are, with their scale.
 
     Args:
         axes: axes of the whole page, in mm.
         left, top: upper left corner of the drawing.
         size: width and height that it may have.
+        limits: what the keys of [chamber] may be, for dimensions that show one of them.
     """
     mm = 1e3 * chamber.vertices
     low, high = mm.min(axis=0), mm.max(axis=0)
-    across = int(high[1] - low[1] > high[0] - low[0] + SAME)  # axis to the right in the section
-    axis = np.array([across, 2])
+    planes = section_planes(chamber)
     part = 1e3 * chamber.part.vertices
-    beyond = np.array([
-        max(0.0, low[across] - part[:, across].min(), part[:, across].max() - high[across]),
-        max(0.0, part[:, 2].max() - high[2]),
+    least, most = part.min(axis=0), part.max(axis=0)
+    beyond = np.maximum(0.0, [
+        (max(low[k] - least[k], most[k] - high[k]), most[2] - high[2])
+        for k in (one.right for one in planes)
     ])  # fmt: skip
-    scale, outside, needs = _fit(high - low, across, beyond, np.asarray(size))
+    scale, outside, needs = _fit(high - low, planes, beyond, np.asarray(size))
     middle = top - 0.5 * size[1]
-    start = left + 0.5 * (size[0] - needs)
+    x = left + 0.5 * (size[0] - needs)
     tall, deep = (scale * (high - low)[k] for k in (2, 1))
-    corner = np.array([start + BESIDE + outside[0], middle - 0.5 * (tall + outside[1]) + 1.0])
-    section = View(across, scale, corner, low[axis], high[axis], outside)
-    beside = corner[0] + scale * (high - low)[across] + outside[0] + 2.0 * BESIDE
-    corner = np.array([beside, middle - 0.5 * deep + 1.0])
-    plan = View(0, scale, corner, low[:2], high[:2], np.zeros(2))
-    at = _place_of_section(chamber, 1 - across)
-    _draw_section(axes, chamber, section, at)
-    _draw_plan(axes, chamber, plan, across, at)
-    return f"{plain(scale)}:1" if scale >= 1.0 else f"1:{plain(1.0 / scale)}"
+    for name, plane, more in zip("AB", planes, outside, strict=False):
+        axis = np.array([plane.right, 2])
+        corner = np.array([x + BESIDE + more[0], middle - 0.5 * (tall + more[1]) + 1.0])
+        view = View(plane.right, scale, corner, low[axis], high[axis], more)
+        _draw_section(axes, chamber, view, plane.at, name, limits)
+        x = corner[0] + scale * (high - low)[plane.right] + more[0] + BESIDE
+    corner = np.array([x + BESIDE, middle - 0.5 * deep + 1.0])
+    view = View(0, scale, corner, low[:2], high[:2], np.zeros(2))
+    _draw_plan(axes, chamber, view, planes, limits)
+    text = f"{plain(scale)}:1" if scale >= 1.0 else f"1:{plain(1.0 / scale)}"
+    what = "Section A–A" if len(planes) == 1 else "Sections A–A and B–B"
+    return f"{what} and plan, scale {text}"
 
 
 def _fit(
-    cavity: np.ndarray, across: int, beyond: np.ndarray, size: np.ndarray
+    cavity: np.ndarray, planes: Sequence[SectionPlane], beyond: np.ndarray, size: np.ndarray
 ) -> tuple[float, np.ndarray, float]:
-    """Return the largest scale at which section and plan of a cavity fit on a page.
+    """Return the largest scale at which sections and plan of a cavity fit on a page.
 
     Args:
         cavity: size of the cavity along x, y and z [mm].
-        across: axis (0 or 1) that points to the right in the section.
-        beyond: how far the part extends beyond the cavity, to a side and upwards [mm].
+        planes: planes of the sections.
+        beyond: how far the part extends beyond the cavity in each section, to a side and upwards,
+            (n, 2) [mm].
         size: width and height that the drawing may have [mm].
     Returns:
-        The scale; how much of the part beyond the cavity is drawn, on the page [mm]; and the width
-        of both views [mm].
+        The scale; how much of the part beyond the cavity is drawn, on the page, (n, 2) [mm]; and
+        the width of all views [mm].
     """
+    lengths = sum(cavity[one.right] for one in planes) + cavity[0]
     for scale in SCALES:
         outside = np.minimum(MOST_OUTSIDE, scale * beyond)
-        wide = scale * (cavity[across] + cavity[0]) + 2.0 * outside[0] + 4.0 * BESIDE
-        tall = max(scale * cavity[2] + outside[1] + FACE, scale * cavity[1]) + ABOVE + BELOW
+        wide = scale * lengths + 2.0 * outside[:, 0].sum() + 2.0 * (len(planes) + 1) * BESIDE
+        above = outside[:, 1].max()
+        tall = max(scale * cavity[2] + above + FACE, scale * cavity[1]) + ABOVE + BELOW
         if (np.array([wide, tall]) <= size).all():
             break
     return float(scale), outside, float(wide)
 
 
-def _place_of_section(chamber: Chamber, axis: int) -> float:
-    """Return where the plane of the section cuts a horizontal axis (0 or 1) [mm].
+def _with_limits(text: str, length: float, limits: Limits, *keys: str) -> str:
+    """Return the text of a dimension with the tolerance of the key that it shows, if any.
 
-    The plane runs through the chamber's axis if it meets the part there, otherwise through the
-    middle of the part inside the chamber.
+    Args:
+        length: the dimension [mm]. A key with another value is not what is drawn.
+        keys: keys of [chamber] whose value the dimension may be.
     """
-    own = np.unique(chamber.triangles[chamber.tags == TAG_PART])
-    side = 1e3 * chamber.vertices[own, axis]
-    low, high = float(side.min()), float(side.max())
-    return 0.0 if low < 0.0 < high else 0.5 * (low + high)
+    for key in keys:
+        value, low, high = limits.get(key, (math.inf, 0.0, 0.0))
+        if abs(value - length) < SAME:
+            down, up = value - low, high - value
+            if abs(up - down) < 1e-9 * value:
+                return f"{text} ±{plain(up)}"
+            return f"{text} +{plain(up)}/−{plain(down)}"
+    return text
 
 
-def _draw_section(axes: Axes, chamber: Chamber, view: View, at: float) -> None:
+def _draw_section(
+    axes: Axes, chamber: Chamber, view: View, at: float, name: str, limits: Limits
+) -> None:
     other = 1 - view.right
+    side = ("length_mm", "width_mm")[view.right]
     lines, row = cut(chamber.vertices, chamber.triangles, other, 1e-3 * at)
     own, _ = cut(chamber.part.vertices, chamber.part.triangles, other, 1e-3 * at)
     window = view.window(axes)
@@ -210,29 +242,40 @@ def _draw_section(axes: Axes, chamber: Chamber, view: View, at: float) -> None:
     (axis_at, y), (_, top) = view.place([[0.0, 0.0], [0.0, view.high[1]]])
     above = top + view.outside[1]
     across_line(axes, (axis_at, y - FACE - 1.0), (axis_at, above + 1.0))
-    _label(axes, view.corner[0], above + 2.5, f"A–A: {'xy'[view.right]} to the right, z up")
+    words = f"{name}–{name}: {'xy'[view.right]} to the right, z up"
+    _label(axes, view.corner[0], above + 2.5, words)
     # The sonotrode is a band below its mean face, at z = 0.
+    face_wide = 0.0
     face = 1e3 * lines[tags == TAG_SONOTRODE][..., 0]
     if face.size:
         x1, x2 = view.place([[face.min(), 0.0], [face.max(), 0.0]])[:, 0]
         look: Any = {"facecolor": "white", "edgecolor": BLUE, "hatch": "xxxx", "lw": 1.0}
         axes.fill_between([x1, x2], y - FACE, y, **look)
         size = face_size_mm(chamber)
-        text = f"Ø {plain(size[0])}" if len(size) == 1 else plain(float(np.ptp(face)))
+        face_wide = size[0] if len(size) == 1 else float(np.ptp(face))
+        text = f"Ø {plain(face_wide)}" if len(size) == 1 else plain(face_wide)
+        text = _with_limits(text, face_wide, limits, "diameter_mm", side)
+        if len(size) == 1:  # the plane may cut a round face beside its axis
+            x1, x2 = view.place([[-0.5 * face_wide, 0.0], [0.5 * face_wide, 0.0]])[:, 0]
         dimension(axes, (x1, y - FACE), (x2, y - FACE), 4.0, text)
     wide = float((view.high - view.low)[0])
-    if not face.size or wide > np.ptp(face) + WIDER:
+    if wide > face_wide + WIDER:
         low, high = view.place([[view.low[0], 0.0], [view.high[0], 0.0]])[:, 0]
-        dimension(axes, (low, y - FACE), (high, y - FACE), 8.5, plain(wide))
+        text = _with_limits(plain(wide), wide, limits, side)
+        dimension(axes, (low, y - FACE), (high, y - FACE), 8.5, text)
     own = chamber.vertices[np.unique(chamber.triangles[chamber.tags == TAG_PART]), 2]
     lowest = 1e3 * float(own.min())
     left, low_at = view.place([view.low[0], lowest]) - np.array([view.outside[0], 0.0])
     right = view.place(view.high)[0] + view.outside[0]
-    dimension(axes, (left, y), (left, low_at), 4.5, plain(lowest), upright=True)
-    dimension(axes, (right, y), (right, top), -4.5, plain(view.high[1]), upright=True)
+    text = _with_limits(plain(lowest), lowest, limits, "sonotrode_distance_mm")
+    dimension(axes, (left, y), (left, low_at), 4.5, text, upright=True)
+    text = _with_limits(plain(view.high[1]), float(view.high[1]), limits, "height_mm")
+    dimension(axes, (right, y), (right, top), -4.5, text, upright=True)
 
 
-def _draw_plan(axes: Axes, chamber: Chamber, view: View, across: int, at: float) -> None:
+def _draw_plan(
+    axes: Axes, chamber: Chamber, view: View, planes: Sequence[SectionPlane], limits: Limits
+) -> None:
     from matplotlib.collections import PolyCollection
 
     part, target = chamber.tags == TAG_PART, chamber.on_target
@@ -247,20 +290,27 @@ def _draw_plan(axes: Axes, chamber: Chamber, view: View, across: int, at: float)
     _lines(axes, view, chamber.vertices[border_edges(face)][:, :, :2], BLUE, 1.1)
     (left, bottom), (right, top) = view.place([view.low, view.high])
     x, y = view.place([0.0, 0.0])
-    at_x, at_y = view.place([at, at])
-    wide, deep = map(plain, view.high - view.low)
-    is_round = len(face_size_mm(chamber)) == 1
-    if across == 0:
-        across_line(axes, (x, bottom - 1.0), (x, top + 1.0))
-        across_line(axes, (left - 3.0, at_y), (right + 3.0, at_y), name="A")
-        if not is_round:
-            dimension(axes, (right, bottom), (right, top), -9.5, deep, upright=True)
-    else:
-        across_line(axes, (left - 1.0, y), (right + 1.0, y))
-        across_line(axes, (at_x, bottom - 3.0), (at_x, top + 3.0), name="A")
-        if not is_round:
-            dimension(axes, (left, bottom), (right, bottom), 9.5, wide)
-    _label(axes, left, top + (2.5 if across == 0 else 6.5), "plan: x to the right, y up")
+    is_upright = False
+    for name, plane in zip("AB", planes, strict=False):
+        at_x, at_y = view.place([plane.at, plane.at])
+        if plane.right == 0:
+            across_line(axes, (left - 3.0, at_y), (right + 3.0, at_y), name=name)
+        else:
+            across_line(axes, (at_x, bottom - 3.0), (at_x, top + 3.0), name=name)
+            is_upright = True
+    if len(planes) == 1:  # the other axis, and the length that the section does not show
+        across = planes[0].right
+        if across == 0:
+            across_line(axes, (x, bottom - 1.0), (x, top + 1.0))
+        else:
+            across_line(axes, (left - 1.0, y), (right + 1.0, y))
+        length = float((view.high - view.low)[1 - across])
+        text = _with_limits(plain(length), length, limits, ("width_mm", "length_mm")[across])
+        if len(face_size_mm(chamber)) > 1 and across == 0:
+            dimension(axes, (right, bottom), (right, top), -9.5, text, upright=True)
+        elif len(face_size_mm(chamber)) > 1:
+            dimension(axes, (left, bottom), (right, bottom), 9.5, text)
+    _label(axes, left, top + (6.5 if is_upright else 2.5), "plan: x to the right, y up")
 
 
 def _fill(axes: Axes, view: View, lines: np.ndarray, window: Rectangle, **look: Any) -> None:

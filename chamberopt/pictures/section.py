@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from chamberopt.design.shape_surface import TAG_SONOTRODE
+from chamberopt.design.shape_surface import TAG_PART, TAG_SONOTRODE
 from chamberopt.geometry.triangles import border_edges
 
 if TYPE_CHECKING:
@@ -19,6 +20,77 @@ if TYPE_CHECKING:
 OFF_THE_CORNERS = 1.7e-8
 SAME = 0.02  # mm: lengths that differ by less count as equal
 FEWEST_CORNERS = 8  # of a face that is drawn as round
+TRIED = 16  # planes in each direction
+ENOUGH = 0.8  # share of the part's outline that one section must show; below it there are two
+AREA = 0.2  # weight of the area of the cut beside its span, for planes of the same span
+AS_GOOD = 0.9  # of the best plane's score: then the plane through the chamber's axis is taken
+
+
+@dataclass(frozen=True)
+class SectionPlane:
+    """An upright plane in which a chamber is cut for a drawing.
+
+    right: axis of the chamber (0, 1) that points to the right in the section.
+    at: place of the plane on the other horizontal axis [mm].
+    span: product of the shares of the part's width and height between the ends of its cut.
+    """
+
+    right: int
+    at: float
+    span: float
+
+
+def section_planes(chamber: Chamber) -> list[SectionPlane]:
+    """Return one plane that shows the part best, or two across each other if one does not do.
+
+    Of planes that show the part about alike, the one through the chamber's axis is taken, along the
+    longer side of the chamber.
+    """
+    size = np.ptp(chamber.vertices, axis=0)
+    longer = int(size[1] > size[0] + 1e-3 * SAME)
+    found = [_planes(chamber, right) for right in (longer, 1 - longer)]
+    largest = max(area for planes in found for _, area in planes) or 1.0
+    best = [_best_plane(planes, largest) for planes in found]
+    top = max(score for _, score in best)
+    planes = [plane for plane, _ in sorted(best, key=lambda one: one[1] < AS_GOOD * top)]
+    return planes[: 1 if planes[0].span >= ENOUGH else 2]
+
+
+def _best_plane(
+    planes: list[tuple[SectionPlane, float]], largest: float
+) -> tuple[SectionPlane, float]:
+    """Return the best of parallel planes with its score: the first if it is about as good.
+
+    Args:
+        planes: planes, and the area of the part in each.
+        largest: largest of all these areas, and of those of the planes across.
+    """
+    scored = [(plane, plane.span + AREA * area / largest) for plane, area in planes]
+    best = max(scored, key=lambda one: one[1])
+    return scored[0] if scored[0][1] >= AS_GOOD * best[1] else best
+
+
+def _planes(chamber: Chamber, right: int) -> list[tuple[SectionPlane, float]]:
+    """Return parallel planes through the part with its area in each [m²].
+
+    The plane through the chamber's axis is the first if it meets the part there, else the plane
+    through the middle of the part in the chamber.
+    """
+    part, other = chamber.part, 1 - right
+    inside = chamber.vertices[np.unique(chamber.triangles[chamber.tags == TAG_PART])]
+    low, high = inside[:, other].min(), inside[:, other].max()
+    middle = 0.0 if low < 0.0 < high else 0.5 * (low + high)
+    places = [middle, *np.linspace(low, high, TRIED + 2)[1:-1]]
+    whole, found = np.ptp(part.vertices[:, [right, 2]], axis=0), []
+    for at in places:
+        lines, _ = cut(part.vertices, part.triangles, other, at)
+        ends = lines.reshape(-1, 2)
+        span = float(np.prod(np.ptp(ends, axis=0) / whole)) if len(ends) else 0.0
+        # The lines go round the part, so that the shoelace formula holds without their order.
+        (x1, y1), (x2, y2) = lines[:, 0].T, lines[:, 1].T
+        area = 0.5 * abs(float(np.sum(x1 * y2 - x2 * y1)))
+        found.append((SectionPlane(right, 1e3 * float(at), span), area))
+    return found
 
 
 def cut(

@@ -1,20 +1,24 @@
-"""Lay the process sheet out on one A4 page and write it as PDF."""
+"""Lay the process sheet out on A4 pages and write it as PDF.
+
+All of it is on one page if that can be read, else limits and warnings go on further pages.
+"""
 
 from __future__ import annotations
 
 import io
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import cache
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from chamberopt.common.files import claim_file, write_bytes
-from chamberopt.documents.document import Block, Document, Sentence, Table
-from chamberopt.documents.sheet import process_sheet
+from chamberopt.documents.document import Block, Document, Section, Sentence, Table
+from chamberopt.documents.sheet import chamber_limits, process_sheet
 from chamberopt.pictures.charts.colours import BLACK, DARK_GREY, GREY
 from chamberopt.pictures.charts.figure_style import ignore_settings_here
-from chamberopt.pictures.part_drawing import LEGEND, RASTER, draw_chamber
+from chamberopt.pictures.part_drawing import LEGEND, RASTER, Limits, draw_chamber
 from chamberopt.pictures.section import face_size_mm
 from chamberopt.printers.report_page import PageFile, require_free_page
 from chamberopt.results.arrays_file import load_chamber
@@ -33,15 +37,19 @@ SHEET_FILE = PageFile("process sheet", (".pdf",), lambda content: CREATOR.encode
 WIDTH, HEIGHT, MARGIN, GAP = 210.0, 297.0, 12.0, 6.0  # mm
 INNER = WIDTH - 2.0 * MARGIN
 SIZES = (8.0, 7.5, 7.0, 6.5, 6.0, 5.5, 5.0)  # pt of the text; the largest size that fits is used
+LEAST_ALONE = 6.5  # pt: with smaller letters on one page, limits and warnings get further pages
 # Height of the drawing with its caption [mm]: the least for each pt of the text, and the most.
 DRAWING_PER_PT, MOST_DRAWING = 13.0, 125.0
-CAPTION, SIGNATURES = 7.0, 14.0  # mm
-SIGNED = ("Set up by", "Date", "Checked by", "Date")
+CAPTION, ROW = 7.0, 8.0  # mm, of the caption, and of a row of the title block
+FIELDS = 5  # in a row of the title block
+FOOT = MARGIN + 2.0 * ROW + 3.0  # mm, where the content ends
+RED = "#C00000"
 COLUMNS = (88.0, 62.0, 36.0)  # mm, of a table with a head
 MM_PER_PT = 25.4 / 72.0
 LEADING = 1.25  # height of a line over the size of its letters
 NAMES = 0.52  # share of a column's width that names may take at most
 MOST_LINES = 4  # lines of a text; a longer text ends in an ellipsis
+ALL_LINES = 40  # the same where a text must be whole, and may go on further pages
 
 
 class Writer:
@@ -50,9 +58,9 @@ class Writer:
     A Writer without axes writes nothing and only measures heights.
     """
 
-    def __init__(self, axes: Axes | None, size: float) -> None:
-        """Prepare to write letters of `size` [pt] on `axes`."""
-        self.axes, self.size = axes, size
+    def __init__(self, axes: Axes | None, size: float, most: int = MOST_LINES) -> None:
+        """Prepare to write letters of `size` [pt] on `axes`, and at most `most` lines of a text."""
+        self.axes, self.size, self.most = axes, size, most
 
     @property
     def line(self) -> float:
@@ -60,10 +68,10 @@ class Writer:
         return self.size * LEADING * MM_PER_PT
 
     def write(
-        self, text: str, x: float, top: float, width: float, bold: bool = False, grey: bool = False
+        self, text: str, x: float, top: float, width: float, bold: bool = False, colour: str = BLACK
     ) -> float:
         """Write a text in lines of limited width and return the height of its bottom [mm]."""
-        lines = broken(text, width, self.size, bold)
+        lines = broken(text, width, self.size, bold, self.most)
         for number, one in enumerate(lines):
             if self.axes is not None:
                 self.axes.text(
@@ -72,7 +80,7 @@ class Writer:
                     one,
                     size=self.size,
                     weight="bold" if bold else "normal",
-                    color=DARK_GREY if grey else BLACK,
+                    color=colour,
                     va="top",
                     parse_math=False,
                 )
@@ -83,18 +91,29 @@ class Writer:
 
         A value with an empty name takes the whole width.
         """
-        y = self.write(table.caption, x, top, width, bold=True) - 0.1 * self.line
-        self.rule(x, y, width)
-        y -= 0.25 * self.line
-        longest = max(text_width(name, self.size) for name, _ in table.rows)
-        names = min(NAMES * width, longest + 2.0)
-        for name, value in table.rows:
-            if name:
-                low = self.write(name, x, y, names - 1.5, grey=True)
-                y = min(low, self.write(value, x + names, y, width - names))
-            else:
-                y = self.write(value, x, y - 0.15 * self.line, width)
+        y = self.caption(table.caption, x, top, width)
+        for row in table.rows:
+            y = self.row(row, x, y, width, self.names(table, width))
         return y
+
+    def caption(self, text: str, x: float, top: float, width: float) -> float:
+        """Write the caption of a table with a line below. Return the bottom's height [mm]."""
+        y = self.write(text, x, top, width, bold=True) - 0.1 * self.line
+        self.rule(x, y, width)
+        return y - 0.25 * self.line
+
+    def names(self, table: Table, width: float) -> float:
+        """Return the width of the column of names of a table [mm]."""
+        longest = max(text_width(name, self.size) for name, _ in table.rows)
+        return min(NAMES * width, longest + 2.0)
+
+    def row(self, row: Sequence[str], x: float, top: float, width: float, names: float) -> float:
+        """Write a name and its value. Return the height of their bottom [mm]."""
+        name, value = row
+        if not name:
+            return self.write(value, x, top - 0.15 * self.line, width)
+        low = self.write(name, x, top, names - 1.5, colour=DARK_GREY)
+        return min(low, self.write(value, x + names, top, width - names))
 
     def columns(self, tables: Sequence[Table], top: float) -> float:
         """Write tables of names and values in two columns of similar length.
@@ -130,9 +149,12 @@ class Writer:
             self.axes.plot([x, x + width], [y, y], color=colour, lw=0.5)
 
 
-def broken(text: str, width: float, size: float, bold: bool = False) -> list[str]:
-    """Return a text broken into lines no wider than `width` [mm]. A wider word is cut.
+def broken(
+    text: str, width: float, size: float, bold: bool = False, most: int = MOST_LINES
+) -> list[str]:
+    """Return a text broken into at most `most` lines no wider than `width` [mm].
 
+    A wider word is cut, and what is beyond the last line is replaced by an ellipsis.
     A number stays on a line with its interval and unit. A letter not in the font becomes "?".
     """
     lines, line = [], ""
@@ -156,12 +178,12 @@ def broken(text: str, width: float, size: float, bold: bool = False) -> list[str
             lines.append(line)
             line = word
     lines.append(line)
-    if len(lines) <= MOST_LINES:
+    if len(lines) <= most:
         return lines
-    last = lines[MOST_LINES - 1]
+    last = lines[most - 1]
     while last and text_width(f"{last} …", size, bold) > width:
         last = last[:-1]
-    return [*lines[: MOST_LINES - 1], f"{last} …"]
+    return [*lines[: most - 1], f"{last} …"]
 
 
 def text_width(text: str, size: float, bold: bool = False) -> float:
@@ -210,47 +232,105 @@ def write_sheet(result: str | Path, path: str | Path | None = None) -> tuple[Pat
     with claim_file(path):
         chamber = load_chamber(loaded)
         sheet = process_sheet(loaded, face_size_mm(chamber))
-        _save(path, draw_sheet(sheet, chamber), sheet.name)
+        pages = draw_sheet(sheet, chamber, chamber_limits(loaded))
+        _save(path, pages, sheet.name)
     return path, sheet
 
 
-def draw_sheet(sheet: Document, chamber: Chamber) -> Figure:
-    """Return a process sheet, a document of one section, as a figure of one page.
+def draw_sheet(
+    sheet: Document, chamber: Chamber, limits: Limits = MappingProxyType({})
+) -> list[Figure]:
+    """Return a process sheet as figures of its pages.
 
-    The page has a heading, a drawing of the chamber, the content, and lines for signatures.
+    The first page has a heading, sentences in red, a drawing of the chamber and the content, and
+    each page has the title block at its foot.
+
+    Args:
+        sheet: a document as process_sheet makes it.
+        limits: what the keys of [chamber] may be, for the drawing's dimensions.
     """
+    ignore_settings_here()
+    first, further, block = sheet.sections
+    axes = _page()
+    pages = [axes]
+    red = [one for one in first.content if isinstance(one, Sentence) and one.kind == "warning"]
+    content = [one for one in first.content if one not in red]
+    whole = [*content, *further.content]
+    top = _heading(axes, first.title, sheet, red)
+    for alone in (True, False):
+        shown, most = (whole, ALL_LINES) if alone else (content, MOST_LINES)
+        for size in SIZES:
+            room = top - FOOT + _content(Writer(None, size, most), shown, 0.0)
+            if room >= DRAWING_PER_PT * size or (alone and size <= LEAST_ALONE):
+                break
+        if room >= DRAWING_PER_PT * size:
+            break
+    tall = min(MOST_DRAWING, room) - CAPTION
+    views = draw_chamber(axes, chamber, MARGIN, top, (INNER, tall), limits)
+    Writer(axes, 6.0).write(f"{views}, {LEGEND}", MARGIN, top - tall, INNER, colour=DARK_GREY)
+    _content(Writer(axes, size, most), shown, top - tall - CAPTION)
+    if not alone:
+        pages += _further_pages(further, sheet.name)
+    for number, one in enumerate(pages, 1):
+        (fields,) = block.content
+        assert isinstance(fields, Table)
+        _title_block(one, [*fields.rows, ("sheet", f"{number} of {len(pages)}")])
+    return [figure for one in pages if (figure := one.get_figure(root=True))]
+
+
+def _page() -> Axes:
+    """Return the axes of a new page, in mm."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    ignore_settings_here()
     figure = Figure(figsize=(WIDTH / 25.4, HEIGHT / 25.4), dpi=RASTER)
     FigureCanvasAgg(figure)
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0), xlim=(0.0, WIDTH), ylim=(0.0, HEIGHT))
     axes.axis("off")
-    (section,) = sheet.sections
-    top, foot = _heading(axes, section.title, sheet), MARGIN + SIGNATURES
-    for size in SIZES:
-        room = top - foot + _content(Writer(None, size), section.content, 0.0)
-        if room >= DRAWING_PER_PT * size:
-            break
-    tall = min(MOST_DRAWING, room) - CAPTION
-    scale = draw_chamber(axes, chamber, MARGIN, top, (INNER, tall))
-    caption = f"Section A–A and plan, scale {scale}, {LEGEND}"
-    Writer(axes, 6.0).write(caption, MARGIN, top - tall, INNER, grey=True)
-    _content(Writer(axes, size), section.content, top - tall - CAPTION)
-    _signatures(axes)
-    return figure
+    return axes
 
 
-def _heading(axes: Axes, title: str, sheet: Document) -> float:
-    """Write title, name and answer of the sheet. Return the height of their bottom [mm]."""
+def _heading(axes: Axes, title: str, sheet: Document, red: Sequence[Sentence]) -> float:
+    """Write title, name and answer of the sheet, and sentences in red.
+
+    Returns:
+        Height of their bottom [mm].
+    """
     y = Writer(axes, 15.0).write(title, MARGIN, HEIGHT - MARGIN, 60.0, bold=True)
     beside, width = MARGIN + 62.0, INNER - 62.0
     name = Writer(axes, 9.0).write(sheet.name, beside, HEIGHT - MARGIN, width, bold=True)
-    y = min(y, Writer(axes, 7.0).write(sheet.subtitle, beside, name, width, grey=True)) - 1.5
+    y = min(y, Writer(axes, 7.0).write(sheet.subtitle, beside, name, width, colour=DARK_GREY)) - 1.5
     y = Writer(axes, 8.0).write(sheet.answer, MARGIN, y, INNER) - 1.5
+    for one in red:
+        y = Writer(axes, 8.0).write(one.text, MARGIN, y, INNER, bold=True, colour=RED) - 1.0
     Writer(axes, 8.0).rule(MARGIN, y, INNER, BLACK)
     return y
+
+
+def _further_pages(section: Section, name: str) -> Iterator[Axes]:
+    """Yield pages with the tables of a section, one below the other, as wide as the page.
+
+    A page is not finished before the next one is asked for.
+    """
+    measure, y, write = Writer(None, SIZES[0], ALL_LINES), FOOT, Writer(None, SIZES[0])
+    for table in section.content:
+        assert isinstance(table, Table)
+        names, caption = measure.names(table, INNER), table.caption
+        for row in table.rows:
+            head = -measure.caption(caption, MARGIN, 0.0, INNER) if caption else 0.0
+            if y - head + measure.row(row, MARGIN, 0.0, INNER, names) <= FOOT:
+                axes = _page()
+                yield axes
+                write, caption = Writer(axes, SIZES[0], ALL_LINES), table.caption
+                y = Writer(axes, 12.0).write(
+                    section.title, MARGIN, HEIGHT - MARGIN, 80.0, bold=True
+                )
+                beside, width = MARGIN + 82.0, INNER - 82.0
+                y = min(y, Writer(axes, 9.0).write(name, beside, HEIGHT - MARGIN, width)) - 3.0
+            if caption:
+                y, caption = write.caption(caption, MARGIN, y, INNER), ""
+            y = write.row(row, MARGIN, y, INNER, names) - 0.3 * write.line
+        y -= 0.8 * write.line
 
 
 def _content(write: Writer, content: Sequence[Block], top: float) -> float:
@@ -269,22 +349,28 @@ def _content(write: Writer, content: Sequence[Block], top: float) -> float:
     return y
 
 
-def _signatures(axes: Axes) -> None:
-    """Draw lines for signatures at the foot of the page."""
-    width, write = (INNER - 3.0 * GAP) / len(SIGNED), Writer(axes, 7.0)
-    for number, what in enumerate(SIGNED):
-        x = MARGIN + number * (width + GAP)
-        write.rule(x, MARGIN + 3.5, width, BLACK)
-        write.write(what, x, MARGIN + 3.0, width, grey=True)
+def _title_block(axes: Axes, fields: Sequence[Sequence[str]]) -> None:
+    """Draw the title block at the foot of a page. A field without a value is room to write."""
+    from matplotlib.patches import Rectangle
+
+    width = INNER / FIELDS
+    for number, (name, value) in enumerate(fields):
+        row, column = divmod(number, FIELDS)
+        x, y = MARGIN + column * width, MARGIN + (1 - row) * ROW
+        axes.add_patch(Rectangle((x, y), width, ROW, facecolor="none", edgecolor=BLACK, lw=0.5))
+        top = Writer(axes, 5.5).write(name, x + 1.0, y + ROW - 0.8, width - 2.0, colour=DARK_GREY)
+        Writer(axes, 6.5, most=2).write(value, x + 1.0, top - 0.2, width - 2.0)
 
 
-def _save(path: Path, figure: Figure, title: str) -> None:
-    """Write the page as a PDF file with text that can be selected, whole or not at all."""
+def _save(path: Path, pages: Sequence[Figure], title: str) -> None:
+    """Write pages as a PDF file with text that can be selected, whole or not at all."""
     from matplotlib import rc_context
+    from matplotlib.backends.backend_pdf import PdfPages
 
     content = io.BytesIO()
-    with rc_context({"pdf.fonttype": 42}):
-        title = title.encode(errors="replace").decode()  # the name of a folder may be no valid text
-        about = {"Creator": CREATOR, "Title": f"{title}: process sheet"}
-        figure.savefig(content, format="pdf", metadata=about)
+    title = title.encode(errors="replace").decode()  # the name of a folder may be no valid text
+    about = {"Creator": CREATOR, "Title": f"{title}: process sheet"}
+    with rc_context({"pdf.fonttype": 42}), PdfPages(content, metadata=about) as file:
+        for page in pages:
+            page.savefig(file, format="pdf")
     write_bytes(path, content.getvalue())

@@ -29,7 +29,7 @@ def report(result: Path, /, *, sheet: bool = False, json: Json = False, out: Pag
     result
         Results folder of a study or a simulation.
     sheet
-        Write a process sheet instead: one A4 page (.pdf) to print, with drawing, settings, what to
+        Write a process sheet instead: A4 (.pdf) to print, with drawing, settings, what to
         expect and what to measure first.
     """
     from chamberopt.common.progress import step
