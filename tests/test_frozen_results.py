@@ -139,7 +139,7 @@ TIMED = "to build the chamber|to simulate|to compute the coverage|run time of al
 MASKS = {
     r"\d{4}-\d\d-\d\d(T[\d:.+]+)?": MASKED,
     r"\b[0-9a-f]{64}\b": MASKED,
-    r"(?<=sha256 )[0-9a-f]{30,}( [0-9a-f]+)?": MASKED,  # broken into two lines on a sheet
+    r"(?<=sha256 )([0-9a-f]{30,}( [0-9a-f]+)?|[0-9a-f]{12}\b)": MASKED,  # of a sheet, broken or cut
     r"(?<=chamberopt )\d[\w.]*": MASKED,
     r"[\d.]+(?= MB)": MASKED,
     r"(?<=candidates in )[\d.]+ \w+": MASKED,
