@@ -281,15 +281,11 @@ def find_reach(
         normals: unit vectors of the surface at the corners of the cavity's triangles, into the
             cavity, shape (k, 3, 3). None if the triangles are the surface.
     """
-    if normals is None:
-        normals = np.repeat(-unit_normals(mesh.corners)[:, None], 3, axis=1)
     radius = 0.5 * diameter
-    overlap = TOLERATED_OVERLAP * radius
     near_cell = radius + 1.01 * np.sqrt(3.0) * cell_edge(mesh, radius)
     max_radius = max(near_cell, MEASURED_WIDTH * 0.5 * (largest or diameter))
-    spacing = _spacing(mesh, SPACING * radius)
-    widest = float(spacing.max())
-    touches = find_touch_points(mesh, normals, spacing, max_radius, overlap)
+    touches, widest = find_touches(mesh, diameter, max_radius, normals)
+    overlap = TOLERATED_OVERLAP * radius
     region, volume = find_regions(mesh, touches, radius - overlap, widest)
     fits = touches.radius >= radius
     region = np.where(fits, region, -1)
@@ -297,6 +293,24 @@ def find_reach(
     reached = fits & np.isin(region, start)
     share = _share(touches.triangle, touches.area, reached, len(mesh.triangles))
     return Reach(mesh, diameter, touches, fits, reached, region, volume, widest, share)
+
+
+def find_touches(
+    mesh: TriangleMesh, diameter: float, max_radius: float, normals: np.ndarray | None = None
+) -> tuple[TouchPoints, float]:
+    """Return the points to test on a cavity's surface, and the largest distance between them [m].
+
+    Args:
+        diameter: diameter of the smallest ball [m].
+        max_radius: radius [m] up to which the largest ball at each point is found.
+        normals: those of `find_reach`.
+    """
+    if normals is None:
+        normals = np.repeat(-unit_normals(mesh.corners)[:, None], 3, axis=1)
+    radius = 0.5 * diameter
+    spacing = _spacing(mesh, SPACING * radius)
+    overlap = TOLERATED_OVERLAP * radius
+    return find_touch_points(mesh, normals, spacing, max_radius, overlap), float(spacing.max())
 
 
 def reached_part_share(reach: Reach, source: np.ndarray, count: int) -> np.ndarray:

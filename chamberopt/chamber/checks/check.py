@@ -201,7 +201,7 @@ def warnings(design: Design, chamber: Chamber, reach: Reach | None = None) -> li
     texts += facet_warnings(chamber.part, reach.diameter, _reached_share(reach, chamber.on_target))
     texts += pocket_warnings(reach, chamber)
     turns = design.effects.part_turn is not None
-    texts += gap_warnings(reach, chamber, design.shot.diameter, turns)
+    texts += gap_warnings(reach, chamber, design.shot.diameters, turns)
     return texts + fillet_warnings(reach, chamber, max(design.shot.diameters))
 
 

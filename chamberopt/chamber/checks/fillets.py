@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from chamberopt.chamber.checks.gaps import MAX_COSINE
+from chamberopt.chamber.checks.jams import MAX_COSINE
 from chamberopt.chamber.checks.place_names import one_of
 from chamberopt.chamber.largest_ball import largest_balls
 from chamberopt.chamber.reach import TOLERATED_OVERLAP

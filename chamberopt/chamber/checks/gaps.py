@@ -1,16 +1,18 @@
 """Warnings about shapes that keep the shot from the surface, each with a position and a remedy.
 
-Such shapes are gaps too narrow for a ball, wedges that hold a ball, pockets behind a narrow mouth,
+Such shapes are gaps in which balls jam, gaps too narrow for a ball, pockets behind a narrow mouth,
 and hollows sharper than a ball.
 """
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from chamberopt.chamber.build import TARGET, selection_of
+from chamberopt.chamber.checks.jams import JamGap, clusters, gaps_in_reach, jam_gaps, sides_of_gap
 from chamberopt.chamber.checks.place_names import (
     CEILING,
     SONOTRODE,
@@ -21,51 +23,50 @@ from chamberopt.chamber.checks.place_names import (
 )
 from chamberopt.chamber.largest_ball import TouchPoints
 from chamberopt.chamber.reach import TOLERATED_OVERLAP
+from chamberopt.common.number_text import percent
 from chamberopt.design.shape_surface import TAG_PART, TAG_SONOTRODE, TAG_WALL
 from chamberopt.geometry.triangles import area_vectors, connected_pieces, sides_of
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from chamberopt.chamber.build import Chamber
     from chamberopt.chamber.reach import Reach
     from chamberopt.design.load import Design
 
-# Two faces hold a ball by friction, however hard it is pushed in, if the tangent of half the angle
-# between them is below the coefficient of friction, here the value of dry steel. Such faces count
-# as facing each other. Hollows that open wider count as roots.
-FRICTION = 0.3
-MAX_COSINE = -(1.0 - FRICTION**2) / (1.0 + FRICTION**2)  # between the normals of facing faces
-WIDTH_TOLERANCE = 0.1  # share of the ball's diameter within which a gap is as wide as the ball
 MAX_WARNINGS = 4  # of one kind
 MIN_MISSED_SHARE = 0.005  # share of the target that is worth a warning
 
-# The two surfaces beside a gap, and true if a ball can wedge in the gap.
-GapKind = tuple[str, str, bool]
+MIN_FREE = 0.1  # ball diameters: smaller balls are no remedy
+NEW_SHAPE, CLOSED = "change the chamber's shape", "close it where it is not to be peened"
+Sides = tuple[str, str]  # the surfaces beside a gap
 
 
-def gap_warnings(reach: Reach, chamber: Chamber, largest: float, turns: bool = False) -> list[str]:
-    """Return warnings about gaps narrower than the largest ball, the largest areas first.
+def gap_warnings(
+    reach: Reach, chamber: Chamber, diameters: Sequence[float], turns: bool = False
+) -> list[str]:
+    """Return warnings about gaps in which balls jam, and about narrower ones, by size.
 
     Args:
-        largest: diameter of the largest ball [m].
+        diameters: those of the balls [m].
         turns: True if the part turns, so that a ball may be jammed beside it.
     """
-    touches = reach.touches
-    facing = (touches.obstacle >= 0) & (touches.cosine < MAX_COSINE)
-    narrow = facing & (touches.radius < 0.5 * largest)
-    almost_narrow = touches.radius < 0.5 * (1.0 + WIDTH_TOLERANCE) * largest
-    entrance = touches.select(facing & reach.reached & ~narrow & almost_narrow).centre
-    inside, names = touches.select(narrow), surface_names(chamber)
-    gaps: dict[GapKind, list[TouchPoints]] = {}
-    for members in _clusters(inside.centre, 2.0 * reach.spacing):
-        gap = inside.select(members)
-        if gap.area.sum() > (0.5 * largest) ** 2:
-            pairs = np.sort(np.c_[names[gap.triangle], names[gap.obstacle]].astype(str), axis=1)
-            sides, counts = np.unique(pairs, axis=0, return_counts=True)
-            one, two = map(str, sides[counts.argmax()])  # the surfaces beside most of the gap
-            wedge = _is_wedge(gap, entrance, largest, 2.0 * reach.spacing)
-            gaps.setdefault((one, two, wedge), []).append(gap)
-    kinds = sorted(gaps, key=lambda kind: -sum(gap.area.sum() for gap in gaps[kind]))[:MAX_WARNINGS]
-    return [_gap_warning(kind, gaps[kind], reach.diameter, largest, turns) for kind in kinds]
+    gaps, largest = gaps_in_reach(reach), max(diameters)
+    jams = [(size, gap) for size in sorted(set(diameters)) for gap in jam_gaps(chamber, size, gaps)]
+    jammed = np.unique(np.concatenate([gap.rows for _, gap in jams] or [np.zeros(0, dtype=int)]))
+    inside = np.flatnonzero(np.isfinite(gaps.width) & (reach.touches.radius < 0.5 * largest))
+    names = surface_names(chamber)
+    narrow: dict[Sides, list[TouchPoints]] = {}
+    for members in clusters(reach.touches.centre[inside], 2.0 * reach.spacing):
+        gap = reach.touches.select(inside[members])
+        in_jam = np.isin(inside[members], jammed).any()
+        if gap.area.sum() > (0.5 * largest) ** 2 and not in_jam:
+            narrow.setdefault(sides_of_gap(gap, names), []).append(gap)
+    largest_first = sorted(narrow, key=lambda one: -sum(gap.area.sum() for gap in narrow[one]))
+    return _jam_warnings(jams) + [
+        _narrow_warning(sides, narrow[sides], reach.diameter, largest, turns)
+        for sides in largest_first[:MAX_WARNINGS]
+    ]
 
 
 def pocket_warnings(reach: Reach, chamber: Chamber) -> list[str]:
@@ -121,85 +122,90 @@ def surface_warnings(
     ]
 
 
-def _clusters(centre: np.ndarray, near: float) -> list[np.ndarray]:
-    """Return the indices of the points in each group whose points are linked by steps of at most
-    ``near`` [m].
+def _jam_warnings(jams: list[tuple[float, JamGap]]) -> list[str]:
+    """Return warnings about gaps in which balls jam, one for all between the same two surfaces.
 
     Args:
-        centre: the points [m], (n, 3).
+        jams: diameter of the balls [m], and the gap.
     """
-    from scipy.spatial import KDTree
-
-    if not len(centre):
-        return []
-    one, two = KDTree(centre).query_pairs(near, output_type="ndarray").T
-    label = connected_pieces(one, two, len(centre))[1]
-    order = np.argsort(label, kind="stable")
-    return np.split(order, np.flatnonzero(np.diff(label[order])) + 1)
+    kinds: dict[tuple[float, Sides], list[JamGap]] = {}
+    for diameter, gap in jams:
+        kinds.setdefault((diameter, gap.sides), []).append(gap)
+    first = sorted(kinds, key=lambda kind: -sum(gap.area for gap in kinds[kind]))[:MAX_WARNINGS]
+    return [_jam_warning(diameter, kinds[diameter, sides]) for diameter, sides in first]
 
 
-def _is_wedge(gap: TouchPoints, entrance: np.ndarray, largest: float, near: float) -> bool:
-    """True if a gap narrows steadily from an entrance as wide as a ball, which balls reach.
+def _jam_warning(diameter: float, gaps: list[JamGap]) -> str:
+    """Return one warning about all gaps between the same surfaces in which such balls [m] jam."""
+    low, high = min(gap.width[0] for gap in gaps), max(gap.width[1] for gap in gaps)
+    share = sum(gap.target_share for gap in gaps)
+    target = f", on {percent(share)} of the target" if share else ""
+    below, above = min(gap.free_below for gap in gaps), max(gap.free_above for gap in gaps)
+    ends = [
+        f"below {math.floor(1e5 * below) / 100:g} mm" * (below > MIN_FREE * diameter),
+        f"above {math.ceil(1e5 * above) / 100:g} mm" if math.isfinite(above) else "",
+    ]
+    free = " or ".join(end for end in ends if end)
+    remedy = f"balls {free} do not jam in there; or " if free else ""
+    return (
+        f"balls of {1e3 * diameter:g} mm can jam in {_where(gaps[0].sides, len(gaps))} at "
+        f"{around(gaps[0].place[None])} in the chamber's frame, {_width(low, high)} wide there"
+        f"{target}: friction holds balls between faces that are 0.9 to 1.15 balls apart, or they "
+        f"rattle; {remedy}{_change(set(gaps[0].sides))}"
+    )
 
-    Args:
-        entrance: centres (n, 3) [m] of reached balls in gaps slightly wider than the largest ball.
-        largest: diameter of the largest ball [m].
-        near: largest distance from the gap to its entrance [m].
-    """
-    from scipy.spatial import KDTree
 
-    begins = gap.centre[gap.radius > 0.5 * (1.0 - WIDTH_TOLERANCE) * largest]
-    return bool(len(begins) and len(entrance) and KDTree(entrance).query(begins)[0].min() < near)
-
-
-def _gap_warning(
-    kind: GapKind, gaps: list[TouchPoints], smallest: float, largest: float, turns: bool
+def _narrow_warning(
+    sides: Sides, gaps: list[TouchPoints], smallest: float, largest: float, turns: bool
 ) -> str:
-    """Return one warning about all gaps between the same two surfaces.
+    """Return one warning about all narrow gaps between the same two surfaces.
 
     Args:
-        kind: names of both surfaces, and True if a ball can wedge in the gap.
+        sides: names of both surfaces.
         smallest, largest: diameters of the balls [m].
         turns: True if the part turns.
     """
-    one, two, wedge = kind
     biggest = max(gaps, key=lambda gap: gap.area.sum())
     radius = np.concatenate([gap.radius for gap in gaps])
     low, high = (
-        max(0.0, 1e3 * (2.0 * end - TOLERATED_OVERLAP * 0.5 * smallest))
+        max(0.0, 2.0 * end - TOLERATED_OVERLAP * 0.5 * smallest)
         for end in (radius.min(), radius.max())
     )
-    between = f"between {one} and {two}" if one != two else f"of {one}"
     where = f"at {one_of(biggest.centre, biggest.area)} in the chamber's frame"
-    what = (
-        f"the gap {between} {where}"
-        if len(gaps) == 1
-        else f"each of {len(gaps)} gaps {between}, one {where},"
-    )
+    balls = "no ball gets" if high < smallest else "only the smaller balls get"
     ball = f"a ball of {1e3 * largest:g} mm"
-    if wedge:
-        fault = (
-            f"narrows from more than {ball} to {low:.3g} mm, so gently that friction holds it: it "
-            "can wedge there"
-        )
-    else:
-        width = f"{low:.3g} to {high:.3g}" if low < 0.98 * high else f"{high:.3g}"
-        balls = "no ball gets" if high < 1e3 * smallest else "only the smaller balls get"
-        fault = f"is {width} mm wide, narrower than {ball}: {balls} in there"
-        if turns and "part" in one + two:
-            fault += ", or one may be jammed as the part turns"
-    return f"{what} {fault}; {_remedy({one, two})}"
+    jam = ", or one may be jammed as the part turns" * (turns and "part" in "".join(sides))
+    change = _change(set(sides))
+    if change in (NEW_SHAPE, CLOSED):
+        change += ", or use smaller balls"
+    return (
+        f"{_where(sides, len(gaps))} {where} is {_width(low, high)} wide, narrower than {ball}: "
+        f"{balls} in there{jam}; {change}"
+    )
 
 
-def _remedy(sides: set[str]) -> str:
+def _where(sides: Sides, count: int) -> str:
+    one, two = sides
+    between = f"between {one} and {two}" if one != two else f"of {one}"
+    return f"the gap {between}" if count == 1 else f"each of {count} gaps {between}, one"
+
+
+def _width(low: float, high: float) -> str:
+    """Return the widths [m] of a gap as text."""
+    one, two = (f"{1e3 * width:.3g}" for width in (low, high))
+    return f"{one} to {two} mm" if low < 0.98 * high else f"{two} mm"
+
+
+def _change(sides: set[str]) -> str:
+    """Return what to change of the chamber so that a gap between these surfaces is no more."""
     if not any("part" in side for side in sides):
-        return "change the chamber's shape, or use smaller balls"
+        return NEW_SHAPE
     if SONOTRODE in sides:
         return "raise chamber.sonotrode_distance_mm"
     if CEILING in sides:
         return "raise the ceiling or close the gap"
     if all("part" in side for side in sides):
-        return "use smaller balls, or close it where it is not to be peened"
+        return CLOSED
     return "enlarge the chamber, check part.offset_mm, or close the gap"
 
 

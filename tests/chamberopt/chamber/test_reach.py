@@ -51,7 +51,8 @@ def cavity(*pieces: trimesh.Trimesh, above_mm: float = 10.0) -> Chamber:
     source = np.full(len(triangles), -1)
     source[own] = np.arange(len(own))
     area = areas(vertices, triangles[own])
-    part = Part(vertices, triangles[own], area, np.ones(len(own), dtype=bool), "niche")
+    out_of_part = triangles[own][:, ::-1]
+    part = Part(vertices, out_of_part, area, np.ones(len(own), dtype=bool), "niche")
     return Chamber(vertices, triangles, tags, source, 1e-9 * whole.volume, part, area, ())
 
 
@@ -86,7 +87,7 @@ def test_of_a_slot_narrower_than_the_ball_nothing_is_touched_and_it_is_said() ->
     chamber = slot(2.4)
     found = reached(chamber)
     assert reached_area_mm2(found, facing_x(found)) == 0.0
-    (said,) = gap_warnings(found, chamber, BALL)
+    (said,) = gap_warnings(found, chamber, [BALL])
     assert "2.4 mm wide, narrower than a ball of 3 mm: no ball gets in there" in said
     assert "the gap of the part's side" in said
     (said,) = surface_warnings(found, chamber)
@@ -94,7 +95,7 @@ def test_of_a_slot_narrower_than_the_ball_nothing_is_touched_and_it_is_said() ->
     (said,) = surface_warnings(found, chamber, "zone root")
     assert said.startswith("100.0% of zone root in the chamber (")
     assert said.endswith("; or narrow the target of zone root")
-    assert not gap_warnings(reached(slot(3.3)), slot(3.3), BALL)
+    assert not gap_warnings(reached(slot(3.6)), slot(3.6), [BALL])
 
 
 @pytest.mark.parametrize("half_angle", [12.0, 35.0, 60.0])
@@ -117,8 +118,8 @@ def test_a_groove_is_touched_down_to_where_the_ball_lies_on_both_flanks(half_ang
     touched = found.touches.point[flanks & found.reached]
     lowest = (10.0 + deep - 1e3 * touched[:, 2].max()) / np.cos(a)
     assert lowest == pytest.approx(first, abs=0.1)
-    wedges = gap_warnings(found, chamber, BALL)
-    assert any("can wedge there" in text for text in wedges) == (half_angle == 12.0)
+    wedges = gap_warnings(found, chamber, [BALL])
+    assert any("balls of 3 mm can jam in" in text for text in wedges) == (half_angle == 12.0)
 
 
 def pocket(neck_mm: float) -> Chamber:
