@@ -146,12 +146,11 @@ def _jam_warning(diameter: float, gaps: list[JamGap]) -> str:
         f"above {math.ceil(1e5 * above) / 100:g} mm" if math.isfinite(above) else "",
     ]
     free = " or ".join(end for end in ends if end)
-    remedy = f"balls {free} do not jam in there; or " if free else ""
+    remedy = f"use balls {free}, or " if free else ""
     return (
         f"balls of {1e3 * diameter:g} mm can jam in {_where(gaps[0].sides, len(gaps))} at "
         f"{around(gaps[0].place[None])} in the chamber's frame, {_width(low, high)} wide there"
-        f"{target}: friction holds balls between faces that are 0.9 to 1.15 balls apart, or they "
-        f"rattle; {remedy}{_change(set(gaps[0].sides))}"
+        f"{target}; {remedy}{_change(set(gaps[0].sides))}"
     )
 
 
