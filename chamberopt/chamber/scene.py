@@ -248,4 +248,5 @@ def build_scene(
         duration=design.process.recorded_time,
         warmup=design.process.accuracy.warmup_time,
         record=(TAG_PART,),
+        record_held=False,
     )

@@ -210,7 +210,7 @@ def peen_strip(
             FITS,
             *_few_dents(dents),
             *resting_notes([one.resting for one in replicas if one.resting], len(replicas)),
-            *trapped_notes([one.trapped for one in replicas], design.effects.roughness is not None),
+            *trapped_notes([one.trapped for one in replicas], design),
         ),
     )
 

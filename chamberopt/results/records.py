@@ -151,8 +151,12 @@ class TrappedRecord(Table):
 
     Args:
         hopping_time, rattling_time: share of the balls times recorded time.
-        hopping_impacts, rattling_impacts: share of the impacts on the part.
+        hopping_impacts, rattling_impacts: share of all impacts on the part. Those of rattling balls
+            are in no figure.
         hopping_at_end: share of the balls that hopped on one spot at the end.
+        rattling_balls: share of the balls that rattled in a gap at some time; None if not known, as
+            in results whose figures still have the impacts of rattling balls.
+        rattling_longest: share of the recorded time in which the ball held longest was held.
     """
 
     hopping_time: Share
@@ -160,6 +164,8 @@ class TrappedRecord(Table):
     hopping_at_end: Share
     rattling_time: Share
     rattling_impacts: Share
+    rattling_balls: Share | None = None
+    rattling_longest: Share | None = None
 
 
 class AdviceRecord(Table):

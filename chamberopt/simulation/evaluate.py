@@ -209,9 +209,7 @@ class _Run:
                 *zone_notes,
                 *stress_notes(design.materials.part),
                 *resting_notes([one.resting for one in replicas if one.resting], done),
-                *trapped_notes(
-                    [one.trapped for one in replicas], design.effects.roughness is not None
-                ),
+                *trapped_notes([one.trapped for one in replicas], design),
             ),
             zones={name: one.field.reachable for name, one in zones.items()},
             stream=plan.stream,

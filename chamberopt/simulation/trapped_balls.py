@@ -1,24 +1,26 @@
 """Write notes on balls that hop on one spot or rattle in a gap while impacts are recorded.
 
-Their impacts are in the figures, although they dent one spot again and again. Definitions
-of *hopping* and *rattling* balls are in sim_core/loop/stays.py.
+Hops are in the figures, although they dent one spot again and again. Rattling balls are jammed,
+held in their gap, and the simulator leaves their impacts out, so that they are in no figure.
+Definitions of *hopping* and *rattling* balls are in sim_core/loop/stays.py.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from chamberopt.chamber.checks.place_names import around, surface_names
-from chamberopt.common.number_text import percent
+from chamberopt.common.number_text import percent, plain
 from chamberopt.design.shape_surface import TAG_PART
 from chamberopt.simulation.resting_balls import join_names, triangles_near
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
+    from chamberopt.design.load import Design
     from sim_core import SimulationResult
 
 # Share of the shot's time, or of the impacts, from which on there is a note. Below it no figure
@@ -35,7 +37,10 @@ class TrappedBalls:
         hopping_time: share of the balls times recorded time in which balls hopped on one spot.
         hopping_impacts: share of the impacts on the part that these hops made.
         hopping_at_end: share of the balls that hopped on one spot at the end.
-        rattling_time, rattling_impacts: the same shares for balls in a gap.
+        rattling_time: share of the balls times recorded time in which balls were held in a gap.
+        rattling_impacts: share of all impacts on the part that they made there, which are left out.
+        rattling_balls: share of the balls that were held in a gap at some time.
+        rattling_longest: share of the recorded time in which the ball held longest was held.
         place: surfaces and position of the gap whose balls hit the part most often; "" without.
     """
 
@@ -44,10 +49,14 @@ class TrappedBalls:
     hopping_at_end: float
     rattling_time: float
     rattling_impacts: float
+    rattling_balls: float
+    rattling_longest: float
     place: str
 
 
-NOT_TRAPPED = TrappedBalls(0.0, 0.0, 0.0, 0.0, 0.0, "")  # in a replica of which nothing is known
+NOT_TRAPPED = TrappedBalls(
+    0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, ""
+)  # in a replica of which nothing is known
 SHARES = tuple(one.name for one in fields(TrappedBalls) if one.name != "place")
 
 
@@ -61,7 +70,8 @@ def find_trapped_balls(
         part_turns: whether the part turns. Its surfaces are then not named.
     """
     found, balls = result.trapped, len(result.balls)
-    impacts = max(len(result.impacts), 1)
+    left_out = int(found.rattling_hits.sum())
+    impacts = max(len(result.impacts) + left_out, 1)
     time = balls * duration
     hops = found.at_end & (found.hopping > 0.0)
     return TrappedBalls(
@@ -69,7 +79,9 @@ def find_trapped_balls(
         hopping_impacts=int(found.hopping_hits.sum()) / impacts,
         hopping_at_end=int(hops.sum()) / balls,
         rattling_time=min(1.0, float(found.rattling.sum()) / time),
-        rattling_impacts=int(found.rattling_hits.sum()) / impacts,
+        rattling_impacts=left_out / impacts,
+        rattling_balls=int((found.rattling > 0.0).sum()) / balls,
+        rattling_longest=min(1.0, float(found.rattling.max(initial=0.0)) / duration),
         place=_place(result, chamber, part_turns),
     )
 
@@ -94,12 +106,30 @@ def trapped_shares(found: Sequence[TrappedBalls]) -> dict[str, float]:
     return {name: float(np.mean([getattr(one, name) for one in found])) for name in SHARES}
 
 
-def trapped_notes(found: Sequence[TrappedBalls], rough: bool) -> tuple[str, ...]:
-    """Return notes on hopping and on rattling balls, if there are so many that figures change.
+def jammed_text(shares: Mapping[str, float], design: Design) -> str:
+    """Return how many balls are lost in gaps and for how long, as text; "" if hardly any are.
+
+    Args:
+        shares: mean of each share over the replicas, by its name.
+    """
+    if max(shares["rattling_time"], shares["rattling_impacts"]) < MIN_SHARE:
+        return ""
+    seconds = design.process.recorded_time
+    return (
+        f"{plain(shares['rattling_balls'] * design.shot.count, 2)} of {design.shot.count} balls "
+        "jam in gaps about as wide as themselves, the longest held one for "
+        f"{plain(shares['rattling_longest'] * seconds, 2)} of {plain(seconds, 2)} s: the shot "
+        f"loses {percent(shares['rattling_time'])} of its time, and "
+        f"{percent(shares['rattling_impacts'])} of all impacts on the part are those of held "
+        "balls, which count in no figure"
+    )
+
+
+def trapped_notes(found: Sequence[TrappedBalls], design: Design) -> tuple[str, ...]:
+    """Return notes on hopping and on rattling balls, if there are so many that they matter.
 
     Args:
         found: what they did in each replica.
-        rough: whether the design has rough faces.
     """
     mean = trapped_shares(found)
     notes = []
@@ -109,7 +139,7 @@ def trapped_notes(found: Sequence[TrappedBalls], rough: bool) -> tuple[str, ...]
         ends = "" if not end else f", and at the end {_of_the_shot(end)} did"
         remedy = (
             "the shot may be too dense to move sideways: lower shot.mass_g"
-            if rough
+            if design.effects.roughness is not None
             else "smooth faces with friction take all sideways speed of a few balls, and rough "
             "ones give it back: give effects.roughness, e.g. { slope_deg = 3 }"
         )
@@ -119,15 +149,10 @@ def trapped_notes(found: Sequence[TrappedBalls], rough: bool) -> tuple[str, ...]
             f"{percent(mean['hopping_impacts'])} of the impacts on the part{ends}; do not trust "
             f"where the dents are; {remedy}"
         )
-    if mean and max(mean["rattling_time"], mean["rattling_impacts"]) >= MIN_SHARE:
-        some = sum(one.place != "" for one in found)
+    if mean and (jammed := jammed_text(mean, design)):
         worst = max(found, key=lambda one: (one.rattling_impacts, one.rattling_time))
         notes.append(
-            f"in {some} of {len(found)} replicas balls sat in a gap hardly narrower or wider than "
-            f"themselves: {percent(mean['rattling_impacts'])} of the impacts on the part are "
-            f"their rattling, in {percent(mean['rattling_time'])} of the shot's time, e.g. "
-            f"{worst.place}; their slow impacts lower the mean speed; give another "
-            "shot.diameter_mm than the gap, or close it"
+            f"{jammed}; e.g. {worst.place}; give another shot.diameter_mm than the gap, or close it"
         )
     return tuple(notes)
 

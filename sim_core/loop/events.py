@@ -156,9 +156,10 @@ def advance(state: SimulationState) -> tuple[int, int]:
             elif was_still:
                 wake_if_it_moves(state.contact, queue, state.motion, event)
         # 4 log
-        log_impact(buffer, event, clock.origin, impact, state.obstacles.lookup)
         recorded = buffer.record[impact.tag]
-        note_hit(state.stays, state.sizes, state.contact, event, impact, recorded)
+        held = note_hit(state.stays, state.sizes, state.contact, event, impact, recorded)
+        if not held or buffer.record_held[0]:
+            log_impact(buffer, event, clock.origin, impact, state.obstacles.lookup)
         if kind == SURFACE and not (
             _speed_squared(state, ball) <= speed_limit(state.neighbours) ** 2
         ):

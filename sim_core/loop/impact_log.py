@@ -47,6 +47,7 @@ class ImpactBuffer(NamedTuple):
 
     filled: number of rows written, (1,).
     record: True if the surface of a tag is recorded, (MAX_TAGS,) bool.
+    record_held: True if impacts of balls that rattle in a gap are logged too, (1,) bool.
     """
 
     time: np.ndarray
@@ -57,12 +58,14 @@ class ImpactBuffer(NamedTuple):
     normal_speed: np.ndarray
     filled: np.ndarray
     record: np.ndarray
+    record_held: np.ndarray
 
 
-def new_impact_buffer(record: np.ndarray) -> ImpactBuffer:
+def new_impact_buffer(record: np.ndarray, record_held: bool) -> ImpactBuffer:
     """Return an empty buffer for impacts.
 
     ``record``: True for each surface whose impacts are recorded, by its tag, (MAX_TAGS,) bool.
+    ``record_held``: True if impacts of balls that rattle in a gap are logged too.
     """
     return ImpactBuffer(
         time=np.zeros(BUFFER_SIZE),
@@ -73,6 +76,7 @@ def new_impact_buffer(record: np.ndarray) -> ImpactBuffer:
         normal_speed=np.zeros(BUFFER_SIZE),
         filled=np.zeros(1, dtype=np.int64),
         record=record,
+        record_held=np.array([record_held]),
     )
 
 

@@ -4,13 +4,19 @@ A series holds the successive hits of a ball on surfaces that lie within a ball'
 first hit sideways, and during which the ball hits surfaces more often than other balls. In a series
 of MIN_HITS or more the ball is
 
-- *rattling* in a gap, if all hits also lie within a ball's radius in height, come from surfaces
-  that face each other, and are slow: below SLOW of the sonotrode's peak speed on average;
-- *hopping* on one spot, if it is not rattling and the series lasts for MIN_TIME or more.
+- *rattling* in a gap, as long as all hits so far also lie within a ball's radius in height, come
+  from surfaces that face each other, and are slow: below SLOW of the sonotrode's peak speed on
+  average. It is held in its gap;
+- *hopping* on one spot, if it never rattled and the series lasts for MIN_TIME or more.
+
+Whether a ball rattles is decided at each hit by the hits so far, so that a simulation that is cut
+short decides alike. The first MIN_HITS - 1 hits of a series, with which a ball gets into its gap,
+are therefore like any others.
 
 Sideways means across gravity, or, without gravity, across the motion of the sonotrode. A series
 also ends when the ball lands to lie still, slide or roll, of which contact mode tells. Hops that
-end like this are not those of a hopping ball. On a turning part a hit lies where it is on the part.
+end like this are not those of a hopping ball. The series of a rattling ball also ends when the ball
+gets out of its gap upwards or downwards. On a turning part a hit lies where it is on the part.
 """
 
 import math
@@ -55,8 +61,10 @@ class Stays(NamedTuple):
     hits: number of the hits, (n,) int32. 0 if there is no series.
     logged: number of those on recorded surfaces, (n,) int32.
     meetings: number of collisions with balls during the series, (n,) int32.
-    time: time for which each ball was HOPPING and RATTLING in past series [s], (n, 2).
-    recorded: number of the hits on recorded surfaces in this time, (n, 2) int64.
+    rattled: last hit at which the ball was rattling [s since the start], (n,).
+    time: time for which each ball was HOPPING in past series, and RATTLING so far [s], (n, 2).
+    recorded: number of the hits on recorded surfaces in past series of hops, and of those at which
+        the ball was rattling, (n, 2) int64.
     spot: position of the ball's centre at the start of the latest of these series [m], (n, 3).
     """
 
@@ -72,6 +80,7 @@ class Stays(NamedTuple):
     hits: np.ndarray
     logged: np.ndarray
     meetings: np.ndarray
+    rattled: np.ndarray
     time: np.ndarray
     recorded: np.ndarray
     spot: np.ndarray
@@ -84,7 +93,8 @@ class Trapped:
     ball: numbers of the balls, (k,).
     hopping: time for which each of them hopped on one spot [s], (k,).
     rattling: time for which it sat in a gap [s], (k,).
-    hopping_hits, rattling_hits: number of its hits on the recorded surfaces in this time, (k,).
+    hopping_hits: number of its hits on the recorded surfaces in this time, (k,).
+    rattling_hits: number of its hits on the recorded surfaces at which it was rattling, (k,).
     at_end: True if it did so at the end, (k,) bool.
     position: position of its centre when it began to do so for the last time [m], (k, 3).
     """
@@ -133,6 +143,7 @@ def new_stays(balls: int, radius: float, gravity: Gravity | None, waves: tuple[W
         hits=whole(),
         logged=whole(),
         meetings=whole(),
+        rattled=real(),
         time=np.zeros((balls, 2)),
         recorded=np.zeros((balls, 2), dtype=np.int64),
         spot=np.zeros((balls, 3)),
@@ -147,26 +158,29 @@ def note_hit(
     event: BallEvent,
     impact: Impact,
     recorded: bool,
-) -> None:
+) -> bool:
     """Add a ball's hit on a surface to its series, or begin a new series with it.
 
     Args:
         impact: the hit. A normal speed of 0 means no hit.
         recorded: True if impacts on the surface are logged now.
+
+    Returns: True if the ball is rattling in a gap.
     """
     ball = event.ball
     if not impact.normal_speed > 0.0:
-        return
+        return False
     away = sub(impact.position, vec3_at(stays.place, ball))
     height = dot(away, stays.axis)
     radius = radius_of_ball(sizes, stays.radius, ball)
     landed = not is_flying(contact, ball)
-    if landed or dot(away, away) - height * height > radius * radius:
+    is_out = stays.rattled[ball] > stays.began[ball] and abs(height) > radius
+    if landed or is_out or dot(away, away) - height * height > radius * radius:
         if stays.hits[ball] >= MIN_HITS:
-            end_series(stays, radius, ball, landed)
+            end_series(stays, ball, landed)
         stays.hits[ball] = 0
     if landed:
-        return
+        return False
     if stays.hits[ball] == 0:
         _begin_series(stays, event, impact.position)
         height = 0.0
@@ -177,6 +191,27 @@ def note_hit(
     stays.speed[ball] += impact.normal_speed
     stays.hits[ball] += 1
     stays.logged[ball] += recorded
+    return stays.hits[ball] >= MIN_HITS and _note_rattling(stays, radius, ball, recorded)
+
+
+@jit
+def _note_rattling(stays: Stays, radius: float, ball: int, recorded: bool) -> bool:
+    """Add a ball's last hit to its time of rattling, if it is rattling, and return whether it is.
+
+    Args:
+        radius: radius of the ball [m].
+        recorded: True if impacts on the surface are logged now.
+    """
+    hits, last, normal = stays.hits[ball], stays.last[ball], vec3_at(stays.normal, ball)
+    faces = dot(normal, normal) < (FACING * hits) ** 2
+    slow = stays.speed[ball] < stays.slow * hits
+    if not (faces and slow and stays.rise[ball] < radius and hits > stays.meetings[ball]):
+        return False
+    stays.time[ball, RATTLING] += last - max(stays.began[ball], stays.rattled[ball])
+    stays.recorded[ball, RATTLING] += recorded
+    stays.rattled[ball] = last
+    set_vec3(stays.spot, ball, vec3_at(stays.place, ball))
+    return True
 
 
 @inlined
@@ -199,27 +234,23 @@ def note_meeting(stays: Stays, one: int, two: int) -> None:
 
 
 @jit
-def end_series(stays: Stays, radius: float, ball: int, landed: bool) -> bool:
-    """Add a ball's series of hits to the time for which it was hopping or rattling.
+def end_series(stays: Stays, ball: int, landed: bool) -> bool:
+    """Add a ball's series of hits to the time for which it was hopping, if it was.
 
     Args:
-        radius: radius of the ball [m].
         landed: True if the series ends because the ball lands.
 
-    Returns: False if the ball was neither hopping nor rattling.
+    Returns: True if the ball was hopping, or rattling at its last hit.
     """
     hits, lasted = stays.hits[ball], stays.last[ball] - stays.began[ball]
     if hits < MIN_HITS or hits <= stays.meetings[ball]:
         return False
-    normal = vec3_at(stays.normal, ball)
-    faces = dot(normal, normal) < (FACING * hits) ** 2
-    kind = HOPPING
-    if faces and stays.rise[ball] < radius and stays.speed[ball] < stays.slow * hits:
-        kind = RATTLING
-    elif landed or lasted < MIN_TIME:
+    if stays.rattled[ball] > stays.began[ball]:
+        return bool(stays.rattled[ball] == stays.last[ball])
+    if landed or lasted < MIN_TIME:
         return False
-    stays.time[ball, kind] += lasted
-    stays.recorded[ball, kind] += stays.logged[ball]
+    stays.time[ball, HOPPING] += lasted
+    stays.recorded[ball, HOPPING] += stays.logged[ball]
     set_vec3(stays.spot, ball, vec3_at(stays.place, ball))
     return True
 
@@ -233,18 +264,17 @@ def is_on_one_side(stays: Stays, ball: int) -> bool:
 
 def begin_anew(stays: Stays) -> None:
     """Forget all series so far, as recording begins now."""
-    for column in (stays.hits, stays.time, stays.recorded):
+    for column in (stays.hits, stays.rattled, stays.time, stays.recorded):
         column[:] = 0
 
 
-def trapped(stays: Stays, radii: np.ndarray, middle: np.ndarray) -> Trapped:
+def trapped(stays: Stays, middle: np.ndarray) -> Trapped:
     """End all series, and return the balls that were hopping or rattling since recording began.
 
     Args:
-        radii: radius of each ball [m], (n,).
         middle: middle of the mesh [m], (3,).
     """
-    at_end = np.array([end_series(stays, float(r), k, False) for k, r in enumerate(radii)], bool)
+    at_end = np.array([end_series(stays, k, False) for k in range(len(stays.hits))], bool)
     stays.hits[:] = 0
     balls = np.flatnonzero(stays.time.any(axis=1))
     time, hits = stays.time[balls], stays.recorded[balls]

@@ -72,6 +72,7 @@ class Scene:
         warmup: duration of the simulation before recording starts [s].
         record: tags of the surfaces whose impacts are logged; None means all.
         record_collisions: True to log collisions of balls with one another too.
+        record_held: False to leave impacts of balls that rattle in a gap out of the log.
         start_time: time of the scene's start [s] on the clock of the vibrations and the turning
             part. Their phases are given at time 0 of this clock. A scene that goes on with the
             balls of an earlier result has that result's ``time``.
@@ -95,6 +96,7 @@ class Scene:
     warmup: float = 0.0
     record: tuple[int, ...] | None = None
     record_collisions: bool = False
+    record_held: bool = True
     start_time: float = 0.0
 
     def __post_init__(self) -> None:
@@ -109,10 +111,9 @@ class Scene:
         if self.record is not None and not all(tag in self.mesh.tags for tag in self.record):
             tags = np.unique(self.mesh.tags).tolist()
             raise SceneError(f"scene.record is {self.record}, but the mesh has tags {tags}")
-        if self.record_collisions not in (True, False):
-            raise SceneError(
-                f"scene.record_collisions is {self.record_collisions!r}: give True or False"
-            )
+        for name in ("record_collisions", "record_held"):
+            if getattr(self, name) not in (True, False):
+                raise SceneError(f"scene.{name} is {getattr(self, name)!r}: give True or False")
         self._require_physics()
         self._require_room()
 

@@ -39,7 +39,7 @@ def test_all_balls_of_few_end_hopping_and_the_note_says_so() -> None:
     chamber = build_chamber(plate)
     rubs = plate.effects.model_copy(update={"friction": FrictionTable(mu=0.3, beta0=0.2)})
     setting = ReplicaSetting(plate, chamber, chamber_mesh(chamber))
-    assert trapped_notes([simulate_replica(setting, replica_seed(1, 0)).trapped], False) == ()
+    assert trapped_notes([simulate_replica(setting, replica_seed(1, 0)).trapped], plate) == ()
 
     setting = setting._replace(design=plate.model_copy(update={"effects": rubs}))
     found = simulate_replica(setting, replica_seed(1, 0)).trapped
@@ -47,7 +47,7 @@ def test_all_balls_of_few_end_hopping_and_the_note_says_so() -> None:
     assert 0.9 < found.hopping_time <= 1.0
     assert 0.9 < found.hopping_impacts <= 1.0
     assert found.rattling_time == 0.0
-    (note,) = trapped_notes([found], rough=False)
+    (note,) = trapped_notes([found], setting.design)
     assert "in 1 of 1 replicas balls hopped up and down on one spot" in note
     assert "at the end all balls did" in note
     assert "effects.roughness" in note
@@ -82,29 +82,36 @@ def test_a_rattling_ball_is_counted_and_its_gap_named(chamber: Chamber) -> None:
         at_end=np.array([True, False]),
         position=np.array([[8.485e-3, 0.0, 0.0], [0.0, 0.0, 8e-3]]),
     )
-    found = find_trapped_balls(result(1000, two), 2.0, chamber, part_turns=False)
+    found = find_trapped_balls(result(520, two), 2.0, chamber, part_turns=False)
     assert found == TrappedBalls(
         hopping_time=0.025,
         hopping_impacts=0.03,
         hopping_at_end=0.0,
         rattling_time=0.05,
         rattling_impacts=0.48,
+        rattling_balls=0.1,
+        rattling_longest=0.5,
         place="between the part's side and the wall, around (8.5, 0.0, 0.0) mm",
     )
-    hops, rattles = trapped_notes([found, NOT_TRAPPED, found], rough=True)
+    plate = plate_design(process__accuracy__simulated_time_s=2.0)
+    plate = plate.changed({"shot.mass_g": 1e4 * plate.shot.ball_mass})
+    hops, rattles = trapped_notes([found, NOT_TRAPPED, found], plate)
     assert "in 2 of 3 replicas balls hopped" in hops
     assert "at the end" not in hops
     assert "shot.mass_g" in hops
-    assert "32 % of the impacts on the part are their rattling, in 3.3 % of" in rattles
-    assert "e.g. between the part's side and the wall, around (8.5, 0.0, 0.0) mm" in rattles
-    assert "shot.diameter_mm" in rattles
-    turned = find_trapped_balls(result(1000, two), 2.0, chamber, part_turns=True)
+    assert rattles == (
+        "0.67 of 10 balls jam in gaps about as wide as themselves, the longest held one for 0.67 "
+        "of 2 s: the shot loses 3.3 % of its time, and 32 % of all impacts on the part are those "
+        "of held balls, which count in no figure; e.g. between the part's side and the wall, "
+        "around (8.5, 0.0, 0.0) mm; give another shot.diameter_mm than the gap, or close it"
+    )
+    turned = find_trapped_balls(result(520, two), 2.0, chamber, part_turns=True)
     assert turned.place == "at the wall, around (8.5, 0.0, 0.0) mm"
 
 
 def test_a_few_hops_change_no_figure_and_make_no_note() -> None:
-    few = TrappedBalls(0.002, 0.004, 0.0, 0.0, 0.001, "")
-    assert trapped_notes([few, NOT_TRAPPED], rough=False) == ()
-    assert trapped_notes([], rough=False) == ()
+    few = TrappedBalls(0.002, 0.004, 0.0, 0.0, 0.001, 0.1, 0.004, "")
+    assert trapped_notes([few, NOT_TRAPPED], plate_design()) == ()
+    assert trapped_notes([], plate_design()) == ()
     assert trapped_shares([]) == {}
     assert tuple(trapped_shares([few])) == SHARES == tuple(TrappedRecord.model_fields)
