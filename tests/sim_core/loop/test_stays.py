@@ -69,13 +69,13 @@ def test_balls_that_come_to_lie_still_are_not_trapped() -> None:
     assert len(result.trapped) == 0
 
 
-def groove(subdivisions: int) -> Scene:
-    """A ball above a groove between two blocks that is 2 % narrower than the ball, and a floor that
-    vibrates far below.
+def groove(subdivisions: int, width: float = 0.98) -> Scene:
+    """A ball above a groove between two blocks, of a width in balls, and a floor that vibrates far
+    below.
     """
     blocks = [trimesh.creation.box((6e-3, 4e-3, 4e-3)) for _ in range(2)]
     for side, block in zip((-1.0, 1.0), blocks, strict=True):
-        block.apply_translation([0.0, side * (2e-3 + 0.49 * DIAMETER), 0.0])
+        block.apply_translation([0.0, side * (2e-3 + 0.5 * width * DIAMETER), 0.0])
     blocks = [block.subdivide() if subdivisions else block for block in blocks]
     mesh = box_around(trimesh.util.concatenate(blocks), 10e-3)
     heights = mesh.vertices[mesh.triangles][:, :, 2]
@@ -100,6 +100,19 @@ def test_a_ball_in_a_groove_hardly_narrower_than_itself_rattles(subdivisions: in
     assert found.rattling_hits[0] > 0.9 * len(result.impacts)
     away = found.position[0] - scene.balls.positions[0]
     assert np.hypot(*away[:2]) < 0.5 * DIAMETER
+
+
+def test_a_ball_between_parallel_walls_is_held_from_its_tenth_hit_on() -> None:
+    """Without gravity and loss it hits after half a clearance c, then every c / v."""
+    scene, clearance, speed, hits = groove(0, 1.006), 0.006 * DIAMETER, 0.1, 40
+    lossless = Restitution(((1.0, 1.0, 0.0),) * 3, (1.0, 1.0, 0.0))
+    physics = scene.physics._replace(gravity=Gravity(0.0, 0.0, 0.0), restitution=lossless)
+    ball = Balls(np.zeros((1, 3)), np.array([[0.0, speed, 0.0]]), DIAMETER)
+    between = replace(scene, balls=ball, physics=physics, duration=hits * clearance / speed)
+    found = simulate(replace(between, record_held=False))
+    assert len(found.impacts) == MIN_HITS - 1
+    assert found.trapped.rattling_hits.tolist() == [hits - (MIN_HITS - 1)]
+    assert found.trapped.rattling[0] == pytest.approx((hits - 1) * clearance / speed)
 
 
 def test_hits_of_a_held_ball_can_be_left_out_of_the_log_and_change_no_other_bit() -> None:
