@@ -326,7 +326,8 @@ def _read(path: Path, unit: str) -> PartMesh:
     try:
         mesh = read_part(path, unit)
     except InputError as error:
-        raise InputError(str(error).replace("part.unit", "--unit")) from None
+        error.args = (str(error).replace("part.unit", "--unit"),)
+        raise
     return replace(mesh, notes=tuple(note.replace("part.unit", "--unit") for note in mesh.notes))
 
 

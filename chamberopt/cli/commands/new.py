@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -31,7 +32,7 @@ def new(
     material: str = "",
     shot: str = "steel",
     ball_mm: float | None = None,
-    unit: Literal["um", "mm", "cm", "m", "in", "guess"] = "guess",
+    unit: Literal["um", "mm", "cm", "m", "in", "guess"] | None = None,
     out: Out = None,
 ) -> None:
     """Propose a first design and study for a part, each number with its reason, and a picture.
@@ -52,7 +53,8 @@ def new(
     ball_mm
         Diameter of a ball; by default the largest sold that touches nearly all of the target.
     unit
-        Of the numbers in the part's file; by default what the file states, or its size suggests.
+        Of the numbers in the part's file; by default what the file states. Where it states none and
+        several are possible, `new` asks, or stops if nobody can answer; guess takes the likeliest.
     """
     import chamberopt.pictures.part  # noqa: F401  # imported before the folder is claimed
     from chamberopt.chamber.propose.proposal import Wanted, propose
@@ -63,6 +65,7 @@ def new(
     from chamberopt.common.progress import step
     from chamberopt.common.toml_fields import allowed_range
     from chamberopt.design.shot import ShotSize
+    from chamberopt.geometry.meshes.units import STATED, UnknownUnitError
     from chamberopt.results.vtp_files import pyvista
 
     _require_file(part)
@@ -79,7 +82,13 @@ def new(
     out = out or Path(part.stem if part.suffix else f"{part.name}_chamber")
     with claim_folder(out):
         pass  # reports a folder that is taken before the work begins
-    made = propose(part, Wanted(unit, shape, material, shot, ball_mm), choose)
+    wanted = Wanted(unit or STATED, shape, material, shot, ball_mm)
+    try:
+        made = propose(part, wanted, choose)
+    except UnknownUnitError as error:
+        if not sys.stdin.isatty():
+            raise
+        made = propose(part, replace(wanted, unit=_asked_unit(part, error.sizes)), choose)
     pyvista()  # before the folder is claimed: Ctrl-C during an import would leave the folder behind
     with claim_folder(out) as folder, whole_or_nothing(folder):
         write_text(folder / "design.toml", design_text(made, folder))
@@ -105,6 +114,26 @@ def _require_file(part: Path) -> None:
     except UnicodeEncodeError:
         text = "its path is not UTF-8, so that no design can name it; rename the file or its folder"
         raise InputError(f"{part}: {text}") from None
+
+
+def _asked_unit(part: Path, sizes: Mapping[str, str]) -> str:
+    """Ask the user in which unit the numbers of the part's file are, and return it.
+
+    Args:
+        sizes: the size that the part would have, by unit.
+    """
+    from chamberopt.common.errors import InputError
+
+    show([f"{part} does not state the unit of its numbers. The part measures"])
+    show([f"  {size} if they are in {unit}" for unit, size in sizes.items()])
+    try:
+        answer = input(f"unit ({', '.join(sizes)}): ").strip().lower()
+    except EOFError:
+        answer = ""
+    if answer not in sizes:
+        text = f"given {answer!r}" if answer else "got no answer"
+        raise InputError(f"--unit: {text}; give one of {', '.join(sizes)}")
+    return answer
 
 
 def _picked(known: Sequence[Surface]) -> Sequence[str]:

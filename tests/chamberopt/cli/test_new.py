@@ -2,6 +2,7 @@
 
 import io
 import os
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ from chamberopt.geometry.triangles import rotation_matrix
 from chamberopt.search.study import load_study
 from tests.chamberopt.design.test_shipped_parts import PARTS
 from tests.helpers.eight_parts import EIGHT_PARTS, KEPT_ASIDE, ExamplePart
+from tests.helpers.four_parts import FOUR_PARTS
 
 SHARES = np.array([0.95, 0.94, 0.6])
 SIZES = (1e-3, 2e-3, 3e-3)
@@ -157,7 +159,7 @@ def test_a_box_that_cannot_be_used_is_told(
 
 
 class Nobody(io.StringIO):
-    """A terminal whose input has ended."""
+    """A terminal whose input ends after the given text."""
 
     def isatty(self) -> bool:
         return True
@@ -177,7 +179,7 @@ def test_a_guess_is_said_and_no_folder_is_held_while_the_design_is_made(
 
     monkeypatch.setattr("chamberopt.chamber.propose.proposal.propose", watched)
     monkeypatch.setattr("chamberopt.cli.commands.check.draw_target", lambda *_: None)
-    assert main(["new", "box.stl", "--out", "out"]) == 0
+    assert main(["new", "box.stl", "--unit", "guess", "--out", "out"]) == 0
     said = capfd.readouterr()
     assert "mm: GUESSED: the part measures 20 x 20 x 30 mm" in said.out
     assert "unit guessed as 'mm' (by its size)" in said.err
@@ -188,18 +190,38 @@ def test_a_guess_is_said_and_no_folder_is_held_while_the_design_is_made(
     load_study("out/study.toml")
 
 
+def test_a_unit_that_cannot_be_known_is_asked_for(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """An angle of 5 x 3 x 2 in, whose file states no unit, is no part of 5 x 3 x 2 mm."""
+    monkeypatch.chdir(tmp_path)
+    FOUR_PARTS["bracket"].write(tmp_path)
+    assert main(["new", "bracket.stl"]) == 2
+    message = (
+        "bracket.stl: the file does not state the unit of its numbers; give --unit: "
+        "mm (5 x 3 x 2 mm), cm (50 x 30 x 20 mm) or in (127 x 76.2 x 50.8 mm)"
+    )
+    assert message in capfd.readouterr().err
+    for answer, said in (("in\n", "in: the part measures 127 x 76.2"), ("", "got no answer")):
+        monkeypatch.setattr("sys.stdin", Nobody(answer))
+        assert main(["new", "bracket.stl", "--ball-mm", "3"]) == (0 if answer else 2)
+        shown = capfd.readouterr()
+        assert "127 x 76.2 x 50.8 mm if they are in in" in shown.out
+        assert said in shown.out + shown.err
+        shutil.rmtree("bracket", ignore_errors=True)
+
+
 @pytest.mark.long
-@pytest.mark.parametrize("name", [*EIGHT_PARTS, *KEPT_ASIDE])
+@pytest.mark.parametrize("name", [*EIGHT_PARTS, *KEPT_ASIDE, *FOUR_PARTS])
 def test_from_file_to_process_sheet(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The eight parts of the tutorial's readers, and those kept aside: no file is edited."""
     monkeypatch.chdir(tmp_path)
-    one: ExamplePart = {**EIGHT_PARTS, **KEPT_ASIDE}[name]
-    part = one.write(tmp_path)
-    unit = [] if one.unit is None else ["--unit", one.unit]
-    assert main(["new", str(part), "--out", "new", *unit]) == 0
-    size = np.ptp(read_part(part, one.unit or "guess").vertices, axis=0)
+    one: ExamplePart = {**EIGHT_PARTS, **KEPT_ASIDE, **FOUR_PARTS}[name]
+    part, unit = one.write(tmp_path), one.unit or "guess"
+    assert main(["new", str(part), "--out", "new", "--unit", unit]) == 0
+    size = np.ptp(read_part(part, unit).vertices, axis=0)
     assert 1e3 * size == pytest.approx(one.size_mm, abs=0.1)
     assert main(["check", "new/design.toml"]) == 0
     assert main(["simulate", "new/design.toml", "--no-ranges", "--out", "simulated"]) == 0
