@@ -7,12 +7,14 @@ from typing import Any
 import numpy as np
 
 from chamberopt.chamber.part import preview_part
-from chamberopt.chamber.propose.pose import turns_down
+from chamberopt.chamber.propose.pose import square_to_walls, turns_down
+from chamberopt.chamber.propose.proposed_target import SHAPES, propose_sizes
 from chamberopt.common.errors import InputError
 from chamberopt.design.design import Design
 from chamberopt.design.part import MAX_FACES, FaceAt, Selection
 from chamberopt.geometry.faces import Faces
 from chamberopt.geometry.meshes.part_mesh import PartMesh
+from chamberopt.geometry.triangles import rotation_matrix
 
 DIGITS = 4  # decimals of a place [mm]: a tenth of a micrometre
 TARGET_TABLE = "part.target"
@@ -90,18 +92,31 @@ class Picker:
         return _row(faces, _face_of(faces, triangle), crease_deg, alike)
 
     def face_down(self, design: Design, triangle: int, crease_deg: float) -> dict[str, object]:
-        """Return changes of a design that turn a face of the part towards the sonotrode.
+        """Return changes of a design that lay a face of the part level, towards the sonotrode.
+
+        The part is squared to the walls, and a chamber of simple form gets the sizes that `new`
+        proposes for the pose.
 
         Args:
             triangle: number of a triangle of the face.
             crease_deg: angle between neighbouring triangles from which on they belong to two faces
                 [degrees].
         """
-        faces = self._faces(preview_part(design).mesh, crease_deg)
+        preview = preview_part(design)
+        mesh, faces = preview.mesh, self._faces(preview.mesh, crease_deg)
         normal = faces.normal(_face_of(faces, triangle))
         if not normal.any():
             raise InputError("this face bends all round and faces no way; click another one")
-        return {f"part.rotate_deg.{k}": turn for k, turn in enumerate(turns_down(normal))}
+        turns = square_to_walls(mesh.vertices, turns_down(normal))
+        changes: dict[str, object] = {f"part.rotate_deg.{k}": one for k, one in enumerate(turns)}
+        if design.chamber.shape in SHAPES:
+            posed = mesh.vertices @ rotation_matrix(turns).T
+            posed[:, 2] -= posed[:, 2].min()
+            top = float(posed[mesh.triangles[preview.target], 2].max())
+            sizes = propose_sizes(posed, top, max(design.shot.diameters), design.chamber.shape)
+            changes |= {f"chamber.{key}": size for key, size in sizes.lengths_mm().items()}
+            changes |= {f"part.offset_mm.{k}": 0.0 for k in (0, 1) if design.part.offset[k]}
+        return changes
 
     def _faces(self, mesh: PartMesh, crease_deg: float) -> Faces:
         key = id(mesh), crease_deg

@@ -5,22 +5,36 @@ angle between its normal and the way down: 1 where the target faces the sonotrod
 walls, 0 where it faces up. The pose has the highest mean minus standard deviation of the exposure
 over the target's area, as the objective of a study has of coverage (coverage/metrics.py). A shaft
 should therefore stand upright: if it lies, it is hit below and not above. This rule gives a first
-pose and is no simulation.
+pose and is no simulation. A pose that a fixture gives more simply has an advantage: it is taken
+where it is worse by less.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from itertools import product
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from chamberopt.geometry.triangles import area_vectors, rotation_matrix, unit_vectors
 
+if TYPE_CHECKING:
+    from chamberopt.chamber.propose.proposed_target import Surface
+    from chamberopt.geometry.meshes.part_mesh import PartMesh
+
 Turns = tuple[float, float, float]
 
-# Advantage of the pose as drawn and of other poses along the file's axes, over all other poses.
-AS_DRAWN, ALONG_AXIS = 0.10, 0.08
+# Advantages in the mean minus standard deviation of the exposure, over poses of any angle: of the
+# pose as drawn, of turns by multiples of 90 and of 45 degrees, and of turns by steps of 15 and 5.
+AS_DRAWN, ALONG_AXIS, DIAGONAL = 0.10, 0.08, 0.05
+OF_STEP = {15.0: 0.02, 5.0: 0.01}
 LOW = 0.05  # advantage of a target at the part's lower end over a target at its upper end
+FLAT = 0.999  # length of the mean unit normal of a target that counts as flat
+LEVEL_DEG = 0.5  # a flat face is level if it is tilted by less
+# Steps of the turn that brings the long side to x, and the share by which the rectangle round the
+# part may be larger than the smallest one. Simple turns are taken first.
+SQUARE_STEPS = ((90.0, 0.05), (45.0, 0.05), (15.0, 0.01), (5.0, 0.01), (1.0, 0.01))
 
 
 def propose_pose(
@@ -44,12 +58,10 @@ def propose_pose(
         spread = float(np.sqrt(max(weight @ (exposed - mean) ** 2, 0.0)))
         along = vertices @ -down
         height = float((middle @ -down - along.min()) / max(np.ptp(along), 1e-12))
-        return mean - spread - LOW * height + bonus
+        return round(mean - spread - LOW * height + bonus, 6)  # equal poses: the first
 
-    tried = [
-        (worth(down, bonus), -k, down) for k, (down, bonus) in enumerate(_downs(normal, weight))
-    ]
-    down = max(tried)[2]
+    turns = max(_poses(normal, weight), key=lambda one: worth(_down(one[0]), one[1]))[0]
+    down = _down(turns)
     facing = float(weight @ (normal @ down))
     if facing > 0.5:
         reason = "the target faces the sonotrode"
@@ -57,27 +69,76 @@ def propose_pose(
         reason = "the target's sides are as evenly exposed as they can be"
     else:
         reason = "the target stands upright, so that all its sides are exposed alike"
-    return turns_down(down), reason
+    return turns, reason
 
 
 def square_to_walls(vertices: np.ndarray, turns: Turns) -> Turns:
     """Return the turns [degrees] with a further turn about z that brings the part's long side to x.
 
-    The long side is the longer side of the smallest rectangle round the part, seen from above.
+    The long side is the longer side of the smallest rectangle round the part, seen from above. The
+    turn is the simplest that gives nearly this rectangle.
     """
     from shapely import MultiPoint
 
-    plan = (vertices @ rotation_matrix(turns).T)[:, :2]
-    box = np.array(MultiPoint(plan).convex_hull.minimum_rotated_rectangle.exterior.coords)
+    hull = MultiPoint((vertices @ rotation_matrix(turns).T)[:, :2]).convex_hull
+    box = np.array(hull.minimum_rotated_rectangle.exterior.coords)
     sides = np.diff(box[:3], axis=0)
     x, y = sides[np.linalg.norm(sides, axis=1).argmax()]
-    angle = -np.degrees(np.arctan2(y, x)) % 180.0
-    angle = round(float(angle - 180.0 if angle > 90.0 else angle), 1) + 0.0
-    return turns[0], turns[1], angle
+    corners = np.array(hull.exterior.coords)
+
+    def sides_at(angle: float) -> np.ndarray:
+        turn = rotation_matrix((0.0, 0.0, angle))[:2, :2]
+        return np.asarray(np.ptp(corners @ turn.T, axis=0))
+
+    for step, larger in SQUARE_STEPS:
+        angle = min(
+            np.arange(0.0, 180.0, step).tolist(),
+            key=lambda one: (round(float(np.prod(sides_at(one))), 9), round(-sides_at(one)[0], 6)),
+        )
+        if np.prod(sides_at(angle)) <= (1.0 + larger) * hull.minimum_rotated_rectangle.area:
+            break
+    else:
+        angle = round(float(-np.degrees(np.arctan2(y, x)) % 180.0), 1)
+    return turns[0], turns[1], angle - 180.0 if angle > 90.0 else angle
 
 
-def _downs(normal: np.ndarray, weight: np.ndarray) -> Iterator[tuple[np.ndarray, float]]:
-    """Yield directions (3,) of the part's file that may be turned down, and an advantage for each.
+def pose_in_words(mesh: PartMesh, known: Sequence[Surface], turns: Turns) -> str:
+    """Return words for a pose as a fixture gives it: which face is level, and the turn upright.
+
+    Args:
+        mesh: the part.
+        known: surfaces of the part, the largest first.
+        turns: turns of the part about x, then y, then z [degrees].
+    """
+    if not any(turns):
+        return "as drawn"
+    up = rotation_matrix(turns)[2]  # in the part's file
+    tilts = {}  # of flat faces [degrees]: 0 facing down, 180 facing up
+    for one in known:
+        if "faces" in one.keys and "alike" not in one.keys["faces"][0]:
+            vectors = area_vectors(mesh.vertices, mesh.triangles[one.triangles])
+            whole = vectors.sum(axis=0)
+            length = np.linalg.norm(whole)
+            if length > FLAT * np.linalg.norm(vectors, axis=1).sum():
+                down = float(np.clip(-whole @ up / length, -1.0, 1.0))
+                tilts[one.name] = float(np.degrees(np.arccos(down)))
+    axis = int(np.abs(up).argmax())
+    words = []
+    if abs(up[axis]) > np.cos(np.radians(LEVEL_DEG)):
+        words.append(f"the file's {'-' if up[axis] > 0.0 else '+'}{'xyz'[axis]} down")
+    level = [f"{name} level below" for name, tilt in tilts.items() if tilt < LEVEL_DEG]
+    level += [f"{name} level above" for name, tilt in tilts.items() if tilt > 180.0 - LEVEL_DEG]
+    words += level[:1]
+    if not words:
+        tilted = [f"{name} tilted by {min(t, 180.0 - t):.3g} degrees" for name, t in tilts.items()]
+        words.append(tilted[0] if tilted else "no flat face level")
+    if turns[2]:
+        words.append(f"turned by {turns[2]:.4g} degrees about the vertical")
+    return ", ".join(words)
+
+
+def _poses(normal: np.ndarray, weight: np.ndarray) -> Iterator[tuple[Turns, float]]:
+    """Yield turns [degrees] of the part, the simplest first, and an advantage for each.
 
     The advantage is added to the mean minus standard deviation of the exposure.
 
@@ -87,26 +148,39 @@ def _downs(normal: np.ndarray, weight: np.ndarray) -> Iterator[tuple[np.ndarray,
     """
     for axis in (2, 0, 1):
         for sign in (-1.0, 1.0):
-            yield sign * np.eye(3)[axis], AS_DRAWN if (axis, sign) == (2, -1.0) else ALONG_AXIS
+            as_drawn = (axis, sign) == (2, -1.0)
+            yield turns_down(sign * np.eye(3)[axis]), AS_DRAWN if as_drawn else ALONG_AXIS
+    for x, y, z in product((0.0, -1.0, 1.0), repeat=3):
+        if abs(x) + abs(y) + abs(z) == 2.0:
+            yield turns_down(np.array([x, y, z]) / np.sqrt(2.0)), DIAGONAL
     mean = weight @ normal
+    if np.linalg.norm(mean) > FLAT:
+        yield turns_down(mean / np.linalg.norm(mean)), 0.0
+        return
+    directions = [*np.linalg.eigh((weight[:, None] * normal).T @ normal)[1].T]
+    directions += [-one for one in directions]
     if np.linalg.norm(mean) > 0.05:
-        yield mean / np.linalg.norm(mean), 0.0
-    for direction in np.linalg.eigh((weight[:, None] * normal).T @ normal)[1].T:
-        yield direction, 0.0
-        yield -direction, 0.0
+        directions.insert(0, mean / np.linalg.norm(mean))
+    for direction in directions:
+        x, y, _ = turns = turns_down(direction)
+        for step, bonus in OF_STEP.items():
+            yield (step * round(x / step) + 0.0, step * round(y / step) + 0.0, 0.0), bonus
+        yield turns, 0.0
+
+
+def _down(turns: Turns) -> np.ndarray:
+    """Return the direction (3,) of the part's file that these turns turn down."""
+    return np.asarray(-rotation_matrix(turns)[2])
 
 
 def turns_down(down: np.ndarray) -> Turns:
-    """Return the turns about x, then y [degrees, to a tenth] that turn a direction down.
+    """Return the turns about x, then y [degrees] that turn a direction down, so that it is level.
 
     >>> turns_down(np.array([1.0, 0.0, 0.0]))
     (0.0, 90.0, 0.0)
     """
     x, y, z = down
     across = float(np.hypot(y, z))
-    about_x = np.degrees(np.arctan2(-y, -z)) if across > 1e-9 else 0.0
-    return (
-        round(float(about_x), 1) + 0.0,
-        round(float(np.degrees(np.arctan2(x, across))), 1) + 0.0,
-        0.0,
-    )
+    about_x = np.degrees(np.arctan2(-y + 0.0, -z)) if across > 1e-9 else 0.0
+    about_y = np.degrees(np.arctan2(x, across))
+    return round(float(about_x), 4) + 0.0, round(float(about_y), 4) + 0.0, 0.0

@@ -17,7 +17,7 @@ from chamberopt.chamber.build import Chamber, build_chamber
 from chamberopt.chamber.checks.check import shot_reach, warnings
 from chamberopt.chamber.checks.fillets import OF_FILLET, inner_edges
 from chamberopt.chamber.largest_ball import largest_balls, spread_points
-from chamberopt.chamber.propose.pose import propose_pose, square_to_walls
+from chamberopt.chamber.propose.pose import pose_in_words, propose_pose, square_to_walls
 from chamberopt.chamber.propose.proposed_target import (
     Sizes,
     Surface,
@@ -272,7 +272,7 @@ def propose(
     reasons = {
         "part.unit": ("GUESSED: " if any(GUESSED in note for note in mesh.notes) else "")
         + f"the part measures {format_box(mesh.size)}",
-        "part.rotate_deg": f"{pose_reason}; about the file's x, then y, then z",
+        "part.rotate_deg": f"{pose_in_words(mesh, known, turns)}: {pose_reason}",
         "part.target": target.reason,
         "sonotrode.amplitude_um": "ZERO-TO-PEAK, half of peak-to-valley; take your machine's",
         "shot.diameter_mm": ball_reason,

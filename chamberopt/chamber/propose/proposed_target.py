@@ -43,6 +43,12 @@ class Sizes:
     through_ceiling: bool  # true if the part goes out through the ceiling
     top: float  # height over the part's lowest point that must be below the ceiling [m]
 
+    def lengths_mm(self) -> dict[str, float]:
+        """Return the lengths of these sizes by their keys of [chamber]."""
+        lengths = {key: one for key, one in self.plan.items() if isinstance(one, float)}
+        height, distance = round(1e3 * self.height, 3), round(1e3 * self.distance, 3)
+        return {**lengths, "height_mm": height, "sonotrode_distance_mm": distance}
+
 
 def shape_for(box: np.ndarray) -> str:
     """Return the name of the chamber's shape for a part with a bounding box of these sides (3,).
@@ -94,13 +100,16 @@ def _up_mm(length: float) -> float:
 
 
 CREASE_DEG = 30.0
-MOST = 0.5  # share of the area from which a named surface counts as the rest beside marked ones
+WHOLE_PART = 0.99  # share of the area from which a named surface counts as the whole part
+RUNNERS_UP = 2  # that a reason names
 MAX_KINDS = 40  # kinds of faces that are listed, the largest areas first
 FOR = "(?:peen|target|(?:ge)?strahl|grenaill)"
 MEANT = re.compile(FOR, re.I)  # names that say that a surface is to be peened
 NOT, GAP = "un|not?|non|without|kein|keine|nicht|ohne|sans|pas", r"[\s_-]"
 # Names of surfaces to leave out: unpeened, DO_NOT_PEEN, nicht zu strahlen, mask.
 LEFT_OUT = re.compile(rf"(?<![a-z])(?:(?:{NOT})(?:{GAP}+.*)?{FOR}|mask|abdeck)", re.I)
+# Names of what is left when the surfaces of interest are named.
+REST = re.compile(r"^(?:the[\s_-]+)?(?:rest|others?|remain\w*|default|body|bulk)(?![a-z])", re.I)
 AS_LARGE = 0.9  # of the largest face's area: the target takes a face as large, e.g. a blade's back
 PATTERN = 6  # number of alike faces that make a repeated feature, such as teeth
 COLOUR, VIVID = re.compile(r"#([0-9a-f]{2})([0-9a-f]{2})([0-9a-f]{2})$", re.I), 100
@@ -172,14 +181,20 @@ def propose_target(mesh: PartMesh, known: Sequence[Surface], wanted: Iterable[st
         several = ", the reddest of several" if len(marked) > 1 else ""
         return _joined([best], f"its colour {best.colour} marks it{several}")
     area = areas(mesh.vertices, mesh.triangles)
+
+    def beside(others: Sequence[Surface]) -> str:
+        texts = [f"{one.name} ({one.text})" for one in others[:RUNNERS_UP]]
+        return f"; after it {' and '.join(texts)}" if texts else ""
+
     special = [
         one
         for one in named
-        if area[one.triangles].sum() < MOST * area.sum()
+        if area[one.triangles].sum() < WHOLE_PART * area.sum()
+        and not REST.match(one.name)
         and len(border_edges(mesh.triangles[one.triangles]))  # a whole body has no border
     ]
     if special:
-        return _joined(special[:1], "the largest surface that the file names, beside the rest")
+        return _joined(special[:1], "the largest surface that the file names" + beside(special[1:]))
     repeated = [one for one in faces if one.keys["faces"][0].get("alike")]
     counts = {one.name: _count(one) for one in repeated}
     features = [one for one in repeated if counts[one.name] >= PATTERN]
@@ -187,10 +202,12 @@ def propose_target(mesh: PartMesh, known: Sequence[Surface], wanted: Iterable[st
         best = max(features, key=lambda one: float(area[one.triangles].sum()))
         fits = {counts[best.name] * k // 2 for k in (1, 2, 4)}
         pattern = [one for one in features if counts[one.name] in fits]
-        return _joined(pattern, "faces that repeat round the part, such as those of teeth")
+        others = [one for one in faces if one not in pattern]
+        text = "faces that repeat round the part, such as those of teeth"
+        return _joined(pattern, text + beside(others))
     sizes = [area[one.triangles].sum() for one in faces]
     large = [one for one, size in zip(faces, sizes, strict=True) if size >= AS_LARGE * sizes[0]]
-    return _joined(large, "the largest between sharp edges")
+    return _joined(large, "the largest between sharp edges" + beside(faces[len(large) :]))
 
 
 def _faces(mesh: PartMesh) -> list[Surface]:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import tomlkit
 
+from chamberopt.chamber.propose.left_out import LeftOut
 from chamberopt.chamber.propose.proposal import Proposal
 from chamberopt.chamber.propose.proposed_target import Surface
 from chamberopt.common.errors import one_line
@@ -16,10 +17,11 @@ MAX_LISTED = 20  # surfaces in a comment
 EVALUATIONS, SEARCH_HALF_WIDTH = 20, 0.04
 
 
-def design_text(proposal: Proposal, folder: Path) -> str:
+def design_text(proposal: Proposal, folder: Path, left_out: Sequence[LeftOut] = ()) -> str:
     """Return the text of the proposed design file.
 
     Args:
+        left_out: what may be left out of the target.
         folder: folder that the file will be in. The path of the part is relative to it.
     """
     tables = with_paths_from(folder.resolve(), proposal.tables)
@@ -31,6 +33,7 @@ def design_text(proposal: Proposal, folder: Path) -> str:
         lines += ["", f"[{table}]" + (f"  # {one_line(reason)}" if reason else "")]
         lines += _values(values, table, proposal.reasons)
         if table == "part.target":
+            lines += _left_out(left_out)
             lines += _choices(proposal.known)
     return "\n".join(lines) + "\n"
 
@@ -103,6 +106,17 @@ def _line(key: str, value: object) -> str:
     if isinstance(value, float) and value.is_integer():
         value = int(value)
     return f"{key} = {tomlkit.item(value).as_string()}"
+
+
+def _left_out(offers: Sequence[LeftOut]) -> list[str]:
+    """Return comment lines with keys of [part.target] that leave something out of the target."""
+    lines = []
+    for one in offers:
+        first, *more = (_line(key, value) for key, value in one.keys.items())
+        also = ", with the next line" if more else ""
+        lines += [f"# {first}  # leaves out {one_line(one.text)}{also}"]
+        lines += [f"# {line}" for line in more]
+    return lines
 
 
 def _choices(known: Sequence[Surface]) -> list[str]:

@@ -15,6 +15,7 @@ from chamberopt.cli.options import Out, app
 from chamberopt.common.errors import one_line
 
 if TYPE_CHECKING:
+    from chamberopt.chamber.propose.left_out import LeftOut
     from chamberopt.chamber.propose.proposal import Proposal
     from chamberopt.chamber.propose.proposed_target import Surface
 
@@ -57,6 +58,7 @@ def new(
         several are possible, `new` asks, or stops if nobody can answer; guess takes the likeliest.
     """
     import chamberopt.pictures.part  # noqa: F401  # imported before the folder is claimed
+    from chamberopt.chamber.propose.left_out import find_left_out
     from chamberopt.chamber.propose.proposal import Wanted, propose
     from chamberopt.chamber.propose.text import design_text, study_text
     from chamberopt.cli.commands.check import draw_target
@@ -89,13 +91,14 @@ def new(
         if not sys.stdin.isatty():
             raise
         made = propose(part, replace(wanted, unit=_asked_unit(part, error.sizes)), choose)
+    left_out = find_left_out(made)
     pyvista()  # before the folder is claimed: Ctrl-C during an import would leave the folder behind
     with claim_folder(out) as folder, whole_or_nothing(folder):
-        write_text(folder / "design.toml", design_text(made, folder))
+        write_text(folder / "design.toml", design_text(made, folder, left_out))
         write_text(folder / "study.toml", study_text(made, "design.toml"))
         with step("drawing"):
             draw_target(made.chamber, made.reach, folder / "design.png")
-    show(_summary(made))
+    show(_summary(made, left_out))
     print_remarks(f"note: {one_line(text)}" for text in made.mesh.notes)
     print_remarks(f"warning: {text}" for text in made.warnings)
     show([f"design in {folder / 'design.toml'}", f"study in {folder / 'study.toml'}"])
@@ -150,9 +153,12 @@ def _picked(known: Sequence[Surface]) -> Sequence[str]:
     return [name.strip() for name in answer.split(",") if name.strip()]
 
 
-def _summary(made: Proposal) -> list[str]:
+def _summary(made: Proposal, left_out: Sequence[LeftOut]) -> list[str]:
     """Return lines with each proposed value and its reason, and other possible targets."""
     lines = [f"{'part.target':38}{one_line(made.reasons['part.target'])}"]
+    for one in left_out:
+        keys = " and ".join(f"part.target.{key}" for key in one.keys)
+        lines.append(f"{'':38}{one_line(one.text)}: {keys} in the design leave it out")
     for table, values in made.tables.items():
         for key, value in values.items():
             reason = made.reasons.get(f"{table}.{key}")

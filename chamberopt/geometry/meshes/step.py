@@ -55,6 +55,8 @@ LEADS_TO = {
 }
 # Names that CAD programs give to faces without a name.
 NO_NAMES = ("", "NONE")
+# Names that programs which write STEP give to bodies without a name: their own.
+TRANSLATOR = re.compile(r"Open ?CASCADE|\b(?:STEP|IGES)\W+(?:translator|(?:pre)?processor)\b", re.I)
 
 
 class StepFace(NamedTuple):
@@ -165,6 +167,7 @@ def read_step(path: Path, content: bytes, how: Tessellation | None = None) -> Ra
     face_of, body = arrays["face_of"], arrays["body"]
     solids = read_solids(text) if NAMED_FACE.search(text) else []
     names = [name.rpartition("/")[2] for name in arrays["name"]]
+    names = ["" if TRANSLATOR.search(name) else name for name in names]
     notes = [
         f"STEP: {len(body)} faces meshed to {1e6 * how.chord:g} µm and "
         f"{np.degrees(how.angle):.3g} degrees"

@@ -7,13 +7,20 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import trimesh
+from shapely import Polygon
 
+from chamberopt.chamber.part import chosen_triangles
+from chamberopt.chamber.propose.left_out import find_left_out
+from chamberopt.chamber.propose.pose import pose_in_words
 from chamberopt.chamber.propose.proposal import propose_charge, propose_ranges
 from chamberopt.chamber.propose.proposed_target import Sizes, propose_target, surfaces
 from chamberopt.chamber.propose.text import design_text
-from chamberopt.geometry.meshes.part_mesh import PartMesh
+from chamberopt.design.part import Selection, Target
+from chamberopt.geometry.meshes.part_mesh import PartMesh, read_part
 from chamberopt.geometry.meshes.raw_mesh import number_by_position
+from chamberopt.geometry.triangles import areas
 from chamberopt.search.study.parameters import Varied
+from tests.helpers.four_parts import FOUR_PARTS
 
 
 @pytest.mark.parametrize(
@@ -74,6 +81,9 @@ ALL = (0, 1, 2, 3, 4, 5)
         ({"do not peen": 0, "NOT_TO_PEEN": 1, "no target": 2, "mask": 3, "FREE": 4}, [], ["FREE"]),
         ({"nicht zu strahlen": 0, "ungestrahlt": 1, "Strahlen": 4}, [], ["Strahlen"]),
         ({"No. 5 target": 4, "SIDE": 0}, [], ["No. 5 target"]),
+        # The largest named surface, unless it is the whole part or says that it is the rest.
+        ({"COILS": (0, 1, 2, 3), "LEGS": 4, "ENDS": 5}, [], ["COILS"]),
+        ({"BODY_1": (0, 1, 2, 3), "LEGS": 4, "PART": ALL}, [], ["LEGS"]),
     ],
 )
 def test_the_target_is_what_is_named_or_marked(
@@ -81,6 +91,67 @@ def test_the_target_is_what_is_named_or_marked(
 ) -> None:
     mesh = box_with(names)
     assert propose_target(mesh, surfaces(mesh), wanted).keys == {"surface": target}
+
+
+def test_a_target_is_named_with_those_that_come_after_it() -> None:
+    mesh = box_with({"COILS": (0, 1, 2, 3), "LEGS": 4})
+    reason = propose_target(mesh, surfaces(mesh), []).reason
+    assert reason == "COILS: the largest surface that the file names; after it LEGS (400 mm²)"
+
+
+@pytest.mark.parametrize(
+    ("turns", "words"),
+    [
+        ((0.0, 0.0, 0.0), "as drawn"),
+        ((180.0, 0.0, 0.0), "the file's +z down, face 3 level above"),
+        (
+            (0.0, -90.0, 30.0),
+            "the file's -x down, face 4 level below, turned by 30 degrees about the vertical",
+        ),
+        ((45.0, 0.0, 0.0), "face 3 tilted by 45 degrees"),
+    ],
+)
+def test_a_pose_is_said_as_a_fixture_gives_it(
+    turns: tuple[float, float, float], words: str
+) -> None:
+    """A block with a step: face 3 is its bottom, face 4 its end at -x, and others are alike."""
+    step = trimesh.creation.extrude_polygon(
+        Polygon([(0, 0), (40, 0), (40, 30), (30, 30), (30, 20), (0, 20)]), 15
+    )
+    step.apply_transform(trimesh.transformations.rotation_matrix(np.pi / 2, (1, 0, 0)))
+    mesh = PartMesh(1e-3 * step.vertices, step.faces, number_by_position(20), (), "", {})
+    known = surfaces(mesh)
+    assert pose_in_words(mesh, known, turns) == words
+
+
+def test_what_faces_away_is_offered_for_leaving_out(tmp_path: Path) -> None:
+    """The heel ends of a bevel gear's teeth face away from the sonotrode, its apex down."""
+    mesh = read_part(FOUR_PARTS["bevel_gear"].write(tmp_path), "mm")
+    known = surfaces(mesh)
+    target, area = propose_target(mesh, known, []), areas(mesh.vertices, mesh.triangles)
+    heels, toes = (next(o.triangles for o in known if o.name == f"face {k}") for k in (7, 9))
+    part = SimpleNamespace(target=Selection(**target.keys), rotate_deg=(0.0, 0.0, 0.0))
+    posed = SimpleNamespace(triangles=mesh.triangles, target=target.triangles, area=area)
+    made = SimpleNamespace(
+        mesh=mesh,
+        known=known,
+        design=SimpleNamespace(part=part),
+        chamber=SimpleNamespace(part=posed, source=np.arange(len(area))),
+        reach=SimpleNamespace(mesh=mesh, share=np.where(toes, 0.5, 1.0)),
+        tables={"part": {"mesh": str(tmp_path / "gear.obj")}, "part.target": target.keys},
+        reasons={},
+    )
+    away, hidden = find_left_out(made)
+    assert away.text == "the 12% that face away from the sonotrode (face 7)"
+    assert hidden.text == "the 3% that no ball touches here"
+    text = design_text(made, tmp_path, [away, hidden])
+    for line in ("direction = [0, 0, -1]", "angle_deg = [0, 105]", "reachable = true"):
+        assert f"# {line}" in text
+        text = text.replace(f"# {line}", line)  # as a user would
+    table = tomllib.loads(text)["part"]["target"]
+    left = chosen_triangles(mesh, Target.model_validate(table))
+    assert (left == target.triangles & ~heels).all()
+    assert table["reachable"]
 
 
 def test_faces_do_not_take_a_name_of_the_file() -> None:

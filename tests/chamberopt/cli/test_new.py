@@ -52,6 +52,19 @@ def test_a_flat_target_is_turned_to_the_sonotrode(direction: tuple[float, float,
     assert sides == pytest.approx([60, 40, 5], abs=0.3)
 
 
+def test_turns_are_simple_where_that_is_as_good(tmp_path: Path) -> None:
+    """The inner faces of an angle, 5 and 3 in long, face down best at 30 degrees, well at 45."""
+    angle = read_part(FOUR_PARTS["bracket"].write(tmp_path), "in")
+    target = propose_target(angle, surfaces(angle), []).triangles
+    assert propose_pose(angle.vertices, angle.triangles, target)[0] == (-90.0, 45.0, 0.0)
+    round_bar = trimesh.creation.cylinder(10.0, 50.0, sections=31)
+    assert square_to_walls(round_bar.vertices, (0.0, 0.0, 0.0)) == (0.0, 0.0, 0.0)
+    plate = trimesh.creation.box((60, 40, 5))
+    for turn, needed in ((7.3, -7.3), (7.02, -7.0), (0.4, 0.0), (-60.0, 60.0), (-90.0, 90.0)):
+        turned = plate.vertices @ rotation_matrix((0.0, 0.0, turn)).T
+        assert square_to_walls(turned, (0.0, 0.0, 0.0))[2] == pytest.approx(needed)
+
+
 def test_a_ball_touches_what_its_radius_lets_it(tmp_path: Path) -> None:
     """A slot of 2 mm with square corners: balls above 2 mm touch none of its walls."""
     from shapely import Polygon

@@ -5,14 +5,16 @@ from typing import Any
 
 import numpy as np
 import pytest
+import trimesh
 
 from chamberopt.chamber.part import posed_part, preview_part
 from chamberopt.common.errors import InputError
 from chamberopt.design.design import Design
-from chamberopt.geometry.triangles import area_vectors
+from chamberopt.geometry.triangles import area_vectors, rotation_matrix
 from chamberopt.page.edited_file import EditedFile
 from chamberopt.page.picking import Picker
 from tests.chamberopt.design.test_shipped_parts import PARTS
+from tests.helpers.mesh_files import write_stl
 from tests.hunt.base import write_base
 
 TARGET = "part.target"
@@ -108,4 +110,22 @@ def test_a_face_is_turned_down(tmp_path: Path) -> None:
         box.changes |= box.picker.face_down(box.design, triangle, 30.0)
         turn = preview_part(box.design).rotation
         normal = turn @ area_vectors(mesh.vertices, mesh.triangles)[triangle]
-        assert normal / np.linalg.norm(normal) == pytest.approx([0, 0, -1], abs=2e-3)
+        assert normal / np.linalg.norm(normal) == pytest.approx([0, 0, -1], abs=1e-7)
+
+
+def test_a_face_down_is_squared_and_the_chamber_fits(tmp_path: Path) -> None:
+    """A plate of 120 x 60 x 10 mm, drawn askew, in a chamber of 40 mm that is too small for it."""
+    write_base(tmp_path)
+    plate = trimesh.creation.box((120, 60, 10))
+    askew = rotation_matrix((20.0, 35.0, 50.0))
+    write_stl(tmp_path / "box.stl", (plate.vertices @ askew.T)[plate.faces])
+    whole = dict.fromkeys(f"{TARGET}.{key}" for key in ("direction", "angle_deg", "box_mm"))
+    page = Edited(tmp_path / "design.toml", whole)
+    broad = int((plate.face_normals[:, 2] > 0.5).argmax())
+    page.changes |= page.picker.face_down(page.design, broad, 30.0)
+    low, high = (end(preview_part(page.design).vertices, axis=0) for end in (np.min, np.max))
+    assert 1e3 * (high - low) == pytest.approx([120, 60, 10], abs=0.3)
+    assert low[:2] == pytest.approx(-high[:2], abs=1e-6)  # on the axis
+    chamber = page.design.chamber
+    assert chamber.diameter_mm > np.hypot(120, 60)
+    assert chamber.height_mm > 1e3 * high[2] > 1e3 * low[2] > 6

@@ -27,5 +27,6 @@ def test_a_part_is_read_with_its_size_and_its_targets_name(tmp_path: Path, name:
     assert 1e3 * np.sort(part.size) == pytest.approx(np.sort(given.size_mm), abs=0.06)
     if given.target:
         assert 0 < part.groups[given.target].sum() < len(part.triangles)
+    assert not [one for one in part.groups if "translator" in one]  # no name of a part
     dropped = [note for note in part.notes if "dropped 1 stray triangle of no" in note]
     assert len(dropped) == (name == "scan_stray")

@@ -1,0 +1,53 @@
+"""Offer what may be left out of a proposed target: what faces away, and what no ball touches."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from chamberopt.chamber.part import chosen_triangles
+from chamberopt.chamber.propose.proposal import Proposal
+from chamberopt.chamber.reach import reached_part_share
+from chamberopt.geometry.triangles import area_vectors, areas, rotation_matrix, unit_vectors
+
+AWAY_DEG = 105.0  # angle to the way down from which on a face is turned away from the sonotrode
+LEAST = 0.02  # share of the target's area below which nothing is offered
+NEARLY_ALL, MOST_NAMED = 0.9, 3
+
+
+@dataclass(frozen=True)
+class LeftOut:
+    """What may be left out of a target, and the keys of [part.target] that leave it out."""
+
+    keys: dict[str, object]
+    text: str
+
+
+def find_left_out(proposal: Proposal) -> list[LeftOut]:
+    """Return what of a proposed target faces away from the sonotrode or is hidden from the shot."""
+    mesh, part, chamber = proposal.mesh, proposal.design.part, proposal.chamber
+    target, area = chosen_triangles(mesh, part.target), areas(mesh.vertices, mesh.triangles)
+    down = -rotation_matrix(part.rotate_deg)[2]
+    normals = unit_vectors(area_vectors(mesh.vertices, mesh.triangles))
+    away = target & (normals @ down < np.cos(np.radians(AWAY_DEG)))
+    found = []
+    whole = [
+        one
+        for one in proposal.known
+        if area[one.triangles & away].sum() > NEARLY_ALL * area[one.triangles].sum()
+    ]
+    # The upper half of a round surface is no face that could be left out.
+    of_faces = np.any([one.triangles for one in whole], axis=0) & away
+    share = area[away].sum() / area[target].sum()
+    if share > LEAST and area[of_faces].sum() > 0.5 * area[away].sum():
+        named = ", ".join(one.name for one in whole[:MOST_NAMED])
+        direction = [round(float(x), 4) + 0.0 for x in down]
+        keys: dict[str, object] = {"direction": direction, "angle_deg": [0.0, AWAY_DEG]}
+        found.append(LeftOut(keys, f"the {share:.0%} that face away from the sonotrode ({named})"))
+    posed = chamber.part
+    touched = reached_part_share(proposal.reach, chamber.source, len(posed.triangles))
+    hidden = 1.0 - touched[posed.target] @ posed.area[posed.target] / posed.area[posed.target].sum()
+    if hidden > LEAST:
+        found.append(LeftOut({"reachable": True}, f"the {hidden:.0%} that no ball touches here"))
+    return found
