@@ -35,6 +35,7 @@ LEVEL_DEG = 0.5  # a flat face is level if it is tilted by less
 # Steps of the turn that brings the long side to x, and the share by which the rectangle round the
 # part may be larger than the smallest one. Simple turns are taken first.
 SQUARE_STEPS = ((90.0, 0.05), (45.0, 0.05), (15.0, 0.01), (5.0, 0.01), (1.0, 0.01))
+NEARLY_SQUARE = 1.01  # length over width up to which a rectangle has no long side
 
 
 def propose_pose(
@@ -90,11 +91,13 @@ def square_to_walls(vertices: np.ndarray, turns: Turns) -> Turns:
         turn = rotation_matrix((0.0, 0.0, angle))[:2, :2]
         return np.asarray(np.ptp(corners @ turn.T, axis=0))
 
+    def excess(angle: float) -> tuple[float, bool, float]:
+        """Return what is least at the best of several angles: area, whether y is long, angle."""
+        x, y = sides_at(angle)
+        return round(float(x * y), 9), y > NEARLY_SQUARE * x, angle
+
     for step, larger in SQUARE_STEPS:
-        angle = min(
-            np.arange(0.0, 180.0, step).tolist(),
-            key=lambda one: (round(float(np.prod(sides_at(one))), 9), round(-sides_at(one)[0], 6)),
-        )
+        angle = min(np.arange(0.0, 180.0, step).tolist(), key=excess)
         if np.prod(sides_at(angle)) <= (1.0 + larger) * hull.minimum_rotated_rectangle.area:
             break
     else:
@@ -150,13 +153,13 @@ def _poses(normal: np.ndarray, weight: np.ndarray) -> Iterator[tuple[Turns, floa
         for sign in (-1.0, 1.0):
             as_drawn = (axis, sign) == (2, -1.0)
             yield turns_down(sign * np.eye(3)[axis]), AS_DRAWN if as_drawn else ALONG_AXIS
+    mean = weight @ normal
+    if np.linalg.norm(mean) > FLAT:
+        yield turns_down(mean / np.linalg.norm(mean)), 0.0  # lies on a face
+        return
     for x, y, z in product((0.0, -1.0, 1.0), repeat=3):
         if abs(x) + abs(y) + abs(z) == 2.0:
             yield turns_down(np.array([x, y, z]) / np.sqrt(2.0)), DIAGONAL
-    mean = weight @ normal
-    if np.linalg.norm(mean) > FLAT:
-        yield turns_down(mean / np.linalg.norm(mean)), 0.0
-        return
     directions = [*np.linalg.eigh((weight[:, None] * normal).T @ normal)[1].T]
     directions += [-one for one in directions]
     if np.linalg.norm(mean) > 0.05:
