@@ -129,8 +129,8 @@ def pose_in_words(mesh: PartMesh, known: Sequence[Surface], turns: Turns) -> str
     words = []
     if abs(up[axis]) > np.cos(np.radians(LEVEL_DEG)):
         words.append(f"the file's {'-' if up[axis] > 0.0 else '+'}{'xyz'[axis]} down")
-    level = [f"{name} level below" for name, tilt in tilts.items() if tilt < LEVEL_DEG]
-    level += [f"{name} level above" for name, tilt in tilts.items() if tilt > 180.0 - LEVEL_DEG]
+    level = [f"{name} level facing down" for name, tilt in tilts.items() if tilt < LEVEL_DEG]
+    level += [f"{name} level facing up" for name, tilt in tilts.items() if tilt > 180.0 - LEVEL_DEG]
     words += level[:1]
     if not words:
         tilted = [f"{name} tilted by {min(t, 180.0 - t):.3g} degrees" for name, t in tilts.items()]

@@ -103,10 +103,10 @@ def test_a_target_is_named_with_those_that_come_after_it() -> None:
     ("turns", "words"),
     [
         ((0.0, 0.0, 0.0), "as drawn"),
-        ((180.0, 0.0, 0.0), "the file's +z down, face 3 level above"),
+        ((180.0, 0.0, 0.0), "the file's +z down, face 3 level facing up"),
         (
             (0.0, -90.0, 30.0),
-            "the file's -x down, face 4 level below, turned by 30 degrees about the vertical",
+            "the file's -x down, face 4 level facing down, turned by 30 degrees about the vertical",
         ),
         ((45.0, 0.0, 0.0), "face 3 tilted by 45 degrees"),
     ],
