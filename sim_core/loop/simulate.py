@@ -124,7 +124,7 @@ def simulate(
     times = _checked_frames(frames, scene)
     run = Simulation(scene, progress)
     run.play(scene.warmup, record=False)
-    begin_anew(run.state.stays)
+    begin_anew(run.state.stays, scene.warmup)
     end = scene.warmup + scene.duration
     noted = run.play(end, record=True, frames=scene.warmup + times)
     balls, state = run.balls(), run.state

@@ -11,7 +11,9 @@ of MIN_HITS or more the ball is
 
 Whether a ball rattles is decided at each hit by the hits so far, so that a simulation that is cut
 short decides alike. The first MIN_HITS - 1 hits of a series, with which a ball gets into its gap,
-are therefore like any others.
+are therefore like any others. A ball that has rattled stays held: its slow hits count as those of a
+rattling ball, also when it lands or creeps along the gap, until one lies more than its diameter
+from the one before.
 
 Sideways means across gravity, or, without gravity, across the motion of the sonotrode. A series
 also ends when the ball lands to lie still, slide or roll, of which contact mode tells. Hops that
@@ -61,11 +63,13 @@ class Stays(NamedTuple):
     hits: number of the hits, (n,) int32. 0 if there is no series.
     logged: number of those on recorded surfaces, (n,) int32.
     meetings: number of collisions with balls during the series, (n,) int32.
-    rattled: last hit at which the ball was rattling [s since the start], (n,).
+    rattled: last hit at which the ball was rattling [s since the start], (n,). 0 if there
+        is none, and negative if the ball got away since.
     time: time for which each ball was HOPPING in past series, and RATTLING so far [s], (n, 2).
     recorded: number of the hits on recorded surfaces in past series of hops, and of those at which
         the ball was rattling, (n, 2) int64.
-    spot: position of the ball's centre at the start of the latest of these series [m], (n, 3).
+    spot: position of the ball's centre at the start of its latest series of hops, or at its last
+        rattling hit [m], (n, 3).
     """
 
     axis: Vec3
@@ -173,14 +177,17 @@ def note_hit(
     away = sub(impact.position, vec3_at(stays.place, ball))
     height = dot(away, stays.axis)
     radius = radius_of_ball(sizes, stays.radius, ball)
+    held = _is_still_held(stays, radius, ball, impact)
+    if held:
+        _note_held(stays, event, impact.position, recorded)
     landed = not is_flying(contact, ball)
-    is_out = stays.rattled[ball] > stays.began[ball] and abs(height) > radius
+    is_out = abs(stays.rattled[ball]) > stays.began[ball] and abs(height) > radius
     if landed or is_out or dot(away, away) - height * height > radius * radius:
         if stays.hits[ball] >= MIN_HITS:
             end_series(stays, ball, landed)
         stays.hits[ball] = 0
     if landed:
-        return False
+        return held
     if stays.hits[ball] == 0:
         _begin_series(stays, event, impact.position)
         height = 0.0
@@ -191,27 +198,55 @@ def note_hit(
     stays.speed[ball] += impact.normal_speed
     stays.hits[ball] += 1
     stays.logged[ball] += recorded
-    return stays.hits[ball] >= MIN_HITS and _note_rattling(stays, radius, ball, recorded)
+    if not held and stays.hits[ball] >= MIN_HITS and _is_rattling(stays, radius, ball):
+        _note_held(stays, event, impact.position, recorded)
+        return True
+    return held
 
 
-@jit
-def _note_rattling(stays: Stays, radius: float, ball: int, recorded: bool) -> bool:
-    """Add a ball's last hit to its time of rattling, if it is rattling, and return whether it is.
+@inlined
+def _is_still_held(stays: Stays, radius: float, ball: int, impact: Impact) -> bool:
+    """Return whether a hit is one more of a ball that rattled, and note if it got away.
 
     Args:
         radius: radius of the ball [m].
-        recorded: True if impacts on the surface are logged now.
     """
-    hits, last, normal = stays.hits[ball], stays.last[ball], vec3_at(stays.normal, ball)
+    if not stays.rattled[ball] > 0.0:
+        return False
+    away = sub(impact.position, vec3_at(stays.spot, ball))
+    if dot(away, away) > 4.0 * radius * radius:
+        stays.rattled[ball] *= -1.0
+        return False
+    return impact.normal_speed < stays.slow
+
+
+@jit
+def _is_rattling(stays: Stays, radius: float, ball: int) -> bool:
+    """Return whether a ball is rattling in a gap, by all hits of its series.
+
+    Args:
+        radius: radius of the ball [m].
+    """
+    hits, normal = stays.hits[ball], vec3_at(stays.normal, ball)
     faces = dot(normal, normal) < (FACING * hits) ** 2
     slow = stays.speed[ball] < stays.slow * hits
-    if not (faces and slow and stays.rise[ball] < radius and hits > stays.meetings[ball]):
-        return False
-    stays.time[ball, RATTLING] += last - max(stays.began[ball], stays.rattled[ball])
+    return bool(faces and slow and stays.rise[ball] < radius and hits > stays.meetings[ball])
+
+
+@inlined
+def _note_held(stays: Stays, event: BallEvent, position: Vec3, recorded: bool) -> None:
+    """Add a hit of a rattling ball to its time in the gap.
+
+    Args:
+        position: of the ball's centre [m].
+        recorded: True if impacts on the surface are logged now.
+    """
+    ball, now = event.ball, event.time_since_start
+    since = stays.rattled[ball] if stays.rattled[ball] > 0.0 else stays.began[ball]
+    stays.time[ball, RATTLING] += now - since
     stays.recorded[ball, RATTLING] += recorded
-    stays.rattled[ball] = last
-    set_vec3(stays.spot, ball, vec3_at(stays.place, ball))
-    return True
+    stays.rattled[ball] = now
+    set_vec3(stays.spot, ball, position)
 
 
 @inlined
@@ -240,13 +275,13 @@ def end_series(stays: Stays, ball: int, landed: bool) -> bool:
     Args:
         landed: True if the series ends because the ball lands.
 
-    Returns: True if the ball was hopping, or rattling at its last hit.
+    Returns: True if the ball was hopping.
     """
     hits, lasted = stays.hits[ball], stays.last[ball] - stays.began[ball]
     if hits < MIN_HITS or hits <= stays.meetings[ball]:
         return False
-    if stays.rattled[ball] > stays.began[ball]:
-        return bool(stays.rattled[ball] == stays.last[ball])
+    if abs(stays.rattled[ball]) > stays.began[ball]:
+        return False
     if landed or lasted < MIN_TIME:
         return False
     stays.time[ball, HOPPING] += lasted
@@ -262,10 +297,11 @@ def is_on_one_side(stays: Stays, ball: int) -> bool:
     return hits > max(MIN_HITS, int(stays.meetings[ball])) and normal >= FACING * hits
 
 
-def begin_anew(stays: Stays) -> None:
-    """Forget all series so far, as recording begins now."""
-    for column in (stays.hits, stays.rattled, stays.time, stays.recorded):
+def begin_anew(stays: Stays, now: float) -> None:
+    """Forget all series so far, as recording begins now [s]. Balls that are held stay so."""
+    for column in (stays.hits, stays.time, stays.recorded):
         column[:] = 0
+    stays.rattled[:] = np.where(stays.rattled > 0.0, now, 0.0)
 
 
 def trapped(stays: Stays, middle: np.ndarray) -> Trapped:
@@ -274,7 +310,8 @@ def trapped(stays: Stays, middle: np.ndarray) -> Trapped:
     Args:
         middle: middle of the mesh [m], (3,).
     """
-    at_end = np.array([end_series(stays, k, False) for k in range(len(stays.hits))], bool)
+    hopped = np.array([end_series(stays, k, False) for k in range(len(stays.hits))], bool)
+    at_end = hopped | (stays.rattled > 0.0)
     stays.hits[:] = 0
     balls = np.flatnonzero(stays.time.any(axis=1))
     time, hits = stays.time[balls], stays.recorded[balls]
