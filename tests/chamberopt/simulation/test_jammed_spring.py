@@ -11,7 +11,7 @@ import pytest
 import trimesh
 from scipy.stats import t
 
-from chamberopt.chamber.build import build_chamber
+from chamberopt.chamber.build import Chamber, build_chamber
 from chamberopt.chamber.checks.jams import jam_gaps
 from chamberopt.chamber.part import turning_axis
 from chamberopt.chamber.replica_seed import replica_seed
@@ -81,9 +81,9 @@ def test_check_finds_the_gap_between_the_coils(design: Design) -> None:
     assert not jam_gaps(chamber, 0.99 * gap.free_below)
 
 
-def dented_area(found: SimulationResult, design: Design) -> float:
+def dented_area(found: SimulationResult, chamber: Chamber, design: Design) -> float:
     """Sum of the squares of the dents' diameters on the part [m²]."""
-    return float((dent_diameters(found.impacts, design) ** 2).sum())
+    return float((dent_diameters(found.impacts, chamber, design) ** 2).sum())
 
 
 def without(scene: Scene, found: SimulationResult, rows: np.ndarray) -> Scene:
@@ -107,7 +107,9 @@ def test_dents_are_those_of_a_run_without_the_jammed_balls(design: Design) -> No
         held = first.trapped.ball[first.trapped.at_end & (first.trapped.rattling > 0.0)]
         if len(held):
             rows = np.zeros(0, dtype=int), held
-            both = [dented_area(simulate(without(scene, first, one)), design) for one in rows]
+            both = [
+                dented_area(simulate(without(scene, first, one)), chamber, design) for one in rows
+            ]
             apart.append(both[0] - both[1])
             area.append(both[1])
     assert len(apart) >= 3
