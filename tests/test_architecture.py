@@ -24,10 +24,11 @@ ORDER = {
     "part_mesh",
     "chamberopt/design": (
         "shape_surface+table_base materials shapes effects+part+process+shot+sonotrode "
-        "almen_strip+calibration+flexure+ranges+tolerances+zones design load"
+        "almen_strip+calibration+fixture+flexure+ranges+tolerances+zones design load"
     ),
     "chamberopt/chamber": (
-        "replica_seed bores_and_deflectors thin_part part reach+largest_ball build dimensionless "
+        "replica_seed bores_and_deflectors thin_part part fixture+reach+largest_ball build "
+        "dimensionless "
         "flexure+scene analytic checks propose"
     ),
     "chamberopt/coverage": "dents part_impacts+metrics field coverage_from_impacts "

@@ -115,13 +115,13 @@ TAG_END = 255  # tag of a bore's end, which must vanish
 
 class TriangleProperties(NamedTuple):
     """Properties of a surface's triangles: tag (number for part, wall or sonotrode), direction,
-    part triangle under each, and fitting (hole or deflector).
+    part triangle under each, and fitting (hole, deflector, holder or mask).
     """
 
     tags: np.ndarray  # (k,), uint8
     facing: np.ndarray  # area vector out of the cavity [m²], (k, 3)
     source: np.ndarray  # part triangle under each triangle, else -1; (k,)
-    fitting: np.ndarray  # hole or deflector as an index into `fitting_names`, else -1; (k,)
+    fitting: np.ndarray  # its index in `fitting_names`, -1 for none; (k,)
 
 
 def triangle_properties(
@@ -133,7 +133,7 @@ def triangle_properties(
         facing: area vectors out of the cavity [m²], (k, 3).
         tags: number for the kind of surface, one for all triangles or one for each, (k,).
         source: part triangle under each triangle, (k,); None if they are not on the part.
-        fitting: index of a hole or deflector in `fitting_names`, else -1.
+        fitting: index of the fitting in `fitting_names`, -1 for none.
     """
     count = len(facing)
     return TriangleProperties(
@@ -145,9 +145,11 @@ def triangle_properties(
 
 
 def fitting_names(design: Design) -> list[str]:
-    """Return the dotted names of all holes, then of all deflectors, such as chamber.holes.0."""
+    """Return the names of holes and deflectors, such as chamber.holes.0, then holder and mask."""
     counts = {"holes": len(design.chamber.holes), "deflectors": len(design.chamber.deflectors)}
-    return [f"chamber.{kind}.{k}" for kind, count in counts.items() for k in range(count)]
+    names = [f"chamber.{kind}.{k}" for kind, count in counts.items() for k in range(count)]
+    given = {"holder": design.holder is not None, "mask": design.mask is not None}
+    return names + [name for name, is_given in given.items() if is_given]
 
 
 @dataclass(frozen=True)
@@ -236,7 +238,7 @@ def _bore_of_hole(cavity: CavitySolid, hole: Hole, k: int) -> Bore:
     Raises InputError if the hole's axis does not lead out of the room.
     """
     name, at, out = f"chamber.holes.{k}", np.array(hole.at), np.array(hole.direction)
-    distance, entering = _first_crossings(cavity.body.surface(), at[None], out, -WALL_TOLERANCE)
+    distance, entering = first_crossings(cavity.body.surface(), at[None], out, -WALL_TOLERANCE)
     if entering[0] or not np.isfinite(distance[0]):
         raise InputError(
             f"{name}.at_mm: from {format_point(at)} the axis does not lead out of the room; give a "
@@ -295,7 +297,7 @@ def _length_to_room(cavity: CavitySolid, bore: Bore, rim: np.ndarray) -> float:
         rim: points on the edge of the bore's bottom [m], (p, 3).
     """
     starts = np.r_[rim, bore.bottom[None]]
-    distance, entering = _first_crossings(cavity.body.surface(), starts, bore.axis, 0.0)
+    distance, entering = first_crossings(cavity.body.surface(), starts, bore.axis, 0.0)
     if not (entering & np.isfinite(distance) & (distance > bore.amplitude)).all():
         remedy = (
             "raise depth_mm"
@@ -340,7 +342,7 @@ def _without_deflectors(
     return cavity.without(unite(solids, "the deflectors"), pieces)
 
 
-def _first_crossings(
+def first_crossings(
     surface: SolidSurface, points: np.ndarray, direction: np.ndarray, beyond: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Find where each line first crosses a surface. A line along an edge counts as a crossing.

@@ -1,10 +1,10 @@
 """Build the chamber of a design: the closed cavity that the shot flies in.
 
-The cavity is the shape with its bores and deflectors, less the part. The same subtraction serves a
-part that hangs freely, a part whose shaft goes out through the ceiling, and a part that closes the
-chamber like a lid. Of the rooms that are left, only the room over the sonotrode is kept. A part
-that is drawn with its chamber may already be a piece of the chamber's surface. All files are read
-before solids are cut.
+The cavity is the shape with its bores and deflectors, less the part and what holds and masks it.
+The same subtraction serves a part that hangs freely, a part whose shaft goes out through the
+ceiling, and a part that closes the chamber like a lid. Of the rooms that are left, only the room
+over the sonotrode is kept. A part that is drawn with its chamber may already be a piece of the
+chamber's surface. All files are read before solids are cut.
 
 Frame: metres, z up, mean sonotrode face at z = 0, chamber axis at x = y = 0.
 """
@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -26,6 +26,7 @@ from chamberopt.chamber.bores_and_deflectors import (
     swept_faces,
     triangle_properties,
 )
+from chamberopt.chamber.fixture import Fixture, with_fixtures
 from chamberopt.chamber.part import Part, posed_part
 from chamberopt.chamber.reach import find_reach, reached_part_share
 from chamberopt.common.errors import InputError
@@ -76,10 +77,11 @@ class Chamber:
     part: Part  # in the chamber's frame, with m triangles
     exposed_area: np.ndarray  # (m,), area of each part triangle that bounds the cavity [m²]
     notes: tuple[str, ...]  # what was assumed, repaired or left out
-    # (k,), hole or deflector of a TAG_WALL triangle as an index into
+    # (k,), hole, deflector, holder or mask of a TAG_WALL triangle as an index into
     # `bores_and_deflectors.fitting_names`, else -1. None where the fittings are not known.
     fitting: np.ndarray | None = None
     shape_sha256: str = ""  # of the Python file that a user's own shape was run from
+    fixtures: dict[str, Fixture] = field(default_factory=dict)  # "holder" and "mask", if any
 
     @property
     def height(self) -> float:
@@ -96,7 +98,14 @@ class Chamber:
     @property
     def pieces_in_air(self) -> int:
         """Number of pieces of the part that reach no wall, and so have no holder."""
-        return _pieces_in_air(self.vertices, self.triangles, self.tags)
+        floating = (self.tags == TAG_PART) | self.on_fixture("mask")
+        return _pieces_in_air(self.vertices, self.triangles, floating)
+
+    def on_fixture(self, name: str) -> np.ndarray:
+        """Return True for each triangle of the cavity on the holder or the mask, (k,)."""
+        if name not in self.fixtures or self.fitting is None:
+            return np.zeros(len(self.tags), dtype=bool)
+        return np.asarray(self.fitting == self.fixtures[name].number)
 
     @property
     def on_target(self) -> np.ndarray:
@@ -124,7 +133,8 @@ def build_chamber(design: Design, target: np.ndarray | None = None) -> Chamber:
             keeps the target of its start.
     Raises:
         InputError: the part's mesh cannot be used, the part is outside the cavity or touches the
-            sonotrode, no target triangle faces the shot, or there is no room over the sonotrode.
+            sonotrode, no target triangle faces the shot, there is no room over the sonotrode, or
+            the holder or the mask is out of place.
     """
     part, notes = posed_part(design)
     deflectors = read_deflectors(design)
@@ -133,7 +143,7 @@ def build_chamber(design: Design, target: np.ndarray | None = None) -> Chamber:
     shape = design.chamber.surface(part.vertices, part.triangles)
     _refuse_misplaced_part(part, shape, design)
 
-    cavity = cavity_solid(design, shape, deflectors)
+    cavity = filled = cavity_solid(design, shape, deflectors)
     notes += [note for one in deflectors for note in one.notes]
     if shape.source is None:  # otherwise the part is already a piece of the cavity's surface
         solids, voids = split_bodies(part.vertices, part.triangles, part.name)
@@ -150,6 +160,7 @@ def build_chamber(design: Design, target: np.ndarray | None = None) -> Chamber:
         facing = -area_vectors(part.vertices, part.triangles)
         own = triangle_properties(facing, TAG_PART, np.arange(len(facing)))
         cavity = cavity.without(body, {solid.label: own for solid in solids})
+    cavity, fixtures = with_fixtures(design, part, filled, cavity)
     is_drawn = design.chamber.setup() is not None
     whole = cavity.body.surface()
     tags = cavity.trace(whole).tags
@@ -178,12 +189,13 @@ def build_chamber(design: Design, target: np.ndarray | None = None) -> Chamber:
         turn = "" if is_drawn else "check part.rotate_deg (which side faces the sonotrode); "
         raise _misplaced(part, shape, f"{text}no shot reaches it; {turn}{_where_to_look(is_drawn)}")
     _refuse_hidden_zones(part, exposed)
-    notes += [*room_notes, *_notes_on_room(room, traced, part.name)]
+    notes += [*room_notes, *_notes_on_rounding(room, traced)]
     volume = float(tetrahedron_volumes(room.vertices, room.triangles).sum())
     surface = room.vertices, room.triangles, traced.tags, traced.source
     origin = tuple(notes), traced.fitting, design.chamber.sha256
-    chamber = Chamber(*surface, volume, part, exposed, *origin)
-    return replace(chamber, notes=(*notes, *_hidden_notes(chamber)))
+    chamber = Chamber(*surface, volume, part, exposed, *origin, fixtures)
+    _refuse_idle_bore(design, chamber)
+    return replace(chamber, notes=(*notes, *_hidden_notes(chamber), *_holding_notes(chamber)))
 
 
 def _misplaced(part: Part, shape: ShapeSurface, text: str) -> SurfaceError:
@@ -411,15 +423,37 @@ def _hidden_notes(chamber: Chamber) -> list[str]:
     ]
 
 
-def _pieces_in_air(vertices: np.ndarray, triangles: np.ndarray, tags: np.ndarray) -> int:
-    """Return the number of pieces of the part that reach no wall of the cavity."""
+def _pieces_in_air(vertices: np.ndarray, triangles: np.ndarray, floating: np.ndarray) -> int:
+    """Return the number of pieces of the part that reach no wall of the cavity.
+
+    Args:
+        floating: marks the triangles of the part and of its mask, (k,).
+    """
     shells, volumes = find_shells(vertices, triangles)
-    on_part = tags == TAG_PART
-    return sum(bool(on_part[shells == k].all()) for k in range(len(volumes)))
+    return sum(bool(floating[shells == k].all()) for k in range(len(volumes)))
 
 
-def _notes_on_room(room: SolidSurface, traced: TriangleProperties, part_name: str) -> Iterator[str]:
-    """Yield a note on triangles turned by rounding, and a note on pieces of the part in the air.
+def _refuse_idle_bore(design: Design, chamber: Chamber) -> None:
+    """Raise InputError if the part should be held in a bore, but does not go out of the room."""
+    if design.holder is not None and design.holder.kind == "bore" and chamber.pieces_in_air:
+        raise InputError(
+            'holder.kind: given "bore", but the part goes out through no wall; lower the ceiling '
+            f'(chamber.{design.chamber.ceiling_key}), or give "rod", "collar" or "plate"'
+        )
+
+
+def _holding_notes(chamber: Chamber) -> Iterator[str]:
+    """Yield a note on pieces of the part that nothing holds."""
+    if count := chamber.pieces_in_air:
+        what = "the part reaches" if count == 1 else f"{count} pieces of the part reach"
+        yield (
+            f"{chamber.part.name}: {what} no wall: simulated as held in the air, without a holder; "
+            "[holder] gives it one"
+        )
+
+
+def _notes_on_rounding(room: SolidSurface, traced: TriangleProperties) -> Iterator[str]:
+    """Yield a note on triangles turned by rounding.
 
     Args:
         room: surface of the cavity.
@@ -435,6 +469,3 @@ def _notes_on_room(room: SolidSurface, traced: TriangleProperties, part_name: st
             "turned them: the part nearly touches a wall there; a slightly different diameter or "
             "offset avoids it"
         )
-    if count := _pieces_in_air(room.vertices, room.triangles, traced.tags):
-        what = "the part reaches" if count == 1 else f"{count} pieces of the part reach"
-        yield f"{part_name}: {what} no wall: simulated as held in the air, without a holder"

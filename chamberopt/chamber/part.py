@@ -307,6 +307,19 @@ def preview_part(design: Design) -> PartPreview:
     return PartPreview(mesh, *_pose(mesh, mesh.vertices, design), target, zones)
 
 
+def chosen_on_part(design: Design, wanted: Selection, field: str) -> np.ndarray:
+    """Mark the triangles (m,) of the part of `posed_part` that meet a further selection.
+
+    Args:
+        field: name of the design's key with the selection, for messages.
+    Raises:
+        InputError: no triangle meets all conditions.
+    """
+    given, table = _part_of_file(design), design.part
+    found = _simulated(given, table.target, table.smoothing, design.zones, _is_wall(design))
+    return np.asarray(_chosen(given, wanted, field)[found.origin])
+
+
 def turning_axis(design: Design, part: Part) -> Axis | None:
     """Return the axis about which the part turns: a point [m] and a direction, (3,) each.
 

@@ -26,6 +26,7 @@ from chamberopt.design.calibration import (
     with_measured_values,
 )
 from chamberopt.design.effects import Effects
+from chamberopt.design.fixture import Holder, Mask, fixture_problems
 from chamberopt.design.flexure import flexure_problems
 from chamberopt.design.materials import Materials, with_friction, with_numbers
 from chamberopt.design.part import PartTable
@@ -45,7 +46,9 @@ from chamberopt.design.zones import MAX_ZONES, Zone, zone_problems
 # Each further sonotrode has a tag below 255 and needs a cut through all walls before it.
 MAX_SONOTRODES = 50
 SHAPE = "chamber.shape"
-NOT_VARIED = ("calibration.", "zones.", "ranges.", "part.tessellation.")
+NOT_VARIED = (
+    "calibration.", "zones.", "ranges.", "part.tessellation.", "holder.at.", "mask.at.",
+)  # fmt: skip
 
 
 class Design(FileTable):
@@ -66,6 +69,10 @@ class Design(FileTable):
         "surfaces of the part with figures and limits of their own",
         (),
     )
+    holder: Holder | None = Field(
+        default=None, description="what holds the part in the room; absent: it hangs in the air"
+    )
+    mask: Mask | None = Field(default=None, description="what keeps the shot from faces")
     effects: Effects = Field(default_factory=Effects)
     process: Process
     calibration: CalibrationField = None
@@ -153,6 +160,8 @@ class Design(FileTable):
         yield from zone_problems(self.zones, self.calibration)
         yield from calibration_problems(self)
         yield from flexure_problems(self)
+        balls_mm, turns = 1e3 * min(self.shot.diameters), self.effects.part_turn is not None
+        yield from fixture_problems(self.holder, self.mask, balls_mm, turns)
         if self.sonotrodes and self.sonotrode.motion == "random_phase":
             text = 'given "random_phase" beside sonotrodes: not supported together; leave it out'
             yield Problem("sonotrode.motion", text)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from chamberopt.chamber.fixture import size_in_words
 from chamberopt.common.estimate import Estimate
 from chamberopt.common.number_text import estimate_text, percent
 from chamberopt.coverage.coverage_intervals import NOT_RESOLVED
@@ -103,7 +104,7 @@ def cautions(result: Result) -> Iterator[str]:
             "coverage and times are those of the facets."
         )
     if result.record.chamber.pieces_in_air:
-        yield "The part is held in the air: its holder is neither designed nor simulated."
+        yield "The part is held in the air: nothing holds it, [holder] of the design would."
     if ends := result.study.on_bounds if result.study else []:
         yield (
             f"The search ended on its bounds of {', '.join(ends)}: a better chamber may lie beyond."
@@ -297,8 +298,24 @@ def _chamber(result: Result) -> Iterator[Row]:
     for what, several in counted.items():
         if several:
             yield what, f"{len(several)}: see the report"
+    yield from _fixtures(result)
     if volume := result.record.chamber.volume_mm3:
         yield "free volume", f"{plain(1e-3 * volume)} cm³"
+
+
+def _fixtures(result: Result) -> Iterator[Row]:
+    """Yield a row on what holds the part, and one on what masks it."""
+    holder = result.design.holder
+    if holder is not None and holder.kind == "bore":
+        play = f"{plain(holder.clearance_mm)} mm of clearance all round"
+        yield "fixture", f"the part's own end in a bore, {play if holder.clearance_mm else 'tight'}"
+    for name, one in result.record.chamber.fixtures.items():
+        size = size_in_words(one.kind, one.size_mm)
+        text = f"{one.kind} {size or 'up to the wall'}"
+        if one.length_mm:
+            text += f", {plain(one.length_mm)} mm long"
+        what = "fixture" if name == "holder" else "mask"
+        yield what, f"{text}, on {plain(one.covered_mm2, 3)} mm² of the part"
 
 
 def _key_row(key: str, value: Any) -> Row:

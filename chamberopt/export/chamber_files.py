@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from chamberopt.chamber.bores_and_deflectors import fitting_names
+from chamberopt.common.errors import InputError
 from chamberopt.common.files import make_output_folder, new_file
 from chamberopt.design.shape_surface import TAG_PART, TAG_SONOTRODE, TAG_WALL, further_sonotrode_tag
 from chamberopt.results.arrays_file import load_chamber
@@ -46,7 +47,7 @@ def read_cavity(folder: Path) -> NamedSurfaces:
     """Read the cavity of a results folder and return it with its named surfaces.
 
     The surfaces are named part, sonotrode and wall, and, as in the design, sonotrodes.0,
-    chamber.holes.0, chamber.deflectors.0 and so on.
+    chamber.holes.0, chamber.deflectors.0, holder, mask and so on.
     """
     result = load_result(folder)
     chamber = load_chamber(result)
@@ -71,6 +72,20 @@ def write_stl_per_surface(folder: Path, out: Path) -> None:
     cavity, out = read_cavity(folder), make_output_folder(out)
     for name, own in cavity.surfaces.items():
         write_stl(out / f"{name}.stl", cavity.vertices, cavity.triangles[own])
+
+
+def write_fixtures(folder: Path, out: Path) -> list[str]:
+    """Write holder and mask as closed bodies, each a binary STL in mm, into a new folder.
+
+    They end at the part and at the wall of the chamber. Return a remark on each.
+    """
+    chamber = load_chamber(load_result(folder))
+    if not chamber.fixtures:
+        raise InputError(f"{folder}: its design has neither a [holder] nor a [mask] with a body")
+    out = make_output_folder(out)
+    for name, one in chamber.fixtures.items():
+        write_stl(out / f"{name}.stl", one.vertices * MM, one.triangles)
+    return ["holder and mask end at the chamber's wall: add what goes through it"]
 
 
 def write_3mf(folder: Path, file: Path) -> None:

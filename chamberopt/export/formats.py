@@ -86,6 +86,12 @@ FORMATS = {
         (),
         "chamber_files.write_stl_per_surface",
     ),
+    "fixtures-stl": ExportFormat(
+        "fixtures-stl",
+        "holder and mask as closed bodies, an STL each, in mm",
+        (),
+        "chamber_files.write_fixtures",
+    ),
     "chamber-3mf": ExportFormat(
         "chamber.3mf",
         "the closed cavity with named surfaces, in mm",

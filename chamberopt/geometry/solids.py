@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from chamberopt.common.errors import InputError
-from chamberopt.geometry.triangles import border_edges, find_shells, shell_winding
+from chamberopt.geometry.triangles import find_shells, shell_winding, swept
 
 if TYPE_CHECKING:
     from manifold3d import CrossSection, Manifold
@@ -158,10 +158,7 @@ def sweep_face(face: SolidSurface, way: np.ndarray, name: str) -> Solid:
 
     The normals of the face must point away from the prism.
     """
-    count, (a, b) = len(face.vertices), border_edges(face.triangles).T
-    walls = np.concatenate([np.c_[b, a, a + count], np.c_[b, a + count, b + count]])
-    triangles = np.concatenate([face.triangles, face.triangles[:, ::-1] + count, walls])
-    return make_solid(np.concatenate([face.vertices, face.vertices + way]), triangles, name)
+    return make_solid(*swept(face.vertices, face.triangles, way), name)
 
 
 def unite(solids: list[Solid], name: str) -> Solid:
@@ -258,11 +255,15 @@ def extrude(outline: np.ndarray, height: float) -> tuple[np.ndarray, np.ndarray]
     return vertices, np.asarray(mesh.tri_verts).astype(np.int32)
 
 
+def intersect(one: Solid, two: Solid, name: str) -> Solid:
+    """Return the body that two solids have in common. It may be empty."""
+    text = f"{one.name} and {two.name} cannot be intersected"
+    return Solid(_checked(one.body ^ two.body, text), -1, name)
+
+
 def overlap_volume(one: Solid, two: Solid) -> float:
     """Return the volume [m³] that two solids have in common."""
-    common = one.body ^ two.body
-    text = f"{one.name} and {two.name} cannot be intersected"
-    return float(_checked(common, text).volume()) * 1e-9
+    return intersect(one, two, "what they share").volume
 
 
 def find_cavities(surface: SolidSurface) -> list[np.ndarray]:

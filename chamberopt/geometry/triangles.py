@@ -71,6 +71,22 @@ def border_edges(triangles: np.ndarray) -> np.ndarray:
     return sides[~np.isin(sides[:, 0] * count + sides[:, 1], sides[:, 1] * count + sides[:, 0])]
 
 
+def swept(
+    vertices: np.ndarray, triangles: np.ndarray, way: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the closed surface that a piece of surface sweeps as its vertices move by `way` [m].
+
+    Args:
+        vertices: vertices of the piece [m], (n, 3).
+        triangles: its triangles, whose normals point away from the way.
+        way: the same for all vertices (3,), or for each its own (n, 3).
+    """
+    count, (a, b) = len(vertices), border_edges(triangles).T
+    walls = np.concatenate([np.c_[b, a, a + count], np.c_[b, a + count, b + count]])
+    all_triangles = np.concatenate([triangles, triangles[:, ::-1] + count, walls])
+    return np.concatenate([vertices, vertices + way]), all_triangles.astype(np.int32)
+
+
 def sharp_edges(vertices: np.ndarray, triangles: np.ndarray, degrees: float = 30.0) -> np.ndarray:
     """Return both end vertices (k, 2) of the edges at which a closed surface turns sharply.
 

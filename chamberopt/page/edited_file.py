@@ -235,6 +235,7 @@ def _table(value: dict[str, object]) -> object:
 # part, which would become another part.
 NOT_SHOWN = (
     "calibration.", "part.target.", "zones.", "tolerances.", "ranges.", "part.tessellation.",
+    "holder.at.", "mask.at.",
 )  # fmt: skip
 
 
@@ -267,11 +268,13 @@ def field_names(design: Design) -> set[str]:
 def _numbers(design: Design) -> Iterator[tuple[str, FieldInfo]]:
     """Yield dotted name and field of each number that the page shows.
 
-    Items of lists that the design leaves out are skipped.
+    Items of lists that the design leaves out, and a holder or mask that it has not, are skipped.
     """
+    absent = [f"{table}." for table in ("holder", "mask") if getattr(design, table) is None]
+    hidden = (*NOT_SHOWN, *absent)
     for name, field in numeric_fields(design):
         in_list = name.rpartition(".")[2].isdecimal()
-        if not name.startswith(NOT_SHOWN) and (not in_list or _value(design, name) is not None):
+        if not name.startswith(hidden) and (not in_list or _value(design, name) is not None):
             yield name, field
 
 

@@ -75,7 +75,7 @@ def strip_design(
     data["materials"]["part"] = strip_material(design.shot).model_dump()
     data["effects"]["part_turn"] = None
     data["effects"]["flexure"] = False  # the strip is held down on a thick block
-    for of_the_part in ("zones", "tolerances"):
+    for of_the_part in ("zones", "tolerances", "holder", "mask"):
         data.pop(of_the_part, None)
     return validate(Design, data)
 

@@ -8,9 +8,15 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from chamberopt.design.shape_surface import TAG_WALL, is_sonotrode
-from chamberopt.pictures.charts.colours import FEW_DENTS, OUTSIDE, UNREACHED, zone_colour
+from chamberopt.pictures.charts.colours import (
+    FEW_DENTS,
+    FIXTURE_COLOURS,
+    OUTSIDE,
+    UNREACHED,
+    zone_colour,
+)
 from chamberopt.pictures.drawn_part import DrawnPart
-from chamberopt.results.vtp_files import Surface, pyvista
+from chamberopt.results.vtp_files import Surface, fixture_marks, pyvista
 
 GREY, DARK, GLASS, SONOTRODE, BACKGROUND = "#b9bec4", "#2b3440", "#9db7cc", "#e08a2e", "white"
 FAULT, PALE = "#d01c1c", "#eceff2"
@@ -95,13 +101,13 @@ def _add_zones(plotter: Any, part: DrawnPart) -> list[Any]:
 
 
 def add_chamber(plotter: Any, chamber: Surface) -> tuple[dict[int, Any], list[Any]]:
-    """Add a chamber to a plotter: the sonotrodes, and the walls as glass with their edges.
+    """Add a chamber to a plotter: sonotrodes, holder and mask, and walls as glass with edges.
 
-    Clicks pass through both, to the part.
+    Clicks pass through all of them, to the part.
 
     Returns:
         The actors of the sonotrodes, by the tag (number) of a sonotrode's surface, and the actors
-        of the walls.
+        of the walls, with those of holder and mask.
     """
     tags = np.asarray(chamber["tag"])
     style = {"pickable": False, **NO_RENDER}
@@ -109,9 +115,19 @@ def add_chamber(plotter: Any, chamber: Surface) -> tuple[dict[int, Any], list[An
     for tag in np.unique(tags[is_sonotrode(tags)]):
         face = chamber.extract_cells(tags == tag).extract_surface(algorithm="dataset_surface")
         faces[int(tag)] = plotter.add_mesh(face, color=SONOTRODE, lighting=False, **style)
-    wall = chamber.extract_cells(tags == TAG_WALL).extract_surface(algorithm="dataset_surface")
+    fixtures, glass, actors = fixture_marks(chamber), tags == TAG_WALL, []
+    for name, own in fixtures.items():
+        glass &= ~own
+        body = chamber.extract_cells(own).extract_surface(algorithm="dataset_surface")
+        body = pyvista().PolyData.from_regular_faces(  # with its normals into the cavity
+            body.points, np.asarray(body.regular_faces)[:, ::-1]
+        )
+        look = {"color": FIXTURE_COLOURS[name], "ambient": 0.45, "diffuse": 0.6, **style}
+        actors.append(plotter.add_mesh(body, **look))
+    wall = chamber.extract_cells(glass).extract_surface(algorithm="dataset_surface")
     edges = wall.extract_feature_edges(SHARP_EDGE, non_manifold_edges=False, manifold_edges=False)
     return faces, [
+        *actors,
         plotter.add_mesh(wall, color=GLASS, opacity=0.16, specular=0.3, **style),
         plotter.add_mesh(edges, color=DARK, line_width=2, opacity=0.6, **style),
     ]

@@ -10,12 +10,27 @@ import numpy as np
 
 from chamberopt.pictures.actors import FAULT, GREY, NO_RENDER, SONOTRODE, add_edges
 from chamberopt.pictures.camera import cells_of, near_directions, near_views, pushed_back, seen_area
-from chamberopt.pictures.charts.colours import BLUE, ORANGE, OUTSIDE, PURPLE, SKY, YELLOW
+from chamberopt.pictures.charts.colours import (
+    BLUE,
+    FIXTURE_COLOURS,
+    ORANGE,
+    OUTSIDE,
+    PURPLE,
+    SKY,
+    YELLOW,
+)
 from chamberopt.pictures.panels import BORDER, SIZE, choose_views, near_panels, part_panels
 from chamberopt.pictures.picture_page import Panel, Row, write_page
 from chamberopt.pictures.subprocess_drawing import draw_in_subprocess, picture_path
 from chamberopt.pictures.view import render_view
-from chamberopt.results.vtp_files import MM, Surface, cavity_surface, pyvista, size_text
+from chamberopt.results.vtp_files import (
+    MM,
+    Surface,
+    cavity_surface,
+    fixture_marks,
+    pyvista,
+    size_text,
+)
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
@@ -89,7 +104,9 @@ def render_part(job: dict[str, Any]) -> None:
     kinds = np.select([missed, marked], [MISSED, MARKED], PLAIN)
     part, shown = _coloured(job, kinds)
     legend = [COLOURS[k] for k in np.unique(np.concatenate([kind for _, kind in shown]))]
-    legend = [(SONOTRODE, "sonotrode"), *legend] if job["chamber"] is not None else legend
+    if job["chamber"] is not None:
+        fixtures = [(FIXTURE_COLOURS[name], name) for name in fixture_marks(job["chamber"])]
+        legend = [(SONOTRODE, "sonotrode"), *fixtures, *legend]
     legend = legend if not len(edges) else [(FAULT, "what the message tells of")]
     rows = [Row(job["title"], _panels(job, part, shown, COLOURS))]
     if softness is not None:

@@ -15,12 +15,12 @@ from typing import Any
 import numpy as np
 
 from chamberopt.design.shape_surface import TAG_PART, TAG_WALL, is_sonotrode
-from chamberopt.pictures.charts.colours import FEW_DENTS, UNREACHED
+from chamberopt.pictures.charts.colours import FEW_DENTS, FIXTURE_COLOURS, UNREACHED
 from chamberopt.pictures.drawn_part import DrawnPart, point_areas
 from chamberopt.pictures.quantities import QUANTITIES
 from chamberopt.results.arrays_file import load_result_arrays
 from chamberopt.results.load import Result
-from chamberopt.results.vtp_files import Surface
+from chamberopt.results.vtp_files import Surface, fixture_marks
 
 # A triangle takes about 80 bytes of the page. Up to this number the page stays below 60 MB.
 MAX_TRIANGLES = 600_000
@@ -131,10 +131,12 @@ def _surfaces(
     """Return the surfaces that view3d.js draws, by name.
 
     The names are part (the target with enough dents), few (the target with too few dents),
-    unreached (the target that no ball can touch), rest (the rest of the part), sonotrode, and glass
-    (the walls).
+    unreached (the target that no ball can touch), rest (the rest of the part), sonotrode, holder,
+    mask, and glass (the walls).
     """
     tags = np.asarray(chamber["tag"])
+    fixtures = fixture_marks(chamber)
+    glass = (tags == TAG_WALL) & ~np.any([tags < 0, *fixtures.values()], axis=0)
     target, resolved = part.target, np.asarray(part.target["resolved"])
     corners = target.regular_faces
     found: dict[str, dict[str, Any]] = {
@@ -144,7 +146,8 @@ def _surfaces(
     }
     walls = {
         "sonotrode": (is_sonotrode(tags), SONOTRODE, 0.55 if eye[2] > 0.0 else 0.08),
-        "glass": (tags == TAG_WALL, GLASS, 0.13),
+        "glass": (glass, GLASS, 0.13),
+        **{name: (own, FIXTURE_COLOURS[name], 1.0) for name, own in fixtures.items()},
     }
     others = [("unreached", part.unreached, UNREACHED, 1.0), ("rest", rest, PART_GREY, 1.0)]
     others += [

@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from chamberopt.chamber.fixture import size_in_words
 from chamberopt.common.number_text import typeset_plain as plain
 from chamberopt.design.shape_surface import TAG_PART, TAG_SONOTRODE, TAG_WALL
 from chamberopt.geometry.triangles import border_edges
-from chamberopt.pictures.charts.colours import BLACK, BLUE, DARK_GREY, ORANGE
+from chamberopt.pictures.charts.colours import BLACK, BLUE, DARK_GREY, FIXTURE_COLOURS, ORANGE
 from chamberopt.pictures.section import (
     SAME,
     SectionPlane,
@@ -102,6 +103,7 @@ LEGEND = (
     "dimensions in mm. Orange: target, in the plan also where it is hidden. Hatched or grey: part. "
     "Blue: sonotrode."
 )
+LABEL = {"boxstyle": "square,pad=0.1", "facecolor": "white", "edgecolor": "none", "alpha": 0.85}
 
 
 @dataclass(frozen=True)
@@ -127,6 +129,11 @@ class View:
     def place(self, points: ArrayLike) -> np.ndarray:
         """Return the points on the page [mm] that show points (..., 2) [mm] of the chamber."""
         return np.asarray(self.corner + self.scale * (np.asarray(points) - self.low))
+
+    def chamber_point(self, place: Point) -> Point:
+        """Return the point [mm] of the chamber that is drawn at a place on the page [mm]."""
+        x, y = self.low + (np.array(place) - self.corner) / self.scale
+        return float(x), float(y)
 
     def window(self, axes: Axes) -> Rectangle:
         """Return the rectangle of the page that the view takes, at which drawings are cut off."""
@@ -239,6 +246,7 @@ def _draw_section(
     _lines(axes, view, lines[tags == TAG_WALL], BLACK, 1.1)
     _lines(axes, view, lines[tags > TAG_WALL], BLUE, 2.5)
     _lines(axes, view, lines[target], ORANGE, 2.0)
+    _draw_fixtures(axes, chamber, view, 1e-3 * at)
     (axis_at, y), (_, top) = view.place([[0.0, 0.0], [0.0, view.high[1]]])
     above = top + view.outside[1]
     across_line(axes, (axis_at, y - FACE - 1.0), (axis_at, above + 1.0))
@@ -271,6 +279,32 @@ def _draw_section(
     dimension(axes, (left, y), (left, low_at), 4.5, text, upright=True)
     text = _with_limits(plain(view.high[1]), float(view.high[1]), limits, "height_mm")
     dimension(axes, (right, y), (right, top), -4.5, text, upright=True)
+
+
+def _draw_fixtures(axes: Axes, chamber: Chamber, view: View, at: float) -> None:
+    """Draw holder and mask in the section, each with its name and size.
+
+    Args:
+        at: place of the section's plane [m].
+    """
+    window = view.window(axes)
+    for name, one in chamber.fixtures.items():
+        lines, _ = cut(one.vertices, one.triangles, 1 - view.right, at)
+        look: Any = {"facecolor": FIXTURE_COLOURS[name], "edgecolor": BLACK, "lw": 0.7}
+        _fill(axes, view, lines, window, hatch="....", **look)
+        if len(lines):
+            (left, low), (right, high) = view.place(
+                1e3 * np.array([lines.min(axis=(0, 1)), lines.max(axis=(0, 1))])
+            )
+            middle = 0.5 * (left + right), 0.5 * (low + high)
+            area = inside(1e3 * lines)
+            text = f"{name}\n{size_in_words(one.kind, [1e3 * side for side in one.size])}".strip()
+            style: Any = {"size": 5.0, "va": "center", "bbox": LABEL}
+            in_body = area is not None and area.contains_point(view.chamber_point(middle))
+            if in_body and right - left > SHORT:
+                axes.text(middle[0], middle[1], text, ha="center", **style)
+            else:
+                axes.text(right + 1.0, middle[1], text, ha="left", **style)
 
 
 def _draw_plan(

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from chamberopt.chamber.build import Chamber
+from chamberopt.chamber.fixture import Fixture
 from chamberopt.chamber.part import Part, PartOfFile
 from chamberopt.common.errors import InputError
 from chamberopt.common.limits import MAX_NUMBER
@@ -149,6 +150,8 @@ RULES: dict[str, Rule] = {
     "chamber.tags": Rule("uint8", "faces", 0, 255),
     "chamber.source": Rule(WHOLE, "faces", -1, "triangles"),
     "chamber.fitting": Rule(WHOLE, "faces", -1, "faces"),
+    **_mesh_rules("chamber.fixtures.holder", "of_holder", "on_holder"),
+    **_mesh_rules("chamber.fixtures.mask", "of_mask", "on_mask"),
     "chamber.exposed_area": Rule("float64", "triangles", 0.0, LARGEST),
     f"{PART}.area": Rule("float64", "triangles", 0.0, LARGEST),
     f"{PART}.target": Rule("bool", "triangles", *MARK),
@@ -212,7 +215,7 @@ def read_result_arrays(path: Path) -> ResultArrays:
         InputError: the file is missing, damaged or not the file that was written.
     """
     classes = (
-        Chamber, Part, PartOfFile, PartMesh, ElementNumbers, SmoothingFacts, DisplayField,
+        Chamber, Fixture, Part, PartOfFile, PartMesh, ElementNumbers, SmoothingFacts, DisplayField,
         DisplayMesh,
     )  # fmt: skip
     arrays = load_record(path, ResultArrays, classes, REMEDY)

@@ -132,10 +132,26 @@ class ZoneRecord(Table):
     limits: list[ZoneLimit]
 
 
+class FixtureRecord(Table):
+    """A holder or a mask.
+
+    size_mm: a diameter, two sides, or the thickness of a shell.
+    length_mm: length in the room along its axis, 0 for a shell.
+    covered_mm2: area of the part under it, of which covered_target_mm2 is on the target.
+    """
+
+    kind: str
+    size_mm: list[Positive]
+    length_mm: Positive
+    covered_mm2: float
+    covered_target_mm2: float
+
+
 class ChamberRecord(Table):
     """Volume, target and mesh of the chamber that was simulated.
 
     pieces_in_air: number of pieces of the part that reach no wall.
+    fixtures: "holder" and "mask", if there are any.
     facets_left: True if coarse triangles in place of a curved surface decide the coverage.
     """
 
@@ -144,6 +160,7 @@ class ChamberRecord(Table):
     target_triangles: Count
     pieces_in_air: Count
     facets_left: bool
+    fixtures: dict[str, FixtureRecord] = Field(default_factory=dict)
 
 
 class TrappedRecord(Table):

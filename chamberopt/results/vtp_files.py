@@ -30,6 +30,7 @@ OF_ELEMENT = {
     "element_impacts": "impacts",
 }
 ZONE = "zone"  # a column of both files, in results with zones
+FIXTURES = {"holder": 1, "mask": 2}  # numbers of the cell data "fixture" in chamber.vtp
 MM = 1e3
 
 Surface = Any
@@ -77,13 +78,26 @@ def cavity_surface(chamber: Chamber) -> Surface:
 
     tag: surface to which it belongs: 0 part, 1 sonotrode, 2 wall, 3 and more further sonotrodes.
     source: number of the same triangle in the part, -1 off the part.
-    fitting: number of the hole or deflector (fitting) to which it belongs, -1 for none. Only
+    fitting: number of its hole, deflector, holder or mask (fitting), -1 for none. Only
         chambers with fittings have this value.
+    fixture: 1 on the holder, 2 on the mask, 0 elsewhere. Only chambers with either have this value.
     """
     fields = {"tag": chamber.tags, "source": chamber.source}
     if chamber.fitting is not None:
         fields["fitting"] = chamber.fitting
+    if chamber.fixtures:
+        marks = sum(number * chamber.on_fixture(name) for name, number in FIXTURES.items())
+        fields["fixture"] = np.asarray(marks, dtype=np.uint8)
     return _surface(chamber.vertices, chamber.triangles, fields)
+
+
+def fixture_marks(cavity: Surface) -> dict[str, np.ndarray]:
+    """Return marks (k,) of the triangles of a cavity on its holder and its mask, if there are."""
+    if "fixture" not in cavity.cell_data:
+        return {}
+    numbers = np.asarray(cavity["fixture"])
+    marks = {name: numbers == number for name, number in FIXTURES.items()}
+    return {name: own for name, own in marks.items() if own.any()}
 
 
 def write_coverage(folder: Path, part: Surface, field: Surface) -> None:

@@ -28,6 +28,7 @@ from chamberopt.results.records import (
     ConfirmedRecord,
     CoverageAtTime,
     FieldRecord,
+    FixtureRecord,
     FrontPoint,
     ModelRecord,
     Needed,
@@ -219,6 +220,7 @@ def _write_candidate(folder: Path, candidate: CandidateResult, **more: Any) -> C
             target_triangles=int(target.sum()),
             pieces_in_air=chamber.pieces_in_air,
             facets_left=facets_are_left(chamber.part),
+            **_about_fixtures(chamber),
         ),
         notes=[*chamber.notes, *evaluation.notes],
         design=_design_values(design, folder),
@@ -228,6 +230,21 @@ def _write_candidate(folder: Path, candidate: CandidateResult, **more: Any) -> C
         versions=versions(),
         **more,
     )
+
+
+def _about_fixtures(chamber: Chamber) -> dict[str, Any]:
+    """Return the record of holder and mask under its key. It is empty without them."""
+    fixtures = {
+        name: FixtureRecord(
+            kind=one.kind,
+            size_mm=[1e3 * side for side in one.size],
+            length_mm=1e3 * one.length,
+            covered_mm2=1e6 * one.covered,
+            covered_target_mm2=1e6 * one.covered_target,
+        )
+        for name, one in chamber.fixtures.items()
+    }
+    return {"fixtures": fixtures} if fixtures else {}
 
 
 def _about_zones(design: Design, chamber: Chamber, evaluation: Evaluation) -> list[ZoneRecord]:

@@ -15,7 +15,7 @@ from chamberopt.chamber.checks.gaps import (
     pocket_warnings,
     surface_warnings,
 )
-from chamberopt.chamber.checks.place_names import CEILING, SIDE_WALL, surface_names
+from chamberopt.chamber.checks.place_names import CEILING, SIDE_WALL, mm2, surface_names
 from chamberopt.chamber.dimensionless import free_path
 from chamberopt.chamber.flexure import flexure_facts, flexure_of_surfaces
 from chamberopt.chamber.part import turning_axis
@@ -40,6 +40,7 @@ if TYPE_CHECKING:
 MAX_PACKING_FRACTION = 0.2
 MIN_AMPLITUDES = 10.0  # between part and sonotrode, as for sonotrode_distance_mm of a design
 MAX_HIDDEN_SHARE = 0.05  # of the target's area; a larger share means a misplaced ceiling or wall
+MIN_MASKED = 1e-4  # share of the target under a mask that is worth a warning
 MIN_FREE_PATH = 10.0  # chamber heights; on longer paths few balls meet another ball before a dent
 
 Facts = dict[str, object]
@@ -68,6 +69,7 @@ def describe(design: Design, chamber: Chamber, reach: Reach | None = None) -> di
     return {
         **with_clearance(first_facts(design, chamber), reach.mesh),
         **_zone_facts(reach, chamber),
+        **_fixture_facts(design, chamber),
         **_turn_facts(design, chamber.part),
         **flexure_facts(design, chamber),
         "materials": {name: law.in_words for name, law in design.materials},
@@ -244,6 +246,7 @@ def first_warnings(design: Design, chamber: Chamber, mesh: TriangleMesh) -> list
             f"last only {plain(recorded, 3)} s: coverage is that of some of its positions; raise "
             "process.accuracy.simulated_time_s or replicas"
         )
+    texts += _mask_warnings(chamber)
     texts += calibration_warnings(design)
     texts += _sonotrode_warnings(design, mesh, turning_axis(design, chamber.part))
     texts += _side_wall_warnings(design, chamber)
@@ -341,6 +344,35 @@ def _turn_facts(design: Design, part: Part) -> dict[str, Facts]:
     return {"part_turn": {**(swing if turn.rpm is None else {"rpm": turn.rpm}), **pose}}
 
 
+def _fixture_facts(design: Design, chamber: Chamber) -> dict[str, Facts]:
+    """Return size and place of holder and mask, and the area of the part under each."""
+    facts: dict[str, Facts] = {}
+    if design.holder is not None and design.holder.kind == "bore":
+        facts["holder"] = {"kind": "bore", "clearance_mm": design.holder.clearance_mm}
+    for name, one in chamber.fixtures.items():
+        facts[name] = {
+            "kind": one.kind,
+            "size_mm": [_rounded(1e3 * side) for side in one.size],
+            "length_mm": _rounded(1e3 * one.length),
+            "covered_mm2": _rounded(1e6 * one.covered),
+            "covered_target_mm2": _rounded(1e6 * one.covered_target),
+        }
+    return facts
+
+
+def _mask_warnings(chamber: Chamber) -> list[str]:
+    """Return a warning if the mask covers some of the target, else an empty list."""
+    mask, part = chamber.fixtures.get("mask"), chamber.part
+    whole = float(part.area[part.target].sum())
+    if mask is None or mask.covered_target < MIN_MASKED * whole:
+        return []
+    return [
+        f"the mask covers {mask.covered_target / whole:.1%} of the target "
+        f"({mm2(mask.covered_target)}), which counts as not covered: leave these faces out of "
+        "[part.target], or mask fewer faces"
+    ]
+
+
 def _tolerance_facts(design: Design) -> dict[str, Facts]:
     """Return the lowest, given and highest value of each number of a design that has a tolerance.
 
@@ -358,11 +390,12 @@ def _side_wall_warnings(design: Design, chamber: Chamber) -> list[str]:
     """Return a warning if the part goes out through the side wall, else an empty list.
 
     There is no warning for a part that closes the chamber like a lid, turns (its joint is a round
-    shaft), has a hole for its fixture, or is drawn with its chamber.
+    shaft), has a hole or a bore for its fixture, or is drawn with its chamber.
     """
     turns, drawn = design.effects.part_turn is not None, design.chamber.setup() is not None
     names = surface_names(chamber)
-    if design.chamber.holes or turns or drawn or not (names == CEILING).any():
+    held = design.holder is not None and design.holder.kind == "bore"
+    if design.chamber.holes or held or turns or drawn or not (names == CEILING).any():
         return []
     edges, of_part = edge_keys(chamber.triangles), np.repeat(chamber.tags == TAG_PART, 3)
     joint = np.repeat(names == SIDE_WALL, 3) & np.isin(edges, edges[of_part])

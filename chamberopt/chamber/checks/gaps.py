@@ -197,6 +197,9 @@ def _width(low: float, high: float) -> str:
 
 def _change(sides: set[str]) -> str:
     """Return what to change of the chamber so that a gap between these surfaces is no more."""
+    for name in ("holder", "mask"):
+        if f"the {name}" in sides:
+            return f"change [{name}] or close the gap"
     if not any("part" in side for side in sides):
         return NEW_SHAPE
     if SONOTRODE in sides:
@@ -211,14 +214,16 @@ def _change(sides: set[str]) -> str:
 HEIGHT_TOLERANCE = 1e-9  # m: corners are level if their heights differ by less
 AREA_TOLERANCE = 1e-6  # share of a triangle's area: a smaller upward component is rounding
 REMEDY = {
-    TAG_PART: "turn it (effects.part_turn), tilt it (part.rotate_deg), or lower chamber.{key} to "
+    "part": "turn it (effects.part_turn), tilt it (part.rotate_deg), or lower chamber.{key} to "
     "its top side",
-    TAG_WALL: "make it slope towards the sonotrode",
+    "wall": "make it slope towards the sonotrode",
+    "holder": "let it go up to the ceiling: leave out holder.thickness_mm",
+    "mask": "mask.axis = [0, 0, 1] closes the room above it",
 }
 
 
 class Ledge(NamedTuple):
-    """Surfaces of the part or of the wall that face up, so that balls can come to rest on them."""
+    """Surfaces of the part or of a wall that face up, so that balls can come to rest on them."""
 
     message: str
     level: bool  # true if enough of the surface is level for a ball to lie on
@@ -240,9 +245,15 @@ def find_ledges(design: Design, chamber: Chamber) -> list[Ledge]:
     flat = upward & (np.hypot(normal[:, 0], normal[:, 1]) <= Rest().resistance * normal[:, 2])
     cross_section = np.pi / 4.0 * design.shot.diameter**2
     found = []
-    for tag, name in ((TAG_PART, "part"), (TAG_WALL, "wall")):
-        faces = upward & (chamber.tags == tag)
-        if not faces.any() or (tag == TAG_PART and design.effects.part_turn is not None):
+    still = {name: chamber.on_fixture(name) for name in chamber.fixtures}
+    wall = chamber.tags == TAG_WALL
+    for own in still.values():
+        wall &= ~own
+    if design.effects.part_turn is None:
+        still = {"part": chamber.tags == TAG_PART, **still}
+    for name, own in {**still, "wall": wall}.items():
+        faces = upward & own
+        if not faces.any():
             continue
         level = bool(area[faces & flat].sum() >= cross_section)
         # balls do not roll off these faces
@@ -259,7 +270,7 @@ def find_ledges(design: Design, chamber: Chamber) -> list[Ledge]:
             f"{mm2(area[shown].sum())} {extent}, around "
             f"{around(corners.mean(axis=1), area[shown])} in the chamber's frame, "
             f"at z = {heights}; "
-            f"{REMEDY[tag].format(key=design.chamber.ceiling_key)}"
+            f"{REMEDY[name].format(key=design.chamber.ceiling_key)}"
         )
         found.append(Ledge(message, level))
     return found

@@ -25,6 +25,8 @@ def surface_names(chamber: Chamber) -> np.ndarray:
     on_wall = np.select(faces, ["a ledge of the wall", CEILING], SIDE_WALL)
     words = np.where(chamber.tags == TAG_PART, on_part, on_wall).astype(object)
     words[chamber.tags == TAG_SONOTRODE] = SONOTRODE
+    for name in chamber.fixtures:
+        words[chamber.on_fixture(name)] = f"the {name}"
     for tag in np.unique(chamber.tags[chamber.tags > TAG_WALL]):
         words[chamber.tags == tag] = f"sonotrodes.{tag - further_sonotrode_tag(0)}"
     return words

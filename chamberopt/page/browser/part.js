@@ -150,7 +150,7 @@ function showParts({ quantities, scenes, scales }) {
   controls.fit.addEventListener("change", recolour);
   controls.time.addEventListener("input", recolour);
   controls.glass.addEventListener("change", () => {
-    for (const view of views) view.show(["sonotrode", "glass", "edges"], controls.glass.checked);
+    for (const view of views) view.show(["sonotrode", "glass", "edges", "holder", "mask"], controls.glass.checked);
   });
   recolour();
   return views;

@@ -20,6 +20,8 @@ DIFFERENCE_MAP = "PuOr"
 # chamber.
 FEW_DENTS, UNREACHED, OUTSIDE = "#6c737a", "#a9714f", PURPLE
 
+FIXTURE_COLOURS = {"holder": "#7f8a96", "mask": "#d9c9a3"}
+
 # Colours and line styles of compared results.
 _COLOURS = (BLUE, ORANGE, GREEN, PURPLE, BLACK, YELLOW, SKY, GREY)
 _DASHES = (6, 1, 1, 1, 1, 1), (8, 2), (2, 1), (4, 1, 1, 1)

@@ -1,0 +1,450 @@
+"""Cut what holds and what masks the part out of the cavity of its chamber.
+
+A holder is a prism along the holder's axis, which points out of the room: round (rod, collar) or
+rectangular (plate). It ends inside the wall. A mask is what faces of the part sweep, either along
+their own normals by the thickness of a shell, or along an axis into the wall.
+
+      ======= wall ======
+         |  holder  |         ^ axis      z: along the axis, from the origin of the chamber's frame
+         |__________|  start  |
+      ___|  part    |___                  start: the lowest place of the clamped faces under it
+
+Both are walls: they neither move nor count as part. The part's faces under them are not in the
+cavity any more.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from chamberopt.chamber.bores_and_deflectors import (
+    DEPTH_IN_ROOM,
+    SIDES,
+    WALL_TOLERANCE,
+    CavitySolid,
+    TriangleProperties,
+    first_crossings,
+    fitting_names,
+    swept_faces,
+    triangle_properties,
+)
+from chamberopt.chamber.part import chosen_on_part, turning_axis
+from chamberopt.common.errors import InputError
+from chamberopt.common.number_text import typeset_plain
+from chamberopt.design.shape_surface import TAG_PART, TAG_WALL, lofted
+from chamberopt.geometry.meshes.self_intersection import crossing_pairs
+from chamberopt.geometry.meshes.surface_error import format_point
+from chamberopt.geometry.solids import intersect, overlap_volume, split_bodies, unite
+from chamberopt.geometry.triangles import area_vectors, areas, swept, unit_vectors
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from chamberopt.chamber.part import Part
+    from chamberopt.design.design import Design
+
+SINK = 1e-6  # m: depth of a holder's end in the part, so that rounding leaves no gap between them
+FARTHEST = 1e-3  # share of the part's extent: what reaches farthest, without `holder.at`
+OF_FACE = 0.8  # diameter of a rod, over that of the widest circle in its face
+ROUND_FACE = 1.25  # diameter of a collar, over that of the narrowest circle round its faces
+ON_AXIS = 1e-5  # m: a holder this close to the axis about which the part turns is on it
+# Longest way of a vertex of a shell over its thickness: the shell is cut off over sharper edges.
+MITRE = 2.0
+# Smallest spread of normals at a vertex that counts as an edge, as a share of their mean square.
+CREASE = 0.01
+
+
+@dataclass(frozen=True)
+class Fixture:
+    """A holder or a mask as it stands in the room, without what is in the part or in the wall."""
+
+    kind: str  # as in the design; of a mask "shell", or "filled" up to the wall
+    size: tuple[float, ...]  # [m]: a diameter, two sides, or the thickness of a shell
+    length: float  # along its axis, from its end at the part to the wall [m]; 0 for a shell
+    number: int  # index into `fitting_names`
+    covered: float  # area of the part under it [m²]
+    covered_target: float  # of this area, on the target [m²]
+    vertices: np.ndarray  # of its closed surface [m], (n, 3)
+    triangles: np.ndarray  # (k, 3) int32, normals outward
+
+
+def size_in_words(kind: str, size_mm: Sequence[float]) -> str:
+    """Return the size of a fixture of a kind as text, such as "Ø 12 mm"; empty if it has none."""
+    if not size_mm:
+        return ""
+    text = f"{' × '.join(map(typeset_plain, size_mm))} mm"
+    if kind == "shell":
+        return f"{text} thick"
+    return f"Ø {text}" if len(size_mm) == 1 else text
+
+
+class _Made(NamedTuple):
+    """The surfaces of a holder or mask, which may overlap, and what `Fixture` says of it."""
+
+    surfaces: list[tuple[np.ndarray, np.ndarray]]  # closed: vertices [m] and triangles of each
+    clamped: np.ndarray  # (m,), the part's triangles to touch
+    kind: str
+    size: tuple[float, ...]
+    length: float  # as in `Fixture`
+
+
+def with_fixtures(
+    design: Design, part: Part, filled: CavitySolid, cavity: CavitySolid
+) -> tuple[CavitySolid, dict[str, Fixture]]:
+    """Return the cavity without the design's holder and mask, and these by their names.
+
+    Args:
+        filled: the cavity before the part was cut out of it.
+        cavity: the cavity without the part.
+    Raises:
+        InputError: one of them is out of place, or the holder covers some of the target.
+    """
+    made = {}
+    if design.holder is not None and design.holder.kind != "bore":
+        made["holder"] = _holder(design, part, filled)
+    if design.mask is not None:
+        made["mask"] = _mask(design, part, filled)
+    sweeps = swept_faces(design, cavity) if made else []
+    sides = np.diff(part.vertices[part.triangles][:, [0, 1, 2, 0]], axis=1)
+    least = 2.0 * SINK * np.linalg.norm(sides, axis=2).max(axis=1)  # what the sunk end may cover
+    fixtures = {}
+    for name, one in made.items():
+        number = fitting_names(design).index(name)
+        pieces: dict[int, TriangleProperties] = {}
+        solids = []
+        for surface in one.surfaces:
+            properties = triangle_properties(-area_vectors(*surface), TAG_WALL, fitting=number)
+            own = split_bodies(*surface, name)[0]
+            pieces |= {solid.label: properties for solid in own}
+            solids += own
+        body = unite(solids, name)
+        for sonotrode, sweep in sweeps:
+            if overlap_volume(sweep, body) > 0.0:
+                raise InputError(
+                    f"{name}: the face of [{sonotrode}] would hit it; give other faces, or another "
+                    f"{name}.axis"
+                )
+        before, cavity, room = cavity, cavity.without(body, pieces), cavity.body
+        left = _exposed(cavity, part)
+        covered = _exposed(before, part) - left
+        covered[covered < least] = 0.0
+        _require_touch(name, covered, left, one.clamped, part)
+        inside = intersect(room, body, name).surface()
+        fixtures[name] = Fixture(
+            kind=one.kind,
+            size=one.size,
+            length=one.length,
+            number=number,
+            covered=float(covered.sum()),
+            covered_target=float(covered[part.target].sum()),
+            vertices=inside.vertices,
+            triangles=inside.triangles,
+        )
+    return cavity, fixtures
+
+
+def _exposed(cavity: CavitySolid, part: Part) -> np.ndarray:
+    """Return the area of each triangle of the part that bounds the cavity [m²], (m,)."""
+    surface = cavity.body.surface()
+    traced = cavity.trace(surface)
+    own, area = traced.tags == TAG_PART, areas(surface.vertices, surface.triangles)
+    return np.bincount(traced.source[own], area[own], len(part.triangles))
+
+
+def _require_touch(
+    name: str, covered: np.ndarray, left: np.ndarray, clamped: np.ndarray, part: Part
+) -> None:
+    """Raise InputError if a holder or mask touches none of its faces, or covers the target.
+
+    A holder must cover nothing of the target, and a mask must not cover all of it.
+
+    Args:
+        covered: area of each triangle of the part under it [m²], (m,).
+        left: area of each triangle of the part that is still in the room [m²], (m,).
+        clamped: marks the triangles of the faces that it is to touch, (m,).
+    """
+    if not covered[clamped].any():
+        raise InputError(
+            f"{name}.at: it touches none of these faces inside the room; give faces that are in "
+            f"the room, and look along {name}.axis"
+        )
+    on_target = np.where(part.target, covered, 0.0)
+    if name == "mask" and on_target.any() and not left[part.target].any():
+        raise InputError(
+            "mask.at: the mask covers all of the target in the room; leave the faces to be peened "
+            "out of it"
+        )
+    if name == "holder" and on_target.any():
+        first = int(on_target.argmax())
+        place = format_point(part.vertices[part.triangles[first]].mean(axis=0))
+        raise InputError(
+            f"holder.at: the holder covers {1e6 * on_target.sum():.3g} mm² of the target, most on "
+            f"triangle {part.elements[first]} near {place}; clamp other faces, make the holder "
+            "smaller, or leave these faces out of [part.target]"
+        )
+
+
+def _holder(design: Design, part: Part, filled: CavitySolid) -> _Made:
+    holder = design.holder
+    assert holder is not None
+    axis = np.array(holder.direction)
+    frame = _frame(axis)
+    clamped = _clamped(design, part, axis)
+    faces = part.vertices[part.triangles[clamped]] @ frame.T
+    hull = _hull(faces.reshape(-1, 3)[:, :2])
+    if holder.kind == "plate":
+        middle, sides, turn = _narrowest_rectangle(hull)
+        usual = sides if holder.grip_mm is None else ROUND_FACE * sides
+        size = tuple(usual if holder.size_mm is None else 1e-3 * np.array(holder.size_mm))
+        corners = 0.5 * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * size
+        outline = middle + corners @ turn
+    else:
+        middle = _centroid(hull)
+        inner, outer = _radii(hull, middle)
+        radius = ROUND_FACE * outer if holder.kind == "collar" else OF_FACE * inner
+        given = holder.diameter_mm
+        size = (2.0 * radius if given is None else 1e-3 * given,)
+        outline = _circle(middle, size[0])
+    _refuse_off_axis(design, part, axis, frame.T[:, :2] @ middle)
+    heights = _heights_under(outline, faces)
+    collar = holder.kind == "collar"
+    low = float(faces[..., 2].min() if collar or not heights.size else heights.min())
+    wall, end = _way_out(filled, frame, middle, outline, low)
+    top = min(float(faces[..., 2].max() if collar or not heights.size else heights.max()), wall)
+    start = low if holder.grip_mm is None else top - 1e-3 * holder.grip_mm
+    if collar and start > top - SINK:
+        raise InputError(
+            "holder.grip_mm: missing: the clamped faces are level, so that the collar encloses "
+            "nothing; give the length of the part that it encloses"
+        )
+    solids = []
+    plate_top = end if holder.thickness_mm is None else top + 1e-3 * holder.thickness_mm
+    if plate_top < wall:
+        rod_mm = holder.diameter_mm
+        rod = OF_FACE * min(size) if rod_mm is None else 1e-3 * rod_mm
+        solids.append(_prism(frame, _circle(middle, rod), plate_top - SINK, end))
+    solids.append(_prism(frame, outline, start - SINK, min(plate_top, end)))
+    return _Made(solids, clamped, holder.kind, tuple(map(float, size)), wall - start)
+
+
+def _clamped(design: Design, part: Part, axis: np.ndarray) -> np.ndarray:
+    """Mark the triangles (m,) of the part that the holder clamps.
+
+    Raises InputError if a rod or plate would stand on faces that look the other way.
+    """
+    holder = design.holder
+    assert holder is not None
+    if holder.at is not None:
+        chosen = chosen_on_part(design, holder.at, "holder.at")
+    else:
+        height = (part.vertices @ axis)[part.triangles]
+        near = height > height.max() - FARTHEST * np.ptp(height)
+        chosen = near.all(axis=1) if near.all(axis=1).any() else near.any(axis=1)
+    facing = area_vectors(part.vertices, part.triangles[chosen]).sum(axis=0) @ axis
+    if holder.kind != "collar" and facing <= 0.0:
+        raise InputError(
+            f"holder.at: these faces do not look along holder.axis = {list(holder.axis)}, the way "
+            "out of the room in the chamber's frame; give other faces, or another axis"
+        )
+    return chosen
+
+
+def _refuse_off_axis(design: Design, part: Part, axis: np.ndarray, middle: np.ndarray) -> None:
+    """Raise InputError if the part turns about another axis than that of its holder.
+
+    Args:
+        axis: unit vector along the holder, (3,).
+        middle: a point on the holder's axis [m], (3,).
+    """
+    line = turning_axis(design, part)
+    if line is None:
+        return
+    point, direction = line[0], line[1] / np.linalg.norm(line[1])
+    aside = np.linalg.norm(np.cross(middle - point, direction))
+    length = float(np.linalg.norm(np.ptp(part.vertices, axis=0)))
+    if np.linalg.norm(np.cross(axis, direction)) * length > ON_AXIS or aside > ON_AXIS:
+        raise InputError(
+            f"holder: its axis is {1e3 * aside:.3g} mm beside that of effects.part_turn, or leans: "
+            "a holder turns with the part only about its own axis; clamp faces round that axis"
+        )
+
+
+def _way_out(
+    filled: CavitySolid, frame: np.ndarray, middle: np.ndarray, outline: np.ndarray, low: float
+) -> tuple[float, float]:
+    """Return where the holder's axis meets the wall, and where all of the holder is in the wall.
+
+    Both are places along the axis [m]. Raises InputError if the axis does not lead out of the room.
+
+    Args:
+        middle: place of the axis across it [m], (2,).
+        outline: corners of the holder's section [m], (n, 2).
+        low: start of the axis [m].
+    """
+    starts = np.c_[np.r_[middle[None], outline], np.full(len(outline) + 1, low)] @ frame
+    surface = filled.body.surface()
+    distance, entering = first_crossings(surface, starts, frame[2], WALL_TOLERANCE)
+    leaving = np.isfinite(distance) & ~entering
+    if not leaving[0]:
+        place = format_point(np.round(starts[0], 9) + 0.0)
+        raise InputError(
+            f"holder.axis: from {place}, in the middle of the faces that it clamps, no wall is met "
+            "along this way; give faces inside the room, and the way out of it in the chamber's "
+            "frame"
+        )
+    return low + float(distance[0]), low + float(distance[leaving].max()) + DEPTH_IN_ROOM
+
+
+def _frame(axis: np.ndarray) -> np.ndarray:
+    """Return two unit vectors across an axis, and the axis: rows of a rotation, (3, 3)."""
+    aside = np.cross(axis, np.eye(3)[np.abs(axis).argmin()])
+    aside /= np.linalg.norm(aside)
+    return np.array([aside, np.cross(axis, aside), axis])
+
+
+def _prism(
+    frame: np.ndarray, outline: np.ndarray, low: float, high: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return vertices [m] and triangles of a prism between two places along an axis [m].
+
+    Args:
+        frame: axes of the prism, the last along it, (3, 3).
+        outline: corners of its section [m], counter-clockwise, (n, 2).
+    """
+    made = lofted([np.c_[outline, np.full(len(outline), z)] @ frame for z in (low, high)])
+    return made.vertices, made.triangles
+
+
+def _circle(middle: np.ndarray, diameter: float) -> np.ndarray:
+    angle = 2.0 * np.pi * np.arange(SIDES) / SIDES
+    return np.asarray(middle + 0.5 * diameter * np.c_[np.cos(angle), np.sin(angle)])
+
+
+def _hull(points: np.ndarray) -> np.ndarray:
+    """Return the corners (n, 2) of the convex hull of points (p, 2), counter-clockwise."""
+    from scipy.spatial import ConvexHull, QhullError
+
+    try:
+        return np.asarray(points[ConvexHull(points).vertices])
+    except QhullError:
+        raise InputError(
+            "holder.at: seen along holder.axis these faces have no area; give faces that look "
+            "along it, or that go round it"
+        ) from None
+
+
+def _centroid(hull: np.ndarray) -> np.ndarray:
+    """Return the centroid (2,) of the area in a convex hull (n, 2)."""
+    nexts = np.roll(hull, -1, axis=0)
+    twice = hull[:, 0] * nexts[:, 1] - nexts[:, 0] * hull[:, 1]
+    return np.asarray(((hull + nexts) * twice[:, None]).sum(axis=0) / (3.0 * twice.sum()))
+
+
+def _radii(hull: np.ndarray, middle: np.ndarray) -> tuple[float, float]:
+    """Return the radius of the widest circle about a point in a hull, and of that round it."""
+    along = unit_vectors(np.roll(hull, -1, axis=0) - hull)
+    out = np.c_[along[:, 1], -along[:, 0]]
+    inner = np.einsum("ij,ij->i", hull - middle, out).min()
+    return float(inner), float(np.linalg.norm(hull - middle, axis=1).max())
+
+
+def _narrowest_rectangle(hull: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the rectangle of least area round a hull: middle, sides (2,), and axes (2, 2).
+
+    The first side is the longer one.
+
+    Source: H. Freeman and R. Shapira, Comm. ACM 18 (1975) 409: one side lies along an edge.
+    """
+    along = unit_vectors(np.roll(hull, -1, axis=0) - hull)
+    axes = np.stack([along, np.c_[-along[:, 1], along[:, 0]]], axis=1)  # (n, 2, 2)
+    places = np.einsum("kij,pj->kpi", axes, hull)
+    low, high = places.min(axis=1), places.max(axis=1)
+    best = int(np.prod(high - low, axis=1).argmin())
+    middle, sides, own = 0.5 * (low + high)[best] @ axes[best], (high - low)[best], axes[best]
+    if sides[0] < sides[1]:
+        sides, own = sides[::-1], np.array([own[1], -own[0]])
+    return middle, sides, own
+
+
+def _heights_under(outline: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """Return heights of faces (k, 3, 3) [m] at the corners of an outline and at vertices inside.
+
+    Their least and largest are those of the faces inside the convex outline (n, 2), up to what
+    curves between its corners.
+    """
+    corners = faces.reshape(-1, 3)
+    along = np.roll(outline, -1, axis=0) - outline
+    offset = corners[:, None, :2] - outline
+    inside = (along[:, 0] * offset[..., 1] - along[:, 1] * offset[..., 0] >= 0.0).all(axis=1)
+    a, b, c = faces.swapaxes(0, 1)
+    twice = _cross(b - a, c - a)
+    flat = np.abs(twice) > 0.0
+    a, b, c, twice = a[flat], b[flat], c[flat], twice[flat]
+    p = np.c_[outline, np.zeros(len(outline))][:, None]
+    weights = np.stack([_cross(v - u, p - u) / twice for u, v in ((b, c), (c, a), (a, b))])
+    row, face = np.nonzero((weights >= -1e-9).all(axis=0))
+    z = np.stack([a[face, 2], b[face, 2], c[face, 2]])
+    return np.concatenate([corners[inside, 2], (weights[:, row, face] * z).sum(axis=0)])
+
+
+def _cross(one: np.ndarray, two: np.ndarray) -> np.ndarray:
+    """Return the component along z of the cross product of vectors (..., 3)."""
+    return np.asarray(one[..., 0] * two[..., 1] - one[..., 1] * two[..., 0])
+
+
+def _mask(design: Design, part: Part, filled: CavitySolid) -> _Made:
+    mask = design.mask
+    assert mask is not None
+    chosen = chosen_on_part(design, mask.at, "mask.at")
+    axis = None if mask.axis is None else unit_vectors(np.array(mask.axis, dtype=float))
+    covered = chosen
+    if axis is not None:
+        covered = chosen & (area_vectors(part.vertices, part.triangles) @ axis > 0.0)
+        if not covered.any():
+            raise InputError(
+                f"mask.axis: given {list(mask.axis or ())}, along which none of the faces of "
+                "mask.at looks; give the way from them to the wall, in the chamber's frame"
+            )
+    used, numbers = np.unique(part.triangles[covered], return_inverse=True)
+    triangles, vertices = numbers.reshape(-1, 3), part.vertices[used]
+    length, size = 0.0, (mask.thickness,) if axis is None else ()
+    if axis is None:
+        way = _offsets(vertices, triangles, mask.thickness)
+    else:
+        far = float((filled.body.surface().vertices @ axis).max())
+        length = far - float((vertices @ axis).min())
+        way = axis * (length + DEPTH_IN_ROOM)
+    surface = swept(vertices, triangles[:, ::-1], way)
+    inner, outer = (area_vectors(one, triangles) for one in (vertices, vertices + way))
+    turned = (np.einsum("ij,ij->i", inner, outer) <= 0.0).any()
+    if turned or crossing_pairs(*surface).shape[1]:
+        remedy = "give a thinner one, or fewer faces" if axis is None else "give fewer faces"
+        what = f"a shell of {1e3 * mask.thickness:g} mm" if axis is None else "the mask"
+        field = "mask.thickness_mm" if axis is None else "mask.axis"
+        raise InputError(
+            f"{field}: {what} crosses itself, in hollows of these faces or where they lie over "
+            f"each other; {remedy}"
+        )
+    return _Made([surface], covered, "shell" if axis is None else "filled", size, length)
+
+
+def _offsets(vertices: np.ndarray, triangles: np.ndarray, thickness: float) -> np.ndarray:
+    """Return the way of each vertex (n, 3) [m] that moves its triangles outward by a thickness [m].
+
+    The way d solves n d = thickness for the normals n of the triangles round a vertex by least
+    squares. So edges stay sharp. Over edges of less than some 60 degrees the shell is cut off.
+    """
+    normal = unit_vectors(area_vectors(vertices, triangles))
+    squares = np.zeros((len(vertices), 3, 3))
+    sums = np.zeros((len(vertices), 3))
+    for k in range(3):
+        np.add.at(squares, triangles[:, k], np.einsum("ij,ik->ijk", normal, normal))
+        np.add.at(sums, triangles[:, k], normal)
+    size, axes = np.linalg.eigh(squares)
+    inverse = np.where(size > CREASE * size[:, -1:], 1.0 / np.maximum(size, 1e-30), 0.0)
+    way = thickness * np.einsum("nij,nj,nkj,nk->ni", axes, inverse, axes, sums)
+    length = np.linalg.norm(way, axis=1, keepdims=True)
+    return np.asarray(way * np.minimum(1.0, MITRE * thickness / np.maximum(length, 1e-30)))

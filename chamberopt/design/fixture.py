@@ -1,0 +1,138 @@
+"""Tables of a design file for what holds the part in its chamber, and for what masks it."""
+
+import math
+from collections.abc import Iterator
+from typing import Literal
+
+from pydantic import Field
+
+from chamberopt.common import toml_fields
+from chamberopt.common.toml_errors import Problem
+from chamberopt.common.toml_fields import Direction, Pair, list_field, quantity
+from chamberopt.design.part import Selection
+from chamberopt.design.table_base import SI, FileTable
+
+# Sink of a ball into a gap, over its radius, up to which the chamber is closed there. It is what
+# chamberopt.chamber.reach tolerates of an overlap. A ball of diameter d over a gap of width w sinks
+# by (d - sqrt(d² - w²)) / 2, so w is at most d sqrt(1 - (1 - SINK)²).
+SINK = 0.01
+WIDEST_GAP = math.sqrt(1.0 - (1.0 - SINK) ** 2)  # over the ball's diameter
+USUAL_SHELL_MM = 1.0
+
+# The keys that each kind of holder may have beside `axis`.
+HOLDER_KEYS = {
+    "rod": ("at", "diameter_mm"),
+    "collar": ("at", "diameter_mm", "grip_mm"),
+    "plate": ("at", "size_mm", "grip_mm", "thickness_mm", "diameter_mm"),
+    "bore": ("clearance_mm",),
+}
+
+
+class Holder(FileTable):
+    """A body that holds the part and goes out through the chamber's wall, along its axis.
+
+    A rod stands on a face of the part, a collar goes round an end or a shaft, and a plate is a
+    block on a face, or round a root. In a bore the part itself goes out through the wall.
+    """
+
+    kind: Literal["rod", "collar", "plate", "bore"] = Field(description="what holds the part")
+    at: Selection | None = Field(
+        default=None,
+        description="faces that it clamps, by the keys of [part.target]; absent: what reaches "
+        "farthest along axis",
+    )
+    axis: Direction = list_field(
+        "three numbers [x, y, z], not all 0", "the way out of the room", (0.0, 0.0, 1.0)
+    )
+    diameter_mm: float | None = quantity(
+        0.1, 2000, "mm", "of a rod, outside of a collar; absent: from the clamped faces", None
+    )
+    size_mm: Pair | None = list_field(
+        "two numbers [long, wide] in mm, above 0",
+        "sides of a plate; absent: from the clamped faces",
+        None,
+    )
+    grip_mm: float | None = quantity(
+        0.01, 2000, "mm",
+        "length of the part that it encloses; absent: a collar encloses its faces, a plate nothing",
+        None,
+    )  # fmt: skip
+    thickness_mm: float | None = quantity(
+        0.1, 2000, "mm", "of a plate that a rod carries; absent: up to the wall", None
+    )
+    clearance_mm: float = quantity(0, 100, "mm", "of a bore, all round the part", 0.0)
+
+    def _problems(self) -> Iterator[Problem]:
+        allowed = HOLDER_KEYS[self.kind]
+        for name, field in type(self).model_fields.items():
+            is_given = getattr(self, name) != field.default
+            if is_given and name not in (*allowed, "kind", "axis"):
+                text = f"not of a {self.kind}, which may have {' and '.join(allowed)}; leave it out"
+                yield Problem(name, text)
+        if self.size_mm is not None and not all(0.1 <= side <= 2000 for side in self.size_mm):
+            text = f"given {list(self.size_mm)}; each side must be from 0.1 to 2000 mm"
+            yield Problem("size_mm", text)
+        if self.kind == "plate" and self.diameter_mm and self.thickness_mm is None:
+            text = "given without thickness_mm: a rod carries only a plate of given thickness"
+            yield Problem("diameter_mm", f"{text}; give both or neither")
+
+    @property
+    def direction(self) -> tuple[float, float, float]:
+        """The way out of the room, a unit vector (3,) in the chamber's frame."""
+        return toml_fields.unit_vector(self.axis)
+
+    clearance = SI("clearance_mm", 1e-3, "Clearance of a bore, all round the part [m]")
+
+
+class Mask(FileTable):
+    """A cover that keeps the shot from faces of the part: a shell on them, or all up to a wall."""
+
+    at: Selection = Field(description="faces that it covers, by the keys of [part.target]")
+    thickness_mm: float | None = quantity(
+        0.01, 100, "mm", f"of the shell on these faces; absent: {USUAL_SHELL_MM:g}", None
+    )
+    axis: Direction | None = list_field(
+        "three numbers [x, y, z], not all 0",
+        "no shell, but all that is on these faces along this way, up to the wall",
+        None,
+    )
+
+    def _problems(self) -> Iterator[Problem]:
+        if self.axis is not None and self.thickness_mm is not None:
+            text = "given beside axis, along which the mask goes on to the wall; leave one out"
+            yield Problem("thickness_mm", text)
+
+    @property
+    def thickness(self) -> float:
+        """Thickness of the shell [m]."""
+        given = self.thickness_mm
+        return 1e-3 * (USUAL_SHELL_MM if given is None else given)
+
+
+def fixture_problems(
+    holder: Holder | None, mask: Mask | None, balls_mm: float, turns: bool
+) -> Iterator[Problem]:
+    """Yield problems of holder and mask with the other tables of a design.
+
+    Args:
+        balls_mm: diameter of the smallest balls [mm].
+        turns: True if the part turns.
+    """
+    if mask is not None and turns:
+        text = "given for a part that turns, with which it would turn: not supported; leave it out"
+        yield Problem("mask", text)
+    if holder is None:
+        return
+    if turns and holder.kind == "plate":
+        text = 'given "plate" for a part that turns: only a round holder can turn; give "collar"'
+        yield Problem("holder.kind", f'{text} or "rod"')
+    # The part may lie against one side of its bore. The whole play is then on the other side.
+    most = 0.5 * WIDEST_GAP * balls_mm
+    if holder.clearance_mm > most:
+        yield Problem(
+            "holder.clearance_mm",
+            f"given {holder.clearance_mm:g}; allowed: at most {math.floor(1e3 * most) / 1e3:g} for "
+            f"balls of {balls_mm:g} mm, which sink by up to a hundredth of their radius into twice "
+            "that, the play on one side; in a wider gap they may wedge: close it, or use larger "
+            "balls",
+        )

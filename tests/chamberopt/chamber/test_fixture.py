@@ -1,0 +1,339 @@
+"""A holder and a mask take their volume out of the cavity, and nothing of the target."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import trimesh
+
+from chamberopt.chamber.build import Chamber, build_chamber
+from chamberopt.chamber.checks.check import first_warnings, surface_names, warnings
+from chamberopt.chamber.checks.gaps import find_ledges
+from chamberopt.chamber.fixture import size_in_words
+from chamberopt.chamber.part import turning_axis
+from chamberopt.chamber.scene import chamber_mesh, require_turnable
+from chamberopt.common.errors import InputError
+from chamberopt.design.design import Design, validate
+from chamberopt.design.fixture import WIDEST_GAP
+from chamberopt.design.load import load_design
+from chamberopt.design.shapes import TAG_PART, TAG_WALL
+from chamberopt.geometry.triangles import area_vectors, areas
+
+DESIGNS = Path(__file__).resolve().parents[3] / "designs"
+BOX, ROOM = (20.0, 12.0, 8.0), (60.0, 50.0, 40.0)  # mm
+DISTANCE = 15.0
+ABOVE = ROOM[2] - DISTANCE - BOX[2]  # between box and ceiling
+RADIUS, LONG = 6.0, 60.0  # of a shaft through the ceiling
+DOWN = {"direction": (0, 0, -1), "angle_deg": (0, 30)}
+UP = {"direction": (0, 0, 1), "angle_deg": (0, 30)}
+NOT_DOWN = {"direction": (0, 0, 1), "angle_deg": (0, 100)}
+ROUND = {"direction": (0, 0, 1), "angle_deg": (80, 100)}
+SUNK = 1e-3  # mm: depth of a holder's end in the part
+
+
+@pytest.fixture(scope="module")
+def parts(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("parts")
+    trimesh.creation.box(BOX).export(folder / "box.stl")
+    trimesh.creation.cylinder(RADIUS, LONG, sections=64).export(folder / "shaft.stl")
+    return folder
+
+
+def design(parts: Path, mesh: str = "box", **tables: Any) -> Design:
+    """A box or a shaft over the sonotrode in a room of 60 x 50 x 40 mm; its underside is peened."""
+    data = load_design(DESIGNS / "gear.toml").model_dump()
+    part = {"mesh": str(parts / f"{mesh}.stl"), "unit": "mm", "target": DOWN, "smoothing": "off"}
+    sizes = dict(zip(("length_mm", "width_mm", "height_mm"), ROOM, strict=True))
+    chamber = {"shape": "box", **sizes, "sonotrode_distance_mm": DISTANCE}
+    part.update(tables.pop("part", {}))
+    chamber.update(tables.pop("chamber", {}))
+    return validate(Design, {**data, "part": part, "chamber": chamber, **tables})
+
+
+def polygon(diameter: float) -> float:
+    """Area of the 64-sided polygon in a circle."""
+    return 32 * (diameter / 2) ** 2 * np.sin(2 * np.pi / 64)
+
+
+def sound(chamber: Chamber) -> None:
+    """Closed, of the volume that it says; triangles of the part lie on the part's triangles."""
+    mesh = trimesh.Trimesh(chamber.vertices, chamber.triangles, process=False)
+    assert mesh.is_watertight
+    assert mesh.is_winding_consistent
+    assert chamber.volume == pytest.approx(mesh.volume, rel=1e-9)
+    own = chamber.tags == TAG_PART
+    assert ((chamber.source >= 0) == own).all()
+    part, pieces = chamber.part, chamber.vertices[chamber.triangles[own]]
+    sources = part.vertices[part.triangles[chamber.source[own]]]
+    normal = np.cross(sources[:, 1] - sources[:, 0], sources[:, 2] - sources[:, 0])
+    normal /= np.linalg.norm(normal, axis=1)[:, None]
+    assert np.abs(np.einsum("tki,ti->tk", pieces - sources[:, :1], normal)).max() < 2e-9
+    for one in chamber.fixtures:
+        assert (chamber.tags[chamber.on_fixture(one)] == TAG_WALL).all()
+
+
+def taken(chamber: Chamber, mesh: str) -> float:
+    """Volume [mm³] that the room lacks, beside that of the part."""
+    of_part = np.prod(BOX) if mesh == "box" else polygon(2 * RADIUS) * (ROOM[2] - DISTANCE)
+    return np.prod(ROOM) - of_part - 1e9 * chamber.volume
+
+
+PLATE, FACE = 20 * 12, 25 * 15  # mm²: a plate on the box, and one a quarter larger round it
+CASES: dict[str, tuple[str, dict[str, Any], float, float]] = {
+    # part, tables, volume taken [mm³], area of the part covered [mm²]
+    "rod": ("box", {"holder": {"kind": "rod"}}, polygon(9.6) * ABOVE, polygon(9.6)),
+    "thin rod": (
+        "box",
+        {"holder": {"kind": "rod", "at": UP, "diameter_mm": 6.0}},
+        polygon(6) * ABOVE,
+        polygon(6),
+    ),
+    "plate": ("box", {"holder": {"kind": "plate"}}, PLATE * ABOVE, PLATE),
+    "plate on a rod": (
+        "box",
+        {"holder": {"kind": "plate", "size_mm": (30.0, 20.0), "thickness_mm": 5.0}},
+        600 * 5 + polygon(16) * (ABOVE - 5),
+        PLATE,
+    ),
+    "block round a root": (
+        "box",
+        {"holder": {"kind": "plate", "grip_mm": 3.0}},
+        FACE * ABOVE + 3 * (FACE - PLATE),
+        PLATE + 3 * 64,
+    ),
+    "collar in the air": (
+        "box",
+        {"holder": {"kind": "collar", "grip_mm": 3.0, "diameter_mm": 30.0}},
+        polygon(30) * (ABOVE + 3) - 3 * PLATE,
+        PLATE + 3 * 64,
+    ),
+    "collar of a shaft": (
+        "shaft",
+        {"holder": {"kind": "collar", "at": ROUND, "grip_mm": 4.0}},
+        4 * (polygon(15) - polygon(12)),
+        4 * 64 * 12 * np.sin(np.pi / 64),
+    ),
+    "bore": ("shaft", {"holder": {"kind": "bore", "clearance_mm": 0.1}}, 0.0, 0.0),
+    "mask of a face": ("box", {"mask": {"at": UP, "thickness_mm": 2.0}}, 2 * PLATE, PLATE),
+    "mask like a cap": (
+        "box",
+        {"mask": {"at": NOT_DOWN}},
+        22 * 14 * 9 - np.prod(BOX),
+        PLATE + 8 * 64,
+    ),
+    "mask up to the wall": (
+        "box",
+        {"mask": {"at": UP, "axis": (0.0, 0.0, 1.0)}},
+        PLATE * ABOVE,
+        PLATE,
+    ),
+    "mask of a shaft": (
+        "shaft",
+        {"mask": {"at": ROUND, "thickness_mm": 2.0}},
+        # the flat sides move out by 2 mm: the apothem of the polygon grows by that
+        25 * 64 * np.tan(np.pi / 64) * ((RADIUS * np.cos(np.pi / 64) + 2) ** 2) - 25 * polygon(12),
+        25 * 64 * 12 * np.sin(np.pi / 64),
+    ),
+    "both": (
+        "box",
+        {"holder": {"kind": "rod"}, "mask": {"at": UP, "thickness_mm": 2.0}},
+        polygon(9.6) * (ABOVE - 2) + 2 * PLATE,
+        PLATE,
+    ),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_volumes_and_areas_are_those_of_closed_forms(parts: Path, case: str) -> None:
+    mesh, tables, volume, covered = CASES[case]
+
+    chamber = build_chamber(design(parts, mesh, **tables))
+
+    sound(chamber)
+    assert taken(chamber, mesh) == pytest.approx(volume, abs=SUNK * 500.0)
+    covered_mm2 = 1e6 * sum(one.covered for one in chamber.fixtures.values())
+    assert covered_mm2 == pytest.approx(covered, abs=SUNK * 70.0)
+    part, target = chamber.part, chamber.part.target
+    # Nothing of the target is covered: its triangles in the cavity have all of its area.
+    assert chamber.exposed_area[target] == pytest.approx(part.area[target], rel=1e-9)
+    own = areas(chamber.vertices, chamber.triangles)
+    assert own[chamber.on_target].sum() == pytest.approx(part.area[target].sum(), rel=1e-9)
+    assert all(one.covered_target == 0.0 for one in chamber.fixtures.values())
+    is_held = "holder" in tables or mesh == "shaft" or case == "mask up to the wall"
+    assert chamber.pieces_in_air == (0 if is_held else 1)
+    assert any("without a holder" in note for note in chamber.notes) != is_held
+    for one in chamber.fixtures.values():
+        body = trimesh.Trimesh(one.vertices, one.triangles, process=False)
+        assert body.is_watertight
+    bodies = sum(
+        trimesh.Trimesh(1e3 * one.vertices, one.triangles).volume
+        for one in chamber.fixtures.values()
+    )
+    assert bodies == pytest.approx(taken(chamber, mesh), abs=1e-3)
+
+
+def test_a_tilted_part_with_rod_and_mask_is_closed(parts: Path) -> None:
+    """Faces that touch off the grid leave no gap, and no slivers."""
+    tables = {
+        "part": {"rotate_deg": (34.0, 20.0, 10.0)},
+        "holder": {"kind": "rod", "at": UP, "axis": (0.3, -0.2, 1.0)},
+        "mask": {"at": {"direction": (1, 0, 0), "angle_deg": (0, 10)}},
+    }
+
+    chamber = build_chamber(design(parts, **tables))
+
+    sound(chamber)
+    assert chamber.pieces_in_air == 0
+    assert not any("rounding" in note or "cuts off" in note for note in chamber.notes)
+    assert 1e6 * chamber.fixtures["mask"].covered == pytest.approx(12 * 8, rel=1e-4)
+    body = chamber.fixtures["mask"]
+    volume = trimesh.Trimesh(1e3 * body.vertices, body.triangles).volume
+    assert volume == pytest.approx(12 * 8 * 1, rel=1e-4)
+
+
+def test_a_plate_lies_as_its_face_does(parts: Path) -> None:
+    """The plate of a part that is turned by 30 degrees about z is turned with it."""
+    chamber = build_chamber(
+        design(parts, part={"rotate_deg": (0.0, 0.0, 30.0)}, holder={"kind": "plate"})
+    )
+
+    sound(chamber)
+    assert 1e3 * np.array(chamber.fixtures["holder"].size) == pytest.approx([20, 12])
+    assert taken(chamber, "box") == pytest.approx(PLATE * ABOVE, rel=1e-5)
+
+
+@pytest.mark.parametrize("facing", [(1.0, 0.0, 0.0), (0.0, -1.0, 0.0)])
+def test_a_rod_may_come_from_a_side_wall(parts: Path, facing: tuple[float, ...]) -> None:
+    at = {"direction": facing, "angle_deg": (0, 10)}
+    chamber = build_chamber(design(parts, holder={"kind": "rod", "at": at, "axis": facing}))
+
+    sound(chamber)
+    along = int(np.abs(facing).argmax())
+    way = 0.5 * (ROOM[along] - BOX[along])
+    assert taken(chamber, "box") == pytest.approx(polygon(0.8 * 8) * way, rel=1e-5)
+    assert 1e3 * chamber.fixtures["holder"].length == pytest.approx(way)
+
+
+@pytest.mark.parametrize(
+    ("mesh", "tables", "message"),
+    [
+        ("box", {"holder": {"kind": "rod"}, "part": {"target": UP}},
+         r"holder\.at: the holder covers 72\.3 mm² of the target, most on triangle \d+ near"),
+        ("box", {"holder": {"kind": "rod", "at": DOWN}}, r"holder\.at: .* do not look along"),
+        ("box", {"holder": {"kind": "rod", "at": DOWN, "axis": (0.0, 0.0, -1.0)},
+                 "part": {"target": UP}}, r"holder: the face of \[sonotrode\] would hit it"),
+        ("box", {"holder": {"kind": "rod", "at": {"box_mm": ((90, 0, 0), (91, 1, 1))}}},
+         r"holder\.at: chooses none of the 12 triangles"),
+        ("box", {"holder": {"kind": "bore"}}, r"holder\.kind: given \"bore\", but .* no wall"),
+        ("shaft", {"holder": {"kind": "rod"}}, r"holder\.axis: from \(0, 0, 75\) mm, .* no wall"),
+        ("box", {"holder": {"kind": "collar"}}, r"holder\.grip_mm: missing: .* level"),
+        ("box", {"holder": {"kind": "rod", "grip_mm": 3.0}}, r"holder\.grip_mm: not of a rod"),
+        ("box", {"holder": {"kind": "plate", "size_mm": (0.0, 5.0)}}, r"holder\.size_mm: given"),
+        ("box", {"holder": {"kind": "plate", "diameter_mm": 5.0}}, r"diameter_mm: .* give both"),
+        ("box", {"holder": {"kind": "rod", "axis": (0.0, 0.0, 0.0)}}, r"axis: given \[0, 0, 0\]"),
+        ("shaft", {"holder": {"kind": "bore", "clearance_mm": 0.2}},
+         r"clearance_mm: given 0\.2; allowed: at most 0\.105 for balls of 1\.5 mm"),
+        ("box", {"mask": {}}, r"mask\.at: missing"),
+        ("box", {"mask": {"at": {}}}, r"mask\.at: the mask covers all of the target"),
+        ("box", {"mask": {"at": NOT_DOWN, "axis": (0.0, 0.0, -1.0)}}, r"mask\.axis: given .* none"),
+        ("box", {"mask": {"at": UP, "axis": (0.0, 0.0, 1.0), "thickness_mm": 1.0}},
+         r"mask\.thickness_mm: given beside axis"),
+        ("box", {"mask": {"at": UP}, "effects": {"part_turn": {"rpm": 30.0}}},
+         r"mask: given for a part that turns"),
+        ("box", {"holder": {"kind": "plate"}, "effects": {"part_turn": {"rpm": 30.0}}},
+         r"holder\.kind: given \"plate\" for a part that turns"),
+        ("shaft", {"holder": {"kind": "collar", "at": ROUND, "grip_mm": 4.0},
+                   "effects": {"part_turn": {"rpm": 30.0, "through_mm": (1.0, 0.0, 0.0)}}},
+         r"holder: its axis is 1 mm beside that of effects\.part_turn"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_held_or_masked_is_refused(
+    parts: Path, mesh: str, tables: dict[str, Any], message: str
+) -> None:
+    with pytest.raises(InputError, match=message):
+        build_chamber(design(parts, mesh, **tables))
+
+
+def test_a_shell_that_crosses_itself_is_refused(parts: Path) -> None:
+    """The walls of a groove of 4 mm meet under shells of 3 mm each."""
+    groove = trimesh.boolean.difference(
+        [trimesh.creation.box((20, 12, 8)), trimesh.creation.box((4, 20, 6), translate(0, 0, 4))]
+    )
+    groove.export(parts / "groove.stl")
+    inside = {"box_mm": ((-2.1, -7, 0), (2.1, 7, 4.1)), **NOT_DOWN}
+    with pytest.raises(InputError, match=r"mask\.thickness_mm: a shell of 3 mm crosses itself"):
+        build_chamber(design(parts, "groove", mask={"at": inside, "thickness_mm": 3.0}))
+    chamber = build_chamber(design(parts, "groove", mask={"at": inside, "thickness_mm": 1.0}))
+    sound(chamber)
+
+
+def translate(x: float, y: float, z: float) -> np.ndarray:
+    return trimesh.transformations.translation_matrix((x, y, z))
+
+
+def test_the_clearance_of_a_bore_is_one_that_balls_hardly_sink_into() -> None:
+    """A ball over a gap sinks by a hundredth of its radius where the gap is as wide as stated."""
+    radius, half = 1.0, WIDEST_GAP
+    assert radius - np.sqrt(radius**2 - half**2) == pytest.approx(0.01 * radius)
+
+
+def test_a_round_holder_on_the_axis_turns_with_the_part(parts: Path) -> None:
+    turning = design(
+        parts,
+        "shaft",
+        holder={"kind": "collar", "at": ROUND, "grip_mm": 4.0},
+        effects={"part_turn": {"rpm": 30.0}},
+    )
+    chamber = build_chamber(turning)
+
+    require_turnable(turning, chamber_mesh(chamber), turning_axis(turning, chamber.part))
+
+
+def test_checks_name_holder_and_mask(parts: Path) -> None:
+    """A plate below the ceiling has a ledge; the mask of some of the target is a warning."""
+    plate = {"kind": "plate", "size_mm": (30.0, 20.0), "thickness_mm": 5.0}
+    whole = {"direction": (0, 0, -1), "angle_deg": (0, 100)}  # underside and sides
+    side = {"direction": (1, 0, 0), "angle_deg": (0, 10)}
+    given = design(parts, holder=plate, mask={"at": side}, part={"target": whole})
+    chamber = build_chamber(given)
+
+    names = surface_names(chamber)
+    assert {"the holder", "the mask", "the ceiling", "the wall"} <= set(names)
+    up = -area_vectors(chamber.vertices, chamber.triangles)[:, 2] > 0.0
+    assert up[names == "the holder"].any()
+    ledges = [one.message for one in find_ledges(given, chamber)]
+    assert any("on the holder" in text and "holder.thickness_mm" in text for text in ledges)
+    texts = first_warnings(given, chamber, chamber_mesh(chamber))
+    share = 12 * 8 / (PLATE + 8 * 64)
+    assert any(f"the mask covers {share:.1%} of the target (96 mm²)" in text for text in texts)
+    assert not any("goes out through the side wall" in text for text in warnings(given, chamber))
+
+
+@pytest.mark.parametrize(
+    ("name", "holder"),
+    [
+        ("blade_conformal", {"kind": "bore"}),
+        ("gear", {"kind": "collar", "at": {"radius_mm": (7, 9)}, "grip_mm": 3.0}),
+        ("plate_imported", {"kind": "rod", "at": {"surface": "PART"}, "axis": (0.0, 0.0, 1.0)}),
+    ],
+)
+def test_holders_in_chambers_of_other_shapes(name: str, holder: dict[str, Any]) -> None:
+    """A part drawn as a piece of the wall has no face towards the wall: it is held already."""
+    data = load_design(DESIGNS / f"{name}.toml").model_dump()
+    data["part"]["smoothing"] = "off"
+    held = validate(Design, {**data, "holder": holder})
+    if name == "plate_imported":
+        with pytest.raises(InputError, match=r"holder\.(at|axis): "):
+            build_chamber(held)
+        return
+    chamber = build_chamber(held)
+    sound(chamber)
+    assert chamber.pieces_in_air == 0
+
+
+def test_sizes_in_words() -> None:
+    assert size_in_words("rod", [12.0]) == "Ø 12 mm"
+    assert size_in_words("plate", [20.0, 12.5]) == "20 × 12.5 mm"
+    assert size_in_words("shell", [1.0]) == "1 mm thick"
+    assert size_in_words("filled", []) == ""
