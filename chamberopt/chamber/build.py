@@ -195,7 +195,7 @@ def build_chamber(design: Design, target: np.ndarray | None = None) -> Chamber:
     origin = tuple(notes), traced.fitting, design.chamber.sha256
     chamber = Chamber(*surface, volume, part, exposed, *origin, fixtures)
     _refuse_idle_bore(design, chamber)
-    return replace(chamber, notes=(*notes, *_hidden_notes(chamber), *_holding_notes(chamber)))
+    return replace(chamber, notes=(*notes, *_holding_notes(chamber), *_hidden_notes(chamber)))
 
 
 def _misplaced(part: Part, shape: ShapeSurface, text: str) -> SurfaceError:
