@@ -71,11 +71,11 @@ class Fixture:
     triangles: np.ndarray  # (k, 3) int32, normals outward
 
 
-def size_in_words(kind: str, size_mm: Sequence[float]) -> str:
+def size_in_words(kind: str, size_mm: Sequence[float], unit: str = " mm") -> str:
     """Return the size of a fixture of a kind as text, such as "Ø 12 mm"; empty if it has none."""
     if not size_mm:
         return ""
-    text = f"{' × '.join(map(typeset_plain, size_mm))} mm"
+    text = " × ".join(map(typeset_plain, size_mm)) + unit
     if kind == "shell":
         return f"{text} thick"
     return f"Ø {text}" if len(size_mm) == 1 else text

@@ -298,7 +298,8 @@ def _draw_fixtures(axes: Axes, chamber: Chamber, view: View, at: float) -> None:
             )
             middle = 0.5 * (left + right), 0.5 * (low + high)
             area = inside(1e3 * lines)
-            text = f"{name}\n{size_in_words(one.kind, [1e3 * side for side in one.size])}".strip()
+            size = size_in_words(one.kind, [1e3 * side for side in one.size], unit="")
+            text = f"{name}\n{size}".strip()
             style: Any = {"size": 5.0, "va": "center", "bbox": LABEL}
             in_body = area is not None and area.contains_point(view.chamber_point(middle))
             if in_body and right - left > SHORT:
