@@ -8,7 +8,7 @@ Source: ASTM B851, as quoted in docs/peening.md.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -92,12 +92,21 @@ def fillet_warnings(reach: Reach, chamber: Chamber, largest: float) -> list[str]
     return [*_fillets(chamber, chosen, largest), *_slots(reach, chamber, chosen, largest)]
 
 
+class InnerEdges(NamedTuple):
+    """Inner edges between triangles, which are the edges of fillets."""
+
+    middle: np.ndarray  # [m], (e, 3)
+    length: np.ndarray  # [m], (e,)
+    radius: np.ndarray  # of the fillet there [m], (e,); 0 at an edge without a fillet
+    triangles: np.ndarray  # on both sides, (e, 2)
+
+
 def inner_edges(
     vertices: np.ndarray,
     triangles: np.ndarray,
     chosen: np.ndarray,
     hollow: np.ndarray | None = None,
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+) -> InnerEdges:
     """Find the inner edges between chosen triangles, which are the edges of fillets.
 
     Facets of a height L that turn by an angle a at each edge touch a circle of the radius L / (2
@@ -111,9 +120,6 @@ def inner_edges(
         triangles: triangles of the part, normals outward, shape (m, 3).
         chosen: marks the triangles to look at, shape (m,).
         hollow: curvature of the surface behind the triangles [1/m], 0 where unknown, shape (m,).
-    Returns:
-        Middles of the inner edges [m], shape (e, 3), their lengths [m] and the radii of the fillets
-        there [m], shape (e,).
     """
     sides, triangle = sides_of(triangles), np.repeat(np.arange(len(triangles)), 3)
     keys = edge_keys(triangles)
@@ -144,7 +150,8 @@ def inner_edges(
         known = (curvature > 0.0) | (turn < np.radians(FOLD))
         radius[known] = 1.0 / np.maximum(curvature[known], 1e-9)
     radius[turn > np.radians(SHARP)] = 0.0
-    return ends.mean(axis=1)[inner], length[inner], radius
+    beside = np.c_[triangle[one], triangle[two]][inner]
+    return InnerEdges(ends.mean(axis=1)[inner], length[inner], radius, beside)
 
 
 def _turn_across(ends: np.ndarray, way: np.ndarray, turns: np.ndarray) -> np.ndarray:
@@ -171,7 +178,7 @@ def _turn_across(ends: np.ndarray, way: np.ndarray, turns: np.ndarray) -> np.nda
 
 def _fillets(chamber: Chamber, chosen: np.ndarray, largest: float) -> list[str]:
     part = chamber.part
-    middle, length, radius = inner_edges(part.vertices, part.triangles, chosen, part.hollow)
+    middle, length, radius, _ = inner_edges(part.vertices, part.triangles, chosen, part.hollow)
     small = radius * OF_FILLET < largest
     if length[small].sum() < largest:  # a fillet is longer than a ball
         return []

@@ -15,9 +15,16 @@ import numpy as np
 
 from chamberopt.chamber.build import Chamber, build_chamber
 from chamberopt.chamber.checks.check import shot_reach, warnings
-from chamberopt.chamber.checks.fillets import OF_FILLET, inner_edges
-from chamberopt.chamber.largest_ball import largest_balls, spread_points
-from chamberopt.chamber.propose.pose import pose_in_words, propose_pose, square_to_walls
+from chamberopt.chamber.checks.jams import JamGap, gaps_in_reach, jam_gaps
+from chamberopt.chamber.part import Part, posed_part
+from chamberopt.chamber.propose.pose import (
+    Turns,
+    pose_in_words,
+    propose_pose,
+    square_to_walls,
+)
+from chamberopt.chamber.propose.proposed_balls import fit_sizes, propose_ball
+from chamberopt.chamber.propose.proposed_floor import Floor, floor_on_sonotrode, require_room
 from chamberopt.chamber.propose.proposed_target import (
     Sizes,
     Surface,
@@ -27,7 +34,8 @@ from chamberopt.chamber.propose.proposed_target import (
     shape_for,
     surfaces,
 )
-from chamberopt.chamber.reach import TOLERATED_OVERLAP, Reach
+from chamberopt.chamber.propose.shop import Shop, usual_shop
+from chamberopt.chamber.reach import Reach
 from chamberopt.chamber.scene import MAX_BALLS
 from chamberopt.common.errors import InputError, UnreadableError
 from chamberopt.common.progress import step
@@ -40,78 +48,7 @@ from chamberopt.design.shot import ShotTable
 from chamberopt.geometry.meshes.part_mesh import PartMesh, read_part
 from chamberopt.geometry.meshes.surface_error import format_box
 from chamberopt.geometry.meshes.units import GUESSED
-from chamberopt.geometry.triangles import area_vectors, areas, rotation_matrix, unit_vectors
-
-POINTS = 20_000  # on the target
-MISSED = 0.05  # share of the target's area that a larger ball may leave out
-
-
-def touched_shares(
-    vertices: np.ndarray, triangles: np.ndarray, target: np.ndarray, diameters: Sequence[float]
-) -> np.ndarray:
-    """Return the share of a part's target that balls of each diameter [m] can touch from any side.
-
-    Args:
-        vertices: vertices of the part [m], shape (n, 3).
-        triangles: triangles of the part, normals outward, shape (m, 3).
-        target: marks the triangles of the target, the surface to peen, shape (m,).
-    Returns:
-        The share for each diameter.
-    """
-    from sim_core import TriangleMesh
-
-    own = triangles[target]
-    spacing = np.full(len(own), np.sqrt(areas(vertices, own).sum() / POINTS))
-    triangle, point, area = spread_points(vertices, own, spacing)
-    normal = unit_vectors(area_vectors(vertices, own))[triangle]
-    mesh = TriangleMesh(vertices, triangles, np.zeros(len(triangles), dtype=np.uint8))
-    overlap = TOLERATED_OVERLAP * 0.5 * min(diameters)
-    radius = largest_balls(mesh, point, normal, 0.5 * max(diameters), overlap)[0]
-    touched = [area[radius >= 0.5 * one - overlap].sum() for one in diameters]
-    return np.asarray(np.array(touched) / area.sum())
-
-
-def fit_fillets(
-    vertices: np.ndarray, triangles: np.ndarray, target: np.ndarray, diameters: Sequence[float]
-) -> np.ndarray:
-    """Return True for each ball diameter [m] that is small enough for the target's fillets.
-
-    Inner edges without a fillet are left out, because no ball fits there.
-
-    Args:
-        vertices: vertices of the part [m], shape (n, 3).
-        triangles: triangles of the part, normals outward, shape (m, 3).
-        target: marks the triangles of the target, the surface to peen, shape (m,).
-    """
-    _, length, radius = inner_edges(vertices, triangles, target)
-    small = [(radius > 0.0) & (OF_FILLET * radius < one) for one in diameters]
-    return np.array([length[own].sum() < one for own, one in zip(small, diameters, strict=True)])
-
-
-def propose_ball(
-    shares: np.ndarray, fits: np.ndarray, diameters: Sequence[float]
-) -> tuple[float, str]:
-    """Return the diameter [m] of the proposed ball, and the reason for it.
-
-    It is the largest ball that touches nearly as much of the target as the smallest ball does. It
-    is also small enough for the fillets, if there is such a ball.
-
-    Args:
-        shares: share of the target that balls of each diameter can touch.
-        fits: True for each diameter that is small enough for the target's fillets.
-        diameters: diameters of the balls [m], in ascending order.
-    """
-    touching = shares >= shares[0] - MISSED
-    both = touching & fits
-    chosen = int(np.flatnonzero(both if both.any() else touching)[-1])
-    reason = f"touches {shares[chosen]:.0%} of the target"
-    if both.any() and not fits.all():
-        reason += ", at most half the radius of its fillets"
-    elif chosen + 1 < len(diameters):
-        larger = f"{1e3 * diameters[chosen + 1]:g} mm {shares[chosen + 1]:.0%}"
-        reason += f", balls of {larger}"
-    return diameters[chosen], reason
-
+from chamberopt.geometry.triangles import areas, rotation_matrix
 
 LAYER, PACKED = 0.25, 0.9069  # layers of balls in the charge; share of a plane under a full layer
 LIGHTER, HEAVIER = 0.4, 2.5  # charges of the study, as shares of the first
@@ -192,9 +129,9 @@ def _heaviest_g(ball_mass: float) -> float:
 
 
 LARGEST_BALL = 3e-3  # m: larger balls are in use, but they are few and slow to cover
-BALLS_ACROSS = 50  # ball diameters across the part's width: smaller balls come in thousands
+MOST_BALLS = 5000  # of a charge under the part: more take hours to simulate
 WIDER = (1.0, 1.4, 2.0)  # factors on the room round the part that are tried
-AMPLITUDE_UM, FREQUENCY_KHZ = 40.0, 20.0
+AMPLITUDE_UM = 40.0  # zero-to-peak; the nearest that the sonotrode can set is taken
 USUAL_PART, WALL, SONOTRODE = "42CrMo4", "42CrMo4", "Ti-6Al-4V"  # of the catalogue
 TREATMENT_S, HALF_WIDTH = 300.0, 0.01
 
@@ -211,6 +148,7 @@ class Wanted:
     alloy: str = ""
     shot: str = "steel"
     ball_mm: float | None = None
+    shop: Shop | None = None  # what the shop has; usual sizes if it is not known
 
 
 @dataclass(frozen=True)
@@ -220,12 +158,13 @@ class Proposal:
     design: Design
     tables: Tables  # the values of the design file
     reasons: dict[str, str]  # of values, by dotted name
-    bounds: dict[str, Range]  # of the study
+    bounds: dict[str, dict[str, Any]]  # of the study, as its file has them
     known: tuple[Surface, ...]  # surfaces to choose the target from
     mesh: PartMesh
     chamber: Chamber
     reach: Reach
     warnings: tuple[str, ...]
+    jams: tuple[JamGap, ...]  # gaps of chamber and part in which the balls jam
 
 
 def propose(
@@ -245,20 +184,13 @@ def propose(
     target = propose_target(mesh, known, choose(known))
     _require_near_origin(path, target)
     turns, pose_reason = propose_pose(mesh.vertices, mesh.triangles, target.triangles)
-    with step("choosing the balls"):
-        diameter, ball_reason = _ball_diameter(mesh, target, wanted)
-    square = square_to_walls(mesh.vertices, turns)
-    shape = wanted.shape or shape_for(np.ptp(mesh.vertices @ rotation_matrix(square).T, axis=0))
-    turns = square if shape == "box" else turns
-    posed = mesh.vertices @ rotation_matrix(turns).T
-    posed[:, 2] -= posed[:, 2].min()
-    top = float(posed[mesh.triangles[target.triangles], 2].max())
+    shop = wanted.shop or usual_shop()
     tables: Tables = {
         "part": {"mesh": str(path.resolve()), "unit": mesh.unit, "rotate_deg": list(turns)},
         "part.target": target.keys,
         "chamber": {},
-        "sonotrode": {"frequency_khz": FREQUENCY_KHZ, "amplitude_um": AMPLITUDE_UM},
-        "shot": {"mass_g": 1.0, "diameter_mm": round(1e3 * diameter, 4), "material": shot},
+        "sonotrode": {},
+        "shot": {"mass_g": 1.0, "diameter_mm": 1.0, "material": shot},
         "materials": {"part": part_alloy, "wall": WALL, "sonotrode": SONOTRODE},
         "effects": {"gravity": True, "friction": CATALOGUE, "roughness": USUAL},
         "process": {"treatment_time_s": TREATMENT_S, "seed": 1},
@@ -269,12 +201,14 @@ def propose(
             "objective_half_width": HALF_WIDTH,
         },
     }
+    with step("choosing the balls"):
+        diameter, ball_reason = _ball_diameter(tables, wanted, shop)
+    tables["shot"]["diameter_mm"] = round(1e3 * diameter, 4)
     reasons = {
         "part.unit": ("GUESSED: " if any(GUESSED in note for note in mesh.notes) else "")
         + f"the part measures {format_box(mesh.size)}",
         "part.rotate_deg": f"{pose_in_words(mesh, known, turns)}: {pose_reason}",
         "part.target": target.reason,
-        "sonotrode.amplitude_um": "ZERO-TO-PEAK, half of peak-to-valley; take your machine's",
         "shot.diameter_mm": ball_reason,
         "materials.part": "C0 and v0 are computed: to be calibrated"
         if wanted.alloy
@@ -289,16 +223,18 @@ def propose(
     with step("building and checking the chamber") as progress:
         for number, wider in enumerate(WIDER):
             progress(number, len(WIDER), None)
-            sizes = propose_sizes(posed, top, diameter, shape, wider)
-            tables["chamber"] = _chamber_table(sizes)
             try:
-                made = _checked(tables, {**reasons, **_size_reasons(sizes)}, sizes, known, mesh)
+                placed, floor = _place(mesh, target, turns, diameter, wanted, wider)
+                tables["part"]["rotate_deg"] = list(placed)
+                tables |= _floor_tables(floor)
+                made = _checked(tables, {**reasons, **_floor_reasons(floor)}, floor, known, mesh)
+                made = replace(made, bounds=_in_shop(made.bounds, wanted.shop))
             except UnreadableError:
                 raise
             except InputError as error:
                 refused = refused or error
                 continue
-            if best is None or len(made.warnings) < len(best.warnings):
+            if best is None or _faults(made) < _faults(best):
                 best = made
             if not any(word in text for text in made.warnings for word in ("gap", "side wall")):
                 break
@@ -340,43 +276,140 @@ def _require_near_origin(path: Path, target: Target) -> None:
         raise InputError(f"{path}: {text}, {most}; move it to the origin in CAD and export again")
 
 
-def _ball_diameter(mesh: PartMesh, target: Target, wanted: Wanted) -> tuple[float, str]:
-    """Return the wanted or proposed diameter of the balls [m], and the reason for it."""
+def _ball_diameter(tables: Tables, wanted: Wanted, shop: Shop) -> tuple[float, str]:
+    """Return the wanted or proposed diameter of the balls [m], and the reason for it.
+
+    Raises InputError if the shop does not have the wanted balls.
+
+    Args:
+        tables: tables of the design file, of which those of the part and the shot count.
+    """
+    material = tables["shot"]["material"]
+    stock = shop.stock_mm(material)
     if wanted.ball_mm is not None:
+        if wanted.shop is not None and wanted.ball_mm not in stock:
+            have = ", ".join(f"{one:g}" for one in stock)
+            text = f"the shop's stock of {material} has {have} mm"
+            raise InputError(f"--ball-mm: given {wanted.ball_mm:g}, but {text}; give one of them")
         return 1e-3 * wanted.ball_mm, "as asked"
-    least = float(np.sort(mesh.size)[1]) / BALLS_ACROSS
-    sold = [
-        size
-        for size in (6e-4, 8e-4, 1e-3, 1.2e-3, 1.5e-3, 2e-3, 2.5e-3, 3e-3, 4e-3)
-        if size <= LARGEST_BALL
-    ]
+    part = _part_alone(tables)
+    sides = np.sort(np.ptp(part.vertices, axis=0))[1:]
+    least = math.sqrt(LAYER * PACKED * float(sides.prod()) / (math.pi / 4.0 * MOST_BALLS))
+    sold = [1e-3 * size for size in stock if 1e-3 * size <= LARGEST_BALL] or [1e-3 * stock[0]]
     sizes = [size for size in sold if size >= least] or sold[-1:]
-    surface = mesh.vertices, mesh.triangles, target.triangles, sizes
-    return propose_ball(touched_shares(*surface), fit_fillets(*surface), sizes)
+    return propose_ball(fit_sizes(part, sizes))
 
 
-def _chamber_table(sizes: Sizes) -> dict[str, float | str]:
-    distance, height = round(1e3 * sizes.distance, 3), round(1e3 * sizes.height, 3)
+def _part_alone(tables: Tables) -> Part:
+    """Return the posed part of a design's tables, with its curved surfaces, without a chamber."""
+    room: dict[str, Any] = {"shape": "cylinder", "diameter_mm": LARGEST_MM, "height_mm": LARGEST_MM}
+    alone: Tables = {
+        "chamber": {**room, "sonotrode_distance_mm": 100.0},
+        "sonotrode": {"frequency_khz": 20.0, "amplitude_um": AMPLITUDE_UM},
+    }
+    return posed_part(validate(Design, _nested({**tables, **alone})))[0]
+
+
+def _place(
+    mesh: PartMesh, target: Target, turns: Turns, ball: float, wanted: Wanted, wider: float
+) -> tuple[Turns, Floor]:
+    """Return the turns of a part [degrees] and the sizes of a chamber round it on a sonotrode.
+
+    The form of the chamber is the wanted one, else the one whose walls lean less: that which suits
+    the part, or a cylinder.
+
+    Args:
+        turns: turns that bring the target down; the part may still be turned about z.
+        ball: diameter of the balls [m].
+        wider: factor on the room round the part.
+    Raises:
+        InputError: the shop has no sonotrode for it, or no chamber so large.
+    """
+    square, found = square_to_walls(mesh.vertices, turns), []
+    suits = shape_for(np.ptp(mesh.vertices @ rotation_matrix(square).T, axis=0))
+    refused: InputError | None = None
+    for shape in dict.fromkeys([wanted.shape] if wanted.shape else [suits, "cylinder"]):
+        placed = square if shape == "box" else turns
+        posed = mesh.vertices @ rotation_matrix(placed).T
+        posed[:, 2] -= posed[:, 2].min()
+        top = float(posed[mesh.triangles[target.triangles], 2].max())
+        sizes, shop = propose_sizes(posed, top, ball, shape, wider), wanted.shop
+        try:
+            floor = floor_on_sonotrode(sizes, _round(posed), shop or usual_shop(), shop is None)
+            if shop is not None:
+                floor = floor._replace(sizes=require_room(floor.sizes, shop))
+        except InputError as error:
+            refused = refused or error
+            continue
+        found.append((placed, floor))
+    if refused and not found:
+        raise refused
+    return min(found, key=lambda one: one[1].lean)
+
+
+def _round(posed: np.ndarray) -> float:
+    """Return the radius [m] of the part about the middle of its box, seen from above."""
+    plan = posed[:, :2]
+    middle = 0.5 * (plan.min(axis=0) + plan.max(axis=0))
+    return float(np.linalg.norm(plan - middle, axis=1).max())
+
+
+def _floor_tables(floor: Floor) -> Tables:
+    """Return the tables of the design file that follow from the floor: chamber and sonotrode."""
+    sizes, one = floor.sizes, floor.sonotrode
+    key, amplitude = one.amplitude_nearest(AMPLITUDE_UM)
     return {
-        "shape": sizes.shape,
-        **sizes.plan,
-        "height_mm": height,
-        "sonotrode_distance_mm": distance,
+        "chamber": {
+            "shape": sizes.shape,
+            **sizes.plan,
+            "height_mm": round(1e3 * sizes.height, 3),
+            "sonotrode_distance_mm": round(1e3 * sizes.distance, 3),
+        },
+        "sonotrode": {"frequency_khz": one.frequency_khz, key: amplitude},
     }
 
 
-def _size_reasons(sizes: Sizes) -> dict[str, str]:
+def _floor_reasons(floor: Floor) -> dict[str, str]:
+    sizes, one = floor.sizes, floor.sonotrode
     first = next(key for key in sizes.plan if key.endswith("_mm"))
     where = "the part goes out through it" if sizes.through_ceiling else "it hangs without a holder"
+    key, _ = one.amplitude_nearest(AMPLITUDE_UM)
+    kind = (
+        "ZERO-TO-PEAK, half of" if key == "amplitude_um" else "PEAK-TO-VALLEY, twice zero-to-peak"
+    )
+    kind += " peak-to-valley" if key == "amplitude_um" else ""
     return {
-        f"chamber.{first}": f"leaves {1e3 * sizes.gap:.3g} mm beside the part",
+        f"chamber.{first}": f"leaves {1e3 * sizes.gap:.3g} mm beside the part; {floor.reason}",
         "chamber.height_mm": f"sonotrode to ceiling; {where}",
         "chamber.sonotrode_distance_mm": "mean sonotrode face to the part's lowest point",
+        **({"sonotrode.frequency_khz": one.note} if one.note else {}),
+        f"sonotrode.{key}": f"{kind}; one that the sonotrode can set",
     }
+
+
+def _in_shop(bounds: dict[str, dict[str, Any]], shop: Shop | None) -> dict[str, dict[str, Any]]:
+    """Return the bounds of a study within what a shop has: its standard heights, its largest."""
+    name, bounds = "chamber.height_mm", dict(bounds)
+    if shop is None or name not in bounds:
+        return bounds
+    low, high = bounds[name]["low"], bounds[name]["high"]
+    if shop.heights_mm:
+        heights = sorted({one for one in shop.heights_mm if low <= one <= high})
+        bounds[name] = {"choose": heights}
+        if len(heights) < 2:
+            del bounds[name]
+    elif shop.largest_chamber_mm is not None:
+        bounds[name]["high"] = min(high, math.floor(shop.largest_chamber_mm[2]))
+    return bounds
+
+
+def _faults(made: Proposal) -> tuple[int, int]:
+    """Return how many gaps of a proposal jam balls, and how many warnings it has."""
+    return len(made.jams), len(made.warnings)
 
 
 def _checked(
-    tables: Tables, reasons: dict[str, str], sizes: Sizes, known: Sequence[Surface], mesh: PartMesh
+    tables: Tables, reasons: dict[str, str], floor: Floor, known: Sequence[Surface], mesh: PartMesh
 ) -> Proposal:
     """Choose the mass of the balls for these values, and return the built and checked proposal.
 
@@ -385,10 +418,11 @@ def _checked(
     Args:
         tables: tables of the design file. Their mass of the balls is replaced.
         reasons: reason for each value, by dotted name.
-        sizes: sizes of the chamber, from which the ranges of the study follow.
+        floor: sizes of the chamber, from which the ranges of the study follow.
         known: surfaces to choose the target from.
         mesh: the part.
     """
+    sizes = floor.sizes
     largest = max(size for key, size in tables["chamber"].items() if key.endswith("_mm"))
     if largest > LARGEST_MM:
         text = f"the part measures {format_box(mesh.size)}, too much for a chamber: it would need"
@@ -396,16 +430,29 @@ def _checked(
         raise InputError(f"{text} {most}; check --unit, or cut the part down to what is peened")
     design = validate(Design, _nested(tables))
     chamber = build_chamber(design)
-    floor = float(areas(chamber.vertices, chamber.triangles)[chamber.tags == TAG_SONOTRODE].sum())
+    face = float(areas(chamber.vertices, chamber.triangles)[chamber.tags == TAG_SONOTRODE].sum())
     diameter, ball_mass = design.shot.diameter, design.shot.ball_mass
-    mass_g, reason = propose_charge(floor, diameter, ball_mass)
+    mass_g, reason = propose_charge(face, diameter, ball_mass)
     tables = {**tables, "shot": {**tables["shot"], "mass_g": mass_g}}
     design = validate(Design, _nested(tables))
     reach = shot_reach(design, chamber)
     reasons = {**reasons, "shot.mass_g": f"{reason}: {design.shot.count}"}
     found = tuple(warnings(design, chamber, reach))
-    bounds = propose_ranges(sizes, mass_g, 1e3 * diameter, ball_mass)
-    return Proposal(design, tables, reasons, bounds, tuple(known), mesh, chamber, reach, found)
+    if math.isinf(floor.lean):
+        found = (f"chamber: {floor.reason}", *found)
+    ranges = propose_ranges(sizes, mass_g, 1e3 * diameter, ball_mass)
+    return Proposal(
+        design=design,
+        tables=tables,
+        reasons=reasons,
+        bounds={name: one._asdict() for name, one in ranges.items()},
+        known=tuple(known),
+        mesh=mesh,
+        chamber=chamber,
+        reach=reach,
+        warnings=found,
+        jams=tuple(jam_gaps(chamber, diameter, gaps_in_reach(reach))),
+    )
 
 
 def _nested(tables: Tables) -> dict[str, object]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import tomlkit
 
@@ -44,14 +45,13 @@ def study_text(proposal: Proposal, design: str) -> str:
     Args:
         design: name of the design file, in the same folder.
     """
-    bounds = {name: one._asdict() for name, one in proposal.bounds.items()}
     start = {name: f"now {proposal.design.value(name):g}" for name in proposal.bounds}
-    return study_lines(design, bounds, start)
+    return study_lines(design, proposal.bounds, start)
 
 
 def study_lines(
     design: str,
-    bounds: Mapping[str, Mapping[str, float]],
+    bounds: Mapping[str, Mapping[str, Any]],
     notes: Mapping[str, str],
     evaluations: int = EVALUATIONS,
 ) -> str:

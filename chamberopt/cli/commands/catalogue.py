@@ -1,4 +1,4 @@
-"""The commands `materials` and `shot`: list the known alloys, and balls as they are sold.
+"""The commands `materials`, `shot` and `shop`: alloys, balls as they are sold, what a shop has.
 
 `materials` lists friction and slopes of faces too.
 """
@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
 from textwrap import wrap
 from typing import TYPE_CHECKING
 
@@ -63,6 +64,33 @@ def materials(name: str | None = None, /, *, json: Json = False) -> None:
         *_friction({one.metal for one in listed}),
         *_sources(listed),
     ])  # fmt: skip
+
+
+@app.command
+def shop(file: Path | None = None, /, *, example: bool = False) -> None:
+    """Check a file of what a shop has (sonotrodes, balls, chambers), or print one as an example.
+
+    Parameters
+    ----------
+    file
+        The shop's file, which `chamberopt new PART --shop FILE` takes.
+    example
+        Print an annotated file with usual sizes, to start from.
+    """
+    from chamberopt.chamber.propose.shop import example_text, load_shop
+    from chamberopt.common.errors import InputError
+
+    if example == (file is not None):
+        raise InputError("shop: give the shop's file, or --example: one of them")
+    if file is None:
+        show([example_text().rstrip("\n")])
+        return
+    found = load_shop(file)
+    show([f"{one.in_words}, {one.frequency_khz:g} kHz" for one in found.sonotrodes])
+    stock = [
+        f"{one.material}: {', '.join(f'{d:g}' for d in one.diameters_mm)} mm" for one in found.balls
+    ]
+    show(["balls:", *(stock or ["all that are sold (chamberopt shot)"])])
 
 
 @app.command

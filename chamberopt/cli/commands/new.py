@@ -33,6 +33,7 @@ def new(
     material: str = "",
     shot: str = "steel",
     ball_mm: float | None = None,
+    shop: Path | None = None,
     unit: Literal["um", "mm", "cm", "m", "in", "guess"] | None = None,
     out: Out = None,
 ) -> None:
@@ -52,7 +53,11 @@ def new(
     shot
         Material of the balls; `chamberopt shot` lists them.
     ball_mm
-        Diameter of a ball; by default the largest sold that touches nearly all of the target.
+        Diameter of a ball; by default the largest in stock that suits the target's fillets and
+        slots, and jams in no gap.
+    shop
+        A file of the sonotrodes, balls and sizes of chambers that your shop has; nothing else is
+        proposed. `chamberopt shop --example` prints one. By default usual sizes.
     unit
         Of the numbers in the part's file; by default what the file states. Where it states none and
         several are possible, `new` asks, or stops if nobody can answer; guess takes the likeliest.
@@ -60,6 +65,7 @@ def new(
     import chamberopt.pictures.part  # noqa: F401  # imported before the folder is claimed
     from chamberopt.chamber.propose.left_out import find_left_out
     from chamberopt.chamber.propose.proposal import Wanted, propose
+    from chamberopt.chamber.propose.shop import load_shop
     from chamberopt.chamber.propose.text import design_text, study_text
     from chamberopt.cli.commands.check import draw_target
     from chamberopt.common.errors import InputError
@@ -78,13 +84,15 @@ def new(
     if PICK in target and not sys.stdin.isatty():
         raise InputError("--target: pick asks, and nobody answers here; give names or faces")
 
+    of_shop = None if shop is None else load_shop(shop)
+    wanted = Wanted(unit or STATED, shape, material, shot, ball_mm, of_shop)
+
     def choose(known: Sequence[Surface]) -> Sequence[str]:
         return _picked(known) if PICK in target else target
 
     out = out or Path(part.stem if part.suffix else f"{part.name}_chamber")
     with claim_folder(out):
         pass  # reports a folder that is taken before the work begins
-    wanted = Wanted(unit or STATED, shape, material, shot, ball_mm)
     try:
         made = propose(part, wanted, choose)
     except UnknownUnitError as error:

@@ -10,13 +10,7 @@ import pytest
 import trimesh
 
 from chamberopt.chamber.propose.pose import propose_pose, square_to_walls
-from chamberopt.chamber.propose.proposal import (
-    Proposal,
-    Wanted,
-    propose,
-    propose_ball,
-    touched_shares,
-)
+from chamberopt.chamber.propose.proposal import Proposal, Wanted, propose
 from chamberopt.chamber.propose.proposed_target import propose_target, surfaces
 from chamberopt.cli import main
 from chamberopt.common.errors import InputError
@@ -27,9 +21,6 @@ from chamberopt.search.study import load_study
 from tests.chamberopt.design.test_shipped_parts import PARTS
 from tests.helpers.eight_parts import EIGHT_PARTS, KEPT_ASIDE, ExamplePart
 from tests.helpers.four_parts import FOUR_PARTS
-
-SHARES = np.array([0.95, 0.94, 0.6])
-SIZES = (1e-3, 2e-3, 3e-3)
 
 
 @pytest.fixture(scope="module")
@@ -71,24 +62,6 @@ def test_turns_are_simple_where_that_is_as_good(tmp_path: Path) -> None:
         assert square_to_walls(turned, (0.0, 0.0, 0.0))[2] == pytest.approx(needed)
 
 
-def test_a_ball_touches_what_its_radius_lets_it(tmp_path: Path) -> None:
-    """A slot of 2 mm with square corners: balls above 2 mm touch none of its walls."""
-    from shapely import Polygon
-
-    outline = [(0, 0), (22, 0), (22, 10), (12, 10), (12, 5), (10, 5), (10, 10), (0, 10)]
-    block = trimesh.creation.extrude_polygon(Polygon(outline), 20)
-    middle = block.triangles_center
-    walls = (np.abs(middle[:, 0] - 11) < 1.01) & (middle[:, 1] > 5.01) & (middle[:, 1] < 9.99)
-    shares = touched_shares(1e-3 * block.vertices, block.faces, walls, (1e-3, 1.9e-3, 2.1e-3))
-    # The corner at the bottom keeps a ball half its diameter away.
-    assert shares == pytest.approx([0.9, 0.81, 0.0], abs=0.01)
-
-
-def test_the_largest_ball_that_misses_little_is_proposed() -> None:
-    assert propose_ball(SHARES, np.array([True, False, False]), SIZES)[0] == 1e-3  # fillets
-    assert propose_ball(SHARES, np.zeros(3, dtype=bool), SIZES)[0] == 2e-3
-
-
 def test_new_writes_a_design_and_a_study_that_are_accepted(
     tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -119,6 +92,7 @@ def test_new_writes_a_design_and_a_study_that_are_accepted(
         (["--shot", "glass"], "--shot: given 'glass'; the hardness of these balls is not known"),
         (["--unit", "m"], "with --unit = 'm' the part measures"),
         (["--ball-mm", "900"], "--ball-mm: given 900; allowed: from 0.1 to 20 mm"),
+        (["--shop", "nowhere.toml"], "nowhere.toml: no such shop file"),
     ],
 )
 def test_what_new_cannot_use_is_told(

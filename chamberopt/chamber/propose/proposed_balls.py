@@ -1,0 +1,114 @@
+"""Propose balls by the rules by which `check` warns: of fillets, slots and gaps in which they jam.
+
+A ball of the diameter d serves a place of the target if it touches it, if it does not lie in a
+fillet of less than 2 d radius (OF_FILLET) nor in a slot of less than 4 d (OF_SLOT), and if it is
+not held there by a gap of 0.9 d to 1.15 d (JAM_BAND). A smaller ball serves all that a larger one
+serves, but for gaps in which it jams: so a mix of two sizes serves no more than the better of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from chamberopt.chamber.checks.fillets import OF_FILLET, OF_SLOT, inner_edges
+from chamberopt.chamber.checks.jams import JAM_BAND, MAX_COSINE, MIN_AREA
+from chamberopt.chamber.largest_ball import largest_balls, spread_points
+from chamberopt.chamber.part import Part
+from chamberopt.chamber.reach import TOLERATED_OVERLAP
+from chamberopt.geometry.triangles import areas, interpolate, unit_vectors
+
+POINTS = 20_000  # on the target, and as many on the rest of the part
+MISSED = 0.05  # share of the target's area that a larger ball may fail to touch
+AS_GOOD = 0.02  # share of the target's area within which two sizes serve alike
+MOST_LISTED = 5  # sizes in a reason
+
+
+@dataclass(frozen=True)
+class SizeFit:
+    """How balls of one size suit the target."""
+
+    diameter: float  # [m]
+    touched: float  # share of the target that the ball can touch from any side
+    served: float  # share of the target that it serves
+    suits: bool  # true if no fillet or slot is so small that `check` would warn
+    jam: float  # width of a gap of the part in which the ball jams [m]; 0 if there is none
+
+
+def fit_sizes(part: Part, diameters: Sequence[float]) -> list[SizeFit]:
+    """Return how balls of each diameter [m] suit the target of a part, without its chamber.
+
+    Inner edges without a fillet are left out, because no ball fits there.
+    """
+    from sim_core import TriangleMesh
+
+    mesh = TriangleMesh(part.vertices, part.triangles, np.zeros(len(part.triangles), np.uint8))
+    size = areas(part.vertices, part.triangles)
+    spacing = np.empty(len(size))
+    for rows in (part.target, ~part.target):
+        spacing[rows] = np.sqrt(size[rows].sum() / POINTS)
+    triangle, point, area = spread_points(part.vertices, part.triangles, spacing)
+    corners = part.vertices[part.triangles[triangle]]
+    normal = unit_vectors(interpolate(part.corner_normals[triangle], corners, point))
+    overlap = TOLERATED_OVERLAP * 0.5 * min(diameters)
+    widest = max(diameters) * max(0.5 / OF_SLOT, JAM_BAND[1])
+    radius, obstacle, cosine = largest_balls(mesh, point, normal, 0.5 * widest, overlap)
+    across = np.where((obstacle >= 0) & (cosine < MAX_COSINE), 2.0 * radius, np.inf)
+    width = across - overlap
+    edges = inner_edges(part.vertices, part.triangles, part.target, part.hollow)
+    fillet = np.full(len(size), np.inf)  # radius of the smallest fillet at each triangle
+    round_ = edges.radius > 0.0
+    np.minimum.at(fillet, edges.triangles[round_].ravel(), np.repeat(edges.radius[round_], 2))
+    on, whole = part.target[triangle], float(area[part.target[triangle]].sum())
+    fits = []
+    for one in diameters:
+        in_slot = on & (across < one / OF_SLOT)
+        small = round_ & (OF_FILLET * edges.radius < one)
+        held = (width >= JAM_BAND[0] * one) & (width <= JAM_BAND[1] * one)
+        jams = area[held].sum() >= MIN_AREA * one**2
+        touched = on & (radius >= 0.5 * one - overlap)
+        served = touched & ~in_slot & (OF_FILLET * fillet[triangle] >= one)
+        suits = area[in_slot].sum() < one**2 and edges.length[small].sum() < one
+        jam = float(np.average(width[held], weights=area[held])) if jams else 0.0
+        touch, serve = (float(area[rows].sum()) / whole for rows in (touched, served))
+        fits.append(SizeFit(one, touch, serve, bool(suits), jam))
+    return fits
+
+
+def propose_ball(fits: Sequence[SizeFit]) -> tuple[float, str]:
+    """Return the diameter [m] of the proposed ball, and the reason for it.
+
+    It is the largest ball that jams in no gap of the part and suits all fillets and slots. If there
+    is none, it is the largest of those that serve the most.
+
+    Args:
+        fits: sizes in ascending order.
+    """
+    free = [one for one in fits if not one.jam] or list(fits)
+    touching = max(one.touched for one in free) - MISSED
+    reach = [one for one in free if one.touched >= touching]
+    if suited := [one for one in reach if one.suits]:
+        best = suited[-1]
+        text = f"touches {best.touched:.0%} of the target"
+        larger = [one for one in fits if one.diameter > best.diameter]
+        if any(not one.suits for one in larger):
+            text += ", at most half the radius of its fillets and a quarter of its slots"
+        elif larger and larger[0].touched < touching:
+            text += f", balls of {_mm(larger[0])} {larger[0].touched:.0%}"
+    else:
+        most = max(one.served for one in reach)
+        best = [one for one in reach if one.served >= most - AS_GOOD][-1]
+        shown = sorted({*fits[:: max(1, len(fits) // MOST_LISTED)], best}, key=lambda x: x.diameter)
+        shares = ", ".join(f"{_mm(one)} {one.served:.0%}" for one in shown)
+        text = f"NO SIZE SERVES ALL (fillets of 2, slots of 4 diameters); of the target: {shares}"
+    if best.jam:
+        text += f"; IT JAMS in gaps of {1e3 * best.jam:.4g} mm, as every size does"
+    elif jammed := [one for one in fits if one.jam]:
+        text += f"; {', '.join(map(_mm, jammed[:MOST_LISTED]))} would jam in gaps of the part"
+    return best.diameter, text
+
+
+def _mm(one: SizeFit) -> str:
+    return f"{1e3 * one.diameter:g} mm"

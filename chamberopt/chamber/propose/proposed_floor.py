@@ -1,0 +1,188 @@
+"""Propose the sonotrode of a shop on which a chamber stands, and fit the chamber's floor to it.
+
+The floor of a chamber is the vibrating face. A sonotrode that is larger carries the wall over its
+face, with the shop's clearance, which no ball enters; one that is smaller is the floor, and the
+walls lean out from its rim, so that the room is as wide as the part needs where the part is.
+
+Notation
+    t   how far the walls of the wanted floor must move in to stand on the face [m]
+    a   angle by which they lean, tan(a) = t / distance from the sonotrode to the part
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from chamberopt.chamber.propose.proposed_target import Sizes
+from chamberopt.chamber.propose.shop import Shop, ShopSonotrode
+from chamberopt.common.errors import InputError
+
+TIGHTER = 0.6  # share of the room beside the part that is left, so that the walls stand upright
+STEEPEST = 30.0  # degrees: walls that lean more throw the balls up rather than inwards
+FARTHER = 1.5  # factor by which the sonotrode's distance may grow, so that walls lean less
+WIDEST = 25e-3  # m: how far a leaning wall may move out up to the ceiling
+WHOLE = 1.25  # a face up to so much larger than the wanted floor becomes the whole floor
+
+
+class Floor(NamedTuple):
+    """The sizes of a chamber on a sonotrode of a shop."""
+
+    sizes: Sizes
+    sonotrode: ShopSonotrode
+    reason: str  # for the chamber's size in plan
+    lean: float = 0.0  # of the walls [degrees]; infinite if no sonotrode is large enough
+
+
+def floor_on_sonotrode(sizes: Sizes, round_part: float, shop: Shop, may_exceed: bool) -> Floor:
+    """Return the sizes of a chamber that stands on the most suitable sonotrode of a shop.
+
+    It is the smallest that holds the wanted floor, else the one on which the walls lean least.
+
+    Args:
+        sizes: the wanted sizes.
+        round_part: radius about the chamber's axis that a conformal chamber needs [m].
+        may_exceed: True if a floor larger than all sonotrodes may be proposed.
+    Raises:
+        InputError: the shop has no sonotrode for it.
+    """
+    moves = [(_move(sizes, round_part, one), one) for one in shop.sonotrodes]
+    held = [(_area(one), k) for k, (move, one) in enumerate(moves) if move <= 1e-9]
+    if held:
+        return _over_the_face(sizes, shop, shop.sonotrodes[min(held)[1]])
+    move, sonotrode = min(moves, key=lambda one: one[0])
+    if move <= (1.0 - TIGHTER) * sizes.gap and sizes.shape != "conformal":
+        tight = replace(sizes, plan=_moved(sizes, move, sonotrode), gap=sizes.gap - move)
+        return _over_the_face(tight, shop, sonotrode)
+    far = min(
+        max(sizes.distance, move / math.tan(math.radians(STEEPEST))), FARTHER * sizes.distance
+    )
+    far = 1e-3 * math.ceil(1e3 * far - 1e-6)
+    angle = math.degrees(math.atan(move / far))
+    rise = (sizes.height + far - sizes.distance) * move / far
+    if sizes.shape != "conformal" and angle <= STEEPEST + 0.5 and rise <= WIDEST:
+        height = sizes.height + far - sizes.distance
+        return _leaning(replace(sizes, distance=far, height=height), move, angle, sonotrode)
+    wanted = " x ".join(f"{1e3 * one:.4g}" for one in _sides(sizes, round_part))
+    ways = (
+        "peen it a strip at a time, each in a chamber of its own (cut the part down to it), "
+        "set several sonotrodes side by side, or take a larger one"
+    )
+    text = f"the floor of {wanted} mm is larger than the largest sonotrode, {sonotrode.in_words}"
+    if not may_exceed:
+        raise InputError(f"--shop: {text}, also with walls that lean by {STEEPEST:g}°: {ways}")
+    usual = "usual ones: discs of 40 to 80 mm (chamberopt shop --example; give yours by --shop)"
+    reason = f"LARGER THAN USUAL SONOTRODES, simulated as one face: {ways}; {usual}"
+    return Floor(sizes, sonotrode, reason, math.inf)
+
+
+def _half(sizes: Sizes) -> tuple[float, float]:
+    """Half the length and width [m] of a box's floor."""
+    return 5e-4 * float(sizes.plan["length_mm"]), 5e-4 * float(sizes.plan["width_mm"])
+
+
+def _radius(sizes: Sizes, round_part: float) -> float:
+    """Radius of the circle round the floor of a chamber that is no box [m]."""
+    if sizes.shape == "conformal":
+        return round_part + 1e-3 * float(sizes.plan["gap_mm"])
+    if sizes.shape == "prism":
+        return 5e-4 * float(sizes.plan["across_mm"]) / math.cos(math.pi / int(sizes.plan["sides"]))
+    return 5e-4 * float(sizes.plan["diameter_mm"])
+
+
+def _sides(sizes: Sizes, round_part: float) -> tuple[float, float]:
+    """Length and width [m] of the wanted floor."""
+    if sizes.shape == "box":
+        x, y = _half(sizes)
+        return 2.0 * x, 2.0 * y
+    return (2.0 * _radius(sizes, round_part),) * 2
+
+
+def _area(sonotrode: ShopSonotrode) -> float:
+    length, width = sonotrode.sides_mm
+    return length * width
+
+
+def _move(sizes: Sizes, round_part: float, sonotrode: ShopSonotrode) -> float:
+    """Return how far the walls of the wanted floor must move in to stand on a face [m].
+
+    It is at most 0 if the floor lies within the face, and infinite if no floor of this form does.
+    A box whose walls move in by t has the half diagonal r at x + y - 2 t = sqrt(2 r² - (x - y)²).
+    """
+    length, width = (5e-4 * one for one in sonotrode.sides_mm)
+    if sizes.shape != "box":
+        radius = _radius(sizes, round_part)
+        inner = math.cos(math.pi / int(sizes.plan["sides"])) if sizes.shape == "prism" else 1.0
+        return inner * (radius - width)
+    x, y = _half(sizes)
+    if sonotrode.size_mm is not None:
+        across, along = (width, length) if x < y else (length, width)
+        return max(x - across, y - along)
+    square = 2.0 * width**2 - (x - y) ** 2
+    move = 0.5 * (x + y - math.sqrt(square)) if square > 0.0 else math.inf
+    return move if move < 0.8 * min(x, y) else math.inf
+
+
+def _moved(sizes: Sizes, move: float, sonotrode: ShopSonotrode) -> dict[str, float | str]:
+    """Return the keys of the floor with its walls moved in by some length [m] onto a face."""
+    if sizes.shape == "cylinder":
+        return {**sizes.plan, "diameter_mm": sonotrode.sides_mm[1]}
+    plan = {key: one for key, one in sizes.plan.items() if key.endswith("_mm")}
+    inside = {key: math.floor(10.0 * float(one) - 2e4 * move) / 10.0 for key, one in plan.items()}
+    return {**sizes.plan, **inside}
+
+
+def _over_the_face(sizes: Sizes, shop: Shop, sonotrode: ShopSonotrode) -> Floor:
+    """Return a floor that is the whole face, if the face is little larger, else a part of it."""
+    clear = f"{shop.clearance_mm:g} mm clear"
+    face = dict(zip(("length_mm", "width_mm"), sonotrode.sides_mm, strict=True))
+    if sizes.shape == "box" and sizes.plan["length_mm"] < sizes.plan["width_mm"]:  # type: ignore[operator]
+        face = dict(zip(face, reversed(face.values()), strict=True))
+    if sizes.shape == "cylinder":
+        face = {"diameter_mm": sonotrode.sides_mm[0]}
+    alike = (sizes.shape, sonotrode.size_mm is None) in (("cylinder", True), ("box", False))
+    if alike and all(face[key] <= WHOLE * float(sizes.plan[key]) for key in face):
+        more = min(face[key] - float(sizes.plan[key]) for key in face)
+        wider = replace(sizes, plan={**sizes.plan, **face}, gap=sizes.gap + 5e-4 * more)
+        reason = f"the face of sonotrode {sonotrode.in_words}, the wall round it {clear}"
+        return Floor(wider, sonotrode, reason)
+    reason = f"on sonotrode {sonotrode.in_words}: the wall ends over its face, {clear}"
+    return Floor(sizes, sonotrode, reason)
+
+
+def _leaning(sizes: Sizes, move: float, angle: float, sonotrode: ShopSonotrode) -> Floor:
+    """Return a floor that is smaller than the room, with walls that lean out from it."""
+    lean = float(math.ceil(angle))
+    plan = {**_moved(sizes, move, sonotrode), "inclination_deg": lean}
+    reason = (
+        f"the floor is sonotrode {sonotrode.in_words}; its walls lean out by {lean:g}°, to be wide "
+        "enough where the part is"
+    )
+    return Floor(replace(sizes, plan=plan), sonotrode, reason, lean)
+
+
+def require_room(sizes: Sizes, shop: Shop) -> Sizes:
+    """Return the sizes with a height that the shop has.
+
+    Raises InputError if the shop can build no chamber of these sizes.
+    """
+    height = round(1e3 * sizes.height, 3)
+    if shop.heights_mm:
+        higher = [one for one in shop.heights_mm if one >= height]
+        if not higher:
+            text = f"the chamber would be {height:g} mm high, above all of heights_mm"
+            raise InputError(f"--shop: {text}; add a higher lid, or let the part go out through it")
+        height = min(higher)
+    if shop.largest_chamber_mm is not None:
+        lean = 2.0 * height * math.tan(math.radians(float(sizes.plan.get("inclination_deg", 0.0))))
+        keys = [key for key in sizes.plan if key.endswith("_mm") and key != "gap_mm"]
+        wide = sorted((float(sizes.plan[key]) + lean for key in keys), reverse=True)
+        most = np.sort(shop.largest_chamber_mm[:2])[::-1]
+        if height > shop.largest_chamber_mm[2] or (np.array(wide) > most[: len(wide)]).any():
+            given = " x ".join(f"{one:.4g}" for one in (*wide, height))
+            text = f"the chamber would measure {given} mm, more than largest_chamber_mm"
+            raise InputError(f"--shop: {text}; peen the part a strip at a time, or in another pose")
+    return replace(sizes, height=1e-3 * height)

@@ -1,0 +1,154 @@
+"""A shop: the sonotrodes, balls and sizes of chambers that it has, known before any calibration.
+
+`chamberopt new --shop FILE` proposes nothing that the shop in the file does not have. Without a
+file, `usual_shop` stands in: usual sizes, with their sources in usual_shop.toml.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Annotated
+
+from pydantic import Field
+
+from chamberopt.common.errors import InputError
+from chamberopt.common.files import read_file
+from chamberopt.common.toml_errors import Problem
+from chamberopt.common.toml_fields import Pair, Several, Triple, list_field, quantity, read_toml
+from chamberopt.design.design import validate
+from chamberopt.design.materials import ball, ball_sizes, balls, find
+from chamberopt.design.table_base import FileTable
+
+EXAMPLE = Path(__file__).with_name("usual_shop.toml")
+MOST = 200  # sonotrodes, sizes of balls and heights in one file
+AMPLITUDES = {"amplitudes_um": 500.0, "amplitudes_pv_um": 1000.0}  # the most of each [µm]
+Numbers = Annotated[Several[float], Field(max_length=MOST)]
+
+
+class ShopSonotrode(FileTable):
+    """A sonotrode of a shop: its face, its frequency and the amplitudes that it can set."""
+
+    name: str = Field(min_length=1, max_length=100, description="what the shop calls it")
+    diameter_mm: float | None = quantity(5, 2000, "mm", "of a round face", None)
+    size_mm: Pair | None = list_field("two numbers [length, width] in mm", "of a block", None)
+    frequency_khz: float = quantity(0.01, 200, "kHz", "usually 20")
+    amplitudes_um: Numbers | None = list_field("a list of numbers", "zero-to-peak", None)
+    amplitudes_pv_um: Numbers | None = list_field("a list of numbers", "peak-to-valley", None)
+    note: str = Field(default="", max_length=300, description="such as its own resonance")
+
+    def _problems(self) -> Iterator[Problem]:
+        if (self.diameter_mm is None) == (self.size_mm is None):
+            yield Problem("diameter_mm", "give it for a disc, or size_mm for a block: one of them")
+        if self.size_mm is not None and not all(5.0 <= one <= 2000.0 for one in self.size_mm):
+            yield Problem("size_mm", f"given {list(self.size_mm)}; allowed: 5 to 2000 mm each")
+        given = [key for key in AMPLITUDES if getattr(self, key) is not None]
+        if len(given) != 1:
+            text = "give amplitudes_um (zero-to-peak) or amplitudes_pv_um, one of them"
+            yield Problem("amplitudes_um", text)
+        for key in given:
+            values = getattr(self, key)
+            if not values or not all(0.1 <= one <= AMPLITUDES[key] for one in values):
+                text = f"given {list(values)}; allowed: one or more, 0.1 to {AMPLITUDES[key]:g} µm"
+                yield Problem(key, text)
+
+    def amplitude_nearest(self, zero_to_peak_um: float) -> tuple[str, float]:
+        """Return the design's key and value [µm] of the settable amplitude nearest to a given one.
+
+        Args:
+            zero_to_peak_um: the amplitude that is wanted.
+        """
+        if self.amplitudes_um is not None:
+            near = min(self.amplitudes_um, key=lambda one: abs(one - zero_to_peak_um))
+            return "amplitude_um", near
+        assert self.amplitudes_pv_um is not None
+        near = min(self.amplitudes_pv_um, key=lambda one: abs(0.5 * one - zero_to_peak_um))
+        return "amplitude_pv_um", near
+
+    @property
+    def sides_mm(self) -> tuple[float, float]:
+        """Length and width of the face; of a disc twice its diameter."""
+        if self.size_mm is None:
+            assert self.diameter_mm is not None
+            return self.diameter_mm, self.diameter_mm
+        return max(self.size_mm), min(self.size_mm)
+
+    @property
+    def in_words(self) -> str:
+        """Name and size, such as "disc A" (70 mm)."""
+        size = " x ".join(f"{one:g}" for one in dict.fromkeys(self.sides_mm))
+        return f'"{self.name}" ({size} mm)'
+
+
+class StockBalls(FileTable):
+    """Balls of one material that a shop has in stock."""
+
+    material: str = Field(description="a name that `chamberopt shot` lists")
+    diameters_mm: Numbers = list_field("a list of numbers", "of the balls in stock")
+
+    def _problems(self) -> Iterator[Problem]:
+        if find(self.material, balls()) is None:
+            known = ", ".join(one.name for one in balls())
+            yield Problem("material", f"given {self.material!r}; known are {known}")
+        if not self.diameters_mm or not all(0.1 <= one <= 20.0 for one in self.diameters_mm):
+            text = f"given {list(self.diameters_mm)}; allowed: one or more, 0.1 to 20 mm"
+            yield Problem("diameters_mm", text)
+
+
+class Shop(FileTable):
+    """What a shop has: sonotrodes, balls in stock, and the sizes of chambers that it can build."""
+
+    sonotrodes: Annotated[Several[ShopSonotrode], Field(min_length=1, max_length=MOST)]
+    balls: Annotated[Several[StockBalls], Field(max_length=MOST)] = list_field(
+        "a list of tables, [[balls]]", "in stock; without any, all that are sold", ()
+    )
+    clearance_mm: float = quantity(0.01, 5, "mm", "between a sonotrode and the wall round it", 0.2)
+    largest_chamber_mm: Triple | None = list_field(
+        "three numbers [length, width, height] in mm", "inside of the largest chamber", None
+    )
+    heights_mm: Numbers = list_field("a list of numbers", "of standard walls and lids", ())
+
+    def _problems(self) -> Iterator[Problem]:
+        if not all(2.0 <= one <= 2000.0 for one in self.largest_chamber_mm or ()):
+            text = f"given {list(self.largest_chamber_mm or ())}; allowed: 2 to 2000 mm each"
+            yield Problem("largest_chamber_mm", text)
+        if not all(2.0 <= one <= 2000.0 for one in self.heights_mm):
+            text = f"given {list(self.heights_mm)}; allowed: 2 to 2000 mm each"
+            yield Problem("heights_mm", text)
+
+    def stock_mm(self, material: str) -> tuple[float, ...]:
+        """Return the diameters [mm] in stock of balls of a material, in ascending order.
+
+        Raises InputError if there are none that do not enter the clearance round a sonotrode.
+        """
+        stock = ball_sizes(material)
+        if self.balls:
+            own = [one for one in self.balls if ball(one.material).name == ball(material).name]
+            stock = tuple(size for one in own for size in one.diameters_mm)
+            if not own:
+                have = ", ".join(sorted({ball(one.material).name for one in self.balls}))
+                raise InputError(f"--shot: the shop has no balls of {material}; it has {have}")
+        fit = tuple(sorted({one for one in stock if one >= 2.0 * self.clearance_mm}))
+        if not fit:
+            text = f"all balls of {material} are smaller than twice clearance_mm"
+            raise InputError(f"--shop: {text} = {self.clearance_mm:g}; give larger ones")
+        return fit
+
+
+def load_shop(path: Path) -> Shop:
+    """Load a shop's file. Raises InputError, which names every problem with file and line."""
+    source, data = read_toml(path, "shop", "see chamberopt shop --example")
+    if "log_mean" in data:
+        text = "this is what chamberopt calibrate found of a machine; give a file of what the shop"
+        raise InputError(f"{path}: {text} has: chamberopt shop --example prints one")
+    return validate(Shop, data, path, source)
+
+
+def example_text() -> str:
+    """Return the text of an annotated file of a shop, with usual sizes."""
+    return read_file(EXAMPLE, follow=True).decode()
+
+
+def usual_shop() -> Shop:
+    """Return a shop with usual sonotrodes, and with all balls that are sold."""
+    return load_shop(EXAMPLE).model_copy(update={"balls": ()})

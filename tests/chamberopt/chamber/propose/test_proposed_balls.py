@@ -1,0 +1,76 @@
+"""Balls that `new` proposes: by fillets, slots, and gaps in which they would jam."""
+
+import numpy as np
+import pytest
+import trimesh
+from shapely import Polygon
+
+from chamberopt.chamber.part import Part
+from chamberopt.chamber.propose.proposed_balls import SizeFit, fit_sizes, propose_ball
+from chamberopt.geometry.triangles import areas
+
+
+def part_of(mesh: trimesh.Trimesh, target: np.ndarray) -> Part:
+    """A part of a mesh in metres, some of whose triangles are the target."""
+    vertices, triangles = np.asarray(mesh.vertices), np.asarray(mesh.faces)
+    return Part(vertices, triangles, areas(vertices, triangles), target, "a part")
+
+
+def block_with_slot(width_mm: float) -> trimesh.Trimesh:
+    """A block of 20 mm with a slot 5 mm deep, whose middle is at x = 11 mm."""
+    low, high = 11.0 - 0.5 * width_mm, 11.0 + 0.5 * width_mm
+    outline = [(0, 0), (22, 0), (22, 10), (high, 10), (high, 5), (low, 5), (low, 10), (0, 10)]
+    block = trimesh.creation.extrude_polygon(Polygon(outline), 20)
+    block.apply_scale(1e-3)
+    return block
+
+
+def walls_of_slot(block: trimesh.Trimesh, width_mm: float) -> np.ndarray:
+    middle = 1e3 * block.triangles_center
+    aside = np.abs(middle[:, 0] - 11.0) < 0.5 * width_mm + 0.01
+    return np.asarray(aside & (middle[:, 1] > 5.01) & (middle[:, 1] < 9.99))
+
+
+def test_a_ball_touches_what_its_radius_lets_it() -> None:
+    """A slot of 2 mm with square corners: balls above 2 mm touch none of its walls."""
+    block = block_with_slot(2.0)
+    part = part_of(block, walls_of_slot(block, 2.0))
+    fits = fit_sizes(part, (1e-3, 1.9e-3, 2.1e-3))
+    # The corner at the bottom keeps a ball half its diameter away.
+    assert [one.touched for one in fits] == pytest.approx([0.9, 0.81, 0.0], abs=0.01)
+    # Four balls do not fit across; beside the corner it is the slot's bottom that is in the way.
+    assert max(one.served for one in fits) < 0.15
+
+
+@pytest.mark.parametrize(
+    ("width_mm", "chosen", "said"),
+    [
+        (1.988, 1.5, "2 mm would jam in gaps of the part"),  # the gap of the issue's spring
+        (6.2, 1.5, "a quarter of its slots"),
+        (30.0, 3.0, "touches"),
+    ],
+)
+def test_balls_suit_a_slot_and_jam_in_none(width_mm: float, chosen: float, said: str) -> None:
+    block = block_with_slot(min(width_mm, 20.0))
+    target = np.ones(len(block.faces), dtype=bool)
+    if width_mm > 20.0:
+        block = trimesh.creation.box((0.03, 0.02, 0.01))
+        target = block.face_normals[:, 2] > 0.5
+    diameter, reason = propose_ball(fit_sizes(part_of(block, target), (1.5e-3, 2e-3, 3e-3)))
+    assert 1e3 * diameter == pytest.approx(chosen)
+    assert said in reason
+
+
+def test_what_serves_the_most_is_proposed_where_no_size_serves_all() -> None:
+    fits = [
+        SizeFit(1e-3, 0.95, 0.90, False, 0.0),
+        SizeFit(2e-3, 0.94, 0.89, False, 0.0),
+        SizeFit(3e-3, 0.93, 0.70, False, 0.0),
+    ]
+    diameter, reason = propose_ball(fits)
+    assert diameter == 2e-3
+    assert "NO SIZE SERVES ALL" in reason
+    assert "1 mm 90%, 2 mm 89%, 3 mm 70%" in reason
+    jams = [SizeFit(1e-3, 1.0, 1.0, True, 0.0), SizeFit(2e-3, 1.0, 1.0, True, 1.988e-3)]
+    assert propose_ball(jams)[0] == 1e-3
+    assert "IT JAMS in gaps of 1.988 mm" in propose_ball(jams[1:])[1]

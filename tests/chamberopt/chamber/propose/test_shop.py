@@ -1,0 +1,158 @@
+"""What a shop has: its file, and the sonotrode on which a proposed chamber stands."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from chamberopt.chamber.propose.proposed_floor import (
+    STEEPEST,
+    Floor,
+    floor_on_sonotrode,
+    require_room,
+)
+from chamberopt.chamber.propose.proposed_target import Sizes
+from chamberopt.chamber.propose.shop import Shop, example_text, load_shop, usual_shop
+from chamberopt.cli import main
+from chamberopt.common.errors import InputError
+
+DISC = {"name": "D", "diameter_mm": 60.0, "frequency_khz": 20.0, "amplitudes_um": [20.0, 30.0]}
+BLOCK = {"name": "B", "size_mm": [120.0, 50.0], "frequency_khz": 20.0, "amplitudes_pv_um": [50.0]}
+
+
+def shop(*sonotrodes: dict[str, object], **more: object) -> Shop:
+    return Shop.model_validate({"sonotrodes": list(sonotrodes), **more})
+
+
+def floor(plan: dict[str, float | str], shape: str, own: Shop, gap: float = 0.01) -> Floor:
+    sizes = Sizes(shape, plan, 0.015, 0.05, gap, False, 0.03)
+    return floor_on_sonotrode(sizes, 0.02, own, may_exceed=False)
+
+
+def test_the_example_is_a_shop_that_is_read(tmp_path: Path) -> None:
+    file = tmp_path / "shop.toml"
+    file.write_text(example_text(), encoding="utf-8")
+    assert load_shop(file).sonotrodes == usual_shop().sonotrodes
+    assert load_shop(file).stock_mm("100Cr6")[0] == 0.4
+    assert usual_shop().stock_mm("tungsten_carbide")[0] == 0.5  # all that are sold
+
+
+@pytest.mark.parametrize(
+    ("plan", "shape", "size"),
+    [
+        ({"diameter_mm": 52.0}, "cylinder", {"diameter_mm": 60.0}),  # the whole face
+        ({"diameter_mm": 30.0}, "cylinder", {"diameter_mm": 30.0}),  # a part of it
+        ({"diameter_mm": 66.0}, "cylinder", {"diameter_mm": 60.0}),  # less room beside the part
+        ({"length_mm": 45.0, "width_mm": 30.0}, "box", {"length_mm": 45.0, "width_mm": 30.0}),
+        ({"length_mm": 45.0, "width_mm": 110.0}, "box", {"length_mm": 50.0, "width_mm": 120.0}),
+        ({"sides": 6.0, "across_mm": 50.0}, "prism", {"sides": 6.0, "across_mm": 50.0}),
+    ],
+)
+def test_a_floor_lies_within_the_face_of_a_sonotrode(
+    plan: dict[str, float | str], shape: str, size: dict[str, float]
+) -> None:
+    found = floor(plan, shape, shop(DISC, BLOCK))
+    assert found.lean == 0.0
+    assert found.sizes.plan == size
+    assert "clear" in found.reason
+
+
+@pytest.mark.parametrize(
+    ("plan", "shape"),
+    [({"diameter_mm": 74.0}, "cylinder"), ({"length_mm": 60.0, "width_mm": 36.0}, "box")],
+)
+def test_walls_lean_out_of_a_face_that_is_small(plan: dict[str, float | str], shape: str) -> None:
+    """Where the part begins, the room is as wide as it should be; the floor lies on the face."""
+    found = floor(plan, shape, shop(DISC), gap=0.004)
+    out = 2e3 * found.sizes.distance * math.tan(math.radians(found.lean))
+    own = [float(found.sizes.plan[key]) for key in plan]
+    assert 0.0 < found.lean <= STEEPEST + 1.0
+    assert np.hypot(*own, *([0.0] if shape == "cylinder" else [])) <= 60.0
+    assert all(one + out >= float(plan[key]) - 0.1 for one, key in zip(own, plan, strict=True))
+
+
+def test_what_no_sonotrode_holds_is_refused_with_a_way_out() -> None:
+    with pytest.raises(InputError, match=r"floor of 190 x 96 mm is larger than the largest.*strip"):
+        floor({"length_mm": 190.0, "width_mm": 96.0}, "box", shop(DISC, BLOCK))
+    sizes = Sizes("box", {"length_mm": 190.0, "width_mm": 96.0}, 0.015, 0.05, 0.01, False, 0.03)
+    unknown = floor_on_sonotrode(sizes, 0.02, usual_shop(), may_exceed=True)
+    assert math.isinf(unknown.lean)
+    assert "LARGER THAN USUAL SONOTRODES" in unknown.reason
+
+
+def test_a_height_is_one_that_the_shop_has() -> None:
+    sizes = Sizes("cylinder", {"diameter_mm": 60.0}, 0.015, 0.041, 0.01, False, 0.03)
+    own = shop(DISC, heights_mm=[30.0, 70.0, 50.0], largest_chamber_mm=[80.0, 60.0, 60.0])
+    assert require_room(sizes, own).height == pytest.approx(0.05)
+    with pytest.raises(InputError, match="above all of heights_mm"):
+        require_room(sizes, shop(DISC, heights_mm=[30.0]))
+    with pytest.raises(InputError, match="60 x 41 mm, more than largest_chamber_mm"):
+        require_room(sizes, shop(DISC, largest_chamber_mm=[50.0, 50.0, 50.0]))
+
+
+def test_amplitudes_are_those_that_a_sonotrode_can_set() -> None:
+    disc, block = shop(DISC, BLOCK).sonotrodes
+    assert disc.amplitude_nearest(40.0) == ("amplitude_um", 30.0)
+    assert block.amplitude_nearest(40.0) == ("amplitude_pv_um", 50.0)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "the file is empty"),
+        ("log_mean = [1]", "this is what chamberopt calibrate found of a machine"),
+        ("clearance_mm = 1", "sonotrodes: missing"),
+        ("sonotrodes = []", "sonotrodes"),
+        ('[[sonotrodes]]\nname = "A"\nfrequency_khz = 20\namplitudes_um = [9]', "or size_mm"),
+        (
+            '[[sonotrodes]]\nname = "A"\ndiameter_mm = 60\nfrequency_khz = 20',
+            "give amplitudes_um (zero-to-peak) or amplitudes_pv_um",
+        ),
+        (
+            '[[sonotrodes]]\nname = "A"\ndiameter_mm = 60\nfrequency_khz = 20\n'
+            "amplitudes_um = [1e9]",
+            "allowed: one or more, 0.1 to 500 µm",
+        ),
+        (
+            '[[sonotrodes]]\nname = "A"\ndiameter_mm = 60\nfrequency_khz = 20\n'
+            'amplitudes_um = [9]\n[[balls]]\nmaterial = "lead"\ndiameters_mm = [1]',
+            "given 'lead'; known are",
+        ),
+        (
+            '[[sonotrodes]]\nname = "A"\ndiameter_mm = 60\nfrequency_khz = 20\n'
+            'amplitudes_um = [9]\n[[balls]]\nmaterial = "steel"\ndiameters_mm = [nan]',
+            "diameters_mm",
+        ),
+    ],
+)
+def test_a_wrong_file_is_told(
+    text: str, message: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "shop.toml"
+    file.write_text(text, encoding="utf-8")
+    assert main(["shop", str(file)]) == 2
+    assert message in capfd.readouterr().err
+
+
+def test_the_command_prints_an_example_and_checks_a_file(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["shop", "--example"]) == 0
+    file = tmp_path / "shop.toml"
+    file.write_text(capfd.readouterr().out, encoding="utf-8")
+    assert main(["shop", str(file)]) == 0
+    assert '"disc of 80 mm" (80 mm), 20 kHz' in capfd.readouterr().out
+    assert main(["shop"]) == 2
+    assert "give the shop's file, or --example" in capfd.readouterr().err
+
+
+def test_balls_are_in_stock_and_do_not_enter_the_clearance() -> None:
+    own = shop(DISC, balls=[{"material": "steel", "diameters_mm": [3.0, 0.3, 1.0]}])
+    assert own.stock_mm("steel") == (1.0, 3.0)
+    with pytest.raises(InputError, match="has no balls of zirconia; it has steel"):
+        own.stock_mm("zirconia")
+    with pytest.raises(InputError, match="smaller than twice clearance_mm = 2"):
+        shop(DISC, clearance_mm=2.0, balls=[{"material": "steel", "diameters_mm": [3.0]}]).stock_mm(
+            "steel"
+        )
