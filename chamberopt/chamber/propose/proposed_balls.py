@@ -20,7 +20,7 @@ from chamberopt.chamber.part import Part
 from chamberopt.chamber.reach import TOLERATED_OVERLAP
 from chamberopt.geometry.triangles import areas, interpolate, unit_vectors
 
-POINTS = 20_000  # on the target, and as many on the rest of the part
+POINTS = 8_000  # on the target, and as many on the rest of the part
 MISSED = 0.05  # share of the target's area that a larger ball may fail to touch
 AS_GOOD = 0.02  # share of the target's area within which two sizes serve alike
 MOST_LISTED = 5  # sizes in a reason
@@ -53,7 +53,7 @@ def fit_sizes(part: Part, diameters: Sequence[float]) -> list[SizeFit]:
     corners = part.vertices[part.triangles[triangle]]
     normal = unit_vectors(interpolate(part.corner_normals[triangle], corners, point))
     overlap = TOLERATED_OVERLAP * 0.5 * min(diameters)
-    widest = max(diameters) * max(0.5 / OF_SLOT, JAM_BAND[1])
+    widest = max(diameters) / OF_SLOT
     radius, obstacle, cosine = largest_balls(mesh, point, normal, 0.5 * widest, overlap)
     across = np.where((obstacle >= 0) & (cosine < MAX_COSINE), 2.0 * radius, np.inf)
     width = across - overlap
