@@ -183,7 +183,9 @@ class CandidateEvaluator:
         The share of the target that balls can reach limits its objective.
         """
         try:
-            self._require_promise(self._study.at_search_accuracy(candidate.design), candidate.bar)
+            design = self._study.at_search_accuracy(candidate.design)
+            self._require_buildable(design)
+            self._require_promise(design, candidate.bar)
         except UnreadableError:
             raise
         except InputError:
@@ -194,12 +196,23 @@ class CandidateEvaluator:
         if candidate.stage == "confirm":
             return self._simulate(candidate.design, "confirm", candidate.replicas)
         design, bar = self._study.at_search_accuracy(candidate.design), candidate.bar
+        if candidate.stage == "search" and not candidate.is_start:
+            self._require_buildable(design)
         self._require_promise(design, bar)
         if bar is not None and self._first_look is not None:
             first = self._simulate(design, "search", self._first_look)
             if first.objective.high < bar:
                 return first
         return self._simulate(design, "search", candidate.replicas)
+
+    def _require_buildable(self, design: Design) -> None:
+        """Raise InputError if a candidate's chamber has a gap in which balls jam or get in nowhere.
+
+        It is found by geometry, without a simulation.
+        """
+        find_fault = getattr(self._simulator, "unbuildable", None)
+        if find_fault is not None and (fault := find_fault(design)):
+            raise InputError(f"not simulated: {fault}")
 
     def _require_promise(self, design: Design, bar: float | None) -> None:
         """Raise NoPromiseError if a candidate is clearly worse than the best candidate so far.

@@ -265,6 +265,7 @@ class ChamberSimulator:
     def __init__(self, study: Study, executor: Executor, target: np.ndarray | None) -> None:
         self._study, self._executor, self._target = study, executor, target
         self._confirmed: dict[str, _Simulated] = {}
+        self._meant: set[tuple[str, str]] | None = None  # tight gaps of the study's own design
         self._searched = threading.local()  # each thread's last candidate of the search
 
     def __call__(self, design: Design, stream: str, replicas: int | None) -> Evaluation:
@@ -281,6 +282,22 @@ class ChamberSimulator:
         one = self._candidate(design, "search")
         one.known.target = prepare_target(design, one.chamber, chamber_mesh(one.chamber))
         return one.known.target.reach.largest
+
+    def unbuildable(self, design: Design) -> str:
+        """Return what no shop would build in a candidate's chamber, by geometry; "" if all is well.
+
+        It is a gap beside a wall, tighter than a ball passes, that the study's own design does not
+        have: what that has is meant.
+        """
+        from chamberopt.chamber.build import build_chamber
+        from chamberopt.chamber.checks.tight_gaps import tight_gaps
+
+        found = list(tight_gaps(self._candidate(design, "search").chamber, design.shot.diameters))
+        if found and self._meant is None:
+            own = self._study.design
+            chamber = build_chamber(own, self._target)
+            self._meant = {one.sides for one in tight_gaps(chamber, own.shot.diameters)}
+        return next((one.text for one in found if one.sides not in (self._meant or ())), "")
 
     def _candidate(self, design: Design, stream: str) -> _Simulated:
         from chamberopt.chamber.build import build_chamber
