@@ -24,6 +24,7 @@ from chamberopt.chamber.propose.pose import (
     square_to_walls,
 )
 from chamberopt.chamber.propose.proposed_balls import fit_sizes, propose_ball
+from chamberopt.chamber.propose.proposed_budget import REPLICAS, propose_budget
 from chamberopt.chamber.propose.proposed_floor import Floor, floor_on_sonotrode, require_room
 from chamberopt.chamber.propose.proposed_target import (
     Sizes,
@@ -133,7 +134,7 @@ MOST_BALLS = 5000  # of a charge under the part: more take hours to simulate
 WIDER = (1.0, 1.4, 2.0)  # factors on the room round the part that are tried
 AMPLITUDE_UM = 40.0  # zero-to-peak; the nearest that the sonotrode can set is taken
 USUAL_PART, WALL, SONOTRODE = "42CrMo4", "42CrMo4", "Ti-6Al-4V"  # of the catalogue
-TREATMENT_S, HALF_WIDTH = 300.0, 0.01
+TREATMENT_S, HALF_WIDTH, MOST_REPLICAS = 300.0, 0.02, 24
 
 Tables = dict[str, dict[str, Any]]
 """Tables of a design file by dotted name, as TOML values."""
@@ -195,10 +196,11 @@ def propose(
         "effects": {"gravity": True, "friction": CATALOGUE, "roughness": USUAL},
         "process": {"treatment_time_s": TREATMENT_S, "seed": 1},
         "process.accuracy": {
-            "replicas": 8,
-            "simulated_time_s": 2.0,
+            "replicas": REPLICAS,
+            "simulated_time_s": 1.0,
             "warmup_time_s": 0.2,
             "objective_half_width": HALF_WIDTH,
+            "max_replicas": MOST_REPLICAS,
         },
     }
     with step("choosing the balls"):
@@ -216,7 +218,7 @@ def propose(
         "effects.friction": "mu of these balls on these metals, dry: chamberopt materials",
         "effects.roughness": "rms slope of faces that shot has dented",
         "process.treatment_time_s": "a start: the report has coverage over time",
-        "process.accuracy.objective_half_width": "replicas are added until it is this sure",
+        "process.accuracy.objective_half_width": "replicas are added until it is so sure",
     }
     best: Proposal | None = None
     refused: InputError | None = None
@@ -434,9 +436,17 @@ def _checked(
     diameter, ball_mass = design.shot.diameter, design.shot.ball_mass
     mass_g, reason = propose_charge(face, diameter, ball_mass)
     tables = {**tables, "shot": {**tables["shot"], "mass_g": mass_g}}
+    budget = propose_budget(validate(Design, _nested(tables)), chamber)
+    accuracy = {"simulated_time_s": budget.time, "gauge_mm2": budget.gauge_mm2}
+    tables["process.accuracy"] = {**tables["process.accuracy"], **accuracy}
     design = validate(Design, _nested(tables))
     reach = shot_reach(design, chamber)
-    reasons = {**reasons, "shot.mass_g": f"{reason}: {design.shot.count}"}
+    reasons = {
+        **reasons,
+        "shot.mass_g": f"{reason}: {design.shot.count}",
+        "process.accuracy.simulated_time_s": budget.time_reason,
+        "process.accuracy.gauge_mm2": budget.gauge_reason,
+    }
     found = tuple(warnings(design, chamber, reach))
     if math.isinf(floor.lean):
         found = (f"chamber: {floor.reason}", *found)

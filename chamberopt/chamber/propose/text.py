@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import tomlkit
 
@@ -16,6 +16,32 @@ from chamberopt.design.load import with_paths_from
 
 MAX_LISTED = 20  # surfaces in a comment
 EVALUATIONS, SEARCH_HALF_WIDTH = 20, 0.04
+
+
+class Goal(NamedTuple):
+    """What a study of `new` is after."""
+
+    words: str
+    objective: str  # name of it in a study file
+    meaning: str
+    time: float  # simulated in the search, over that of the design
+    accuracy: str  # a further line of [search_accuracy]
+
+
+MOST_EVEN = Goal(
+    "the most even coverage after the treatment time",
+    "uniform_coverage",
+    "mean minus standard deviation of coverage",
+    0.5,
+    f"objective_half_width = {SEARCH_HALF_WIDTH}",
+)
+FASTEST = Goal(
+    "98 % everywhere in the shortest time",
+    "minus_time_to_98_s",
+    "minus the time after which 95 % of the target's area has 98 %",
+    1.0,
+    "max_replicas = 4  # objective_half_width would be in seconds",
+)
 
 
 def design_text(proposal: Proposal, folder: Path, left_out: Sequence[LeftOut] = ()) -> str:
@@ -39,14 +65,16 @@ def design_text(proposal: Proposal, folder: Path, left_out: Sequence[LeftOut] = 
     return "\n".join(lines) + "\n"
 
 
-def study_text(proposal: Proposal, design: str) -> str:
+def study_text(proposal: Proposal, design: str, goal: Goal = MOST_EVEN) -> str:
     """Return the text of a study file that varies numbers of the proposed design.
 
     Args:
         design: name of the design file, in the same folder.
+        goal: what the study maximises.
     """
     start = {name: f"now {proposal.design.value(name):g}" for name in proposal.bounds}
-    return study_lines(design, proposal.bounds, start)
+    time = goal.time * proposal.design.process.accuracy.simulated_time_s
+    return study_lines(design, proposal.bounds, start, goal=goal, time=time)
 
 
 def study_lines(
@@ -54,6 +82,8 @@ def study_lines(
     bounds: Mapping[str, Mapping[str, Any]],
     notes: Mapping[str, str],
     evaluations: int = EVALUATIONS,
+    goal: Goal = MOST_EVEN,
+    time: float = 1.0,
 ) -> str:
     """Return the text of a study file that varies numbers of a design.
 
@@ -61,17 +91,19 @@ def study_lines(
         design: name of the design file, in the same folder.
         bounds: keys in [vary] by dotted name, such as low and high.
         notes: a comment on each number.
+        goal: what the study maximises.
+        time: simulated time of each replica of the search [s].
     """
     vary = {f'"{name}"': dict(one) for name, one in bounds.items()}
     lines = [
-        "# Searches a better chamber for the same part.",
+        f"# Searches a better chamber for the same part: {goal.words}.",
         _line("design", design),
         "",
         "[vary]  # in the units of the names",
         *_values(vary, "x", {f'x."{name}"': text for name, text in notes.items()}),
         "",
         "[objective]",
-        'name = "uniform_coverage"  # mean minus standard deviation of coverage',
+        f'name = "{goal.objective}"  # {goal.meaning}',
         "",
         "[optimizer]",
         f"evaluations = {evaluations}",
@@ -81,8 +113,8 @@ def study_lines(
         "",
         "[search_accuracy]  # of the search; confirmations take the design's own",
         "replicas = 4",
-        "simulated_time_s = 1",
-        f"objective_half_width = {SEARCH_HALF_WIDTH}",
+        _line("simulated_time_s", float(f"{time:.3g}")),
+        goal.accuracy,
     ]
     return "\n".join(lines) + "\n"
 

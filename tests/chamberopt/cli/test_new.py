@@ -178,7 +178,9 @@ def test_a_guess_is_said_and_no_folder_is_held_while_the_design_is_made(
     assert "unit guessed as 'mm' (by its size)" in said.err
     assert "give --unit if that is wrong" in said.err
     assert not held
-    assert sorted(one.name for one in Path("out").iterdir()) == ["design.toml", "study.toml"]
+    made = sorted(one.name for one in Path("out").iterdir())
+    assert made == ["design.toml", "fastest.toml", "study.toml"]
+    assert load_study("out/fastest.toml").objective.name == "minus_time_to_98_s"
     assert "# GUESSED: the part measures" in Path("out/design.toml").read_text(encoding="utf-8")
     load_study("out/study.toml")
 
