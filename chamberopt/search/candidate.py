@@ -210,8 +210,14 @@ class CandidateEvaluator:
 
         It is found by geometry, without a simulation.
         """
+        from sim_core import SceneError
+
         find_fault = getattr(self._simulator, "unbuildable", None)
-        if find_fault is not None and (fault := find_fault(design)):
+        try:
+            fault = find_fault(design) if find_fault is not None else ""
+        except SceneError as error:
+            raise InputError(str(error)) from None
+        if fault:
             raise InputError(f"not simulated: {fault}")
 
     def _require_promise(self, design: Design, bar: float | None) -> None:
