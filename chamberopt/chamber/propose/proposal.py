@@ -339,7 +339,10 @@ def _place(
         try:
             floor = floor_on_sonotrode(sizes, _round(posed), shop or usual_shop(), shop is None)
             if shop is not None:
-                floor = floor._replace(sizes=require_room(floor.sizes, shop))
+                room, highest = require_room(floor.sizes, shop), float(posed[:, 2].max())
+                if highest < room.height - room.distance:  # a higher lid takes in the whole part
+                    room = replace(room, through_ceiling=False, top=highest)
+                floor = floor._replace(sizes=room)
         except InputError as error:
             refused = refused or error
             continue
