@@ -17,12 +17,7 @@ from chamberopt.chamber.build import Chamber, build_chamber
 from chamberopt.chamber.checks.check import shot_reach, warnings
 from chamberopt.chamber.checks.jams import JamGap, gaps_in_reach, jam_gaps
 from chamberopt.chamber.part import Part, posed_part
-from chamberopt.chamber.propose.pose import (
-    Turns,
-    pose_in_words,
-    propose_pose,
-    square_to_walls,
-)
+from chamberopt.chamber.propose.pose import Turns, pose_in_words, propose_pose, square_to_walls
 from chamberopt.chamber.propose.proposed_balls import fit_sizes, propose_ball
 from chamberopt.chamber.propose.proposed_budget import REPLICAS, propose_budget
 from chamberopt.chamber.propose.proposed_floor import Floor, floor_on_sonotrode, require_room
@@ -209,7 +204,6 @@ def propose(
     reasons = {
         "part.unit": ("GUESSED: " if any(GUESSED in note for note in mesh.notes) else "")
         + f"the part measures {format_box(mesh.size)}",
-        "part.rotate_deg": f"{pose_in_words(mesh, known, turns)}: {pose_reason}",
         "part.target": target.reason,
         "shot.diameter_mm": ball_reason,
         "materials.part": "C0 and v0 are computed: to be calibrated"
@@ -227,9 +221,11 @@ def propose(
             progress(number, len(WIDER), None)
             try:
                 placed, floor = _place(mesh, target, turns, diameter, wanted, wider)
-                tables["part"]["rotate_deg"] = list(placed)
+                tables["part"] = {**tables["part"], "rotate_deg": list(placed)}
                 tables |= _floor_tables(floor)
-                made = _checked(tables, {**reasons, **_floor_reasons(floor)}, floor, known, mesh)
+                pose = {"part.rotate_deg": f"{pose_in_words(mesh, known, placed)}: {pose_reason}"}
+                why = {**reasons, **pose, **_floor_reasons(floor)}
+                made = _checked({**tables}, why, floor, known, mesh)
                 made = replace(made, bounds=_in_shop(made.bounds, wanted.shop))
             except UnreadableError:
                 raise
