@@ -87,6 +87,7 @@ OPENED_ELSEWHERE = {
     "geometry/meshes/step_tessellation.py": {"gmsh.open"},
 }
 MOST_ENTRIES = 20
+COMPILER = ("jit.py", "step_compiler.py", "whole_records.py", "simd.py", "compile_cache.py")
 
 
 def sources(package: str) -> list[Path]:
@@ -289,7 +290,7 @@ def test_the_only_compiler_of_sim_core_is_one_file() -> None:
     wrong = [
         relative(path)
         for path in sources("sim_core")
-        if path.name not in ("jit.py", "simd.py", "compile_cache.py")
+        if path.name not in COMPILER
         for module, _, _ in imports(path)
         if module.split(".")[0] == "numba"
     ]

@@ -20,6 +20,7 @@ from numba.core import event
 from numba.core.registry import CPUDispatcher
 
 from sim_core.numerics.compile_cache import CheckedCache, is_private
+from sim_core.numerics.step_compiler import StepCompiler
 
 # Both are untyped, or typed without the attributes used here.
 _settings: Any = numba.config
@@ -100,9 +101,9 @@ class Step(CPUDispatcher):
     """A compiled function that other compiled functions call.
 
     numba makes three modules of machine code for each function: the function itself, and two
-    wrappers for calls from Python and from C. Nobody calls the wrappers of a step of the event
-    loop, and they took 43 % of the compilation. A step that is called from Python after all is
-    compiled a second time, with its wrapper.
+    wrappers for calls from Python and from C. Nobody runs them for a step of the event loop, since
+    its code is linked into its caller, and they took half of the compilation. A step that is called
+    from Python after all is compiled a second time, with its wrapper.
     """
 
     def __call__(self, *arguments: Any) -> Any:
@@ -115,9 +116,11 @@ class Step(CPUDispatcher):
 def _compiled(function: F, inline: bool, from_python: bool = False) -> F:
     # numba reads the folder when the decorator runs. Other packages keep their own folder. The file
     # names do not tell functions with wrappers from functions without wrappers.
-    options = {"nogil": True, "error_model": "numpy", "fastmath": False, "_nrt": False}
+    options: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": False}
+    options["_nrt"] = False
     if not from_python:
         options |= {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+        options["pipeline_class"] = StepCompiler
     with _DECORATING:
         before = _settings.CACHE_DIR
         _settings.CACHE_DIR = str(CACHE_FOLDER / ("entries" if from_python else "steps"))
