@@ -8,16 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sim_core import (
-    Balls,
-    Gravity,
-    Physics,
-    Scene,
-    SceneError,
-    SimulationError,
-    TriangleMesh,
-    simulate,
-)
+from sim_core import Balls, Physics, Scene, SceneError, SimulationError, TriangleMesh, simulate
 from sim_core.scene.invariants import (
     beneath_mean_plane,
     clearance,
@@ -37,7 +28,6 @@ DEEPEST = 1e-12
 CONSTANT = 1e6  # m/s: a yield speed v0 that no ball reaches, so that e = C0 at any speed
 # Effects that change nothing, where a case wants none: fewer combinations of effects have to be
 # compiled.
-WEIGHTLESS = Gravity(0.0, 0.0, 0.0)
 LOSSLESS = uniform_restitution(1.0, CONSTANT)
 
 

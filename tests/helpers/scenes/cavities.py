@@ -6,10 +6,11 @@ Tags: 0 ceiling (the part's place), 1 floor (the sonotrode's), 2 sides.
 import numpy as np
 import trimesh
 
-from sim_core import Balls, Restitution, TriangleMesh
+from sim_core import Balls, Gravity, Restitution, TriangleMesh
 from sim_core.effects.restitution import ELASTIC_BELOW
 
 CEILING, FLOOR, SIDES = 0, 1, 2
+WEIGHTLESS = Gravity(0.0, 0.0, 0.0)  # the same machine code as with gravity
 
 
 def tagged(vertices: np.ndarray, triangles: np.ndarray) -> TriangleMesh:

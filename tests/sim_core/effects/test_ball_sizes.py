@@ -24,7 +24,14 @@ from sim_core import (
     simulate,
 )
 from sim_core.scene.invariants import clearance, contained, energy, momentum, narrowest_gap
-from tests.helpers.scenes.cavities import FLOOR, box, box_around, cylinder, uniform_restitution
+from tests.helpers.scenes.cavities import (
+    FLOOR,
+    WEIGHTLESS,
+    box,
+    box_around,
+    cylinder,
+    uniform_restitution,
+)
 from tests.helpers.scenes.gas import SURE
 from tests.sim_core.loop.test_determinism import fingerprint
 
@@ -56,7 +63,7 @@ def test_two_unequal_balls_collide_as_momentum_and_energy_say() -> None:
         np.array([3e-3, 1e-3]),
         np.array([7800.0, 15e3]),
     )
-    after = simulate(Scene(room, balls, Physics(), 0.025)).balls
+    after = simulate(Scene(room, balls, Physics(WEIGHTLESS), 0.025)).balls
     m, n = balls.masses
     expected = [
         ((m - n) * 1.0 + 2.0 * n * -2.0) / (m + n),
@@ -101,11 +108,11 @@ def test_energy_is_shared_out_evenly_between_the_sizes() -> None:
     room = box((0.03, 0.03, 0.03))
     balls = mixture(room, (30, 30, 30), 4)
     assert balls.masses.max() / balls.masses.min() > 5.0
-    balls = simulate(Scene(room, balls, Physics(), 2.0, record=())).balls
+    balls = simulate(Scene(room, balls, Physics(WEIGHTLESS), 2.0, record=())).balls
     which = [balls.diameters == size for size in SIZES]
     samples = []
     for _ in range(300):
-        balls = simulate(Scene(room, balls, Physics(), 0.03, record=())).balls
+        balls = simulate(Scene(room, balls, Physics(WEIGHTLESS), 0.03, record=())).balls
         each = balls.masses * (balls.velocities**2).sum(axis=1)
         samples.append([each[own].mean() for own in which])
     rows = np.array(samples) / np.mean(samples)

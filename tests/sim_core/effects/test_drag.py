@@ -28,7 +28,7 @@ from sim_core import (
 )
 from sim_core.effects.gravity import STANDARD as G
 from sim_core.scene.invariants import closest_pair, contained, energy
-from tests.helpers.scenes.cavities import FLOOR, box, cylinder, uniform_restitution
+from tests.helpers.scenes.cavities import FLOOR, WEIGHTLESS, box, cylinder, uniform_restitution
 from tests.sim_core.physics.test_conservation import gas
 
 DIAMETER, DENSITY = 3e-3, 7800.0
@@ -101,7 +101,7 @@ def worst(drag: Drag, gravity: bool) -> tuple[float, float]:
         )
     else:
         room, balls = row(distances, (0.0, 0.0, 5.0), 0.1)
-        time, speed = first_hits(room, balls, Physics(drag=drag), 1.0)
+        time, speed = first_hits(room, balls, Physics(WEIGHTLESS, drag=drag), 1.0)
         place, exact = np.log1p(K * 5.0 * time) / K, 5.0 * np.exp(-K * distances)
     return float(np.abs(place - distances).max()), float(np.abs(speed - exact).max())
 
@@ -131,7 +131,7 @@ def test_within_a_piece_the_path_is_off_by_at_most_an_eighth_of_the_square() -> 
     drag = Drag(density=50.0 * AIR, viscosity=VISCOSITY, piece=piece)
     k = K * 0.05
     room, balls = row(distances, (0.0, 0.0, 5.0), 0.05 + DIAMETER)
-    log = simulate(Scene(room, balls, Physics(drag=drag), 0.03)).impacts
+    log = simulate(Scene(room, balls, Physics(WEIGHTLESS, drag=drag), 0.03)).impacts
     for ball in range(len(balls)):
         one, two = np.flatnonzero(log.ball == ball)[
             :2
@@ -145,7 +145,7 @@ def test_a_small_slow_ball_is_slowed_as_its_equation_says() -> None:
     """Schiller & Naumann's range, Re 300 to 30, against Runge and Kutta."""
     diameter, density = 1e-3, 500.0
     ball = Balls(np.array([[0.1, 0.1, 0.1]]), np.array([[0.0, 0.0, 4.5]]), diameter, density)
-    end = simulate(Scene(box((0.2, 0.2, 3.0)), ball, Physics(drag=Drag()), 1.0)).balls
+    end = simulate(Scene(box((0.2, 0.2, 3.0)), ball, Physics(WEIGHTLESS, drag=Drag()), 1.0)).balls
 
     def slope(v: float) -> float:
         re = AIR * v * diameter / VISCOSITY

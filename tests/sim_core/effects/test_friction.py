@@ -18,8 +18,7 @@ from sim_core import (
     simulate,
 )
 from sim_core.scene.invariants import energy, momentum
-from tests.hard_cases.outcome import WEIGHTLESS
-from tests.helpers.scenes.cavities import FLOOR, box, uniform_restitution
+from tests.helpers.scenes.cavities import FLOOR, WEIGHTLESS, box, uniform_restitution
 from tests.helpers.scenes.turning_parts import BODIES, PART, box_around
 
 DIAMETER = 3e-3

@@ -23,7 +23,7 @@ from sim_core import (
 )
 from sim_core.effects.gravity import STANDARD as G
 from sim_core.effects.restitution import checked_restitution, restitution_law
-from tests.helpers.scenes.cavities import balls_at, box, uniform_restitution
+from tests.helpers.scenes.cavities import WEIGHTLESS, balls_at, box, uniform_restitution
 
 DIAMETER = 3e-3
 ROOM = box((0.02, 0.02, 0.02))
@@ -77,7 +77,7 @@ def test_two_balls_part_with_e_times_the_speed_at_which_they_met(law: str) -> No
     places = np.array([[0.048, 0.05, 0.05], [0.052, 0.05, 0.05]])
     for speed in SPEEDS:
         velocities = np.array([[speed + 0.3, 0, 0], [0.3, 0, 0]])
-        physics = Physics(None, Restitution((ANY,) * 3, given))
+        physics = Physics(WEIGHTLESS, Restitution((ANY,) * 3, given))
         shot = Balls(places, velocities, DIAMETER)
         end = simulate(Scene(room, shot, physics, 0.0011 / speed)).balls.velocities
         np.testing.assert_allclose(end[1, 0] - end[0, 0], e(speed) * speed, rtol=1e-12)

@@ -25,7 +25,7 @@ from sim_core import (
 )
 from sim_core.scene.invariants import clearance
 from tests.helpers.jit_on_and_off import with_and_without_jit
-from tests.helpers.scenes.cavities import box_around, uniform_restitution
+from tests.helpers.scenes.cavities import WEIGHTLESS, box_around, uniform_restitution
 from tests.helpers.scenes.turning_parts import BODIES, PART, Rotor, bar
 
 EARLY = 1e-12  # m
@@ -150,9 +150,6 @@ def test_a_grazing_corner_hits_a_resting_ball_or_not_by_which_side_it_is_on(
 
 
 BAR_HALF, REACH = 2e-3, 3.5e-3  # m: half the bar's width, and that plus a ball's radius
-
-
-WEIGHTLESS = Gravity(0.0, 0.0, 0.0)
 
 
 def effects(turn: PartRotation | None, gravity: Gravity = WEIGHTLESS, e: float = 1.0) -> Physics:

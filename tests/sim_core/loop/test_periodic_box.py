@@ -31,11 +31,11 @@ from sim_core.loop.spatial_blocks import MIN_BALLS
 from sim_core.numerics.periodic_sides import horizon, new_periodic_sides, put_back
 from sim_core.scene.invariants import energy, momentum, narrowest_gap
 from tests.helpers.jit_on_and_off import with_and_without_jit
-from tests.helpers.scenes.cavities import box
+from tests.helpers.scenes.cavities import WEIGHTLESS, box
 
 D = 1e-3
 SIDES = np.array([0.012, 0.02, 0.03])
-FREE = Physics(Gravity(0.0, 0.0, 0.0))  # the same machine code as with gravity
+FREE = Physics(WEIGHTLESS)
 BOX = periodic_box((0.0, 0.0, 0.0), SIDES, (0, 1))
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from sim_core import Balls, Gravity, Physics, Restitution, Scene, TriangleMesh, pack_balls, simulate
 from sim_core.scene.invariants import closest_pair, contained, energy
-from tests.helpers.scenes.cavities import box, cylinder, uniform_restitution
+from tests.helpers.scenes.cavities import WEIGHTLESS, box, cylinder, uniform_restitution
 
 DIAMETER = 3e-3
 
@@ -42,7 +42,7 @@ def test_an_elastic_gas_keeps_its_energy_between_slanted_faces_too() -> None:
 def test_two_balls_meet_head_on_and_keep_their_momentum() -> None:
     room = box((0.1, 0.1, 0.1))
     e = 0.5
-    physics = Physics(None, Restitution(((1.0, 1.0),) * 3, (e, 100.0)))
+    physics = Physics(WEIGHTLESS, Restitution(((1.0, 1.0),) * 3, (e, 100.0)))
     balls = Balls(
         np.array([[0.04, 0.05, 0.05], [0.06, 0.05, 0.05]]),
         np.array([[2.0, 0, 0], [-1.0, 0, 0]]),

@@ -7,7 +7,7 @@ import pytest
 
 from sim_core import Balls, Gravity, Physics, Restitution, Scene, restitution_at, simulate
 from sim_core.effects.gravity import STANDARD as G
-from tests.helpers.scenes.cavities import CEILING, FLOOR, box
+from tests.helpers.scenes.cavities import CEILING, FLOOR, WEIGHTLESS, box
 
 DIAMETER = 3e-3
 
@@ -45,7 +45,7 @@ def test_under_gravity_a_drop_bounces_as_v_over_g() -> None:
 
 def test_the_papers_law_slows_a_ball_between_plates() -> None:
     c0, v0 = 0.9, 0.7
-    physics = Physics(None, Restitution(((c0, v0),) * 3, (1.0, 1.0)))
+    physics = Physics(WEIGHTLESS, Restitution(((c0, v0),) * 3, (1.0, 1.0)))
     log = simulate(Scene(box((0.03, 0.03, 0.02)), one_ball(0.01, 10.0), physics, 0.3)).impacts
     speed = 10.0
     for seen in log.normal_speed:
