@@ -22,7 +22,7 @@ from sim_core import (
     zener_restitution,
 )
 from sim_core.effects.flexure import new_flexure_state
-from tests.helpers.scenes.cavities import CEILING, FLOOR, SIDES, box, box_around
+from tests.helpers.scenes.cavities import CEILING, FLOOR, SIDES, WEIGHTLESS, box, box_around
 from tests.helpers.scenes.turning_parts import PART, bar
 
 STEEL = 210e9 / (1.0 - 0.3**2)  # E / (1 - nu²) [Pa]
@@ -147,7 +147,8 @@ def test_each_triangle_has_its_own_thickness() -> None:
     x, speeds = (np.arange(10) + 0.4) * 0.01, np.linspace(0.5, 8.0, 10)
     places = np.column_stack([x, np.full(10, 0.03), np.full(10, 1.6e-3)])
     velocities = np.column_stack([np.zeros((10, 2)), -speeds])
-    physics = Physics(restitution=Restitution((LAW,) * 3, LAW), flexure=Flexure(mobility, CONTACT))
+    law = Restitution((LAW,) * 3, LAW)
+    physics = Physics(WEIGHTLESS, law, flexure=Flexure(mobility, CONTACT))
     after = simulate(Scene(mesh, Balls(places, velocities, 3e-3), physics, 3e-4)).balls.velocities
     mass = 4.0 / 3.0 * np.pi * 1.5e-3**3 * 7800.0
     for k in range(10):
@@ -178,7 +179,7 @@ def test_rigid_triangles_change_no_bit_and_slow_hits_lose_nothing() -> None:
 
     def end(flexure: Flexure | None, elastic_below: float = 0.01) -> np.ndarray:
         law = Restitution((LAW,) * 3, LAW, elastic_below)
-        physics = Physics(restitution=law, flexure=flexure)
+        physics = Physics(WEIGHTLESS, law, flexure=flexure)
         return simulate(Scene(mesh, balls, physics, 0.5)).balls.velocities
 
     count = len(mesh.triangles)

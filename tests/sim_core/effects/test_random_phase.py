@@ -21,7 +21,7 @@ from sim_core import (
     simulate,
 )
 from sim_core.effects.random_phase import draw_phase
-from tests.helpers.scenes.cavities import CEILING, FLOOR, box
+from tests.helpers.scenes.cavities import CEILING, FLOOR, WEIGHTLESS, box
 from tests.helpers.scenes.gas import jackknife
 from tests.sim_core.loop.test_determinism import fingerprint
 from tests.sim_core.physics.test_shaken_ball import DIAMETER, LAWS, SHAKING, G, balls_side_by_side
@@ -36,11 +36,10 @@ def flights(count: int) -> tuple[ImpactLog, np.ndarray]:
     floor.
     """
     ball = Balls(np.array([[0.005, 0.005, 0.01]]), np.array([[0.0, 0.0, -20.0]]), DIAMETER)
+    elastic = Restitution(((1.0, 1.0, 0.0),) * 3, (1.0, 1.0, 0.0))
     shaking = Vibration(FLOOR, 25e-6, 20e3)
-    scene = Scene(
-        ONE_BALL, ball, Physics(vibration=shaking, random_phase=RandomPhase(1)), count * 1e-3
-    )
-    log = simulate(scene).impacts
+    physics = Physics(WEIGHTLESS, elastic, shaking, random_phase=RandomPhase(1))
+    log = simulate(Scene(ONE_BALL, ball, physics, count * 1e-3)).impacts
     return log, ONE_BALL.tags[log.triangle] == FLOOR
 
 

@@ -29,6 +29,15 @@ from tests.sim_core.loop.test_determinism import fingerprint
 UNLIKELY = 1e-4
 COUNT, DIAMETER, SPEED = 4000, 1e-3, 5.0
 ROOM = box((1.0, 1.0, 0.02))
+ELASTIC = Restitution(((1.0, 1.0, 0.0),) * 3, (1.0, 1.0, 0.0))
+
+LAW = (0.9, 1.0, 0.25)
+ALL = Physics(
+    gravity=Gravity(),
+    restitution=Restitution((LAW,) * 3, LAW),
+    vibration=Vibration(FLOOR, 25e-6, 20e3),
+    friction=Friction(((0.2, 0.2),) * 3, (0.2, 0.2)),
+)
 
 
 def thrown(angle: float, slope: float, e: float = 1.0) -> SimulationResult:
@@ -110,7 +119,8 @@ def gas(slope: float, seconds: float) -> SimulationResult:
     places = pack_balls(cube, 300, np.full(300, 3e-3), rng)
     velocity = rng.normal(size=(300, 3))
     velocity *= SPEED / np.linalg.norm(velocity, axis=1)[:, None]
-    physics = Physics(roughness=Roughness((slope,) * 3, 2), ball_collisions=None)
+    roughness = Roughness((slope,) * 3, 2)
+    physics = Physics(restitution=ELASTIC, roughness=roughness, ball_collisions=None)
     return simulate(Scene(cube, Balls(places, velocity, 3e-3), physics, seconds, 0.2))
 
 
@@ -136,14 +146,7 @@ def hopping_share(slope: float) -> float:
     balls = 15
     rng = np.random.default_rng(1)
     places = pack_balls(room, balls, np.full(balls, 3e-3), rng, clear=40e-6)
-    law = ((0.9, 1.0, 0.25),) * 3
-    physics = Physics(
-        gravity=Gravity(),
-        restitution=Restitution(law, law[0]),
-        vibration=Vibration(FLOOR, 25e-6, 20e3),
-        friction=Friction(((0.2, 0.2),) * 3, (0.2, 0.2)),
-        roughness=Roughness((slope,) * 3, 7),
-    )
+    physics = ALL._replace(roughness=Roughness((slope,) * 3, 7))
     start = Balls(places, rng.normal(0.0, 2.0, (balls, 3)), 3e-3)
     log = simulate(Scene(room, start, physics, 5.0, 5.0, record=(CEILING,))).impacts
     sideways = np.linalg.norm(log.velocity[:, :2], axis=1) / np.abs(log.velocity[:, 2])
@@ -162,7 +165,7 @@ def test_a_slope_of_zero_changes_no_bit() -> None:
         places = pack_balls(cube, 50, np.full(50, 3e-3), rng)
         roughness = None if slope is None else Roughness((slope,) * 3)
         balls = Balls(places, rng.normal(0.0, 2.0, (50, 3)), 3e-3)
-        return simulate(Scene(cube, balls, Physics(roughness=roughness), 0.1)).impacts
+        return simulate(Scene(cube, balls, ALL._replace(roughness=roughness), 0.1)).impacts
 
     np.testing.assert_array_equal(hits(0.0).position, hits(None).position)
 
@@ -199,7 +202,8 @@ def test_surfaces_are_rough_one_by_one() -> None:
     balls = Balls(places, np.tile([1.0, 0.0, -SPEED], (100, 1)), DIAMETER)
     slopes = [0.0, 0.0, 0.0]
     slopes[CEILING], slopes[SIDES] = 0.1, 0.1
-    physics = Physics(roughness=Roughness(tuple(slopes)), ball_collisions=None)
+    roughness = Roughness(tuple(slopes))
+    physics = Physics(restitution=ELASTIC, roughness=roughness, ball_collisions=None)
     result = simulate(Scene(ROOM, balls, physics, 0.003))
     np.testing.assert_array_equal(result.balls.velocities[:, 0], 1.0)
     result = simulate(Scene(ROOM, balls, physics, 0.007))
