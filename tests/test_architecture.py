@@ -17,7 +17,8 @@ ORDER = {
         "common geometry design chamber coverage simulation peening search results pictures "
         "documents printers viewer workflows export page api cli __main__"
     ),
-    "chamberopt/geometry": "triangles faces+solids+remesh+thickness meshes slivers+smoothing",
+    "chamberopt/geometry": "triangles faces+outline+solids+remesh+thickness meshes "
+    "slivers+smoothing",
     "chamberopt/geometry/smoothing": "rounds normals divide smooth part",
     "chamberopt/geometry/meshes": "surface_error native_reader+units+raw_mesh+self_intersection "
     "healing+elements+step_tessellation abaqus+gmsh+nastran+obj+ply+step+stl+threemf+vtk formats "

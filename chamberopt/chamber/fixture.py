@@ -37,6 +37,13 @@ from chamberopt.common.number_text import typeset_plain
 from chamberopt.design.shape_surface import TAG_PART, TAG_WALL, lofted
 from chamberopt.geometry.meshes.self_intersection import crossing_pairs
 from chamberopt.geometry.meshes.surface_error import format_point
+from chamberopt.geometry.outline import (
+    centroid,
+    convex_hull,
+    frame_along,
+    narrowest_rectangle,
+    radii,
+)
 from chamberopt.geometry.solids import intersect, overlap_volume, split_bodies, unite
 from chamberopt.geometry.triangles import area_vectors, areas, swept, unit_vectors
 
@@ -191,19 +198,24 @@ def _holder(design: Design, part: Part, filled: CavitySolid) -> _Made:
     holder = design.holder
     assert holder is not None
     axis = np.array(holder.direction)
-    frame = _frame(axis)
+    frame = frame_along(axis)
     clamped = _clamped(design, part, axis)
     faces = part.vertices[part.triangles[clamped]] @ frame.T
-    hull = _hull(faces.reshape(-1, 3)[:, :2])
+    hull = convex_hull(faces.reshape(-1, 3)[:, :2])
+    if hull is None:
+        raise InputError(
+            "holder.at: seen along holder.axis these faces have no area; give faces that look "
+            "along it, or that go round it"
+        )
     if holder.kind == "plate":
-        middle, sides, turn = _narrowest_rectangle(hull)
+        middle, sides, turn = narrowest_rectangle(hull)
         usual = sides if holder.grip_mm is None else ROUND_FACE * sides
         size = tuple(usual if holder.size_mm is None else 1e-3 * np.array(holder.size_mm))
         corners = 0.5 * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * size
         outline = middle + corners @ turn
     else:
-        middle = _centroid(hull)
-        inner, outer = _radii(hull, middle)
+        middle = centroid(hull)
+        inner, outer = radii(hull, middle)
         radius = ROUND_FACE * outer if holder.kind == "collar" else OF_FACE * inner
         given = holder.diameter_mm
         size = (2.0 * radius if given is None else 1e-3 * given,)
@@ -298,13 +310,6 @@ def _way_out(
     return low + float(distance[0]), low + float(distance[leaving].max()) + DEPTH_IN_ROOM
 
 
-def _frame(axis: np.ndarray) -> np.ndarray:
-    """Return two unit vectors across an axis, and the axis: rows of a rotation, (3, 3)."""
-    aside = np.cross(axis, np.eye(3)[np.abs(axis).argmin()])
-    aside /= np.linalg.norm(aside)
-    return np.array([aside, np.cross(axis, aside), axis])
-
-
 def _prism(
     frame: np.ndarray, outline: np.ndarray, low: float, high: float
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -321,52 +326,6 @@ def _prism(
 def _circle(middle: np.ndarray, diameter: float) -> np.ndarray:
     angle = 2.0 * np.pi * np.arange(SIDES) / SIDES
     return np.asarray(middle + 0.5 * diameter * np.c_[np.cos(angle), np.sin(angle)])
-
-
-def _hull(points: np.ndarray) -> np.ndarray:
-    """Return the corners (n, 2) of the convex hull of points (p, 2), counter-clockwise."""
-    from scipy.spatial import ConvexHull, QhullError
-
-    try:
-        return np.asarray(points[ConvexHull(points).vertices])
-    except QhullError:
-        raise InputError(
-            "holder.at: seen along holder.axis these faces have no area; give faces that look "
-            "along it, or that go round it"
-        ) from None
-
-
-def _centroid(hull: np.ndarray) -> np.ndarray:
-    """Return the centroid (2,) of the area in a convex hull (n, 2)."""
-    nexts = np.roll(hull, -1, axis=0)
-    twice = hull[:, 0] * nexts[:, 1] - nexts[:, 0] * hull[:, 1]
-    return np.asarray(((hull + nexts) * twice[:, None]).sum(axis=0) / (3.0 * twice.sum()))
-
-
-def _radii(hull: np.ndarray, middle: np.ndarray) -> tuple[float, float]:
-    """Return the radius of the widest circle about a point in a hull, and of that round it."""
-    along = unit_vectors(np.roll(hull, -1, axis=0) - hull)
-    out = np.c_[along[:, 1], -along[:, 0]]
-    inner = np.einsum("ij,ij->i", hull - middle, out).min()
-    return float(inner), float(np.linalg.norm(hull - middle, axis=1).max())
-
-
-def _narrowest_rectangle(hull: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the rectangle of least area round a hull: middle, sides (2,), and axes (2, 2).
-
-    The first side is the longer one.
-
-    Source: H. Freeman and R. Shapira, Comm. ACM 18 (1975) 409: one side lies along an edge.
-    """
-    along = unit_vectors(np.roll(hull, -1, axis=0) - hull)
-    axes = np.stack([along, np.c_[-along[:, 1], along[:, 0]]], axis=1)  # (n, 2, 2)
-    places = np.einsum("kij,pj->kpi", axes, hull)
-    low, high = places.min(axis=1), places.max(axis=1)
-    best = int(np.prod(high - low, axis=1).argmin())
-    middle, sides, own = 0.5 * (low + high)[best] @ axes[best], (high - low)[best], axes[best]
-    if sides[0] < sides[1]:
-        sides, own = sides[::-1], np.array([own[1], -own[0]])
-    return middle, sides, own
 
 
 def _heights_under(outline: np.ndarray, faces: np.ndarray) -> np.ndarray:

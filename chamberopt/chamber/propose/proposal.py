@@ -21,6 +21,7 @@ from chamberopt.chamber.propose.pose import Turns, pose_in_words, propose_pose, 
 from chamberopt.chamber.propose.proposed_balls import fit_sizes, propose_ball
 from chamberopt.chamber.propose.proposed_budget import REPLICAS, propose_budget
 from chamberopt.chamber.propose.proposed_floor import Floor, floor_on_sonotrode, require_room
+from chamberopt.chamber.propose.proposed_holder import holder_choices
 from chamberopt.chamber.propose.proposed_target import (
     Sizes,
     Surface,
@@ -31,10 +32,10 @@ from chamberopt.chamber.propose.proposed_target import (
     surfaces,
 )
 from chamberopt.chamber.propose.shop import Shop, usual_shop
-from chamberopt.chamber.reach import Reach
+from chamberopt.chamber.reach import Reach, reached_part_share
 from chamberopt.chamber.scene import MAX_BALLS
 from chamberopt.common.errors import InputError, UnreadableError
-from chamberopt.common.progress import step
+from chamberopt.common.progress import Progress, step
 from chamberopt.common.toml_fields import MAX_COORDINATE_MM, allowed_range
 from chamberopt.design.design import Design, validate
 from chamberopt.design.materials import CATALOGUE, USUAL, alloy, ball, balls
@@ -129,6 +130,8 @@ MOST_BALLS = 5000  # of a charge under the part: more take hours to simulate
 WIDER = (1.0, 1.4, 2.0)  # factors on the room round the part that are tried
 AMPLITUDE_UM = 40.0  # zero-to-peak; the nearest that the sonotrode can set is taken
 USUAL_PART, WALL, SONOTRODE = "42CrMo4", "42CrMo4", "Ti-6Al-4V"  # of the catalogue
+MOST_HOLDERS = 6  # that are tried
+HIDDEN = 0.005  # share of the target that a holder may keep from the balls
 TREATMENT_S, HALF_WIDTH, MOST_REPLICAS = 300.0, 0.02, 24
 
 Tables = dict[str, dict[str, Any]]
@@ -214,7 +217,7 @@ def propose(
         "process.treatment_time_s": "a start: the report has coverage over time",
         "process.accuracy.objective_half_width": "replicas are added until it is so sure",
     }
-    best: Proposal | None = None
+    best: tuple[Proposal, Floor] | None = None
     refused: InputError | None = None
     with step("building and checking the chamber") as progress:
         for number, wider in enumerate(WIDER):
@@ -232,14 +235,84 @@ def propose(
             except InputError as error:
                 refused = refused or error
                 continue
-            if best is None or _faults(made) < _faults(best):
-                best = made
+            if best is None or _faults(made) < _faults(best[0]):
+                best = made, floor
             if not any(word in text for text in made.warnings for word in ("gap", "side wall")):
                 break
     if best is None:
         assert refused is not None
         raise refused
-    return best
+    if best[1].sizes.through_ceiling:
+        return best[0]
+    with step("choosing what holds the part") as progress:
+        return _held(*best, target, wanted.shop, progress)
+
+
+def _held(
+    free: Proposal, floor: Floor, target: Target, shop: Shop | None, progress: Progress
+) -> Proposal:
+    """Return a proposal with the first holder that does no harm, or without one and the reason.
+
+    A holder does harm if no chamber can be built with it somewhere in the ranges of the study, if
+    balls jam beside it, or if it keeps the balls from some of the target.
+
+    Args:
+        free: the proposal without a holder.
+    """
+    diameter, turns = free.design.shot.diameter, free.design.part.rotate_deg
+    choices = holder_choices(free.mesh, target.triangles, turns, diameter)[:MOST_HOLDERS]
+    why = "" if choices else "no flat face beside the target looks up or aside and has room for one"
+    for number, one in enumerate(choices):
+        progress(number, len(choices), None)
+        tables = _with_table(free.tables, "sonotrode", "holder", one.keys)
+        height = "sonotrode to ceiling; what holds the part goes on to the wall"
+        reasons = {**free.reasons, "holder.kind": one.reason, "chamber.height_mm": height}
+        try:
+            made = _checked(tables, reasons, floor, free.known, free.mesh)
+            made = replace(made, bounds=_in_shop(made.bounds, shop))
+            for extreme in _extremes(made.bounds):
+                build_chamber(made.design.changed(extreme))
+        except UnreadableError:
+            raise
+        except InputError as error:
+            why = why or str(error)
+            continue
+        if _touched(free) - _touched(made) > HIDDEN:
+            why = why or "a holder would keep the balls from some of the target"
+        elif _faults(made) > _faults(free):
+            new = [text for text in made.warnings if text not in free.warnings]
+            why = why or f"a {one.keys['kind']} would bring a warning: {(new or made.warnings)[0]}"
+        else:
+            return made
+    text = f"sonotrode to ceiling; NOTHING HOLDS THE PART: {why}"
+    return replace(free, reasons={**free.reasons, "chamber.height_mm": text})
+
+
+def _with_table(tables: Tables, after: str, name: str, values: dict[str, Any]) -> Tables:
+    """Return tables with one more after that of some name."""
+    added: Tables = {}
+    for key, one in tables.items():
+        added |= {key: one, name: values} if key == after else {key: one}
+    return added
+
+
+def _extremes(bounds: dict[str, dict[str, Any]]) -> list[dict[str, Any]]:
+    """Return the lowest room of a study with the part high in it, and the opposite."""
+    ends = {
+        name: sorted(one.get("choose", (one.get("low"), one.get("high"))))
+        for name, one in bounds.items()
+        if name.startswith("chamber.")
+    }
+    distance = "chamber.sonotrode_distance_mm"
+    low, high = ({name: one[k] for name, one in ends.items()} for k in (0, -1))
+    return [{**low, distance: high[distance]}, {**high, distance: low[distance]}]
+
+
+def _touched(made: Proposal) -> float:
+    """Return the share of the target's area that the balls can touch."""
+    part = made.chamber.part
+    share = reached_part_share(made.reach, made.chamber.source, len(part.triangles))
+    return float(share[part.target] @ part.area[part.target] / part.area[part.target].sum())
 
 
 def _shot(name: str) -> str:
@@ -373,7 +446,7 @@ def _floor_tables(floor: Floor) -> Tables:
 def _floor_reasons(floor: Floor) -> dict[str, str]:
     sizes, one = floor.sizes, floor.sonotrode
     first = next(key for key in sizes.plan if key.endswith("_mm"))
-    where = "the part goes out through it" if sizes.through_ceiling else "it hangs without a holder"
+    where = "; the part goes out through it" if sizes.through_ceiling else ""
     key, _ = one.amplitude_nearest(AMPLITUDE_UM)
     kind = (
         "ZERO-TO-PEAK, half of" if key == "amplitude_um" else "PEAK-TO-VALLEY, twice zero-to-peak"
@@ -381,7 +454,7 @@ def _floor_reasons(floor: Floor) -> dict[str, str]:
     kind += " peak-to-valley" if key == "amplitude_um" else ""
     return {
         f"chamber.{first}": f"leaves {1e3 * sizes.gap:.3g} mm beside the part; {floor.reason}",
-        "chamber.height_mm": f"sonotrode to ceiling; {where}",
+        "chamber.height_mm": f"sonotrode to ceiling{where}",
         "chamber.sonotrode_distance_mm": "mean sonotrode face to the part's lowest point",
         **({"sonotrode.frequency_khz": one.note} if one.note else {}),
         f"sonotrode.{key}": f"{kind}; one that the sonotrode can set",

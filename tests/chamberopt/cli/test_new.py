@@ -183,6 +183,9 @@ def test_a_guess_is_said_and_no_folder_is_held_while_the_design_is_made(
     assert load_study("out/fastest.toml").objective.name == "minus_time_to_98_s"
     assert "# GUESSED: the part measures" in Path("out/design.toml").read_text(encoding="utf-8")
     load_study("out/study.toml")
+    assert "holder.kind" in said.out
+    design = load_design("out/design.toml")
+    assert design.holder is not None
 
 
 def test_a_unit_that_cannot_be_known_is_asked_for(

@@ -1,0 +1,178 @@
+"""Propose what holds a part in its chamber: a holder on faces that are not to be peened.
+
+Every flat face that does not look down may carry a holder along its normal, to the ceiling or to
+the side wall. An end or a root is enclosed; any other face carries a rod.
+
+       |   holder   |
+       |   _______  |         ^ axis
+       |  |  end  | |         grip: down to where the part widens, or near the target
+       |__|       |_|
+     _____|       |_____
+    |       part        |
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from chamberopt.chamber.fixture import OF_FACE
+from chamberopt.common.number_text import plain
+from chamberopt.geometry.faces import Faces
+from chamberopt.geometry.meshes.part_mesh import PartMesh
+from chamberopt.geometry.outline import (
+    centroid,
+    convex_hull,
+    frame_along,
+    narrowest_rectangle,
+    radii,
+)
+from chamberopt.geometry.triangles import area_vectors, closest_on_each, rotation_matrix
+
+FLAT_DEG = 1.0  # largest angle in a flat face: fillets beside it are no part of it
+MOST_FACES = 40  # flat faces that are looked at, the largest
+UP, LEVEL = 0.98, -0.1  # upward component of the normal of a face on top, and of one at the side
+HIGHER = 1e-4  # m: what is higher than a face by more stands in the way of a rod on it
+CLEAR = 2.0  # ball diameters between a holder and the target, so that balls get there
+# Of an end that is enclosed: how much wider it may get, over its outermost face; least length over
+# its width; most length over the part's.
+WIDER, SHORTEST, LONGEST = 2.0, 0.25, 0.4
+WALL = 2e-3  # m: of a collar or block round an end
+THINNEST, SLIM = 2e-3, 0.15  # of a rod: m, and over the part's width: slim ones come last
+# Over the radius of a face: least seat of a rod round a hole in it, and least edge beside a target.
+SEAT, EDGE = 0.05, 0.3
+OPPOSITE = 0.5  # cosine from which on a face is opposite to the target
+
+
+class HolderChoice(NamedTuple):
+    """A holder that may be proposed: its keys of [holder], and the reason for it."""
+
+    keys: dict[str, Any]
+    reason: str
+
+
+class _Seen(NamedTuple):
+    """The part as it is seen along the normal of one of its flat faces."""
+
+    corners: np.ndarray  # of all triangles [m], (m, 3, 3), the last coordinate along the normal
+    face: np.ndarray  # marks those of the face, (m,)
+    target: np.ndarray  # (m,)
+    hull: np.ndarray  # of the face [m], (n, 2)
+    clear: float  # least distance from the target [m]
+    where: str  # "up" or "aside"
+
+    @property
+    def level(self) -> float:
+        """Place of the face along its normal [m]."""
+        return float(self.corners[self.face][..., 2].max())
+
+    @property
+    def highest(self) -> np.ndarray:
+        """Place along the normal of the highest corner of each triangle [m], (m,)."""
+        return np.asarray(self.corners[..., 2].max(axis=1))
+
+
+def holder_choices(
+    mesh: PartMesh, target: np.ndarray, turns: tuple[float, float, float], ball: float
+) -> list[HolderChoice]:
+    """Return the holders that may hold a part, the best first; none if no face can carry one.
+
+    Ends that point up come first, then rods on the highest faces, then rods and ends at the side,
+    of these first on faces opposite to the target, then the thickest. Slim rods come last.
+
+    Args:
+        target: marks the triangles to be peened, (m,).
+        turns: turns of the part in the chamber [degrees].
+        ball: diameter of a ball [m].
+    """
+    posed = mesh.vertices @ rotation_matrix(turns).T
+    faces = Faces(mesh.vertices, mesh.triangles, FLAT_DEG)
+    vectors = area_vectors(posed, mesh.triangles)
+    sums = np.stack([np.bincount(faces.of_triangle, one) for one in vectors.T], axis=1)
+    # A face that bends has a sum of area vectors that is shorter than its area.
+    flat = np.linalg.norm(sums, axis=1) > math.cos(math.radians(FLAT_DEG)) * faces.area
+    free = np.bincount(faces.of_triangle, target) == 0.0
+    usable = np.flatnonzero(flat & free & (sums[:, 2] > LEVEL * faces.area))
+    away = -vectors[target].sum(axis=0)
+    width = float(np.sort(np.ptp(posed, axis=0))[1])
+    found = []
+    for face in usable[np.argsort(-faces.area[usable], kind="stable")][:MOST_FACES]:
+        normal = np.round(sums[face] / np.linalg.norm(sums[face]), 4) + 0.0
+        up = bool(normal[2] > UP)
+        axis = np.array([0.0, 0.0, 1.0]) if up else normal
+        corners = (posed @ frame_along(axis / np.linalg.norm(axis)).T)[mesh.triangles]
+        own = faces.of_triangle == face
+        hull = convex_hull(corners[own].reshape(-1, 3)[:, :2])
+        if hull is None:
+            continue
+        seen = _Seen(corners, own, target, hull, CLEAR * ball, "up" if up else "aside")
+        place = [round(1e3 * float(x), 3) + 0.0 for x in faces.place(face)]
+        at: dict[str, Any] = {"at": {"faces": [{"at_mm": place, "crease_deg": FLAT_DEG}]}}
+        at |= {} if up else {"axis": axis.tolist()}
+        opposite = axis @ away > OPPOSITE * np.linalg.norm(away)
+        order = (-round(1e3 * seen.level), 0) if up else (-int(opposite), 0)
+        for made in (_around_end(seen), _rod(seen, float(faces.area[face]))):
+            if made is None:
+                continue
+            thick = 1e-3 * made.keys.get("diameter_mm", min(made.keys.get("size_mm", [0.0])))
+            is_rod = made.keys["kind"] == "rod"
+            slim = is_rod and thick < SLIM * width
+            rank = (slim, not up, is_rod == up, *order, -thick)
+            found.append((rank, len(found), HolderChoice({**made.keys, **at}, made.reason)))
+    return [one for _, _, one in sorted(found, key=lambda one: one[:2])]
+
+
+def _around_end(seen: _Seen) -> HolderChoice | None:
+    """Return a collar or block round the end that the face closes; None if the face closes none."""
+    level, highest = seen.level, seen.highest
+    if highest.max() > level + HIGHER:
+        return None
+    middle, sides, axes = narrowest_rectangle(seen.hull)
+    round_middle = centroid(seen.hull)
+    outer = radii(seen.hull, round_middle)[1]
+    is_round = math.pi * outer**2 < sides.prod()
+    if is_round:
+        aside = np.linalg.norm(seen.corners[..., :2] - round_middle, axis=2, keepdims=True)
+        half = np.array([outer])
+    else:
+        aside, half = np.abs((seen.corners[..., :2] - middle) @ axes.T), 0.5 * sides
+    aside = aside.max(axis=1)  # of each triangle, (m, 1 or 2)
+    wider = (aside > WIDER * half).any(axis=1)
+    target_top = float(highest[seen.target].max())
+    low = max([float(highest[wider].max(initial=-math.inf)), target_top + seen.clear])
+    grip = min(level - low, LONGEST * float(np.ptp(seen.corners[..., 2])))
+    grip = 1e-4 * math.floor(1e4 * grip + 1e-6)
+    needed = 2.0 * aside[highest > level - grip].max(axis=0, initial=0.0)
+    if grip < SHORTEST * needed.min() or grip <= 0.0:
+        return None
+    outside = [math.ceil(2e3 * (one + 2.0 * WALL) - 1e-6) / 2.0 for one in needed]
+    size = {"diameter_mm": outside[0]} if is_round else {"size_mm": outside}
+    beyond = plain(1e3 * (level - grip - target_top), 2)
+    text = f"round the end that points {seen.where}, which is not peened; the target begins"
+    keys = {"kind": "collar" if is_round else "plate", **size, "grip_mm": round(1e3 * grip, 1)}
+    return HolderChoice(keys, f"{text} {beyond} mm beyond it")
+
+
+def _rod(seen: _Seen, area: float) -> HolderChoice | None:
+    """Return a rod on the face, of some area [m²]; None if there is no room for one."""
+    middle, level, highest = centroid(seen.hull), seen.level, seen.highest
+    flat = seen.corners * [1.0, 1.0, 0.0]
+    point = np.r_[middle, 0.0]
+
+    def distance(rows: np.ndarray) -> float:
+        """Return how far the marked triangles (m,) are from the rod's axis [m]."""
+        points = np.broadcast_to(point, (int(rows.sum()), 3))
+        away = np.linalg.norm(closest_on_each(flat[rows], points) - point, axis=1)
+        return float(away.min(initial=math.inf))
+
+    inner, hole = radii(seen.hull, middle)[0], distance(seen.face)
+    in_the_way = distance(~seen.face & (highest > level + HIGHER)) - seen.clear
+    beside = distance(seen.target & (highest > level - seen.clear)) - min(seen.clear, EDGE * inner)
+    radius = min(max(OF_FACE * inner, 0.5 * (hole + inner)), in_the_way, beside)
+    diameter_mm = math.floor(4e3 * radius) / 2.0
+    if 1e-3 * diameter_mm < max(THINNEST, 2.0 * hole + 2.0 * SEAT * inner):
+        return None
+    text = f"on a flat face of {plain(1e6 * area, 3)} mm² that looks {seen.where} and is not peened"
+    return HolderChoice({"kind": "rod", "diameter_mm": diameter_mm}, f"{text}; it fits the face")

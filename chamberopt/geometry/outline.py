@@ -1,0 +1,60 @@
+"""Outlines of faces seen along an axis: the convex hull, the circles and the rectangle about it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from chamberopt.geometry.triangles import unit_vectors
+
+
+def frame_along(axis: np.ndarray) -> np.ndarray:
+    """Return two unit vectors across an axis, and the axis: rows of a rotation, (3, 3)."""
+    aside = np.cross(axis, np.eye(3)[np.abs(axis).argmin()])
+    aside /= np.linalg.norm(aside)
+    return np.array([aside, np.cross(axis, aside), axis])
+
+
+def convex_hull(points: np.ndarray) -> np.ndarray | None:
+    """Return the corners (n, 2) of the convex hull of points (p, 2), counter-clockwise.
+
+    Return None if the points lie on a line.
+    """
+    from scipy.spatial import ConvexHull, QhullError
+
+    try:
+        return np.asarray(points[ConvexHull(points).vertices])
+    except QhullError:
+        return None
+
+
+def centroid(hull: np.ndarray) -> np.ndarray:
+    """Return the centroid (2,) of the area in a convex hull (n, 2)."""
+    nexts = np.roll(hull, -1, axis=0)
+    twice = hull[:, 0] * nexts[:, 1] - nexts[:, 0] * hull[:, 1]
+    return np.asarray(((hull + nexts) * twice[:, None]).sum(axis=0) / (3.0 * twice.sum()))
+
+
+def radii(hull: np.ndarray, middle: np.ndarray) -> tuple[float, float]:
+    """Return the radius of the widest circle about a point in a hull, and of that round it."""
+    along = unit_vectors(np.roll(hull, -1, axis=0) - hull)
+    out = np.c_[along[:, 1], -along[:, 0]]
+    inner = np.einsum("ij,ij->i", hull - middle, out).min()
+    return float(inner), float(np.linalg.norm(hull - middle, axis=1).max())
+
+
+def narrowest_rectangle(hull: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the rectangle of least area round a hull: middle, sides (2,), and axes (2, 2).
+
+    The first side is the longer one.
+
+    Source: H. Freeman and R. Shapira, Comm. ACM 18 (1975) 409: one side lies along an edge.
+    """
+    along = unit_vectors(np.roll(hull, -1, axis=0) - hull)
+    axes = np.stack([along, np.c_[-along[:, 1], along[:, 0]]], axis=1)  # (n, 2, 2)
+    places = np.einsum("kij,pj->kpi", axes, hull)
+    low, high = places.min(axis=1), places.max(axis=1)
+    best = int(np.prod(high - low, axis=1).argmin())
+    middle, sides, own = 0.5 * (low + high)[best] @ axes[best], (high - low)[best], axes[best]
+    if sides[0] < sides[1]:
+        sides, own = sides[::-1], np.array([own[1], -own[0]])
+    return middle, sides, own

@@ -1,0 +1,110 @@
+"""What `chamberopt new` proposes to hold a part with: bodies whose best place to hold is known."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from manifold3d import CrossSection, Manifold
+
+from chamberopt.chamber.propose.proposal import Wanted, propose
+from chamberopt.chamber.propose.proposed_holder import HolderChoice, holder_choices
+from chamberopt.geometry.meshes.part_mesh import PartMesh
+from chamberopt.geometry.meshes.raw_mesh import number_by_position
+
+BALL = 1e-3
+
+
+def choices_of(body: trimesh.Trimesh, target: np.ndarray) -> list[HolderChoice]:
+    """The choices for a body in mm, as drawn, with balls of 1 mm."""
+    count = len(body.faces)
+    assert len(target) == count
+    triangles = body.faces.astype(np.int32)
+    mesh = PartMesh(1e-3 * body.vertices, triangles, number_by_position(count), (), "", {})
+    return holder_choices(mesh, target, (0.0, 0.0, 0.0), BALL)
+
+
+def solid(made: Manifold) -> trimesh.Trimesh:
+    mesh = made.to_mesh()
+    return trimesh.Trimesh(mesh.vert_properties, mesh.tri_verts, process=False)
+
+
+def test_a_plate_is_held_by_a_rod_opposite_to_its_target() -> None:
+    """The rod has 0.8 of the widest circle in the face, from 0.5 mm to 0.5 mm."""
+    plate = trimesh.creation.box((60, 41, 5))
+    first = choices_of(plate, plate.face_normals[:, 2] < -0.5)[0]
+    assert (first.keys["kind"], first.keys["diameter_mm"]) == ("rod", 32.5)
+    assert first.keys["at"]["faces"][0]["at_mm"][2] == pytest.approx(2.5)
+    assert "axis" not in first.keys  # to the ceiling
+    assert "looks up" in first.reason
+
+
+def test_a_target_on_top_leaves_the_sides() -> None:
+    """A rod keeps from the edges of the target: 0.3 of the 10 mm to the edge, above two balls."""
+    block = trimesh.creation.box((60, 40, 20))
+    up = np.abs(block.face_normals[:, 2]) > 0.5
+    found = choices_of(block, up)
+    assert {one.keys["kind"] for one in found} == {"rod"}
+    assert all(abs(one.keys["axis"][2]) < 1e-9 for one in found)
+    assert [one.keys["diameter_mm"] for one in found] == [16.0] * 4
+    assert not choices_of(block, np.ones(len(up), dtype=bool))
+
+
+def test_a_shaft_gets_a_collar_up_to_where_it_widens() -> None:
+    """A disc of 60 x 10 mm on whose top a shaft of 12 x 20 mm stands: 0.4 of 30 mm are enclosed."""
+    body = solid(
+        Manifold.cylinder(10, 30, circular_segments=64)
+        + Manifold.cylinder(30, 6, circular_segments=64)
+    )
+    below = body.triangles_center[:, 2] < 1e-6
+    first, second = choices_of(body, below)[:2]
+    assert (first.keys["kind"], first.keys["grip_mm"]) == ("collar", 12.0)
+    assert first.keys["diameter_mm"] == pytest.approx(12 + 2 * 2)  # walls of 2 mm
+    assert second.keys["kind"] == "rod"
+    # With the flank of the disc's top as the target, the collar ends two balls above it.
+    short = solid(
+        Manifold.cylinder(10, 30, circular_segments=64)
+        + Manifold.cylinder(16, 6, circular_segments=64)
+    )
+    level = (np.abs(short.triangles_center[:, 2] - 10) < 1e-6) & (short.face_normals[:, 2] > 0.5)
+    (grip,) = (one.keys["grip_mm"] for one in choices_of(short, level)[:1])
+    assert grip == pytest.approx(6 - 2, abs=0.11)
+
+
+def test_a_root_is_held_by_a_block_round_its_widest_place() -> None:
+    """A dovetail that is 10 mm wide at its end and 16 mm below it, 40 mm long, on a blade."""
+    outline = [(-2, 0), (2, 0), (2, 40), (8, 44), (8, 46), (5, 60), (-5, 60), (-8, 46), (-8, 44)]
+    outline.append((-2, 40))
+    blade = Manifold.extrude(CrossSection([outline]), 40.0).rotate([90, 0, 0])
+    body = solid(blade)
+    first = choices_of(body, body.triangles_center[:, 2] < 40.0)[0]
+    assert first.keys["kind"] == "plate"
+    assert first.keys["size_mm"] == [44.0, 20.0]
+    assert first.keys["grip_mm"] == pytest.approx(60 - 40 - 2, abs=0.11)
+    assert "the target begins 2 mm beyond it" in first.reason
+
+
+def test_a_rod_covers_the_hole_of_its_face() -> None:
+    ring = solid(
+        Manifold.cylinder(5, 20, circular_segments=96)
+        - Manifold.cylinder(5, 17, circular_segments=96)
+    )
+    first = choices_of(ring, ring.face_normals[:, 2] < -0.5)[0]
+    assert 34.0 < first.keys["diameter_mm"] < 40.0
+    narrow = solid(
+        Manifold.cylinder(5, 20, circular_segments=96)
+        - Manifold.cylinder(5, 19.5, circular_segments=96)
+    )
+    assert not choices_of(narrow, narrow.face_normals[:, 2] < -0.5)
+
+
+def test_where_nothing_can_hold_the_part_the_reason_is_said(tmp_path: Path) -> None:
+    part = tmp_path / "box.stl"
+    trimesh.creation.box((20, 20, 30)).export(part)
+    made = propose(part, Wanted("mm"), lambda _: ["all"])
+    assert made.design.holder is None
+    assert made.reasons["chamber.height_mm"].endswith(
+        "NOTHING HOLDS THE PART: no flat face beside the target looks up or aside and has room for "
+        "one"
+    )
+    assert any("held in the air" in note for note in made.chamber.notes)
