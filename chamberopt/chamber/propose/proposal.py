@@ -132,6 +132,10 @@ AMPLITUDE_UM = 40.0  # zero-to-peak; the nearest that the sonotrode can set is t
 USUAL_PART, WALL, SONOTRODE = "42CrMo4", "42CrMo4", "Ti-6Al-4V"  # of the catalogue
 MOST_HOLDERS = 6  # that are tried
 HIDDEN = 0.005  # share of the target that a holder may keep from the balls
+NO_PLACE = (
+    "no flat face beside the target looks up or aside and has room for a holder",
+    "all of it is to be peened; leave out of [part.target] the face to hold it by",
+)
 TREATMENT_S, HALF_WIDTH, MOST_REPLICAS = 300.0, 0.02, 24
 
 Tables = dict[str, dict[str, Any]]
@@ -261,7 +265,7 @@ def _held(
     """
     diameter, turns = free.design.shot.diameter, free.design.part.rotate_deg
     choices = holder_choices(free.mesh, target.triangles, turns, diameter)[:MOST_HOLDERS]
-    why = "" if choices else "no flat face beside the target looks up or aside and has room for one"
+    why = "" if choices else NO_PLACE[bool(target.triangles.all())]
     for number, one in enumerate(choices):
         progress(number, len(choices), None)
         tables = _with_table(free.tables, "sonotrode", "holder", one.keys)

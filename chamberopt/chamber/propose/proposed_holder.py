@@ -97,7 +97,7 @@ def holder_choices(
     usable = np.flatnonzero(flat & free & (sums[:, 2] > LEVEL * faces.area))
     away = -vectors[target].sum(axis=0)
     width = float(np.sort(np.ptp(posed, axis=0))[1])
-    found = []
+    found: list[tuple[tuple[float, ...], int, HolderChoice]] = []
     for face in usable[np.argsort(-faces.area[usable], kind="stable")][:MOST_FACES]:
         normal = np.round(sums[face] / np.linalg.norm(sums[face]), 4) + 0.0
         up = bool(normal[2] > UP)

@@ -104,7 +104,7 @@ def test_where_nothing_can_hold_the_part_the_reason_is_said(tmp_path: Path) -> N
     made = propose(part, Wanted("mm"), lambda _: ["all"])
     assert made.design.holder is None
     assert made.reasons["chamber.height_mm"].endswith(
-        "NOTHING HOLDS THE PART: no flat face beside the target looks up or aside and has room for "
-        "one"
+        "NOTHING HOLDS THE PART: all of it is to be peened; leave out of [part.target] the face to "
+        "hold it by"
     )
     assert any("held in the air" in note for note in made.chamber.notes)
