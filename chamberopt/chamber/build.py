@@ -62,6 +62,7 @@ if TYPE_CHECKING:
 # Rotation of a triangle by rounding [rad] that is worth a note. The facets of a round wall turn a
 # ball's path a hundred times as much.
 MAX_ROTATION = 1e-3
+MIN_ROOM = 1e-13  # [m³], a fifth of the smallest ball: less is rounding, and worth no note
 TARGET = "the target"
 
 
@@ -168,10 +169,12 @@ def build_chamber(design: Design, target: np.ndarray | None = None) -> Chamber:
         text = f"{part.name}: no part of it is inside the chamber; "
         raise _misplaced(part, shape, text + _where_to_look(is_drawn))
 
-    room, room_notes = _room_over_sonotrode(whole, tags)
-    if not is_drawn:
-        ceiling = float(shape.vertices[:, 2].max())
-        room_notes += _ceiling_notes(room, ceiling, design.chamber.ceiling_key)
+    bodies = f"the part or its {' or '.join(fixtures)}" if fixtures else "the part"
+    room, room_notes = _room_over_sonotrode(whole, tags, bodies)
+    ceiling = float(shape.vertices[:, 2].max())
+    at_ceiling = shape.vertices[shape.triangles, 2] >= ceiling - MIN_HEIGHT
+    if not is_drawn and at_ceiling.all(axis=1).any():  # a tip or a dome has no level ceiling
+        room_notes += _ceiling_notes(room, ceiling, design.chamber.ceiling_key, bodies)
     room = remove_slivers(room)
     traced = cavity.trace(room)
     on_part = traced.tags == TAG_PART
@@ -189,7 +192,7 @@ def build_chamber(design: Design, target: np.ndarray | None = None) -> Chamber:
         turn = "" if is_drawn else "check part.rotate_deg (which side faces the sonotrode); "
         raise _misplaced(part, shape, f"{text}no shot reaches it; {turn}{_where_to_look(is_drawn)}")
     _refuse_hidden_zones(part, exposed)
-    notes += [*room_notes, *_notes_on_rounding(room, traced)]
+    notes += [*room_notes, *_notes_on_rounding(room, traced, bodies)]
     volume = float(tetrahedron_volumes(room.vertices, room.triangles).sum())
     surface = room.vertices, room.triangles, traced.tags, traced.source
     origin = tuple(notes), traced.fitting, design.chamber.sha256
@@ -305,12 +308,15 @@ def _refuse_wide_swings(design: Design, room: SolidSurface, tags: np.ndarray) ->
             )
 
 
-def _room_over_sonotrode(whole: SolidSurface, tags: np.ndarray) -> tuple[SolidSurface, list[str]]:
+def _room_over_sonotrode(
+    whole: SolidSurface, tags: np.ndarray, bodies: str
+) -> tuple[SolidSurface, list[str]]:
     """Return the surface of the room over the sonotrode, and a note on rooms that were left out.
 
     Args:
         whole: surface of all closed rooms into which the part divides the chamber.
         tags: kind of surface of its triangles (part, sonotrode or wall), (k,).
+        bodies: what stands in the chamber, for the note: "the part or its holder".
     """
     rooms = find_cavities(whole)
     floor = tags == TAG_SONOTRODE
@@ -326,28 +332,31 @@ def _room_over_sonotrode(whole: SolidSurface, tags: np.ndarray) -> tuple[SolidSu
     if not rest:
         return whole.select(kept), []
     volumes = [float(tetrahedron_volumes(room.vertices, room.triangles).sum()) for room in rest]
+    if max(volumes) < MIN_ROOM:
+        return whole.select(kept), []
     largest = rest[int(np.argmax(volumes))]
     low, high = 1e3 * largest.vertices[:, 2].min(), 1e3 * largest.vertices[:, 2].max()
     what = "a closed room" if len(rest) == 1 else f"{len(rest)} closed rooms, the largest"
     note = (
-        f"the part cuts off {what} of {1e6 * max(volumes):.3g} cm³ between z = {low:.4g} and "
+        f"{bodies} cuts off {what} of {1e6 * max(volumes):.3g} cm³ between z = {low:.4g} and "
         f"{high:.4g} mm: no shot gets there, it is left out"
     )
     return whole.select(kept), [note]
 
 
-def _ceiling_notes(room: SolidSurface, ceiling: float, key: str) -> list[str]:
+def _ceiling_notes(room: SolidSurface, ceiling: float, key: str, bodies: str) -> list[str]:
     """Return a note if the part closes the chamber below its ceiling, else an empty list.
 
     Args:
         ceiling: height of the ceiling [m].
         key: key of [chamber] that sets this height.
+        bodies: what stands in the chamber, as in `_room_over_sonotrode`.
     """
     top = float(room.vertices[:, 2].max())
     if top >= ceiling - MIN_HEIGHT:
         return []
     higher = "a higher ceiling" if key == "shape" else f"more chamber.{key}"
-    return [f"the part closes the chamber at z = {1e3 * top:.4g} mm: {higher} has no effect"]
+    return [f"{bodies} closes the chamber at z = {1e3 * top:.4g} mm: {higher} has no effect"]
 
 
 def _only_reachable(
@@ -452,12 +461,15 @@ def _holding_notes(chamber: Chamber) -> Iterator[str]:
         )
 
 
-def _notes_on_rounding(room: SolidSurface, traced: TriangleProperties) -> Iterator[str]:
+def _notes_on_rounding(
+    room: SolidSurface, traced: TriangleProperties, bodies: str
+) -> Iterator[str]:
     """Yield a note on triangles turned by rounding.
 
     Args:
         room: surface of the cavity.
         traced: properties of its triangles, such as their directions before rounding.
+        bodies: what stands in the chamber, as in `_room_over_sonotrode`.
     """
     own = area_vectors(room.vertices, room.triangles)
     across = np.linalg.norm(np.cross(own, traced.facing), axis=1)
@@ -466,6 +478,6 @@ def _notes_on_rounding(room: SolidSurface, traced: TriangleProperties) -> Iterat
         area_mm2 = 1e6 * np.linalg.norm(own[turned], axis=1).sum()
         yield (
             f"{turned.sum()} triangles ({area_mm2:.2g} mm² together) are so thin that rounding "
-            "turned them: the part nearly touches a wall there; a slightly different diameter or "
-            "offset avoids it"
+            f"turned them: {bodies} nearly touches another surface there; a slightly different "
+            "diameter or offset avoids it"
         )

@@ -276,11 +276,15 @@ def _refuse_off_axis(design: Design, part: Part, axis: np.ndarray, middle: np.nd
         return
     point, direction = line[0], line[1] / np.linalg.norm(line[1])
     aside = np.linalg.norm(np.cross(middle - point, direction))
+    lean = np.linalg.norm(np.cross(axis, direction))
     length = float(np.linalg.norm(np.ptp(part.vertices, axis=0)))
-    if np.linalg.norm(np.cross(axis, direction)) * length > ON_AXIS or aside > ON_AXIS:
+    if lean * length > ON_AXIS or aside > ON_AXIS:
+        off = f"leans by {np.degrees(np.arcsin(min(lean, 1.0))):.3g}° from"
+        if lean * length <= ON_AXIS:
+            off = f"is {1e3 * aside:.3g} mm beside"
         raise InputError(
-            f"holder: its axis is {1e3 * aside:.3g} mm beside that of effects.part_turn, or leans: "
-            "a holder turns with the part only about its own axis; clamp faces round that axis"
+            f"holder: its axis {off} that of effects.part_turn: a holder turns with the part only "
+            "about its own axis; clamp faces round that axis"
         )
 
 

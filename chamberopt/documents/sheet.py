@@ -308,14 +308,13 @@ def _fixtures(result: Result) -> Iterator[Row]:
     holder = result.design.holder
     if holder is not None and holder.kind == "bore":
         play = f"{plain(holder.clearance_mm)} mm of clearance all round"
-        yield "fixture", f"the part's own end in a bore, {play if holder.clearance_mm else 'tight'}"
+        yield "holder", f"the part's own end in a bore, {play if holder.clearance_mm else 'tight'}"
     for name, one in result.record.chamber.fixtures.items():
         size = size_in_words(one.kind, one.size_mm)
         text = f"{one.kind} {size or 'up to the wall'}"
         if one.length_mm:
             text += f", {plain(one.length_mm)} mm long"
-        what = "fixture" if name == "holder" else "mask"
-        yield what, f"{text}, on {plain(one.covered_mm2, 3)} mm² of the part"
+        yield name, f"{text}, on {plain(one.covered_mm2, 3)} mm² of the part"
 
 
 def _key_row(key: str, value: Any) -> Row:

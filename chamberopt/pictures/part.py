@@ -114,7 +114,7 @@ def render_part(job: dict[str, Any]) -> None:
         part, shown = _coloured(job, bands, beyond=False)
         rows.append(Row(f"{job['title']}: flexure", _panels(job, part, shown, BAND_COLOURS)))
         legend += [BAND_COLOURS[k] for k in np.unique(bands) if k != PLAIN]
-    write_page(job["picture"], rows, legend, remarks=[f"part {size_text(part)}"])
+    write_page(job["picture"], rows, legend, remarks=[f"part as it stands: {size_text(part)}"])
 
 
 def _coloured(

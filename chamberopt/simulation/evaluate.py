@@ -301,15 +301,13 @@ def _end(replicas: int, objective: Estimate, wanted: float | None) -> tuple[str,
     if objective.half_width <= wanted:
         note = f"the wanted accuracy of ± {wanted:g} was reached after {replicas} replicas"
         return "accuracy", (note,)
-    needed = (
-        f"about {math.ceil(replicas * (objective.half_width / wanted) ** 2)}"
-        if math.isfinite(objective.half_width)
-        else "many more"
-    )
+    reached = ""
+    if math.isfinite(objective.half_width):
+        needed = math.ceil(replicas * (objective.half_width / wanted) ** 2)
+        reached = f" with ± {objective.half_width:.2g}, and about {needed} replicas would be needed"
     note = (
         f"the wanted accuracy of ± {wanted:g} was not reached: the simulation stopped at "
-        f"process.accuracy.max_replicas = {replicas} with ± {objective.half_width:.2g}, and "
-        f"{needed} replicas would be needed; raise process.accuracy.max_replicas or "
+        f"process.accuracy.max_replicas = {replicas}{reached}; raise process.accuracy.max_replicas or "
         "simulated_time_s"
     )
     return "max_replicas", (note,)

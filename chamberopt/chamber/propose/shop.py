@@ -33,11 +33,14 @@ class ShopSonotrode(FileTable):
     diameter_mm: float | None = quantity(5, 2000, "mm", "of a round face", None)
     size_mm: Pair | None = list_field("two numbers [length, width] in mm", "of a block", None)
     frequency_khz: float = quantity(0.01, 200, "kHz", "usually 20")
-    amplitudes_um: Numbers | None = list_field("a list of numbers", "zero-to-peak", None)
-    amplitudes_pv_um: Numbers | None = list_field("a list of numbers", "peak-to-valley", None)
+    amplitudes_um: Numbers | None = list_field(f"1 to {MOST} numbers", "zero-to-peak", None)
+    amplitudes_pv_um: Numbers | None = list_field(f"1 to {MOST} numbers", "peak-to-valley", None)
     note: str = Field(default="", max_length=300, description="such as its own resonance")
 
     def _problems(self) -> Iterator[Problem]:
+        for key in ("name", "note"):  # a line break would end the design's comment
+            if not getattr(self, key).isprintable():
+                yield Problem(key, "has a line break or a control character; leave it out")
         if (self.diameter_mm is None) == (self.size_mm is None):
             yield Problem("diameter_mm", "give it for a disc, or size_mm for a block: one of them")
         if self.size_mm is not None and not all(5.0 <= one <= 2000.0 for one in self.size_mm):
@@ -84,7 +87,7 @@ class StockBalls(FileTable):
     """Balls of one material that a shop has in stock."""
 
     material: str = Field(description="a name that `chamberopt shot` lists")
-    diameters_mm: Numbers = list_field("a list of numbers", "of the balls in stock")
+    diameters_mm: Numbers = list_field(f"1 to {MOST} numbers", "of the balls in stock")
 
     def _problems(self) -> Iterator[Problem]:
         if find(self.material, balls()) is None:
@@ -98,15 +101,17 @@ class StockBalls(FileTable):
 class Shop(FileTable):
     """What a shop has: sonotrodes, balls in stock, and the sizes of chambers that it can build."""
 
-    sonotrodes: Annotated[Several[ShopSonotrode], Field(min_length=1, max_length=MOST)]
+    sonotrodes: Annotated[Several[ShopSonotrode], Field(min_length=1, max_length=MOST)] = (
+        list_field(f"1 to {MOST} tables, [[sonotrodes]]", "that can carry a chamber")
+    )
     balls: Annotated[Several[StockBalls], Field(max_length=MOST)] = list_field(
-        "a list of tables, [[balls]]", "in stock; without any, all that are sold", ()
+        f"at most {MOST} tables, [[balls]]", "in stock; without any, all that are sold", ()
     )
     clearance_mm: float = quantity(0.01, 5, "mm", "between a sonotrode and the wall round it", 0.2)
     largest_chamber_mm: Triple | None = list_field(
         "three numbers [length, width, height] in mm", "inside of the largest chamber", None
     )
-    heights_mm: Numbers = list_field("a list of numbers", "of standard walls and lids", ())
+    heights_mm: Numbers = list_field(f"at most {MOST} numbers", "of standard walls and lids", ())
 
     def _problems(self) -> Iterator[Problem]:
         if not all(2.0 <= one <= 2000.0 for one in self.largest_chamber_mm or ()):

@@ -192,6 +192,26 @@ def test_a_tilted_part_with_rod_and_mask_is_closed(parts: Path) -> None:
     assert volume == pytest.approx(12 * 8 * 1, rel=1e-4)
 
 
+def test_a_rod_up_to_a_domes_tip_closes_nothing(parts: Path) -> None:
+    profile = {"shape": "revolve", "profile_mm": [[30, 0], [30, 30], [0, 50]]}
+    tables = design(parts, holder={"kind": "rod", "diameter_mm": 6}).model_dump()
+    tables["chamber"] = {**profile, "sonotrode_distance_mm": DISTANCE}
+
+    chamber = build_chamber(validate(Design, tables))
+
+    sound(chamber)
+    assert not any("closes the chamber" in note for note in chamber.notes)
+
+
+def test_a_holder_that_leans_from_the_turning_axis_is_told_the_angle(parts: Path) -> None:
+    turn = {"axis": (0, 0, 1), "through_mm": (0, 0, 0), "rpm": 60}
+    side = {"direction": (1, 0, 0), "angle_deg": (0, 10)}
+    effects = {**design(parts).model_dump()["effects"], "part_turn": turn}
+    tables = {"holder": {"kind": "rod", "at": side, "axis": (1, 0, 0)}, "effects": effects}
+    with pytest.raises(InputError, match=r"leans by 90° from that of effects\.part_turn"):
+        build_chamber(design(parts, **tables))
+
+
 def test_a_plate_lies_as_its_face_does(parts: Path) -> None:
     """The plate of a part that is turned by 30 degrees about z is turned with it."""
     chamber = build_chamber(

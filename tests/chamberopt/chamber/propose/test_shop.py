@@ -103,7 +103,12 @@ def test_amplitudes_are_those_that_a_sonotrode_can_set() -> None:
         ("", "the file is empty"),
         ("log_mean = [1]", "this is what chamberopt calibrate found of a machine"),
         ("clearance_mm = 1", "sonotrodes: missing"),
-        ("sonotrodes = []", "sonotrodes"),
+        ("sonotrodes = []", "given []; allowed: 1 to 200 tables, [[sonotrodes]]"),
+        (
+            '[[sonotrodes]]\nname = "A"\nnote = "\\n[shot]"\ndiameter_mm = 60\n'
+            "frequency_khz = 20\namplitudes_um = [9]",
+            "note: has a line break",
+        ),
         ('[[sonotrodes]]\nname = "A"\nfrequency_khz = 20\namplitudes_um = [9]', "or size_mm"),
         (
             '[[sonotrodes]]\nname = "A"\ndiameter_mm = 60\nfrequency_khz = 20',
