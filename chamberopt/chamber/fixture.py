@@ -276,7 +276,7 @@ def _refuse_off_axis(design: Design, part: Part, axis: np.ndarray, middle: np.nd
         return
     point, direction = line[0], line[1] / np.linalg.norm(line[1])
     aside = np.linalg.norm(np.cross(middle - point, direction))
-    lean = np.linalg.norm(np.cross(axis, direction))
+    lean = float(np.linalg.norm(np.cross(axis, direction)))
     length = float(np.linalg.norm(np.ptp(part.vertices, axis=0)))
     if lean * length > ON_AXIS or aside > ON_AXIS:
         off = f"leans by {np.degrees(np.arcsin(min(lean, 1.0))):.3g}° from"

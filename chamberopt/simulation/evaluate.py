@@ -307,7 +307,7 @@ def _end(replicas: int, objective: Estimate, wanted: float | None) -> tuple[str,
         reached = f" with ± {objective.half_width:.2g}, and about {needed} replicas would be needed"
     note = (
         f"the wanted accuracy of ± {wanted:g} was not reached: the simulation stopped at "
-        f"process.accuracy.max_replicas = {replicas}{reached}; raise process.accuracy.max_replicas or "
-        "simulated_time_s"
+        f"process.accuracy.max_replicas = {replicas}{reached}; raise "
+        "process.accuracy.max_replicas or simulated_time_s"
     )
     return "max_replicas", (note,)

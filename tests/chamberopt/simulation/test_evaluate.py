@@ -216,6 +216,7 @@ def test_a_figure_that_is_not_resolved_does_not_reach_the_wanted_accuracy() -> N
     found = evaluate(design, build_chamber(design), SerialExecutor())
     assert found.objective.half_width == np.inf
     assert (found.stopped_by, found.replicas) == ("max_replicas", 12)
+    assert not any("± inf" in note for note in found.notes)
 
 
 def test_a_figure_without_an_interval_is_not_resolved() -> None:
