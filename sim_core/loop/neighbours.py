@@ -47,7 +47,6 @@ from sim_core.numerics.simd import (
     lowest_bit,
 )
 from sim_core.numerics.vec3 import Vec3, sub
-from sim_core.numerics.whole_records import passed_whole
 
 # share of distance²: float32 loses 2e-7 of it in the miss distance
 FAR_SHARE = np.float32(1.0 - 1e-6)
@@ -63,7 +62,6 @@ MAX_SPEED = 1e6
 TINY = 1e-30  # replaces a velocity component of zero, whose inverse would be infinite
 
 
-@passed_whole
 class NeighbourFilter(NamedTuple):
     """Float32 copies of the paths of all balls, and the data with which a search filters them.
 
