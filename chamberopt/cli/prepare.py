@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from chamberopt.chamber.build import Chamber
+    from chamberopt.chamber.propose.proposal import Proposal
     from chamberopt.common.progress import Progress
     from chamberopt.design.load import Design
     from chamberopt.results.load import Result
@@ -79,6 +80,28 @@ def advise_effects(design: Design, chamber: Chamber) -> list[dict[str, object]]:
         advice = with_effects_resolved(design, chamber, executor, progress, prepare)[1]
         advice = advice or advise(design, chamber, executor, progress, prepare)
     return [advice_record(one).as_json() for one in advice]
+
+
+def with_pilot(made: Proposal) -> Proposal:
+    """Return a proposal whose treatment time and budget follow from a short simulation.
+
+    Where that cannot run, the proposal stays as it is, and a warning gives the reason.
+    """
+    from chamberopt.chamber.propose.proposed_budget import propose_budget, with_budget
+    from chamberopt.common.errors import InputError
+    from chamberopt.common.executor import local_executor
+    from chamberopt.common.progress import step
+    from chamberopt.simulation.budget_pilot import measure_budget
+    from sim_core import SimulationError
+
+    try:
+        compile_with_message(made.design, made.chamber)
+        with local_executor() as executor, step("pilot run (--no-pilot leaves it out)") as progress:
+            found = measure_budget(made.design, made.chamber, executor, progress)
+    except (InputError, SimulationError) as error:
+        print_remarks([f"warning: no pilot, treatment and simulated time are starts: {error}"])
+        return made
+    return with_budget(made, propose_budget(found))
 
 
 def seconds_of(progress: Progress, whole: float) -> Callable[[float], None]:

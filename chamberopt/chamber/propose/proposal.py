@@ -19,7 +19,6 @@ from chamberopt.chamber.checks.jams import JamGap, gaps_in_reach, jam_gaps
 from chamberopt.chamber.part import Part, posed_part
 from chamberopt.chamber.propose.pose import Turns, pose_in_words, propose_pose, square_to_walls
 from chamberopt.chamber.propose.proposed_balls import fit_sizes, propose_ball
-from chamberopt.chamber.propose.proposed_budget import REPLICAS, propose_budget
 from chamberopt.chamber.propose.proposed_floor import Floor, floor_on_sonotrode, require_room
 from chamberopt.chamber.propose.proposed_holder import holder_choices
 from chamberopt.chamber.propose.proposed_target import (
@@ -137,6 +136,8 @@ NO_PLACE = (
     "all of it is to be peened; leave out of [part.target] the face to hold it by",
 )
 TREATMENT_S, HALF_WIDTH, MOST_REPLICAS = 300.0, 0.02, 24
+REPLICAS = 10  # the fewest that a wanted half-width takes
+START = "a start, NOT MEASURED by a pilot"
 
 Tables = dict[str, dict[str, Any]]
 """Tables of a design file by dotted name, as TOML values."""
@@ -218,7 +219,8 @@ def propose(
         else "NOT KNOWN, a guess: chamberopt materials lists alloys",
         "effects.friction": "mu of these balls on these metals, dry: chamberopt materials",
         "effects.roughness": "rms slope of faces that shot has dented",
-        "process.treatment_time_s": "a start: the report has coverage over time",
+        "process.treatment_time_s": f"{START}: the report has coverage over time",
+        "process.accuracy.simulated_time_s": f"{START}: results say what is resolved",
         "process.accuracy.objective_half_width": "replicas are added until it is so sure",
     }
     best: tuple[Proposal, Floor] | None = None
@@ -512,17 +514,9 @@ def _checked(
     diameter, ball_mass = design.shot.diameter, design.shot.ball_mass
     mass_g, reason = propose_charge(face, diameter, ball_mass)
     tables = {**tables, "shot": {**tables["shot"], "mass_g": mass_g}}
-    budget = propose_budget(validate(Design, _nested(tables)), chamber)
-    accuracy = {"simulated_time_s": budget.time, "gauge_mm2": budget.gauge_mm2}
-    tables["process.accuracy"] = {**tables["process.accuracy"], **accuracy}
     design = validate(Design, _nested(tables))
     reach = shot_reach(design, chamber)
-    reasons = {
-        **reasons,
-        "shot.mass_g": f"{reason}: {design.shot.count}",
-        "process.accuracy.simulated_time_s": budget.time_reason,
-        "process.accuracy.gauge_mm2": budget.gauge_reason,
-    }
+    reasons = {**reasons, "shot.mass_g": f"{reason}: {design.shot.count}"}
     found = tuple(warnings(design, chamber, reach))
     if math.isinf(floor.lean):
         found = (f"chamber: {floor.reason}", *found)

@@ -1,72 +1,136 @@
-"""Propose how long to simulate, and in which windows, so that a first run resolves single places.
+"""Propose how long to peen, how long to simulate, and in which windows, by what a pilot measured.
 
-    n, N    balls per volume [1/m³], number of balls
-    V       peak speed of the sonotrode [m/s]
-    r       impacts on the target per area and time [1/(m² s)], estimated as IMPACTS n V
-    g       gauge, the area of a window [m²]
-    l       mean path of a ball: 1 / l = S / (4 Q) + 1 / (path from ball to ball), for the surface S
-            and the volume Q of the cavity (Cauchy's mean chord 4 Q / S)
-
-A window gets r g t dents in the time t. It is an estimate: a gas of balls whose mean speed is
-SPEED V gives r = SPEED n V / 4, and places far from the sonotrode get less.
-
-Source: the flux of an ideal gas on a wall, n v / 4, as in any textbook of kinetic theory.
+A window, a disc of the target, gets d g t dents: d dents per area and simulated time in the median
+window, g its area (the gauge), t the simulated time of all replicas. Single places take 25 dents in
+a window, the mean the more, the longer the treatment is (chamberopt/coverage/coverage_intervals).
 """
 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import NamedTuple
 
-from chamberopt.chamber.build import Chamber
-from chamberopt.chamber.dimensionless import free_path
-from chamberopt.design.load import Design
-from chamberopt.geometry.triangles import areas
+from chamberopt.chamber.propose.proposal import REPLICAS, Proposal
 
-REPLICAS = 8
-DENTS = 33.0  # in a window: single places need 25 (coverage_intervals), and this is an estimate
-SPEED = 0.3  # mean speed of the balls over the sonotrode's peak speed
-FAR = 0.5  # of the impacts of an even gas, at the target's middle places
-EVENTS = 2e7  # of all replicas: some minutes on two cores
-LEAST_TIME, MOST_TIME = 0.5, 200.0  # s, of each replica
-GAUGE = 1e-6  # m²: wider only where the time would be too long
+DENTS, MARGIN = 25.0, 1.3  # needed in a window; over what is needed, as a pilot is short
+# Of all replicas, for MINUTES on two cores: 0.5e5 (4,000 balls) to 1.1e5 (160 balls) in a second of
+# a core were measured.
+COLLISIONS = 2e7
+MINUTES = 3.0
+LEAST_TIME, MOST_TIME = 0.1, 1000.0  # s, of each replica
+USUAL_GAUGE = 1e-6  # m²: wider only where the time would be too long
 WIDEST = 0.02  # of the target's area
+# What is set on a machine [s]: above them whole hours, below them whole seconds.
+SET_TIMES = (10, 20, 30, 60, 120, 180, 300, 600, 900, 1200, 1800, 2700, 3600)
+LONG = 1800.0  # s: fastest.toml searches for less
+
+
+class Measured(NamedTuple):
+    """What a pilot run measured of a design, at the slow end of friction.
+
+    Attributes:
+        dent_rate: dents in the median window, over its area and the time [1/(m² s)].
+        collision_rate: collisions of one replica in a simulated second [1/s].
+        time_to_98: after which 98 % of the target are dented [s].
+        places: of 95 % of the target, each place; not of the whole on average.
+        spread: half-width of the time's 95 % interval [s]; infinite if it is not known.
+        friction: the friction was that of the slow end, not absent or known exactly.
+        dents_for_mean: dents in the median window that the mean takes, for each s of treatment.
+        target: area of the target [m²].
+        simulated: simulated time of all replicas of the pilot [s].
+    """
+
+    dent_rate: float
+    collision_rate: float
+    time_to_98: float
+    places: bool
+    spread: float
+    friction: bool
+    dents_for_mean: float
+    target: float
+    simulated: float
 
 
 class Budget(NamedTuple):
-    """Simulated time of each replica, and the windows in which coverage is measured."""
+    """Treatment time, simulated time of each replica, and gauge, each with its reason."""
 
+    treatment: float  # [s]
     time: float  # [s]
     gauge_mm2: float
-    time_reason: str
-    gauge_reason: str
+    reasons: dict[str, str]  # by dotted name
 
 
-def propose_budget(design: Design, chamber: Chamber) -> Budget:
+def propose_budget(found: Measured) -> Budget:
     """Return the budget with which single places of the target are probably resolved."""
-    speed = SPEED * design.sonotrode.peak_speed
-    density = design.shot.count / chamber.volume
-    rate = FAR * density * speed / 4.0
-    surface = float(areas(chamber.vertices, chamber.triangles).sum())
-    per_path = surface / (4.0 * chamber.volume)
-    per_path += 1.0 / (free_path(design, chamber) * chamber.height)
-    events = design.shot.count * speed * per_path  # in a second
-    wanted = DENTS / (REPLICAS * rate * GAUGE)
-    time = _rounded_up(min(max(wanted, LEAST_TIME), max(EVENTS / (REPLICAS * events), LEAST_TIME)))
-    time = min(time, MOST_TIME)
-    dents = REPLICAS * rate * GAUGE * time
-    target = float(chamber.part.area[chamber.part.target].sum())
-    gauge = _rounded_up(max(1.0, min(DENTS / dents, WIDEST * target / GAUGE)))
-    said = f"about {dents * gauge:.2g} dents in a window, by an estimate; 25 resolve single places"
-    wider = (
-        "WIDER than the usual 1 mm²: a window gets its dents within minutes" if gauge > 1 else ""
+    treatment = settable(found.time_to_98)
+    needed = max(MARGIN * DENTS, found.dents_for_mean * treatment)
+    enough = needed / (REPLICAS * found.dent_rate * USUAL_GAUGE)
+    most = COLLISIONS / (REPLICAS * found.collision_rate)
+    time = _rounded_up(min(max(enough, LEAST_TIME), max(most, LEAST_TIME), MOST_TIME))
+    dents = REPLICAS * found.dent_rate * USUAL_GAUGE * time
+    widest = max(1.0, WIDEST * found.target / USUAL_GAUGE)
+    gauge = min(_rounded_up(max(1.0, needed / dents)), float(f"{widest:.2g}"))
+    expected = (
+        f"about {_plain(dents * gauge, 2)} dents in a window by a pilot; {needed:.0f} would do"
     )
-    return Budget(time, gauge, said, wider)
+    few = f": TOO FEW within {MINUTES:g} minutes on two cores; give more"
+    wider = f"WIDER than the usual 1 mm²: enough dents within {MINUTES:g} minutes on two cores"
+    reasons = {
+        "process.treatment_time_s": _said_of_treatment(found),
+        "process.accuracy.simulated_time_s": expected + (few if dents * gauge < needed else ""),
+    }
+    if gauge > 1.0:
+        reasons["process.accuracy.gauge_mm2"] = wider
+    return Budget(treatment, time, gauge, reasons)
+
+
+def with_budget(made: Proposal, budget: Budget) -> Proposal:
+    """Return a proposal with a budget in the place of its own."""
+    values = {
+        "process.treatment_time_s": budget.treatment,
+        "process.accuracy.simulated_time_s": budget.time,
+        "process.accuracy.gauge_mm2": budget.gauge_mm2,
+    }
+    tables = {name: dict(table) for name, table in made.tables.items()}
+    for name, value in values.items():
+        table, _, key = name.rpartition(".")
+        tables[table][key] = value
+    reasons = {**made.reasons, **budget.reasons}
+    return replace(made, tables=tables, reasons=reasons, design=made.design.changed(values))
+
+
+def settable(seconds: float) -> float:
+    """Return the next longer time that is usually set on a machine [s]."""
+    if seconds <= SET_TIMES[0]:
+        return float(max(1, math.ceil(seconds)))
+    if seconds > SET_TIMES[-1]:
+        return 3600.0 * math.ceil(seconds / 3600.0)
+    return float(next(one for one in SET_TIMES if one >= seconds))
+
+
+def _said_of_treatment(found: Measured) -> str:
+    """Return in words from what the proposed treatment time follows."""
+    spread = f" ± {_plain(found.spread, 1)}" if math.isfinite(found.spread) else ""
+    what = "95 % of the target is 98 % covered"
+    if not found.places:
+        what = "the target is 98 % covered ON AVERAGE (places are out of reach or not resolved)"
+    friction = " at the slow end of friction" if found.friction else ""
+    long = "; LONG: more shot, more amplitude or fastest.toml" if found.time_to_98 > LONG else ""
+    return (
+        f"an estimate, rounded up: after about {_plain(found.time_to_98, 2)}{spread} s {what}"
+        f"{friction}, by a pilot of {_plain(found.simulated, 2)} simulated s{long}"
+    )
+
+
+def _plain(value: float, digits: int) -> str:
+    """Return a number rounded to some digits, without an exponent: 5000, not 5e+03."""
+    return f"{float(f'{value:.{digits}g}'):g}"
 
 
 def _rounded_up(value: float) -> float:
-    """Return the next of 1, 2, 3, 5, 7 and their decimal multiples."""
+    """Return the next of 1, 1.5, 2, 3, 5, 7 and their decimal multiples."""
     power = 10.0 ** math.floor(math.log10(value) + 1e-9)
     return float(
-        f"{next(k for k in (1, 2, 3, 5, 7, 10) if k * power >= value * 0.999) * power:.3g}"
+        f"{next(k for k in (1, 1.5, 2, 3, 5, 7, 10) if k * power >= value * 0.999) * power:.3g}"
     )

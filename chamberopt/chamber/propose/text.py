@@ -16,6 +16,7 @@ from chamberopt.design.load import with_paths_from
 
 MAX_LISTED = 20  # surfaces in a comment
 EVALUATIONS, SEARCH_HALF_WIDTH = 20, 0.04
+SEARCH_REPLICAS = 4
 
 
 class Goal(NamedTuple):
@@ -24,7 +25,6 @@ class Goal(NamedTuple):
     words: str
     objective: str  # name of it in a study file
     meaning: str
-    time: float  # simulated in the search, over that of the design
     accuracy: str  # a further line of [search_accuracy]
 
 
@@ -32,15 +32,13 @@ MOST_EVEN = Goal(
     "the most even coverage after the treatment time",
     "uniform_coverage",
     "mean minus standard deviation of coverage",
-    0.5,
     f"objective_half_width = {SEARCH_HALF_WIDTH}",
 )
 FASTEST = Goal(
     "98 % everywhere in the shortest time",
     "minus_time_to_98_s",
     "minus the time after which 95 % of the target's area has 98 %",
-    1.0,
-    "max_replicas = 4  # objective_half_width would be in seconds",
+    f"max_replicas = {SEARCH_REPLICAS}  # objective_half_width would be in seconds",
 )
 
 
@@ -73,7 +71,8 @@ def study_text(proposal: Proposal, design: str, goal: Goal = MOST_EVEN) -> str:
         goal: what the study maximises.
     """
     start = {name: f"now {proposal.design.value(name):g}" for name in proposal.bounds}
-    time = goal.time * proposal.design.process.accuracy.simulated_time_s
+    accuracy = proposal.design.process.accuracy
+    time = accuracy.replicas * accuracy.simulated_time_s / SEARCH_REPLICAS  # as many dents
     return study_lines(design, proposal.bounds, start, goal=goal, time=time)
 
 
@@ -112,7 +111,7 @@ def study_lines(
         "seed = 1",
         "",
         "[search_accuracy]  # of the search; confirmations take the design's own",
-        "replicas = 4",
+        f"replicas = {SEARCH_REPLICAS}",
         _line("simulated_time_s", float(f"{time:.3g}")),
         goal.accuracy,
     ]

@@ -35,6 +35,7 @@ def new(
     ball_mm: float | None = None,
     shop: Path | None = None,
     unit: Literal["um", "mm", "cm", "m", "in", "guess"] | None = None,
+    pilot: bool = True,
     out: Out = None,
 ) -> None:
     """Propose a first design and study for a part, each number with its reason, and a picture.
@@ -61,6 +62,9 @@ def new(
     unit
         Of the numbers in the part's file; by default what the file states. Where it states none and
         several are possible, `new` asks, or stops if nobody can answer; guess takes the likeliest.
+    pilot
+        Simulate some seconds, so that the treatment time and what is simulated are estimates. It
+        takes seconds, and the first time minutes to compile the simulator.
     """
     import chamberopt.pictures.part  # noqa: F401  # imported before the folder is claimed
     from chamberopt.chamber.propose.left_out import find_left_out
@@ -68,6 +72,7 @@ def new(
     from chamberopt.chamber.propose.shop import load_shop
     from chamberopt.chamber.propose.text import FASTEST, design_text, study_text
     from chamberopt.cli.commands.check import draw_target
+    from chamberopt.cli.prepare import with_pilot
     from chamberopt.common.errors import InputError
     from chamberopt.common.files import claim_folder, whole_or_nothing, write_text
     from chamberopt.common.progress import step
@@ -100,6 +105,8 @@ def new(
             raise
         made = propose(part, replace(wanted, unit=_asked_unit(part, error.sizes)), choose)
     left_out = find_left_out(made)
+    if pilot:
+        made = with_pilot(made)
     pyvista()  # before the folder is claimed: Ctrl-C during an import would leave the folder behind
     with claim_folder(out) as folder, whole_or_nothing(folder):
         write_text(folder / "design.toml", design_text(made, folder, left_out))

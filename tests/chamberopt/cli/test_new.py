@@ -11,6 +11,7 @@ import trimesh
 
 from chamberopt.chamber.propose.pose import propose_pose, square_to_walls
 from chamberopt.chamber.propose.proposal import Proposal, Wanted, propose
+from chamberopt.chamber.propose.proposed_budget import Measured
 from chamberopt.chamber.propose.proposed_target import propose_target, surfaces
 from chamberopt.cli import main
 from chamberopt.common.errors import InputError
@@ -68,7 +69,7 @@ def test_new_writes_a_design_and_a_study_that_are_accepted(
     monkeypatch.chdir(tmp_path)
     part = EIGHT_PARTS["crank_pin"].write(tmp_path)
     command = ["new", str(part), "--target", "PIN", "--target", "FILLETS"]
-    assert main([*command, "--material", "18CrNiMo7-6", "--shape", "prism"]) == 0
+    assert main([*command, "--material", "18CrNiMo7-6", "--shape", "prism", "--no-pilot"]) == 0
     assert "crank_pin/design.toml" in capfd.readouterr().out
     design = load_design("crank_pin/design.toml")
     assert set(design.part.target.surface) == {"PIN", "FILLETS"}
@@ -172,7 +173,7 @@ def test_a_guess_is_said_and_no_folder_is_held_while_the_design_is_made(
 
     monkeypatch.setattr("chamberopt.chamber.propose.proposal.propose", watched)
     monkeypatch.setattr("chamberopt.cli.commands.check.draw_target", lambda *_: None)
-    assert main(["new", "box.stl", "--unit", "guess", "--out", "out"]) == 0
+    assert main(["new", "box.stl", "--unit", "guess", "--out", "out", "--no-pilot"]) == 0
     said = capfd.readouterr()
     assert "mm: GUESSED: the part measures 20 x 20 x 30 mm" in said.out
     assert "unit guessed as 'mm' (by its size)" in said.err
@@ -211,6 +212,32 @@ def test_a_unit_that_cannot_be_known_is_asked_for(
         shown = capfd.readouterr()
         assert "127 x 76.2 x 50.8 mm if they are in in" in shown.out
         assert said in shown.err
+
+
+def test_a_pilot_that_cannot_run_leaves_the_starts_and_says_so(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fails(*_: Any) -> Measured:
+        raise InputError("the shot hardly hits the target")
+
+    monkeypatch.chdir(tmp_path)
+    trimesh.creation.box((20, 20, 30)).export("box.stl")
+    monkeypatch.setattr("chamberopt.cli.prepare.compile_with_message", lambda *_: None)
+    monkeypatch.setattr("chamberopt.simulation.budget_pilot.measure_budget", fails)
+    monkeypatch.setattr("chamberopt.cli.commands.check.draw_target", lambda *_: None)
+    assert main(["new", "box.stl", "--unit", "mm"]) == 0
+    assert "warning: no pilot, treatment and simulated time are starts" in capfd.readouterr().err
+    assert "a start, NOT MEASURED by a pilot" in Path("box/design.toml").read_text("utf-8")
+
+    measured = Measured(1e5, 1e4, 250.0, True, 60.0, True, 0.01, 5e-3, 6.4)
+    monkeypatch.setattr("chamberopt.simulation.budget_pilot.measure_budget", lambda *_: measured)
+    assert main(["new", "box.stl", "--unit", "mm", "--out", "piloted"]) == 0
+    process = load_design("piloted/design.toml").process
+    assert process.treatment_time == 300.0
+    assert process.accuracy.simulated_time == 50.0  # 10 replicas: 50 dents in 1 mm²
+    assert "after about 250 ± 60 s" in capfd.readouterr().out
+    searched = load_study("piloted/study.toml").search_accuracy
+    assert searched["replicas"] * searched["simulated_time_s"] == 500.0
 
 
 @pytest.mark.long

@@ -1,33 +1,77 @@
-"""How long `new` proposes to simulate, and in which windows."""
+"""What `new` proposes after a pilot: treatment time, simulated time and windows."""
 
-from types import SimpleNamespace
-from typing import Any
-
-import numpy as np
 import pytest
-import trimesh
 
-from chamberopt.chamber.propose.proposed_budget import DENTS, FAR, REPLICAS, SPEED, propose_budget
-from tests.helpers.synthetic import chamber_round
+from chamberopt.chamber.propose.proposal import REPLICAS
+from chamberopt.chamber.propose.proposed_budget import (
+    COLLISIONS,
+    DENTS,
+    LEAST_TIME,
+    WIDEST,
+    Measured,
+    propose_budget,
+    settable,
+)
+
+PILOT = Measured(
+    dent_rate=1e5,  # 0.1 dents in 1 mm² and a second
+    collision_rate=1e4,
+    time_to_98=250.0,
+    places=True,
+    spread=60.0,
+    friction=True,
+    dents_for_mean=0.01,
+    target=5e-3,
+    simulated=6.4,
+)
+TIME, GAUGE = "process.accuracy.simulated_time_s", "process.accuracy.gauge_mm2"
 
 
-@pytest.mark.parametrize("count", [20, 200, 2000, 20_000])
-def test_windows_get_their_dents_by_the_flux_of_a_gas(count: int) -> None:
-    """n v / 4 impacts per area and time: the time, or else the gauge, follows from it."""
-    chamber = chamber_round(trimesh.creation.box((0.03, 0.03, 0.03)), gap=0.02)
-    shot = SimpleNamespace(count=count, diameter=1e-3)
-    design: Any = SimpleNamespace(shot=shot, sonotrode=SimpleNamespace(peak_speed=5.0))
-    budget = propose_budget(design, chamber)
-    flux = FAR * count / chamber.volume * SPEED * 5.0 / 4.0
-    dents = REPLICAS * flux * 1e-6 * budget.gauge_mm2 * budget.time
-    assert dents >= 0.99 * DENTS
-    assert np.isclose(budget.gauge_mm2, 1.0) == (not budget.gauge_reason)
+@pytest.mark.parametrize("rate", [1e4, 1e5, 1e6, 1e7])
+@pytest.mark.parametrize("for_mean", [0.0, 0.2])
+def test_windows_get_the_dents_that_are_needed(rate: float, for_mean: float) -> None:
+    """Dents are rate times gauge times the time of all replicas."""
+    budget = propose_budget(
+        PILOT._replace(dent_rate=rate, collision_rate=1e3, dents_for_mean=for_mean)
+    )
+    dents = rate * 1e-6 * budget.gauge_mm2 * REPLICAS * budget.time
+    assert dents >= max(DENTS, for_mean * budget.treatment)
+    assert budget.gauge_mm2 == 1.0
+    assert GAUGE not in budget.reasons
+    assert "TOO FEW" not in budget.reasons[TIME]
+    if budget.time > LEAST_TIME:
+        assert dents <= 2.5 * max(DENTS, for_mean * budget.treatment)
 
 
-def test_few_balls_get_wider_windows_and_it_is_said() -> None:
-    chamber = chamber_round(trimesh.creation.box((0.3, 0.3, 0.3)), gap=0.1)
-    shot = SimpleNamespace(count=3, diameter=3e-3)
-    design: Any = SimpleNamespace(shot=shot, sonotrode=SimpleNamespace(peak_speed=5.0))
-    budget = propose_budget(design, chamber)
+def test_windows_widen_where_the_time_would_be_too_long_and_it_is_said() -> None:
+    budget = propose_budget(PILOT._replace(collision_rate=1e5))
+    assert REPLICAS * budget.time * 1e5 <= 1.5 * COLLISIONS
     assert budget.gauge_mm2 > 1.0
-    assert "WIDER" in budget.gauge_reason
+    assert 1e5 * 1e-6 * budget.gauge_mm2 * REPLICAS * budget.time >= DENTS
+    assert budget.reasons[GAUGE].startswith("WIDER than the usual 1 mm²")
+
+
+def test_what_does_not_resolve_in_the_time_is_said() -> None:
+    budget = propose_budget(PILOT._replace(collision_rate=1e8))
+    assert budget.gauge_mm2 == pytest.approx(1e6 * WIDEST * PILOT.target)
+    assert "TOO FEW within 3 minutes on two cores; give more" in budget.reasons[TIME]
+
+
+def test_the_treatment_time_is_rounded_up_and_says_what_it_rests_on() -> None:
+    budget = propose_budget(PILOT)
+    assert budget.treatment == 300.0
+    said = budget.reasons["process.treatment_time_s"]
+    assert said.startswith("an estimate, rounded up: after about 250 ± 60 s 95 % of the target is")
+    assert "slow end of friction" in said
+    of_mean = propose_budget(PILOT._replace(places=False, friction=False))
+    said = of_mean.reasons["process.treatment_time_s"]
+    assert "covered ON AVERAGE" in said
+    assert "friction" not in said
+
+
+@pytest.mark.parametrize(
+    ("seconds", "set_to"),
+    [(0.3, 1), (4.2, 5), (11, 20), (60, 60), (61, 120), (1000, 1200), (3601, 7200), (9e4, 9e4)],
+)
+def test_times_are_those_that_a_machine_is_set_to(seconds: float, set_to: float) -> None:
+    assert settable(seconds) == set_to

@@ -20,7 +20,7 @@ SWEEP = "sweep study.toml --grid 2 --workers 1 --out study"
 RESUMED = (RUN, SWEEP)
 OUTPUTS = {
     SIMULATE: "result", RUN: "study", SWEEP: "study", "save": "design.toml",
-    "new box.stl --unit mm --out new": "new", "check design.toml --out check": "check",
+    "new box.stl --unit mm --no-pilot --out new": "new", "check design.toml --out check": "check",
     "report given": "given/report.html", "report given --sheet": "given/process_sheet.pdf",
     "export given --to fields-vtp --to chamber-3mf --out all": "all",
     "export given --to impacts-csv --workers 1 --out impacts.csv": "impacts.csv",
