@@ -71,6 +71,8 @@ class Fixture:
     kind: str  # as in the design; of a mask "shell", or "filled" up to the wall
     size: tuple[float, ...]  # [m]: a diameter, two sides, or the thickness of a shell
     length: float  # along its axis, from its end at the part to the wall [m]; 0 for a shell
+    # Of a holder: middle of its end at the part, in the chamber's frame [m], (3,).
+    place: tuple[float, ...] | None
     number: int  # index into `fitting_names`
     covered: float  # area of the part under it [m²]
     covered_target: float  # of this area, on the target [m²]
@@ -96,6 +98,7 @@ class _Made(NamedTuple):
     kind: str
     size: tuple[float, ...]
     length: float  # as in `Fixture`
+    place: tuple[float, ...] | None = None  # likewise
 
 
 def with_fixtures(
@@ -144,6 +147,7 @@ def with_fixtures(
             kind=one.kind,
             size=one.size,
             length=one.length,
+            place=one.place,
             number=number,
             covered=float(covered.sum()),
             covered_target=float(covered[part.target].sum()),
@@ -239,7 +243,8 @@ def _holder(design: Design, part: Part, filled: CavitySolid) -> _Made:
         rod = OF_FACE * min(size) if rod_mm is None else 1e-3 * rod_mm
         solids.append(_prism(frame, _circle(middle, rod), plate_top - SINK, end))
     solids.append(_prism(frame, outline, start - SINK, min(plate_top, end)))
-    return _Made(solids, clamped, holder.kind, tuple(map(float, size)), wall - start)
+    place = tuple(map(float, np.array([*middle, start]) @ frame))
+    return _Made(solids, clamped, holder.kind, tuple(map(float, size)), wall - start, place)
 
 
 def _clamped(design: Design, part: Part, axis: np.ndarray) -> np.ndarray:

@@ -314,6 +314,9 @@ def _fixtures(result: Result) -> Iterator[Row]:
         text = f"{one.kind} {size or 'up to the wall'}"
         if one.length_mm:
             text += f", {plain(one.length_mm)} mm long"
+        if one.place_mm and holder is not None:
+            at, along = (", ".join(map(plain, three)) for three in (one.place_mm, holder.axis))
+            text += f", from ({at}) mm along ({along}) in the chamber's frame"
         yield name, f"{text}, on {plain(one.covered_mm2, 3)} mm² of the part"
 
 
@@ -339,7 +342,7 @@ def _key_row(key: str, value: Any) -> Row:
 def _sonotrode(result: Result, face_mm: tuple[float, ...]) -> Iterator[Row]:
     design = result.design
     size = " × ".join(map(plain, face_mm))
-    yield "face", f"Ø {size} mm" if len(face_mm) == 1 else f"{size} mm"
+    yield "face in the chamber", f"Ø {size} mm" if len(face_mm) == 1 else f"{size} mm"
     yield "frequency", f"{plain(design.sonotrode.frequency_khz)} kHz"
     yield "amplitude", _amplitude(design.sonotrode)
     yield "peak speed of the face", f"{plain(design.sonotrode.peak_speed, 3)} m/s"

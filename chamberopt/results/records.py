@@ -137,6 +137,7 @@ class FixtureRecord(Table):
 
     size_mm: a diameter, two sides, or the thickness of a shell.
     length_mm: length in the room along its axis, 0 for a shell.
+    place_mm: middle of a holder's end at the part, in the chamber's frame.
     covered_mm2: area of the part under it, of which covered_target_mm2 is on the target.
     """
 
@@ -145,6 +146,7 @@ class FixtureRecord(Table):
     length_mm: Positive
     covered_mm2: float
     covered_target_mm2: float
+    place_mm: list[float] | None = None
 
 
 class ChamberRecord(Table):

@@ -241,6 +241,7 @@ def _about_fixtures(chamber: Chamber) -> dict[str, Any]:
             length_mm=1e3 * one.length,
             covered_mm2=1e6 * one.covered,
             covered_target_mm2=1e6 * one.covered_target,
+            **({"place_mm": [1e3 * x for x in one.place]} if one.place else {}),
         )
         for name, one in chamber.fixtures.items()
     }
