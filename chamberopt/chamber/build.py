@@ -173,7 +173,8 @@ def build_chamber(design: Design, target: np.ndarray | None = None) -> Chamber:
     room, room_notes = _room_over_sonotrode(whole, tags, bodies)
     ceiling = float(shape.vertices[:, 2].max())
     at_ceiling = shape.vertices[shape.triangles, 2] >= ceiling - MIN_HEIGHT
-    if not is_drawn and at_ceiling.all(axis=1).any():  # a tip or a dome has no level ceiling
+    is_level = at_ceiling.all(axis=1).any()  # a holder may hide the tip of a dome, at any height
+    if not is_drawn and (is_level or "holder" not in fixtures):
         room_notes += _ceiling_notes(room, ceiling, design.chamber.ceiling_key, bodies)
     room = remove_slivers(room)
     traced = cavity.trace(room)
