@@ -1,7 +1,13 @@
 """Settings of all tests."""
 
 import gc
+import os
 
 # Python's collector of garbage looks through what the compiler keeps again and again. It took a
 # sixth of compiling the simulator.
 gc.set_threshold(100_000, 50, 1000)
+
+
+def pytest_xdist_auto_num_workers() -> int:
+    """One worker more than cores: tests wait for commands, browsers and clusters they started."""
+    return (os.cpu_count() or 1) + 1

@@ -9,7 +9,6 @@ import numpy as np
 from sim_core import Balls, Gravity, Physics, Restitution, Scene, pack_balls, simulate
 from sim_core.scene.invariants import clearance, closest_pair, momentum
 from tests.hard_cases.outcome import (
-    WEIGHTLESS,
     Case,
     Claim,
     Outcome,
@@ -20,7 +19,7 @@ from tests.hard_cases.outcome import (
     play,
     with_rest,
 )
-from tests.helpers.scenes.cavities import box
+from tests.helpers.scenes.cavities import WEIGHTLESS, box
 from tests.helpers.scenes.fuzzed_chambers import Chamber
 
 DIAMETER = 3e-3  # m

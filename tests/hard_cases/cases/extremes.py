@@ -23,7 +23,6 @@ from tests.hard_cases.outcome import (
     DRIFT,
     LOSSLESS,
     ROUNDING,
-    WEIGHTLESS,
     Case,
     Claim,
     Outcome,
@@ -33,7 +32,14 @@ from tests.hard_cases.outcome import (
     play,
     with_rest,
 )
-from tests.helpers.scenes.cavities import FLOOR, box, box_around, cylinder, uniform_restitution
+from tests.helpers.scenes.cavities import (
+    FLOOR,
+    WEIGHTLESS,
+    box,
+    box_around,
+    cylinder,
+    uniform_restitution,
+)
 from tests.helpers.scenes.fuzzed_chambers import Chamber
 
 SIDE = 0.03  # m

@@ -18,7 +18,6 @@ from sim_core import (
 from tests.hard_cases.outcome import (
     LOSSLESS,
     ROUNDING,
-    WEIGHTLESS,
     Case,
     Claim,
     Outcome,
@@ -28,7 +27,7 @@ from tests.hard_cases.outcome import (
     play,
     refusal,
 )
-from tests.helpers.scenes.cavities import CEILING, FLOOR, box
+from tests.helpers.scenes.cavities import CEILING, FLOOR, WEIGHTLESS, box
 from tests.helpers.scenes.fuzzed_chambers import Chamber
 
 RADIUS = 1.5e-3  # m

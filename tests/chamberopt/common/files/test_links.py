@@ -14,7 +14,7 @@ from tests.hunt.command import Server, fault, fingerprint
 
 HERE = "tests.chamberopt.common.files"
 COMMANDS = (
-    "new box.stl --unit mm --out out",
+    "new box.stl --unit mm --no-pilot --out out",
     "check design.toml --out out",
     "check study.toml --out out",
     "simulate design.toml --workers 1",
