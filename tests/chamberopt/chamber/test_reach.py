@@ -185,6 +185,7 @@ def test_the_largest_ball_at_a_place_is_the_inscribed_one() -> None:
     assert against[0] == -1
 
 
+@pytest.mark.long
 def test_smaller_balls_reach_more_of_a_gear() -> None:
     chamber = build_chamber(load_design(DESIGNS / "gear.toml"))
     mesh = chamber_mesh(chamber)

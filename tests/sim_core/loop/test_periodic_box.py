@@ -271,6 +271,7 @@ def test_further_effects_work_together_with_it() -> None:
     assert energy(end) < 0.9 * energy(start)
 
 
+@pytest.mark.long
 def test_the_jit_switched_off_gives_the_same_bits() -> None:
     code = (
         "from tests.sim_core.loop.test_determinism import fingerprint;"
