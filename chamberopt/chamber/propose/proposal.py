@@ -234,8 +234,7 @@ def propose(
                 tables |= _floor_tables(floor)
                 pose = {"part.rotate_deg": f"{pose_in_words(mesh, known, placed)}: {pose_reason}"}
                 why = {**reasons, **pose, **_floor_reasons(floor)}
-                made = _checked({**tables}, why, floor, known, mesh)
-                made = replace(made, bounds=_in_shop(made.bounds, wanted.shop))
+                made = _checked({**tables}, why, floor, known, mesh, wanted.shop)
             except UnreadableError:
                 raise
             except InputError as error:
@@ -274,8 +273,7 @@ def _held(
         height = "sonotrode to ceiling; what holds the part goes on to the wall"
         reasons = {**free.reasons, "holder.kind": one.reason, "chamber.height_mm": height}
         try:
-            made = _checked(tables, reasons, floor, free.known, free.mesh)
-            made = replace(made, bounds=_in_shop(made.bounds, shop))
+            made = _checked(tables, reasons, floor, free.known, free.mesh, shop)
             for extreme in _extremes(made.bounds):
                 build_chamber(made.design.changed(extreme))
         except UnreadableError:
@@ -489,7 +487,12 @@ def _faults(made: Proposal) -> tuple[int, int]:
 
 
 def _checked(
-    tables: Tables, reasons: dict[str, str], floor: Floor, known: Sequence[Surface], mesh: PartMesh
+    tables: Tables,
+    reasons: dict[str, str],
+    floor: Floor,
+    known: Sequence[Surface],
+    mesh: PartMesh,
+    shop: Shop | None,
 ) -> Proposal:
     """Choose the mass of the balls for these values, and return the built and checked proposal.
 
@@ -501,6 +504,7 @@ def _checked(
         floor: sizes of the chamber, from which the ranges of the study follow.
         known: surfaces to choose the target from.
         mesh: the part.
+        shop: the shop in whose bounds the study stays, if it is known.
     """
     sizes = floor.sizes
     largest = max(size for key, size in tables["chamber"].items() if key.endswith("_mm"))
@@ -525,7 +529,7 @@ def _checked(
         design=design,
         tables=tables,
         reasons=reasons,
-        bounds={name: one._asdict() for name, one in ranges.items()},
+        bounds=_in_shop({name: one._asdict() for name, one in ranges.items()}, shop),
         known=tuple(known),
         mesh=mesh,
         chamber=chamber,
