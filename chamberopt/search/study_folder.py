@@ -124,6 +124,7 @@ def _exact(point: Sequence[float]) -> str:
 
 FORMAT = 1
 MAX_DIFFERENCES = 12  # in one message
+RANGES = "study.design.ranges"  # no trial depends on them
 
 
 def study_inputs(study: Study, plan: Mapping[str, object] | None = None) -> dict[str, object]:
@@ -146,7 +147,10 @@ def study_inputs(study: Study, plan: Mapping[str, object] | None = None) -> dict
 def require_same_inputs(
     folder: Path, before: Mapping[str, object], now: Mapping[str, object]
 ) -> None:
-    """Raise InputError if the inputs with which the study began, `before`, differ from `now`."""
+    """Raise InputError if the inputs with which the study began, `before`, differ from `now`.
+
+    The `[ranges]` of the design may differ: they are simulated after the last trial.
+    """
     title = f"{folder}: the study in this folder began otherwise:"
     remedy = "to resume it, restore these inputs; to run the new study, give another folder (--out)"
     _require_same(before, now, title, remedy)
@@ -171,7 +175,10 @@ def _require_same(
         title: first line of the message.
         remedy: last line of the message.
     """
-    old, new = _flatten(before), _flatten(now)
+    old, new = (
+        {name: value for name, value in _flatten(one).items() if not name.startswith(RANGES)}
+        for one in (before, now)
+    )
     changed = [
         f"{name}: was {_format(old, name)}, is {_format(new, name)}"
         for name in {**old, **new}

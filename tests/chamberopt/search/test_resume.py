@@ -364,6 +364,12 @@ class TestChanges:
         heavier = study().model_copy(update={"design": GEAR.changed({"shot.mass_g": 6.0})})
         assert "study.design.shot.mass_g: was 5.0, is 6.0" in self.refused(heavier, folder)
 
+    def test_of_ranges_alone_is_none(self, folder: Path) -> None:
+        done = calls(folder)
+        known = study().model_copy(update={"design": GEAR.changed({"ranges": {"v0": [1, 1]}})})
+        assert len(run(known, folder).trials) == len(run(study(), folder).trials)
+        assert calls(folder) > done
+
     def test_of_the_bounds(self, folder: Path) -> None:
         bounds = {**study().vary, "shot.mass_g": Varied(low=2.0, high=9.0)}
         said = self.refused(study().model_copy(update={"vary": bounds}), folder)
