@@ -93,14 +93,16 @@ def gear(subdivisions: int) -> TriangleMesh:
     return TriangleMesh(vertices, triangles, tags)
 
 
-MESHES = {
-    "cylinder-30-1k": (lambda: cylinder(0.035, 0.015, 1_000), 30),
-    "cylinder-200-1k": (lambda: cylinder(0.035, 0.04, 1_000), 200),
-    "cylinder-200-10k": (lambda: cylinder(0.035, 0.04, 10_000), 200),
-    "cylinder-200-100k": (lambda: cylinder(0.035, 0.04, 100_000), 200),
-    "wide-2000-10k": (lambda: cylinder(0.35, 0.04, 10_000), 2_000),
-    "gear-200-10k": (lambda: gear(0), 200),
-    "gear-200-100k": (lambda: gear(2), 200),
+MESHES = {  # and the balls in them: how many, and their diameter [m]
+    "cylinder-30-1k": (lambda: cylinder(0.035, 0.015, 1_000), 30, DIAMETER),
+    "cylinder-200-1k": (lambda: cylinder(0.035, 0.04, 1_000), 200, DIAMETER),
+    "cylinder-200-10k": (lambda: cylinder(0.035, 0.04, 10_000), 200, DIAMETER),
+    "cylinder-200-100k": (lambda: cylinder(0.035, 0.04, 100_000), 200, DIAMETER),
+    "wide-2000-10k": (lambda: cylinder(0.35, 0.04, 10_000), 2_000, DIAMETER),
+    "gear-200-10k": (lambda: gear(0), 200, DIAMETER),
+    "gear-200-100k": (lambda: gear(2), 200, DIAMETER),
+    "gear-363-10k": (lambda: gear(0), 363, 1.5e-3),  # the shot of its studies: 5 and 10 g
+    "gear-725-10k": (lambda: gear(0), 725, 1.5e-3),
 }
 
 
@@ -113,8 +115,8 @@ def mesh(name: str) -> TriangleMesh:
 def scene(name: str, duration: float = 1.0, seed: int = 1) -> Scene:
     """A named scene, its balls packed low with 2 m/s a component; not yet in steady state."""
     rng = np.random.default_rng(seed)
-    count = MESHES[name][1]
-    positions = pack_balls(mesh(name), count, DIAMETER, rng, clear=50e-6)
+    _, count, diameter = MESHES[name]
+    positions = pack_balls(mesh(name), count, diameter, rng, clear=50e-6)
     return Scene(
-        mesh(name), Balls(positions, rng.normal(0.0, 2.0, (count, 3)), DIAMETER), PHYSICS, duration
+        mesh(name), Balls(positions, rng.normal(0.0, 2.0, (count, 3)), diameter), PHYSICS, duration
     )

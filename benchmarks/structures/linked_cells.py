@@ -138,7 +138,7 @@ def upkeep(cells, ends, before, times, partners):  # type: ignore[no-untyped-def
     crossings, in_flight = 0, 0
     while True:
         ball = np.int64(cells.queue.winners[1])
-        time = cells.queue.next_time[ball]
+        time = cells.queue.match_time[1]
         if (
             time >= before
         ):  # what was played past the ends of flights counts as that many flights more

@@ -38,10 +38,11 @@ class EventQueue(NamedTuple):
     path_number: number of changes of the ball's path, (n,) int32.
     events: number of events of the ball in this window, (n,) int32.
     meetings: None if balls do not collide with one another.
-    next_time: the earlier of wall time and meeting time [s], (m,), padded with NEVER. m is the next
-        power of two.
-    winners: balls that win the tournament's matches, (2 m,) int32. winners[1] is the ball with the
-        next event.
+    match_time: times of the tournament [s], (2 m,). m is the next power of two. match_time[m + i]
+        is the earlier of ball i's wall time and meeting time, padded with NEVER, and
+        match_time[j] the earlier of match_time[2 j] and match_time[2 j + 1], of match j.
+    winners: the balls that these times are of, (2 m,) int32. winners[1] is the ball with the next
+        event.
     """
 
     wall_time: np.ndarray
@@ -49,7 +50,7 @@ class EventQueue(NamedTuple):
     path_number: np.ndarray
     events: np.ndarray
     meetings: Meetings | None
-    next_time: np.ndarray
+    match_time: np.ndarray
     winners: np.ndarray
 
 
@@ -61,13 +62,15 @@ def new_event_queue(balls: int, pairs: bool = True) -> EventQueue:
     leaves = 1
     while leaves < balls:
         leaves *= 2
-    next_time = np.full(leaves, NEVER)
-    next_time[:balls] = 0.0
+    match_time = np.full(2 * leaves, NEVER)
+    match_time[leaves : leaves + balls] = 0.0
     winners = np.zeros(2 * leaves, dtype=np.int32)
     winners[leaves:] = np.arange(leaves)
-    for match in range(leaves - 1, 0, -1):
-        one, two = winners[2 * match], winners[2 * match + 1]
-        winners[match] = one if next_time[one] <= next_time[two] else two
+    matches = np.arange(leaves // 2, leaves)  # the first round
+    while len(matches) and matches[0]:
+        winner = 2 * matches + (match_time[2 * matches] > match_time[2 * matches + 1])
+        match_time[matches], winners[matches] = match_time[winner], winners[winner]
+        matches = np.arange(matches[0] // 2, matches[0])
     meetings = None
     if pairs:
         nobody = np.full(balls, -1, dtype=np.int32)
@@ -78,7 +81,7 @@ def new_event_queue(balls: int, pairs: bool = True) -> EventQueue:
         path_number=np.zeros(balls, dtype=np.int32),
         events=np.zeros(balls, dtype=np.int32),
         meetings=meetings,
-        next_time=next_time,
+        match_time=match_time,
         winners=winners,
     )
 
@@ -111,15 +114,20 @@ def _shift_meetings(meetings: Meetings | None, window: float) -> None:
 def reschedule(queue: EventQueue, ball: int) -> None:
     """Note the earlier of the ball's two predicted events, and replay its tournament matches.
 
-    The earlier event wins a match, and in a tie the ball with the lower number.
+    The earlier event wins a match, and in a tie the ball with the lower number. The winner is
+    selected without a branch, because a branch would be guessed wrong every other time.
     """
-    queue.next_time[ball] = min(meeting_time(queue.meetings, ball), queue.wall_time[ball])
-    match = (len(queue.next_time) + ball) // 2
-    while match >= 1:
-        one = queue.winners[2 * match]
-        two = queue.winners[2 * match + 1]
-        queue.winners[match] = one if queue.next_time[one] <= queue.next_time[two] else two
+    times, winners = queue.match_time, queue.winners
+    match = len(times) // 2 + ball
+    time, winner = min(meeting_time(queue.meetings, ball), queue.wall_time[ball]), np.int32(ball)
+    times[match] = time
+    while match > 1:
+        other_time, other = times[match ^ 1], winners[match ^ 1]
+        loses = (other_time < time) | ((other_time == time) & (other < winner))
+        time = other_time if loses else time
+        winner = other if loses else winner
         match //= 2
+        times[match], winners[match] = time, winner
 
 
 @jit
@@ -157,5 +165,6 @@ def shift_queue(queue: EventQueue, window: float) -> None:
     _shift_meetings(queue.meetings, window)
     for ball in range(len(queue.wall_time)):
         queue.wall_time[ball] -= window
-        queue.next_time[ball] -= window
         queue.events[ball] = 0
+    for match in range(len(queue.match_time)):
+        queue.match_time[match] -= window

@@ -100,7 +100,7 @@ def advance(state: SimulationState) -> tuple[int, int]:
         # 1 next event
         left = clock.stop - clock.now[1] * clock.window
         ball = int(np.int64(queue.winners[1]))  # one integer type, so that functions compile once
-        time = queue.next_time[ball]
+        time = queue.match_time[1]
         if time >= min(left, clock.window):
             if left <= clock.window:
                 clock.now[0] = left
