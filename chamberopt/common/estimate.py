@@ -264,19 +264,41 @@ def student_quantile(freedom: float, confidence: float = CONFIDENCE) -> float:
 def paired_difference(
     after: Estimate, before: Estimate, confidence: float = CONFIDENCE
 ) -> Estimate:
-    """Return the difference after - before, from the differences of replicas with equal seeds.
+    """Return the difference after - before of two estimates whose replicas have equal seeds.
 
-    A peening chamber is chaotic, so that replicas with equal seeds hardly correlate. If they do,
-    the interval is still right. Estimates with different numbers of replicas are taken as
-    independent.
+    Where the replicas correlate, it comes from the differences of replicas with equal seeds. A
+    peening chamber is chaotic, so that they hardly do: then pairs would take half of the degrees of
+    freedom and give nothing for them, and the estimates are taken as independent.
     """
-    if not after.pseudovalues or len(after.pseudovalues) != len(before.pseudovalues):
+    if not are_pairs(after, before):
         return independent_difference(after, before, confidence)
     gaps = np.subtract(after.pseudovalues, before.pseudovalues)
     shared = sum_of_shared(((1.0, after), (-1.0, before)))
     bias = after.beyond_scatter + before.beyond_scatter
     pairs = estimate(gaps, bias=bias, confidence=confidence, shared=shared)
     return replace(pairs, value=after.value - before.value)
+
+
+def are_pairs(after: Estimate, before: Estimate) -> bool:
+    """Return True if replicas of two estimates correlate, replica by replica.
+
+    Their correlation is above 0 by a one-sided test at 5 %. In simulations with normal replicas the
+    95 % intervals of differences that follow from this choice held in 94.4 to 96 % of cases, for 3
+    to 40 replicas and correlations from 0 to 0.95 (tests/chamberopt/common/test_estimate.py).
+
+    Source: R. A. Fisher, "Frequency distribution of the values of the correlation coefficient in
+    samples from an indefinitely large population", Biometrika 10 (1915) 507.
+    """
+    n = len(after.pseudovalues)
+    if n != len(before.pseudovalues) or n < 2:
+        return False
+    one, two = (np.subtract(x.pseudovalues, np.mean(x.pseudovalues)) for x in (after, before))
+    spread = math.sqrt(float(one @ one) * float(two @ two))
+    if n == 2 or not spread:  # no correlation can be measured
+        return n == 2 or after.pseudovalues == before.pseudovalues
+    correlation = float(one @ two) / spread
+    least = student_quantile(n - 2, 0.9)  # 90 % on both sides: 95 % on one
+    return correlation > least / math.sqrt(n - 2 + least**2)
 
 
 def independent_difference(

@@ -69,11 +69,10 @@ def _legend(comparison: Comparison) -> list[str]:
         )
     for k, label in enumerate(later):
         paired = [several[k].paired for several in comparison.differences.values()]
-        if any(paired):
-            lines.append(f"{label} - {first}: paired, replica by replica on the same seeds.")
-        elif comparison.results[k + 1].seeds == comparison.results[0].seeds:
+        if comparison.results[k + 1].seeds == comparison.results[0].seeds:
             lines.append(
-                f"{label} - {first}: taken as independent, because the numbers of replicas differ."
+                f"{label} - {first}: on the same seeds. {sum(paired)} of {len(paired)} figures, "
+                "whose replicas correlate, are compared replica by replica, others as independent."
             )
         else:
             lines.append(f"{label} - {first}: independent, on other seeds.")

@@ -83,7 +83,8 @@ def figures(result: Result, start: Result | None) -> list[Figure]:
 def change(after: Estimate, before: Estimate, result: Result, start: Result) -> Estimate:
     """Return `after` - `before` with its interval: the change of a figure from start to result.
 
-    Replicas are compared pair by pair if both results have the same seeds, else as independent.
+    Replicas are compared pair by pair if both results have the same seeds and their replicas
+    correlate, else as independent.
     """
     if after == before:  # the start is the best: the change is exactly 0
         return Estimate(0.0, 0.0) if after.has_number else Estimate(0.0, 0.0).not_known("not known")

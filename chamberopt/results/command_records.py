@@ -327,7 +327,7 @@ class DifferenceRecord(Table):
 
 
     Args:
-        paired: True if replicas were compared pair by pair on the same seeds.
+        paired: True if replicas were compared pair by pair, on the same seeds, as they correlate.
         real: True if the difference is larger than its half-width.
         times_as_long: factor in simulated time with which the difference would be real.
         replicas: number of replicas with which the difference would be real.

@@ -174,8 +174,8 @@ def comparison_of(results: Sequence[Result], names: Sequence[str]) -> Comparison
 
     Raises InputError if parts, targets, windows, treatment times or calibrations differ.
 
-    Results on the same seeds are compared replica by replica. Other results are compared as
-    independent samples (Welch).
+    Results on the same seeds are compared replica by replica where their replicas correlate. Other
+    results are compared as independent samples (Welch).
     """
     first, folders = results[0], [result.folder for result in results]
     designs = [result.design for result in results]

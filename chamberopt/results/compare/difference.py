@@ -13,6 +13,7 @@ from chamberopt.common.estimate import (
     CONFIDENCE,
     ZERO_TOLERANCE,
     Estimate,
+    are_pairs,
     independent_difference,
     paired_difference,
     shared_half_width,
@@ -30,8 +31,8 @@ class Difference:
     Args:
         value: the difference.
         half_width: half-width of its interval.
-        paired: True if replicas were compared pair by pair on the same seeds. False if the samples
-            were compared as independent (Welch).
+        paired: True if replicas were compared pair by pair on the same seeds, as they correlate.
+            False if the samples were compared as independent (Welch).
         time_ratio: `replicas` divided by the number of replicas that were simulated.
         replicas: number of replicas of the later candidate that would show the difference if it is
             as large as it looks. `replicas` and `time_ratio` are None if the difference is real or
@@ -73,10 +74,11 @@ def difference(
 ) -> Difference:
     """Return the difference `after` - `before` with its interval.
 
-    Replicas are compared pair by pair if both results have the same seeds and number of replicas.
+    Replicas are compared pair by pair if both results have the same seeds and their replicas
+    correlate.
     """
     count = len(after.pseudovalues)
-    paired = same_seeds and count == len(before.pseudovalues) > 0
+    paired = same_seeds and are_pairs(after, before)
     gap = (paired_difference if paired else independent_difference)(after, before, confidence)
     found = Difference(
         0.0 if abs(gap.value) < ZERO_TOLERANCE else gap.value, gap.half_width, paired

@@ -28,6 +28,25 @@ def test_differences() -> None:
     )
 
 
+@pytest.mark.parametrize("correlation", [0.0, 0.3, 0.9])
+@pytest.mark.parametrize("replicas", [3, 8, 30])
+def test_intervals_of_differences_hold_whether_or_not_pairs_are_chosen(
+    replicas: int, correlation: float
+) -> None:
+    rng, tries, held, width, of_pairs = np.random.default_rng(replicas), 1000, 0, 0.0, 0.0
+    for _ in range(tries):
+        one, own = rng.normal(size=(2, replicas))
+        two = correlation * one + math.sqrt(1.0 - correlation**2) * own
+        gap = paired_difference(estimate(one), estimate(two))
+        held += abs(gap.value) <= gap.half_width
+        width, of_pairs = width + gap.half_width, of_pairs + estimate(one - two).half_width
+    assert 0.93 <= held / tries <= 0.98
+    if not correlation:
+        assert width < 0.995 * of_pairs
+    if correlation * replicas > 8:
+        assert width < 1.1 * of_pairs  # as taken independent it would be three times as wide
+
+
 def test_value_stays_in_its_range_and_one_replica_has_no_interval() -> None:
     assert estimate([1.02, 1.01, 1.03], 0.0, 1.0).value == 1.0
     assert estimate([0.5], 0.0, 1.0).half_width == np.inf

@@ -114,7 +114,7 @@ def test_what_is_made_of_a_clipped_value_agrees_with_its_interval() -> None:
     goal = weighted_sum(OBJECTIVES["uniform_coverage"], metrics)
     assert goal.value == pytest.approx(0.75 - 0.5)
     assert np.mean(goal.pseudovalues) == pytest.approx(goal.value)
-    gain = paired_difference(goal, estimate([0.1, 0.12, 0.11]))
+    gain = paired_difference(goal, estimate(0.5 * np.array(goal.pseudovalues)))
     assert np.mean(gain.pseudovalues) == pytest.approx(gain.value)
 
 

@@ -90,7 +90,7 @@ def test_designs_of_one_name_on_the_draws_of_the_first(
     instead = "seed = 7 instead of 1 and 5 replicas instead of as many as give ± 0.01"
     assert remarks == [f"b/plate: {instead}, as the first candidate"]
     assert set(compared.parameters) == {"shot.mass_g"}
-    assert all(gap.paired for (gap,) in compared.differences.values())
+    assert compared.results[0].seeds == compared.results[1].seeds
     # What was simulated can be inspected after, and simulated again from its own file.
     for name in ("plate", "plate-2"):
         result = load_result(tmp_path / "out" / name)
@@ -119,7 +119,7 @@ def test_a_design_against_a_confirmed_result(
         6,
     )
     assert "p05_coverage" in compared.differences
-    assert compared.differences["mean_coverage"][0].paired
+    assert compared.results[0].seeds == compared.results[1].seeds
 
 
 def test_another_treatment_time_is_simulated_again_on_its_own_seeds(
