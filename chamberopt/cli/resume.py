@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import shlex
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,15 +15,23 @@ if TYPE_CHECKING:
     from chamberopt.search.study_folder import StudyFolder
 
 
-def resume_command(study: Path, folder: Path, plan: Mapping[str, object] | None = None) -> str:
+def resume_command(
+    study: Path,
+    folder: Path,
+    plan: Mapping[str, object] | None = None,
+    options: Sequence[object] = (),
+) -> str:
     """Return the command line that resumes a study or sweep in `folder`, quoted for a shell.
 
-    `plan` has the method, count and seed of a sweep. It is None for a study.
+    Args:
+        plan: the method, count and seed of a sweep; None for a study.
+        options: further options with which the study was begun.
     """
     if plan is None:
-        return quoted("run", study, "--out", folder)
+        return quoted("run", study, *options, "--out", folder)
     seed = () if plan["seed"] is None else ("--seed", plan["seed"])
-    return quoted("sweep", study, f"--{plan['method']}", plan["count"], *seed, "--out", folder)
+    method = f"--{plan['method']}", plan["count"], *seed
+    return quoted("sweep", study, *method, *options, "--out", folder)
 
 
 def quoted(*words: object) -> str:

@@ -7,7 +7,17 @@ from pathlib import Path
 
 from chamberopt.cli import console
 from chamberopt.cli.interrupt import Interrupt
-from chamberopt.cli.options import Cluster, Json, Resumable, Workers, app
+from chamberopt.cli.options import (
+    Accuracy,
+    Cluster,
+    Json,
+    Resumable,
+    TreatmentTime,
+    Workers,
+    app,
+    as_options,
+    given_values,
+)
 from chamberopt.cli.resume import quoted, resume_command, resume_note, unfinished
 
 
@@ -16,6 +26,9 @@ def run(
     study: Path,
     /,
     *,
+    evaluations: int | None = None,
+    accuracy: Accuracy = None,
+    time: TreatmentTime = None,
     ranges: bool = True,
     workers: Workers = None,
     cluster: Cluster = None,
@@ -31,6 +44,9 @@ def run(
     ----------
     study
         Study file (.toml).
+    evaluations
+        What the search may simulate, in candidates, in the place of the file's
+        optimizer.evaluations.
     ranges
         At the end also simulate start, best and runner-up at the ends of what is not calibrated
         (friction, v0, slopes of faces), and say whether the best stays best.
@@ -44,7 +60,8 @@ def run(
         from chamberopt.search.study_folder import open_study_folder
         from chamberopt.workflows.optimise import optimise_study
 
-        loaded = load_study(study)
+        values = given_values(accuracy, time, evaluations)
+        loaded = load_study(study, values)
         if out is None:
             console.print_remarks(unfinished(study, study.stem))
         claim = partial(open_study_folder, loaded)
@@ -53,7 +70,7 @@ def run(
                 line = f"best design: {summary(load_result(folder.path))}"
                 console.print_finished(folder.path, "study", [line], json)
                 return
-            command = resume_command(study, folder.path)
+            command = resume_command(study, folder.path, options=as_options(values))
             with resume_note(folder, command), open_executor(workers, cluster) as executor:
                 teller = SearchTeller(interrupt, f"to resume: {command}")
                 done = optimise_study(folder, executor, teller, lambda: interrupt.requested, ranges)

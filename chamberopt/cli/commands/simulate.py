@@ -5,7 +5,16 @@ from __future__ import annotations
 from pathlib import Path
 
 from chamberopt.cli import console
-from chamberopt.cli.options import Cluster, Json, Out, Workers, app
+from chamberopt.cli.options import (
+    Accuracy,
+    Cluster,
+    Json,
+    Out,
+    TreatmentTime,
+    Workers,
+    app,
+    given_values,
+)
 
 
 @app.command
@@ -13,6 +22,8 @@ def simulate(
     design: Path,
     /,
     *,
+    accuracy: Accuracy = None,
+    time: TreatmentTime = None,
     analytic: bool = False,
     tolerances: bool = False,
     ranges: bool = True,
@@ -46,6 +57,8 @@ def simulate(
     from chamberopt.workflows.simulate import SimulationSettings, simulate_design
 
     candidate = load_design(design)
+    if values := given_values(accuracy, time):
+        candidate = candidate.changed(values)
     if tolerances:
         plan_tolerances(candidate)  # reports wrong tolerances before the work begins
     elif candidate.tolerances:

@@ -6,7 +6,17 @@ from functools import partial
 from pathlib import Path
 
 from chamberopt.cli import console
-from chamberopt.cli.options import Cluster, Json, Resumable, Workers, app
+from chamberopt.cli.options import (
+    Accuracy,
+    Cluster,
+    Json,
+    Resumable,
+    TreatmentTime,
+    Workers,
+    app,
+    as_options,
+    given_values,
+)
 from chamberopt.cli.resume import resume_command, resume_note, unfinished
 
 
@@ -18,6 +28,8 @@ def sweep(
     grid: int | None = None,
     sobol: int | None = None,
     seed: int | None = None,
+    accuracy: Accuracy = None,
+    time: TreatmentTime = None,
     workers: Workers = None,
     cluster: Cluster = None,
     json: Json = False,
@@ -48,7 +60,8 @@ def sweep(
     from chamberopt.search.study_folder import open_study_folder
     from chamberopt.workflows.optimise import sweep_study
 
-    loaded = load_study(study)
+    values = given_values(accuracy, time)
+    loaded = load_study(study, values)
     plan = plan_sweep(loaded, grid, sobol, seed)
     name = f"{study.stem}-sweep"
     if out is None:
@@ -58,7 +71,8 @@ def sweep(
         if folder.finished:
             console.print_finished(folder.path, "sweep", [], json)
             return
-        with resume_note(folder, resume_command(study, folder.path, plan.as_json())):
+        command = resume_command(study, folder.path, plan.as_json(), as_options(values))
+        with resume_note(folder, command):
             done = sweep_study(folder, plan, TerminalTeller(), workers, cluster)
     console.print_remarks(done.remarks)
     notes = [*map(str, done.advice)]

@@ -15,18 +15,24 @@ from chamberopt.design.load import is_study, load_design, read_toml
 from chamberopt.search.study.parameters import Varied
 from chamberopt.search.study.schema import Study
 
+OF_STUDY = "optimizer."  # how names of a study's own values begin
 
-def load_study(path: str | Path) -> Study:
+
+def load_study(path: str | Path, values: Mapping[str, Any] | None = None) -> Study:
     """Load a study file and the design that it names.
 
     Raises InputError with every problem of both files, each with its file and line.
+
+    Args:
+        values: values in the place of those of the files, by dotted name: of the study's
+            [optimizer], and of the design.
     """
     path = Path(path)
     source, data = read_toml(path, "study")
     if not is_study(data):
         text = "this is a design file; a study file is wanted: one with design = ... and [vary]"
         raise InputError(f"{path}: {text}")
-    return _study(path, source, data)
+    return _study(path, source, data, values)
 
 
 def load(path: str | Path) -> Design | Study:
@@ -39,7 +45,9 @@ def load(path: str | Path) -> Design | Study:
     return _study(path, source, data) if is_study(data) else validate(Design, data, path, source)
 
 
-def _study(path: Path, source: str, data: dict[str, object]) -> Study:
+def _study(
+    path: Path, source: str, data: dict[str, object], values: Mapping[str, Any] | None = None
+) -> Study:
     named = data.get("design")
     if not isinstance(named, str):
         given = "missing" if named is None else f"given {named!r}"
@@ -56,6 +64,14 @@ def _study(path: Path, source: str, data: dict[str, object]) -> Study:
         problem = Problem("design", f"given {named!r}, which cannot be used:")
         lines = [toml_errors.format_problems([problem], path, source), str(error)]
         raise InputError("\n".join([*lines, *_other_problems(data, path, source)])) from None
+    values = values or {}
+    if of_design := {k: v for k, v in values.items() if not k.startswith(OF_STUDY)}:
+        design = design.changed(of_design)
+    if of_study := {k: v for k, v in values.items() if k.startswith(OF_STUDY)}:
+        table = data.get("optimizer") or {}
+        if isinstance(table, Mapping):
+            own = {name.removeprefix(OF_STUDY): value for name, value in of_study.items()}
+            data = {**data, "optimizer": {**table, **own}}
     return validate(Study, {**data, "design": design}, path, source)
 
 

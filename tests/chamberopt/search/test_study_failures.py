@@ -229,17 +229,21 @@ class TestCommandLine:
     ) -> None:
         self.at[3] = lambda: os.kill(os.getpid(), signal.SIGINT)
         before = signal.getsignal(signal.SIGINT)
-        assert main(["run", "small.toml", "--out", "out"]) == 130
+        assert main(["run", "small.toml", "--evaluations", "4", "--time=1m", "--out", "out"]) == 130
         err = capfd.readouterr().err
         assert FIRST in err
-        assert err.splitlines()[-1] == "to resume: chamberopt run small.toml --out out"
+        resume = "chamberopt run small.toml --time 60s --evaluations 4 --out out"
+        assert err.splitlines()[-1] == f"to resume: {resume}"
         assert (self.rows(), len(evaluated)) == (3, 3)
         assert signal.getsignal(signal.SIGINT) is before
-        assert main(["run", "small.toml", "--out", "out"]) == 0
+        assert main(["run", "small.toml", "--out", "out"]) == 2  # not what was begun
+        assert main(resume.split()[1:]) == 0
         out, err = capfd.readouterr()
         assert "out: resuming after 3 evaluations" in err
         assert "gain" in out
-        assert len(evaluated) == len(set(evaluated)) == self.rows() == ROWS
+        assert len(evaluated) == len(set(evaluated)) == self.rows() == ROWS - 1
+        ran = load_study("out/study.toml")
+        assert (ran.optimizer.evaluations, ran.design.process.treatment_time) == (4, 60.0)
 
     def test_ctrl_c_finishes_all_that_runs(self, evaluated: list) -> None:
         """The third and the fourth run when it comes, and the third ends last."""
