@@ -12,6 +12,7 @@ import pytest
 
 from benchmarks.scenes import DIAMETER, PHYSICS, cylinder, scene
 from sim_core import Balls, Physics, Scene, SceneError, SimulationError, SimulationResult, simulate
+from sim_core.effects.amplitude_profile import shares_at
 from sim_core.geometry.flat_faces import SurfaceTriangles, surface_triangles
 from sim_core.geometry.sonotrode_border import SonotrodeBorder, find_border
 from sim_core.loop.simulate import Simulation
@@ -50,7 +51,8 @@ class Record:
 def height_at(chamber: Chamber, points: np.ndarray, time: np.ndarray) -> np.ndarray:
     """Height (n,) [m] of points (n, 3) [m] above the nearest sonotrode at time (n,) [s].
 
-    Sonotrodes are planes here. With a random phase they are taken at their lowest.
+    Sonotrodes are planes here, each place of which swings by its share of the amplitude. With a
+    random phase they are taken at their lowest.
     """
     mesh, height = chamber.mesh, np.full(len(points), np.inf)
     for vibration in chamber.physics.vibrations:
@@ -60,6 +62,8 @@ def height_at(chamber: Chamber, points: np.ndarray, time: np.ndarray) -> np.ndar
         )
         if chamber.physics.random_phase is not None:
             shift = np.full(len(points), -vibration.amplitude)
+        else:
+            shift = shift * shares_at(vibration, points)
         height = np.minimum(
             height, (points - mesh.corners[mesh.tags == vibration.tag][0, 0]) @ axis - shift
         )
