@@ -1,17 +1,20 @@
-"""Checked files of compiled code.
+"""Checked files of compiled code, which processes make one at a time.
 
 A damaged file would run as it is, or end in a traceback each time, because numba does not check its
-files.
+files. Two processes that compile the same would do the work twice, and two that save code of one
+function at once could save it under each other's name.
 """
 
 import io
 import os
 import sys
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from functools import cache
 from hashlib import sha256
 from pathlib import Path
+from typing import BinaryIO
 
 from numba.core.caching import (
     CompileResultCacheImpl,
@@ -20,7 +23,11 @@ from numba.core.caching import (
     UserProvidedCacheLocator,
 )
 
+if sys.platform != "win32":
+    import fcntl
+
 DIGEST_BYTES = 32
+MAX_WAIT_S = 60.0  # for a process that compiles the same; it may have been stopped
 
 
 class _InChosenFolder(CompileResultCacheImpl):
@@ -61,9 +68,60 @@ class CheckedCache(FunctionCache):
         super().__init__(function)
         self._cache_file.__class__ = _CheckedFiles
 
+    def load_overload(self, sig: object, target_context: object) -> object:
+        """Load compiled code. While another process compiles it, wait."""
+        found = super().load_overload(sig, target_context)
+        if found is None:  # until it is saved, others wait
+            self._lock(sig)
+            found = super().load_overload(sig, target_context)
+            if found is not None:
+                self._unlock(sig)
+        return found
+
     def save_overload(self, sig: object, data: object) -> None:
+        self._lock()
         with suppress(OSError):  # such as a full disk: every process compiles for itself
             super().save_overload(sig, data)
+        self._unlock()
+        self._unlock(sig)
+
+    def _lock(self, sig: object = None) -> None:
+        """Lock the code of a signature, or without one the index of the function's code.
+
+        After MAX_WAIT_S the process goes on without the lock.
+        """
+        file, until = _lock_file(self._cache_file._cache_path), time.monotonic() + MAX_WAIT_S
+        while file is not None and time.monotonic() < until:
+            try:
+                fcntl.lockf(file, fcntl.LOCK_EX | fcntl.LOCK_NB, 1, self._byte(sig))
+            except (BlockingIOError, PermissionError):  # another process has it
+                time.sleep(0.02)
+            except OSError:  # such as a file system without locks
+                return
+            else:
+                return
+
+    def _unlock(self, sig: object = None) -> None:
+        file = _lock_file(self._cache_file._cache_path)
+        if file is not None:
+            with suppress(OSError):
+                fcntl.lockf(file, fcntl.LOCK_UN, 1, self._byte(sig))
+
+    def _byte(self, sig: object) -> int:
+        """Place in the file of locks that belongs to the function and the signature."""
+        name = f"{self._cache_file._index_path} {sig}"
+        return int.from_bytes(sha256(name.encode()).digest()[:7], "big")
+
+
+@cache
+def _lock_file(folder: str) -> BinaryIO | None:
+    """Open the empty file whose bytes are locked. None without locks, and in a removed folder."""
+    if sys.platform == "win32":
+        return None
+    try:
+        return open(Path(folder, "locks"), "ab")
+    except OSError:
+        return None
 
 
 def is_private(folder: Path) -> bool:
