@@ -1,6 +1,7 @@
 """Impacts without a simulation, and parts of which the answer is known."""
 
 from collections.abc import Sequence
+from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -159,11 +160,16 @@ def no_hits() -> Hits:
     return Hits(np.zeros(0, np.int32), np.zeros((0, 3), np.float32), *np.zeros((4, 0), np.float32))
 
 
+@cache
+def _metrics_of_the_plate() -> tuple[str, ...]:
+    return tuple(metric_names(plate_design()))
+
+
 def judged(objective: np.ndarray, **metrics: float) -> Evaluation:
     """An evaluation whose replicas have these objectives; metrics given are exact, the others 0."""
     exact = {
         name: Estimate(metrics.get(name, 0.0), 0.0, (metrics.get(name, 0.0),) * 3)
-        for name in {*metric_names(plate_design()), *metrics}
+        for name in {*_metrics_of_the_plate(), *metrics}
     }
     count = len(objective)
     return Evaluation(

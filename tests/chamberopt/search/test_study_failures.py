@@ -22,11 +22,12 @@ from chamberopt.chamber.build import build_chamber
 from chamberopt.cli import main
 from chamberopt.cli.interrupt import EARLY, FIRST, SECOND
 from chamberopt.common.estimate import Estimate
+from chamberopt.design.load import save_design
 from chamberopt.results.load import load_result
 from chamberopt.search.judge import FAILURE_PENALTY
 from chamberopt.search.study import load_study
 from tests.helpers.results.resumable_study import calls, history, logged, run, study
-from tests.helpers.synthetic import DESIGNS, plate_design, poisson_evaluation
+from tests.helpers.synthetic import plate_design, poisson_evaluation
 
 fork = (
     multiprocessing.get_context("fork")
@@ -178,8 +179,8 @@ class TestWorkerThatDies:
         assert history(folder) == expected
 
 
-STUDY = f"""
-design = "{(DESIGNS / "plate.toml").as_posix()}"
+STUDY = """
+design = "plate.toml"
 [vary]
 "shot.mass_g" = [1.5, 8.0]
 [optimizer]
@@ -204,7 +205,9 @@ class TestCommandLine:
         """
         monkeypatch.chdir(tmp_path)
         Path("small.toml").write_text(STUDY)
-        chamber = build_chamber(plate_design())
+        plate = plate_design(process__accuracy__points=1000)
+        save_design(plate, Path("plate.toml"))
+        chamber = build_chamber(plate)
         done: list = []
 
         def simulator(design, stream, replicas):
@@ -218,7 +221,7 @@ class TestCommandLine:
         monkeypatch.setattr("chamberopt.search.run_study.ChamberSimulator", lambda *_: simulator)
         monkeypatch.setattr("chamberopt.workflows.optimise.study_ranges", lambda *_: None)
         monkeypatch.setattr("chamberopt.cli.teller.compile_with_message", lambda *_: None)
-        monkeypatch.setattr("chamberopt.pictures.coverage.draw_coverage", lambda *_: None)
+        monkeypatch.setattr("chamberopt.workflows.save_run.draw_coverage", lambda *_: None)
         return done
 
     def rows(self, folder: str = "out") -> int:
