@@ -18,8 +18,10 @@ import pytest
 
 from chamberopt.cli import main
 from chamberopt.common.progress import step
+from tests.helpers.opengl import needs_opengl
 
 ROOT = Path(__file__).resolve().parents[3]
+NO_OPENGL = "chamberopt.pictures.subprocess_drawing.missing_opengl"
 
 
 @dataclass(frozen=True)
@@ -446,14 +448,14 @@ class TestWhole:
     def small(self, copies: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         """The folder with small copies of the plate's design and study, as the working folder."""
         monkeypatch.chdir(copies)
+        monkeypatch.setattr(NO_OPENGL, lambda: "not in this test")
         design = Path("designs/plate.toml")
         text = design.read_text(encoding="utf-8")
         for line in ("replicas = 8", "simulated_time_s = 4.0", "warmup_time_s = 0.2"):
             assert line in text
         text = text.replace("replicas = 8", "replicas = 3").replace("time_s = 4.0", "time_s = 0.05")
-        design.write_text(
-            text.replace("warmup_time_s = 0.2", "warmup_time_s = 0.01"), encoding="utf-8"
-        )
+        text = text.replace("warmup_time_s = 0.2", "warmup_time_s = 0.01")
+        design.write_text(f"{text}points = 1000\n", encoding="utf-8")
         study = "[optimizer]\nevaluations = 3\nconfirm = 1\nconfirm_replicas = 3\n"
         study += '[vary]\n"shot.mass_g" = [2, 5]\n'
         Path("studies/small.toml").write_text(
@@ -485,12 +487,7 @@ class TestWhole:
         assert compared["differences_to_first"]["mean_coverage"][0]["value"] == 0.0
         assert Path(compared["folder"], "compare.txt").is_file()
 
-    def test_compare_simulates_designs_on_common_seeds(
-        self, small: Path, chamberopt: Said, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
-        monkeypatch.setattr(
-            "chamberopt.pictures.subprocess_drawing.missing_opengl", lambda: "not in this test"
-        )
+    def test_compare_simulates_designs_on_common_seeds(self, small: Path, chamberopt: Said) -> None:
         text = Path("designs/plate.toml").read_text(encoding="utf-8")
         heavier = text.replace("mass_g = 3.308", "mass_g = 9.9").replace("seed = 1", "seed = 5")
         Path("designs/heavier.toml").write_text(heavier, encoding="utf-8")
@@ -537,12 +534,10 @@ class TestWhole:
         assert "the part reaches into the cavity" in err
         assert not Path("results/gear").exists()
 
+    @needs_opengl
     @pytest.mark.long
-    def test_inspect(self, small: Path, chamberopt: Said) -> None:
-        from chamberopt.pictures.subprocess_drawing import missing_opengl
-
-        if missing_opengl():
-            pytest.skip(missing_opengl() or "")
+    def test_inspect(self, small: Path, chamberopt: Said, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setattr(NO_OPENGL, lambda: None)
         assert chamberopt("simulate", "designs/plate.toml", "--no-ranges")[0] == 0
         status, out, _ = chamberopt("inspect", "results/plate", "--screenshot", "look.png")
         assert (status, out.splitlines()[-1]) == (0, "picture in look.png")
