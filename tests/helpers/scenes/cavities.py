@@ -22,6 +22,15 @@ def tagged(vertices: np.ndarray, triangles: np.ndarray) -> TriangleMesh:
     return TriangleMesh(vertices, triangles, tags)
 
 
+def uniform_restitution(c0: float, v0: float, elastic_below: float = ELASTIC_BELOW) -> Restitution:
+    """The same restitution (C0, v0) of all three surfaces and of ball on ball."""
+    return Restitution(((c0, v0),) * 3, (c0, v0), elastic_below)
+
+
+# the same bits as without a law, and the same machine code as with losses; for up to eight tags
+ELASTIC = Restitution(((1.0, 1e9),) * 8, (1.0, 1e9))
+
+
 def box(
     sides: tuple[float, float, float], centre: tuple[float, float, float] | None = None
 ) -> TriangleMesh:
@@ -57,8 +66,3 @@ def box_around(obstacle: trimesh.Trimesh, half: float) -> TriangleMesh:
 def balls_at(positions: np.ndarray, diameter: float = 3e-3) -> Balls:
     """Balls at rest."""
     return Balls(positions, np.zeros_like(positions, dtype=float), diameter)
-
-
-def uniform_restitution(c0: float, v0: float, elastic_below: float = ELASTIC_BELOW) -> Restitution:
-    """The same restitution (C0, v0) of all three surfaces and of ball on ball."""
-    return Restitution(((c0, v0),) * 3, (c0, v0), elastic_below)

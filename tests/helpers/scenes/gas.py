@@ -13,7 +13,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from sim_core import Balls, Physics, Scene, SimulationResult, TriangleMesh, simulate
-from tests.helpers.scenes.cavities import box
+from tests.helpers.scenes.cavities import WEIGHTLESS, box
 
 DIAMETER = 1e-3  # m
 SPEED = 1.0  # m/s, of every ball at the start
@@ -64,10 +64,10 @@ def played(
     """
     duration = collisions / enskog_rate(carnahan_starling(gas.packing), gas.kt)
     balls = simulate(
-        Scene(gas.room, gas.balls, Physics(), 100.0 * duration / collisions, record=())
+        Scene(gas.room, gas.balls, Physics(WEIGHTLESS), 100.0 * duration / collisions, record=())
     ).balls
     for _ in range(pieces):
-        result = simulate(Scene(gas.room, balls, Physics(), duration, record=record))
+        result = simulate(Scene(gas.room, balls, Physics(WEIGHTLESS), duration, record=record))
         balls = result.balls
         yield result, duration
 

@@ -51,6 +51,11 @@ def mixture(
     return Balls(places, rng.normal(0.0, 3.0, (len(which), 3)), diameter, density)
 
 
+def logged(room: TriangleMesh, balls: Balls, gravity: Gravity, duration: float) -> Scene:
+    """Elastic balls, with a log of collisions: the same machine code as in test_collision_log."""
+    return Scene(room, balls, Physics(gravity), duration, record_collisions=True)
+
+
 def test_two_unequal_balls_collide_as_momentum_and_energy_say() -> None:
     """Head on: v1' = ((m1 - m2) v1 + 2 m2 v2) / (m1 + m2) when elastic; they meet when r1 + r2
     apart.
@@ -63,7 +68,7 @@ def test_two_unequal_balls_collide_as_momentum_and_energy_say() -> None:
         np.array([3e-3, 1e-3]),
         np.array([7800.0, 15e3]),
     )
-    after = simulate(Scene(room, balls, Physics(WEIGHTLESS), 0.025)).balls
+    after = simulate(logged(room, balls, WEIGHTLESS, 0.025)).balls
     m, n = balls.masses
     expected = [
         ((m - n) * 1.0 + 2.0 * n * -2.0) / (m + n),
@@ -108,11 +113,11 @@ def test_energy_is_shared_out_evenly_between_the_sizes() -> None:
     room = box((0.03, 0.03, 0.03))
     balls = mixture(room, (30, 30, 30), 4)
     assert balls.masses.max() / balls.masses.min() > 5.0
-    balls = simulate(Scene(room, balls, Physics(WEIGHTLESS), 2.0, record=())).balls
+    balls = simulate(logged(room, balls, WEIGHTLESS, 2.0)).balls
     which = [balls.diameters == size for size in SIZES]
     samples = []
     for _ in range(300):
-        balls = simulate(Scene(room, balls, Physics(WEIGHTLESS), 0.03, record=())).balls
+        balls = simulate(logged(room, balls, WEIGHTLESS, 0.03)).balls
         each = balls.masses * (balls.velocities**2).sum(axis=1)
         samples.append([each[own].mean() for own in which])
     rows = np.array(samples) / np.mean(samples)
@@ -133,7 +138,7 @@ def test_every_size_touches_at_its_own_radius(name: str) -> None:
     )
     room = cylinder(0.02, 0.02, sections=12) if name == "slanted walls" else box_around(cube, 0.015)
     start = mixture(room, (20, 20, 20), 5)
-    log = simulate(Scene(room, start, Physics(Gravity()), 0.3)).impacts
+    log = simulate(logged(room, start, Gravity(), 0.3)).impacts
     radius = 0.5 * start.diameters[log.ball]
     for size in SIZES:
         own = np.flatnonzero(radius == 0.5 * size)[:400]
@@ -148,13 +153,14 @@ def test_each_ball_of_a_mixture_flies_as_it_does_alone() -> None:
     """
     room = cylinder(0.012, 0.02, sections=12)
     physics = Physics(Gravity(), uniform_restitution(0.9, 0.7), Vibration(FLOOR, 25e-6, 20e3, 0.3))
-    physics = physics._replace(ball_collisions=None)
+    by_itself, physics = physics, physics._replace(ball_collisions=None)
     balls = mixture(room, (4, 4, 4), 10, clear=50e-6)
     together = simulate(Scene(room, balls, physics, 0.2))
     for ball in range(len(balls)):
         diameter, density = float(balls.diameters[ball]), float(balls.densities[ball])
         one = Balls(balls.positions[[ball]], balls.velocities[[ball]], diameter, density)
-        alone, own = simulate(Scene(room, one, physics, 0.2)), together.impacts.ball == ball
+        alone = simulate(Scene(room, one, by_itself, 0.2))
+        own = together.impacts.ball == ball
         np.testing.assert_array_equal(together.impacts.position[own], alone.impacts.position)
         np.testing.assert_array_equal(together.impacts.triangle[own], alone.impacts.triangle)
         assert (together.balls.velocities[ball] == alone.balls.velocities[0]).all()
@@ -192,7 +198,7 @@ def test_many_balls_in_blocks_meet_as_few_do() -> None:
 
 def test_same_scene_same_bits_and_equal_numbers_are_one() -> None:
     room = cylinder(0.015, 0.02, sections=12)
-    scene = Scene(room, mixture(room, (10, 10, 10), 8), Physics(Gravity()), 0.3)
+    scene = logged(room, mixture(room, (10, 10, 10), 8), Gravity(), 0.3)
     with ThreadPoolExecutor(4) as pool:
         assert len({fingerprint(result) for result in pool.map(simulate, [scene] * 4)}) == 1
     one = Balls(np.full((1, 3), 0.01), np.zeros((1, 3)), 1e-3)

@@ -29,7 +29,7 @@ from sim_core.effects.vibration import checked_waves
 from sim_core.loop import compile_ahead
 from sim_core.loop.simulate import Simulation
 from sim_core.motion import WINDOW
-from tests.helpers.scenes.cavities import CEILING, FLOOR, SIDES, WEIGHTLESS, balls_at, box
+from tests.helpers.scenes.cavities import CEILING, ELASTIC, FLOOR, SIDES, WEIGHTLESS, balls_at, box
 from tests.sim_core.geometry.test_sonotrode_border import trough
 
 LAW = (0.9, 1.0)
@@ -151,7 +151,7 @@ def test_a_vibrating_wall_beyond_does_not_hide_the_face_a_ball_comes_down_on(
     start = Balls(np.array([[0.026, 0.02, 1.5e-3 - 10e-6]]), np.array([[-3.3, 0.0, 0.6]]), 3e-3)
     floor = LOW._replace(phase=phase)
     plates = (floor, ACROSS._replace(tag=wall)) if wall != FLOOR else floor
-    physics = Physics(Gravity(0.0, 0.0, -500.0), None, plates)  # type: ignore[arg-type]
+    physics = Physics(Gravity(0.0, 0.0, -500.0), ELASTIC, plates)  # type: ignore[arg-type]
     log = simulate(Scene(room, start, physics, 0.004)).impacts
     assert room.tags[log.triangle].tolist() == [FLOOR, wall]
     assert log.time[0] == pytest.approx(2 * 0.6 / 500, rel=0.05)
@@ -239,7 +239,7 @@ def test_two_that_meet_in_a_blunt_edge_are_refused(blunt: float) -> None:
         SceneError, match=r"vibrating triangles \d+ and \d+, of tags (1 and 3|3 and 1), meet"
     ):
         simulate(Scene(two_faced(blunt), ball, Physics(vibration=plates), 0.01))
-    simulate(Scene(two_faced(20.0), ball, Physics(WEIGHTLESS, None, plates), 0.01))
+    simulate(Scene(two_faced(20.0), ball, Physics(WEIGHTLESS, ELASTIC, plates), 0.01))
 
 
 def test_a_ball_inside_one_of_them_is_named_with_its_tag() -> None:

@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 
 from sim_core import Balls, Gravity, ImpactLog, Physics, Scene, TriangleMesh, Vibration, simulate
 from sim_core.effects.gravity import STANDARD
-from tests.helpers.scenes.cavities import CEILING, FLOOR, SIDES, WEIGHTLESS, box
+from tests.helpers.scenes.cavities import CEILING, ELASTIC, FLOOR, SIDES, WEIGHTLESS, box
 from tests.sim_core.geometry.test_sonotrode_border import trough
 
 R = 1.5e-3  # m
@@ -83,7 +83,7 @@ def next_hit(
 def box_log(plates: tuple[Vibration, ...], duration: float, g: float, v: float = 1.0) -> ImpactLog:
     room = box((0.03, 0.03, TOP))
     ball = Balls(np.array([[0.011, 0.013, 0.008]]), np.array([[0.0, 0.0, v]]), 2 * R)
-    return simulate(Scene(room, ball, Physics(Gravity(z=-g), vibration=plates), duration)).impacts
+    return simulate(Scene(room, ball, Physics(Gravity(z=-g), ELASTIC, plates), duration)).impacts
 
 
 def plates_hit(log: ImpactLog, room: TriangleMesh) -> np.ndarray:
@@ -148,7 +148,7 @@ def test_the_same_chamber_upside_down_gives_the_same_upside_down() -> None:
             Scene(
                 room,
                 Balls(turn * places, turn * speeds, 2 * R),
-                Physics(WEIGHTLESS, None, plates),
+                Physics(WEIGHTLESS, ELASTIC, plates),
                 0.3,
             )
         )
@@ -167,7 +167,7 @@ def test_a_wall_that_goes_to_and_fro_gives_its_own_speed_along_its_own_axis() ->
     sides = Vibration(SIDES, 15e-6, 23.1e3, 1.0, EAST)
     room = box((0.03, 0.03, TOP))
     ball = Balls(np.array([[0.011, 0.013, 0.008]]), np.array([[1.3, 0.0, 0.9]]), 2 * R)
-    log = simulate(Scene(room, ball, Physics(WEIGHTLESS, None, (STRONG[0], sides)), 1.0)).impacts
+    log = simulate(Scene(room, ball, Physics(WEIGHTLESS, ELASTIC, (STRONG[0], sides)), 1.0)).impacts
     tags = room.tags[log.triangle]
     assert {FLOOR, CEILING, SIDES} <= set(tags.tolist())
     velocity = np.array([1.3, 0.0, 0.9])
@@ -204,7 +204,7 @@ def test_two_faces_in_one_plane_are_hit_at_their_own_times(first: int) -> None:
         2 * R,
     )
     log = simulate(
-        Scene(room, ball, Physics(WEIGHTLESS, None, (plates[first], plates[1 - first])), 0.005)
+        Scene(room, ball, Physics(WEIGHTLESS, ELASTIC, (plates[first], plates[1 - first])), 0.005)
     ).impacts
     for k, plate in enumerate(plates):
         own = log.ball == k

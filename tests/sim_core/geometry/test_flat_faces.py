@@ -15,7 +15,7 @@ from sim_core.geometry.flat_faces import LONE, FlatFaces, cover_with_quadrangles
 from sim_core.geometry.obstacle_set import ObstacleSet, build_obstacle_set
 from sim_core.numerics.vec3 import Flight, Vec3
 from sim_core.scene.invariants import clearance, contained
-from tests.helpers.scenes.cavities import CEILING, box_around, cylinder
+from tests.helpers.scenes.cavities import CEILING, WEIGHTLESS, box_around, cylinder
 
 RADIUS = 1.5e-3
 
@@ -92,7 +92,7 @@ def test_a_hit_on_a_flat_is_booked_on_the_triangle_under_the_ball() -> None:
     logs = []
     for place in places_for_a_ball(room, 300, rng):
         ball = Balls(place[None], rng.normal(0.0, 3.0, (1, 3)), 2 * RADIUS)
-        logs.append(simulate(Scene(room, ball, Physics(), duration=0.03)).impacts)
+        logs.append(simulate(Scene(room, ball, Physics(WEIGHTLESS), duration=0.03)).impacts)
     triangle = np.concatenate([log.triangle for log in logs])
     centre = np.concatenate([log.position for log in logs])
     gap = [

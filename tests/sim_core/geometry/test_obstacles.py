@@ -6,7 +6,7 @@ import trimesh
 from sim_core import Balls, Physics, Scene, simulate
 from sim_core.geometry.obstacle_set import build_obstacle_set
 from sim_core.geometry.obstacles import CAPSULE, FACE
-from tests.helpers.scenes.cavities import CEILING, box, box_around, cylinder
+from tests.helpers.scenes.cavities import CEILING, WEIGHTLESS, box, box_around, cylinder
 
 
 def test_only_edges_convex_towards_the_shot_are_obstacles() -> None:
@@ -31,7 +31,9 @@ def test_hits_on_an_edge_are_shared_by_its_two_faces() -> None:
         -0.9e-3, 0.9e-3, 60
     ):  # within the radius x sin 45° that meets the ridge, not a slope
         ball = Balls(np.array([[0.003, offset, top + 0.01]]), np.array([[0.0, 0.0, -5.0]]), 3e-3)
-        log = simulate(Scene(room, ball, Physics(), duration=0.0025, record=(CEILING,))).impacts
+        log = simulate(
+            Scene(room, ball, Physics(WEIGHTLESS), duration=0.0025, record=(CEILING,))
+        ).impacts
         assert len(log) == 1
         normal = np.cross(
             *(room.corners[log.triangle[0], k] - room.corners[log.triangle[0], 0] for k in (1, 2))

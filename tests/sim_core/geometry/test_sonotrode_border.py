@@ -22,7 +22,7 @@ from sim_core import (
     simulate,
 )
 from sim_core.scene.invariants import clearance
-from tests.helpers.scenes.cavities import CEILING, FLOOR, WEIGHTLESS
+from tests.helpers.scenes.cavities import CEILING, ELASTIC, FLOOR, WEIGHTLESS
 
 SWING = 25e-6  # m
 RADIUS = 1.5e-3  # m
@@ -65,7 +65,9 @@ def test_a_ball_from_a_gentle_slope_does_not_pass_into_the_face(phase: float) ->
         np.array([[0.0201, 0.02, RADIUS + 16e-6]]), np.array([[-1.0, 0.0, -0.08]]), 2.0 * RADIUS
     )
     end = simulate(
-        Scene(room, start, Physics(WEIGHTLESS, None, Vibration(FLOOR, SWING, 20e3, phase)), 0.003)
+        Scene(
+            room, start, Physics(WEIGHTLESS, ELASTIC, Vibration(FLOOR, SWING, 20e3, phase)), 0.003
+        )
     ).balls
     assert clearance(room.corners, end.positions, 4.0 * RADIUS)[0] > RADIUS - SWING - 1e-9
 
@@ -79,7 +81,7 @@ def test_a_ball_out_of_a_pit_comes_down_on_the_face(phase: float) -> None:
     start = Balls(
         np.array([[0.026, 0.02, RADIUS - 10e-6]]), np.array([[-3.3, 0.0, 0.6]]), 2.0 * RADIUS
     )
-    physics = Physics(Gravity(0.0, 0.0, -500.0), None, Vibration(FLOOR, SWING, 20e3, phase))
+    physics = Physics(Gravity(0.0, 0.0, -500.0), ELASTIC, Vibration(FLOOR, SWING, 20e3, phase))
     log = simulate(Scene(room, start, physics, 0.003)).impacts
     assert room.tags[log.triangle[0]] == FLOOR
     assert log.time[0] == pytest.approx(2 * 0.6 / 500, rel=0.05)
@@ -101,7 +103,7 @@ LOWERED = Vibration(FLOOR, WIDE, 1e-3, 1.5 * np.pi)  # as good as still, at its 
 def first_impact(room: TriangleMesh, place: list[float], velocity: list[float]) -> ImpactLog:
     """Of a ball that flies over the lowered face."""
     start = Balls(np.array([place]), np.array([velocity]), 2.0 * RADIUS)
-    return simulate(Scene(room, start, Physics(WEIGHTLESS, None, LOWERED), 0.02)).impacts
+    return simulate(Scene(room, start, Physics(WEIGHTLESS, ELASTIC, LOWERED), 0.02)).impacts
 
 
 def prism(outline: list[tuple[float, float]]) -> TriangleMesh:
@@ -179,7 +181,7 @@ def test_the_largest_amplitude_is_where_face_and_wall_part(lean: float, limit: f
         np.testing.assert_allclose(place, [0.02, 0.0, 0.0], atol=1e-12)
         start = Balls(np.array([[0.02, 0.02, 0.012]]), np.zeros((1, 3)), 2.0 * RADIUS)
         swing = Vibration(FLOOR, 0.999 * limit, 1.0)
-        simulate(Scene(room, start, Physics(WEIGHTLESS, None, swing), 1e-3))
+        simulate(Scene(room, start, Physics(WEIGHTLESS, ELASTIC, swing), 1e-3))
         swing = Vibration(FLOOR, 1.001 * limit, 1.0)
         with pytest.raises(SceneError, match=r"come out of it.* or lower the amplitude to 0\.0"):
-            simulate(Scene(room, start, Physics(WEIGHTLESS, None, swing), 1e-3))
+            simulate(Scene(room, start, Physics(WEIGHTLESS, ELASTIC, swing), 1e-3))

@@ -1,6 +1,7 @@
 """Collisions of balls with one another, logged on request."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ from sim_core import Balls, Gravity, Physics, Rest, Restitution, Scene, SceneErr
 from sim_core.effects.gravity import STANDARD
 from sim_core.loop.impact_log import BUFFER_SIZE
 from sim_core.loop.simulate import Simulation
-from tests.helpers.scenes.cavities import box
+from tests.helpers.scenes.cavities import ELASTIC, WEIGHTLESS, box
 from tests.helpers.scenes.gas import lattice_gas
 
 ROOM = box((0.1, 0.1, 0.1))
@@ -48,11 +49,9 @@ def test_every_collision_of_a_gas_is_logged_once_and_the_log_changes_no_bit() ->
 
     Chapman & Cowling, The Mathematical Theory of Non-uniform Gases, 3rd ed. (1970), section 5.21.
     """
-    gas = lattice_gas(8, 0.1, seed=2)
-    plain = Scene(gas.room, gas.balls, Physics(), 0.5, warmup=0.1, record=())
-    logged = Scene(
-        gas.room, gas.balls, Physics(), 0.5, warmup=0.1, record=(), record_collisions=True
-    )
+    gas, effects = lattice_gas(8, 0.1, seed=2), Physics(WEIGHTLESS, ELASTIC)
+    plain = Scene(gas.room, gas.balls, effects, 0.5, warmup=0.1, record=())
+    logged = replace(plain, record_collisions=True)
     without, result = simulate(plain), simulate(logged)
     assert without.ball_collisions is None
     np.testing.assert_array_equal(without.balls.positions, result.balls.positions)
@@ -60,7 +59,7 @@ def test_every_collision_of_a_gas_is_logged_once_and_the_log_changes_no_bit() ->
     assert without.collisions == result.collisions
     log = result.ball_collisions
     assert log is not None
-    warm = simulate(Scene(gas.room, gas.balls, Physics(), 0.1, record=())).collisions.balls
+    warm = simulate(Scene(gas.room, gas.balls, effects, 0.1, record=())).collisions.balls
     assert len(log) == result.collisions.balls - warm > BUFFER_SIZE
     assert (np.diff(log.time) >= 0.0).all()
     assert 0.0 <= log.time[0] < log.time[-1] <= 0.5
@@ -79,7 +78,7 @@ def test_the_log_adds_up_to_the_change_of_velocity() -> None:
     e, rng = 0.7, np.random.default_rng(3)
     places = np.stack(np.meshgrid(*[np.linspace(0.03, 0.07, 4)] * 3), axis=-1).reshape(-1, 3)
     balls = Balls(places, 0.2 * rng.normal(size=places.shape), 0.01)
-    physics = Physics(None, Restitution(((1.0, 1.0),) * 3, (e, 1e3), elastic_below=0.0))
+    physics = Physics(WEIGHTLESS, Restitution(((1.0, 1.0),) * 3, (e, 1e3), elastic_below=0.0))
     result = simulate(Scene(ROOM, balls, physics, 0.04, record_collisions=True))
     log = result.ball_collisions
     assert log is not None

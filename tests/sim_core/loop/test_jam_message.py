@@ -16,7 +16,7 @@ from sim_core import (
     simulate,
 )
 from sim_core.loop.simulate import Simulation
-from tests.helpers.scenes.cavities import FLOOR, box
+from tests.helpers.scenes.cavities import ELASTIC, FLOOR, box
 
 DIAMETER = 3e-3
 SHAKING = Vibration(FLOOR, 25e-6, 20e3, -0.5 * math.pi)
@@ -63,6 +63,6 @@ def test_usual_settings_do_not_collapse() -> None:
 def test_a_speed_that_no_shot_has_is_refused_with_its_reason(count: int) -> None:
     places = np.array([[5e-3, 0.01, 2.5e-3], [15e-3, 0.01, 2.5e-3]])[:count]
     balls = Balls(places, np.tile([0.0, 0.0, -1.0], (count, 1)), DIAMETER)
-    effects = Physics(Gravity(), None, Vibration(FLOOR, 1e-3, 1e9))
+    effects = Physics(Gravity(), ELASTIC, Vibration(FLOOR, 1e-3, 1e9))
     with pytest.raises(SimulationError, match=r"a ball has .* faster than 1e\+06 m/s"):
         simulate(Scene(box((0.02, 0.02, 0.02)), balls, effects, 1e-3))

@@ -18,7 +18,7 @@ def one_ball(z: float, vz: float) -> Balls:
 
 def test_between_plates_without_gravity_impacts_come_every_gap_over_speed() -> None:
     room = box((0.03, 0.03, 0.02))
-    log = simulate(Scene(room, one_ball(0.01, 2.0), Physics(), duration=1.0)).impacts
+    log = simulate(Scene(room, one_ball(0.01, 2.0), Physics(WEIGHTLESS), duration=1.0)).impacts
     gap = 0.02 - DIAMETER
     expected = (0.02 - DIAMETER / 2 - 0.01) / 2.0 + np.arange(len(log)) * gap / 2.0
     assert len(log) == 1 + int((1.0 - expected[0]) / (gap / 2.0))
