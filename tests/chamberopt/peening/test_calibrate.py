@@ -21,6 +21,7 @@ from chamberopt.design.design import Design, validate
 from chamberopt.design.load import load_design, save_design
 from chamberopt.documents.calibration import calibration_lines
 from chamberopt.peening.calibrate import Calibrated, calibrate, prepare
+from chamberopt.peening.kirk_fit import heights
 from chamberopt.peening.measured import Measured, load_measured
 from chamberopt.peening.next_measurement import predict
 from chamberopt.peening.posterior import TOGETHER, fit_surface
@@ -111,13 +112,36 @@ def calibrated(folder: Path, data: dict[str, Any]) -> Calibrated:
     path.write_text(tomlkit.dumps(data), encoding="utf-8")
     measured, designs = load_measured(path)
     prepared = prepare(measured, designs, folder)
-    return calibrate(measured, designs, prepared, SerialExecutor(), simulator=known_impacts)
+    seeds: list[int] = []
+
+    def counted(
+        setup: Setup, values: Mapping[Parameter, float], by: Executor, seed: int
+    ) -> Impacts:
+        seeds.append(seed)
+        return known_impacts(setup, values, by, seed)
+
+    found = calibrate(measured, designs, prepared, SerialExecutor(), simulator=counted)
+    assert found.runs == len(seeds)
+    return found
 
 
 @pytest.fixture(scope="module")
 def found(tmp_path_factory: pytest.TempPathFactory) -> Calibrated:
     folder = tmp_path_factory.mktemp("shop")
     return calibrated(folder, shop(folder))
+
+
+def test_errors_of_a_reading_hold_what_few_dents_leave_open() -> None:
+    """Scatter among replicas, and the bound on the bias, both relative to the arc height."""
+    setup = Setup(smooth_plate(), _chamber(), ("amplitude", "C0", "v0"))
+    impacts = known_impacts(setup, TRUTH, SerialExecutor(), 90)
+    found = heights(impacts.strip_dents(DISC), np.array(TIMES))
+    scatter = [np.var(one.pseudovalues, ddof=1) / len(one.pseudovalues) for one in found]
+    bias = [one.bias**2 for one in found]
+    assert min(bias) > 0.0
+    errors = (np.array(scatter) + bias) / np.square([one.value for one in found])
+    noise = ArcProbe(DISC, TIMES).read(impacts).noise
+    np.testing.assert_allclose(np.diag(noise), errors, rtol=1e-9)
 
 
 def test_hidden_parameters_are_found_within_their_deviations(found: Calibrated) -> None:

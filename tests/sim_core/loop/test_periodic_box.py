@@ -102,6 +102,20 @@ def test_fast_balls_meet_after_any_number_of_trips_round_the_box() -> None:
     assert trips > 10.0
 
 
+@pytest.mark.parametrize("fast", [0, 1])
+def test_a_ball_that_is_fast_along_one_side_alone_meets_after_many_trips(fast: int) -> None:
+    """It goes round and round at 30 m/s, and the other comes near at 0.2 m/s across its path."""
+    slow, x = 1 - fast, np.array([0.005, 0.01])
+    places, velocities = np.full((2, 3), 0.015), np.zeros((2, 3))
+    places[:, fast], places[:, slow] = x[::-1], x
+    velocities[0, fast], velocities[1, slow] = 30.0, -0.2
+    result = simulate(Scene(BOX, Balls(places, velocities, D), FREE, 0.03, record_collisions=True))
+    expected = first_meeting(*np.concatenate([places, velocities], axis=1), D, images=90)
+    assert expected * 30.0 > 30.0 * SIDES[fast]
+    assert result.ball_collisions is not None
+    assert result.ball_collisions.time[0] == pytest.approx(expected, rel=1e-10)
+
+
 @pytest.mark.parametrize(
     "count", [5, 200, *(pytest.param(n, marks=pytest.mark.long) for n in (MIN_BALLS, 3000))]
 )
