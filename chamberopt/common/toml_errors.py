@@ -9,6 +9,7 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, get_args, get_origin
 
@@ -257,6 +258,11 @@ def _alternatives(annotation: Any) -> tuple[Any, ...]:
 
     A type that does not allow None is returned alone, also if it is a union.
     """
+    return _found_alternatives(annotation)
+
+
+@cache
+def _found_alternatives(annotation: Any) -> tuple[Any, ...]:
     types = get_args(annotation)
     types = tuple(t for t in types if t is not type(None)) if type(None) in types else (annotation,)
     return tuple(map(_bare, types))
@@ -272,9 +278,15 @@ def _table_of(field: FieldInfo, of_rows: bool = False) -> type[BaseModel] | None
 
     With `of_rows`, a field that is a list of tables gives the model of these tables.
     """
-    types = (*_alternatives(field.annotation), *map(_bare, get_args(field.annotation)[1:]))
+    annotation: Any = field.annotation
+    return _found_table(annotation, of_rows)
+
+
+@cache
+def _found_table(annotation: Any, of_rows: bool) -> type[BaseModel] | None:
+    types = (*_alternatives(annotation), *map(_bare, get_args(annotation)[1:]))
     if of_rows:
-        lists = (t for t in _alternatives(field.annotation) if get_origin(t) is tuple)
+        lists = (t for t in _alternatives(annotation) if get_origin(t) is tuple)
         types = tuple(item for one in lists for item in get_args(one)[:1])
     return next((t for t in types if isinstance(t, type) and issubclass(t, BaseModel)), None)
 

@@ -156,7 +156,8 @@ class Design(FileTable):
     def _problems(self) -> Iterator[Problem]:
         yield from self._setup_problems()
         yield from self._size_problems()
-        yield from tolerance_problems(self, dict(toml_errors.numeric_fields(self)))
+        if self.tolerances:
+            yield from tolerance_problems(self, dict(toml_errors.numeric_fields(self)))
         yield from zone_problems(self.zones, self.calibration)
         yield from calibration_problems(self)
         yield from flexure_problems(self)
