@@ -93,6 +93,10 @@ def test_equal_impacts_follow_the_curve_of_kirk_exactly(name: str) -> None:
     assert found.strength.value == pytest.approx(0.9 * s)
     assert found.strength.half_width == pytest.approx(0.0, abs=1e-9 * s)
     assert -np.expm1(-rate * found.time.value) == pytest.approx(0.9)
+    soon = strip_saturation(dents._replace(seconds=1e-3 * dents.seconds))  # within a second
+    assert soon.time.value < 1.0
+    assert soon.time.value == pytest.approx(1e-3 * found.time.value)
+    assert soon.strength.value == pytest.approx(0.9 * s)
     shop = np.multiply(MULTIPLES, found.time.value)
     for fit in kirk_fits(shop, np.array([one.value for one in heights(dents, shop)])):
         assert fit.saturation_time == pytest.approx(found.time.value, rel=1e-4)

@@ -173,6 +173,20 @@ def test_a_finer_chord_makes_more_triangles_nearer_to_the_surface(tmp_path: Path
     assert counts[1] > 2 * counts[0]
 
 
+def test_planes_hold_as_many_triangles_as_their_side_asks_for(tmp_path: Path) -> None:
+    """An area A holds 4 A / sqrt(3) s² equilateral triangles of side s."""
+    path = written(tmp_path / "block.step", step_of_a_box(SI.format(".MILLI.")))
+    a, b, c = 1e-3 * np.array(SIDES)
+    expected = 8.0 * (a * b + b * c + c * a) / math.sqrt(3.0)
+    side = 0.1 * min(a, b, c)
+    part = read_part(path, how=Tessellation(side=side))
+    assert len(part.triangles) == pytest.approx(expected / side**2, rel=0.3)
+    with pytest.raises(InputError, match="million triangles") as told:
+        read_part(path, how=Tessellation(side=1e-3 * side))
+    count = float(str(told.value).split("about ")[1].split(" million")[0])
+    assert count == pytest.approx(expected / side**2, rel=0.01)  # in millions
+
+
 @pytest.mark.parametrize(
     ("how", "remedy"),
     [
