@@ -349,12 +349,13 @@ def test_a_deviation_keeps_the_interval_of_its_variance() -> None:
 def test_time_to_98_by_avrami() -> None:
     """A coverage of 1 - 1/e has x = 1 at the treatment time: it takes ln 50 of them."""
     share = 1.0 - np.exp(-1.0)
-    known = estimate(share + np.array([-1e-3, 1e-3, 0.0]))
+    known = estimate(share + np.array([-1e-3, 1e-3, 0.0]), shared=(1e-4, -2e-4))
     found = time_to_98_estimate(known, TREATMENT)
     assert found.value == pytest.approx(TREATMENT * np.log(50.0))
     assert found.in_words == ""
     slope = TREATMENT * np.log(50.0) * np.exp(1.0)  # of the time over the coverage, at x = 1
     assert found.half_width == pytest.approx(slope * known.half_width, rel=0.02)
+    assert found.shared == pytest.approx((-1e-4 * slope, 2e-4 * slope), rel=0.02)  # less time
     wide = time_to_98_estimate(estimate([0.3, 0.1, 0.2]), TREATMENT)
     soonest = TREATMENT * np.log(50.0) / -np.log1p(-estimate([0.3, 0.1, 0.2]).high)
     assert wide.in_words == f"more than {soonest:,.0f} s"
