@@ -16,8 +16,6 @@ from sim_core import (
     Rest,
     Restitution,
     Scene,
-    SceneError,
-    SimulationError,
     Vibration,
 )
 from tests.hard_cases.fuzz import Plan, plans, play_and_check, require_invariants
@@ -56,12 +54,14 @@ def test_many_scenes_with_these_effects_run_or_say_why_not(effects: str) -> None
 
 
 @pytest.mark.parametrize("path", SAVED, ids=[path.stem for path in SAVED])
-def test_a_saved_scene_runs_or_says_why_not(path: Path) -> None:
-    try:
-        scene = load_scene(path)
-        require_invariants(Chamber(scene.mesh, scene.balls, scene.physics), scene.duration)
-    except (SceneError, SimulationError) as error:
-        assert "has left the mesh" not in str(error), error  # noqa: PT017
+def test_a_saved_scene_runs(path: Path) -> None:
+    """All of them do; one that is rightly refused belongs into a test that names its message."""
+    scene = load_scene(path)
+    require_invariants(Chamber(scene.mesh, scene.balls, scene.physics), scene.duration)
+
+
+def test_there_are_saved_scenes() -> None:
+    assert len(SAVED) >= 4
 
 
 LAW = (0.9, 1.0)
