@@ -1,14 +1,15 @@
 """An absent effect is in none of the arrays and in none of the machine code of a scene."""
 
 import json
-import os
 import subprocess
 import sys
+from collections.abc import Iterator
 from operator import attrgetter
 from pathlib import Path
 
 import numpy as np
 import pytest
+from numba.core.caching import NullCache
 
 from sim_core import (
     BallCollisions,
@@ -27,8 +28,9 @@ from sim_core import (
     Vibration,
 )
 from sim_core.effects.surface.surface_effects import MAKERS, SurfaceEffects, surface_effects
+from sim_core.loop import events
 from sim_core.loop.simulate import Simulation
-from sim_core.numerics.jit import Step
+from sim_core.numerics.jit import Step, _compiled
 from tests.helpers.scenes.cavities import box
 
 # what the loop keeps of an effect, by the name of the field and the kind of thing it is when the
@@ -74,18 +76,32 @@ def bare_scene(physics: Physics = BARE) -> Scene:
     )
 
 
-def compiled_functions() -> dict[str, list[str]]:
-    """Every function of the simulator that was compiled in this process, with the types it was
-    compiled for.
-    """
-    found = {}
+def steps() -> Iterator[tuple[str, Step]]:
+    """Every function of the simulator in this process, with its name."""
     for name, module in list(sys.modules.items()):
         if name.startswith("sim_core."):
             for function in vars(module).values():
                 if isinstance(function, Step) and function.py_func.__module__ == name:
-                    kinds = [*function.signatures, *getattr(function, "entry", function).signatures]
-                    if kinds:
-                        found[f"{name}.{function.py_func.__name__}"] = [*map(str, kinds)]
+                    yield f"{name}.{function.py_func.__name__}", function
+
+
+def forget_the_loop() -> None:
+    """Compile the event loop from nothing; what sets up a scene may be loaded from the cache."""
+    for _, step in steps():
+        step._cache = NullCache()
+    events.advance.entry = _compiled(events.advance.py_func, inline=False, from_python=True)
+    events.advance.entry._cache = NullCache()
+
+
+def compiled_functions() -> dict[str, list[str]]:
+    """Every function of the simulator that was compiled or loaded in this process, with the types
+    that it was compiled for.
+    """
+    found = {}
+    for name, function in steps():
+        kinds = [*function.signatures, *getattr(function, "entry", function).signatures]
+        if kinds:
+            found[name] = [*map(str, kinds)]
     return found
 
 
@@ -110,17 +126,16 @@ def test_further_effects_of_surfaces_are_absent_unless_given() -> None:
 
 
 @pytest.fixture(scope="module")
-def bare(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[str]]:
-    """What a scene without any effect compiles, from nothing."""
+def bare() -> dict[str, list[str]]:
+    """What a scene without any effect compiles."""
     code = (
         "import json; from sim_core import simulate; from "
-        "tests.sim_core.effects.test_absent_effects import *;"
+        "tests.sim_core.effects.test_absent_effects import *; forget_the_loop();"
         "simulate(bare_scene()); print(json.dumps(compiled_functions()))"
     )
     answer = subprocess.run(
         [sys.executable, "-c", code],
         cwd=Path(__file__).parents[3],
-        env={**os.environ, "NUMBA_CACHE_DIR": str(tmp_path_factory.mktemp("cache"))},
         check=True,
         capture_output=True,
         text=True,
