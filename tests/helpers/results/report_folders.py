@@ -10,7 +10,7 @@ from chamberopt.workflows.save_run import save_simulation, save_study
 from tests.helpers.studies import run_in_folder
 from tests.helpers.synthetic import plate_design, poisson_evaluation
 
-DESIGN = plate_design(process__accuracy__points=2000)  # figures of a page need no more
+DESIGN = plate_design(process__accuracy__points=1000)  # figures of a page need no more
 
 
 def simulated(folder: Path, per_mm2: float = 60.0) -> tuple[Path, Chamber]:

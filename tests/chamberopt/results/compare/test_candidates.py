@@ -7,6 +7,7 @@ is refused before anything is simulated.
 import shutil
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +27,8 @@ from chamberopt.workflows.save_run import save_simulation
 from chamberopt.workflows.simulate import Teller
 from tests.helpers.synthetic import DESIGNS, plate_design, poisson_evaluation
 
-PLATE = plate_design()
+plate = partial(plate_design, process__accuracy__points=1000)
+PLATE = plate()
 CHAMBER = build_chamber(PLATE)
 
 
@@ -63,7 +65,7 @@ def made(tmp_path: Path) -> Callable[..., Path]:
     def make(name: str, **values: float) -> Path:
         path = tmp_path / name
         path.parent.mkdir(exist_ok=True)
-        save_design(plate_design(**values), path)
+        save_design(plate(**values), path)
         return path
 
     return make
@@ -125,7 +127,7 @@ def test_a_design_against_a_confirmed_result(
 def test_another_treatment_time_is_simulated_again_on_its_own_seeds(
     simulations: Simulations, made, tmp_path: Path
 ) -> None:
-    short = plate_design(process__treatment_time_s=2.0, process__seed=9)
+    short = plate(process__treatment_time_s=2.0, process__seed=9)
     save_simulation(tmp_path / "short", short, CHAMBER, poisson_evaluation(short, CHAMBER, 20, 6))
     paths = [made("long.toml"), tmp_path / "short"]
     with pytest.raises(InputError, match=r"peened for 2 s.*for 5 s.*--treatment-time-s"):

@@ -5,6 +5,7 @@ The number of replicas that would make a difference clear is foretold correctly.
 
 import json
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -30,7 +31,8 @@ from tests.helpers.results.arrays import change_arrays
 from tests.helpers.results.digests import accept_changes
 from tests.helpers.synthetic import DESIGNS, machine_values, plate_design, poisson_evaluation
 
-PLATE = plate_design()
+plate = partial(plate_design, process__accuracy__points=1000)
+PLATE = plate()
 CHAMBER = build_chamber(PLATE)
 
 
@@ -77,14 +79,14 @@ def test_the_same_twice(tmp_path: Path) -> None:
 
 
 def test_the_error_of_the_depth_is_not_common_to_two_metals(tmp_path: Path) -> None:
-    other = plate_design(materials__part__tensile_MPa=500.0)
+    other = plate(materials__part__tensile_MPa=500.0)
     both = compare([left(tmp_path / "a", 10), left(tmp_path / "other", 10, design=other)])
     (apart,) = both.differences["compression_depth_um"]
     assert apart.half_width > np.sqrt(2.0) * ERROR * both.metrics["compression_depth_um"][0].value
 
 
 def test_what_differs_is_named_and_measured(tmp_path: Path) -> None:
-    heavier = plate_design(shot__mass_g=6.0, process__seed=2)
+    heavier = plate(shot__mass_g=6.0, process__seed=2)
     both = compare([left(tmp_path / "light", 10), left(tmp_path / "heavy", 30, 1, heavier)])
     assert both.parameters["shot.mass_g"] == (PLATE.shot.mass_g, 6.0)
     assert set(both.parameters) == {"shot.mass_g", "process.seed"}
@@ -267,14 +269,14 @@ def test_what_cannot_be_compared(tmp_path: Path) -> None:
     elsewhere = left(tmp_path / "all", 20, 0, PLATE.model_copy(update={"part": part}))
     with pytest.raises(InputError, match=r"part\.target differs"):
         compare([one, elsewhere])
-    longer = left(tmp_path / "longer", 20, 0, plate_design(process__treatment_time_s=10))
+    longer = left(tmp_path / "longer", 20, 0, plate(process__treatment_time_s=10))
     with pytest.raises(InputError, match=r"peened for 10 s.*for 5 s.*--treatment-time-s"):
         compare([one, longer])
-    wider = left(tmp_path / "wider", 20, 0, plate_design(process__accuracy__gauge_mm2=4))
+    wider = left(tmp_path / "wider", 20, 0, plate(process__accuracy__gauge_mm2=4))
     with pytest.raises(InputError, match=r"gauge_mm2 is 4, in .* 1: .* different areas"):
         compare([one, wider])
     machines = [
-        left(tmp_path / name, 20, 0, plate_design(calibration=machine_values(v0=sd)))
+        left(tmp_path / name, 20, 0, plate(calibration=machine_values(v0=sd)))
         for name, sd in (("mine", 0.1), ("yours", 0.2))
     ]
     with pytest.raises(InputError, match="another calibration than in"):
