@@ -30,6 +30,7 @@ ROOT = Path(__file__).resolve().parents[2]
 MEMORY = 3 << 30  # bytes that a command may take beyond what the server has
 FILE_SIZE = 1 << 30  # bytes of the largest file that it may write
 SECONDS = 30  # of CPU, and twice that of wall-clock time
+WITHOUT_VTK = "tests.chamberopt.common.files.shim:run_drawing"  # a command's pictures are empty
 CONTROL = {*map(chr, range(32)), *map(chr, range(127, 160))} - {"\n"}
 
 

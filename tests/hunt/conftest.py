@@ -8,7 +8,7 @@ import pytest
 from tests.hunt.command import Server
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def server() -> Iterator[Server]:
     os.environ.setdefault("CHAMBEROPT_READER_S", "8")  # hunts wait for no damaged file to end
     with Server() as one:

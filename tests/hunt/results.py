@@ -39,7 +39,7 @@ SIMULATE_AGAIN = (
 )  # fmt: skip
 FORMULAS = ("=1+1", "=cmd|' /C calc'!A0", "+1+1", "-2+3", "@SUM(A1)", "\t=1", "\r=1", '="a"')
 NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?$|[-+]inf$")
-RESUME = ["run", "study.toml", "--out", "study"]
+RESUME = ["run", "study.toml", "--no-ranges", "--out", "study"]
 
 
 def _values(table: Any) -> list[tuple[Any, Any]]:

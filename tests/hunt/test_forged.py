@@ -16,15 +16,15 @@ from chamberopt.results.arrays_file import ARRAYS_FILE, read_result_arrays
 from tests.helpers.results.arrays import change_elements
 from tests.helpers.results.digests import accept_changes
 from tests.hunt.base import write_base
-from tests.hunt.command import Server, fault
+from tests.hunt.command import WITHOUT_VTK, Server, fault
 
 
 @pytest.fixture(scope="module")
 def result(server: Server, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("forged")
     write_base(folder)
-    words = ["simulate", "design.toml", "--out", "result"]
-    assert server.run(folder, words, seconds=300).status == 0
+    words = ["simulate", "design.toml", "--no-ranges", "--out", "result"]
+    assert server.run(folder, words, seconds=300, within=WITHOUT_VTK).status == 0
     return folder / "result"
 
 

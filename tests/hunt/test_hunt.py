@@ -16,7 +16,7 @@ import pytest
 
 from tests.hunt import arguments, meshes, results, toml_files
 from tests.hunt.base import write_base
-from tests.hunt.command import Executable, Server, fault, fingerprint
+from tests.hunt.command import WITHOUT_VTK, Executable, Server, fault, fingerprint
 
 DRAW: dict[str, Callable[[random.Random, Path, Path], list[str]]] = {
     "toml": toml_files.write_wrong_files,
@@ -45,10 +45,10 @@ def base(server: Server, tmp_path_factory: pytest.TempPathFactory) -> Path:
     write_base(folder)
     for words in (
         ["simulate", "design.toml", "--out", "result"],
-        ["run", "study.toml", "--out", "study"],
+        ["run", "study.toml", "--no-ranges", "--out", "study"],
         ["sweep", "study.toml", "--grid", "2", "--out", "sweep", "--workers", "1"],
     ):
-        outcome = server.run(folder, words, seconds=300)
+        outcome = server.run(folder, words, seconds=300, within=WITHOUT_VTK)
         assert outcome.status == 0, outcome.errors
     return folder
 

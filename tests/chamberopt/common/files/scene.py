@@ -20,7 +20,7 @@ from chamberopt.workflows import ranges, save_run
 from tests.hunt.base import write_base
 
 TINY = {"simulated_time_s": "0.02", "warmup_time_s": "0.001", "replicas": "3", "mass_g": "0.5"}
-SIMULATE = "simulate design.toml --workers 1 --out result"
+SIMULATE = "simulate design.toml --workers 1 --no-ranges --out result"
 RUN = "run study.toml --workers 1 --out study"
 
 
