@@ -6,7 +6,7 @@ Tags: 0 ceiling (the part's place), 1 floor (the sonotrode's), 2 sides.
 import numpy as np
 import trimesh
 
-from sim_core import Balls, Gravity, Restitution, TriangleMesh
+from sim_core import Balls, Friction, Gravity, Restitution, TriangleMesh
 from sim_core.effects.restitution import ELASTIC_BELOW
 
 CEILING, FLOOR, SIDES = 0, 1, 2
@@ -29,6 +29,7 @@ def uniform_restitution(c0: float, v0: float, elastic_below: float = ELASTIC_BEL
 
 # the same bits as without a law, and the same machine code as with losses; for up to eight tags
 ELASTIC = Restitution(((1.0, 1e9),) * 8, (1.0, 1e9))
+SMOOTH = Friction(((0.0, -1.0),) * 8, (0.0, -1.0))  # the same bits as without friction
 
 
 def box(

@@ -25,7 +25,7 @@ from sim_core import (
 )
 from sim_core.scene.invariants import clearance
 from tests.helpers.jit_on_and_off import with_and_without_jit
-from tests.helpers.scenes.cavities import WEIGHTLESS, box_around, uniform_restitution
+from tests.helpers.scenes.cavities import SMOOTH, WEIGHTLESS, box_around, uniform_restitution
 from tests.helpers.scenes.turning_parts import BODIES, PART, Rotor, bar
 
 EARLY = 1e-12  # m
@@ -153,10 +153,9 @@ BAR_HALF, REACH = 2e-3, 3.5e-3  # m: half the bar's width, and that plus a ball'
 
 
 def effects(turn: PartRotation | None, gravity: Gravity = WEIGHTLESS, e: float = 1.0) -> Physics:
-    """One set of effects for most tests, as each set is compiled."""
-    return Physics(
-        gravity, Restitution(((e, 1e3),) * 3, (1.0, 1e3), elastic_below=0.0), part_rotation=turn
-    )
+    """One set of effects for most tests, as each set is compiled; test_friction has it too."""
+    law = Restitution(((e, 1e3),) * 3, (1.0, 1e3), elastic_below=0.0)
+    return Physics(gravity, law, part_rotation=turn, friction=SMOOTH)
 
 
 def one_ball(
