@@ -37,11 +37,17 @@ fork = (
 needs_fork = pytest.mark.skipif(fork is None, reason="needs fork")
 
 
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of the study when nothing goes wrong."""
+    folder = tmp_path_factory.mktemp("study") / "whole"
+    run(study(), folder)
+    return folder
+
+
 @pytest.fixture
-def expected(tmp_path: Path) -> bytes:
-    """The history of the study when nothing goes wrong."""
-    run(study(), tmp_path / "whole")
-    return history(tmp_path / "whole")
+def expected(whole: Path) -> bytes:
+    return history(whole)
 
 
 def failing(folder: Path, at: int, error: Callable[[], BaseException], times: int = 1):
@@ -107,7 +113,7 @@ class TestFullDisk:
 @pytest.mark.parametrize("error", [ZeroDivisionError, MemoryError, KeyboardInterrupt])
 @pytest.mark.parametrize("at", [5, 17])
 def test_a_fault_of_ours_stops_the_study_not_the_candidate(
-    error: type[BaseException], at: int, tmp_path: Path, expected: bytes
+    error: type[BaseException], at: int, tmp_path: Path, whole: Path
 ) -> None:
     folder = tmp_path / "out"
     with pytest.raises(error) as raised:
@@ -119,8 +125,8 @@ def test_a_fault_of_ours_stops_the_study_not_the_candidate(
             f"in evaluation {at + 1} ({'search' if at < 16 else 'confirm'}): chamber.height_mm = "
         )
     run(study(), folder)
-    assert history(folder) == expected
-    assert len(calls(folder)) == len(calls(tmp_path / "whole"))
+    assert history(folder) == history(whole)
+    assert len(calls(folder)) == len(calls(whole))
 
 
 def test_no_number_is_no_score(tmp_path: Path) -> None:
