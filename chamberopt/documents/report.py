@@ -65,6 +65,7 @@ STOP_REASONS = {
     "replicas": "the requested number of replicas",
     "accuracy": "the requested accuracy was reached",
     "max_replicas": "the largest allowed number; the requested accuracy was not reached",
+    "points": "more would bring nothing: the error is in the choice of the windows' points",
 }
 COLLISIONS = {
     "walls": "with walls and part",
@@ -199,7 +200,7 @@ def _cost_of_study(study: StudyRecord, trials: Sequence[Trial]) -> dict[str, str
     return {
         "in the search": _count(study.evaluations),
         "of these not simulated": _count(study.failed),
-        "of these given up after a few replicas": _count(study.given_up),
+        "of these told enough in a few replicas": _count(study.ended_early),
         "of these miss a constraint": _count(study.missing_a_constraint),
         "confirmations": _count(sum(one.stage == "confirm" for one in trials)),
         "run time of all": f"{plain(study.seconds, 3)} s",

@@ -91,10 +91,11 @@ def study_lines(result: StudyResult, ranges: StudyRanges | None = None) -> list[
     if study.objective.pareto:
         names = " and ".join(study.objective.pareto)
         lines += [f"the Pareto front of {names}: pareto.csv, pareto.png", ""]
-    replicas, seconds = best.evaluation.replicas, study.design.process.recorded_time
+    counts = dict.fromkeys(one.evaluation.replicas for one in (start, best))
+    replicas, seconds = " and ".join(map(str, counts)), study.design.process.recorded_time
     effort = replicas_text(study.at_search_accuracy(study.design))
-    if result.given_up:
-        effort += f"; {study.first_look} where they showed that a candidate is worse"
+    if result.ended_early:
+        effort += f"; {study.first_look} where more would have told nothing"
     return [
         *lines,
         f"± 95 % intervals; start and best: {replicas} replicas of {seconds:g} s with seeds of "

@@ -297,7 +297,7 @@ class StudyRecord(Table):
     algorithm: str
     vary: dict[str, Ends]
     evaluations: Count
-    given_up: Count
+    ended_early: Count
     accuracy: Accuracies
     failed: Count
     missing_a_constraint: Count

@@ -31,6 +31,7 @@ from chamberopt.search.candidate import (
     ConfirmedCandidate,
     Figures,
     close_to_best,
+    limited_figures,
     simulated_figures,
 )
 from chamberopt.search.judge import Judge
@@ -235,10 +236,15 @@ class Search:
     # Questions. None where the candidates that are out must be told first.
 
     def _candidate(
-        self, stage: str, point: np.ndarray, replicas: int | None = None, bar: float | None = None
+        self,
+        stage: str,
+        point: np.ndarray,
+        replicas: int | None = None,
+        first: int | None = None,
+        bar: float | None = None,
     ) -> Candidate:
         number = len(self.trials) + len(self._asked)
-        return Candidate(number, stage, point, self.space, replicas, bar)
+        return Candidate(number, stage, point, self.space, replicas, first, bar)
 
     def _begin_search(self) -> Iterator[Candidate | None]:
         while (point := self._search.ask()) is not None or self._asked:
@@ -246,7 +252,9 @@ class Search:
                 yield None
             else:
                 bar = self._best_low if self.trials else None
-                yield self._candidate("search", point, bar=bar)
+                is_start = not self.trials and not self._asked
+                few = None if is_start else self._study.first_look
+                yield self._candidate("search", point, first=few, bar=bar)
         yield from self._confirm()
 
     @property
@@ -258,14 +266,16 @@ class Search:
     def _confirm(self) -> Iterator[Candidate | None]:
         """Ask for the start and the best candidates with new seeds and the design's own accuracy.
 
-        Each gets more replicas than in the search. If the design asks for an accuracy, this sets
-        the number of replicas. While noise hides which candidate is best, and the study has rounds
-        left, the close candidates and the start get twice the replicas. Candidates whose evaluation
-        fails are left out.
+        Each gets more replicas than in the search, unless the first of them tell that more would
+        bring nothing. If the design asks for an accuracy, this sets the number of replicas. While
+        the noise of replicas hides which candidate is best, and the study has rounds left, the
+        close candidates and the start get twice the replicas. Candidates whose evaluation fails are
+        left out.
         """
         settings = self._study.optimizer
         asks_for_accuracy = self._study.design.process.accuracy.objective_half_width is not None
         replicas = None if asks_for_accuracy else settings.confirm_replicas
+        first = self._study.first_look_of_confirmation
         places = self._promising(settings.confirm)
         confirmed: dict[int, ConfirmedCandidate] = {}  # by position in places
         again = list(range(len(places)))
@@ -274,7 +284,7 @@ class Search:
             for i in again:
                 while len(self._asked) >= settings.batch:
                     yield None
-                begun.append(self._candidate("confirm", places[i][1], replicas))
+                begun.append(self._candidate("confirm", places[i][1], replicas, first))
                 yield begun[-1]
             while self._asked:
                 yield None
@@ -283,7 +293,7 @@ class Search:
                     confirmed[i] = one
             best = close_to_best(list(confirmed.values())) if replicas else []
             again = [i for i, one in confirmed.items() if i == 0 or any(one is x for x in best)]
-            replicas = 2 * (replicas or 0)
+            replicas, first = 2 * (replicas or 0), None
             if not best:
                 break
         self.confirmed = tuple(confirmed.values())
@@ -298,7 +308,7 @@ class Search:
         figures = self._answers.pop(candidate.number, None)
         if figures is None:
             return None
-        limited = self._judge.limited(candidate, figures)
+        limited = limited_figures(self._study, candidate, figures)
         standing = assess_feasibility(self._study.all_constraints, limited)
         lost = self._lost_to_tolerances(candidate.point)
         return ConfirmedCandidate(searched, candidate, figures, *standing, figures.goals, lost)

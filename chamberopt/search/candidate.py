@@ -14,7 +14,15 @@ import numpy as np
 from chamberopt.common.errors import InputError, UnreadableError, WorkerLostError
 from chamberopt.common.estimate import Estimate, paired_difference
 from chamberopt.coverage.metrics import highest_objective, parse_objective
-from chamberopt.search.study.constraints import FEASIBLE, INFEASIBLE, Violation
+from chamberopt.search.study.constraints import (
+    FEASIBLE,
+    INFEASIBLE,
+    NOT_KNOWN,
+    Violation,
+    assess_feasibility,
+    exact,
+)
+from chamberopt.simulation.effort import narrows
 from chamberopt.simulation.estimates import weighted_sum
 from chamberopt.simulation.evaluation import Evaluation
 
@@ -42,8 +50,10 @@ class Candidate:
     point: np.ndarray  # place in the unit cube, (d,)
     space: ParameterSpace = field(repr=False)
     replicas: int | None = None  # that a confirmation gets; by default as the design says
+    # Number of replicas after which it ends if more would bring nothing; None if it gets all.
+    first: int | None = None
     # Lower end of the best objective's interval so far: a candidate of a search that is clearly
-    # below it gets only a few replicas.
+    # below it is not worth more replicas.
     bar: float | None = None
 
     @cached_property
@@ -78,6 +88,18 @@ def simulated_figures(study: Study, evaluation: Evaluation) -> Figures:
     metrics, (_, *others) = evaluation.metrics, study.objective.goals
     more = (weighted_sum(parse_objective(name), metrics) for name in others)
     return Figures((evaluation.objective, *more), metrics, evaluation.replicas, evaluation)
+
+
+def limited_figures(study: Study, candidate: Candidate, figures: Figures) -> dict[str, Estimate]:
+    """Return a candidate's figures that have limits, by name.
+
+    The limits hold for metrics, and for numbers of the design, which are exact.
+    """
+    known = exact(candidate.parameters) | dict(figures.metrics)
+    return {
+        name: known[name] if name in known else Estimate(study.design.value(name), 0.0)
+        for name in study.all_constraints
+    }
 
 
 @dataclass(frozen=True)
@@ -121,16 +143,18 @@ class ConfirmedCandidate:
 
 
 def close_to_best(confirmed: Sequence[ConfirmedCandidate]) -> list[ConfirmedCandidate]:
-    """Return the best candidate and the candidates that noise cannot tell from it.
+    """Return the best candidate and the candidates that more replicas may tell from it.
 
-    The list is empty if the best candidate is clearly better than all others.
+    The list is empty if the best candidate is clearly better than all others, or if what hides the
+    difference is in all replicas.
     """
     feasible = [one for one in confirmed if one.feasibility != INFEASIBLE]
     if not feasible:
         return []
     best = max(feasible, key=lambda one: one.goals[0].value)
     others = [one for one in feasible if one is not best]
-    close = [one for one in others if paired_difference(best.goals[0], one.goals[0]).low <= 0.0]
+    lead = [paired_difference(best.goals[0], one.goals[0]) for one in others]
+    close = [one for one, by in zip(others, lead, strict=True) if by.low <= 0.0 and narrows(by)]
     return [best, *close] if close else []
 
 
@@ -147,7 +171,6 @@ class CandidateEvaluator:
 
     def __init__(self, study: Study, simulator: Simulator) -> None:
         self._study, self._simulator = study, simulator
-        self._first_look = study.first_look
 
     def evaluate(self, candidate: Candidate) -> Evaluation | InputError:
         """Simulate a candidate and return its evaluation, or the error why this is impossible.
@@ -193,17 +216,32 @@ class CandidateEvaluator:
         return True
 
     def _evaluate(self, candidate: Candidate) -> Evaluation:
-        if candidate.stage == "confirm":
-            return self._simulate(candidate.design, "confirm", candidate.replicas)
-        design, bar = self._study.at_search_accuracy(candidate.design), candidate.bar
-        if candidate.stage == "search" and not candidate.is_start:
-            self._require_buildable(design)
-        self._require_promise(design, bar)
-        if bar is not None and self._first_look is not None:
-            first = self._simulate(design, "search", self._first_look)
-            if first.objective.high < bar:
-                return first
-        return self._simulate(design, "search", candidate.replicas)
+        design, stream = candidate.design, "confirm"
+        if candidate.stage != "confirm":
+            design, stream = self._study.at_search_accuracy(design), "search"
+            if candidate.stage == "search" and not candidate.is_start:
+                self._require_buildable(design)
+            self._require_promise(design, candidate.bar)
+        if candidate.first is not None:
+            found = self._simulate(design, stream, candidate.first)
+            if self._tells_enough(candidate, found):
+                return found
+        return self._simulate(design, stream, candidate.replicas)
+
+    def _tells_enough(self, candidate: Candidate, found: Evaluation) -> bool:
+        """Return whether more replicas of a candidate would tell nothing that the study asks for.
+
+        In a search this is so for a candidate that is clearly worse than the best, too.
+        """
+        if candidate.bar is not None and found.objective.high < candidate.bar:
+            return True
+        figures = simulated_figures(self._study, found)
+        limits = self._study.all_constraints
+        limited = limited_figures(self._study, candidate, figures)
+        if candidate.stage == "confirm" and not found.resolution.has_places:
+            return False
+        is_known = assess_feasibility(limits, limited)[0] != NOT_KNOWN
+        return is_known and not any(map(narrows, figures.goals))
 
     def _require_buildable(self, design: Design) -> None:
         """Raise InputError if a candidate's chamber has a gap in which balls jam or get in nowhere.

@@ -10,8 +10,14 @@ from typing import TYPE_CHECKING
 from chamberopt.common.errors import InputError
 from chamberopt.common.estimate import Estimate
 from chamberopt.coverage.metrics import find_metric, parse_objective
-from chamberopt.search.candidate import Candidate, Figures, NoPromiseError, evaluation_cost
-from chamberopt.search.study.constraints import describe_violations, exact, expected_violation
+from chamberopt.search.candidate import (
+    Candidate,
+    Figures,
+    NoPromiseError,
+    evaluation_cost,
+    limited_figures,
+)
+from chamberopt.search.study.constraints import describe_violations, expected_violation
 from chamberopt.search.trial_log import Trial
 
 if TYPE_CHECKING:
@@ -54,17 +60,6 @@ class Judge:
         figures = {name: _finite(name, one) for name, one in told.items()}
         return Figures(tuple(figures[name] for name in self._study.objective.goals), figures)
 
-    def limited(self, candidate: Candidate, figures: Figures) -> dict[str, Estimate]:
-        """Return a candidate's figures that have limits, by name.
-
-        The limits hold for metrics, and for numbers of the design, which are exact.
-        """
-        known = exact(candidate.parameters) | dict(figures.metrics)
-        return {
-            name: known[name] if name in known else Estimate(self._study.design.value(name), 0.0)
-            for name in self._study.all_constraints
-        }
-
     def cost(self, trial: Trial) -> float:
         """Return what a trial of the search has cost, as a share of a trial with all replicas.
 
@@ -90,7 +85,8 @@ class Judge:
             score = worst if highest is None else highest
             return replace(failed, reason=str(answer), score=score, highest=highest)
         unit = self.unit_of(answer) if candidate.is_start else self.unit
-        figures, constraints = self.limited(candidate, answer), self._study.all_constraints
+        figures = limited_figures(self._study, candidate, answer)
+        constraints = self._study.all_constraints
         penalty = sum(expected_violation(figures[k], limits) for k, limits in constraints.items())
         violations = [
             text

@@ -18,6 +18,7 @@ from chamberopt.common.errors import InputError, WorkerLostError
 from chamberopt.common.estimate import Estimate, estimate, paired_difference
 from chamberopt.common.files import write_text
 from chamberopt.common.progress import Progress
+from chamberopt.coverage.metrics import find_metric, parse_objective
 from chamberopt.design.load import save_design
 from chamberopt.peening.calibration_errors import evaluate_calibrated
 from chamberopt.search.ask_and_tell import Search
@@ -41,6 +42,7 @@ Outcome = Evaluation | InputError
 Stop = Callable[[], bool]
 """Returns True when the user wants to stop the study."""
 
+COUNTS = 0.01  # gain of an objective from 0 to 1 that counts, if the design asks for no accuracy
 TOLERANCES = (
     "what the [tolerances] do to the best design: chamberopt simulate best.toml --tolerances"
 )
@@ -72,7 +74,9 @@ class StudyResult:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Sentences on how tolerances changed the search, and on best values at their bounds."""
+        """Sentences on how tolerances changed the search, on best values at their bounds, and on a
+        start from which nothing is left to gain.
+        """
         lost = self.best.lost_to_tolerances
         which = "mean" if self.study.objective.over_tolerances == "mean" else "worst value"
         sentences = tolerance_notes(lost, which) if self.study.design.tolerances else []
@@ -82,7 +86,26 @@ class StudyResult:
             if side := bound_at(value, varied.bounds):
                 place = f"{name} = {value:g} lies on its {side} bound"
                 sentences.append(f"{place}: a better design may lie beyond; widen [vary]")
-        return tuple(sentences)
+        return *sentences, *self._nothing_left
+
+    @property
+    def _nothing_left(self) -> tuple[str, ...]:
+        """A sentence if no candidate is better than the start by what counts; else nothing."""
+        process, goals = self.study.design.process, self.study.objective.goals
+        counts = process.accuracy.objective_half_width or COUNTS
+        metrics = map(find_metric, parse_objective(goals[0]).terms)
+        of_shares = all(metric is not None and metric.highest <= 1.0 for metric in metrics)
+        if len(goals) > 1 or not of_shares or not self.gain.high < counts:
+            return ()
+        time, soon = self.best.figures.metrics.get("time_to_98_s"), ""
+        if time is not None and time.has_number and time.high < process.treatment_time:
+            soon = f": it has full coverage after {time.value:.2g} of {process.treatment_time:g} s"
+        return (
+            f"nothing left to gain here: no confirmed candidate is better than the start by more "
+            f"than {max(self.gain.high, 0.0):.2g}, and less than {counts:g} does not count; the "
+            "best may take less time or shot instead, which a study of minus_time_to_98_s finds "
+            f"(fastest.toml of chamberopt new){soon}",
+        )
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -92,8 +115,8 @@ class StudyResult:
         return (f"constraints: {self.best.reason}",)
 
     @property
-    def given_up(self) -> int:
-        """Number of candidates that the search gave up after a few replicas, as clearly worse."""
+    def ended_early(self) -> int:
+        """Number of candidates of the search whose first few replicas told enough."""
         few = self.study.first_look
         search = (one for one in self.trials if one.stage == "search")
         return sum(one.replicas == few for one in search) if few else 0

@@ -48,6 +48,7 @@ from chamberopt.coverage.metrics import (
     exposed_target,
     find_metric,
     highest_uniform_coverage,
+    parse_objective,
 )
 from chamberopt.coverage.part_impacts import Hits, TargetImpacts
 from chamberopt.coverage.percentile import in_order, sum_dents, time_to_98
@@ -252,6 +253,17 @@ def as_resolved(name: str, value: Estimate, resolution: Resolution) -> Estimate:
     if enough and has_interval:
         return value
     return value.not_known(NOT_RESOLVED)
+
+
+def growth_for_dents(objective_name: str, resolution: Resolution) -> float:
+    """Return the factor on the simulated time that gives an objective the dents that it needs.
+
+    It is 1 or less if they are there, and infinite if the median window has none.
+    """
+    metrics = map(find_metric, parse_objective(objective_name).terms)
+    of_places = any(metric is not None and metric.of_places for metric in metrics)
+    needed = resolution.needed_for_places if of_places else resolution.needed_for_mean
+    return needed / resolution.dents if resolution.dents else math.inf
 
 
 def _ratios(

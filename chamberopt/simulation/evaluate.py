@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import time
 from concurrent.futures import Executor, ThreadPoolExecutor
 from dataclasses import dataclass
@@ -14,7 +13,6 @@ from chamberopt.chamber.analytic import cavity_note
 from chamberopt.chamber.checks.check import amplitude_notes, friction_notes
 from chamberopt.chamber.checks.fillets import facet_warnings
 from chamberopt.chamber.scene import chamber_mesh
-from chamberopt.common.estimate import Estimate
 from chamberopt.common.executor import share
 from chamberopt.common.progress import Progress
 from chamberopt.coverage.compression import stress_notes
@@ -28,10 +26,12 @@ from chamberopt.coverage.field.target_field import (
     require_wide_gauge,
 )
 from chamberopt.coverage.metrics import parse_objective, require_metrics, require_target
+from chamberopt.simulation.effort import Effort
 from chamberopt.simulation.estimates import (
     SeenDents,
     estimate_metrics,
     estimate_zones,
+    growth_for_dents,
     reach_notes,
     resolution_notes,
     strength_notes,
@@ -39,10 +39,8 @@ from chamberopt.simulation.estimates import (
 )
 from chamberopt.simulation.evaluation import Evaluation
 from chamberopt.simulation.replicas import (
-    MIN_REPLICAS_TO_STOP,
     ReplicaSet,
     ReplicaSetting,
-    next_replica_count,
     run_in_order,
     simulate_replica,
 )
@@ -97,18 +95,10 @@ def evaluate(
         sim_core.SimulationError: a replica cannot be simulated.
     """
     plan = plan or ReplicaPlan()
-    accuracy = design.process.accuracy
-    wanted = accuracy.objective_half_width if plan.count is None else None
-    count = plan.count or accuracy.replicas
-    if wanted is not None:
-        count = min(max(count, MIN_REPLICAS_TO_STOP), accuracy.max_replicas)
     run = _Run(design, chamber, executor, plan, cavity, known or ReplicaSet())
     while True:
-        found = run.add_up_to(count, progress, wanted)
-        if wanted is not None:
-            half_width = found.objective.half_width
-            count = next_replica_count(found.replicas, half_width, wanted, accuracy.max_replicas)
-        if count <= found.replicas:
+        found = run.look_after_more(progress)
+        if run.step.stopped_by:
             return found
 
 
@@ -128,6 +118,8 @@ class _Run:
         require_metrics(design, self.plan.objective_name)
         setting = ReplicaSetting(design, chamber, self.cavity or mesh)
         self.setting = share(self.executor, setting)
+        self.effort = Effort.of(design.process.accuracy, self.plan.count)
+        self.step = self.effort.begin  # how many replicas the next look takes
         self.timings = {"simulate": 0.0, "coverage": 0.0}
         require_figures(design, chamber, mesh)
 
@@ -153,14 +145,13 @@ class _Run:
             one.add(hits)
         return hits, target, zones
 
-    def add_up_to(self, count: int, progress: Progress | None, wanted: float | None) -> Evaluation:
-        """Add replicas until there are `count`, and return the evaluation of all replicas.
+    def look_after_more(self, progress: Progress | None) -> Evaluation:
+        """Add the replicas of the next step, and return the evaluation of all replicas.
 
-        Args:
-            wanted: half-width of the objective's interval to reach; None if the user gave the
-                number of replicas.
+        `step` then is the step that follows from it.
         """
         design, plan, replicas = self.design, self.plan, self.known.replicas
+        count = self.step.replicas
         how = design.process.seed, self.executor, plan.stream, range(len(replicas), count), count
         began = time.perf_counter()
         for replica in run_in_order(simulate_replica, self.setting, *how):
@@ -177,7 +168,8 @@ class _Run:
         self.timings["simulate"] += simulated - began
         self.timings["coverage"] += time.perf_counter() - simulated
         field, done = target.field, len(replicas)
-        stopped_by, accuracy_note = _end(done, objective, wanted)
+        growth = growth_for_dents(plan.objective_name, found.resolution)
+        self.step = self.effort.after(done, objective, growth, self.step)
         return Evaluation(
             objective_name=plan.objective_name,
             objective=objective,
@@ -203,7 +195,7 @@ class _Run:
                 *reach_notes(field.reach),
                 *facet_warnings(self.chamber.part, min(design.shot.diameters), field.reach.share),
                 *_symmetry_note(field.alike),
-                *accuracy_note,
+                *((self.step.note,) if self.step.note else ()),
                 *resolution_notes(found.resolution),
                 *strength_notes(found.metrics, found.resolution),
                 *zone_notes,
@@ -213,7 +205,7 @@ class _Run:
             ),
             zones={name: one.field.reachable for name, one in zones.items()},
             stream=plan.stream,
-            stopped_by=stopped_by,
+            stopped_by=self.step.stopped_by or "replicas",
             analytic=self.cavity is not None,
             trapped=trapped_shares([one.trapped for one in replicas]),
         )
@@ -289,25 +281,3 @@ def _symmetry_note(alike: int) -> tuple[str, ...]:
         f"part and chamber look the same after a turn by {angle}: figures and maps of coverage and "
         f"intensity are means over {alike} places that are alike",
     )
-
-
-def _end(replicas: int, objective: Estimate, wanted: float | None) -> tuple[str, tuple[str, ...]]:
-    """Return why a simulation ended, and a note on whether it reached the wanted accuracy.
-
-    There is no note if no accuracy was wanted (None).
-    """
-    if wanted is None:
-        return "replicas", ()
-    if objective.half_width <= wanted:
-        note = f"the wanted accuracy of ± {wanted:g} was reached after {replicas} replicas"
-        return "accuracy", (note,)
-    reached = ""
-    if math.isfinite(objective.half_width):
-        needed = math.ceil(replicas * (objective.half_width / wanted) ** 2)
-        reached = f" with ± {objective.half_width:.2g}, and about {needed} replicas would be needed"
-    note = (
-        f"the wanted accuracy of ± {wanted:g} was not reached: the simulation stopped at "
-        f"process.accuracy.max_replicas = {replicas}{reached}; raise "
-        "process.accuracy.max_replicas or simulated_time_s"
-    )
-    return "max_replicas", (note,)

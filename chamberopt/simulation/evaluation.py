@@ -41,8 +41,7 @@ class Evaluation:
     collisions: dict[str, int]  # number of simulated collisions of each kind, warm-up included
     notes: tuple[str, ...] = ()  # sentences to read before trusting the result
     stream: str = "search"  # stream of seeds, "search" or "confirm"
-    # The reason to end: "replicas" (their number was given), "accuracy" or "max_replicas".
-    stopped_by: str = "replicas"
+    stopped_by: str = "replicas"  # the reason to end, as in effort.py
     # Number of places of the target that are alike by symmetry; figures are means over these.
     alike: int = 1
     # Share of each zone that a ball can touch, by its name.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor, Future
@@ -29,12 +28,6 @@ if TYPE_CHECKING:
 
 S = TypeVar("S")
 T = TypeVar("T")
-
-# Replicas that are added until an interval is narrow enough leave it too narrow by chance. If that
-# begins with 10 replicas and adds a quarter or more each time, a 95 % interval still holds the
-# truth in 94 % of cases (normal replicas; 92 % from 5 on, 90 % from 3 on: docs/accuracy.md).
-MIN_REPLICAS_TO_STOP = 10
-MIN_GROWTH, MAX_GROWTH = 1.25, 2.0
 
 
 class ReplicaSetting(NamedTuple):
@@ -124,33 +117,6 @@ def _result(number: int, future: Future[T]) -> T:
         return future.result()
     except WorkerLostError as error:
         raise WorkerLostError(f"replica {number}: {error}") from None
-
-
-def most_replicas(design: Design) -> int:
-    """Return the largest number of replicas that the design's accuracy may ask for."""
-    accuracy = design.process.accuracy
-    wanted = accuracy.objective_half_width is not None
-    return accuracy.max_replicas if wanted else accuracy.replicas
-
-
-def next_replica_count(done: int, half_width: float, wanted: float, maximum: int) -> int:
-    """Return how many replicas to simulate before looking at the interval again.
-
-    The number is predicted from the interval's present width.
-
-    Args:
-        done: number of replicas so far.
-        half_width: half-width of the interval from these replicas.
-        wanted: half-width to reach.
-        maximum: largest number of replicas.
-
-    Returns:
-        `done` if no more replicas are needed or allowed.
-    """
-    if done >= maximum or half_width <= wanted:
-        return done
-    predicted = done * (half_width / wanted) ** 2 if math.isfinite(half_width) else math.inf
-    return min(maximum, math.ceil(min(max(predicted, MIN_GROWTH * done), MAX_GROWTH * done)))
 
 
 def simulate_replica(setting: ReplicaSetting, seed: int) -> Replica:

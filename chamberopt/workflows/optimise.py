@@ -12,7 +12,7 @@ from chamberopt.coverage.field.memory import PROCESS, evaluation_bytes, how_many
 from chamberopt.results.load import load_trials
 from chamberopt.search.run_study import StudyResult, run_study
 from chamberopt.search.run_sweep import SweepPlan, SweepResult, run_sweep
-from chamberopt.simulation.replicas import most_replicas
+from chamberopt.simulation.effort import Effort
 from chamberopt.workflows.ranges import EndError, study_ranges
 from chamberopt.workflows.save_run import save_study, save_sweep
 from chamberopt.workflows.simulate import Teller, resolve_effects
@@ -147,7 +147,7 @@ def _candidates_at_once(study: Study, chamber: Chamber, teller: Teller) -> int:
     """
     settings = study.optimizer
     replicas = settings.confirm_replicas * 2 ** (settings.confirm_rounds - 1)
-    replicas = max(replicas, most_replicas(study.design))
+    replicas = max(replicas, Effort.of(study.design.process.accuracy).most)
     each = evaluation_bytes(study.design, chamber, replicas)
     count = how_many_fit(settings.batch, each, PROCESS)
     if count < settings.batch:
@@ -164,7 +164,7 @@ def _workers_that_fit(
     Raises InputError if not even one process fits.
     """
     design = study.at_search_accuracy(study.design)
-    each = PROCESS + evaluation_bytes(design, chamber, most_replicas(design))
+    each = PROCESS + evaluation_bytes(design, chamber, Effort.of(design.process.accuracy).most)
     asked = core_count() if wanted is None else wanted
     count = how_many_fit(asked, each, PROCESS)
     if count >= asked:

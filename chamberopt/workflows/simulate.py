@@ -19,8 +19,8 @@ from chamberopt.peening.calibration_errors import evaluate_calibrated
 from chamberopt.peening.range_result import Spreads
 from chamberopt.peening.tolerances import simulate_tolerances
 from chamberopt.simulation.effect_pilot import with_effects_resolved
+from chamberopt.simulation.effort import Effort
 from chamberopt.simulation.evaluate import ReplicaPlan
-from chamberopt.simulation.replicas import most_replicas
 from chamberopt.workflows.ranges import EndError, simulate_ranges
 from chamberopt.workflows.save_run import save_simulation
 
@@ -138,7 +138,8 @@ def simulate_design(
     if chamber is None:
         with teller.step("building the chamber"):
             chamber = build_chamber(design)
-            how_many_fit(1, evaluation_bytes(design, chamber, most_replicas(design)), PROCESS)
+            most = Effort.of(design.process.accuracy).most
+            how_many_fit(1, evaluation_bytes(design, chamber, most), PROCESS)
             warnings = teller.check(design, chamber)
     cavity = analytic_cavity(design, chamber) if settings.analytic else None
     design, advice = resolve_effects(design, chamber, executor, teller)

@@ -34,6 +34,8 @@ from chamberopt.search.study.parameters import (
     with_key,
 )
 
+LEAST_CONFIRMED = 4  # replicas, of which figures of strength take halves and quarters
+
 
 def _refuse_old_name(name: object) -> object:
     if isinstance(name, str) and name in RENAMED_OBJECTIVES:
@@ -154,7 +156,11 @@ class Optimizer(FileTable):
     confirm: int = quantity(1, 1000, "", "best candidates simulated again with new seeds", 3)
     confirm_replicas: int = quantity(3, 100000, "", "replicas of each confirmation", 16)
     first_replicas: int = quantity(
-        0, 100000, "", "replicas after which a clearly worse candidate gets no more; 0: never", 3
+        0,
+        100000,
+        "",
+        "after which a candidate gets no more if more would tell nothing; 0: never",
+        3,
     )
     confirm_rounds: int = quantity(
         1,
@@ -251,7 +257,8 @@ class Study(FileTable):
 
     @property
     def first_look(self) -> int | None:
-        """Number of replicas after which the search may give up a candidate as clearly worse.
+        """Number of replicas after which a candidate of the search gets no more if more would tell
+        nothing: it is clearly worse, or what is not known of it is in all replicas.
 
         It is None if each candidate gets all replicas: with two objectives, or if the design asks
         for an accuracy of the objective, or if the study sets no such number.
@@ -260,6 +267,20 @@ class Study(FileTable):
         few = self.optimizer.first_replicas
         refines = len(self.objective.goals) == 1 and accuracy.objective_half_width is None
         return few if refines and 0 < few < accuracy.replicas else None
+
+    @property
+    def first_look_of_confirmation(self) -> int | None:
+        """Number of replicas after which a confirmation ends if more would tell nothing.
+
+        It is None if each confirmation gets all replicas: if the design asks for an accuracy of the
+        objective or has a calibration, or if the study sets no such number.
+        """
+        few, design = self.optimizer.first_replicas, self.design
+        wanted = design.process.accuracy.objective_half_width
+        if not few or wanted is not None or design.calibration is not None:
+            return None
+        least = max(few, LEAST_CONFIRMED)
+        return least if least < self.optimizer.confirm_replicas else None
 
     def at_search_accuracy(self, design: Design) -> Design:
         """Return a candidate's design with the accuracy of the search, which is usually coarser.

@@ -2,12 +2,14 @@
 
 import threading
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from chamberopt.common.errors import InputError
+from chamberopt.common.estimate import estimate
 from chamberopt.search.trial_log import read_trials
 from tests.helpers.known_optima import bowl, bowl_shares, run_bowl
 from tests.helpers.synthetic import judged
@@ -52,6 +54,41 @@ def test_the_plainly_bad_get_few_replicas_and_close_calls_more(tmp_path: Path) -
     assert 8 in confirmed
     best, start = (one.evaluation.objective.pseudovalues for one in (result.best, result.start))
     assert len(best) == len(start) == max(confirmed)  # pair by pair, as the gain needs
+
+
+def test_candidates_end_early_where_more_replicas_would_tell_nothing(tmp_path: Path) -> None:
+    """Above half of the bounds nearly all of the interval is in all replicas, below nothing."""
+    asked: list[tuple[str, int, bool]] = []
+
+    def simulator(design, stream, replicas):
+        count, high = replicas or design.process.accuracy.replicas, bowl_shares(design)[0] > 0.5
+        asked.append((stream, count, high))
+        made = judged(bowl(bowl_shares(design)) + 0.001 * np.resize([-1.0, 1.0], count))
+        shared = [0.01] if high else []
+        return replace(made, objective=estimate(made.objective.pseudovalues, shared=shared))
+
+    settings = {"first_replicas": 4, "confirm_replicas": 16, "evaluations": 12}
+    result = run_bowl(tmp_path, simulator, settings)
+    assert {count for stream, count, high in asked if high and stream == "confirm"} <= {4}
+    searched = [one for one in result.trials if one.stage == "search"][1:]  # the start gets all
+    early = [one for one in searched if one.replicas == 4]
+    assert result.ended_early == len(early) > 0
+    assert len(searched) > 11  # they cost less than a whole evaluation
+    assert all(one.replicas == 4 for one in searched if one.point[0] > 0.5)
+    assert any(one.replicas == 8 for one in searched)
+
+
+def test_a_study_says_that_nothing_is_left_to_gain(tmp_path: Path) -> None:
+    def simulator(design, stream, replicas):
+        return judged(np.full(3, slope * bowl(bowl_shares(design))), time_to_98_s=30.0)
+
+    slope = 0.02  # no candidate is better by more
+    (note,) = run_bowl(tmp_path / "flat", simulator, {"evaluations": 6}).notes
+    assert note.startswith("nothing left to gain here: no confirmed candidate is better")
+    assert note.endswith("(fastest.toml of chamberopt new): it has full coverage after 30 of 120 s")
+    slope = 1.0
+    steep = run_bowl(tmp_path / "steep", simulator, {"evaluations": 6})
+    assert not any("nothing left" in note for note in steep.notes)
 
 
 def test_a_batch_gives_the_same_trials_whichever_ends_first(tmp_path: Path) -> None:

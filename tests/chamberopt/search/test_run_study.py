@@ -294,6 +294,7 @@ def test_a_study_searches_at_search_accuracy_and_confirms_at_the_designs_own_acc
     fine = GEAR.process.accuracy
     assert seen == {
         ("search", None, 0.25, 3, 16),
+        ("confirm", 4, fine.simulated_time_s, fine.replicas, GEAR.chamber.facets),  # a first look
         ("confirm", 16, fine.simulated_time_s, fine.replicas, GEAR.chamber.facets),
     }
     assert found.best.design.process == GEAR.process

@@ -16,9 +16,10 @@ from chamberopt.coverage.metrics import OBJECTIVES, metric_names
 from chamberopt.coverage.part_impacts import Hits
 from chamberopt.design.design import validate
 from chamberopt.design.load import Design
+from chamberopt.simulation.effort import MIN_REPLICAS_TO_STOP
 from chamberopt.simulation.estimates import SeenDents, estimate_metrics, reach_notes, weighted_sum
 from chamberopt.simulation.evaluate import MAX_SPEED, ReplicaPlan, evaluate, prepare_target
-from chamberopt.simulation.replicas import MIN_REPLICAS_TO_STOP, ReplicaSet
+from chamberopt.simulation.replicas import ReplicaSet
 from tests.helpers.synthetic import evaluation_of, plane_chamber, plate_design, random_dents
 
 DESIGN = plate_design(process__treatment_time_s=50.0)

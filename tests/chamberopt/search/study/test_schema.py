@@ -70,9 +70,7 @@ def test_how_well_a_design_is_known_is_none_of_its_choices() -> None:
         (3, {"replicas": 8}, {"pareto": ["uniform_coverage", "minus_time_to_98_s"]}, None),
     ],
 )
-def test_who_may_be_given_up(
-    first: int, accuracy: dict, objective: dict, looks: int | None
-) -> None:
+def test_who_may_end_early(first: int, accuracy: dict, objective: dict, looks: int | None) -> None:
     study = Study(
         design=GEAR,
         vary=VARY,
