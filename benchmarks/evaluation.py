@@ -85,7 +85,7 @@ def replica_shares(design: Any, chamber: Any) -> dict[str, float]:
     """
     from chamberopt.chamber.replica_seed import replica_seed
     from chamberopt.chamber.scene import chamber_mesh
-    from chamberopt.simulation.convergence import TIME, WARM_UP
+    from chamberopt.simulation.numerical_parameters import TIME, WARM_UP
     from chamberopt.simulation.replicas import ReplicaSetting, simulate_replica
 
     mesh = chamber_mesh(chamber)

@@ -37,6 +37,7 @@ from chamberopt.cli import main
 from chamberopt.common import executor
 from chamberopt.common.versions import versions
 from chamberopt.simulation import convergence as convergence_study
+from chamberopt.simulation import timed_replicas
 from chamberopt.workflows import comparison_folder
 from tests.chamberopt.common.files.scene import write_scene
 from tests.chamberopt.simulation.test_study import made_up_replica
@@ -128,7 +129,7 @@ COMMANDS = {
         "export sweep/out --to study-csv --out sweep/study.csv",
         f"sweep study.toml --grid 2 {ONE} --out sweep/out",  # it is finished
     ],
-    "accuracy": ["accuracy plate.toml --budget-s 3 --out accuracy/out"],
+    "accuracy": ["accuracy plate.toml --budget-s 14 --out accuracy/out"],
     "strip": [f"strip many.toml --disc-mm 30 {ONE} --out strip/out"],
     "compare": [f"compare simulate/out light.toml {ONE} --out compare/out"],
 }
@@ -200,6 +201,8 @@ def patch_surroundings(patch: pytest.MonkeyPatch, sheets: list[Figure]) -> None:
     patch.setattr(convergence_study, "core_count", lambda: 1)
     still = SimpleNamespace(thread_time=lambda: 0.0, perf_counter=lambda: 0.0)
     patch.setattr(convergence_study, "time", still)
+    patch.setattr(timed_replicas, "time", still)
+    patch.setattr(convergence_study, "timed_evaluation", lambda *_: (0.5, 0.4, 0.1))
     patch.setattr("chamberopt.cli.teller.compile_with_message", lambda *_: None)
 
     def save_charts(figure: Figure, *given: Any, **named: Any) -> None:

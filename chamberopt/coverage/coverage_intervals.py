@@ -36,7 +36,7 @@ from typing import NamedTuple
 import numpy as np
 
 from chamberopt.common.estimate import Estimate, estimate, jackknife
-from chamberopt.coverage.coverage_from_impacts import Batch
+from chamberopt.coverage.coverage_from_impacts import Batch, in_batches
 from chamberopt.coverage.field.surface_points import Reach, sampling_errors, sparse_points
 from chamberopt.coverage.field.target_field import Gauge
 from chamberopt.coverage.percentile import (
@@ -44,6 +44,7 @@ from chamberopt.coverage.percentile import (
     P95_COVERAGE,
     P95_EXPOSURE,
     DentSums,
+    dent_sums,
     mean_exposure,
     quantile_estimate,
 )
@@ -77,20 +78,76 @@ def multiply_dents(batches: Sequence[Batch], points: int, ratios: Sequence[float
     from chamberopt.coverage.field.windows import multiply_products
 
     size = np.array([one.replicas for one in batches])
-    total, count, wanted = int(size.sum()), len(ratios), np.array(ratios, dtype=float)
-    # Without a batch, k follows from the number of the other replicas. Batches have two sizes.
-    sizes = np.unique(size)
-    scales = np.concatenate([wanted / total, *(wanted / max(total - one, 1) for one in sizes)])
+    scales = _scales(size, ratios)
     products = np.ones((len(batches), points, len(scales)))
     for product, one in zip(products, batches, strict=True):
         for point, weight in one.footprints.pairs():
             multiply_products(product, point, weight, scales)
-    of_rest = np.empty((len(batches), count))
-    for number, one_size in enumerate(sizes, start=1):
+    return _means_of(products, size, len(ratios))
+
+
+def _scales(size: np.ndarray, ratios: Sequence[float]) -> np.ndarray:
+    """Return k for all batches of these sizes, then k without a batch of each size.
+
+    Without a batch, k follows from the number of the other replicas. Batches have two sizes.
+    """
+    total, wanted = int(size.sum()), np.array(ratios, dtype=float)
+    rests = (wanted / max(total - one, 1) for one in np.unique(size))
+    return np.concatenate([wanted / total, *rests])
+
+
+def _means_of(products: np.ndarray, size: np.ndarray, count: int) -> Products:
+    """Return the products of all batches, and their means without each, for `count` time ratios.
+
+    Args:
+        products: products over the dents of each batch, for all k of `_scales`, (g, p, k).
+        size: replicas of each batch, (g,).
+    """
+    of_rest = np.empty((len(size), count))
+    for number, one_size in enumerate(np.unique(size), start=1):
         part = products[:, :, number * count : (number + 1) * count]
         of_this = size == one_size
         of_rest[of_this] = products_without_each(part).mean(axis=1)[of_this]
     return Products(products[:, :, :count].prod(axis=0), of_rest)
+
+
+class WindowTally:
+    """Sums and products over the dents in windows, to which replicas are added one by one.
+
+    It keeps no dents, but it must know beforehand how many replicas there will be.
+
+    Args:
+        replicas: number of replicas.
+        points: number of windows.
+        time_ratio: treatment time over the simulated time of one replica.
+    """
+
+    def __init__(self, replicas: int, points: int, time_ratio: float) -> None:
+        self._size = np.array([len(one) for one in in_batches(range(replicas))])
+        self._batch = np.repeat(np.arange(len(self._size)), self._size)
+        self._scales = _scales(self._size, [time_ratio, 2.0 * time_ratio])
+        self._sums = np.zeros((len(self._size), points, 3))
+        self._products = np.ones((len(self._size), points, len(self._scales)))
+        self._added = 0
+
+    def add(self, pairs: Sequence[tuple[np.ndarray, np.ndarray]]) -> None:
+        """Add a replica's pairs of a window and the share of it that a dent takes."""
+        from chamberopt.coverage.field.windows import add_powers, multiply_products
+
+        batch, self._added = self._batch[self._added], self._added + 1
+        for point, weight in pairs:
+            add_powers(point, weight, self._sums[batch])
+            multiply_products(self._products[batch], point, weight, self._scales)
+
+    @property
+    def sums(self) -> DentSums:
+        return dent_sums(self._size, self._sums)
+
+    def mean_and_std(self, reach: Reach) -> tuple[Estimate, Estimate]:
+        """Return the estimates of mean and standard deviation of the coverage."""
+        products = _means_of(self._products, self._size, 2)
+        mean, variance = mean_and_variance_estimates(products, reach)
+        return mean, root_of_variance(variance)
 
 
 def coverage_estimates(

@@ -91,8 +91,15 @@ def sum_dents(batches: Sequence[Batch], points: int) -> DentSums:
     for of_batch, one in zip(sums, batches, strict=True):
         for point, weight in one.footprints.pairs():
             add_powers(point, weight, of_batch)
+    return dent_sums(np.array([one.replicas for one in batches]), sums)
+
+
+def dent_sums(replicas: np.ndarray, sums: np.ndarray) -> DentSums:
+    """Return the numbers and shares of dents from sums of their powers, (g, p, 3), by batch of
+    replicas (g,).
+    """
     number, share, _ = np.ascontiguousarray(np.moveaxis(sums, 2, 0))
-    return DentSums(np.array([one.replicas for one in batches]), share, number.sum(axis=0))
+    return DentSums(replicas, share, number.sum(axis=0))
 
 
 def quantile_estimate(

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING
 
-from chamberopt.simulation.convergence import FACETS, setting_text, short_name
+from chamberopt.simulation.numerical_parameters import FACETS, setting_text, short_name
 from chamberopt.simulation.recommendation import ACCURACIES, recommend
 
 if TYPE_CHECKING:
@@ -38,7 +37,9 @@ def accuracy_lines(study: ConvergenceStudy) -> list[str]:
         lines.append(f"{short_name(run.parameter):24}{run.setting:>24}{cpu:>19}{biases}")
     for accuracy in ACCURACIES:
         lines += ["", *recommend(study, accuracy).lines]
-    total = f"{study.cpu_s:.0f} CPU s of simulation, {study.wall_s:.0f} s in all with compiling"
+    total = f"{study.cpu_s:.0f} CPU s without compiling, {study.wall_s:.0f} s in all"
+    if study.left_out:
+        total += f"; left out by --budget-s: {', '.join(map(short_name, study.left_out))}"
     return [*lines, "", total]
 
 
@@ -57,7 +58,8 @@ def describe_reference(study: ConvergenceStudy) -> str:
         f"{short_name(name)} {setting_text(value)}" for name, value in study.settings.items()
     )
     walls = f"; no chamber here has a round wall, so {FACETS} can only be compared with the finest"
-    remark = walls if FACETS in study.settings else ""
+    tried = FACETS in study.settings and FACETS not in study.left_out
+    remark = walls if tried else ""
     return (
         f"reference: {run.replicas} replicas with {settings}: objective {run.objective.value:.4f} "
         f"± {run.objective.half_width:.2g}, mean coverage {run.mean.value:.4f} ± "
@@ -69,9 +71,15 @@ def describe_error_law(study: ConvergenceStudy) -> str:
     """Return a sentence with the factor in cost that halves the error.
 
     The factor is 4 if the error comes from independent replicas alone. If it is another factor, the
-    sentence gives the reason.
+    sentence gives the reason. If the factor is hardly known, the sentence says so.
     """
     law, sizes = study.law, study.sizes
+    if law is None or law.halving is None:
+        return (
+            f"more replicas alone: {sum(one.batches for one in sizes)} batches do not tell what "
+            "halving the error costs; it is 4 times as much for independent replicas; raise "
+            "--budget-s"
+        )
     middle, low, high = law.halving
     unresolved = [str(size.replicas) for size in sizes if not size.is_resolved]
     left_out = len(unresolved) <= len(sizes) - 2
@@ -81,14 +89,10 @@ def describe_error_law(study: ConvergenceStudy) -> str:
         if not left_out:
             reason += ", because the windows have too few dents, and more replicas end it"
     elif low > 4.0:
-        estimating = 1.0 - sizes[-1].replicas * study.reference.cpu.value / sizes[-1].cpu_s
         reason = (
-            "more than the 4 of independent replicas: some replicas differ much from the others, "
-            f"or the estimate, {estimating:.0%} of the largest batch's time, takes too long"
+            "more than the 4 of independent replicas: some replicas differ much from the others"
         )
     cost = f"costs {middle:.2f} times as much ({low:.2f} to {high:.2f}), {reason}"
-    if math.isinf(middle):
-        cost = "is out of reach of the numbers of replicas that were tried"
     text = (
         f"more replicas alone: halving the error {cost} "
         f"(error ~ cost^-{law.power:.2f} ± {law.half_width:.2f})"

@@ -283,7 +283,7 @@ class ErrorLawRecord(Table):
 class HalvingRecord(Table):
     """The factor `times` in cost that halves the error, with its interval from low to high.
 
-    The numbers are null if no cost halves the error.
+    The numbers are null if the batches of replicas do not tell it.
     """
 
     times: float | None
@@ -312,9 +312,10 @@ class ConvergenceRecord(Table):
     format: int
     reference: ReferenceRecord
     rows: list[dict[str, Any]]
-    law: ErrorLawRecord
+    law: ErrorLawRecord | None
     halving: HalvingRecord
     recommendations: list[RecommendationRecord]
+    left_out: list[str]
     cpu_s: float
     wall_s: float
     design: dict[str, Any]

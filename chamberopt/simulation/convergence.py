@@ -2,145 +2,83 @@
 
 A numerical parameter, such as the simulated time, sets how accurately a design is simulated. Its
 settings are the values that are tried. The reference is a run, a series of replicas, with every
-parameter at its finest setting. Each other run has one parameter coarser, and the bias of this
-setting is its difference from the reference. All runs take turns, a few replicas each, so that a
-computer that slows down slows all of them. The error against the number of replicas comes from
-batches of the reference's replicas.
+parameter at its finest setting, but for what more replicas do as well: simulated time and points.
+Each other run has one parameter off the reference, and the bias of this setting is its difference
+from the reference. All runs take turns, a replica each, so that a computer that slows down slows
+all of them. The error against the number of replicas comes from batches of the reference's
+replicas.
+
+The study keeps to a budget of CPU seconds. A replica of the reference tells what each setting will
+take. Settings that the budget does not allow are left out, in the order of LEFT_OUT_FIRST.
 """
 
 from __future__ import annotations
 
 import math
-import re
 import time
-from collections.abc import Callable, Collection, Iterable, Sequence
-from concurrent.futures import Executor
-from dataclasses import dataclass, field, replace
+from collections import deque
+from collections.abc import Callable, Collection, Iterator, Sequence
+from concurrent.futures import Executor, Future
+from dataclasses import dataclass, field
+from itertools import count
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from chamberopt.chamber.replica_seed import replica_seed
 from chamberopt.chamber.scene import chamber_mesh
 from chamberopt.common.errors import InputError
-from chamberopt.common.estimate import Estimate, estimate, paired_difference
-from chamberopt.common.executor import core_count
-from chamberopt.common.progress import step
-from chamberopt.coverage.coverage_from_impacts import Prints, kept_footprints, locate_dents
+from chamberopt.common.executor import SerialExecutor, core_count
+from chamberopt.common.number_text import plain
+from chamberopt.common.progress import Progress, step
 from chamberopt.coverage.field.memory import OF_POINT, PROCESS, evaluation_bytes, how_many_fit
-from chamberopt.coverage.field.target_field import TargetField
-from chamberopt.coverage.metrics import parse_objective
+from chamberopt.coverage.field.target_field import TargetField, WindowSetting, find_target_field
 from chamberopt.design.design import Design
-from chamberopt.design.process import MAX_POINTS, MIN_POINTS
 from chamberopt.simulation import error_law
 from chamberopt.simulation.error_law import BatchSize, ErrorLaw
-from chamberopt.simulation.estimates import weighted_sum, window_estimates
-from chamberopt.simulation.evaluate import prepare_target
-from chamberopt.simulation.replicas import ReplicaSetting, simulate_replica
+from chamberopt.simulation.evaluate import ReplicaPlan, evaluate, window_setting
+from chamberopt.simulation.numerical_parameters import (
+    DESIGNED,
+    LEFT_OUT_FIRST,
+    numerical_parameters,
+    short_name,
+    study_designs,
+)
+from chamberopt.simulation.replicas import ReplicaSet, ReplicaSetting
+from chamberopt.simulation.timed_replicas import (
+    Replicas,
+    Run,
+    TimedReplica,
+    simulate_timed,
+    timed_figures,
+)
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
     from chamberopt.design.shapes import ChamberTable
     from sim_core import TriangleMesh
 
-# The numerical parameters of a design, which trade accuracy for time, and settings to try.
-
-FACETS, MOTION = "chamber.facets", "sonotrode.motion"
-TIME, WARM_UP = "process.accuracy.simulated_time_s", "process.accuracy.warmup_time_s"
-ELASTIC_SPEED = "process.accuracy.elastic_below_mm_s"
-DRAG_STEP = "process.accuracy.drag_step_ms"
-POINTS, GAUGE = "process.accuracy.points", "process.accuracy.gauge_mm2"
-REFERENCE, DESIGNED = "reference", "as designed"
-
-
-def numerical_parameters(design: Design) -> dict[str, tuple[object, ...]]:
-    """Return the values to try of each numerical parameter of a design, by its dotted name.
-
-    The last value is the value in the reference, with which all others are compared.
-    """
-    accuracy = design.process.accuracy
-    settings: dict[str, Iterable[Any]] = {}
-    if design.chamber.is_round:
-        facets = design.value(FACETS)
-        settings[FACETS] = sorted({16, facets, min(1024, max(256, 4 * facets))})
-    if not design.sonotrodes:
-        settings[MOTION] = "random_phase", "sinusoidal"
-    warm_up, time_s = accuracy.warmup_time_s, accuracy.simulated_time_s
-    settings[WARM_UP] = sorted({0.0, warm_up / 4, warm_up, min(1e4, 4 * max(warm_up, 0.05))})
-    settings[ELASTIC_SPEED] = _falling(accuracy.elastic_below_mm_s, 10)
-    if design.effects.drag:
-        settings[DRAG_STEP] = _falling(accuracy.drag_step_ms, 4)
-    points = accuracy.points
-    settings[POINTS] = sorted({max(MIN_POINTS, points // 4), points, min(MAX_POINTS, 4 * points)})
-    gauge = accuracy.gauge_mm2
-    settings[GAUGE] = min(1e4, 4 * gauge), gauge
-    settings[TIME] = max(1e-4, time_s / 4), min(1e4, 4 * time_s), time_s
-    return {name: tuple(values) for name, values in settings.items()}
-
-
-def _falling(value: float, factor: float) -> list[float]:
-    """Return `factor` times a value, the value, and the value over `factor`, the largest first.
-
-    They are cut off at 0.1 and 1000, the range that a design file allows.
-    """
-    return sorted({min(1e3, factor * value), value, max(0.1, value / factor)}, reverse=True)
-
-
-def study_designs(design: Design) -> tuple[dict[str, object], dict[tuple[str, str], Design]]:
-    """Return the finest setting of each numerical parameter, and all designs to simulate.
-
-    The designs are the reference (all parameters finest), a copy of it for each other setting of a
-    parameter, and the design as it is. Their keys are the parameter and its setting as text.
-    """
-    parameters = numerical_parameters(design)
-    settings = {name: values[-1] for name, values in parameters.items()}
-    reference = design.changed(settings)
-    others: dict[tuple[str, str], Design] = {}
-    for name, values in parameters.items():
-        others |= {(name, setting_text(x)): reference.changed({name: x}) for x in values[:-1]}
-    return settings, {(REFERENCE, ""): reference, **others, (DESIGNED, ""): design}
-
-
-def setting_text(value: object) -> str:
-    """Return the value of a numerical parameter as a design file writes it, without quotes."""
-    return f"{value:g}" if isinstance(value, int | float) else str(value)
-
-
-def short_name(parameter: str) -> str:
-    """Return the name of a parameter in words, without its table and unit, as "simulated time"."""
-    return re.sub("_(mm_s|mm2|ms|s)$", "", parameter.rsplit(".", 1)[-1]).replace("_", " ")
-
-
-MIN_ROUNDS = 3  # a run needs three replicas for an interval
+MIN_ROUNDS = 3  # replicas of a run, for an interval
 MIN_REPLICAS, MAX_REPLICAS = 32, 1024  # of the reference; 32 give two sizes of batches
 LIKELY_REPLICAS = 256  # number of replicas of all settings together, whose dents are kept
 MIN_BATCHES = 4  # of each size
+TIMED_REPLICAS = 4  # of the evaluation whose cost is measured; strength takes four
+# CPU seconds of a command beside those of the study itself: imports, tables and picture.
+OF_COMMAND = 4.0
+SERIAL = 0.1  # share of the CPU seconds in which only one core has work
 ZERO_ERROR = 1e-12  # share of an area below which an error is a rounding error
-ZERO = Estimate(0.0, 0.0)
 
 
-@dataclass(frozen=True)
-class Run:
-    """The result of simulations in which one numerical parameter has one of its settings."""
+class EvaluationCost(NamedTuple):
+    """What an evaluation of the design as it is costs, in CPU seconds.
 
-    parameter: str  # dotted name of the numerical parameter that differs from the reference
-    setting: str  # its value as text
-    replicas: int
-    cpu: Estimate  # CPU seconds of a replica
-    objective: Estimate
-    mean: Estimate  # mean coverage
-    bias: Estimate = ZERO  # objective less the reference's
-    mean_bias: Estimate = ZERO  # mean coverage less the reference's
+    Attributes:
+        fixed: to build the chamber and its search tree, and to place the windows (discs in which
+            dents are counted).
+        figures: to locate the dents of a replica, and for its share of all figures.
+    """
 
-    @property
-    def is_biased(self) -> bool:
-        """True if the bias, the difference from the reference, is certainly not 0."""
-        return abs(self.bias.value) > self.bias.half_width
-
-    @property
-    def max_bias(self) -> float:
-        """Largest absolute value that the bias may have by its interval."""
-        return max(self.bias.high, -self.bias.low)
+    fixed: float
+    figures: float
 
 
 @dataclass(frozen=True)
@@ -152,59 +90,12 @@ class ConvergenceStudy:
     reference: Run
     runs: tuple[Run, ...]  # each with a coarser parameter, and the run of the design as it is
     sizes: tuple[BatchSize, ...]  # error against CPU seconds of batches of the reference
-    law: ErrorLaw  # fitted to the sizes
-    cpu_s: float  # CPU seconds of the simulations
+    law: ErrorLaw | None  # fitted to the sizes; None if there are fewer than two
+    resolved_s: float  # simulated time [s] that gives the dents which the objective needs
+    cost: EvaluationCost
+    cpu_s: float  # CPU seconds of the study, without compiling
     wall_s: float  # duration of the study [s]
-
-
-class TimedReplica(NamedTuple):
-    """The dents of a replica, as their footprints in windows, and the CPU seconds that it took.
-
-    A window is a disc of the surface in which dents are counted.
-    """
-
-    footprints: Prints
-    cpu_s: float
-
-
-@dataclass
-class Replicas:
-    """The replicas of one design that have been simulated so far, and their figures."""
-
-    setting: ReplicaSetting
-    target: TargetField
-    skipped: int = 1  # number of first replicas without a time, because they build a search tree
-    started: int = 0  # number of replicas that are simulated or under way
-    done: list[TimedReplica] = field(default_factory=list)
-
-    @property
-    def cpu(self) -> Estimate:
-        """Estimate of the CPU seconds that a replica of this design takes."""
-        return estimate([one.cpu_s for one in self.done[self.skipped :]], 0.0)
-
-    def estimates(self, part: slice = slice(None)) -> tuple[Estimate, Estimate, bool]:
-        """Return objective and mean coverage from some replicas, and if dents suffice for both."""
-        prints = [one.footprints for one in self.done[part]]
-        metrics, found = window_estimates(
-            self.target, self.target.gauge, prints, self.setting.design
-        )
-        objective = weighted_sum(parse_objective("uniform_coverage"), metrics)
-        return objective, metrics["mean_coverage"], found.has_mean
-
-    def run(self, parameter: str, setting: str, reference: Run | None = None) -> Run:
-        """Return the result of all replicas, with its difference from the result of a reference.
-
-        Args:
-            parameter, setting: name of the parameter that differs from the reference, and its
-                value.
-            reference: result of the reference; None if these replicas are the reference themselves.
-        """
-        objective, mean, _ = self.estimates()
-        run = Run(parameter, setting, len(self.done), self.cpu, objective, mean)
-        if reference is None:
-            return run
-        bias = paired_difference(objective, reference.objective)
-        return replace(run, bias=bias, mean_bias=paired_difference(mean, reference.mean))
+    left_out: tuple[str, ...] = ()  # parameters that the budget did not allow to try
 
 
 def require_budget(budget_s: float) -> None:
@@ -214,12 +105,13 @@ def require_budget(budget_s: float) -> None:
         raise InputError(f"--budget-s: given {budget_s:g}; {remedy}")
 
 
-def describe_cost(design: Design, budget_s: float) -> str:
+def describe_cost(budget_s: float) -> str:
     """Return a sentence for the user on the cost of a study, to show before the study begins."""
-    settings = len(study_designs(design)[1])
+    cores = core_count()
+    wall = budget_s * (SERIAL + (1.0 - SERIAL) / cores)
     return (
-        f"{settings} settings, each in {MIN_ROUNDS} replicas or more: about {budget_s:g} CPU s "
-        f"(--budget-s) on {core_count()} cores, more where one replica takes long; and compiling"
+        f"about {plain(budget_s, 3)} CPU s (--budget-s), {plain(wall, 2)} s on {cores} free cores; "
+        "and compiling, once ever"
     )
 
 
@@ -228,100 +120,287 @@ def run_convergence_study(
     budget_s: float,
     executor: Executor,
     prepare: Callable[[Design, Chamber], None] = lambda design, chamber: None,
+    tell: Callable[[str], None] = lambda text: None,
 ) -> ConvergenceStudy:
     """Simulate each setting of each numerical parameter, for about the budgeted CPU seconds.
 
-    Each round simulates a replica of every setting, and as many replicas of the reference as there
-    are settings. There are at least three rounds. `prepare` is called for each design before the
-    first simulation, to compile. Raises InputError if the budget is not positive, the memory is too
-    small, or a design cannot be evaluated.
-    """
-    from chamberopt.chamber.build import build_chamber
+    Args:
+        prepare: called for each design before its first simulation, to compile.
+        tell: called with sentences for the user.
 
+    Raises:
+        InputError: the budget is not positive, or too small even for the fewest settings; the
+            memory is too small; or a design cannot be evaluated.
+    """
     require_budget(budget_s)
     started = time.perf_counter()
-    settings, designs = study_designs(design)
-    chambers: dict[ChamberTable, tuple[Chamber, TriangleMesh]] = {}
-    replicas: dict[tuple[str, str], Replicas] = {}
-    with step("building and compiling, settings") as built:
-        for key, one in designs.items():
+    study = _Study(design, budget_s, executor, prepare)
+    with step("building and timing the reference"):
+        left_out = study.leave_out()
+    if left_out:
+        tell(f"left out by --budget-s = {budget_s:g}: {', '.join(map(short_name, left_out))}")
+    settings, designs = study_designs(design, left_out)
+    with step("building, settings") as built:
+        replicas: dict[tuple[str, str], Replicas] = {}
+        for key, design_of_key in designs.items():
             built(len(replicas), len(designs), None)
-            if one.chamber not in chambers:
-                first = next(iter(chambers.values()), None)
-                chamber = build_chamber(one, first and first[0].part.target)
-                chambers[one.chamber] = chamber, chamber_mesh(chamber)
-            if not replicas:
-                require_memory(designs.values(), chambers[one.chamber][0])
-            setting = ReplicaSetting(one, *chambers[one.chamber])
-            replicas[key] = Replicas(setting, prepare_target(one, *chambers[one.chamber]))
-            prepare(one, replicas[key].setting.chamber)
+            replicas[key] = study.replicas_of(design_of_key)
     (reference_key, reference), *others = replicas.items()
-    a_round = [*(one for _, one in others), *[reference] * len(others)]
-    enough = max(MIN_REPLICAS, MIN_ROUNDS * len(others))
-    spent, least = 0.0, budget_s
-    with step("simulating, CPU seconds") as simulated:
-        while (count := len(reference.done)) < MAX_REPLICAS and (
-            count < enough or spent < budget_s
-        ):
-            spent += _add_replicas(a_round, executor)
-            if not count:
-                _require_error(reference.estimates()[1].value)
-                least = max(budget_s, spent * math.ceil(enough / len(others)))
-            simulated(min(round(spent), round(least)), round(least), None)
-    reference_run = reference.run(*reference_key)
-    sizes = _batch_sizes(reference, reference_run)
+    whole_evaluation, of_figures = study.time_evaluation(replicas[DESIGNED, ""])
+    with step("simulating, CPU seconds") as progress:
+        study.simulate(reference, [one for _, one in others], progress)
+    with step("figures"):
+        whole, sizes, resolved_s = study.figures_of_reference(reference, reference_key)
+        found = [executor.submit(timed_figures, one, [range(one.started)]) for _, one in others]
+        runs = []
+        for (key, one), future in zip(others, found, strict=True):
+            (figures,), seconds, cpu_s = future.result()
+            runs.append(one.run(key, figures, seconds, whole))
+            study.spent += cpu_s
+    each = runs[-1].cpu.value + of_figures  # the last run is of the design as it is
+    cost = EvaluationCost(max(0.0, whole_evaluation - TIMED_REPLICAS * each), of_figures)
     return ConvergenceStudy(
         design=design,
         settings=settings,
-        reference=reference_run,
-        runs=tuple(one.run(*key, reference_run) for key, one in others),
+        reference=whole,
+        runs=tuple(runs),
         sizes=sizes,
-        law=error_law.fit_error_law(sizes),
-        cpu_s=spent,
+        law=error_law.fit_error_law(sizes) if len(sizes) > 1 else None,
+        resolved_s=resolved_s,
+        cost=cost,
+        cpu_s=study.spent,
         wall_s=time.perf_counter() - started,
+        left_out=left_out,
     )
 
 
-def require_memory(designs: Collection[Design], chamber: Chamber) -> None:
+@dataclass
+class _Study:
+    """A study that runs: what it has built, and the CPU seconds that it has spent."""
+
+    design: Design
+    budget_s: float
+    executor: Executor
+    prepare: Callable[[Design, Chamber], None]
+    spent: float = 0.0  # CPU seconds, without compiling
+    seconds: float = 0.0  # CPU seconds of a simulated second of the reference
+    of_figures: float = 0.0  # CPU seconds of a point and simulated second, for the figures
+    chambers: dict[ChamberTable, tuple[Chamber, TriangleMesh]] = field(default_factory=dict)
+    targets: dict[tuple[ChamberTable, WindowSetting], TargetField] = field(default_factory=dict)
+    built: list[float] = field(default_factory=list)  # CPU seconds to build for each new design
+    known: dict[str, Replicas] = field(default_factory=dict)
+
+    def replicas_of(self, design: Design) -> Replicas:
+        """Return the replicas of a design, and build its chamber and windows if they are new.
+
+        The first replica in a chamber builds a search tree, so it is simulated here, without a
+        time.
+        """
+        from chamberopt.chamber.build import build_chamber
+
+        key = design.model_dump_json()
+        if key in self.known:
+            return self.known[key]
+        begin, table = time.thread_time(), design.chamber
+        is_new = table not in self.chambers
+        if is_new:
+            first = next(iter(self.chambers.values()), None)
+            chamber = build_chamber(design, first and first[0].part.target)
+            self.chambers[table] = chamber, chamber_mesh(chamber)
+        chamber, mesh = self.chambers[table]
+        window = window_setting(design, chamber)
+        if (table, window) not in self.targets:
+            require_memory([*self.targets.values()], design, chamber)
+            self.targets[table, window] = target = find_target_field(chamber, mesh, window)
+            _ = target.gauge
+        self.built.append(time.thread_time() - begin)
+        self.spent += self.built[-1]
+        self.prepare(design, chamber)
+        found = Replicas(ReplicaSetting(design, chamber, mesh), self.targets[table, window])
+        self.known[key] = found
+        if is_new:
+            found.skipped = 1
+            self.add(found)
+        return found
+
+    def add(self, one: Replicas) -> None:
+        """Simulate the next replica of a design now."""
+        one.started += 1
+        one.done.append(simulate_timed(one.setting, one.target, one.started - 1))
+        self.spent += one.done[-1].cpu_s
+
+    def leave_out(self) -> tuple[str, ...]:
+        """Time a replica of the reference, and return the parameters that the budget leaves out.
+
+        Raises InputError if the budget is too small even without them.
+        """
+        reference = self.replicas_of(next(iter(study_designs(self.design)[1].values())))
+        self.add(reference)
+        for _ in range(2):  # the first loads compiled code
+            (figures,), _, cpu_s = timed_figures(reference, [range(2)])
+            self.spent += cpu_s
+        _require_error(figures.mean.value)
+        self.seconds = reference.done[1].cpu_s / reference.length
+        self.of_figures = 0.5 * cpu_s / (reference.length * len(reference.target.gauge.area))
+        can_go = [name for name in LEFT_OUT_FIRST if name in numerical_parameters(self.design)]
+        for number in range(len(can_go) + 1):
+            least = self.spent + self.least_cost(can_go[:number])
+            if least <= self.budget_s:
+                return tuple(can_go[:number])
+        remedy = f"give at least {math.ceil(1.1 * least)}, or a shorter simulated_time_s"
+        raise InputError(
+            f"--budget-s: given {self.budget_s:g}, but {MIN_REPLICAS} replicas of the reference "
+            f"and {MIN_ROUNDS} of each simulated time take about {plain(least, 2)} CPU s; {remedy}"
+        )
+
+    def least_cost(self, left_out: Collection[str]) -> float:
+        """Return the CPU seconds of the fewest replicas of a study, without some parameters."""
+        (reference, *others) = study_designs(self.design, left_out)[1].values()
+        chambers = {one.chamber for one in others} - self.chambers.keys()
+        windows = {(one.chamber, *_windows_of(one)) for one in others}
+        # The first was slower, because it loaded libraries.
+        cost = 0.5 * self.built[0] * len(windows)
+        cost += OF_COMMAND + 0.5 * self.built[0]
+        cost += TIMED_REPLICAS * 3.0 * self._cost_of(self.design)
+        cost += (MIN_REPLICAS + len(chambers)) * 1.5 * self._cost_of(reference)
+        return cost + MIN_ROUNDS * sum(map(self._cost_of, others))
+
+    def _cost_of(self, design: Design) -> float:
+        """Return the likely CPU seconds of a replica of a design and of its figures."""
+        accuracy = design.process.accuracy
+        length = design.process.recorded_time + accuracy.warmup_time
+        return length * (self.seconds + self.of_figures * accuracy.points)
+
+    def time_evaluation(self, own: Replicas) -> tuple[float, float]:
+        """Evaluate the design as it is in a few replicas.
+
+        Return the CPU seconds of all that this takes, and of the figures for each replica.
+        """
+        spent, whole, of_figures = timed_evaluation(own.setting, own.target)
+        self.spent += spent
+        return whole, of_figures
+
+    def simulate(self, reference: Replicas, others: Sequence[Replicas], progress: Progress) -> None:
+        """Simulate replicas in turns, until the budget is spent but for what the figures take.
+
+        The reference has MIN_REPLICAS and each other design MIN_ROUNDS in any case.
+        """
+        waiting: deque[tuple[Replicas, Future[TimedReplica]]] = deque()
+
+        def take() -> None:
+            one, future = waiting.popleft()
+            one.done.append(future.result())
+            self.spent += one.done[-1].cpu_s
+            progress(min(round(self.spent), total), total, None)
+
+        total = round(self.budget_s)
+        try:
+            for one in _turns(reference, others):
+                is_least = any(other.started < MIN_ROUNDS for other in others)
+                is_least |= reference.started < MIN_REPLICAS
+                likely = sum(self._cost_of(running.setting.design) for running, _ in waiting)
+                left = self.budget_s - OF_COMMAND - self.spent - likely
+                left -= self._cost_of_figures(reference, others)
+                if not is_least and (left < 0.0 or reference.started >= MAX_REPLICAS):
+                    break
+                task = self.executor.submit(simulate_timed, one.setting, one.target, one.started)
+                waiting.append((one, task))
+                one.started += 1
+                while len(waiting) > 2 * core_count():
+                    take()
+            while waiting:
+                take()
+        finally:
+            for _, future in waiting:
+                future.cancel()
+
+    def _cost_of_figures(self, reference: Replicas, others: Sequence[Replicas]) -> float:
+        each = (
+            one.started * one.length * one.setting.design.process.accuracy.points
+            for one in (reference, reference, *others)  # batches of the reference come on top
+        )
+        return self.of_figures * sum(each)
+
+    def figures_of_reference(
+        self, reference: Replicas, key: tuple[str, str]
+    ) -> tuple[Run, tuple[BatchSize, ...], float]:
+        """Return the result of the reference, and the errors of batches of 4, 8, 16 ... replicas.
+
+        The error of a batch is its difference from the objective of all the reference's replicas.
+        The last number is the simulated time [s] that gives the dents which the objective needs.
+        """
+        whole, size = range(len(reference.done)), 4
+        batches: dict[int, list[range]] = {}
+        while (number := len(whole) // size) >= MIN_BATCHES:
+            batches[size] = [whole[b * size : (b + 1) * size] for b in range(number)]
+            size *= 2
+        parts = [whole, *(one for of_size in batches.values() for one in of_size)]
+        found, seconds, cpu_s = timed_figures(reference, parts)
+        self.spent += cpu_s
+        of_part = dict(zip(parts, found, strict=True))
+        run, sizes = reference.run(key, of_part[whole], seconds), []
+        for size, of_size in batches.items():
+            objectives = [of_part[one].objective for one in of_size]
+            values = np.array([one.value for one in objectives])
+            rms = error_law.rms_error(values, run.objective.value, size / run.replicas)
+            half_width = float(np.mean([one.half_width for one in objectives]))
+            _require_error(min(rms, half_width))
+            is_resolved = all(of_part[one].resolution.has_mean for one in of_size)
+            cost = size * run.cpu.value
+            sizes.append(BatchSize(size, len(of_size), rms, half_width, cost, is_resolved))
+        resolution = of_part[whole].resolution
+        return run, tuple(sizes), resolution.time_for(resolution.needed_for_mean)
+
+
+def _turns(reference: Replicas, others: Sequence[Replicas]) -> Iterator[Replicas]:
+    """Yield without end which design gets the next replica.
+
+    A round has one replica of each other design. The reference, with which all are compared, gets
+    the square root of their number: this makes the differences as sure as the work allows (C. W.
+    Dunnett, J. Am. Stat. Assoc. 50 (1955) 1096). In the first rounds it gets MIN_REPLICAS.
+    """
+    for number in count():
+        least = math.ceil(MIN_REPLICAS / MIN_ROUNDS) if number < MIN_ROUNDS else 0
+        of_reference = max(least, math.ceil(math.sqrt(len(others))))
+        ends = np.linspace(0, of_reference, len(others) + 1).astype(int)
+        for one, more in zip(others, np.diff(ends), strict=True):
+            yield one
+            yield from [reference] * int(more)
+
+
+def _windows_of(design: Design) -> tuple[int, float]:
+    return design.process.accuracy.points, design.process.accuracy.gauge_mm2
+
+
+def timed_evaluation(setting: ReplicaSetting, target: TargetField) -> tuple[float, float, float]:
+    """Evaluate a design in TIMED_REPLICAS replicas, and time that.
+
+    Return the CPU seconds of this function, of building the chamber and evaluating the design, and
+    of the figures for each replica.
+    """
+    from chamberopt.chamber.build import build_chamber
+
+    plan, known, design = ReplicaPlan(TIMED_REPLICAS), ReplicaSet(target=target), setting.design
+    clock = [time.process_time()]
+    for _ in range(2):  # the first loads all code, the second knows the replicas
+        evaluate(design, setting.chamber, SerialExecutor(), plan=plan, known=known)
+        clock.append(time.process_time())
+    chamber = build_chamber(design, setting.chamber.part.target)
+    evaluate(design, chamber, SerialExecutor(), plan=plan)
+    clock.append(time.process_time())
+    begin, loaded, known_again, end = clock
+    return end - begin, end - known_again, (known_again - loaded) / TIMED_REPLICAS
+
+
+def require_memory(known: Sequence[TargetField], design: Design, chamber: Chamber) -> None:
     """Raise InputError if a study's replicas do not fit into memory.
 
     Memory holds the windows (discs in which dents are counted) of all designs, and the dents of
     LIKELY_REPLICAS replicas.
     """
-    reference = next(iter(designs))
-    points = sum(one.process.accuracy.points for one in designs)
-    each = evaluation_bytes(reference, chamber, LIKELY_REPLICAS)
+    points = sum(one.setting.points for one in known)
+    each = evaluation_bytes(design, chamber, LIKELY_REPLICAS)
     how_many_fit(1, each, PROCESS + OF_POINT * points)
-
-
-def _add_replicas(designs: Sequence[Replicas], executor: Executor) -> float:
-    """Simulate another replica of each design, and return the CPU seconds of all these replicas.
-
-    A design that is listed several times gets as many replicas.
-    """
-    futures = []
-    for one in designs:
-        futures.append(executor.submit(simulate_timed, one.setting, one.target, one.started))
-        one.started += 1
-    try:
-        for one, future in zip(designs, futures, strict=True):
-            one.done.append(future.result())
-    finally:
-        for future in futures:
-            future.cancel()
-    return sum(future.result()[-1] for future in futures)
-
-
-def simulate_timed(setting: ReplicaSetting, target: TargetField, number: int) -> TimedReplica:
-    """Simulate the replica with this number, and return its dents' footprints and CPU seconds.
-
-    Its other results are dropped, so that hundreds of replicas fit into memory.
-    """
-    begin = time.thread_time()
-    replica = simulate_replica(setting, replica_seed(setting.design.process.seed, number))
-    dents = locate_dents(target, target.in_sector(replica.hits))
-    found = kept_footprints(target, target.gauge, dents)
-    return TimedReplica(found, time.thread_time() - begin)
 
 
 def _require_error(size: float) -> None:
@@ -330,24 +409,3 @@ def _require_error(size: float) -> None:
         why = "no dent on the target was simulated, so there is no error to measure"
         remedy = "raise it, or see chamberopt check"
         raise InputError(f"process.accuracy.simulated_time_s: {why}; {remedy}")
-
-
-def _batch_sizes(reference: Replicas, whole: Run) -> tuple[BatchSize, ...]:
-    """Return the errors of the objective from batches of 4, 8, 16 ... of the reference's replicas.
-
-    The error of a batch is its difference from the objective of all the reference's replicas.
-    """
-    sizes, count = [], 4
-    while (batches := whole.replicas // count) >= MIN_BATCHES:
-        begin = time.thread_time()
-        estimates = [reference.estimates(slice(b * count, (b + 1) * count)) for b in range(batches)]
-        estimating = (time.thread_time() - begin) / batches
-        values = np.array([objective.value for objective, _, _ in estimates])
-        rms = error_law.rms_error(values, whole.objective.value, count / whole.replicas)
-        half_width = float(np.mean([objective.half_width for objective, _, _ in estimates]))
-        _require_error(min(rms, half_width))
-        cpu_s = count * whole.cpu.value + estimating
-        is_resolved = all(resolved for _, _, resolved in estimates)
-        sizes.append(BatchSize(count, batches, rms, half_width, cpu_s, is_resolved))
-        count *= 2
-    return tuple(sizes)

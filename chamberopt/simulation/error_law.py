@@ -19,6 +19,7 @@ import numpy as np
 
 from chamberopt.common.estimate import CONFIDENCE
 
+KNOWN_TO = 0.5  # largest half-width of the power, as a share of it, of a law that is told
 NORMAL = 1.96  # half-width of a 95 % interval, in standard errors
 
 
@@ -53,10 +54,15 @@ class ErrorLaw:
     half_width: float = math.inf  # of the 95 % interval of the power
 
     @property
-    def halving(self) -> tuple[float, float, float]:
-        """Factor of the cost that halves the error, and its 95 % interval; 4 for a power of 1/2."""
+    def halving(self) -> tuple[float, float, float] | None:
+        """Factor of the cost that halves the error, and its 95 % interval; 4 for a power of 1/2.
+
+        It is None if the power is not known to a half, so that the interval has no end or hardly.
+        """
+        if not self.half_width < KNOWN_TO * self.power:
+            return None
         powers = self.power, self.power + self.half_width, self.power - self.half_width
-        middle, low, high = (2.0 ** (1.0 / p) if p > 1e-3 else math.inf for p in powers)
+        middle, low, high = (2.0 ** (1.0 / p) for p in powers)
         return middle, low, high
 
 

@@ -43,8 +43,8 @@ def measure_accuracy(
     def compile_it(one: Design, chamber: Chamber) -> None:
         teller.compile(one, chamber, None)
 
-    teller.tell(describe_cost(design, budget_s))
-    study = run_convergence_study(design, budget_s, executor, compile_it)
+    teller.tell(describe_cost(budget_s))
+    study = run_convergence_study(design, budget_s, executor, compile_it, teller.tell)
     with teller.step("writing and drawing"):
         save_accuracy(folder, study)
     return study
@@ -61,16 +61,19 @@ def save_accuracy(folder: Path, study: ConvergenceStudy) -> None:
 def convergence_record(study: ConvergenceStudy) -> ConvergenceRecord:
     """Return the content of accuracy.json for an accuracy study."""
     law = study.law
-    times, low, high = map(finite_or_none, law.halving)
+    times, low, high = (law and law.halving) or (None, None, None)
     return ConvergenceRecord(
-        format=3,
+        format=4,
         reference=ReferenceRecord(text=describe_reference(study), settings=study.settings),
         rows=rows(study),
         law=ErrorLawRecord(
             scale=law.scale, power=law.power, power_half_width=finite_or_none(law.half_width)
-        ),
+        )
+        if law
+        else None,
         halving=HalvingRecord(times=times, low=low, high=high, text=describe_error_law(study)),
         recommendations=[_recommendation(recommend(study, one)) for one in ACCURACIES],
+        left_out=list(study.left_out),
         cpu_s=study.cpu_s,
         wall_s=study.wall_s,
         design=study.design.model_dump(mode="json", exclude_none=True, exclude={"part": {"mesh"}}),

@@ -15,8 +15,8 @@ from chamberopt.pictures.charts.figure_style import (
     save_picture,
     style_axes,
 )
-from chamberopt.simulation.convergence import DESIGNED, GAUGE, TIME, short_name
 from chamberopt.simulation.error_law import NORMAL
+from chamberopt.simulation.numerical_parameters import DESIGNED, GAUGE, TIME, short_name
 from chamberopt.simulation.recommendation import ACCURACIES, BIAS_SHARE, recommend
 
 if TYPE_CHECKING:
@@ -50,16 +50,19 @@ def _draw_errors(axes: Axes, study: ConvergenceStudy) -> None:
     cost, error, low, high = np.array(rows).T
     axes.errorbar(cost, error, yerr=[error - low, high - error], fmt="o", ms=6, lw=1, color=BLUE,
                   zorder=4, label="4, 8, 16 … replicas of the reference: 95 % error")  # fmt: skip
-    line = np.geomspace(0.6 * cost[0], 2.0 * cost[-1], 20)
-    axes.plot(line, law.scale * line**-law.power, color=BLUE, lw=1, ls="--",
-              label=rf"error ~ cost$^{{-{law.power:.2f} \pm {law.half_width:.2f}}}$")  # fmt: skip
+    if law is not None and law.halving is not None:
+        line = np.geomspace(0.6 * cost[0], 2.0 * cost[-1], 20)
+        label = rf"error ~ cost$^{{-{law.power:.2f} \pm {law.half_width:.2f}}}$"
+        axes.plot(line, law.scale * line**-law.power, color=BLUE, lw=1, ls="--", label=label)
     _draw_bias_marks(axes, study)
     advice = [recommend(study, accuracy) for accuracy in ACCURACIES]
     reached = [(one.cpu_s, one.accuracy) for one in advice if one.replicas]
     if reached:
         axes.plot(*zip(*reached, strict=True), "*", ms=14, color=BLACK, zorder=6,
                   label="recommended for 5 %, 1 %, 0.1 %: predicted cost")  # fmt: skip
-    title = f"more replicas alone: half the error for {law.halving[0]:.1f} times the CPU time"
+    title = "error of the objective against cost"
+    if law is not None and law.halving is not None:
+        title = f"more replicas alone: half the error for {law.halving[0]:.1f} times the CPU time"
     axes.set_title(title, loc="left", fontsize=TITLE)
     error_label = "error of the objective (half-width of 95 % interval)"
     style_axes(axes, "CPU seconds of an evaluation", error_label)

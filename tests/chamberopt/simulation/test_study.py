@@ -2,8 +2,10 @@
 
 import csv
 import json
+import re
 import tomllib
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -13,7 +15,7 @@ from chamberopt.cli import main
 from chamberopt.coverage.coverage_from_impacts import Footprints
 from chamberopt.coverage.field.target_field import TargetField
 from chamberopt.design.load import load_design, save_design
-from chamberopt.simulation.convergence import (
+from chamberopt.simulation.numerical_parameters import (
     ELASTIC_SPEED,
     FACETS,
     GAUGE,
@@ -21,9 +23,9 @@ from chamberopt.simulation.convergence import (
     POINTS,
     TIME,
     WARM_UP,
-    TimedReplica,
 )
 from chamberopt.simulation.replicas import ReplicaSetting
+from chamberopt.simulation.timed_replicas import TimedReplica
 from tests.helpers.synthetic import plate_design
 
 DENT = 2e-7  # m²
@@ -53,6 +55,12 @@ def made_up_replica(setting: ReplicaSetting, target: TargetField, number: int) -
 @pytest.fixture
 def no_simulator(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("chamberopt.simulation.convergence.simulate_timed", made_up_replica)
+    monkeypatch.setattr(
+        "chamberopt.simulation.convergence.timed_evaluation", lambda *_: (0.5, 0.4, 0.1)
+    )
+    still = SimpleNamespace(thread_time=lambda: 0.0, perf_counter=lambda: 0.0)
+    for module in ("convergence", "timed_replicas"):
+        monkeypatch.setattr(f"chamberopt.simulation.{module}.time", still)
     monkeypatch.setattr("chamberopt.cli.teller.compile_with_message", lambda *_: None)
 
 
@@ -66,7 +74,7 @@ def accuracy(folder: Path, budget: str, *options: str) -> int:
 def test_command_leaves_table_picture_and_lines_to_paste(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    status = accuracy(tmp_path / "out", "2", "--json")
+    status = accuracy(tmp_path / "out", "14", "--json")
     printed = json.loads(capsys.readouterr().out)
     assert status == 0
     folder = Path(printed["folder"])
@@ -95,25 +103,45 @@ def test_command_leaves_table_picture_and_lines_to_paste(
     settings = {(row["parameter"], row["setting"]): row for row in printed["rows"]}
     coarse = settings[FACETS, "16"]  # the bias of a tenth fewer dents is significant
     assert coarse["bias_mean_coverage"] < -coarse["bias_mean_coverage_half_width"] < 0
-    assert printed["cpu_s"] >= 1.5
+    assert 9.0 <= printed["cpu_s"] <= 10.2  # 4 of the 14 are for start and picture
+    assert printed["left_out"] == []
     design = load_design(folder / "design.toml")
-    for advice in printed["recommendations"]:
+    *reachable, too_much = printed["recommendations"]
+    assert any("raise process.accuracy.points" in one for one in too_much["remarks"])
+    for advice in reachable:
         pasted = tomllib.loads("\n".join(advice["lines"]))["process"]["accuracy"]
         assert design.changed({f"process.accuracy.{name}": value for name, value in pasted.items()})
 
 
 @pytest.mark.usefixtures("no_simulator")
 def test_command_prints_its_findings(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert accuracy(tmp_path / "out", "0.01") == 0
+    assert accuracy(tmp_path / "out", "14") == 0
     out = capsys.readouterr().out
     for words in (
-        "reference: 42 replicas",
+        "reference: ",
         "compared with the finest",
-        "halving the error costs",
+        "halving the error cost",
         "CPU s a replica",
     ):
         assert words in out
-    assert out.count("[process.accuracy]") == 3
+    assert out.count("[process.accuracy]") == 2
+
+
+@pytest.mark.usefixtures("no_simulator")
+def test_a_small_budget_leaves_settings_out_or_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert accuracy(tmp_path / "out", "9", "--json") == 0
+    found = capsys.readouterr()
+    printed = json.loads(found.out)
+    assert printed["left_out"][0] == GAUGE  # the first in the order
+    assert WARM_UP not in printed["left_out"]
+    assert "left out by --budget-s = 9: gauge" in found.err
+    assert GAUGE not in {row["parameter"] for row in printed["rows"]}
+    assert accuracy(tmp_path / "small", "5", "--json") == 2
+    err = capsys.readouterr().err
+    assert "--budget-s: given 5, but 32 replicas of the reference" in err
+    assert re.search(r"give at least \d+", err)
 
 
 @pytest.mark.usefixtures("no_simulator")
@@ -124,7 +152,7 @@ def test_without_dents_there_is_no_error_to_measure(
         return TimedReplica(footprints_of(target, np.random.default_rng(1), 1.0, 0.0), 0.01)
 
     monkeypatch.setattr("chamberopt.simulation.convergence.simulate_timed", no_dents)
-    assert accuracy(tmp_path / "out", "0.01") == 2
+    assert accuracy(tmp_path / "out", "14") == 2
     assert "no dent on the target was simulated" in capsys.readouterr().err
 
 

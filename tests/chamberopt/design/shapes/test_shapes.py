@@ -21,7 +21,7 @@ from chamberopt.design.shape_surface import ShapeSurface
 from chamberopt.design.shapes import SHAPES, TAG_SONOTRODE, TAG_WALL
 from chamberopt.design.shapes.custom import find_fault
 from chamberopt.geometry.triangles import areas
-from chamberopt.simulation.convergence import FACETS, numerical_parameters
+from chamberopt.simulation.numerical_parameters import FACETS, numerical_parameters
 
 DESIGNS = Path(__file__).resolve().parents[4] / "designs"
 NOTHING = np.zeros((0, 3)), np.zeros((0, 3), dtype=int)
