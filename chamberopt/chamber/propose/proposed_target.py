@@ -110,6 +110,21 @@ NOT, GAP = "un|not?|non|without|kein|keine|nicht|ohne|sans|pas", r"[\s_-]"
 LEFT_OUT = re.compile(rf"(?<![a-z])(?:(?:{NOT})(?:{GAP}+.*)?{FOR}|mask|abdeck)", re.I)
 # Names of what is left when the surfaces of interest are named.
 REST = re.compile(r"^(?:the[\s_-]+)?(?:rest|others?|remain\w*|default|body|bulk)(?![a-z])", re.I)
+# Names of what is usually peened, the likeliest first: what raises stress, the surfaces that work,
+# and last roots, which of a gear are its fillets, but of a blade what holds it.
+USUAL = (
+    "fillet|weld|notch|groove|slot|fir.?tree|dove.?tail|kehl|schwei(?:ss|ß)|kerb|nut|cong",
+    "flank|tooth|teeth|zahn|air?foil|aerofoil|suction|pressure|blade|vane|pin|journal|coil|shank|"
+    "spoke|leaf|neck|race|zapfen|schaufel",
+    "root|radi(?:us|i)",
+)
+USUALLY = tuple(re.compile(rf"(?<![a-z])(?:{one})s?(?![a-z])", re.I) for one in USUAL)
+# Names of what usually holds the part, or is machined after it was peened.
+SELDOM = re.compile(
+    r"(?<![a-z])(?:base|bottom|end|hub|(?:bolt.?)?hole|bore|mount(?:ing)?|flange|foot|clamp|"
+    r"fixture|seat|tip|leg|thread)s?(?![a-z])",
+    re.I,
+)
 AS_LARGE = 0.9  # of the largest face's area: the target takes a face as large, e.g. a blade's back
 PATTERN = 6  # number of alike faces that make a repeated feature, such as teeth
 COLOUR, VIVID = re.compile(r"#([0-9a-f]{2})([0-9a-f]{2})([0-9a-f]{2})$", re.I), 100
@@ -193,7 +208,12 @@ def propose_target(mesh: PartMesh, known: Sequence[Surface], wanted: Iterable[st
         and not REST.match(one.name)
         and len(border_edges(mesh.triangles[one.triangles]))  # a whole body has no border
     ]
+    for usual in USUALLY:
+        if likely := [one for one in special if usual.search(one.name)]:
+            rest = [one for one in special if one not in likely]
+            return _joined(likely, "by its name, as such are usually peened" + beside(rest))
     if special:
+        special.sort(key=lambda one: SELDOM.search(one.name) is not None)
         return _joined(special[:1], "the largest surface that the file names" + beside(special[1:]))
     repeated = [one for one in faces if one.keys["faces"][0].get("alike")]
     counts = {one.name: _count(one) for one in repeated}

@@ -22,6 +22,7 @@ from chamberopt.search.study import load_study
 from tests.chamberopt.design.test_shipped_parts import PARTS
 from tests.helpers.eight_parts import EIGHT_PARTS, KEPT_ASIDE, ExamplePart
 from tests.helpers.four_parts import FOUR_PARTS
+from tests.helpers.more_parts import MORE_PARTS
 
 
 @pytest.fixture(scope="module")
@@ -241,13 +242,13 @@ def test_a_pilot_that_cannot_run_leaves_the_starts_and_says_so(
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("name", [*EIGHT_PARTS, *KEPT_ASIDE, *FOUR_PARTS])
+@pytest.mark.parametrize("name", [*EIGHT_PARTS, *KEPT_ASIDE, *FOUR_PARTS, *MORE_PARTS])
 def test_from_file_to_process_sheet(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The eight parts of the tutorial's readers, and those kept aside: no file is edited."""
     monkeypatch.chdir(tmp_path)
-    one: ExamplePart = {**EIGHT_PARTS, **KEPT_ASIDE, **FOUR_PARTS}[name]
+    one: ExamplePart = {**EIGHT_PARTS, **KEPT_ASIDE, **FOUR_PARTS, **MORE_PARTS}[name]
     part, unit = one.write(tmp_path), one.unit or "guess"
     assert main(["new", str(part), "--out", "new", "--unit", unit]) == 0
     size = np.ptp(read_part(part, unit).vertices, axis=0)

@@ -10,9 +10,10 @@ from chamberopt.geometry.meshes.part_mesh import read_part
 from chamberopt.geometry.meshes.step_tessellation import Tessellation
 from tests.helpers.eight_parts import EIGHT_PARTS, KEPT_ASIDE
 from tests.helpers.four_parts import FOUR_PARTS
+from tests.helpers.more_parts import MORE_PARTS
 
 COARSE = Tessellation(1e-4, math.radians(25.0))
-PARTS = {**EIGHT_PARTS, **KEPT_ASIDE, **FOUR_PARTS}
+PARTS = {**EIGHT_PARTS, **KEPT_ASIDE, **FOUR_PARTS, **MORE_PARTS}
 
 
 @pytest.mark.parametrize("name", sorted(PARTS))
