@@ -236,6 +236,12 @@ def _holder(design: Design, part: Part, filled: CavitySolid) -> _Made:
             "holder.grip_mm: missing: the clamped faces are level, so that the collar encloses "
             "nothing; give the length of the part that it encloses"
         )
+    if holder.thickness_mm is not None and top + 1e-3 * holder.thickness_mm > wall:
+        raise InputError(
+            f"holder.thickness_mm: given {holder.thickness_mm:g}, but the wall is "
+            f"{1e3 * (wall - top):.4g} mm from the clamped faces: give less, or leave it out, so "
+            "that the plate goes up to the wall"
+        )
     solids = []
     plate_top = end if holder.thickness_mm is None else top + 1e-3 * holder.thickness_mm
     if plate_top < wall:

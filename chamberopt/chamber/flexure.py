@@ -36,24 +36,16 @@ def mean_softness(design: Design, chamber: Chamber) -> float:
 
 
 def flexure_facts(design: Design, chamber: Chamber) -> dict[str, dict[str, object]]:
-    """Return facts on the thickness of the target where flexure is simulated; none elsewhere.
+    """Return facts on the target where flexure is simulated; none elsewhere.
 
-    Shares are of the target's area in the chamber.
+    Shares are of the target's area in the chamber. A note has how thin the target is.
     """
-    softness, thickness = softness_of_part(design, chamber.part), chamber.part.thickness
-    if softness is None or thickness is None:
+    softness = softness_of_part(design, chamber.part)
+    if softness is None:
         return {}
     area = chamber.exposed_area * chamber.part.target
-    order = np.argsort(thickness)
-    below = np.cumsum(area[order]) / area.sum()
-    places = {"thinnest_mm": 0.01, "median_mm": 0.5}  # by shares of the area that are thinner
-    found = {name: thickness[order][np.searchsorted(below, at)] for name, at in places.items()}
     return {
         "flexure": {
-            **{
-                k: float(f"{1e3 * h:.3g}") if np.isfinite(h) else "no plate"
-                for k, h in found.items()
-            },
             "lowers_restitution_on_share": float(
                 f"{area[softness < 1.0 - LOSS].sum() / area.sum():.3g}"
             ),

@@ -28,6 +28,14 @@ HOLDER_KEYS = {
 }
 
 
+def _no_condition(at: Selection | None) -> Iterator[Problem]:
+    """Yield a problem if faces are asked for without a condition, which would be the whole part."""
+    if at is not None and not at.model_fields_set:
+        yield Problem(
+            "at", "given without a key: this is the whole part; say which faces are meant"
+        )
+
+
 class Holder(FileTable):
     """A body that holds the part and goes out through the chamber's wall, along its axis.
 
@@ -63,6 +71,7 @@ class Holder(FileTable):
     clearance_mm: float = quantity(0, 100, "mm", "of a bore, all round the part", 0.0)
 
     def _problems(self) -> Iterator[Problem]:
+        yield from _no_condition(self.at)
         allowed = HOLDER_KEYS[self.kind]
         for name, field in type(self).model_fields.items():
             is_given = getattr(self, name) != field.default
@@ -98,6 +107,7 @@ class Mask(FileTable):
     )
 
     def _problems(self) -> Iterator[Problem]:
+        yield from _no_condition(self.at)
         if self.axis is not None and self.thickness_mm is not None:
             text = "given beside axis, along which the mask goes on to the wall; leave one out"
             yield Problem("thickness_mm", text)

@@ -19,7 +19,7 @@ from chamberopt.documents.answer import answer, answer_lines
 from chamberopt.documents.coverage import figures
 from chamberopt.documents.document import Block, Document, Section, Sentence, Table
 from chamberopt.documents.ranges import groups_text, slow_end_is_late, time_at_slow_end
-from chamberopt.documents.report import limits_of_intervals, notes_of, seed_text
+from chamberopt.documents.report import limits_of_intervals, notes_of
 from chamberopt.documents.study import exposed_target
 from chamberopt.documents.tolerances import sheet_rows
 from chamberopt.documents.wording import metric_label, plain
@@ -51,9 +51,10 @@ def alarms(result: Result) -> Iterator[str]:
     trapped = result.record.trapped
     if trapped and max(trapped.rattling_time, trapped.rattling_impacts) >= JAMMED:
         yield (
-            f"Balls jam in gaps of their own size: {percent(trapped.rattling_time)} of the shot at "
-            f"any time, and {percent(trapped.rattling_impacts)} of the impacts on the part. The "
-            "report has the place: choose other balls, or close or widen the gap."
+            "Balls are held or rattle in gaps hardly wider than they are: "
+            f"{percent(trapped.rattling_time)} of the shot at any time, and "
+            f"{percent(trapped.rattling_impacts)} of the impacts on the part. The report has the "
+            "place: choose other balls, or close or widen the gap."
         )
     yield from _bare(result)
 
@@ -451,7 +452,7 @@ def _identity(result: Result) -> Iterator[Row]:
     record = result.record
     yield "program", f"chamberopt {record.versions['chamberopt']}"
     yield "simulated", f"{record.created[:10]}, {record.replicas} replicas"
-    yield "seed", seed_text(result)
+    yield "seed", str(result.seeds[0])
     yield "part, sha256", record.part_sha256
     if record.shape_sha256:
         yield "shape, sha256", record.shape_sha256

@@ -10,15 +10,7 @@ import numpy as np
 
 from chamberopt.pictures.actors import FAULT, GREY, NO_RENDER, SONOTRODE, add_edges
 from chamberopt.pictures.camera import cells_of, near_directions, near_views, pushed_back, seen_area
-from chamberopt.pictures.charts.colours import (
-    BLUE,
-    FIXTURE_COLOURS,
-    ORANGE,
-    OUTSIDE,
-    PURPLE,
-    SKY,
-    YELLOW,
-)
+from chamberopt.pictures.charts.colours import BLUE, FIXTURE_COLOURS, OUTSIDE
 from chamberopt.pictures.panels import BORDER, SIZE, choose_views, near_panels, part_panels
 from chamberopt.pictures.picture_page import Panel, Row, write_page
 from chamberopt.pictures.subprocess_drawing import draw_in_subprocess, picture_path
@@ -43,15 +35,16 @@ COLOURS = {
     MISSED: (FAULT, "target that hardly a ball can touch"),
     BEYOND: (OUTSIDE, "target outside the chamber"),
 }
-# Restitution of a thin part over that of a rigid one, by bands, and their colours.
+# Restitution of a thin part over that of a rigid one, by bands, and their colours: greens, which
+# mean nothing else in the picture.
 BANDS = (0.5, 0.7, 0.9, 0.98)
 SOFTER = "times the restitution of a rigid part, where the target is thin"
 BAND_COLOURS = {
     PLAIN: (GREY, "not in the target"),
-    1: (PURPLE, f"below 0.5 {SOFTER}"),
-    2: (ORANGE, "0.5 to 0.7"),
-    3: (YELLOW, "0.7 to 0.9"),
-    4: (SKY, "0.9 to 0.98"),
+    1: ("#00441b", f"below 0.5 {SOFTER}"),
+    2: ("#238b45", "0.5 to 0.7"),
+    3: ("#74c476", "0.7 to 0.9"),
+    4: ("#c7e9c0", "0.9 to 0.98"),
     5: (BLUE, "target that is stiff: 0.98 and more"),
 }
 ALL = 0.999  # share of the target's area from which it is wholly in the chamber

@@ -117,7 +117,7 @@ def jammed_text(shares: Mapping[str, float], design: Design) -> str:
     seconds = design.process.recorded_time
     return (
         f"{plain(shares['rattling_balls'] * design.shot.count, 2)} of {design.shot.count} balls "
-        "jam in gaps about as wide as themselves, the longest held one for "
+        "are held or rattle in gaps hardly wider than themselves, the longest one for "
         f"{plain(shares['rattling_longest'] * seconds, 2)} of {plain(seconds, 2)} s: the shot "
         f"loses {percent(shares['rattling_time'])} of its time, and "
         f"{percent(shares['rattling_impacts'])} of all impacts on the part are those of held "

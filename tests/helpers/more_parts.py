@@ -32,7 +32,10 @@ def connecting_rod(folder: Path) -> Path:
     body = Manifold.extrude(plan, 20.0) - _pin(17.0, 0.0, 30.0) - _pin(8.5, ROD, 30.0)
     turn = np.radians(np.linspace(0.0, 90.0, 7))
     rings = []  # a pocket of 6 mm with a fillet of 3 mm round its floor
-    for inside, z in [(-0.5, 1.0), *zip(3 * (1 - np.cos(turn)), -3 - 3 * np.sin(turn), strict=True)]:
+    for inside, z in [
+        (-0.5, 1.0),
+        *zip(3 * (1 - np.cos(turn)), -3 - 3 * np.sin(turn), strict=True),
+    ]:
         corners = [(34, -6.5), (74, -4.5), (74, 4.5), (34, 6.5)]
         ring = CrossSection([corners]).offset(-inside - 3.0, JoinType.Round)
         ring = ring.offset(3.0, JoinType.Round, circular_segments=24).to_polygons()[0]
@@ -81,9 +84,7 @@ def turbine_disc(folder: Path) -> Path:
     names = ["BOLT_HOLES", "BORE", "HUB", "WEB", "RIM"]
     cards = [f'$HMNAME PROP {k} "{name}"' for k, name in enumerate(names, start=1)]
     cards += [f"PSHELL,{k},1,0.001" for k in range(1, 6)] + ["MAT1,1,2.+11,,0.3"]
-    cards += [
-        f"GRID,{k},,{x:.8f},{y:.8f},{z:.8f}" for k, (x, y, z) in enumerate(1e-3 * points, 1)
-    ]
+    cards += [f"GRID,{k},,{x:.8f},{y:.8f},{z:.8f}" for k, (x, y, z) in enumerate(1e-3 * points, 1)]
     cards += [
         f"CTRIA3,{k},{kind[k - 1]},{a},{b},{c}" for k, (a, b, c) in enumerate(triangles + 1, 1)
     ]

@@ -113,9 +113,9 @@ REST = re.compile(r"^(?:the[\s_-]+)?(?:rest|others?|remain\w*|default|body|bulk)
 # Names of what is usually peened, the likeliest first: what raises stress, the surfaces that work,
 # and last roots, which of a gear are its fillets, but of a blade what holds it.
 USUAL = (
-    "fillet|weld|notch|groove|slot|fir.?tree|dove.?tail|kehl|schwei(?:ss|ß)|kerb|nut|cong",
+    "fillet|weld|notch|groove|slot|fir.?tree|dove.?tail|kehle|schwei(?:ss|ß)naht",
     "flank|tooth|teeth|zahn|air?foil|aerofoil|suction|pressure|blade|vane|pin|journal|coil|shank|"
-    "spoke|leaf|neck|race|zapfen|schaufel",
+    "spoke|neck|race|zapfen|schaufel",
     "root|radi(?:us|i)",
 )
 USUALLY = tuple(re.compile(rf"(?<![a-z])(?:{one})s?(?![a-z])", re.I) for one in USUAL)
