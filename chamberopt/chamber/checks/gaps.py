@@ -76,7 +76,8 @@ def pocket_warnings(reach: Reach, chamber: Chamber) -> list[str]:
     found: list[tuple[float, str]] = []
     for region in np.unique(reach.region[closed]):
         own = closed & (reach.region == region)
-        if region < len(reach.region_volume) and reach.region_volume[region] > 0.0:
+        is_room = region < len(reach.region_volume) and reach.region_volume[region] > 0.0
+        if is_room and _in_cavity(reach, touches.centre[own]).any():
             in_target = float(touches.area[own & target].sum())
             loss = f", though {mm2(in_target)} of the target are in it" if in_target else ""
             text = (
@@ -87,6 +88,19 @@ def pocket_warnings(reach: Reach, chamber: Chamber) -> list[str]:
             )
             found.append((float(touches.area[own].sum()), text))
     return [text for _, text in sorted(found, key=lambda one: -one[0])[:MAX_WARNINGS]]
+
+
+def _in_cavity(reach: Reach, places: np.ndarray) -> np.ndarray:
+    """Mark the places (n, 3) [m] in the cavity, of some that are near its surface.
+
+    A ball may reach into a surface a little, so that beside a crease in which two surfaces nearly
+    meet one seems to fit on their other side, in the part.
+    """
+    from sim_core import closest_points
+
+    found = closest_points(reach.mesh, places, 2.0 * reach.diameter)
+    outward = area_vectors(reach.mesh.vertices, reach.mesh.triangles)[found.triangle]
+    return np.asarray(np.einsum("ij,ij->i", places - found.point, outward) < 0.0)
 
 
 def surface_warnings(

@@ -81,6 +81,15 @@ ALL = (0, 1, 2, 3, 4, 5)
         ({"do not peen": 0, "NOT_TO_PEEN": 1, "no target": 2, "mask": 3, "FREE": 4}, [], ["FREE"]),
         ({"nicht zu strahlen": 0, "ungestrahlt": 1, "Strahlen": 4}, [], ["Strahlen"]),
         ({"No. 5 target": 4, "SIDE": 0}, [], ["No. 5 target"]),
+        # What is usually peened; a root is of a gear more than of a blade.
+        ({"WEBS": (0, 1), "PIN": 2, "FILLETS": 4}, [], ["FILLETS"]),
+        ({"BASE": (0, 1), "WEB": 2, "WELD": 4, "ENDS": 5}, [], ["WELD"]),
+        (
+            {"ROOT": (0, 1), "SUCTION_SIDE": 2, "Pressure side": 4},
+            [],
+            ["SUCTION_SIDE", "Pressure side"],
+        ),
+        ({"BORES": (0, 1), "BIG_END": (2, 3), "RODS": 4}, [], ["RODS"]),
         # The largest named surface, unless it is the whole part or says that it is the rest.
         ({"COILS": (0, 1, 2, 3), "LEGS": 4, "ENDS": 5}, [], ["COILS"]),
         ({"BODY_1": (0, 1, 2, 3), "LEGS": 4, "PART": ALL}, [], ["LEGS"]),
@@ -96,7 +105,7 @@ def test_the_target_is_what_is_named_or_marked(
 def test_a_target_is_named_with_those_that_come_after_it() -> None:
     mesh = box_with({"COILS": (0, 1, 2, 3), "LEGS": 4})
     reason = propose_target(mesh, surfaces(mesh), []).reason
-    assert reason == "COILS: the largest surface that the file names; after it LEGS (400 mm²)"
+    assert reason == "COILS: by its name, as such are usually peened; after it LEGS (400 mm²)"
 
 
 @pytest.mark.parametrize(
