@@ -18,7 +18,7 @@ from chamberopt.chamber.checks.check import shot_reach, warnings
 from chamberopt.chamber.checks.jams import JamGap, gaps_in_reach, jam_gaps
 from chamberopt.chamber.part import Part, posed_part
 from chamberopt.chamber.propose.pose import Turns, pose_in_words, propose_pose, square_to_walls
-from chamberopt.chamber.propose.proposed_balls import fit_sizes, propose_ball
+from chamberopt.chamber.propose.proposed_balls import charge_of, fit_sizes, propose_ball
 from chamberopt.chamber.propose.proposed_floor import Floor, floor_on_sonotrode, require_room
 from chamberopt.chamber.propose.proposed_holder import holder_choices
 from chamberopt.chamber.propose.proposed_target import (
@@ -46,7 +46,6 @@ from chamberopt.geometry.meshes.surface_error import format_box
 from chamberopt.geometry.meshes.units import GUESSED
 from chamberopt.geometry.triangles import areas, rotation_matrix
 
-LAYER, PACKED = 0.25, 0.9069  # layers of balls in the charge; share of a plane under a full layer
 LIGHTER, HEAVIER = 0.4, 2.5  # charges of the study, as shares of the first
 FINE_MM, COARSE_MM = 0.5, 1.0  # steps of lengths
 FEW_MM = 400.0  # longest range with fine steps: a study takes at most 999 steps
@@ -69,7 +68,7 @@ def propose_charge(floor: float, diameter: float, ball_mass: float) -> tuple[flo
         floor: area of the sonotrode [m²].
         diameter, ball_mass: diameter [m] and mass [kg] of a ball.
     """
-    count = max(1, round(LAYER * PACKED * floor / (math.pi / 4.0 * diameter**2)))
+    count = max(1, round(charge_of(floor, diameter)))
     wanted, most = 1e3 * count * ball_mass, _heaviest_g(ball_mass)
     if wanted > most:
         return most, "the most that is supported, less than a quarter of a layer of balls"
@@ -369,7 +368,7 @@ def _ball_diameter(tables: Tables, wanted: Wanted, shop: Shop) -> tuple[float, s
         return 1e-3 * wanted.ball_mm, "as asked"
     part = _part_alone(tables)
     sides = np.sort(np.ptp(part.vertices, axis=0))[1:]
-    least = math.sqrt(LAYER * PACKED * float(sides.prod()) / (math.pi / 4.0 * MOST_BALLS))
+    least = math.sqrt(charge_of(float(sides.prod()), 1.0) / MOST_BALLS)
     sold = [1e-3 * size for size in stock if 1e-3 * size <= LARGEST_BALL] or [1e-3 * stock[0]]
     sizes = [size for size in sold if size >= least] or sold[-1:]
     return propose_ball(fit_sizes(part, sizes))

@@ -8,6 +8,7 @@ serves, but for gaps in which it jams: so a mix of two sizes serves no more than
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -22,8 +23,12 @@ from chamberopt.geometry.triangles import areas, interpolate, unit_vectors
 
 POINTS = 8_000  # on the target, and as many on the rest of the part
 MISSED = 0.05  # share of the target's area that a larger ball may fail to touch
-AS_GOOD = 0.02  # share of the target's area within which two sizes serve alike
+AS_GOOD = 0.05  # share of the target's area within which two sizes serve alike
+# Balls in the charge: of sizes that need more, the largest is taken that serves as well. Thousands
+# of small balls make weak dents, are hard to get back from a chamber, and are slow to simulate.
+MANY = 1500
 MOST_LISTED = 5  # sizes in a reason
+LAYER, PACKED = 0.25, 0.9069  # layers of balls in the charge; share of a plane under a full layer
 
 
 @dataclass(frozen=True)
@@ -35,6 +40,12 @@ class SizeFit:
     served: float  # share of the target that it serves
     suits: bool  # true if no fillet or slot is so small that `check` would warn
     jam: float  # width of a gap of the part in which the ball jams [m]; 0 if there is none
+    count: int  # of balls in a charge under the part
+
+
+def charge_of(area: float, diameter: float) -> float:
+    """Return the number of balls in the charge of a face [m²], for their diameter [m]."""
+    return LAYER * PACKED * area / (math.pi / 4.0 * diameter**2)
 
 
 def fit_sizes(part: Part, diameters: Sequence[float]) -> list[SizeFit]:
@@ -73,7 +84,8 @@ def fit_sizes(part: Part, diameters: Sequence[float]) -> list[SizeFit]:
         suits = area[in_slot].sum() < one**2 and edges.length[small].sum() < one
         jam = float(np.average(width[held], weights=area[held])) if jams else 0.0
         touch, serve = (float(area[rows].sum()) / whole for rows in (touched, served))
-        fits.append(SizeFit(one, touch, serve, bool(suits), jam))
+        count = round(charge_of(float(np.sort(np.ptp(part.vertices, axis=0))[1:].prod()), one))
+        fits.append(SizeFit(one, touch, serve, bool(suits), jam, count))
     return fits
 
 
@@ -81,7 +93,7 @@ def propose_ball(fits: Sequence[SizeFit]) -> tuple[float, str]:
     """Return the diameter [m] of the proposed ball, and the reason for it.
 
     It is the largest ball that jams in no gap of the part and suits all fillets and slots. If there
-    is none, it is the largest of those that serve the most.
+    is none, or it takes very many, it is the largest of those that serve about as much as any.
 
     Args:
         fits: sizes in ascending order.
@@ -89,7 +101,10 @@ def propose_ball(fits: Sequence[SizeFit]) -> tuple[float, str]:
     free = [one for one in fits if not one.jam] or list(fits)
     touching = max(one.touched for one in free) - MISSED
     reach = [one for one in free if one.touched >= touching]
-    if suited := [one for one in reach if one.suits]:
+    most = max(one.served for one in reach)
+    as_good = [one for one in reach if one.served >= most - AS_GOOD][-1]
+    suited = [one for one in reach if one.suits]
+    if suited and (suited[-1].count <= MANY or suited[-1].diameter >= as_good.diameter):
         best = suited[-1]
         text = f"touches {best.touched:.0%} of the target"
         larger = [one for one in fits if one.diameter > best.diameter]
@@ -97,12 +112,20 @@ def propose_ball(fits: Sequence[SizeFit]) -> tuple[float, str]:
             text += ", at most half the radius of its fillets and a quarter of its slots"
         elif larger and larger[0].touched < touching:
             text += f", balls of {_mm(larger[0])} {larger[0].touched:.0%}"
+    elif suited:
+        best, small = as_good, suited[-1]
+        text = (
+            f"serves {best.served:.0%} of the target; {_mm(small)} would serve {small.served:.0%}, "
+            f"but take {small.count:,} of them, not {best.count:,}"
+        )
     else:
-        most = max(one.served for one in reach)
-        best = [one for one in reach if one.served >= most - AS_GOOD][-1]
+        best = as_good
         shown = sorted({*fits[:: max(1, len(fits) // MOST_LISTED)], best}, key=lambda x: x.diameter)
         shares = ", ".join(f"{_mm(one)} {one.served:.0%}" for one in shown)
         text = f"NO SIZE SERVES ALL (fillets of 2, slots of 4 diameters); of the target: {shares}"
+    larger = [one for one in fits if one.diameter > best.diameter and one.count <= MANY]
+    if best.count > MANY and larger:
+        text += f"; MANY BALLS: {_mm(larger[0])} would serve {larger[0].served:.0%}"
     if best.jam:
         text += f"; IT JAMS in gaps of {1e3 * best.jam:.4g} mm, as every size does"
     elif jammed := [one for one in fits if one.jam]:

@@ -63,14 +63,25 @@ def test_balls_suit_a_slot_and_jam_in_none(width_mm: float, chosen: float, said:
 
 def test_what_serves_the_most_is_proposed_where_no_size_serves_all() -> None:
     fits = [
-        SizeFit(1e-3, 0.95, 0.90, False, 0.0),
-        SizeFit(2e-3, 0.94, 0.89, False, 0.0),
-        SizeFit(3e-3, 0.93, 0.70, False, 0.0),
+        SizeFit(1e-3, 0.95, 0.90, False, 0.0, 100),
+        SizeFit(2e-3, 0.94, 0.89, False, 0.0, 100),
+        SizeFit(3e-3, 0.93, 0.70, False, 0.0, 100),
     ]
     diameter, reason = propose_ball(fits)
     assert diameter == 2e-3
     assert "NO SIZE SERVES ALL" in reason
     assert "1 mm 90%, 2 mm 89%, 3 mm 70%" in reason
-    jams = [SizeFit(1e-3, 1.0, 1.0, True, 0.0), SizeFit(2e-3, 1.0, 1.0, True, 1.988e-3)]
+    jams = [SizeFit(1e-3, 1.0, 1.0, True, 0.0, 100), SizeFit(2e-3, 1.0, 1.0, True, 1.988e-3, 100)]
     assert propose_ball(jams)[0] == 1e-3
     assert "IT JAMS in gaps of 1.988 mm" in propose_ball(jams[1:])[1]
+
+
+def test_fewer_balls_are_proposed_where_they_serve_nearly_as_much() -> None:
+    small = SizeFit(0.5e-3, 1.0, 1.0, True, 0.0, 4000)
+    others = [SizeFit(1e-3, 1.0, 0.97, False, 0.0, 1000), SizeFit(2e-3, 1.0, 0.6, False, 0.0, 250)]
+    diameter, reason = propose_ball([small, *others])
+    assert diameter == 1e-3
+    assert "0.5 mm would serve 100%, but take 4,000 of them, not 1,000" in reason
+    diameter, reason = propose_ball([small, others[1]])
+    assert diameter == 0.5e-3
+    assert "MANY BALLS: 2 mm would serve 60%" in reason
