@@ -168,6 +168,7 @@ class Proposal:
     reach: Reach
     warnings: tuple[str, ...]
     jams: tuple[JamGap, ...]  # gaps of chamber and part in which the balls jam
+    resolved: bool = False  # true if a pilot resolved the time in which the target is covered
 
 
 def propose(

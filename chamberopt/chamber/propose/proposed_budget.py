@@ -23,7 +23,7 @@ USUAL_GAUGE = 1e-6  # m²: wider only where the time would be too long
 WIDEST = 0.02  # of the target's area
 # What is set on a machine [s]: above them whole hours, below them whole seconds.
 SET_TIMES = (10, 20, 30, 60, 120, 180, 300, 600, 900, 1200, 1800, 2700, 3600)
-LONG = 1800.0  # s: fastest.toml searches for less
+LONG = 1800.0  # s
 
 
 class Measured(NamedTuple):
@@ -59,6 +59,7 @@ class Budget(NamedTuple):
     time: float  # [s]
     gauge_mm2: float
     reasons: dict[str, str]  # by dotted name
+    resolved: bool  # true if the treatment time is that of places, not of the target on average
 
 
 def propose_budget(found: Measured) -> Budget:
@@ -82,7 +83,7 @@ def propose_budget(found: Measured) -> Budget:
     }
     if gauge > 1.0:
         reasons["process.accuracy.gauge_mm2"] = wider
-    return Budget(treatment, time, gauge, reasons)
+    return Budget(treatment, time, gauge, reasons, found.places)
 
 
 def with_budget(made: Proposal, budget: Budget) -> Proposal:
@@ -97,7 +98,8 @@ def with_budget(made: Proposal, budget: Budget) -> Proposal:
         table, _, key = name.rpartition(".")
         tables[table][key] = value
     reasons = {**made.reasons, **budget.reasons}
-    return replace(made, tables=tables, reasons=reasons, design=made.design.changed(values))
+    design = made.design.changed(values)
+    return replace(made, tables=tables, reasons=reasons, design=design, resolved=budget.resolved)
 
 
 def settable(seconds: float) -> float:
@@ -116,7 +118,7 @@ def _said_of_treatment(found: Measured) -> str:
     if not found.places:
         what = "the target is 98 % covered ON AVERAGE (places are out of reach or not resolved)"
     friction = " at the slow end of friction" if found.friction else ""
-    long = "; LONG: more shot, more amplitude or fastest.toml" if found.time_to_98 > LONG else ""
+    long = "; LONG: more shot, more amplitude or the study" if found.time_to_98 > LONG else ""
     return (
         f"an estimate, rounded up: after about {_plain(found.time_to_98, 2)}{spread} s {what}"
         f"{friction}, by a pilot of {_plain(found.simulated, 2)} simulated s{long}"

@@ -70,7 +70,7 @@ def new(
     from chamberopt.chamber.propose.left_out import find_left_out
     from chamberopt.chamber.propose.proposal import Wanted, propose
     from chamberopt.chamber.propose.shop import load_shop
-    from chamberopt.chamber.propose.text import FASTEST, design_text, study_text
+    from chamberopt.chamber.propose.text import design_text, study_text
     from chamberopt.cli.commands.check import draw_target
     from chamberopt.cli.prepare import with_pilot
     from chamberopt.common.errors import InputError
@@ -111,19 +111,12 @@ def new(
     with claim_folder(out) as folder, whole_or_nothing(folder):
         write_text(folder / "design.toml", design_text(made, folder, left_out))
         write_text(folder / "study.toml", study_text(made, "design.toml"))
-        write_text(folder / "fastest.toml", study_text(made, "design.toml", FASTEST))
         with step("drawing"):
             draw_target(made.chamber, made.reach, folder / "design.png")
     show(_summary(made, left_out))
     print_remarks(f"note: {one_line(text)}" for text in made.mesh.notes)
     print_remarks(f"warning: {text}" for text in made.warnings)
-    show(
-        [
-            f"design in {folder / 'design.toml'}",
-            f"study in {folder / 'study.toml'}",
-            f"study of the shortest time in {folder / 'fastest.toml'}",
-        ]
-    )
+    show([f"design in {folder / 'design.toml'}", f"study in {folder / 'study.toml'}"])
 
 
 def _require_file(part: Path) -> None:
