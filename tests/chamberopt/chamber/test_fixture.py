@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
+from shapely import Polygon
 
 from chamberopt.chamber.build import Chamber, build_chamber
 from chamberopt.chamber.checks.check import first_warnings, surface_names, warnings
@@ -361,3 +362,15 @@ def test_sizes_in_words() -> None:
     assert size_in_words("plate", [20.0, 12.5]) == "20 × 12.5 mm"
     assert size_in_words("shell", [1.0]) == "1 mm thick"
     assert size_in_words("filled", []) == ""
+
+
+def test_a_crease_beside_a_mask_is_no_pocket(parts: Path) -> None:
+    """A fin leans away from a mask by a degree: a ball sinks into that crease by 0.2 %."""
+    outline = [(-10, 0), (10, 0), (10, 4), (2, 4), (1.83, 14), (-2, 14), (-2, 4), (-10, 4)]
+    fin = trimesh.creation.extrude_polygon(Polygon(outline), 12.0)
+    fin.apply_transform(trimesh.transformations.rotation_matrix(np.pi / 2, (1, 0, 0)))
+    fin.export(parts / "fin.stl")
+    at = {"faces": [{"at_mm": (6.0, -6.0, 4.0)}]}
+    chamber = build_chamber(design(parts, "fin", mask={"at": at, "thickness_mm": 2.0}))
+    assert chamber.fixtures["mask"].covered > 0.0
+    assert not [one for one in warnings(design(parts, "fin"), chamber) if "pocket" in one]
