@@ -113,6 +113,8 @@ def surface_warnings(
         name: the surface, for the message: "the target" or "zone NAME".
         only_reachable: true if the design takes only the reachable surface for the target.
     """
+    if name == TARGET and only_reachable:
+        return []  # triangles that are touched by halves are left
     touches = reach.touches
     own = chamber.on_target[touches.triangle]
     whole, missed = float(touches.area[own].sum()), own & ~reach.reached
@@ -122,7 +124,7 @@ def surface_warnings(
     sharp = own & ~reach.fits
     place = one_of(touches.point[missed], touches.area[missed])
     remedy = f"narrow {selection_of(name)}"
-    if name == TARGET and not only_reachable:
+    if name == TARGET:
         remedy += ", or set part.target.reachable = true"
     if touches.area[sharp].sum() > 0.5 * left:
         order = np.argsort(touches.radius[own])
@@ -226,6 +228,7 @@ def _change(sides: set[str]) -> str:
 
 
 HEIGHT_TOLERANCE = 1e-9  # m: corners are level if their heights differ by less
+FEW = 0.05  # share of the balls that may find room on a holder or mask without a warning
 AREA_TOLERANCE = 1e-6  # share of a triangle's area: a smaller upward component is rounding
 REMEDY = {
     "part": "turn it (effects.part_turn), tilt it (part.rotate_deg), or lower chamber.{key} to "
@@ -257,7 +260,8 @@ def find_ledges(design: Design, chamber: Chamber) -> list[Ledge]:
     upward = normal[:, 2] > AREA_TOLERANCE * area
     downward = normal[:, 2] < -AREA_TOLERANCE * area
     flat = upward & (np.hypot(normal[:, 0], normal[:, 1]) <= Rest().resistance * normal[:, 2])
-    cross_section = np.pi / 4.0 * design.shot.diameter**2
+    shot = design.shot
+    cross_section = np.pi / 4.0 * shot.diameter**2
     found = []
     still = {name: chamber.on_fixture(name) for name in chamber.fixtures}
     wall = chamber.tags == TAG_WALL
@@ -269,7 +273,8 @@ def find_ledges(design: Design, chamber: Chamber) -> list[Ledge]:
         faces = upward & own
         if not faces.any():
             continue
-        level = bool(area[faces & flat].sum() >= cross_section)
+        few = FEW * shot.count * shot.diameter**2 if name in chamber.fixtures else 0.0
+        level = bool(area[faces & flat].sum() >= max(cross_section, few))
         # balls do not roll off these faces
         shown = faces & flat if level else faces & _in_hollows(chamber, upward, downward)
         if not shown.any():

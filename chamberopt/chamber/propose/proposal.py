@@ -19,8 +19,9 @@ from chamberopt.chamber.checks.jams import JamGap, gaps_in_reach, jam_gaps
 from chamberopt.chamber.part import Part, posed_part
 from chamberopt.chamber.propose.pose import Turns, pose_in_words, propose_pose, square_to_walls
 from chamberopt.chamber.propose.proposed_balls import charge_of, fit_sizes, propose_ball
+from chamberopt.chamber.propose.proposed_end import HeldEnd, held_end
 from chamberopt.chamber.propose.proposed_floor import Floor, floor_on_sonotrode, require_room
-from chamberopt.chamber.propose.proposed_holder import holder_choices
+from chamberopt.chamber.propose.proposed_holder import end_holder, holder_choices
 from chamberopt.chamber.propose.proposed_target import (
     Sizes,
     Surface,
@@ -130,6 +131,7 @@ AMPLITUDE_UM = 40.0  # zero-to-peak; the nearest that the sonotrode can set is t
 USUAL_PART, WALL, SONOTRODE = "42CrMo4", "42CrMo4", "Ti-6Al-4V"  # of the catalogue
 MOST_HOLDERS = 6  # that are tried
 HIDDEN = 0.005  # share of the target that a holder may keep from the balls
+LEAST_LEFT, MOST_LEFT = 0.005, 0.15  # share of the target that is left out if no ball touches it
 NO_PLACE = (
     "no flat face beside the target looks up or aside and has room for a holder",
     "all of it is to be peened; leave out of [part.target] the face to hold it by",
@@ -185,9 +187,13 @@ def propose(
     with step("reading the part"):
         mesh = _read(path, wanted.unit)
         known = surfaces(mesh)
-    target = propose_target(mesh, known, choose(known))
+    asked = choose(known)
+    target = propose_target(mesh, known, asked)
     _require_near_origin(path, target)
     turns, pose_reason = propose_pose(mesh.vertices, mesh.triangles, target.triangles)
+    end = None if asked else held_end(mesh, target, turns)
+    if end is not None:
+        target, turns = end.target, end.turns
     shop = wanted.shop or usual_shop()
     tables: Tables = {
         "part": {"mesh": str(path.resolve()), "unit": mesh.unit, "rotate_deg": list(turns)},
@@ -247,14 +253,36 @@ def propose(
     if best is None:
         assert refused is not None
         raise refused
-    if best[1].sizes.through_ceiling:
-        return best[0]
-    with step("choosing what holds the part") as progress:
-        return _held(*best, target, wanted.shop, progress)
+    made, floor = best
+    if not floor.sizes.through_ceiling:
+        with step("choosing what holds the part") as progress:
+            made = _held(made, floor, target, end, wanted.shop, progress)
+    return _only_touched(made, floor, wanted.shop)
+
+
+def _only_touched(made: Proposal, floor: Floor, shop: Shop | None) -> Proposal:
+    """Return a proposal whose target leaves out what no ball touches, if that is little of it.
+
+    The time until 95 % of the target is covered would be that of the few places beside it. Where
+    it is much, the user is left to choose other balls or another target.
+    """
+    hidden = 1.0 - _touched(made)
+    if not LEAST_LEFT < hidden < MOST_LEFT:
+        return made
+    target = {**made.tables["part.target"], "reachable": True}
+    text = f"leaves out the {hidden:.1%} that no ball touches here"
+    reasons = {**made.reasons, "part.target.reachable": text}
+    tables = {**made.tables, "part.target": target}
+    return _checked(tables, reasons, floor, made.known, made.mesh, shop)
 
 
 def _held(
-    free: Proposal, floor: Floor, target: Target, shop: Shop | None, progress: Progress
+    free: Proposal,
+    floor: Floor,
+    target: Target,
+    end: HeldEnd | None,
+    shop: Shop | None,
+    progress: Progress,
 ) -> Proposal:
     """Return a proposal with the first holder that does no harm, or without one and the reason.
 
@@ -263,9 +291,13 @@ def _held(
 
     Args:
         free: the proposal without a holder.
+        end: an end that is left out of the target to hold the part by, if there is one.
     """
     diameter, turns = free.design.shot.diameter, free.design.part.rotate_deg
     choices = holder_choices(free.mesh, target.triangles, turns, diameter)[:MOST_HOLDERS]
+    if end is not None:
+        one = end_holder(free.mesh, target.triangles, turns, diameter, end.triangles)
+        choices = choices if one is None else [one._replace(keys={**one.keys, "at": end.at})]
     why = "" if choices else NO_PLACE[bool(target.triangles.all())]
     for number, one in enumerate(choices):
         progress(number, len(choices), None)

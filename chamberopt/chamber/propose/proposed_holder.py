@@ -1,7 +1,8 @@
 """Propose what holds a part in its chamber: a holder on faces that are not to be peened.
 
 Every flat face that does not look down may carry a holder along its normal, to the ceiling or to
-the side wall. An end or a root is enclosed; any other face carries a rod.
+the side wall. An end or a root is enclosed; any other face carries a rod, or a block if it is long
+and a rod would be slim.
 
        |   holder   |
        |   _______  |         ^ axis
@@ -43,6 +44,8 @@ WALL = 2e-3  # m: of a collar or block round an end
 THINNEST, SLIM = 2e-3, 0.15  # of a rod: m, and over the part's width: slim ones come last
 # Over the radius of a face: least seat of a rod round a hole in it, and least edge beside a target.
 SEAT, EDGE = 0.05, 0.3
+# A block stands on a face of at least this length over its width, which fills its rectangle.
+LONG_FACE, FILLED = 1.6, 0.9
 OPPOSITE = 0.5  # cosine from which on a face is opposite to the target
 
 
@@ -113,15 +116,38 @@ def holder_choices(
         at |= {} if up else {"axis": axis.tolist()}
         opposite = axis @ away > OPPOSITE * np.linalg.norm(away)
         order = (-round(1e3 * seen.level), 0) if up else (-int(opposite), 0)
-        for made in (_around_end(seen), _rod(seen, float(faces.area[face]))):
+        on_face = _rod(seen, float(faces.area[face]))
+        if on_face is None or 1e-3 * on_face.keys["diameter_mm"] < SLIM * width:
+            on_face = _block(seen, float(faces.area[face])) or on_face
+        for made in (_around_end(seen), on_face):
             if made is None:
                 continue
             thick = 1e-3 * made.keys.get("diameter_mm", min(made.keys.get("size_mm", [0.0])))
-            is_rod = made.keys["kind"] == "rod"
-            slim = is_rod and thick < SLIM * width
+            is_rod = "grip_mm" not in made.keys
+            slim = made.keys["kind"] == "rod" and thick < SLIM * width
             rank = (slim, not up, is_rod == up, *order, -thick)
             found.append((rank, len(found), HolderChoice({**made.keys, **at}, made.reason)))
     return [one for _, _, one in sorted(found, key=lambda one: one[:2])]
+
+
+def end_holder(
+    mesh: PartMesh,
+    target: np.ndarray,
+    turns: tuple[float, float, float],
+    ball: float,
+    end: np.ndarray,
+) -> HolderChoice | None:
+    """Return the collar or block round the upper end of a part; None if there is no room for one.
+
+    Args:
+        target, turns, ball: those of holder_choices.
+        end: marks the triangles of the end, (m,).
+    """
+    corners = (mesh.vertices @ rotation_matrix(turns).T)[mesh.triangles]
+    hull = convex_hull(corners[end].reshape(-1, 3)[:, :2])
+    if hull is None or not target.any():
+        return None
+    return _around_end(_Seen(corners, end, target, hull, CLEAR * ball, "up"))
 
 
 def _around_end(seen: _Seen) -> HolderChoice | None:
@@ -153,6 +179,22 @@ def _around_end(seen: _Seen) -> HolderChoice | None:
     text = f"round the end that points {seen.where}, which is not peened; the target begins"
     keys = {"kind": "collar" if is_round else "plate", **size, "grip_mm": round(1e3 * grip, 1)}
     return HolderChoice(keys, f"{text} {beyond} mm beyond it")
+
+
+def _block(seen: _Seen, area: float) -> HolderChoice | None:
+    """Return a block on a long face [m²] that fills its rectangle; None if there is no room."""
+    middle, sides, axes = narrowest_rectangle(seen.hull)
+    if sides.max() < LONG_FACE * sides.min() or area < FILLED * sides.prod():
+        return None
+    along = np.abs((seen.corners[..., :2] - middle) @ axes.T).min(axis=1)  # (m, 2)
+    higher = ~seen.face & (seen.highest > seen.level + HIGHER)
+    size_mm = [math.floor(2e3 * OF_FACE * one) / 2.0 for one in sides]
+    if (along[higher] < 0.5 * OF_FACE * sides + seen.clear).all(axis=1).any():
+        return None
+    if 1e-3 * min(size_mm) < THINNEST:
+        return None
+    text = f"on a long flat face of {plain(1e6 * area, 3)} mm² that looks {seen.where} and is not "
+    return HolderChoice({"kind": "plate", "size_mm": size_mm}, f"{text}peened; it fits the face")
 
 
 def _rod(seen: _Seen, area: float) -> HolderChoice | None:
