@@ -47,7 +47,7 @@ from chamberopt.geometry.meshes.surface_error import format_box
 from chamberopt.geometry.meshes.units import GUESSED
 from chamberopt.geometry.triangles import areas, rotation_matrix
 
-LIGHTER, HEAVIER = 0.4, 2.5  # charges of the study, as shares of the first
+LIGHTER, HEAVIER = 0.4, 2.0  # charges of the study, as shares of the first
 FINE_MM, COARSE_MM = 0.5, 1.0  # steps of lengths
 FEW_MM = 400.0  # longest range with fine steps: a study takes at most 999 steps
 LARGEST_MM = allowed_range(ParametricChamber.model_fields["height_mm"])[1]  # side of a chamber
@@ -69,11 +69,15 @@ def propose_charge(floor: float, diameter: float, ball_mass: float) -> tuple[flo
         floor: area of the sonotrode [m²].
         diameter, ball_mass: diameter [m] and mass [kg] of a ball.
     """
-    count = max(1, round(charge_of(floor, diameter)))
+    full = round(charge_of(floor, diameter))
+    count = max(1, min(full, MOST_BALLS))
     wanted, most = 1e3 * count * ball_mass, _heaviest_g(ball_mass)
     if wanted > most:
-        return most, "the most that is supported, less than a quarter of a layer of balls"
-    return min(float(f"{wanted:.2g}"), most), "a quarter of a layer of balls on the sonotrode"
+        return most, "the most that is supported, less than half a layer of balls"
+    mass = min(float(f"{wanted:.2g}"), most)
+    if count < full:
+        return mass, "less than half a layer of balls, as more take hours to simulate"
+    return mass, "half a layer of balls on the sonotrode"
 
 
 def propose_ranges(
@@ -125,7 +129,7 @@ def _heaviest_g(ball_mass: float) -> float:
 
 
 LARGEST_BALL = 3e-3  # m: larger balls are in use, but they are few and slow to cover
-MOST_BALLS = 5000  # of a charge under the part: more take hours to simulate
+MOST_BALLS = 10_000  # of a charge: more take hours to simulate
 WIDER = (1.0, 1.4, 2.0)  # factors on the room round the part that are tried
 AMPLITUDE_UM = 40.0  # zero-to-peak; the nearest that the sonotrode can set is taken
 USUAL_PART, WALL, SONOTRODE = "42CrMo4", "42CrMo4", "Ti-6Al-4V"  # of the catalogue

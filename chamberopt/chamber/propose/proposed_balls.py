@@ -26,9 +26,11 @@ MISSED = 0.05  # share of the target's area that a larger ball may fail to touch
 AS_GOOD = 0.05  # share of the target's area within which two sizes serve alike
 # Balls in the charge: of sizes that need more, the largest is taken that serves as well. Thousands
 # of small balls make weak dents, are hard to get back from a chamber, and are slow to simulate.
-MANY = 1500
+MANY = 3000
 MOST_LISTED = 5  # sizes in a reason
-LAYER, PACKED = 0.25, 0.9069  # layers of balls in the charge; share of a plane under a full layer
+# Layers of balls in the charge, and share of a plane under a full layer. Twice a quarter of a layer
+# peened 1.7 to 1.8 times as fast in pilots of three chambers, four times as much hardly faster still.
+LAYER, PACKED = 0.5, 0.9069
 
 
 @dataclass(frozen=True)

@@ -26,10 +26,10 @@ from tests.helpers.four_parts import FOUR_PARTS
 @pytest.mark.parametrize(
     ("floor_mm2", "ball_mm", "height_mm", "mass_g", "reason"),
     [
-        (2700, 3, 63, 9.6, "a quarter of a layer"),
-        (92400, 3, 355, 330, "a quarter of a layer"),  # 327 g, of which a study has no steps
-        (1075, 0.1, 39, 0.081, "the most that is supported"),  # more than 20000 balls
-        (1.4e6, 3, 1533, 2200, "the most that is supported"),
+        (2700, 3, 63, 19, "half a layer"),
+        (92400, 3, 355, 650, "half a layer"),  # 653 g, of which a study has no steps
+        (1075, 0.1, 39, 0.041, "less than half a layer"),  # of more than 10,000 balls
+        (1.4e6, 3, 1533, 1100, "less than half a layer"),
         (3e6, 20, 1900, 10000, "the most that is supported"),  # of shot.mass_g
     ],
 )
