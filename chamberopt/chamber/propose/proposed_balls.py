@@ -29,7 +29,7 @@ AS_GOOD = 0.05  # share of the target's area within which two sizes serve alike
 MANY = 3000
 MOST_LISTED = 5  # sizes in a reason
 # Layers of balls in the charge, and share of a plane under a full layer. Twice a quarter of a layer
-# peened 1.7 to 1.8 times as fast in pilots of three chambers, four times as much hardly faster still.
+# peened 1.7 to 1.8 times as fast in pilots of three chambers, four times as much no faster still.
 LAYER, PACKED = 0.5, 0.9069
 
 
