@@ -174,7 +174,9 @@ class Proposal:
     reach: Reach
     warnings: tuple[str, ...]
     jams: tuple[JamGap, ...]  # gaps of chamber and part in which the balls jam
-    resolved: bool = False  # true if a pilot resolved the time in which the target is covered
+    # Of all replicas of a candidate [s], to know the time in which its target is covered; None if a
+    # pilot did not resolve that time.
+    search_time: float | None = None
 
 
 def propose(

@@ -72,11 +72,11 @@ def study_text(proposal: Proposal, design: str) -> str:
     Args:
         design: name of the design file, in the same folder.
     """
-    goal = FASTEST if proposal.resolved else MOST_EVEN
     start = {name: f"now {proposal.design.value(name):g}" for name in proposal.bounds}
-    accuracy = proposal.design.process.accuracy
-    time = accuracy.replicas * accuracy.simulated_time_s / SEARCH_REPLICAS  # as many dents
-    return study_lines(design, proposal.bounds, start, goal=goal, time=time)
+    accuracy, goal, time = proposal.design.process.accuracy, FASTEST, proposal.search_time
+    if time is None:
+        goal, time = MOST_EVEN, accuracy.replicas * accuracy.simulated_time_s  # as many dents
+    return study_lines(design, proposal.bounds, start, goal=goal, time=time / SEARCH_REPLICAS)
 
 
 def study_lines(

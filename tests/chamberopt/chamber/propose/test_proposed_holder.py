@@ -8,7 +8,9 @@ import trimesh
 from manifold3d import CrossSection, Manifold
 
 from chamberopt.chamber.propose.proposal import Wanted, propose
-from chamberopt.chamber.propose.proposed_holder import HolderChoice, holder_choices
+from chamberopt.chamber.propose.proposed_end import held_end
+from chamberopt.chamber.propose.proposed_holder import HolderChoice, end_holder, holder_choices
+from chamberopt.chamber.propose.proposed_target import WHOLE, Target
 from chamberopt.geometry.meshes.part_mesh import PartMesh
 from chamberopt.geometry.meshes.raw_mesh import number_by_position
 
@@ -108,3 +110,39 @@ def test_where_nothing_can_hold_the_part_the_reason_is_said(tmp_path: Path) -> N
         "hold it by"
     )
     assert any("held in the air" in note for note in made.chamber.notes)
+
+
+def test_a_thin_plate_is_held_by_a_block_on_its_end() -> None:
+    """A plate of 100 x 5 x 40 mm, upright, with peened broad sides: 0.8 of its end carries it."""
+    plate = trimesh.creation.box((100, 5, 40))
+    first = next(
+        one
+        for one in choices_of(plate, np.abs(plate.face_normals[:, 1]) > 0.5)
+        if abs(one.keys.get("axis", (0, 0, 1))[0]) > 0.5
+    )
+    assert (first.keys["kind"], sorted(first.keys["size_mm"])) == ("plate", [4.0, 32.0])
+
+
+def test_a_part_that_is_all_target_is_held_by_its_slimmer_end() -> None:
+    """A rod of 10 x 60 mm with a ball of 20 mm at its upper end, which is turned down."""
+    body = solid(
+        Manifold.cylinder(60, 5, circular_segments=48)
+        + Manifold.sphere(10, circular_segments=48).translate([0, 0, 60])
+    ).subdivide_to_size(4.0)
+    count = len(body.faces)
+    triangles = body.faces.astype(np.int32)
+    mesh = PartMesh(1e-3 * body.vertices, triangles, number_by_position(count), (), "", {})
+    whole = Target(WHOLE, np.ones(count, dtype=bool), "all")
+    end = held_end(mesh, whole, (0.0, 0.0, 0.0))
+    assert end is not None
+    assert end.turns == (180.0, 0.0, 0.0)
+    middle = body.triangles_center[:, 2]
+    assert (end.triangles == (middle < 0.15 * 70)).all()
+    assert (end.target.triangles == ~end.triangles).all()
+    assert end.target.keys["box_mm"][0][2] == end.at["box_mm"][1][2] == 10.5
+    holder = end_holder(mesh, end.target.triangles, end.turns, BALL, end.triangles)
+    assert holder is not None
+    assert (holder.keys["kind"], holder.keys["diameter_mm"]) == ("collar", 14.0)
+    assert 0.0 < holder.keys["grip_mm"] <= 8.5
+    assert held_end(mesh, end.target, (0.0, 0.0, 0.0)) is None  # not all of it is target
+    assert held_end(mesh, whole, (30.0, 0.0, 0.0)) is None  # no axis of the file is upright
