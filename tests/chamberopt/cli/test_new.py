@@ -233,7 +233,7 @@ def test_a_pilot_that_cannot_run_leaves_the_starts_and_says_so(
     monkeypatch.setattr("chamberopt.simulation.budget_pilot.measure_budget", lambda *_: measured)
     assert main(["new", "box.stl", "--unit", "mm", "--out", "piloted"]) == 0
     process = load_design("piloted/design.toml").process
-    assert process.treatment_time == 300.0
+    assert process.treatment_time == 360.0
     assert process.accuracy.simulated_time == 50.0  # 10 replicas: 50 dents in 1 mm²
     assert "after about 250 ± 60 s" in capfd.readouterr().out
     study = load_study("piloted/study.toml")

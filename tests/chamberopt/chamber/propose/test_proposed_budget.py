@@ -59,19 +59,23 @@ def test_what_does_not_resolve_in_the_time_is_said() -> None:
 
 def test_the_treatment_time_is_rounded_up_and_says_what_it_rests_on() -> None:
     budget = propose_budget(PILOT)
-    assert budget.treatment == 300.0
+    assert budget.treatment == 360.0  # 250 s and 30 % more
     said = budget.reasons["process.treatment_time_s"]
     assert said.startswith("an estimate, rounded up: after about 250 ± 60 s 95 % of the target is")
     assert "slow end of friction" in said
+    assert said.endswith("simulated s, and 30% more")
+    assert budget.search_time == pytest.approx(REPLICAS * budget.time, rel=0.5)
     of_mean = propose_budget(PILOT._replace(places=False, friction=False))
     said = of_mean.reasons["process.treatment_time_s"]
     assert "covered ON AVERAGE" in said
     assert "friction" not in said
+    assert of_mean.treatment == 540.0
+    assert of_mean.search_time is None
 
 
 @pytest.mark.parametrize(
     ("seconds", "set_to"),
-    [(0.3, 1), (4.2, 5), (11, 20), (60, 60), (61, 120), (1000, 1200), (3601, 7200), (9e4, 9e4)],
+    [(0.3, 1), (4.2, 5), (11, 15), (60, 60), (61, 90), (1000, 1200), (3601, 7200), (9e4, 9e4)],
 )
 def test_times_are_those_that_a_machine_is_set_to(seconds: float, set_to: float) -> None:
     assert settable(seconds) == set_to
