@@ -132,7 +132,7 @@ LARGEST_BALL = 3e-3  # m: larger balls are in use, but they are few and slow to 
 MOST_BALLS = 10_000  # of a charge: more take hours to simulate
 WIDER = (1.0, 1.4, 2.0)  # factors on the room round the part that are tried
 AMPLITUDE_UM = 40.0  # zero-to-peak; the nearest that the sonotrode can set is taken
-USUAL_PART, WALL, SONOTRODE = "42CrMo4", "42CrMo4", "Ti-6Al-4V"  # of the catalogue
+USUAL_PART, WALL, SONOTRODE = "42CrMo4", "100Cr6", "Ti-6Al-4V"  # of the catalogue
 MOST_HOLDERS = 6  # that are tried
 HIDDEN = 0.005  # share of the target that a holder may keep from the balls
 LEAST_LEFT, MOST_LEFT = 0.005, 0.15  # share of the target that is left out if no ball touches it
@@ -229,6 +229,7 @@ def propose(
         "materials.part": "C0 and v0 are computed: to be calibrated"
         if wanted.alloy
         else "NOT KNOWN, a guess: chamberopt materials lists alloys",
+        "materials.wall": "hardened, as soft walls slow the balls; give yours",
         "effects.friction": "mu of these balls on these metals, dry: chamberopt materials",
         "effects.roughness": "rms slope of faces that shot has dented",
         "process.treatment_time_s": f"{START}: the report has coverage over time",

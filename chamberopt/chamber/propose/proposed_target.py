@@ -128,6 +128,7 @@ SELDOM = re.compile(
 AS_LARGE = 0.9  # of the largest face's area: the target takes a face as large, e.g. a blade's back
 PATTERN = 6  # number of alike faces that make a repeated feature, such as teeth
 COLOUR, VIVID = re.compile(r"#([0-9a-f]{2})([0-9a-f]{2})([0-9a-f]{2})$", re.I), 100
+NUMBERED = re.compile(r"(?:pid|set|zone)[\s_]*\d+$", re.I)  # names that say nothing
 FACE = re.compile(r"face (\d+)", re.I)
 Keys = dict[str, list[Any]]
 """Keys of [part.target], "surface" or "faces", and their values."""
@@ -162,9 +163,11 @@ def surfaces(mesh: PartMesh) -> list[Surface]:
     """
     area = areas(mesh.vertices, mesh.triangles)
     named: dict[bytes, Surface] = {}
-    for name, marked in sorted(
-        mesh.groups.items(), key=lambda one: (COLOUR.match(one[0]) is not None, len(one[0]))
-    ):
+
+    def plainness(one: tuple[str, np.ndarray]) -> tuple[bool, bool, int]:
+        return COLOUR.match(one[0]) is not None, NUMBERED.match(one[0]) is not None, len(one[0])
+
+    for name, marked in sorted(mesh.groups.items(), key=plainness):
         same = named.get(marked.tobytes())
         colour = name if COLOUR.match(name) else ""
         if same is not None:
