@@ -28,7 +28,7 @@ REPLICAS = 4
 WARMUP = 0.1  # s: balls cross the chamber some times
 FIRST_TIME, GROWTH = 0.025, 4.0  # s of each replica; over that of the run before
 DENTS = 100  # in a wide window
-COLLISIONS = 3e6  # of all replicas: a run that would have more is not begun, unless it is the first
+COLLISIONS = 2e6  # of all replicas: a run that would have more is not begun, unless it is the first
 
 
 def at_slow_end(design: Design) -> tuple[Design, bool]:

@@ -6,19 +6,25 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from chamberopt.chamber.part import chosen_triangles
+from chamberopt.chamber.part import chosen_on_part, chosen_triangles
 from chamberopt.chamber.propose.proposal import Proposal
+from chamberopt.chamber.propose.proposed_target import SELDOM, Surface
 from chamberopt.chamber.reach import reached_part_share
+from chamberopt.design.part import Selection
 from chamberopt.geometry.triangles import area_vectors, areas, rotation_matrix, unit_vectors
 
 AWAY_DEG = 105.0  # angle to the way down from which on a face is turned away from the sonotrode
 LEAST = 0.02  # share of the target's area below which nothing is offered
+MET = 0.5  # share of a surface in the chamber from which on it is named
 NEARLY_ALL, MOST_NAMED = 0.9, 3
 
 
 @dataclass(frozen=True)
 class LeftOut:
-    """What may be left out of a target, and the keys of [part.target] that leave it out."""
+    """What may be left out of a target, and the keys of [part.target] that leave it out.
+
+    Without keys it is what the shot meets beside the target, and the text is a whole sentence.
+    """
 
     keys: dict[str, object]
     text: str
@@ -50,4 +56,17 @@ def find_left_out(proposal: Proposal) -> list[LeftOut]:
     hidden = 1.0 - touched[posed.target] @ posed.area[posed.target] / posed.area[posed.target].sum()
     if hidden > LEAST:
         found.append(LeftOut({"reachable": True}, f"the {hidden:.0%} that no ball touches here"))
+    if names := [one.name for one in proposal.known if _is_met(proposal, one)]:
+        text = f"the shot also meets {', '.join(names)}, seldom peened: [mask] keeps it off"
+        found.append(LeftOut({}, f"{text} (docs/chambers.md)"))
     return found
+
+
+def _is_met(proposal: Proposal, surface: Surface) -> bool:
+    """Return whether a surface whose name says that it is seldom peened lies in the chamber."""
+    if not SELDOM.search(surface.name):
+        return False
+    chamber = proposal.chamber
+    rows = chosen_on_part(proposal.design, Selection(**surface.keys), "")
+    inside = chamber.exposed_area[rows & ~chamber.part.target].sum()
+    return bool(inside > MET * chamber.part.area[rows].sum())

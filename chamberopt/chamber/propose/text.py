@@ -146,6 +146,9 @@ def _left_out(offers: Sequence[LeftOut]) -> list[str]:
     """Return comment lines with keys of [part.target] that leave something out of the target."""
     lines = []
     for one in offers:
+        if not one.keys:
+            lines.append(f"# {one_line(one.text)}")
+            continue
         first, *more = (_line(key, value) for key, value in one.keys.items())
         also = ", with the next line" if more else ""
         lines += [f"# {first}  # leaves out {one_line(one.text)}{also}"]

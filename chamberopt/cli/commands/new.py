@@ -105,14 +105,14 @@ def new(
             raise
         made = propose(part, replace(wanted, unit=_asked_unit(part, error.sizes)), choose)
     left_out = find_left_out(made)
-    if pilot:
-        made = with_pilot(made)
     pyvista()  # before the folder is claimed: Ctrl-C during an import would leave the folder behind
     with claim_folder(out) as folder, whole_or_nothing(folder):
+        with step("drawing"):  # before the pilot, so that it can be looked at meanwhile
+            draw_target(made.chamber, made.reach, folder / "design.png")
+        if pilot:
+            made = with_pilot(made)
         write_text(folder / "design.toml", design_text(made, folder, left_out))
         write_text(folder / "study.toml", study_text(made, "design.toml"))
-        with step("drawing"):
-            draw_target(made.chamber, made.reach, folder / "design.png")
     show(_summary(made, left_out))
     print_remarks(f"note: {one_line(text)}" for text in made.mesh.notes)
     print_remarks(f"warning: {text}" for text in made.warnings)
@@ -173,7 +173,8 @@ def _summary(made: Proposal, left_out: Sequence[LeftOut]) -> list[str]:
     lines = [f"{'part.target':38}{one_line(made.reasons['part.target'])}"]
     for one in left_out:
         keys = " and ".join(f"part.target.{key}" for key in one.keys)
-        lines.append(f"{'':38}{one_line(one.text)}: {keys} in the design leave it out")
+        leave = f": {keys} in the design leave it out" if keys else ""
+        lines.append(f"{'':38}{one_line(one.text)}{leave}")
     for table, values in made.tables.items():
         for key, value in values.items():
             reason = made.reasons.get(f"{table}.{key}")

@@ -7,10 +7,12 @@ import pytest
 import trimesh
 from manifold3d import CrossSection, Manifold
 
+from chamberopt.chamber.propose.left_out import find_left_out
 from chamberopt.chamber.propose.proposal import Wanted, propose
 from chamberopt.chamber.propose.proposed_end import held_end
 from chamberopt.chamber.propose.proposed_holder import HolderChoice, end_holder, holder_choices
 from chamberopt.chamber.propose.proposed_target import WHOLE, Target
+from chamberopt.chamber.propose.text import design_text
 from chamberopt.geometry.meshes.part_mesh import PartMesh
 from chamberopt.geometry.meshes.raw_mesh import number_by_position
 
@@ -146,3 +148,18 @@ def test_a_part_that_is_all_target_is_held_by_its_slimmer_end() -> None:
     assert 0.0 < holder.keys["grip_mm"] <= 8.5
     assert held_end(mesh, end.target, (0.0, 0.0, 0.0)) is None  # not all of it is target
     assert held_end(mesh, whole, (30.0, 0.0, 0.0)) is None  # no axis of the file is upright
+
+
+def test_what_is_seldom_peened_is_named_where_the_shot_meets_it(tmp_path: Path) -> None:
+    box = trimesh.creation.box((20, 20, 30))
+    lines = [f"v {x} {y} {z}" for x, y, z in box.vertices]
+    for (a, b, c), (x, _, z) in zip(box.faces + 1, box.face_normals, strict=True):
+        name = "PEENED" if z < -0.5 else "BORE" if x > 0.5 else "SIDES"
+        lines += [f"g {name}", f"f {a} {b} {c}"]
+    part = tmp_path / "box.obj"
+    part.write_text("\n".join(lines) + "\n")
+    made = propose(part, Wanted("mm"), lambda _: [])
+    assert made.design.part.target.surface == ("PEENED",)
+    (said,) = find_left_out(made)
+    assert said.text.startswith("the shot also meets BORE, seldom peened: [mask]")
+    assert f"# {said.text}" in design_text(made, tmp_path, [said])
