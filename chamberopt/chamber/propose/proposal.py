@@ -174,8 +174,8 @@ class Proposal:
     reach: Reach
     warnings: tuple[str, ...]
     jams: tuple[JamGap, ...]  # gaps of chamber and part in which the balls jam
-    # Of all replicas of a candidate [s], to know the time in which its target is covered; None if a
-    # pilot did not resolve that time.
+    # Of all replicas of a candidate [s], to know the time in which its target is covered; None if
+    # no pilot ran, or balls do not touch enough of the target.
     search_time: float | None = None
 
 
@@ -273,7 +273,7 @@ def _only_touched(made: Proposal, floor: Floor, shop: Shop | None) -> Proposal:
     The time until 95 % of the target is covered would be that of the few places beside it. Where
     it is much, the user is left to choose other balls or another target.
     """
-    hidden = 1.0 - _touched(made)
+    hidden = 1.0 - touched_share(made)
     if not LEAST_LEFT < hidden < MOST_LEFT:
         return made
     target = {**made.tables["part.target"], "reachable": True}
@@ -320,7 +320,7 @@ def _held(
         except InputError as error:
             why = why or str(error)
             continue
-        if _touched(free) - _touched(made) > HIDDEN:
+        if touched_share(free) - touched_share(made) > HIDDEN:
             why = why or "a holder would keep the balls from some of the target"
         elif _faults(made) > _faults(free):
             new = [text for text in made.warnings if text not in free.warnings]
@@ -351,7 +351,7 @@ def _extremes(bounds: dict[str, dict[str, Any]]) -> list[dict[str, Any]]:
     return [{**low, distance: high[distance]}, {**high, distance: low[distance]}]
 
 
-def _touched(made: Proposal) -> float:
+def touched_share(made: Proposal) -> float:
     """Return the share of the target's area that the balls can touch."""
     part = made.chamber.part
     share = reached_part_share(made.reach, made.chamber.source, len(part.triangles))

@@ -11,9 +11,10 @@ import math
 from dataclasses import replace
 from typing import NamedTuple
 
-from chamberopt.chamber.propose.proposal import REPLICAS, Proposal
+from chamberopt.chamber.propose.proposal import REPLICAS, Proposal, touched_share
 
 DENTS, MARGIN = 25.0, 1.3  # needed in a window; over what is needed, as a pilot is short
+COVERED = 0.95  # share of the target's area whose time to 98 % counts
 SLOWER = 2.0  # times as slow as the start: candidates of a search that are still resolved
 # Of all replicas, for MINUTES on two cores: 0.5e5 (4,000 balls) to 1.1e5 (160 balls) in a second of
 # a core were measured.
@@ -64,7 +65,7 @@ class Budget(NamedTuple):
     time: float  # [s]
     gauge_mm2: float
     reasons: dict[str, str]  # by dotted name
-    search_time: float | None  # as in Proposal
+    search_time: float  # [s], as in Proposal
 
 
 def propose_budget(found: Measured) -> Budget:
@@ -89,8 +90,8 @@ def propose_budget(found: Measured) -> Budget:
     if gauge > 1.0:
         reasons["process.accuracy.gauge_mm2"] = wider
     # The time to 98 % takes DENTS alone, where the mean takes more. A slow candidate has fewer.
-    search = REPLICAS * time * min(1.0, SLOWER * DENTS / (dents * gauge))
-    return Budget(treatment, time, gauge, reasons, search if found.places else None)
+    share = min(1.0, SLOWER * DENTS / (dents * gauge)) if found.places else 1.0
+    return Budget(treatment, time, gauge, reasons, REPLICAS * time * share)
 
 
 def with_budget(made: Proposal, budget: Budget) -> Proposal:
@@ -106,9 +107,8 @@ def with_budget(made: Proposal, budget: Budget) -> Proposal:
         tables[table][key] = value
     reasons = {**made.reasons, **budget.reasons}
     design = made.design.changed(values)
-    return replace(
-        made, tables=tables, reasons=reasons, design=design, search_time=budget.search_time
-    )
+    search_time = budget.search_time if touched_share(made) > COVERED else None
+    return replace(made, tables=tables, reasons=reasons, design=design, search_time=search_time)
 
 
 def settable(seconds: float) -> float:

@@ -67,7 +67,8 @@ def study_text(proposal: Proposal, design: str) -> str:
     """Return the text of a study file that varies numbers of the proposed design.
 
     It is after the shortest time: the coverage after the proposed time is nearly 1 in every good
-    chamber, and ranks none. Where no time is known, it is after the most even coverage.
+    chamber, and ranks none. Without a pilot, or where balls touch too little of the target to cover
+    it, it is after the most even coverage.
 
     Args:
         design: name of the design file, in the same folder.

@@ -70,7 +70,7 @@ def test_the_treatment_time_is_rounded_up_and_says_what_it_rests_on() -> None:
     assert "covered ON AVERAGE" in said
     assert "friction" not in said
     assert of_mean.treatment == 540.0
-    assert of_mean.search_time is None
+    assert of_mean.search_time == REPLICAS * of_mean.time
 
 
 @pytest.mark.parametrize(
