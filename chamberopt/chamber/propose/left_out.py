@@ -67,6 +67,6 @@ def _is_met(proposal: Proposal, surface: Surface) -> bool:
     if not SELDOM.search(surface.name):
         return False
     chamber = proposal.chamber
-    rows = chosen_on_part(proposal.design, Selection(**surface.keys), "")
+    rows = chosen_on_part(proposal.design, Selection.model_validate(surface.keys), "")
     inside = chamber.exposed_area[rows & ~chamber.part.target].sum()
     return bool(inside > MET * chamber.part.area[rows].sum())

@@ -24,8 +24,10 @@ LEAST_TIME, MOST_TIME = 0.1, 1000.0  # s, of each replica
 USUAL_GAUGE = 1e-6  # m²: wider only where the time would be too long
 WIDEST = 0.02  # of the target's area
 # What is set on a machine [s]: above them whole hours, below them whole seconds.
-SET_TIMES = (10, 15, 20, 30, 45, 60, 90, 120, 180, 240, 300, 360, 420, 480, 540, 600)
-SET_TIMES += (720, 900, 1200, 1500, 1800, 2400, 3000, 3600)
+SET_TIMES = (
+    *(10, 15, 20, 30, 45, 60, 90, 120, 180, 240, 300, 360, 420, 480, 540, 600),
+    *(720, 900, 1200, 1500, 1800, 2400, 3000, 3600),
+)
 # Factors on the pilot's time. Its wide windows even out the least covered places; where it resolves
 # none, they lag behind the target on average: 326 s against 290 s and 133 s in a joint's chamber.
 MORE, LAGGING = 1.3, 2.0
