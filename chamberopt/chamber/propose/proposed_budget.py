@@ -23,7 +23,8 @@ MINUTES = 3.0
 LEAST_TIME, MOST_TIME = 0.1, 1000.0  # s, of each replica
 USUAL_GAUGE = 1e-6  # m²: wider only where the time would be too long
 WIDEST = 0.02  # of the target's area
-# What is set on a machine [s]: above them whole hours, below them whole seconds.
+# What is set on a machine [s]: above them quarters of an hour, below them whole seconds.
+QUARTER = 900.0
 SET_TIMES = (
     *(10, 15, 20, 30, 45, 60, 90, 120, 180, 240, 300, 360, 420, 480, 540, 600),
     *(720, 900, 1200, 1500, 1800, 2400, 3000, 3600),
@@ -118,7 +119,7 @@ def settable(seconds: float) -> float:
     if seconds <= SET_TIMES[0]:
         return float(max(1, math.ceil(seconds)))
     if seconds > SET_TIMES[-1]:
-        return 3600.0 * math.ceil(seconds / 3600.0)
+        return QUARTER * math.ceil(seconds / QUARTER)
     return float(next(one for one in SET_TIMES if one >= seconds))
 
 
