@@ -54,7 +54,7 @@ def find_left_out(proposal: Proposal) -> list[LeftOut]:
     posed = chamber.part
     touched = reached_part_share(proposal.reach, chamber.source, len(posed.triangles))
     hidden = 1.0 - touched[posed.target] @ posed.area[posed.target] / posed.area[posed.target].sum()
-    if hidden > LEAST:
+    if hidden > LEAST and not part.target.reachable:
         found.append(LeftOut({"reachable": True}, f"the {hidden:.0%} that no ball touches here"))
     if names := [one.name for one in proposal.known if _is_met(proposal, one)]:
         text = f"the shot also meets {', '.join(names)}, seldom peened: [mask] keeps it off"

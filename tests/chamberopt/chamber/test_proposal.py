@@ -15,7 +15,7 @@ from chamberopt.chamber.propose.pose import pose_in_words
 from chamberopt.chamber.propose.proposal import propose_charge, propose_ranges
 from chamberopt.chamber.propose.proposed_target import Sizes, propose_target, surfaces
 from chamberopt.chamber.propose.text import design_text
-from chamberopt.design.part import Selection, Target
+from chamberopt.design.part import Target
 from chamberopt.geometry.meshes.part_mesh import PartMesh, read_part
 from chamberopt.geometry.meshes.raw_mesh import number_by_position
 from chamberopt.geometry.triangles import areas
@@ -139,7 +139,7 @@ def test_what_faces_away_is_offered_for_leaving_out(tmp_path: Path) -> None:
     known = surfaces(mesh)
     target, area = propose_target(mesh, known, []), areas(mesh.vertices, mesh.triangles)
     heels, toes = (next(o.triangles for o in known if o.name == f"face {k}") for k in (7, 9))
-    part = SimpleNamespace(target=Selection(**target.keys), rotate_deg=(0.0, 0.0, 0.0))
+    part = SimpleNamespace(target=Target(**target.keys), rotate_deg=(0.0, 0.0, 0.0))
     posed = SimpleNamespace(triangles=mesh.triangles, target=target.triangles, area=area)
     made = SimpleNamespace(
         mesh=mesh,
