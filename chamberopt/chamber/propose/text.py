@@ -63,21 +63,33 @@ def design_text(proposal: Proposal, folder: Path, left_out: Sequence[LeftOut] = 
     return "\n".join(lines) + "\n"
 
 
-def study_text(proposal: Proposal, design: str) -> str:
-    """Return the text of a study file that varies numbers of the proposed design.
+def study_texts(proposal: Proposal, design: str) -> dict[str, str]:
+    """Return the texts of study files that vary numbers of the proposed design, by file name.
 
-    It is after the shortest time: the coverage after the proposed time is nearly 1 in every good
-    chamber, and ranks none. Without a pilot, or where balls touch too little of the target to cover
-    it, it is after the most even coverage.
+    study.toml is after the shortest time, and most_even.toml after the most even coverage in less
+    than the proposed time: after that it is nearly 1 in every good chamber, and ranks none. Without
+    a pilot, or where balls touch too little of the target to cover it, study.toml is after the most
+    even coverage, and alone.
 
     Args:
         design: name of the design file, in the same folder.
     """
     start = {name: f"now {proposal.design.value(name):g}" for name in proposal.bounds}
-    accuracy, goal, time = proposal.design.process.accuracy, FASTEST, proposal.search_time
-    if time is None:
-        goal, time = MOST_EVEN, accuracy.replicas * accuracy.simulated_time_s  # as many dents
-    return study_lines(design, proposal.bounds, start, goal=goal, time=time / SEARCH_REPLICAS)
+    process = proposal.design.process
+
+    def text(goal: Goal, time: float) -> str:
+        each = time / SEARCH_REPLICAS
+        return study_lines(design, proposal.bounds, start, goal=goal, time=each)
+
+    # as many dents as the design's own replicas have
+    even = text(MOST_EVEN, process.accuracy.replicas * process.accuracy.simulated_time_s)
+    if proposal.search_time is None:
+        return {"study.toml": even}
+    short = (
+        "# After the design's treatment time all good chambers are even. Rank them after half of"
+    )
+    short += f" it:\n# chamberopt run most_even.toml --time {0.5 * process.treatment_time:g}s\n"
+    return {"study.toml": text(FASTEST, proposal.search_time), "most_even.toml": short + even}
 
 
 def study_lines(

@@ -70,7 +70,7 @@ def new(
     from chamberopt.chamber.propose.left_out import find_left_out
     from chamberopt.chamber.propose.proposal import Wanted, propose
     from chamberopt.chamber.propose.shop import load_shop
-    from chamberopt.chamber.propose.text import design_text, study_text
+    from chamberopt.chamber.propose.text import design_text, study_texts
     from chamberopt.cli.commands.check import draw_target
     from chamberopt.cli.prepare import with_pilot
     from chamberopt.common.errors import InputError
@@ -112,11 +112,15 @@ def new(
         if pilot:
             made = with_pilot(made)
         write_text(folder / "design.toml", design_text(made, folder, left_out))
-        write_text(folder / "study.toml", study_text(made, "design.toml"))
+        studies = study_texts(made, "design.toml")
+        for name, text in studies.items():
+            write_text(folder / name, text)
     show(_summary(made, left_out))
     print_remarks(f"note: {one_line(text)}" for text in made.mesh.notes)
     print_remarks(f"warning: {text}" for text in made.warnings)
-    show([f"design in {folder / 'design.toml'}", f"study in {folder / 'study.toml'}"])
+    show(
+        [f"design in {folder / 'design.toml'}", *(f"study in {folder / name}" for name in studies)]
+    )
 
 
 def _require_file(part: Path) -> None:

@@ -238,6 +238,8 @@ def test_a_pilot_that_cannot_run_leaves_the_starts_and_says_so(
     assert "after about 250 ± 60 s" in capfd.readouterr().out
     study = load_study("piloted/study.toml")
     assert study.objective.name == "minus_time_to_98_s"
+    assert load_study("piloted/most_even.toml").objective.name == "uniform_coverage"
+    assert "--time 180s" in Path("piloted/most_even.toml").read_text(encoding="utf-8")
     searched = study.search_accuracy
     assert searched["replicas"] * searched["simulated_time_s"] == 500.0
 
