@@ -104,7 +104,7 @@ class StudyResult:
             f"nothing left to gain here: no confirmed candidate is better than the start by more "
             f"than {max(self.gain.high, 0.0):.2g}, and less than {counts:g} does not count; the "
             "best may take less time or shot instead, which a study of minus_time_to_98_s finds "
-            f"(fastest.toml of chamberopt new){soon}",
+            f"(study.toml of chamberopt new){soon}",
         )
 
     @property

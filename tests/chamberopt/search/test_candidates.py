@@ -85,7 +85,7 @@ def test_a_study_says_that_nothing_is_left_to_gain(tmp_path: Path) -> None:
     slope = 0.02  # no candidate is better by more
     (note,) = run_bowl(tmp_path / "flat", simulator, {"evaluations": 6}).notes
     assert note.startswith("nothing left to gain here: no confirmed candidate is better")
-    assert note.endswith("(fastest.toml of chamberopt new): it has full coverage after 30 of 120 s")
+    assert note.endswith("(study.toml of chamberopt new): it has full coverage after 30 of 120 s")
     slope = 1.0
     steep = run_bowl(tmp_path / "steep", simulator, {"evaluations": 6})
     assert not any("nothing left" in note for note in steep.notes)
