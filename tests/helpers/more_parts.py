@@ -151,5 +151,5 @@ MORE_PARTS = {
     "connecting_rod": ExamplePart(connecting_rod, (132.0, 48.0, 20.0), unit="mm"),
     "turbine_disc": ExamplePart(turbine_disc, (100.0, 100.0, 30.0)),
     "leaf_spring": ExamplePart(leaf_spring, (174.4, 36.0, 20.1)),
-    "pelton_bucket": ExamplePart(pelton_bucket, (80.0, 98.0, 24.1), unit="mm"),
+    "pelton_bucket": ExamplePart(pelton_bucket, (79.89, 98.1, 24.13), unit="mm"),
 }
