@@ -75,7 +75,7 @@ def test_the_same_twice(tmp_path: Path) -> None:
     text = comparison_text(both)
     assert "the designs do not differ" in text
     assert row(text, "mean_coverage").endswith("exact")
-    assert "b - a: paired" in text
+    assert "b - a: on the same seeds" in text
 
 
 def test_the_error_of_the_depth_is_not_common_to_two_metals(tmp_path: Path) -> None:
