@@ -415,7 +415,9 @@ class Search:
         # Trials from the record but the last one are not shown.
         known = len(self._folder.recorded.trials) if self._folder else 0
         if self._progress and len(self.trials) >= known:
-            self._progress(len(self.trials), self._expected(), self._best.get(trial.stage))
+            # The best of the few that are confirmed would look like a fall of the best so far.
+            best = None if trial.stage == "confirm" else self._best.get(trial.stage)
+            self._progress(len(self.trials), self._expected(), best)
         return trial
 
     def _record(self, asked: _Asked, answer: Figures | InputError) -> Trial:
