@@ -270,7 +270,7 @@ def paired_difference(
     peening chamber is chaotic, so that they hardly do: then pairs would take half of the degrees of
     freedom and give nothing for them, and the estimates are taken as independent.
     """
-    if not are_pairs(after, before):
+    if not _are_pairs(after, before):
         return independent_difference(after, before, confidence)
     gaps = np.subtract(after.pseudovalues, before.pseudovalues)
     shared = sum_of_shared(((1.0, after), (-1.0, before)))
@@ -279,7 +279,7 @@ def paired_difference(
     return replace(pairs, value=after.value - before.value)
 
 
-def are_pairs(after: Estimate, before: Estimate) -> bool:
+def _are_pairs(after: Estimate, before: Estimate) -> bool:
     """Return True if replicas of two estimates correlate, replica by replica.
 
     Their correlation is above 0 by a one-sided test at 5 %. In simulations with normal replicas the

@@ -12,6 +12,7 @@ import numpy as np
 
 from chamberopt.chamber.propose.pose import Turns, turns_down
 from chamberopt.chamber.propose.proposed_target import Target
+from chamberopt.design.shapes.outlines import area_inside
 from chamberopt.geometry.meshes.part_mesh import PartMesh
 from chamberopt.geometry.outline import convex_hull
 from chamberopt.geometry.triangles import areas, rotation_matrix
@@ -51,10 +52,7 @@ def held_end(mesh: PartMesh, target: Target, turns: Turns) -> HeldEnd | None:
     def size(rows: np.ndarray) -> float:
         """Area of an end as it is seen along the axis [m²]."""
         hull = convex_hull(np.delete(mesh.vertices[rows], axis, axis=1))
-        if hull is None:
-            return 0.0
-        x, y = hull.T
-        return 0.5 * float(abs(x @ np.roll(y, -1) - y @ np.roll(x, -1)))
+        return 0.0 if hull is None else area_inside(hull)
 
     upper = places > places.max() - END * length
     lower = places < places.min() + END * length

@@ -13,7 +13,6 @@ from chamberopt.common.estimate import (
     CONFIDENCE,
     ZERO_TOLERANCE,
     Estimate,
-    are_pairs,
     independent_difference,
     paired_difference,
     shared_half_width,
@@ -78,8 +77,8 @@ def difference(
     correlate.
     """
     count = len(after.pseudovalues)
-    paired = same_seeds and are_pairs(after, before)
-    gap = (paired_difference if paired else independent_difference)(after, before, confidence)
+    gap = (paired_difference if same_seeds else independent_difference)(after, before, confidence)
+    paired = len(gap.pseudovalues) > 0  # one a pair; none from independent samples
     found = Difference(
         0.0 if abs(gap.value) < ZERO_TOLERANCE else gap.value, gap.half_width, paired
     )
