@@ -89,7 +89,7 @@ OPENED_ELSEWHERE = {
     "geometry/meshes/step_tessellation.py": {"gmsh.open"},
 }
 MOST_ENTRIES = 20
-COMPILER = ("jit.py", "step_compiler.py", "whole_records.py", "simd.py", "compile_cache.py")
+COMPILER = ("jit.py", "step_compiler.py", "record_addresses.py", "simd.py", "compile_cache.py")
 
 
 def sources(package: str) -> list[Path]:

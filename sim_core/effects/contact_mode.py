@@ -16,8 +16,8 @@ from sim_core.effects.sonotrodes import SonotrodeWaves
 from sim_core.effects.vibration import Wave
 from sim_core.errors import SceneError, number
 from sim_core.numerics.jit import inlined
+from sim_core.numerics.record_addresses import passed_by_address
 from sim_core.numerics.vec3 import Vec3, vec3_at
-from sim_core.numerics.whole_records import passed_whole
 
 # m/s. A ball that drops from 50 nm is as fast, and the shot is ten thousand times faster. A lower
 # value costs bounces: 22 for each decade at a restitution of 0.9.
@@ -133,7 +133,7 @@ class Ride(NamedTuple):
     waves: SonotrodeWaves | None
 
 
-@passed_whole
+@passed_by_address
 class ContactState(NamedTuple):
     """State of n balls that fly, slide, roll, lie still or are jammed.
 

@@ -18,10 +18,10 @@ from sim_core.geometry.mesh import TriangleMesh
 from sim_core.geometry.obstacles import build_obstacle_table, face_overlap_of
 from sim_core.geometry.triangle_lookup import TriangleLookup, build_lookup
 from sim_core.geometry.turning_part import PartTree, build_part_tree, part_rows, select_rows
-from sim_core.numerics.whole_records import passed_whole
+from sim_core.numerics.record_addresses import passed_by_address
 
 
-@passed_whole
+@passed_by_address
 class ObstacleSet(NamedTuple):
     """All obstacles of a scene, with coordinates relative to the middle of the mesh or cavity.
 

@@ -26,7 +26,7 @@ from sim_core.loop.neighbours import NeighbourFilter
 from sim_core.loop.stays import Stays
 from sim_core.numerics.periodic_sides import PeriodicSides
 from sim_core.numerics.profiler import Profiler
-from sim_core.numerics.whole_records import passed_whole
+from sim_core.numerics.record_addresses import passed_by_address
 
 # Places in SimulationState.counts: hits on walls, on balls and on the sonotrode, searches for a
 # surface, and stale meetings.
@@ -50,7 +50,7 @@ class Clock(NamedTuple):
     origin: float
 
 
-@passed_whole
+@passed_by_address
 class SimulationState(NamedTuple):
     """All data that the event loop works on. An absent effect is None.
 
