@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from contextlib import suppress
 from itertools import count
 from pathlib import Path
-from threading import Lock
 from typing import Any
 
 from chamberopt.chamber.propose.text import study_lines
@@ -20,7 +19,7 @@ from chamberopt.page.answers import part_answer, shape_answer
 from chamberopt.page.checker import Checker
 from chamberopt.page.edited_file import EditedFile, custom_shape, design_fields
 from chamberopt.page.picking import Picker
-from chamberopt.page.started_commands import StartedCommand
+from chamberopt.page.started_commands import OneCommand
 from chamberopt.printers import terminal
 from chamberopt.printers.report_page import REPORT, parts_content
 from chamberopt.printers.sheet_page import SHEET
@@ -79,20 +78,17 @@ class Acts:
     Args:
         path: the design file.
         trusted: whether the chamber's shape in a design may be a Python file, which is then run.
+        command: runs the commands that the page starts.
     """
 
-    def __init__(self, path: Path, trusted: bool) -> None:
-        self._path, self._trusted = path.resolve(), trusted
+    def __init__(self, path: Path, trusted: bool, command: OneCommand) -> None:
+        self._path, self._trusted, self._command = path.resolve(), trusted, command
         self._files: dict[str, EditedFile] = {}
         first = self._read()
         self._picker, self._checker = Picker(), Checker(first.path, first.text)
-        self._command: StartedCommand | None = None
-        self._starting = Lock()
 
     def close(self) -> None:
         self._checker.stop()
-        if self._command is not None:
-            self._command.end()
 
     def read(self, _: object) -> dict[str, object]:
         """Return the design file as it is now, for a page that is opened or reloaded."""
@@ -197,11 +193,7 @@ class Acts:
             sweeps = ["--sobol", str(int(asked["points"]))] if command == "sweep" else []
             folder = self._free_folder(f"{what.stem}-sweep" if sweeps else what.stem)
             arguments = [command, name, *sweeps, "--out", folder]
-        with self._starting:
-            if self._command is not None and self._command.status()["exit"] is None:
-                raise InputError("a command is running; stop it first, or wait for its end")
-            self._command = StartedCommand(arguments, self._path.parent)
-            return self._command.status()
+        return self._command.start(arguments, self._path.parent)
 
     def _refuse_shape(self, file: Path) -> None:
         """Raise InputError if a design or study would run a Python file that is not trusted."""
@@ -215,14 +207,6 @@ class Acts:
                 "the command line, or begin again with --trust-shape"
             )
 
-    def status(self, _: object) -> dict[str, object]:
-        return self._command.status() if self._command else {}
-
-    def stop(self, _: object) -> dict[str, object]:
-        if self._command:
-            self._command.stop()
-        return self.status(None)
-
     def results(self, _: object) -> list[dict[str, object]]:
         return list_results(self._path.parent)
 
@@ -234,16 +218,29 @@ class Acts:
 
         Raises InputError if the path leads out of the folder.
         """
-        path = (self._path.parent / name).resolve()
-        if not path.is_relative_to(self._path.parent):
-            raise InputError(f"{name}: outside the design's folder")
-        return path
+        return path_inside(self._path.parent, name)
 
     def _free_folder(self, name: str) -> str:
         """Return the first new or empty folder of results/NAME, results/NAME-2 and so on."""
-        folders = (Path("results", f"{name}-{k}" if k > 1 else name) for k in count(1))
         self.inside("results")  # the folder may be a link to elsewhere
-        return next(one for one in folders if is_new_or_empty(self._path.parent / one)).as_posix()
+        return free_folder(self._path.parent, Path("results", name))
+
+
+def path_inside(folder: Path, name: str) -> Path:
+    """Return the path of a name in a folder.
+
+    Raises InputError if the path leads out of the folder.
+    """
+    path = (folder / name).resolve()
+    if not path.is_relative_to(folder):
+        raise InputError(f"{name}: outside the folder {folder.name}")
+    return path
+
+
+def free_folder(folder: Path, name: Path) -> str:
+    """Return the first new or empty folder of NAME, NAME-2 and so on in a folder."""
+    tried = (name.with_name(f"{name.name}-{k}") if k > 1 else name for k in count(1))
+    return next(one for one in tried if is_new_or_empty(folder / one)).as_posix()
 
 
 def _files_beside(design: Path) -> list[dict[str, str]]:

@@ -242,22 +242,45 @@ NOT_SHOWN = (
 def design_fields(file: EditedFile) -> list[dict[str, object]]:
     """Return what the page shows of each number and choice in a design, in the order of the file.
 
-    Each row has the name, value, unit, allowed range and explanation.
+    Each row has the name, value, unit, allowed range and explanation, and the reason that the file
+    has behind it.
     """
     design, varied = file.design, set(file.design.numbers())
+    reasons = comments(file.text)
     rows: list[dict[str, Any]] = []
     for name, field in _numbers(design):
         row: dict[str, Any] = {"name": name, "value": _value(design, name), **_bounds(field)}
         extra = field.json_schema_extra if isinstance(field.json_schema_extra, dict) else {}
         row |= {"unit": extra.get("unit", "") or _unit(name), "text": field.description or ""}
         row |= {"whole": field.annotation is int, "varies": name in varied}
-        rows.append(row | {"fixed": file.is_fixed(name)})
+        row |= {"fixed": file.is_fixed(name)}
+        rows.append(row | {"reason": reasons.get(name.removesuffix(".0"), "")})
     for name, allowed in _choices(design).items():
         table, key = name.split(".")
         text = type(getattr(design, table)).model_fields[key].description or ""
         row = {"name": name, "value": design.setting(name), "choices": allowed, "text": text}
+        row |= {"reason": reasons.get(name, "")}
         rows.append(row)
     return rows
+
+
+def comments(text: str) -> dict[str, str]:
+    """Return what the comment behind each key of a TOML file says, by the key's dotted name.
+
+    In a proposed design this is the reason of the key's value. A key without comment is left out.
+    """
+    import tomlkit
+    from tomlkit.items import Table
+
+    def walk(table: Any, before: str) -> Iterator[tuple[str, str]]:
+        for key, item in table.items():
+            name = f"{before}{key}"
+            if isinstance(item, Table):
+                yield from walk(item, f"{name}.")
+            elif hasattr(item, "trivia"):
+                yield name, item.trivia.comment.lstrip("#").strip()
+
+    return {name: comment for name, comment in walk(tomlkit.parse(text), "") if comment}
 
 
 def field_names(design: Design) -> set[str]:

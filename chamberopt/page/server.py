@@ -1,4 +1,4 @@
-"""Serve the web page that edits a design, but only to the person who started the server."""
+"""Serve the web page that makes and edits a design, to the person who started the server alone."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ from starlette.staticfiles import StaticFiles
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from chamberopt.common.errors import InputError
-from chamberopt.page.acts import Acts
 from chamberopt.page.checker import SupersededError
+from chamberopt.page.front import Front
 from chamberopt.printers.report_page import POLICY
 from sim_core import SceneError
 
@@ -127,10 +127,11 @@ BROWSER = Path(__file__).parent / "browser"
 # A report runs scripts of its own. In the sandbox it has no origin, and cannot use this server.
 FILE_POLICY = "sandbox allow-scripts allow-modals allow-popups allow-downloads"
 SHOWN_FILES = {".html": "text/html", ".pdf": "application/pdf", ".png": "image/png"}
-# Names of acts; LOOKS need no question and are asked by GET.
-QUESTIONS = ("read", "part", "shape", "cavity", "reach", "pick")
-ACTS = ("save", "study", "start", "stop", "shown")
-LOOKS = "status", "results"
+# Names of requests to the front page and to that of a design; looks take no question, by GET.
+OF_FRONT, LOOKS_OF_FRONT = ("look", "propose", "open", "close", "stop"), ("front", "status")
+OF_DESIGN = ("read", "part", "shape", "cavity", "reach", "pick", "save", "study", "start", "shown")
+LOOKS_OF_DESIGN = ("results",)
+CLOSED = "no design is open here any more: reload the page"
 NONSENSE = (
     LookupError,
     TypeError,
@@ -140,45 +141,59 @@ NONSENSE = (
     RecursionError,
     OSError,
 )
-MOST_BYTES = 2_000_000  # bytes of a question
-TOO_LONG = f"this question has more than {1e-6 * MOST_BYTES:g} MB; ask for less at a time"
+MOST_BYTES, MOST_OF_PART = 2_000_000, 500_000_000  # bytes of a question, and of a part's file
+TOO_LONG, ASK = "this {} has more than {:g} MB; {}", "ask for less at a time"
 
 
-def make_app(acts: Acts, port: int) -> OnePerson:
+def make_app(front: Front, port: int) -> OnePerson:
     """Return the server's web application.
 
-    It has addresses for each request that `acts` answers, for the page, and for the page's files.
+    It has addresses for each request that the front page and the page of a design can make, for
+    the pages, and for their files.
     """
 
-    def route(name: str, method: str) -> Route:
-        act = getattr(acts, name)
+    async def answered(request: Request, most: int, act: Callable[[bytes], object]) -> Response:
+        try:
+            body = await _body(request, most) if request.method == "POST" else b""
+            if body is None:
+                what = ("file", "give a coarser mesh") if most > MOST_BYTES else ("question", ASK)
+                text = TOO_LONG.format(what[0], 1e-6 * most, what[1])
+                return JSONResponse({"error": text}, 413, {"Connection": "close"})
+            found = await run_in_threadpool(act, body)
+        except ClientDisconnect:  # nobody waits for an answer
+            return Response(status_code=400)
+        except SupersededError:
+            return JSONResponse({"superseded": True})
+        except (InputError, SceneError) as error:
+            return JSONResponse({"error": str(error)})
+        except NONSENSE as error:
+            return JSONResponse({"error": f"not a question of this page: {error!r}"}, 400)
+        if isinstance(found, bytes):
+            return Response(found, media_type="application/octet-stream")
+        return JSONResponse(found)
+
+    def route(name: str, method: str, of_design: bool) -> Route:
+        def act(body: bytes) -> object:
+            page = front.acts if of_design else front
+            if page is None:
+                raise InputError(CLOSED)
+            return getattr(page, name)(json.loads(body or b"{}"))
 
         async def answer(request: Request) -> Response:
-            try:
-                body = await _body(request) if method == "POST" else b"{}"
-                if body is None:
-                    return JSONResponse({"error": TOO_LONG}, 413, {"Connection": "close"})
-                found = await run_in_threadpool(act, json.loads(body or b"{}"))
-            except ClientDisconnect:  # nobody waits for an answer
-                return Response(status_code=400)
-            except SupersededError:
-                return JSONResponse({"superseded": True})
-            except (InputError, SceneError) as error:
-                return JSONResponse({"error": str(error)})
-            except NONSENSE as error:
-                return JSONResponse({"error": f"not a question of this page: {error!r}"}, 400)
-            if isinstance(found, bytes):
-                return Response(found, media_type="application/octet-stream")
-            return JSONResponse(found)
+            return await answered(request, MOST_BYTES, act)
 
         return Route(f"/{name}", answer, methods=[method])
 
+    async def upload(request: Request) -> Response:
+        name = request.query_params.get("name", "")
+        return await answered(request, MOST_OF_PART, lambda body: front.upload(name, body))
+
     async def page(_: Request) -> Response:
-        return FileResponse(BROWSER / "index.html")
+        return FileResponse(BROWSER / ("index.html" if front.acts else "front.html"))
 
     async def file(request: Request) -> Response:
         try:
-            path = acts.inside(request.path_params["name"])
+            path = front.inside(request.path_params["name"])
             kind = SHOWN_FILES.get(path.suffix) if path.is_file() else None
         except (InputError, *NONSENSE) as error:
             return JSONResponse({"error": str(error)}, 404)
@@ -189,31 +204,37 @@ def make_app(acts: Acts, port: int) -> OnePerson:
 
     routes = [
         Route("/", page),
-        *(route(name, "POST") for name in (*QUESTIONS, *ACTS)),
-        *(route(name, "GET") for name in LOOKS),
+        Route("/upload", upload, methods=["POST"]),
+        *(route(name, "POST", False) for name in OF_FRONT),
+        *(route(name, "GET", False) for name in LOOKS_OF_FRONT),
+        *(route(name, "POST", True) for name in OF_DESIGN),
+        *(route(name, "GET", True) for name in LOOKS_OF_DESIGN),
         Route("/files/{name:path}", file),
         Mount("/browser", StaticFiles(directory=BROWSER)),
     ]
     return OnePerson(Starlette(routes=routes), port)
 
 
-async def _body(request: Request) -> bytes | None:
-    """Return the body of a request, or None if it is, or says that it is, too long."""
-    if int(request.headers.get("content-length", 0)) > MOST_BYTES:
+async def _body(request: Request, most: int) -> bytes | None:
+    """Return the body of a request, or None if it has, or says that it has, more bytes."""
+    if int(request.headers.get("content-length", 0)) > most:
         return None
     body = bytearray()
     async for part in request.stream():
         body += part
-        if len(body) > MOST_BYTES:
+        if len(body) > most:
             return None
     return bytes(body)
 
 
-def serve(path: Path, port: int, trusted: bool, tell: Callable[[str], None]) -> None:
-    """Serve the page of a design until Ctrl-C.
+def serve(
+    folder: Path, design: Path | None, port: int, trusted: bool, tell: Callable[[str], None]
+) -> None:
+    """Serve the page of a design, or the front page of a folder, until Ctrl-C.
 
     Args:
-        path: the design file.
+        folder: folder of the front page.
+        design: the design file; None for the front page.
         port: number of the port; 0 for any free port.
         trusted: whether the chamber's shape in a design may be a Python file, which is then run.
         tell: called with the page's address when the server answers there.
@@ -221,7 +242,7 @@ def serve(path: Path, port: int, trusted: bool, tell: Callable[[str], None]) -> 
     Raises:
         InputError: the design cannot be edited, or the port cannot be used.
     """
-    acts = Acts(path, trusted)
+    front = Front(folder, design, trusted)
     listening = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
     if os.name == "posix":  # takes a port just left; Windows would share a port in use
         listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -233,9 +254,9 @@ def serve(path: Path, port: int, trusted: bool, tell: Callable[[str], None]) -> 
             raise InputError(f"--port: {port}: {why}; give another, or none") from None
         listening.listen()
         port = listening.getsockname()[1]
-        app = make_app(acts, port)
+        app = make_app(front, port)
         tell(f"http://127.0.0.1:{port}/?token={app.token}")
         uvicorn.Server(uvicorn.Config(app, log_level="warning", lifespan="off")).run([listening])
     finally:
-        acts.close()
+        front.end()
         listening.close()

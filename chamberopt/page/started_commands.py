@@ -8,10 +8,11 @@ import signal
 import subprocess
 from collections.abc import Sequence
 from pathlib import Path
-from threading import Thread
+from threading import Lock, Thread
 from typing import Any
 
 from chamberopt.common.child import GRACE_S, start_python
+from chamberopt.common.errors import InputError
 
 MOST_LINES = 200  # lines of a command's remarks that the page shows, the last ones
 COMMAND = (
@@ -98,3 +99,34 @@ def _step(line: str) -> dict[str, Any] | None:
         return dict(json.loads(line))
     except ValueError:
         return None
+
+
+class OneCommand:
+    """The command that the page has started last; a further one starts when it has ended."""
+
+    def __init__(self) -> None:
+        self._command: StartedCommand | None = None
+        self._starting = Lock()
+
+    def start(self, arguments: Sequence[str], folder: Path) -> dict[str, object]:
+        """Start a command in a folder, and return its status; `StartedCommand` has the arguments.
+
+        Raises InputError if a command is running.
+        """
+        with self._starting:
+            if self._command is not None and self._command.status()["exit"] is None:
+                raise InputError("a command is running; stop it first, or wait for its end")
+            self._command = StartedCommand(arguments, folder)
+            return self._command.status()
+
+    def status(self) -> dict[str, object]:
+        """Return what the page shows of the command, or nothing if none was started."""
+        return self._command.status() if self._command else {}
+
+    def stop(self) -> None:
+        if self._command:
+            self._command.stop()
+
+    def end(self) -> None:
+        if self._command:
+            self._command.end()

@@ -1,4 +1,4 @@
-"""The command `edit`: edit a design on a page in the browser."""
+"""The command `edit`: make and edit a design on a page in the browser."""
 
 from __future__ import annotations
 
@@ -14,16 +14,21 @@ from chamberopt.cli.options import app
 
 @app.command
 def edit(
-    design: Path, /, *, port: int = 0, trust_shape: Annotated[bool, Parameter(negative="")] = False
+    design: Path = Path(),
+    /,
+    *,
+    port: int = 0,
+    trust_shape: Annotated[bool, Parameter(negative="")] = False,
 ) -> None:
     """Edit a design on a page in the browser: see the chamber, pick the target, turn the part, run.
 
-    The page is for one person on this machine, and needs no network. Ctrl-C ends it.
+    Without a design, the page begins with a part's file, and proposes one. The page is for one
+    person on this machine, and needs no network. Ctrl-C ends it.
 
     Parameters
     ----------
     design
-        Design file (.toml).
+        Design file (.toml), or a folder in which parts are kept; by default this folder.
     port
         Port of 127.0.0.1 at which the page is; by default a free one.
     trust_shape
@@ -32,7 +37,9 @@ def edit(
     from chamberopt.common.errors import InputError
     from chamberopt.common.progress import step
 
-    file = _trusted(design, trust_shape)  # reports a wrong design before the server starts
+    is_folder = design.is_dir()
+    # a wrong design is reported before the server starts
+    trusted = trust_shape if is_folder else _trusted(design, trust_shape)
     try:
         with step("starting"):
             from chamberopt.page.server import serve
@@ -42,9 +49,11 @@ def edit(
         ) from None
 
     def tell(address: str) -> None:
-        show([f"{design} is at {address}", "Ctrl-C ends the page"])
+        shown = "a page for your part" if design == Path() else design
+        show([f"{shown} is at {address}", "Ctrl-C ends the page"])
 
-    serve(design, port, file, tell)
+    folder, file = (design, None) if is_folder else (design.parent, design)
+    serve(folder, file, port, trusted, tell)
 
 
 def _trusted(path: Path, trusted: bool) -> bool:

@@ -4,6 +4,7 @@ import { fillSurfaces, fillTarget, showChosen } from "./target.js";
 import { fillRun, follow } from "./run.js";
 import { closeResults } from "./results.js";
 import { ask, attempt, element, isUnsaved, listen, read, say, state, undo, unpack } from "./state.js";
+import { inUnits, inWords } from "./words.js";
 import { showCavity, showPart, showShape, showState } from "./scene.js";
 
 const find = (id) => document.getElementById(id);
@@ -72,16 +73,14 @@ function sayOf({ facts, warnings, notes }) {
   find("warnings").replaceChildren(...list(warnings));
   find("notes").replaceChildren(...list(notes));
   const rows = [];
-  const add = (table, prefix) => {
-    for (const [name, value] of Object.entries(table)) {
-      if (value && typeof value === "object" && !Array.isArray(value)) { add(value, `${prefix}${name}.`); continue; }
-      const words = (prefix + name).split(/(?<=[._])/).flatMap((word) => [word, element("wbr")]); // where lines may break
-      const text = Array.isArray(value) ? value.join(", ") : String(value);
-      const shown = name === "mesh" ? text.split(/[\\/]/).pop() : text; // without its folder
-      rows.push(element("dt", {}, ...words), element("dd", { textContent: shown, title: text }));
+  for (const [table, inner] of Object.entries(facts)) {
+    const known = inner && typeof inner === "object" && !Array.isArray(inner) ? Object.entries(inner) : [["", inner]];
+    rows.push(element("dt", { className: "of", textContent: inWords(table) }));
+    for (const [name, fact] of known) {
+      const text = name === "mesh" ? fact.split(/[\\/]/).pop() : inUnits(name || table, fact); // a path without its folder
+      rows.push(element("dt", { textContent: inWords(name), title: `${table}.${name}` }), element("dd", { textContent: text, title: String(fact) }));
     }
-  };
-  add(facts, "");
+  }
   find("facts").replaceChildren(...rows);
 }
 
@@ -108,6 +107,12 @@ listen((what) => {
 addEventListener("beforeunload", (event) => { if (isUnsaved()) event.preventDefault(); });
 
 find("undo").addEventListener("click", undo);
+find("front").addEventListener("click", () => attempt(async () => {
+  if (isUnsaved() && !confirm("Go to the parts of this folder? What is not saved is lost.")) return;
+  state.changes = {};
+  await ask("/close", {});
+  location.reload();
+}));
 find("save").addEventListener("click", () => attempt(async () => {
   await read("/save", { changes: state.changes });
   say(`saved in ${state.file.file}`, true);

@@ -1,5 +1,6 @@
 // A slider and a field for every number of the design, grouped by its tables; the ends of sliders bound a study.
 import { change, element, endMove, original, say, state, value } from "./state.js";
+import { inWords } from "./words.js";
 
 const OPEN = ["chamber", "shot", "sonotrode"], POSE = ["part.rotate_deg", "part.offset_mm"];
 const rows = new Map();
@@ -16,15 +17,21 @@ export function makeFields() {
     const table = field.name.slice(0, field.name.indexOf(".", field.name.startsWith("process.accuracy") ? 8 : 0));
     const row = field.choices ? choiceRow(field) : numberRow(field);
     if (isPose) { pose.append(row); continue; }
-    if (!groups.has(table)) groups.set(table, element("details", { open: OPEN.includes(table) }, element("summary", { textContent: `[${table}]` })));
+    if (!groups.has(table)) groups.set(table, element("details", { open: OPEN.includes(table) }, element("summary", { textContent: inWords(table.split(".").reverse().join(" of ")), title: `[${table}]` })));
     groups.get(table).append(row);
   }
   document.getElementById("numbers").replaceChildren(...groups.values());
   showValues();
 }
 
-const label = (field) => element("label", { title: field.text, htmlFor: field.name },
-  element("b", { textContent: field.name.split(".").slice(1).join(".").replace(/(deg|mm)\.([012])$/, (_, unit, k) => `${unit}, ${"xyz"[k]}`) }), element("span", { textContent: field.text }));
+const AXES = ["x", "y", "z"];
+const axis = (name) => AXES[/(?:deg|mm)\.([012])$/.exec(name)?.[1]] ?? "";
+const keyOf = (field) => field.name.split(".").slice(field.name.startsWith("process.accuracy") ? 2 : 1).join(".");
+
+// What a number is, in words, and why the file has it; its key is the tip.
+const label = (field) => element("label", { title: `${field.name} in the file`, htmlFor: field.name },
+  element("b", { textContent: [inWords(keyOf(field)), axis(field.name)].filter(Boolean).join(", ") }), ` ${field.text}`,
+  ...(field.reason && field.reason !== field.text ? [element("small", { textContent: field.reason })] : []));
 
 function choiceRow(field) {
   const select = element("select", { id: field.name }, ...field.choices.map((one) => element("option", { textContent: one })));

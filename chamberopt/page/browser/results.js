@@ -9,7 +9,7 @@ async function refresh() {
   const rows = await ask("/results");
   list.replaceChildren(...rows.map((row) => {
     const tick = element("input", { type: "checkbox", value: row.folder, disabled: Boolean(row.unusable) });
-    const item = element("li", {}, element("label", {}, tick, ` ${row.folder}`), element("small", { textContent: row.text }), element("br"));
+    const item = element("li", {}, element("label", {}, tick, ` ${row.folder}`), element("small", { textContent: row.text }));
     for (const [command, file, name] of row.unusable ? [] : FILES) {
       const button = element("button", { textContent: row[file] ? name : `make the ${name}` });
       button.addEventListener("click", () => attempt(() => open(command, row.folder, file, row[file])));

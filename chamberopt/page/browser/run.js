@@ -1,9 +1,9 @@
 // Running the commands on what is saved, and writing a study from the sliders.
 import { ask, attempt, element, isUnsaved, say, state, read } from "./state.js";
 import { ends, varied } from "./fields.js";
+import { bars, followed } from "./steps.js";
 
 const find = (id) => document.getElementById(id);
-const EVERY = 500; // ms between looks at a command
 
 export function fillRun() {
   const chosen = find("of").value;
@@ -33,27 +33,12 @@ export async function start(command, of) {
 }
 
 // Show a command that runs, by default what the server has started last, and give its exit status.
-export async function follow(started) {
-  let now = started ?? await ask("/status");
-  if (!now.command) return null;
-  document.body.dataset.ended = "";
-  while (now.exit === null) {
-    show(now);
-    await new Promise((done) => { setTimeout(done, EVERY); });
-    now = await ask("/status");
-  }
-  show(now);
-  document.body.dataset.ended = String(now.exit);
-  return now.exit;
-}
+export const follow = async (started) => (await followed(show, started))?.exit ?? null;
 
 function show({ command, steps, lines, exit }) {
   find("stop").disabled = exit !== null;
-  const bars = steps.map((step) => element("div", {},
-    `${step.step}${step.total ? `: ${step.done} of ${step.total}` : ""}${step.best === null ? "" : `, best ${step.best.toFixed(4)}`}`,
-    Object.assign(element("progress"), step.total ? { max: step.total, value: step.done } : {})));
   const ended = exit === null ? [] : [element("b", { textContent: exit === 0 ? "finished" : `ended with exit status ${exit}` })];
-  find("progress").replaceChildren(element("code", { textContent: command }), ...bars, ...ended);
+  find("progress").replaceChildren(element("code", { textContent: command }), ...bars(steps), ...ended);
   find("printed").textContent = lines.join("\n");
 }
 

@@ -10,11 +10,11 @@ if (location.hash.length > 1) {
   history.replaceState(null, "", "/");
 }
 
-// Answer of the server as JSON, or as bytes; throws an error with the server's words.
+// Answer of the server, as JSON or as bytes, to a question or a file; throws an error with the server's words.
 export async function ask(path, question) {
   const headers = { "x-chamberopt-key": sessionStorage.getItem("key") ?? "" };
-  const request = question === undefined ? { headers }
-    : { method: "POST", headers, body: JSON.stringify({ read: state.file?.read, ...question }) };
+  const body = question instanceof Blob ? question : JSON.stringify({ read: state.file?.read, ...question });
+  const request = question === undefined ? { headers } : { method: "POST", headers, body };
   const answer = await fetch(path, request).catch(() => { throw new Error("the server has ended: start chamberopt edit again"); });
   const isBytes = answer.headers.get("content-type") === "application/octet-stream";
   if (isBytes) return answer.arrayBuffer();

@@ -1,0 +1,109 @@
+// The front page: a part's file, what is known of it, and the design that `new` proposes.
+import { ask, attempt, element, say } from "./state.js";
+import { bars, followed } from "./steps.js";
+
+const find = (id) => document.getElementById(id);
+const option = (text) => element("option", { textContent: text, value: text });
+const known = { part: "", unit: "" };
+
+async function show(part = "") {
+  const here = await ask("/front");
+  find("folder").textContent = here.folder;
+  find("file").accept = here.suffixes.join(",");
+  find("part").replaceChildren(element("option", { value: "", textContent: "choose…" }), ...here.parts.map(option));
+  find("here").hidden = !here.parts.length;
+  find("part").value = part;
+  for (const [id, names] of [["material", here.alloys], ["shape", here.shapes], ["shop", here.shops]])
+    find(id).replaceChildren(find(id).options[0], ...names.map(option));
+  find("shot").replaceChildren(...here.balls.map(option));
+  find("of-shop").hidden = !here.shops.length;
+  find("designs").hidden = !here.designs.length;
+  find("designs").querySelector("ul").replaceChildren(...here.designs.map((name) => {
+    const button = element("button", { textContent: "Open" });
+    button.addEventListener("click", () => attempt(() => open(name)));
+    return element("li", {}, button, ` ${name}`);
+  }));
+}
+
+async function open(design) {
+  await ask("/open", { design });
+  location.reload();
+}
+
+// Read a part, to say its size, and to ask for its unit where the file states none.
+async function look(part, unit = "") {
+  Object.assign(known, { part, unit });
+  find("propose").disabled = find("sizes").hidden = find("names").hidden = true;
+  find("known").textContent = part ? `reading ${part} …` : "";
+  document.body.dataset.known = "";
+  if (!part) return;
+  try {
+    const seen = await ask("/look", { part, unit });
+    if (known.part !== part || known.unit !== unit) return;
+    const sizes = Object.entries(seen.sizes);
+    find("sizes").hidden = !sizes.length;
+    find("sizes").replaceChildren(find("sizes").firstElementChild, ...sizes.map(([name, size]) => {
+      const button = element("button", { textContent: `${size} (its numbers are ${name === "in" ? "inches" : name})` });
+      button.addEventListener("click", () => attempt(() => look(part, name)));
+      return element("span", {}, button, " ");
+    }));
+    find("names").hidden = !seen.names.length;
+    find("names").replaceChildren(find("names").firstElementChild, ...seen.names.map((name) =>
+      element("label", {}, element("input", { type: "checkbox", value: name }), ` ${name}`)));
+    find("known").textContent = sizes.length ? "" : `${part} measures ${seen.size}.`;
+    find("propose").disabled = sizes.length > 0;
+    document.body.dataset.known = sizes.length ? "sizes" : "all";
+  } catch (error) {
+    find("known").textContent = "";
+    throw error;
+  }
+}
+
+async function bring(file) {
+  if (!file) return;
+  find("known").textContent = `copying ${file.name} …`;
+  try {
+    const { part } = await ask(`/upload?name=${encodeURIComponent(file.name)}`, file);
+    await show(part);
+    await look(part);
+  } finally { find("file").value = ""; }
+}
+
+const drop = find("drop");
+for (const name of ["dragenter", "dragover"]) drop.addEventListener(name, (event) => { event.preventDefault(); drop.classList.add("over"); });
+for (const name of ["dragleave", "drop"]) drop.addEventListener(name, (event) => { event.preventDefault(); drop.classList.remove("over"); });
+drop.addEventListener("drop", (event) => attempt(() => bring(event.dataTransfer.files[0])));
+find("file").addEventListener("change", () => attempt(() => bring(find("file").files[0])));
+find("part").addEventListener("change", () => attempt(() => look(find("part").value)));
+
+function tell({ steps, lines, exit }) {
+  const remarks = (kind) => lines.filter((line) => line.startsWith(kind)).map((line) => line.slice(kind.length));
+  find("stop").hidden = exit !== null;
+  find("progress").replaceChildren(...bars(steps));
+  find("warnings").replaceChildren(...remarks("warning: ").map((text) => element("li", { textContent: text })));
+  find("printed").textContent = lines.join("\n");
+  find("printed-fold").hidden = !lines.length;
+  find("error").hidden = !exit;
+  find("error").textContent = exit ? lines.join("\n") : "";
+}
+
+find("propose").addEventListener("click", () => attempt(async () => {
+  const chosen = (id) => find(id).value;
+  const target = [...find("names").querySelectorAll("input:checked")].map((one) => one.value);
+  const started = await ask("/propose", { ...known, target, pilot: find("pilot").checked,
+    material: chosen("material"), shot: chosen("shot"), shape: chosen("shape"), shop: chosen("shop") });
+  const design = `${started.out}/design.toml`;
+  find("made").hidden = false;
+  find("next").hidden = find("picture").hidden = find("propose").disabled = true;
+  find("made").scrollIntoView({ behavior: "smooth" });
+  const ended = await followed(tell, started);
+  find("propose").disabled = false;
+  if (ended.exit !== 0) return;
+  find("picture").src = `/files/${started.out.split("/").map(encodeURIComponent).join("/")}/design.png`;
+  find("next").hidden = find("picture").hidden = false;
+  find("open-made").onclick = () => attempt(() => open(design));
+  find("open-made").focus();
+  await show(known.part);
+}));
+find("stop").addEventListener("click", () => attempt(() => ask("/stop", {})));
+attempt(() => show()).then(() => { document.body.dataset.ready = "yes"; });

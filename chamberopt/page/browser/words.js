@@ -1,0 +1,16 @@
+// Words for the names of keys and facts, whose last parts are units.
+const UNITS = { mm: "mm", mm2: "mm²", cm3: "cm³", um: "µm", deg: "°", khz: "kHz", hz: "Hz", mg: "mg", g: "g", kg_m3: "kg/m³",
+  m_s: "m/s", mm_s: "mm/s", HB: "HB", MPa: "MPa", GPa: "GPa", ms: "ms", s: "s", share: "%" };
+const UNIT = new RegExp(`_(${Object.keys(UNITS).sort((a, b) => b.length - a.length).join("|")})(\\.[012])?$`);
+
+export const unitOf = (name) => UNITS[UNIT.exec(name)?.[1]] ?? "";
+// "sonotrode_distance_mm" is "Sonotrode distance"; symbols such as C0 stay.
+export const inWords = (name) => name.replace(UNIT, "").replace("_pv", ", peak to valley").replace(/_/g, " ")
+  .replace(/^[a-z]{3}/, (first) => first[0].toUpperCase() + first.slice(1));
+// A fact with its unit: numbers to four digits, shares as per cent.
+export function inUnits(name, fact) {
+  const number = (x) => typeof x !== "number" ? String(x)
+    : String(Number((unitOf(name) === "%" ? 100 * x : x).toPrecision(4)));
+  const text = Array.isArray(fact) ? fact.map(number).join(", ") : number(fact);
+  return unitOf(name) ? `${text} ${unitOf(name)}` : text;
+}

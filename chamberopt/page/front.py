@@ -1,0 +1,164 @@
+"""Answer the requests of the front page, on which a part's file becomes a design to edit."""
+
+from __future__ import annotations
+
+import re
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from chamberopt.chamber.propose.shop import load_shop
+from chamberopt.common.errors import InputError
+from chamberopt.common.files import check_new_file, write_bytes
+from chamberopt.common.toml_fields import read_toml
+from chamberopt.design.load import is_study
+from chamberopt.design.materials import alloys, balls
+from chamberopt.geometry.meshes.formats import MESH_FORMATS
+from chamberopt.geometry.meshes.part_mesh import read_part_cached
+from chamberopt.geometry.meshes.surface_error import format_box
+from chamberopt.geometry.meshes.units import METRES_PER, STATED, UnknownUnitError
+from chamberopt.page.acts import Acts, free_folder, path_inside
+from chamberopt.page.started_commands import OneCommand
+
+SUFFIXES = tuple(suffix for one in MESH_FORMATS for suffix in one.suffixes)
+PART_NAME = re.compile(r"\w[\w .,()+-]{0,150}")
+SHAPES = "cylinder", "box", "prism", "conformal"
+MOST_NAMES = 40  # names of a part's surfaces that the page lists
+
+
+class Front:
+    """The page of a folder: it proposes designs for parts, and opens one of the designs.
+
+    Attributes:
+        acts: the requests of the page of the open design; None while the front page is shown.
+        command: the command that either page has started.
+
+    Args:
+        folder: folder of the part files, into which proposals are written.
+        design: a design to open at once.
+        trusted: whether the chamber's shape in a design may be a Python file, which is then run.
+    """
+
+    def __init__(self, folder: Path, design: Path | None, trusted: bool) -> None:
+        self._folder, self._trusted = folder.resolve(), trusted
+        self.command = OneCommand()
+        self.acts = None if design is None else Acts(design, trusted, self.command)
+
+    def end(self) -> None:
+        """End the running command and the checks of the open design."""
+        self.close(None)
+        self.command.end()
+
+    def inside(self, name: str) -> Path:
+        """Return the path of a name in the folder that the shown page is for."""
+        return self.acts.inside(name) if self.acts else path_inside(self._folder, name)
+
+    def status(self, _: object) -> dict[str, object]:
+        return self.command.status()
+
+    def stop(self, _: object) -> dict[str, object]:
+        self.command.stop()
+        return self.command.status()
+
+    def front(self, _: object) -> dict[str, object]:
+        """Return what the front page offers: parts, designs and shops here, and the catalogue."""
+        tables = _tables(self._folder)
+        return {
+            "folder": str(self._folder),
+            "parts": [one.name for one in _plain_files(self._folder) if _is_part(one.name)],
+            "suffixes": SUFFIXES,
+            "designs": [name for name, kind in tables if kind == "design"],
+            "shops": [name for name, kind in tables if kind == "shop"],
+            "units": tuple(METRES_PER),
+            "alloys": [one.name for one in alloys()],
+            "balls": [one.name for one in balls()],
+            "shapes": SHAPES,
+        }
+
+    def upload(self, name: str, content: bytes) -> dict[str, object]:
+        """Write a part's file into the folder, where no file has this name."""
+        if not _is_part(name) or not PART_NAME.fullmatch(name):
+            raise InputError(f"{name}: not a part that can be read: {', '.join(SUFFIXES)}")
+        path = self._folder / name
+        if path.exists():
+            raise InputError(f"{name} is in {self._folder} already: choose it, or rename yours")
+        write_bytes(check_new_file(path), content)
+        return {"part": name}
+
+    def look(self, asked: Any) -> dict[str, object]:
+        """Return a part's size and the names of its surfaces; its possible sizes by unit.
+
+        The sizes by unit are empty where the file states its unit, or `asked` gives it.
+        """
+        path, unit = path_inside(self._folder, str(asked["part"])), str(asked["unit"] or STATED)
+        if unit not in (*METRES_PER, STATED):
+            raise InputError(f"unit: given {unit}; allowed: {', '.join(METRES_PER)}")
+        try:
+            mesh = read_part_cached(path, unit)
+        except UnknownUnitError as error:
+            return {"sizes": error.sizes, "unit": "", "size": "", "names": []}
+        names = sorted(mesh.groups, key=lambda name: -int(mesh.groups[name].sum()))
+        size = format_box(mesh.size)
+        return {"sizes": {}, "unit": mesh.unit, "size": size, "names": names[:MOST_NAMES]}
+
+    def propose(self, asked: Any) -> dict[str, object]:
+        """Start the command `new` for a part of the folder, and return into which folder."""
+        part = path_inside(self._folder, str(asked["part"]))
+        wanted = {
+            "unit": (asked["unit"], tuple(METRES_PER)),
+            "material": (asked["material"], [one.name for one in alloys()]),
+            "shot": (asked["shot"], [one.name for one in balls()]),
+            "shape": (asked["shape"], SHAPES),
+        }
+        arguments = ["new", f"./{part.relative_to(self._folder).as_posix()}"]
+        for option, (given, allowed) in wanted.items():
+            if given and given not in allowed:
+                raise InputError(f"{option}: given {given}; allowed: {', '.join(allowed)}")
+            arguments += [f"--{option}={given}"] if given else []
+        arguments += [f"--target={name}" for name in map(str, asked["target"])]
+        if asked["shop"]:
+            shop = path_inside(self._folder, str(asked["shop"]))
+            arguments += [f"--shop=./{shop.relative_to(self._folder).as_posix()}"]
+        arguments += [] if asked["pilot"] else ["--no-pilot"]
+        out = free_folder(self._folder, Path(part.stem))
+        return {"out": out, **self.command.start([*arguments, f"--out={out}"], self._folder)}
+
+    def open(self, asked: Any) -> dict[str, object]:
+        """Show the page of a design from now on."""
+        design = path_inside(self._folder, str(asked["design"]))
+        opened = Acts(design, self._trusted, self.command)
+        self.close(None)
+        self.acts = opened
+        return {}
+
+    def close(self, _: object) -> dict[str, object]:
+        """Show the front page from now on."""
+        if self.acts is not None:
+            self.acts.close()
+        self.acts = None
+        return {}
+
+
+def _is_part(name: str) -> bool:
+    return name.lower().endswith(SUFFIXES)
+
+
+def _plain_files(folder: Path) -> list[Path]:
+    """Return the files of a folder that are no links, by name."""
+    return sorted(one for one in folder.iterdir() if one.is_file() and not one.is_symlink())
+
+
+def _tables(folder: Path) -> list[tuple[str, str]]:
+    """Return path and kind of each design, study and shop in a folder and the folders in it."""
+    found = []
+    for path in sorted([*folder.glob("*.toml"), *folder.glob("*/*.toml")]):
+        if path.resolve() != path:
+            continue  # a link to elsewhere
+        with suppress(InputError):
+            data = read_toml(path, "design")[1]
+            kind = "study" if is_study(data) else "design" if "chamber" in data else ""
+            if not kind:
+                load_shop(path)
+                kind = "shop"
+            found.append((path.relative_to(folder).as_posix(), kind))
+    return found
