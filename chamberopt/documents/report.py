@@ -89,20 +89,10 @@ def report(result: Result) -> Document:
     if start is not None:
         scenes = {START: part_scene(start, START, max_triangles=0), **scenes}
     shown = figures(result, start)
-    said, lines = answer(result, start), answer_lines(result)
     label = objective_label(result.objective_name)
     sections = (
         question_section(result),
-        Section(
-            "The answer",
-            [
-                Sentence(said, "sentence"),
-                *(Sentence(one.text, "warning" if one.warns else "") for one in lines),
-                tiles(shown),
-                Sentence(limits_of_intervals(result), "soft"),
-            ],
-            is_answer=True,
-        ),
+        answer_section(result, start),
         Section("The best chamber" if study else "The chamber", [PartView([scene])]),
         front_section(study) if study else None,
         search_section(result, trials) if study else None,
@@ -117,7 +107,26 @@ def report(result: Result) -> Document:
         _design(result, start),
         _made_with(result),
     )
+    said, lines = answer(result, start), answer_lines(result)
     return Document(name, _subtitle(result), said, lines, [one for one in sections if one])
+
+
+def answer_section(result: Result, start: Result | None) -> Section:
+    """Return what a result says in sentences, and its main figures beside those of the start.
+
+    Args:
+        start: the design with which a study began; None for a result that is no study's.
+    """
+    return Section(
+        "The answer",
+        [
+            Sentence(answer(result, start), "sentence"),
+            *(Sentence(one.text, "warning" if one.warns else "") for one in answer_lines(result)),
+            tiles(figures(result, start)),
+            Sentence(limits_of_intervals(result), "soft"),
+        ],
+        is_answer=True,
+    )
 
 
 def notes_of(result: Result) -> list[str]:

@@ -15,16 +15,18 @@ from chamberopt.common.files import check_new_file, is_new_or_empty, remove_file
 from chamberopt.common.toml_fields import read_toml
 from chamberopt.design.load import is_study
 from chamberopt.documents.comparison import comparison_lines
+from chamberopt.documents.report import answer_section
 from chamberopt.page.answers import part_answer, shape_answer
 from chamberopt.page.checker import Checker
 from chamberopt.page.edited_file import EditedFile, custom_shape, design_fields
 from chamberopt.page.picking import Picker
 from chamberopt.page.started_commands import OneCommand
 from chamberopt.printers import terminal
-from chamberopt.printers.report_page import REPORT, parts_content
+from chamberopt.printers.html import section
+from chamberopt.printers.report_page import REPORT, parts_content, viewer
 from chamberopt.printers.sheet_page import SHEET
 from chamberopt.results.compare.comparison import compare
-from chamberopt.results.load import load_result, summary
+from chamberopt.results.load import load_result, load_start, summary
 from chamberopt.search.study import load_study
 
 RESULT = "result.json"
@@ -53,13 +55,17 @@ def list_results(folder: Path) -> list[dict[str, object]]:
 
 
 def shown(folders: Sequence[Path]) -> dict[str, object]:
-    """Return the 3D view of results side by side, and the text of their comparison.
+    """Return the 3D view of results side by side, with the answer of one or the comparison of two.
 
     Raises:
         InputError: a folder has no usable result, or the results cannot be compared.
     """
     html, content = parts_content(folders)
     several = len(folders) > 1
+    if not several:
+        result = load_result(folders[0])
+        start = load_start(result) if result.study else None
+        html = section(answer_section(result, start), viewer) + html
     text = terminal.text(comparison_lines(compare(folders))) if several else ""
     return {"content": content, "html": html, "comparison": text}
 
@@ -181,6 +187,7 @@ class Acts:
         """Start a command of the command line.
 
         The command works on the saved design, on a study beside it or on a result below its folder.
+        The answer has the folder of the result that it will leave, if any.
         """
         command, what = str(asked["command"]), self.inside(str(asked["of"]))
         if command not in COMMANDS:
@@ -188,12 +195,14 @@ class Acts:
         name = f"./{what.relative_to(self._path.parent).as_posix()}"
         if command in ("report", "sheet"):
             arguments = ["report", name, *(["--sheet"] if command == "sheet" else [])]
+            shows = ""
         else:
             self._refuse_shape(what)
             sweeps = ["--sobol", str(int(asked["points"]))] if command == "sweep" else []
             folder = self._free_folder(f"{what.stem}-sweep" if sweeps else what.stem)
             arguments = [command, name, *sweeps, "--out", folder]
-        return self._command.start(arguments, self._path.parent)
+            shows = "" if sweeps else folder
+        return {"result": shows, **self._command.start(arguments, self._path.parent)}
 
     def _refuse_shape(self, file: Path) -> None:
         """Raise InputError if a design or study would run a Python file that is not trusted."""

@@ -23,15 +23,33 @@ from chamberopt.chamber.scene import chamber_mesh
 from chamberopt.design.design import Design
 from chamberopt.design.shape_surface import TAG_PART, is_sonotrode
 from chamberopt.geometry.triangles import areas, sharp_edges
+from chamberopt.pictures.charts.colours import (
+    BLUE,
+    EDGES,
+    GLASS,
+    OUTSIDE,
+    PART_GREY,
+    SKY,
+    SONOTRODE,
+    UNREACHED,
+)
 
-# Kinds of the part's triangles, by which scene.js colours them.
-REST, TARGET, OUTSIDE, MISSED, ZONE = range(5)
+# Kinds of the part's triangles; their names and colours, and those of the sonotrode.
+REST, TARGET, BEYOND, MISSED, ZONE = range(5)
+LEGEND = (
+    ("rest of the part", PART_GREY),
+    ("target", BLUE),
+    ("target outside the chamber", OUTSIDE),
+    ("target that no ball touches", UNREACHED),
+    ("zone", SKY),
+    ("sonotrode", SONOTRODE),
+)
 # Types of arrays that Three.js takes; single precision is about 1e-5 mm.
 KINDS = {"f": "<f4", "i": "<u4", "u": "<u4", "b": "u1"}
 
 
 def part_answer(design: Design) -> bytes:
-    """Return the part as its file has it [mm], and the file's named surfaces with areas."""
+    """Return the part as its file has it [mm], its named surfaces with areas, and the colours."""
     mesh = preview_part(design).mesh
     size = areas(mesh.vertices, mesh.triangles)
     names = [
@@ -44,6 +62,7 @@ def part_answer(design: Design) -> bytes:
     ]
     box = [round(1e3 * float(side), 4) for side in mesh.size]
     head = {"names": names, "box_mm": box, "unit": mesh.unit, "notes": list(mesh.notes)}
+    head |= {"legend": LEGEND, "glass": GLASS, "edges": EDGES}
     return packed(head, points=1e3 * mesh.vertices, triangles=mesh.triangles)
 
 
@@ -79,7 +98,7 @@ def check_answers(design: Design) -> Iterator[bytes]:
     }
     part = chamber.part
     state = _state(part.target, part.zones)
-    state[part.target & (chamber.exposed_area <= 0.0)] = OUTSIDE
+    state[part.target & (chamber.exposed_area <= 0.0)] = BEYOND
     remeshed = part.file is not None and part.file.original is not None
     own = {"part_points": 1e3 * part.vertices, "part_triangles": part.triangles} if remeshed else {}
     surface = _surface(chamber.vertices, chamber.triangles, chamber.tags)

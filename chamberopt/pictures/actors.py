@@ -11,14 +11,17 @@ from chamberopt.design.shape_surface import TAG_WALL, is_sonotrode
 from chamberopt.pictures.charts.colours import (
     FEW_DENTS,
     FIXTURE_COLOURS,
+    GLASS,
     OUTSIDE,
+    PART_GREY,
+    SONOTRODE,
     UNREACHED,
     zone_colour,
 )
 from chamberopt.pictures.drawn_part import DrawnPart
 from chamberopt.results.vtp_files import Surface, fixture_marks, pyvista
 
-GREY, DARK, GLASS, SONOTRODE, BACKGROUND = "#b9bec4", "#2b3440", "#9db7cc", "#e08a2e", "white"
+DARK, BACKGROUND = "#2b3440", "white"
 FAULT, PALE = "#d01c1c", "#eceff2"
 SHARP_EDGE = 30  # degrees between the triangles at an edge that is drawn
 ROUND_STEPS = (1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0)  # of colour bars, times powers of ten
@@ -38,7 +41,7 @@ def light(plotter: Any) -> None:
 def colour_meanings(parts: Sequence[DrawnPart]) -> list[tuple[str, str]]:
     """Return the colours that stand for no value, such as out of reach, each with its meaning."""
     entries = (
-        (any(part.rest.n_cells for part in parts), GREY, "not in the target"),
+        (any(part.rest.n_cells for part in parts), PART_GREY, "not in the target"),
         (any(not np.all(part.target["resolved"]) for part in parts), FEW_DENTS, "too few dents"),
         (any(part.unreached.n_cells for part in parts), UNREACHED, "out of the shot's reach"),
         (any(part.outside.n_cells for part in parts), OUTSIDE, "target outside the chamber"),
@@ -78,10 +81,10 @@ def add_part(
         (part.target.extract_cells(np.flatnonzero(~resolved & ~pale)), FEW_DENTS),
         (part.unreached, UNREACHED),
         (part.outside, OUTSIDE),
-        (part.rest, GREY),
+        (part.rest, PART_GREY),
     ):
         if surface.n_cells:
-            style |= {"ambient": 0.75, "diffuse": 0.25} if colour == GREY else {}
+            style |= {"ambient": 0.75, "diffuse": 0.25} if colour == PART_GREY else {}
             actors.append(plotter.add_mesh(surface, color=colour, **style))
     for actor in actors:
         actor.prop.interpolation = "Phong"  # by the normals at the vertices
@@ -92,7 +95,7 @@ def _add_zones(plotter: Any, part: DrawnPart) -> list[Any]:
     """Add a part to a plotter with each zone in a colour of its own, and return the actors."""
     actors = []
     for number, surface in part.zones.items():
-        colour = zone_colour(number - 1) if number else GREY
+        colour = zone_colour(number - 1) if number else PART_GREY
         actors.append(
             plotter.add_mesh(surface, color=colour, ambient=0.6, diffuse=0.4, **NO_RENDER)
         )

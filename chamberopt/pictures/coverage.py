@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from chamberopt.pictures.actors import SCATTER, SONOTRODE, add_edges, add_part, colour_meanings
+from chamberopt.pictures.actors import SCATTER, add_edges, add_part, colour_meanings
 from chamberopt.pictures.camera import target_in_chamber
+from chamberopt.pictures.charts.colours import SONOTRODE
 from chamberopt.pictures.drawn_part import DrawnPart, colour_range
 from chamberopt.pictures.panels import choose_views, part_panels
 from chamberopt.pictures.picture_page import ColourBar, Row, write_page

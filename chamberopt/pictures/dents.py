@@ -14,8 +14,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from chamberopt.common.errors import InputError
-from chamberopt.pictures.actors import GREY, NO_RENDER, Discs, disc_actor, light
+from chamberopt.pictures.actors import NO_RENDER, Discs, disc_actor, light
 from chamberopt.pictures.camera import Vector, near_directions, near_views, seen_area, view_frame
+from chamberopt.pictures.charts.colours import PART_GREY
 from chamberopt.pictures.drawn_part import DrawnPart
 from chamberopt.pictures.panels import NEAR_CAPTIONS
 from chamberopt.pictures.picture_page import ColourBar, Panel, Row, write_page
@@ -85,7 +86,7 @@ def render_dents(job: dict[str, Any]) -> None:
         Panel(render_side(part, discs, view, job["pixels"]), caption, is_cut=part.rest.n_cells > 0)
         for view, caption in zip(_views(part, job["view"]), NEAR_CAPTIONS, strict=False)
     ]
-    legend = [("black", "not peened"), (GREY, "not in the target")]
+    legend = [("black", "not peened"), (PART_GREY, "not in the target")]
     bar = ColourBar("dent diameter [µm]", colours, limits, "both")
     write_page(job["picture"], [Row(job["title"], panels)], legend[: 1 + panels[0].is_cut], bar)
 
@@ -138,7 +139,7 @@ def render_side(
     target = plotter.add_mesh(part.whole, color="black", lighting=False, **NO_RENDER)
     rest = plotter.add_mesh(
         part.rest if part.rest.n_cells else pyvista().Sphere(radius=0.0),
-        color=GREY, ambient=AMBIENT, diffuse=1.0 - AMBIENT, **NO_RENDER,
+        color=PART_GREY, ambient=AMBIENT, diffuse=1.0 - AMBIENT, **NO_RENDER,
     )  # fmt: skip
     aim_along(plotter, frame, 0.5 * (low + high) @ frame, 0.5 * rows * pixel_mm)
     corner = 0.5 * (low + high)[:2] + 0.5 * pixel_mm * np.array([-columns, rows])

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from chamberopt.pictures.actors import FAULT, GREY, NO_RENDER, SONOTRODE, add_edges
+from chamberopt.pictures.actors import FAULT, NO_RENDER, add_edges
 from chamberopt.pictures.camera import cells_of, near_directions, near_views, pushed_back, seen_area
-from chamberopt.pictures.charts.colours import BLUE, FIXTURE_COLOURS, OUTSIDE
+from chamberopt.pictures.charts.colours import BLUE, FIXTURE_COLOURS, OUTSIDE, PART_GREY, SONOTRODE
 from chamberopt.pictures.panels import BORDER, SIZE, choose_views, near_panels, part_panels
 from chamberopt.pictures.picture_page import Panel, Row, write_page
 from chamberopt.pictures.subprocess_drawing import draw_in_subprocess, picture_path
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 PLAIN, MARKED, MISSED, BEYOND = range(4)
 COLOURS = {
-    PLAIN: (GREY, "not in the target"),
+    PLAIN: (PART_GREY, "not in the target"),
     MARKED: (BLUE, "target"),
     MISSED: (FAULT, "target that hardly a ball can touch"),
     BEYOND: (OUTSIDE, "target outside the chamber"),
@@ -40,7 +40,7 @@ COLOURS = {
 BANDS = (0.5, 0.7, 0.9, 0.98)
 SOFTER = "times the restitution of a rigid part, where the target is thin"
 BAND_COLOURS = {
-    PLAIN: (GREY, "not in the target"),
+    PLAIN: (PART_GREY, "not in the target"),
     1: ("#00441b", f"below 0.5 {SOFTER}"),
     2: ("#238b45", "0.5 to 0.7"),
     3: ("#74c476", "0.7 to 0.9"),

@@ -15,7 +15,15 @@ from typing import Any
 import numpy as np
 
 from chamberopt.design.shape_surface import TAG_PART, TAG_WALL, is_sonotrode
-from chamberopt.pictures.charts.colours import FEW_DENTS, FIXTURE_COLOURS, UNREACHED
+from chamberopt.pictures.charts.colours import (
+    EDGES,
+    FEW_DENTS,
+    FIXTURE_COLOURS,
+    GLASS,
+    PART_GREY,
+    SONOTRODE,
+    UNREACHED,
+)
 from chamberopt.pictures.drawn_part import DrawnPart, point_areas
 from chamberopt.pictures.quantities import QUANTITIES
 from chamberopt.results.arrays_file import load_result_arrays
@@ -27,7 +35,6 @@ MAX_TRIANGLES = 600_000
 USUAL = np.array([0.55, -0.9, 0.62])  # direction to the camera from the middle of the cavity
 DISTANCE = 1.8  # distance of the camera, in lengths of the cavity's diagonal
 EDGE_ANGLE = 30.0  # degrees; sharper edges of the chamber are drawn
-PART_GREY, SONOTRODE, GLASS, EDGES = "#b9bec4", "#c58b52", "#9fc3dd", "#6f8796"
 
 
 @dataclass(frozen=True)

@@ -11,16 +11,7 @@ from chamberopt.common.errors import InputError
 from chamberopt.design.shape_surface import is_sonotrode
 from chamberopt.geometry.triangles import unit_normals
 from chamberopt.pictures import overlay
-from chamberopt.pictures.actors import (
-    DARK,
-    GREY,
-    PALE,
-    SONOTRODE,
-    add_chamber,
-    add_part,
-    colour_meanings,
-    light,
-)
+from chamberopt.pictures.actors import DARK, PALE, add_chamber, add_part, colour_meanings, light
 from chamberopt.pictures.camera import (
     Room,
     cells_of,
@@ -32,7 +23,7 @@ from chamberopt.pictures.camera import (
     seen_area,
     target_in_chamber,
 )
-from chamberopt.pictures.charts.colours import zone_colour
+from chamberopt.pictures.charts.colours import PART_GREY, SONOTRODE, zone_colour
 from chamberopt.pictures.quantities import QUANTITIES
 from chamberopt.results.vtp_files import pyvista, size_text
 from chamberopt.viewer.opened_result import (
@@ -305,7 +296,7 @@ def _legend(result: OpenedResult, state: ViewState) -> list[tuple[str, str]]:
     """Return the legend of a view: colours that are not on the colour bar, with meanings."""
     if state.quantity == "zones":
         entries = [(zone_colour(k), name) for k, name in enumerate(result.info.zones)]
-        entries.append((GREY, "in no zone"))
+        entries.append((PART_GREY, "in no zone"))
         return [(SONOTRODE, "sonotrode"), *entries] if state.chamber else entries
     entries = colour_meanings([result.part])
     if state.below is not None:

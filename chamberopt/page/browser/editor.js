@@ -86,7 +86,7 @@ function sayOf({ facts, warnings, notes }) {
 
 listen((what) => {
   if (what === "read") {
-    find("file").textContent = state.file.file;
+    find("file").textContent = `${state.file.folder.split(/[\\/]/).pop()}: ${state.file.file}`;
     find("file").title = state.file.folder;
     document.title = `${state.file.file}: chamberopt`;
     makeFields();

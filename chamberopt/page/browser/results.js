@@ -21,12 +21,13 @@ async function refresh() {
 }
 
 async function open(command, folder, file, isThere) {
-  if (!isThere && await start(command, folder) !== 0) throw new Error(find("printed").textContent);
+  if (!isThere && (await start(command, folder)).exit !== 0) throw new Error(find("printed").textContent);
   await refresh();
   window.open(`/files/${`${folder}/${file}`.split("/").map(encodeURIComponent).join("/")}`, "_blank", "noopener");
 }
 
-find("show-results").addEventListener("click", () => attempt(async () => {
+find("show-results").addEventListener("click", () => attempt(() => show()));
+async function show() {
   const folders = [...list.querySelectorAll("input:checked")].map((one) => one.value).reverse(); // the older first
   if (!folders.length || folders.length > 2) throw new Error("tick one result, or two to compare");
   const { html, content, comparison } = await ask("/shown", { folders });
@@ -35,7 +36,7 @@ find("show-results").addEventListener("click", () => attempt(async () => {
   if (comparison) find("shown").append(element("pre", { textContent: comparison }));
   find("shown").hidden = find("close-results").hidden = false;
   views = showParts(content);
-}));
+}
 
 let views = [];
 export function closeResults() {
@@ -47,4 +48,13 @@ export function closeResults() {
 find("close-results").addEventListener("click", closeResults);
 find("refresh").addEventListener("click", () => attempt(refresh));
 document.querySelector("[data-tab=results]").addEventListener("click", () => attempt(refresh));
-document.addEventListener("ended", () => attempt(refresh));
+// What a command has found is shown at its end.
+document.addEventListener("ended", ({ detail }) => attempt(async () => {
+  if (detail) document.querySelector("[data-tab=results]").click();
+  await refresh();
+  const tick = [...list.querySelectorAll("input")].find((one) => one.value === detail);
+  if (!tick) return;
+  tick.checked = true;
+  await show();
+  for (const one of list.querySelectorAll("input")) one.checked = one.value === detail; // the tab has listed them anew
+}));

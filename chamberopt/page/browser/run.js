@@ -27,9 +27,10 @@ function showVaried() {
 }
 document.addEventListener("varied", showVaried);
 
-// Start a command, follow it to its end, and give its exit status.
+// Start a command, follow it to its end, and give its exit status, and the folder of its result.
 export async function start(command, of) {
-  return follow(await ask("/start", { command, of, points: find("points").value }));
+  const started = await ask("/start", { command, of, points: find("points").value });
+  return { exit: await follow(started), result: started.result };
 }
 
 // Show a command that runs, by default what the server has started last, and give its exit status.
@@ -37,15 +38,17 @@ export const follow = async (started) => (await followed(show, started))?.exit ?
 
 function show({ command, steps, lines, exit }) {
   find("stop").disabled = exit !== null;
-  const ended = exit === null ? [] : [element("b", { textContent: exit === 0 ? "finished" : `ended with exit status ${exit}` })];
-  find("progress").replaceChildren(element("code", { textContent: command }), ...bars(steps), ...ended);
+  const now = exit === null ? "running" : exit === 0 ? "finished" : `ended with exit status ${exit}`;
+  find("progress").replaceChildren(element("p", { title: command }, element("b", { textContent: now })), ...bars(steps));
   find("printed").textContent = lines.join("\n");
+  find("printed-fold").hidden = !lines.length;
+  if (exit) find("printed-fold").open = true;
 }
 
 for (const button of document.querySelectorAll("[data-command]")) button.addEventListener("click", () => attempt(async () => {
   if (isUnsaved()) throw new Error("there are unsaved changes: commands use the saved file, so save or undo them first");
-  await start(button.dataset.command, find("of").value);
-  document.dispatchEvent(new Event("ended"));
+  const { exit, result } = await start(button.dataset.command, find("of").value);
+  document.dispatchEvent(new CustomEvent("ended", { detail: exit === 0 ? result : "" }));
 }));
 find("stop").addEventListener("click", () => attempt(() => ask("/stop", {})));
 find("write-study").addEventListener("click", () => attempt(async () => {

@@ -1,9 +1,7 @@
 // The view: part and chamber as the newest answers have them, and handles that turn and move the part.
 import { change, endMove, unpack, value } from "./state.js";
 
-const KINDS = [["rest of the part", "#b9bec4"], ["target", "#2f9e6e"], ["target outside the chamber", "#7a4fb0"],
-  ["target that no ball touches", "#8c5a2b"], ["zone", "#3d7ec4"]];
-const WALLS = ["#9fc3dd", 0.16], SONOTRODE = ["#c58b52", 0.6];
+const CLEAR = 0.16, FACE = 0.6; // opacity of walls and sonotrode
 export const view = new View3D(document.getElementById("view"));
 let part = null, handles = null, grip = null, placed = null, coloured = [];
 
@@ -11,7 +9,7 @@ export function showPart(buffer) {
   part = unpack(buffer);
   view.surface("part", { points: part.points.slice(), triangles: part.triangles.slice() });
   placed = null;
-  document.getElementById("legend").replaceChildren(...[...KINDS, ["sonotrode", SONOTRODE[0]]].map(([name, colour]) => {
+  document.getElementById("legend").replaceChildren(...part.legend.map(([name, colour]) => {
     const item = document.createElement("li"), patch = document.createElement("i");
     patch.style.background = colour;
     item.append(patch, name);
@@ -53,7 +51,7 @@ function colour(name, state) {
   const mesh = view.get(name);
   if (coloured[0] === mesh && coloured[1].every((kind, k) => kind === state[k])) return;
   coloured = [mesh, state];
-  const rgb = KINDS.map(([, hex]) => [1, 3, 5].map((k) => parseInt(hex.slice(k, k + 2), 16) / 255));
+  const rgb = part.legend.map(([, hex]) => [1, 3, 5].map((k) => parseInt(hex.slice(k, k + 2), 16) / 255));
   const colours = new Float32Array(3 * state.length);
   state.forEach((kind, k) => colours.set(rgb[kind], 3 * k));
   view.colourTriangles(name, colours);
@@ -62,10 +60,10 @@ function colour(name, state) {
 function walls(answer) {
   const surface = (name, triangles, [colour, opacity]) =>
     view.surface(name, { points: answer.points.slice(), triangles: triangles.slice(), colour, opacity });
-  surface("walls", answer.walls, WALLS);
-  const [colour, opacity] = SONOTRODE; // from below the part is seen through it
+  surface("walls", answer.walls, [part.glass, CLEAR]);
+  const [colour, opacity] = [part.legend.at(-1)[1], FACE]; // from below the part is seen through it
   surface("sonotrode", answer.sonotrode, [colour, view.camera.position.z < 0 ? 0.15 : opacity]);
-  view.lines("edges", answer.edges.slice(), "#6f8796");
+  view.lines("edges", answer.edges.slice(), part.edges);
 }
 
 const mid = (a, b) => a.map((x, i) => 0.5 * (x + b[i]));

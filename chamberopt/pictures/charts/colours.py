@@ -20,6 +20,8 @@ DIFFERENCE_MAP = "PuOr"
 # chamber.
 FEW_DENTS, UNREACHED, OUTSIDE = "#6c737a", "#a9714f", PURPLE
 
+# The part beside its target, the room's walls with their edges, and the sonotrode.
+PART_GREY, GLASS, EDGES, SONOTRODE = "#b9bec4", "#9fc3dd", "#6f8796", "#e08a2e"
 FIXTURE_COLOURS = {"holder": "#7f8a96", "mask": "#d9c9a3"}
 
 # Colours and line styles of compared results.
