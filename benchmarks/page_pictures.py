@@ -1,9 +1,10 @@
-"""The pictures of docs/page.md: the editor page of a design as a browser shows it.
+"""The pictures of docs/page.md: the program's page as a browser shows it.
 
-    python benchmarks/page_pictures.py chamber/design.toml
+    python benchmarks/page_pictures.py designs/parts/fir_tree.step FIR_TREE
 
-Writes docs/images/page.png and page_target.png. Needs `pip install playwright` and a Chromium on
-PATH, as report_picture.py.
+A part is dropped on the front page, which proposes a design for one of its surfaces and opens it.
+Writes docs/images/page_front.png, page.png and page_target.png. Needs `pip install playwright` and
+a Chromium on PATH, as report_picture.py.
 """
 
 import shutil
@@ -11,6 +12,7 @@ import signal
 import subprocess
 import sys
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from playwright.sync_api import sync_playwright
 
@@ -19,19 +21,32 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from benchmarks.pictures import IMAGES
 from benchmarks.report_picture import SOFTWARE
 
+READY, KNOWN, ENDED = "body[data-ready]", "body[data-known=all]", "body[data-ended='0']"
 CHECKED = "body[data-checked=reach]"
 
 
-def page_pictures(design: Path, folder: Path) -> None:
-    """The page with its numbers, and with its target; page.png and page_target.png."""
-    command = [sys.executable, "-m", "chamberopt", "edit", str(design)]
-    server = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
-    assert server.stdout is not None
-    address = server.stdout.readline().split(" is at ")[1].strip()
-    with sync_playwright() as session:
+def page_pictures(part: Path, target: str, folder: Path) -> None:
+    """The proposal on the front page, and the page of the design: its numbers, and its target."""
+    with TemporaryDirectory() as place, sync_playwright() as session:
+        server = subprocess.Popen(
+            [sys.executable, "-m", "chamberopt", "edit"],
+            cwd=place, stdout=subprocess.PIPE, text=True,
+        )  # fmt: skip
+        assert server.stdout is not None
+        address = server.stdout.readline().split(" is at ")[1].strip()
         browser = session.chromium.launch(executable_path=shutil.which("chromium"), args=SOFTWARE)
         page = browser.new_page(viewport={"width": 1400, "height": 820})
         page.goto(address)
+        page.wait_for_selector(READY, timeout=120_000)
+        page.set_input_files("#file", part)
+        page.wait_for_selector(KNOWN, timeout=120_000)
+        page.check(f"#names input[value={target}]")
+        page.click("#propose")
+        page.wait_for_selector(ENDED, timeout=600_000)
+        page.wait_for_timeout(1000)
+        page.evaluate("document.getElementById('folder').textContent = 'chambers'")
+        page.screenshot(path=folder / "page_front.png", full_page=True)
+        page.click("#open-made")
         page.wait_for_selector(CHECKED, timeout=120_000)
         page.wait_for_timeout(500)
         page.screenshot(path=folder / "page.png")
@@ -39,10 +54,10 @@ def page_pictures(design: Path, folder: Path) -> None:
         page.wait_for_timeout(500)
         page.screenshot(path=folder / "page_target.png")
         browser.close()
-    server.send_signal(signal.SIGINT)
-    server.wait()
+        server.send_signal(signal.SIGINT)
+        server.wait()
 
 
 if __name__ == "__main__":
-    page_pictures(Path(sys.argv[1]), IMAGES)
+    page_pictures(Path(sys.argv[1]), sys.argv[2], IMAGES)
     print(f"pictures in {IMAGES}")

@@ -243,7 +243,7 @@ def test_the_page_takes_no_body_beyond_its_limit(tmp_path: Path) -> None:
     pytest.importorskip("uvicorn", reason="extra `page` is not installed")
     from tests.chamberopt.page.conftest import Served
 
-    rng, page = np.random.default_rng(5), Served(tmp_path)
+    rng, page = np.random.default_rng(5), Served(tmp_path, "design.toml")
     resident = Path(f"/proc/{page.process.pid}/statm")
     before = int(resident.read_text().split()[1])
     for _ in range(60):

@@ -43,7 +43,7 @@ async function look(part, unit = "") {
     const sizes = Object.entries(seen.sizes);
     find("sizes").hidden = !sizes.length;
     find("sizes").replaceChildren(find("sizes").firstElementChild, ...sizes.map(([name, size]) => {
-      const button = element("button", { textContent: `${size} (its numbers are ${name === "in" ? "inches" : name})` });
+      const button = element("button", { textContent: `${size} (numbers in ${name === "in" ? "inches" : name})` });
       button.addEventListener("click", () => attempt(() => look(part, name)));
       return element("span", {}, button, " ");
     }));

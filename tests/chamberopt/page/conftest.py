@@ -17,13 +17,13 @@ pytest.importorskip("uvicorn", reason="extra `page` is not installed")
 
 
 class Served:
-    """A page of a design, and questions to its server as its browser asks them."""
+    """A page of a design or folder, and questions to its server as its browser asks them."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, *design: str) -> None:
         write_base(folder)
         self.folder = folder
         self.process = subprocess.Popen(
-            [sys.executable, "-m", "chamberopt", "edit", "design.toml"],
+            [sys.executable, "-m", "chamberopt", "edit", *design],
             cwd=folder,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
@@ -37,7 +37,8 @@ class Served:
         answer = self.get(self.address.removeprefix(f"http://{self.host}"), cookie="")
         self.cookie = answer.getheader("set-cookie", "").split(";")[0]
         self.key = answer.getheader("location", "").partition("#")[2]
-        self.read = self.ask("/read", {})["read"]
+        if design:
+            self.read = self.ask("/read", {})["read"]
 
     def get(self, path: str, **headers: str) -> http.client.HTTPResponse:
         return self._send("GET", path, None, headers)
@@ -56,7 +57,7 @@ class Served:
         return f"http://{self.host}"
 
     def _send(
-        self, method: str, path: str, body: str | None, headers: dict[str, str]
+        self, method: str, path: str, body: str | bytes | None, headers: dict[str, str]
     ) -> http.client.HTTPResponse:
         connection = http.client.HTTPConnection(self.host, timeout=60)
         own = {"cookie": getattr(self, "cookie", ""), "x-chamberopt-key": getattr(self, "key", "")}
@@ -67,7 +68,7 @@ class Served:
 
 @pytest.fixture(scope="module")
 def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
-    page = Served(tmp_path_factory.mktemp("edited"))
+    page = Served(tmp_path_factory.mktemp("edited"), "design.toml")
     yield page
     page.process.kill()
     page.process.communicate()

@@ -80,9 +80,9 @@ def test_a_report_cannot_use_the_server(served: Served) -> None:
 @pytest.mark.parametrize(
     ("path", "question", "said"),
     [
-        ("/start", {"command": "simulate", "of": "../design.toml"}, "outside the design's folder"),
+        ("/start", {"command": "simulate", "of": "../design.toml"}, "outside the folder"),
         ("/start", {"command": "new", "of": "design.toml"}, "not a command of this page"),
-        ("/shown", {"folders": ["/etc"]}, "outside the design's folder"),
+        ("/shown", {"folders": ["/etc"]}, "outside the folder"),
         ("/shown", {"folders": ["."]}, "result.json"),
         ("/study", {"name": "../s.toml", "vary": {}, "evaluations": 3}, "give a name"),
         ("/study", {"name": "s.toml", "vary": {}, "evaluations": 3}, "nothing varies"),
@@ -211,7 +211,7 @@ def test_what_cannot_be_served_is_one_line(served: Served, tmp_path: Path) -> No
 
 @pytest.mark.skipif(sys.platform == "win32", reason="needs signals")
 def test_ctrl_c_ends_it_quietly(tmp_path: Path) -> None:
-    page = Served(tmp_path)
+    page = Served(tmp_path, "design.toml")
     names = {"origin": page.origin, "cookie": page.cookie, "x-chamberopt-key": page.key}
     cut_off = http.client.HTTPConnection(page.host, timeout=60)
     cut_off.request("POST", "/shape", headers={**names, "content-length": "1000"})

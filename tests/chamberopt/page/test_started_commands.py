@@ -46,7 +46,7 @@ def served_with_a_running(command: str, folder: Path, is_awaited: bool = True) -
     Args:
         is_awaited: whether the command simulates already.
     """
-    page = Served(folder)
+    page = Served(folder, "design.toml")
     for name in ("design.toml", "study.toml"):
         (folder / name).write_text(TIME.sub("2000", (folder / name).read_text()))
     page.ask("/cavity", {"changes": {}})  # the checks have processes too

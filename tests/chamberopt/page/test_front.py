@@ -1,0 +1,115 @@
+"""The front page's server: a part's file comes in, `new` proposes a design for it, and it opens."""
+
+import http.client
+import json
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import trimesh
+
+from chamberopt.design.load import load_design
+from tests.chamberopt.page.conftest import Served
+
+PROPOSED = {
+    "part": "box.stl", "unit": "mm", "material": "", "shot": "steel", "shape": "", "target": [],
+    "shop": "", "pilot": False,
+}  # fmt: skip
+
+
+@pytest.fixture
+def front(tmp_path: Path) -> Iterator[Served]:
+    page = Served(tmp_path)
+    yield page
+    page.process.kill()
+    page.process.communicate()
+
+
+def upload(front: Served, name: str, content: bytes) -> Any:
+    answer = front._send("POST", f"/upload?name={name}", content, {"origin": front.origin})
+    return json.loads(answer.read())
+
+
+def of_front(front: Served) -> dict[str, Any]:
+    return dict(json.loads(front.get("/front").read()))
+
+
+def test_a_part_becomes_a_design_that_opens(front: Served, tmp_path: Path) -> None:
+    box = trimesh.creation.box((30.0, 20.0, 10.0)).export(file_type="stl")
+    assert upload(front, "part.STL", box) == {"part": "part.STL"}
+    here = of_front(front)
+    assert here["parts"] == ["box.stl", "part.STL"]
+    assert here["designs"] == ["design.toml"]
+    assert "42CrMo4" in here["alloys"]
+    known = {"part": "part.STL", "unit": ""}
+    sizes = front.ask("/look", known)["sizes"]
+    assert sizes["mm"] == "30 x 20 x 10 mm"
+    assert front.ask("/look", known | {"unit": "cm"})["size"] == "300 x 200 x 100 mm"
+    started = front.ask("/propose", PROPOSED | known | {"unit": "mm", "material": "IN718"})
+    assert started["out"] == "part"
+    assert "running" in front.ask("/propose", PROPOSED)["error"]
+    while (now := json.loads(front.get("/status").read()))["exit"] is None:
+        time.sleep(0.2)
+    assert now["exit"] == 0, now["lines"]
+    design = load_design(tmp_path / "part" / "design.toml")
+    assert (tmp_path / "part" / design.part.mesh).samefile(tmp_path / "part.STL")
+    assert front.get("/files/part/design.png").status == 200
+    assert "no design is open" in front.ask("/read", {})["error"]
+    assert front.ask("/open", {"design": "part/design.toml"}) == {}
+    fields = {one["name"]: one for one in front.ask("/read", {})["fields"]}
+    assert fields["chamber.height_mm"]["reason"]
+    assert b'id="numbers"' in front.get("/").read()
+    assert front.ask("/close", {}) == {}
+    assert b'id="drop"' in front.get("/").read()
+    assert of_front(front)["designs"] == ["design.toml", "part/design.toml"]
+
+
+def test_a_wrong_file_or_wish_is_answered_in_words(front: Served, tmp_path: Path) -> None:
+    box = (tmp_path / "box.stl").read_bytes()
+    before = sorted(tmp_path.rglob("*"))
+    names = "evil.toml", "..%2Fx.stl", "%2Ftmp%2Fx.stl", ".x.stl", ""
+    for name, said in (("box.stl", "already"), *((name, "not a part") for name in names)):
+        assert said in upload(front, name, box)["error"]
+    wrong = {"unit": "ft", "material": "--help", "shape": "own.py", "shot": "gravel"}
+    for option, given in wrong.items():
+        error = front.ask("/propose", PROPOSED | {option: given})["error"]
+        assert f"{option}: given {given}; allowed" in error
+    for option in ("part", "shop"):
+        error = front.ask("/propose", PROPOSED | {option: "../x.stl"})["error"]
+        assert "outside the folder" in error
+    assert "outside the folder" in front.ask("/look", {"part": "../x", "unit": ""})["error"]
+    assert "unit: given ft" in front.ask("/look", {"part": "box.stl", "unit": "ft"})["error"]
+    (tmp_path / "own.toml").write_text(
+        (tmp_path / "design.toml").read_text().replace('"cylinder"', '"shape.py"')
+    )
+    assert "--trust-shape" in front.ask("/open", {"design": "own.toml"})["error"]
+    (tmp_path / "own.toml").unlink()
+    assert "outside" in front.ask("/open", {"design": "../design.toml"})["error"]
+    assert sorted(tmp_path.rglob("*")) == before
+    assert b'id="drop"' in front.get("/").read()
+
+
+def test_files_are_taken_from_the_page_alone_and_not_too_large(front: Served) -> None:
+    own = {"origin": front.origin}
+    for headers in ({}, {"origin": "null"}, own | {"cookie": ""}, own | {"x-chamberopt-key": ""}):
+        assert front._send("POST", "/upload?name=x.stl", b"solid", headers).status == 403
+    connection = http.client.HTTPConnection(front.host, timeout=60)
+    connection.putrequest("POST", "/upload?name=x.stl", skip_host=True)
+    sent = {"host": front.host, "cookie": front.cookie, "x-chamberopt-key": front.key, **own}
+    for name, text in (sent | {"content-length": "600000000"}).items():
+        connection.putheader(name, text)
+    connection.endheaders()
+    answer = connection.getresponse()
+    assert answer.status == 413
+    assert b"this file has more than 500 MB" in answer.read()
+
+
+def test_a_proposal_that_asks_ends_in_words(front: Served) -> None:
+    """Without a unit, which the file does not state."""
+    front.ask("/propose", PROPOSED | {"unit": ""})
+    while (now := json.loads(front.get("/status").read()))["exit"] is None:
+        time.sleep(0.2)
+    assert now["exit"] == 2
+    assert "does not state the unit" in now["lines"][-1]

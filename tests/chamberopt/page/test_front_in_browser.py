@@ -1,0 +1,41 @@
+"""The front page in a real browser: from a part's file to an open design, without a terminal."""
+
+from pathlib import Path
+
+from tests.chamberopt.page.browser_page import Page
+from tests.chamberopt.page.conftest import Served
+from tests.helpers.results.browser import chromium, expect, needs_chromium
+
+pytestmark = needs_chromium
+
+
+def test_a_part_dropped_on_the_front_page_becomes_an_open_design(tmp_path: Path) -> None:
+    served = Served(tmp_path)
+    dropped = tmp_path / "elsewhere" / "my part.stl"
+    dropped.parent.mkdir()
+    dropped.write_bytes((tmp_path / "box.stl").read_bytes())
+    try:
+        with chromium() as browser:
+            opened = Page(browser, served)
+            page = opened.page
+            page.set_input_files("#file", dropped)
+            opened.wait("data-known=sizes")  # an STL states no unit
+            assert page.locator("#propose").is_disabled()
+            page.click("#sizes button >> text=in mm)")
+            opened.wait("data-known=all")
+            expect(page.locator("#known")).to_contain_text("my part.stl measures 16 x 16 x 16 mm")
+            page.uncheck("#pilot")
+            page.click("#propose")
+            opened.wait('data-ended="0"')
+            page.click("#open-made")
+            opened.wait("data-checked=reach")
+            label = page.locator('label[for="chamber.height_mm"]')
+            expect(label).to_contain_text("Height")
+            expect(label).to_contain_text("sonotrode to ceiling")  # the reason of its number
+            page.click("#front")
+            expect(page.locator("#designs")).to_contain_text("my part/design.toml")
+            assert not opened.errors
+            assert all(one.startswith(f"http://{served.host}/") for one in opened.requests)
+    finally:
+        served.process.kill()
+        served.process.communicate()
