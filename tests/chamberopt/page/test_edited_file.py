@@ -105,7 +105,7 @@ def test_every_number_has_its_bounds_unit_and_description(file: EditedFile) -> N
     assert rows["chamber.height_mm"] == {
         "name": "chamber.height_mm", "value": 30.0, "least": 2.0, "most": 2000.0, "unit": "mm",
         "text": "inner height, sonotrode to ceiling", "whole": False, "varies": True,
-        "fixed": False,
+        "fixed": False, "reason": "to try",
     }  # fmt: skip
     assert rows["part.offset_mm.0"]["value"] == 1.0
     assert rows["sonotrode.motion"]["choices"] == ("sinusoidal", "random_phase")
