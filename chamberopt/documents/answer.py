@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from chamberopt.chamber.checks.calibration import misfit_texts
@@ -13,10 +14,21 @@ from chamberopt.documents.document import AnswerLine
 from chamberopt.documents.ranges import range_answer
 from chamberopt.documents.wording import Label, metric_label, objective_label, plain
 from chamberopt.documents.zones import zone_lines
+from chamberopt.results.load import load_result, load_start
 from chamberopt.search.study.constraints import MET
 
 if TYPE_CHECKING:
     from chamberopt.results.load import Result
+
+
+def answer_in(folder: Path) -> str:
+    """Return the answer of the result of a study or simulation in a folder, in one sentence.
+
+    Raises:
+        InputError: the folder has no usable result.
+    """
+    result = load_result(folder)
+    return answer(result, load_start(result) if result.study else None)
 
 
 def answer(result: Result, start: Result | None) -> str:

@@ -54,8 +54,8 @@ def run(
     with Interrupt() as interrupt:
         from chamberopt.cli.teller import SearchTeller
         from chamberopt.common.executor import open_executor
+        from chamberopt.documents.answer import answer_in
         from chamberopt.documents.terminal_lines import note_lines, study_lines
-        from chamberopt.results.load import load_result, summary
         from chamberopt.search.study import load_study
         from chamberopt.search.study_folder import open_study_folder
         from chamberopt.workflows.optimise import optimise_study
@@ -67,8 +67,7 @@ def run(
         claim = partial(open_study_folder, loaded)
         with console.claimed_folder(out, study.stem, claim) as folder:
             if folder.finished:
-                line = f"best design: {summary(load_result(folder.path))}"
-                console.print_finished(folder.path, "study", [line], json)
+                console.print_finished(folder.path, "study", [answer_in(folder.path)], json)
                 return
             command = resume_command(study, folder.path, options=as_options(values))
             with resume_note(folder, command), open_executor(workers, cluster) as executor:
@@ -84,7 +83,7 @@ def run(
                 *result.best.evaluation.notes,
             ]
             lines = [*study_lines(result, done.ranges), *note_lines(notes)]
-            console.print_result(lines, folder.path, json)
+            console.print_result([*lines, "", answer_in(folder.path)], folder.path, json)
             if not json:
                 show, best = quoted("report", folder.path), folder.path / "best.toml"
                 console.show([f"to see it: {show}; the design: {best}"])

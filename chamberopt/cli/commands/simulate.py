@@ -50,6 +50,7 @@ def simulate(
     from chamberopt.cli.teller import TerminalTeller
     from chamberopt.common.executor import open_executor
     from chamberopt.design.load import load_design
+    from chamberopt.documents.answer import answer_in
     from chamberopt.documents.ranges import range_lines
     from chamberopt.documents.terminal_lines import evaluation_lines, note_lines, zone_limit_lines
     from chamberopt.documents.tolerances import tolerance_lines
@@ -77,4 +78,4 @@ def simulate(
     lines += [*limits, *notes]
     if found.tolerances:
         lines += ["", *tolerance_lines(found.tolerances)]
-    console.print_result(lines, folder, json)
+    console.print_result([*lines, "", answer_in(folder)], folder, json)
