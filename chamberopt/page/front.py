@@ -13,14 +13,13 @@ from chamberopt.common.files import check_new_file, write_bytes
 from chamberopt.common.toml_fields import read_toml
 from chamberopt.design.load import is_study
 from chamberopt.design.materials import alloys, balls
-from chamberopt.geometry.meshes.formats import MESH_FORMATS
+from chamberopt.geometry.meshes.formats import SUFFIXES, is_mesh_name
 from chamberopt.geometry.meshes.part_mesh import read_part_cached
 from chamberopt.geometry.meshes.surface_error import format_box
 from chamberopt.geometry.meshes.units import METRES_PER, STATED, UnknownUnitError
 from chamberopt.page.acts import Acts, free_folder, path_inside
 from chamberopt.page.started_commands import OneCommand
 
-SUFFIXES = tuple(suffix for one in MESH_FORMATS for suffix in one.suffixes)
 PART_NAME = re.compile(r"\w[\w .,()+-]{0,150}")
 SHAPES = "cylinder", "box", "prism", "conformal"
 MOST_NAMES = 40  # names of a part's surfaces that the page lists
@@ -35,14 +34,15 @@ class Front:
 
     Args:
         folder: folder of the part files, into which proposals are written.
-        design: a design to open at once.
+        file: a design to open at once, or a part of the folder to begin with; None for neither.
         trusted: whether the chamber's shape in a design may be a Python file, which is then run.
     """
 
-    def __init__(self, folder: Path, design: Path | None, trusted: bool) -> None:
+    def __init__(self, folder: Path, file: Path | None, trusted: bool) -> None:
         self._folder, self._trusted = folder.resolve(), trusted
         self.command = OneCommand()
-        self.acts = None if design is None else Acts(design, trusted, self.command)
+        self._first = file.name if file is not None and is_mesh_name(file.name) else ""
+        self.acts = None if file is None or self._first else Acts(file, trusted, self.command)
 
     def end(self) -> None:
         """End the running command and the checks of the open design."""
@@ -65,7 +65,8 @@ class Front:
         tables = _tables(self._folder)
         return {
             "folder": str(self._folder),
-            "parts": [one.name for one in _plain_files(self._folder) if _is_part(one.name)],
+            "first": self._first,
+            "parts": [one.name for one in _plain_files(self._folder) if is_mesh_name(one.name)],
             "suffixes": SUFFIXES,
             "designs": [name for name, kind in tables if kind == "design"],
             "shops": [name for name, kind in tables if kind == "shop"],
@@ -77,7 +78,7 @@ class Front:
 
     def upload(self, name: str, content: bytes) -> dict[str, object]:
         """Write a part's file into the folder, where no file has this name."""
-        if not _is_part(name) or not PART_NAME.fullmatch(name):
+        if not is_mesh_name(name) or not PART_NAME.fullmatch(name):
             raise InputError(f"{name}: not a part that can be read: {', '.join(SUFFIXES)}")
         path = self._folder / name
         if path.exists():
@@ -137,10 +138,6 @@ class Front:
             self.acts.close()
         self.acts = None
         return {}
-
-
-def _is_part(name: str) -> bool:
-    return name.lower().endswith(SUFFIXES)
 
 
 def _plain_files(folder: Path) -> list[Path]:

@@ -228,13 +228,13 @@ async def _body(request: Request, most: int) -> bytes | None:
 
 
 def serve(
-    folder: Path, design: Path | None, port: int, trusted: bool, tell: Callable[[str], None]
+    folder: Path, file: Path | None, port: int, trusted: bool, tell: Callable[[str], None]
 ) -> None:
     """Serve the page of a design, or the front page of a folder, until Ctrl-C.
 
     Args:
         folder: folder of the front page.
-        design: the design file; None for the front page.
+        file: the design, or a part with which the front page begins; None for neither.
         port: number of the port; 0 for any free port.
         trusted: whether the chamber's shape in a design may be a Python file, which is then run.
         tell: called with the page's address when the server answers there.
@@ -242,7 +242,7 @@ def serve(
     Raises:
         InputError: the design cannot be edited, or the port cannot be used.
     """
-    front = Front(folder, design, trusted)
+    front = Front(folder, file, trusted)
     listening = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
     if os.name == "posix":  # takes a port just left; Windows would share a port in use
         listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)

@@ -14,7 +14,7 @@ from chamberopt.cli.options import app
 
 @app.command
 def edit(
-    design: Path = Path(),
+    file: Path = Path(),
     /,
     *,
     port: int = 0,
@@ -27,8 +27,9 @@ def edit(
 
     Parameters
     ----------
-    design
-        Design file (.toml), or a folder in which parts are kept; by default this folder.
+    file
+        Design file (.toml), part (STEP, STL, ...), or a folder in which parts are kept; by default
+        this folder.
     port
         Port of 127.0.0.1 at which the page is; by default a free one.
     trust_shape
@@ -36,10 +37,11 @@ def edit(
     """
     from chamberopt.common.errors import InputError
     from chamberopt.common.progress import step
+    from chamberopt.geometry.meshes.formats import is_mesh_name
 
-    is_folder = design.is_dir()
+    is_design = not file.is_dir() and not (file.is_file() and is_mesh_name(file.name))
     # a wrong design is reported before the server starts
-    trusted = trust_shape if is_folder else _trusted(design, trust_shape)
+    trusted = _trusted(file, trust_shape) if is_design else trust_shape
     try:
         with step("starting"):
             from chamberopt.page.server import serve
@@ -49,11 +51,11 @@ def edit(
         ) from None
 
     def tell(address: str) -> None:
-        shown = "a page for your part" if design == Path() else design
+        shown = "a page for your part" if file == Path() else file
         show([f"{shown} is at {address}", "Ctrl-C ends the page"])
 
-    folder, file = (design, None) if is_folder else (design.parent, design)
-    serve(folder, file, port, trusted, tell)
+    folder, first = (file, None) if file.is_dir() else (file.parent, file)
+    serve(folder, first, port, trusted, tell)
 
 
 def _trusted(path: Path, trusted: bool) -> bool:

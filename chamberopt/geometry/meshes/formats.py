@@ -55,8 +55,14 @@ MESH_FORMATS = (
     MeshFormat("Abaqus", (".inp",), _has_line(r"\*(?:HEADING|NODE|PART)\b"), read_abaqus),
     MeshFormat("OBJ", (".obj",), _has_line(r"v[ \t]+[-+.\d]+[ \t]+[-+.\d]"), read_obj),
 )
+SUFFIXES = tuple(suffix for one in MESH_FORMATS for suffix in one.suffixes)
 HEAD = 1 << 16  # bytes in which a text file shows its format, even after comments
 BINARY_HEAD = 1 << 10
+
+
+def is_mesh_name(name: str) -> bool:
+    """Return True if a file's name has the usual ending of a mesh or CAD format."""
+    return name.lower().endswith(SUFFIXES)
 
 
 def read_raw_mesh(path: Path, content: bytes, how: Tessellation | None = None) -> RawMesh:

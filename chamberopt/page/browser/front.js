@@ -106,4 +106,8 @@ find("propose").addEventListener("click", () => attempt(async () => {
   await show(known.part);
 }));
 find("stop").addEventListener("click", () => attempt(() => ask("/stop", {})));
-attempt(() => show()).then(() => { document.body.dataset.ready = "yes"; });
+attempt(async () => {
+  const { first } = await ask("/front");
+  await show(first);
+  await look(first);
+}).then(() => { document.body.dataset.ready = "yes"; });

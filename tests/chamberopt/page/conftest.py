@@ -19,11 +19,11 @@ pytest.importorskip("uvicorn", reason="extra `page` is not installed")
 class Served:
     """A page of a design or folder, and questions to its server as its browser asks them."""
 
-    def __init__(self, folder: Path, *design: str) -> None:
+    def __init__(self, folder: Path, *file: str) -> None:
         write_base(folder)
         self.folder = folder
         self.process = subprocess.Popen(
-            [sys.executable, "-m", "chamberopt", "edit", *design],
+            [sys.executable, "-m", "chamberopt", "edit", *file],
             cwd=folder,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
@@ -37,7 +37,7 @@ class Served:
         answer = self.get(self.address.removeprefix(f"http://{self.host}"), cookie="")
         self.cookie = answer.getheader("set-cookie", "").split(";")[0]
         self.key = answer.getheader("location", "").partition("#")[2]
-        if design:
+        if file and file[0].endswith(".toml"):
             self.read = self.ask("/read", {})["read"]
 
     def get(self, path: str, **headers: str) -> http.client.HTTPResponse:

@@ -113,3 +113,13 @@ def test_a_proposal_that_asks_ends_in_words(front: Served) -> None:
         time.sleep(0.2)
     assert now["exit"] == 2
     assert "does not state the unit" in now["lines"][-1]
+
+
+def test_the_page_begins_with_the_part_that_is_given(tmp_path: Path) -> None:
+    page = Served(tmp_path, "box.stl")
+    try:
+        assert of_front(page)["first"] == "box.stl"
+        assert b'id="drop"' in page.get("/").read()
+    finally:
+        page.process.kill()
+        page.process.communicate()
