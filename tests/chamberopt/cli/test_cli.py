@@ -667,3 +667,11 @@ class TestProgress:
         assert "evaluations" in stream.getvalue()
         assert "4/10" in stream.getvalue()
         assert "best 0.5123" in stream.getvalue()
+
+
+def test_a_command_that_ends_searches_nothing_for_garbage() -> None:
+    run = "from chamberopt.cli import main; main(); import gc; print(gc.get_freeze_count() > 1000)"
+    done = subprocess.run(
+        [sys.executable, "-c", run, "--version"], capture_output=True, text=True, check=True
+    )
+    assert done.stdout.splitlines()[-1] == "True"
