@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 # simulation differs from the machine, in words for a workshop.
 
 TIME = "time_to_98_s"
+WIDEST_FACE = 90.0  # mm: larger faces need slots or are several (chamber/propose/usual_shop.toml)
 JAMMED = 0.01  # least share of the shot's time, or of the impacts, in gaps that is told in red
 
 
@@ -57,6 +58,21 @@ def alarms(result: Result) -> Iterator[str]:
             "place: choose other balls, or close or widen the gap."
         )
     yield from _bare(result)
+
+
+def _wide_face(result: Result, face_mm: tuple[float, ...]) -> Iterator[str]:
+    """Yield a sentence if the face is larger than usual, and its amplitude was not measured."""
+    if max(face_mm) > WIDEST_FACE and result.design.sonotrode.amplitude_profile is None:
+        yield (
+            f"The face, {_face(face_mm)}, is larger than usual sonotrodes, and was simulated as "
+            "one that moves alike all over. If yours is smaller, set several side by side or peen "
+            "a strip at a time; if it has slots, measure its amplitude over the face."
+        )
+
+
+def _face(face_mm: tuple[float, ...]) -> str:
+    """Return the size of a sonotrode's face in words: of a disc its diameter alone."""
+    return f"{'Ø ' if len(face_mm) == 1 else ''}{' × '.join(map(plain, face_mm))} mm"
 
 
 def _is_unresolved(figure: Estimate) -> bool:
@@ -166,7 +182,7 @@ def process_sheet(result: Result, face_mm: tuple[float, ...]) -> Document:
     record = result.record
     start = load_start(result) if result.study else None
     checks, calibrated = first_checks(result), calibrated_to(result)
-    red = [Sentence(text, "warning") for text in alarms(result)]
+    red = [Sentence(text, "warning") for text in (*alarms(result), *_wide_face(result, face_mm))]
     content: list[Block] = [*red, *setting_tables(result, face_mm), checks, *calibrated]
     name = f"{result.design.part.mesh_path.name}: {result.folder.resolve().name}"
     block = Table("", (), [*title_block(result, name).items()], numbers=False)
@@ -342,8 +358,7 @@ def _key_row(key: str, value: Any) -> Row:
 
 def _sonotrode(result: Result, face_mm: tuple[float, ...]) -> Iterator[Row]:
     design = result.design
-    size = " × ".join(map(plain, face_mm))
-    yield "face in the chamber", f"Ø {size} mm" if len(face_mm) == 1 else f"{size} mm"
+    yield "face in the chamber", _face(face_mm)
     yield "frequency", f"{plain(design.sonotrode.frequency_khz)} kHz"
     yield "amplitude", _amplitude(design.sonotrode)
     yield "peak speed of the face", f"{plain(design.sonotrode.peak_speed, 3)} m/s"

@@ -73,14 +73,16 @@ def measure_budget(
     if not dents or not mean > 0.0:
         raise InputError(f"the shot hardly hits the target in {simulated:.3g} simulated s")
     resolved = math.isfinite(places.half_width) and places.value < NEVER
+    mean_time = slow.process.treatment_time / mean
     return Measured(
         dent_rate=dents / (simulated * slow.process.accuracy.gauge),
         collision_rate=collisions / (simulated + REPLICAS * WARMUP),
-        time_to_98=places.value if resolved else slow.process.treatment_time / mean,
+        time_to_98=places.value if resolved else mean_time,
         places=resolved,
         spread=places.half_width if resolved else math.inf,
         friction=friction,
         dents_for_mean=found.resolution.needed_for_mean / slow.process.treatment_time,
         target=area,
         simulated=simulated,
+        mean_time=mean_time,
     )

@@ -6,16 +6,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from chamberopt.chamber.part import chosen_on_part, chosen_triangles
+from chamberopt.chamber.part import chosen_triangles
 from chamberopt.chamber.propose.proposal import Proposal
-from chamberopt.chamber.propose.proposed_target import SELDOM, Surface
+from chamberopt.chamber.propose.proposed_mask import is_met
+from chamberopt.chamber.propose.proposed_target import SELDOM
 from chamberopt.chamber.reach import reached_part_share
-from chamberopt.design.part import Selection
 from chamberopt.geometry.triangles import area_vectors, areas, rotation_matrix, unit_vectors
 
 AWAY_DEG = 105.0  # angle to the way down from which on a face is turned away from the sonotrode
 LEAST = 0.02  # share of the target's area below which nothing is offered
-MET = 0.5  # share of a surface in the chamber from which on it is named
 NEARLY_ALL, MOST_NAMED = 0.9, 3
 
 
@@ -56,17 +55,8 @@ def find_left_out(proposal: Proposal) -> list[LeftOut]:
     hidden = 1.0 - touched[posed.target] @ posed.area[posed.target] / posed.area[posed.target].sum()
     if hidden > LEAST and not part.target.reachable:
         found.append(LeftOut({"reachable": True}, f"the {hidden:.0%} that no ball touches here"))
-    if names := [one.name for one in proposal.known if _is_met(proposal, one)]:
+    seldom = [one for one in proposal.known if SELDOM.search(one.name)]
+    if names := [one.name for one in seldom if is_met(proposal.design, chamber, one)]:
         text = f"the shot also meets {', '.join(names)}, seldom peened: [mask] keeps it off"
         found.append(LeftOut({}, f"{text} (docs/chambers.md)"))
     return found
-
-
-def _is_met(proposal: Proposal, surface: Surface) -> bool:
-    """Return whether a surface whose name says that it is seldom peened lies in the chamber."""
-    if not SELDOM.search(surface.name):
-        return False
-    chamber = proposal.chamber
-    rows = chosen_on_part(proposal.design, Selection.model_validate(surface.keys), "")
-    inside = chamber.exposed_area[rows & ~chamber.part.target].sum()
-    return bool(inside > MET * chamber.part.area[rows].sum())

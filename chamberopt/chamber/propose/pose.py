@@ -29,6 +29,9 @@ Turns = tuple[float, float, float]
 # pose as drawn, of turns by multiples of 90 and of 45 degrees, and of turns by steps of 15 and 5.
 AS_DRAWN, ALONG_AXIS, DIAGONAL = 0.10, 0.08, 0.05
 OF_STEP = {15.0: 0.02, 5.0: 0.01}
+# What a long part may lose by hanging, where no sonotrode is large enough for it lying, and its
+# least length over its width.
+HANGING, LONG = 0.15, 1.6
 LOW = 0.05  # advantage of a target at the part's lower end over a target at its upper end
 FLAT = 0.999  # length of the mean unit normal of a target that counts as flat
 LEVEL_DEG = 0.5  # a flat face is level if it is tilted by less
@@ -48,18 +51,13 @@ def propose_pose(
         triangles: triangles of the part, normals outward, shape (m, 3).
         target: marks the triangles of the target, the surface to peen, shape (m,).
     """
-    vectors = area_vectors(vertices, triangles)[target]
-    weight = np.linalg.norm(vectors, axis=1)
-    normal, weight = unit_vectors(vectors), weight / weight.sum()
+    weight, normal = _weighted_normals(vertices, triangles, target)
     middle = weight @ vertices[triangles[target]].mean(axis=1)
 
     def worth(down: np.ndarray, bonus: float) -> float:
-        exposed = 0.5 * (1.0 + normal @ down)
-        mean = float(weight @ exposed)
-        spread = float(np.sqrt(max(weight @ (exposed - mean) ** 2, 0.0)))
         along = vertices @ -down
         height = float((middle @ -down - along.min()) / max(np.ptp(along), 1e-12))
-        return round(mean - spread - LOW * height + bonus, 6)  # equal poses: the first
+        return round(_evenness(weight, normal, down) - LOW * height + bonus, 6)  # equal: the first
 
     turns = max(_poses(normal, weight), key=lambda one: worth(_down(one[0]), one[1]))[0]
     down = _down(turns)
@@ -71,6 +69,45 @@ def propose_pose(
     else:
         reason = "the target stands upright, so that all its sides are exposed alike"
     return turns, reason
+
+
+def hanging_pose(
+    vertices: np.ndarray, triangles: np.ndarray, target: np.ndarray, turns: Turns
+) -> Turns | None:
+    """Return turns with which a long part stands on end, if its target is exposed nearly as well.
+
+    Such a part needs a small sonotrode. It is None for a part that is not long, or stands already.
+
+    Args:
+        vertices, triangles, target: as of propose_pose.
+        turns: the pose that would be taken otherwise [degrees].
+    """
+    sides = np.ptp(vertices, axis=0)
+    axis = int(sides.argmax())
+    weight, normal = _weighted_normals(vertices, triangles, target)
+    lying = _evenness(weight, normal, _down(turns))
+    ends = [sign * np.eye(3)[axis] for sign in (-1.0, 1.0)]
+    down = max(ends, key=lambda one: _evenness(weight, normal, one))
+    stands = abs(_down(turns)[axis]) > np.cos(np.radians(LEVEL_DEG))
+    if stands or sides[axis] < LONG * np.sort(sides)[1]:
+        return None
+    return turns_down(down) if _evenness(weight, normal, down) >= lying - HANGING else None
+
+
+def _weighted_normals(
+    vertices: np.ndarray, triangles: np.ndarray, target: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return of each triangle of a target its share of the area (m,) and its normal (m, 3)."""
+    vectors = area_vectors(vertices, triangles)[target]
+    weight = np.linalg.norm(vectors, axis=1)
+    return weight / weight.sum(), unit_vectors(vectors)
+
+
+def _evenness(weight: np.ndarray, normal: np.ndarray, down: np.ndarray) -> float:
+    """Return the mean minus standard deviation of the exposure with a direction (3,) down."""
+    exposed = 0.5 * (1.0 + normal @ down)
+    mean = float(weight @ exposed)
+    return mean - float(np.sqrt(max(weight @ (exposed - mean) ** 2, 0.0)))
 
 
 def square_to_walls(vertices: np.ndarray, turns: Turns) -> Turns:

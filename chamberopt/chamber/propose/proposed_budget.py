@@ -33,6 +33,7 @@ SET_TIMES = (
 # none, they lag behind the target on average: 326 s against 290 s and 133 s in a joint's chamber.
 MORE, LAGGING = 1.3, 2.0
 LONG = 1800.0  # s
+UNEVEN = 1.5  # time of single places over that of the target on average, from which on they rule
 
 
 class Measured(NamedTuple):
@@ -48,6 +49,7 @@ class Measured(NamedTuple):
         dents_for_mean: dents in the median window that the mean takes, for each s of treatment.
         target: area of the target [m²].
         simulated: simulated time of all replicas of the pilot [s].
+        mean_time: after which the target is 98 % covered on average [s].
     """
 
     dent_rate: float
@@ -59,6 +61,7 @@ class Measured(NamedTuple):
     dents_for_mean: float
     target: float
     simulated: float
+    mean_time: float
 
 
 class Budget(NamedTuple):
@@ -131,11 +134,22 @@ def _said_of_treatment(found: Measured) -> str:
         what = "the target is 98 % covered ON AVERAGE (places are out of reach or not resolved)"
     friction = " at the slow end of friction" if found.friction else ""
     more = f", and {MORE - 1.0:.0%} more" if found.places else f", times {LAGGING:g}"
-    long = "; LONG: more shot, more amplitude or the study" if found.time_to_98 > LONG else ""
+    long = f"; LONG: {_said_of_long(found)}" if found.time_to_98 > LONG else ""
     return (
         f"an estimate, rounded up: after about {_plain(found.time_to_98, 2)}{spread} s {what}"
         f"{friction}, by a pilot of {_plain(found.simulated, 2)} simulated s{more}{long}"
     )
+
+
+def _said_of_long(found: Measured) -> str:
+    """Return in words what makes a treatment long, and what shortens it."""
+    uneven = found.time_to_98 / found.mean_time
+    if uneven > UNEVEN:
+        return (
+            f"the least covered places take {_plain(uneven, 2)} times as long as the target on "
+            "average; half of the time in a second pose may do, such as end for end"
+        )
+    return "few balls get to the target, or slowly; a larger sonotrode, harder balls or the study"
 
 
 def _plain(value: float, digits: int) -> str:

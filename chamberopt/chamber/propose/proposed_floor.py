@@ -4,6 +4,11 @@ The floor of a chamber is the vibrating face. A sonotrode that is larger carries
 face, with the shop's clearance, which no ball enters; one that is smaller is the floor, and the
 walls lean out from its rim, so that the room is as wide as the part needs where the part is.
 
+A round room is as wide as it is high, as far as a sonotrode allows: in a narrow one the walls take
+the balls' speed by friction before they are up. In pilots of four hanging parts (a fan blade, an
+implant, a connecting rod, a spring) a cylinder on the whole of a disc of 80 mm took 0.3 to 0.6 of
+the time of a box that is as long and wide as the part and the usual room beside it.
+
 Notation
     t   how far the walls of the wanted floor must move in to stand on the face [m]
     a   angle by which they lean, tan(a) = t / distance from the sonotrode to the part
@@ -35,6 +40,7 @@ class Floor(NamedTuple):
     sonotrode: ShopSonotrode
     reason: str  # for the chamber's size in plan
     lean: float = 0.0  # of the walls [degrees]; infinite if no sonotrode is large enough
+    too_large: float = 0.0  # area of a floor for which no sonotrode is large enough [m²]
 
 
 def floor_on_sonotrode(sizes: Sizes, round_part: float, shop: Shop, may_exceed: bool) -> Floor:
@@ -49,6 +55,7 @@ def floor_on_sonotrode(sizes: Sizes, round_part: float, shop: Shop, may_exceed: 
     Raises:
         InputError: the shop has no sonotrode for it.
     """
+    sizes = _as_wide_as_high(sizes, shop)
     moves = [(_move(sizes, round_part, one), one) for one in shop.sonotrodes]
     held = [(_area(one), k) for k, (move, one) in enumerate(moves) if move <= 1e-9]
     if held:
@@ -66,7 +73,8 @@ def floor_on_sonotrode(sizes: Sizes, round_part: float, shop: Shop, may_exceed: 
     if sizes.shape != "conformal" and angle <= STEEPEST + 0.5 and rise <= WIDEST:
         height = sizes.height + far - sizes.distance
         return _leaning(replace(sizes, distance=far, height=height), move, angle, sonotrode)
-    wanted = " x ".join(f"{1e3 * one:.4g}" for one in _sides(sizes, round_part))
+    sides = _sides(sizes, round_part)
+    wanted = " x ".join(f"{1e3 * one:.4g}" for one in sides)
     ways = (
         "peen it a strip at a time, each in a chamber of its own (cut the part down to it), "
         "set several sonotrodes side by side, or take a larger one"
@@ -76,7 +84,17 @@ def floor_on_sonotrode(sizes: Sizes, round_part: float, shop: Shop, may_exceed: 
         raise InputError(f"--shop: {text}, also with walls that lean by {STEEPEST:g}°: {ways}")
     usual = "usual ones: discs of 40 to 80 mm (chamberopt shop --example; give yours by --shop)"
     reason = f"LARGER THAN USUAL SONOTRODES, simulated as one face: {ways}; {usual}"
-    return Floor(sizes, sonotrode, reason, math.inf)
+    return Floor(sizes, sonotrode, reason, math.inf, math.prod(sides))
+
+
+def _as_wide_as_high(sizes: Sizes, shop: Shop) -> Sizes:
+    """Return sizes with a round room made as wide as it is high, as far as a face carries it."""
+    if sizes.shape != "cylinder":
+        return sizes
+    wanted = float(sizes.plan["diameter_mm"])
+    carried = max(one.sides_mm[1] for one in shop.sonotrodes)
+    wider = max(wanted, min(math.floor(1e3 * sizes.height), carried))
+    return replace(sizes, plan={"diameter_mm": wider}, gap=sizes.gap + 5e-4 * (wider - wanted))
 
 
 def _half(sizes: Sizes) -> tuple[float, float]:

@@ -31,7 +31,7 @@ def new(
     target: Annotated[tuple[str, ...], Parameter(negative="")] = (),
     shape: Literal["cylinder", "box", "prism", "conformal"] | None = None,
     material: str = "",
-    shot: str = "steel",
+    shot: str = "",
     ball_mm: float | None = None,
     shop: Path | None = None,
     unit: Literal["um", "mm", "cm", "m", "in", "guess"] | None = None,
@@ -52,7 +52,8 @@ def new(
     material
         Alloy of the part; `chamberopt materials` lists them.
     shot
-        Material of the balls; `chamberopt shot` lists them.
+        Material of the balls; `chamberopt shot` lists them. By default steel, or tungsten carbide
+        where the part is nearly as hard as steel balls.
     ball_mm
         Diameter of a ball; by default the largest in stock that suits the target's fillets and
         slots, and jams in no gap.

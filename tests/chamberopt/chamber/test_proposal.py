@@ -12,8 +12,9 @@ from shapely import Polygon
 from chamberopt.chamber.part import chosen_triangles
 from chamberopt.chamber.propose.left_out import find_left_out
 from chamberopt.chamber.propose.pose import pose_in_words
-from chamberopt.chamber.propose.proposal import propose_charge, propose_ranges
+from chamberopt.chamber.propose.proposal import _shot, propose_charge, propose_ranges
 from chamberopt.chamber.propose.proposed_target import Sizes, propose_target, surfaces
+from chamberopt.chamber.propose.shop import StockBalls, usual_shop
 from chamberopt.chamber.propose.text import design_text
 from chamberopt.design.part import Target
 from chamberopt.geometry.meshes.part_mesh import PartMesh, read_part
@@ -131,6 +132,22 @@ def test_a_pose_is_said_as_a_fixture_gives_it(
     mesh = PartMesh(1e-3 * step.vertices, step.faces, number_by_position(20), (), "", {})
     known = surfaces(mesh)
     assert pose_in_words(mesh, known, turns) == words
+
+
+@pytest.mark.parametrize(
+    ("wanted", "part", "stock", "material"),
+    [
+        ("", "42CrMo4", "", "steel"),
+        ("", "16MnCr5", "", "tungsten_carbide"),  # as hard as steel balls
+        ("", "16MnCr5", "steel", "steel"),  # the shop has no others
+        ("steel", "16MnCr5", "", "steel"),
+    ],
+)
+def test_balls_are_harder_than_the_part(wanted: str, part: str, stock: str, material: str) -> None:
+    own = (StockBalls(material=stock, diameters_mm=(1.0,)),) if stock else ()
+    found, reason = _shot(wanted, part, usual_shop().model_copy(update={"balls": own}))
+    assert found == material
+    assert bool(reason) is (material != "steel")
 
 
 def test_what_faces_away_is_offered_for_leaving_out(tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from chamberopt.chamber.propose.pose import propose_pose, square_to_walls
+from chamberopt.chamber.propose.pose import hanging_pose, propose_pose, square_to_walls
 from chamberopt.chamber.propose.proposal import Proposal, Wanted, propose
 from chamberopt.chamber.propose.proposed_budget import Measured
 from chamberopt.chamber.propose.proposed_target import propose_target, surfaces
@@ -62,6 +62,24 @@ def test_turns_are_simple_where_that_is_as_good(tmp_path: Path) -> None:
     for turn, needed in ((7.3, -7.3), (7.02, -7.0), (0.4, 0.0), (-60.0, 60.0), (-90.0, 90.0)):
         turned = plate.vertices @ rotation_matrix((0.0, 0.0, turn)).T
         assert square_to_walls(turned, (0.0, 0.0, 0.0))[2] == pytest.approx(needed)
+
+
+def test_a_long_part_hangs_where_no_sonotrode_carries_it_lying(tmp_path: Path) -> None:
+    """A strip's two broad faces stand upright, whether it lies on its edge or hangs by an end."""
+    strip = trimesh.creation.box((170, 5, 36))
+    strip.export(tmp_path / "strip.stl")
+    made = propose(tmp_path / "strip.stl", Wanted("mm"), lambda _: [])
+    up = rotation_matrix(made.design.part.rotate_deg) @ [1.0, 0.0, 0.0]
+    assert abs(up[2]) == pytest.approx(1.0)
+    assert made.design.chamber.diameter_mm == 80.0
+    assert made.design.holder is not None
+    assert "on end, as no sonotrode" in made.reasons["part.rotate_deg"]
+    vertices, faces, normals = strip.vertices, strip.faces, strip.face_normals
+    lying = (0.0, 0.0, 0.0)
+    assert hanging_pose(vertices, faces, np.abs(normals[:, 1]) > 0.5, lying)
+    assert hanging_pose(vertices, faces, normals[:, 2] < -0.5, lying) is None  # it looks down
+    short = vertices * [0.3, 1.0, 1.0]
+    assert hanging_pose(short, faces, np.abs(normals[:, 1]) > 0.5, lying) is None
 
 
 def test_new_writes_a_design_and_a_study_that_are_accepted(

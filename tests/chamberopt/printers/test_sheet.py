@@ -228,6 +228,12 @@ def test_what_forbids_to_use_it_is_in_red(folder: Path) -> None:
     assert metric_label("p05_coverage").text in told
     content = process_sheet(result, (50.0,)).sections[0].content
     assert content[0] == Sentence(told, "warning")
+    (wide,) = [
+        one.text
+        for one in process_sheet(result, (130.0,)).sections[0].content
+        if isinstance(one, Sentence) and "larger than usual" in one.text
+    ]
+    assert "The face, Ø 130 mm, is larger than usual sonotrodes" in wide
 
 
 def test_dimensions_have_the_tolerances_of_the_design(folder: Path) -> None:

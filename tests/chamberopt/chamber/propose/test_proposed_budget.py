@@ -23,6 +23,7 @@ PILOT = Measured(
     dents_for_mean=0.01,
     target=5e-3,
     simulated=6.4,
+    mean_time=200.0,
 )
 TIME, GAUGE = "process.accuracy.simulated_time_s", "process.accuracy.gauge_mm2"
 
@@ -71,6 +72,18 @@ def test_the_treatment_time_is_rounded_up_and_says_what_it_rests_on() -> None:
     assert "friction" not in said
     assert of_mean.treatment == 540.0
     assert of_mean.search_time == REPLICAS * of_mean.time
+
+
+def test_what_makes_a_time_long_is_said() -> None:
+    def said(**changes: float) -> str:
+        budget = propose_budget(PILOT._replace(**changes))
+        return budget.reasons["process.treatment_time_s"]
+
+    assert "LONG" not in said(time_to_98=1700.0)
+    assert "take 3 times as long as the target on average" in said(
+        time_to_98=2400.0, mean_time=800.0
+    )
+    assert "LONG: few balls get to the target" in said(time_to_98=2400.0, mean_time=2000.0)
 
 
 @pytest.mark.parametrize(

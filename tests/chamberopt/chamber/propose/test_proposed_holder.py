@@ -150,16 +150,28 @@ def test_a_part_that_is_all_target_is_held_by_its_slimmer_end() -> None:
     assert held_end(mesh, whole, (30.0, 0.0, 0.0)) is None  # no axis of the file is upright
 
 
-def test_what_is_seldom_peened_is_named_where_the_shot_meets_it(tmp_path: Path) -> None:
+@pytest.mark.parametrize("side", ["FLANGE", "BORE"])
+def test_what_is_seldom_peened_is_named_or_masked(tmp_path: Path, side: str) -> None:
+    """A flange may be peened beside the target; a bore must not be, and gets a mask."""
     box = trimesh.creation.box((20, 20, 30))
     lines = [f"v {x} {y} {z}" for x, y, z in box.vertices]
     for (a, b, c), (x, _, z) in zip(box.faces + 1, box.face_normals, strict=True):
-        name = "PEENED" if z < -0.5 else "BORE" if x > 0.5 else "SIDES"
+        name = "PEENED" if z < -0.5 else side if x > 0.5 else "SIDES"
         lines += [f"g {name}", f"f {a} {b} {c}"]
     part = tmp_path / "box.obj"
     part.write_text("\n".join(lines) + "\n")
     made = propose(part, Wanted("mm"), lambda _: [])
     assert made.design.part.target.surface == ("PEENED",)
-    (said,) = find_left_out(made)
-    assert said.text.startswith("the shot also meets BORE, seldom peened: [mask]")
-    assert f"# {said.text}" in design_text(made, tmp_path, [said])
+    left_out = find_left_out(made)
+    text = design_text(made, tmp_path, left_out)
+    if side == "BORE":
+        assert made.design.mask is not None
+        assert made.design.mask.at.surface == ("BORE",)
+        assert made.chamber.fixtures["mask"].covered == pytest.approx(600e-6)
+        assert not left_out
+        assert "[mask]\nthickness_mm = 1  # a bush or a cap on BORE: not to be peened" in text
+        return
+    (said,) = left_out
+    assert made.design.mask is None
+    assert said.text.startswith("the shot also meets FLANGE, seldom peened: [mask]")
+    assert f"# {said.text}" in text

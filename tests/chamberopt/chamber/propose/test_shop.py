@@ -42,7 +42,7 @@ def test_the_example_is_a_shop_that_is_read(tmp_path: Path) -> None:
     ("plan", "shape", "size"),
     [
         ({"diameter_mm": 52.0}, "cylinder", {"diameter_mm": 60.0}),  # the whole face
-        ({"diameter_mm": 30.0}, "cylinder", {"diameter_mm": 30.0}),  # a part of it
+        ({"diameter_mm": 30.0}, "cylinder", {"diameter_mm": 60.0}),  # as wide as it is high
         ({"diameter_mm": 66.0}, "cylinder", {"diameter_mm": 60.0}),  # less room beside the part
         ({"length_mm": 45.0, "width_mm": 30.0}, "box", {"length_mm": 45.0, "width_mm": 30.0}),
         ({"length_mm": 45.0, "width_mm": 110.0}, "box", {"length_mm": 50.0, "width_mm": 120.0}),
