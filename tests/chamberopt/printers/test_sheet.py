@@ -226,6 +226,8 @@ def test_what_forbids_to_use_it_is_in_red(folder: Path) -> None:
     metrics["p05_coverage"] = Estimate(0.5, math.inf, in_words="not resolved")
     (told,) = [text for text in alarms(result) if "Too few dents" in text]
     assert metric_label("p05_coverage").text in told
+    metrics["strength_um"] = metrics["p05_coverage"]
+    assert [text for text in alarms(result) if "Too few dents" in text] == [told]  # no strips
     content = process_sheet(result, (50.0,)).sections[0].content
     assert content[0] == Sentence(told, "warning")
     (wide,) = [
