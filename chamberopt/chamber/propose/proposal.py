@@ -38,6 +38,8 @@ from chamberopt.chamber.propose.proposed_target import (
     shape_for,
     surfaces,
 )
+from chamberopt.chamber.propose.proposed_tolerances import REASON as OF_LENGTHS
+from chamberopt.chamber.propose.proposed_tolerances import propose_tolerances
 from chamberopt.chamber.propose.shop import Shop, usual_shop
 from chamberopt.chamber.reach import Reach, reached_part_share
 from chamberopt.chamber.scene import MAX_BALLS
@@ -637,9 +639,10 @@ def _checked(
     diameter, ball_mass = design.shot.diameter, design.shot.ball_mass
     mass_g, reason = propose_charge(face, diameter, ball_mass)
     tables = {**tables, "shot": {**tables["shot"], "mass_g": mass_g}}
+    tables["tolerances"] = propose_tolerances(tables)
     design = validate(Design, _nested(tables))
     reach = shot_reach(design, chamber)
-    reasons = {**reasons, "shot.mass_g": f"{reason}: {design.shot.count}"}
+    reasons = {**reasons, "shot.mass_g": f"{reason}: {design.shot.count}", "tolerances": OF_LENGTHS}
     found = tuple(warnings(design, chamber, reach))
     if math.isinf(floor.lean):
         found = (f"chamber: {floor.reason}", *found)

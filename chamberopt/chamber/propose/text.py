@@ -56,7 +56,8 @@ def design_text(proposal: Proposal, folder: Path, left_out: Sequence[LeftOut] = 
     for table, values in tables.items():
         reason = proposal.reasons.get(table)
         lines += ["", f"[{table}]" + (f"  # {one_line(reason)}" if reason else "")]
-        lines += _values(values, table, proposal.reasons)
+        quoted = {f'"{key}"' if "." in key else key: one for key, one in values.items()}
+        lines += _values(quoted, table, proposal.reasons)
         if table == "part.target":
             lines += _left_out(left_out)
             lines += _choices(proposal.known)
