@@ -247,7 +247,7 @@ def test_a_pilot_that_cannot_run_leaves_the_starts_and_says_so(
     assert "warning: no pilot, treatment and simulated time are starts" in capfd.readouterr().err
     assert "a start, NOT MEASURED by a pilot" in Path("box/design.toml").read_text("utf-8")
 
-    measured = Measured(1e5, 1e4, 250.0, True, 60.0, True, 0.01, 5e-3, 6.4)
+    measured = Measured(1e5, 1e4, 250.0, True, 60.0, True, 0.01, 5e-3, 6.4, 200.0)
     monkeypatch.setattr("chamberopt.simulation.budget_pilot.measure_budget", lambda *_: measured)
     assert main(["new", "box.stl", "--unit", "mm", "--out", "piloted"]) == 0
     process = load_design("piloted/design.toml").process
