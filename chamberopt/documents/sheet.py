@@ -330,6 +330,8 @@ def _fixtures(result: Result) -> Iterator[Row]:
     if holder is not None and holder.kind == "bore":
         play = f"{plain(holder.clearance_mm)} mm of clearance all round"
         yield "holder", f"the part's own end in a bore, {play if holder.clearance_mm else 'tight'}"
+    if holder is None and not result.record.chamber.pieces_in_air:
+        yield "holder", "none: the part goes out through the wall; clamp it there"
     for name, one in result.record.chamber.fixtures.items():
         size = size_in_words(one.kind, one.size_mm)
         text = f"{one.kind} {size or 'up to the wall'}"
