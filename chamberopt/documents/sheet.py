@@ -332,6 +332,8 @@ def _fixtures(result: Result) -> Iterator[Row]:
         yield "holder", f"the part's own end in a bore, {play if holder.clearance_mm else 'tight'}"
     if holder is None and not result.record.chamber.pieces_in_air:
         yield "holder", "none: the part goes out through the wall; clamp it there"
+    mask = result.design.mask
+    faces = {"holder": holder.at if holder else None, "mask": mask.at if mask else None}
     for name, one in result.record.chamber.fixtures.items():
         size = size_in_words(one.kind, one.size_mm)
         text = f"{one.kind} {size or 'up to the wall'}"
@@ -343,7 +345,9 @@ def _fixtures(result: Result) -> Iterator[Row]:
                 for three in (one.place_mm, holder.axis)
             )
             text += f", from ({at}) mm along ({along}) in the chamber's frame"
-        yield name, f"{text}, on {plain(one.covered_mm2, 3)} mm² of the part"
+        chosen = faces[name]
+        where = f" ({', '.join(chosen.surface)})" if chosen and chosen.surface else ""
+        yield name, f"{text}, on {plain(one.covered_mm2, 3)} mm² of the part{where}"
 
 
 def _key_row(key: str, value: Any) -> Row:
