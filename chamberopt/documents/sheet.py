@@ -346,7 +346,7 @@ def _fixtures(result: Result) -> Iterator[Row]:
             )
             text += f", from ({at}) mm along ({along}) in the chamber's frame"
         chosen = faces[name]
-        where = f" ({', '.join(chosen.surface)})" if chosen and chosen.surface else ""
+        where = f" ({', '.join(chosen.surface)})" if chosen and chosen.surface != ("all",) else ""
         yield name, f"{text}, on {plain(one.covered_mm2, 3)} mm² of the part{where}"
 
 
