@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -44,34 +44,42 @@ def section_planes(chamber: Chamber) -> list[SectionPlane]:
     """Return one plane that shows the part best, or two across each other if one does not do.
 
     Of planes that show the part about alike, the one through the chamber's axis is taken, along the
-    longer side of the chamber.
+    longer side of the chamber. Planes that miss the target are taken only if all do.
     """
     size = np.ptp(chamber.vertices, axis=0)
     longer = int(size[1] > size[0] + 1e-3 * SAME)
     found = [_planes(chamber, right) for right in (longer, 1 - longer)]
-    largest = max(area for planes in found for _, area in planes) or 1.0
+    showing = [[one for one in planes if one.target] for planes in found]
+    found = [planes for planes in showing if planes] or found
+    largest = max(one.area for planes in found for one in planes) or 1.0
     best = [_best_plane(planes, largest) for planes in found]
     top = max(score for _, score in best)
     planes = [plane for plane, _ in sorted(best, key=lambda one: one[1] < AS_GOOD * top)]
     return planes[: 1 if planes[0].span >= ENOUGH else 2]
 
 
-def _best_plane(
-    planes: list[tuple[SectionPlane, float]], largest: float
-) -> tuple[SectionPlane, float]:
+class _Cut(NamedTuple):
+    """A plane, the area of the part in it [m²], and whether it meets the target."""
+
+    plane: SectionPlane
+    area: float
+    target: bool
+
+
+def _best_plane(planes: list[_Cut], largest: float) -> tuple[SectionPlane, float]:
     """Return the best of parallel planes with its score: the first if it is about as good.
 
     Args:
-        planes: planes, and the area of the part in each.
+        planes: the planes.
         largest: largest of all these areas, and of those of the planes across.
     """
-    scored = [(plane, plane.span + AREA * area / largest) for plane, area in planes]
+    scored = [(one.plane, one.plane.span + AREA * one.area / largest) for one in planes]
     best = max(scored, key=lambda one: one[1])
     return scored[0] if scored[0][1] >= AS_GOOD * best[1] else best
 
 
-def _planes(chamber: Chamber, right: int) -> list[tuple[SectionPlane, float]]:
-    """Return parallel planes through the part with its area in each [m²].
+def _planes(chamber: Chamber, right: int) -> list[_Cut]:
+    """Return parallel planes through the part.
 
     The plane through the chamber's axis is the first if it meets the part there, else the plane
     through the middle of the part in the chamber.
@@ -83,13 +91,14 @@ def _planes(chamber: Chamber, right: int) -> list[tuple[SectionPlane, float]]:
     places = [middle, *np.linspace(low, high, TRIED + 2)[1:-1]]
     whole, found = np.ptp(part.vertices[:, [right, 2]], axis=0), []
     for at in places:
-        lines, _ = cut(part.vertices, part.triangles, other, at)
+        lines, cut_ones = cut(part.vertices, part.triangles, other, at)
         ends = lines.reshape(-1, 2)
         span = float(np.prod(np.ptp(ends, axis=0) / whole)) if len(ends) else 0.0
         # The lines go round the part, so that the shoelace formula holds without their order.
         (x1, y1), (x2, y2) = lines[:, 0].T, lines[:, 1].T
         area = 0.5 * abs(float(np.sum(x1 * y2 - x2 * y1)))
-        found.append((SectionPlane(right, 1e3 * float(at), span), area))
+        plane = SectionPlane(right, 1e3 * float(at), span)
+        found.append(_Cut(plane, area, bool(part.target[cut_ones].any())))
     return found
 
 

@@ -267,6 +267,15 @@ def test_the_metal_says_how_surely_its_hardness_is_known(folder: Path) -> None:
     assert metal(alloy="54SiCr6", hardness_HB=530) == "54SiCr6, 530 HB, as given"
 
 
+def test_the_section_shows_the_target() -> None:
+    """No plane along x meets the faces of a cube at y = 10 and -10 mm; those across do."""
+    cube = trimesh.creation.box((20e-3, 20e-3, 20e-3))
+    chamber = chamber_round(cube)
+    across = np.ptp(chamber.part.vertices[chamber.part.triangles][..., 1], axis=1) < 1e-9
+    (plane,) = section_planes(replace(chamber, part=replace(chamber.part, target=across)))
+    assert plane.right == 1
+
+
 def test_the_section_shows_the_part() -> None:
     """One plane along a bar beside the axis; two for bars across each other, apart."""
     bar = trimesh.creation.box((40e-3, 4e-3, 4e-3))
