@@ -93,7 +93,8 @@ def _as_wide_as_high(sizes: Sizes, shop: Shop) -> Sizes:
         return sizes
     wanted = float(sizes.plan["diameter_mm"])
     carried = max(one.sides_mm[1] for one in shop.sonotrodes)
-    wider = max(wanted, min(math.floor(1e3 * sizes.height), carried))
+    most = min(carried, *(shop.largest_chamber_mm or (carried,))[:2])
+    wider = max(wanted, min(math.floor(1e3 * sizes.height), most))
     return replace(sizes, plan={"diameter_mm": wider}, gap=sizes.gap + 5e-4 * (wider - wanted))
 
 

@@ -58,6 +58,13 @@ def test_a_floor_lies_within_the_face_of_a_sonotrode(
     assert "clear" in found.reason
 
 
+def test_a_room_is_no_wider_than_the_largest_chamber() -> None:
+    own = shop(DISC, largest_chamber_mm=[45.0, 46.0, 60.0])
+    found = floor({"diameter_mm": 30.0}, "cylinder", own)
+    assert found.sizes.plan == {"diameter_mm": 45.0}
+    assert found.sizes.gap == pytest.approx(0.01 + 7.5e-3)
+
+
 @pytest.mark.parametrize(
     ("plan", "shape"),
     [({"diameter_mm": 74.0}, "cylinder"), ({"length_mm": 60.0, "width_mm": 36.0}, "box")],
