@@ -16,8 +16,8 @@ from chamberopt.chamber.propose.proposal import REPLICAS, Proposal, touched_shar
 DENTS, MARGIN = 25.0, 1.3  # needed in a window; over what is needed, as a pilot is short
 COVERED = 0.95  # share of the target's area whose time to 98 % counts
 SLOWER = 2.0  # times as slow as the start: candidates of a search that are still resolved
-# Of all replicas, for MINUTES on two cores, with 1.2 times as many at the ends of friction and other
-# ranges: 0.5e5 (4,000 balls) to 1.1e5 (160 balls) in a second of a core were measured.
+# Of all replicas, for MINUTES on two cores, with 1.2 times as many at the ends of friction and of
+# other ranges: 0.5e5 (4,000 balls) to 1.1e5 (160 balls) in a second of a core were measured.
 COLLISIONS = 2e7
 MINUTES = 6.0
 LEAST_TIME, MOST_TIME = 0.1, 1000.0  # s, of each replica
