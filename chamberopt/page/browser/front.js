@@ -13,9 +13,8 @@ async function show(part = "") {
   find("part").replaceChildren(element("option", { value: "", textContent: "choose…" }), ...here.parts.map(option));
   find("here").hidden = !here.parts.length;
   find("part").value = part;
-  for (const [id, names] of [["material", here.alloys], ["shape", here.shapes], ["shop", here.shops]])
+  for (const [id, names] of [["material", here.alloys], ["shot", here.balls], ["shape", here.shapes], ["shop", here.shops]])
     find(id).replaceChildren(find(id).options[0], ...names.map(option));
-  find("shot").replaceChildren(...here.balls.map(option));
   find("of-shop").hidden = !here.shops.length;
   find("designs").hidden = !here.designs.length;
   find("designs").querySelector("ul").replaceChildren(...here.designs.map((name) => {
