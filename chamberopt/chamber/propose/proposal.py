@@ -148,7 +148,7 @@ USUAL_PART, WALL, SONOTRODE = "42CrMo4", "100Cr6", "Ti-6Al-4V"  # of the catalog
 STEEL, HARD, HARDER = "steel", "tungsten_carbide", 1.25
 MOST_HOLDERS = 6  # that are tried
 HIDDEN = 0.005  # share of the target that a holder may keep from the balls
-LEAST_LEFT, MOST_LEFT = 0.02, 0.15  # share of the target that is left out if no ball touches it
+LEAST_LEFT, MOST_LEFT = 0.005, 0.15  # share of the target that is left out if no ball touches it
 NO_PLACE = (
     "no flat face beside the target looks up or aside and has room for a holder",
     "all of it is to be peened; leave out of [part.target] the face to hold it by",
