@@ -52,11 +52,16 @@ class Metric:
 
 @dataclass(frozen=True)
 class ObjectiveFunction:
-    """A weighted sum of metrics that a study maximises."""
+    """A weighted sum of metrics, and of numbers of the design, that a study maximises."""
 
     name: str
     summary: str
-    terms: dict[str, float]  # weight of each metric, by its name
+    terms: dict[str, float]  # weight of each metric or number, by its name
+
+    @property
+    def is_exact(self) -> bool:
+        """Whether it is of numbers of the design alone, which no simulation has to find."""
+        return not any(find_metric(name) for name in self.terms)
 
 
 def exposed_target(chamber: Chamber) -> np.ndarray:
@@ -223,10 +228,21 @@ def find_metric(name: str) -> Metric | None:
     return replace(metric, name=name, summary=summary, required=False)
 
 
+def is_number(name: str) -> bool:
+    """Return whether a name may be that of a number of a design, such as shot.mass_g."""
+    return "." in name and find_metric(name) is None
+
+
 def metric_problem(design: Design, name: str) -> str:
-    """Return the reason why a design lacks the named metric, or "" if the design has it."""
+    """Return the reason why a design lacks the named metric or number, or "" if it has it."""
     metric = find_metric(name)
     if metric is None:
+        if is_number(name):
+            try:
+                design.value(name)
+            except InputError as error:
+                return str(error).removeprefix(f"{name}: ")
+            return ""
         return f"not a metric; {toml_errors.did_you_mean(name, METRICS)}"
     zone, zones = name.rpartition(".")[0], [one.name for one in design.zones]
     if zone and zone not in zones:
@@ -259,6 +275,11 @@ OBJECTIVES = {
             {"time_to_98_s": -1.0},
         ),
         ObjectiveFunction(
+            "minus_treatment_time_s",
+            "treatment time that meets all limits, the shorter the better",
+            {"process.treatment_time_s": -1.0},
+        ),
+        ObjectiveFunction(
             "intensity_uniformity",
             "how even the peening strength is over the target",
             {"intensity_uniformity": 1.0},
@@ -274,8 +295,8 @@ def renamed_objective(old: str) -> str:
 
 
 def parse_objective(name: str) -> ObjectiveFunction:
-    """Return the objective of this name, or the objective that a weighted sum of objectives and
-    metrics describes.
+    """Return the objective of this name, or the objective that a weighted sum of objectives,
+    metrics and numbers of a design describes.
 
     >>> parse_objective("1 uniform_coverage + -0.001 time_to_98_s").terms
     {'mean_coverage': 1.0, 'std_coverage': -1.0, 'time_to_98_s': -0.001}
@@ -292,7 +313,8 @@ def parse_objective(name: str) -> ObjectiveFunction:
         weight, _, part = term.partition(" ")
         try:
             factor = float(weight)
-            of_part = {part: 1.0} if find_metric(part) else OBJECTIVES[part].terms
+            is_term = find_metric(part) or is_number(part)
+            of_part = {part: 1.0} if is_term else OBJECTIVES[part].terms
         except (ValueError, KeyError):
             raise InputError(
                 f"objective.name: {name!r} is not an objective; allowed: {', '.join(OBJECTIVES)}"
@@ -324,7 +346,9 @@ def highest_objective(name: str, reachable: float) -> float:
     highest = 0.0
     for metric, weight in terms.items():
         limits = find_metric(metric)
-        if weight and limits:
+        if limits is None:
+            return math.inf
+        if weight:
             best = known.get(metric, limits.highest) if weight > 0.0 else limits.lowest
             highest += weight * best
     return highest

@@ -67,6 +67,12 @@ STOP_REASONS = {
     "max_replicas": "the largest allowed number; the requested accuracy was not reached",
     "points": "more would bring nothing: the error is in the choice of the windows' points",
 }
+ENDS = {  # by the reasons in search/optimiser/point_search.py
+    "budget": "as its evaluations were spent",
+    "values": "as all values of [vary] were evaluated",
+    "converged": "as it found no new candidates",
+    "gain": "as nothing was left to gain that counts",
+}
 COLLISIONS = {
     "walls": "with walls and part",
     "balls": "between balls",
@@ -211,6 +217,7 @@ def _cost_of_study(study: StudyRecord, trials: Sequence[Trial]) -> dict[str, str
         "of these not simulated": _count(study.failed),
         "of these told enough in a few replicas": _count(study.ended_early),
         "of these miss a constraint": _count(study.missing_a_constraint),
+        "the search ended": ENDS.get(study.ended_by or "", "not known"),
         "confirmations": _count(sum(one.stage == "confirm" for one in trials)),
         "run time of all": f"{plain(study.seconds, 3)} s",
     }

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from chamberopt.common import number_text
 from chamberopt.common.errors import InputError
 from chamberopt.common.estimate import Estimate
-from chamberopt.coverage.metrics import OBJECTIVES, find_metric, parse_objective
+from chamberopt.coverage.metrics import OBJECTIVES, find_metric, is_number, parse_objective
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ def metric_label(name: str) -> Label:
     """Return the label of the metric `name`. Shares of the surface are shown in per cent."""
     metric = find_metric(name)
     if metric is None:
-        return Label(name.replace("_", " "))
+        return Label(name if is_number(name) else name.replace("_", " "))
     if name.endswith("_coverage"):
         return Label(metric.summary, "%", 100.0)
     return Label(metric.summary, "" if metric.unit == "balls" else metric.unit)  # "number of balls"

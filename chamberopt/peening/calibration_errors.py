@@ -26,9 +26,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 from chamberopt.common.estimate import FIRST_OF_CALIBRATION, Estimate
-from chamberopt.coverage.metrics import parse_objective
 from chamberopt.design.calibration import TIME_ERROR, Parameter
-from chamberopt.simulation.estimates import weighted_sum
+from chamberopt.simulation.estimates import objective_estimate
 from chamberopt.simulation.replicas import ReplicaSet
 from chamberopt.simulation.variations import RunsProgress, Variations
 
@@ -106,7 +105,7 @@ def with_open_errors(runs: Variations) -> Evaluation:
         found,
         metrics=metrics,
         metrics_of_wide={name: figures[WIDE + name] for name in found.metrics_of_wide},
-        objective=weighted_sum(parse_objective(found.objective_name), metrics),
+        objective=objective_estimate(found.objective_name, metrics, runs.design),
         notes=(*found.notes, note),
     )
 

@@ -298,6 +298,9 @@ class StudyRecord(Table):
     vary: dict[str, Ends]
     evaluations: Count
     ended_early: Count
+    ended_by: str | None = None  # why the search ended; None if not known
+    possible_gain: Positive | None = None  # what was left to gain at most; None if not known
+    counts: Positive = 0.0  # smallest gain that counts; 0 if any does
     accuracy: Accuracies
     failed: Count
     missing_a_constraint: Count

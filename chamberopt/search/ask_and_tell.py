@@ -17,7 +17,7 @@ import math
 import time
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -26,6 +26,7 @@ import numpy as np
 from chamberopt.common.errors import InputError, UnreadableError
 from chamberopt.common.estimate import Estimate
 from chamberopt.common.progress import Progress
+from chamberopt.coverage.metrics import highest_objective
 from chamberopt.search.candidate import (
     Candidate,
     ConfirmedCandidate,
@@ -37,7 +38,7 @@ from chamberopt.search.candidate import (
 from chamberopt.search.judge import Judge
 from chamberopt.search.observe import FIRST_OBJECTIVE, observe
 from chamberopt.search.optimiser.acquisition import recommend_points
-from chamberopt.search.optimiser.point_search import PARETO_PHASES, PointSearch
+from chamberopt.search.optimiser.point_search import PARETO_PHASES, End, PointSearch
 from chamberopt.search.optimiser.scalarisation import draw_weights
 from chamberopt.search.optimiser.search_model import POINTS_PER_PARAMETER, Observations, SearchModel
 from chamberopt.search.study.constraints import NOT_KNOWN, assess_feasibility
@@ -153,7 +154,7 @@ class Search:
                 the start has no figures.
         """
         self._require_turn(candidate)
-        given = self._read(answer)
+        given = self._read(candidate, answer)
         if candidate.is_start and isinstance(given, InputError):
             text = f"tell: the design as it is has no figures ({given}), which all others are"
             raise InputError(f"{text} compared with; change the design")
@@ -170,6 +171,26 @@ class Search:
     def phases(self) -> str:
         """The algorithms that the search has used in turn, e.g. "sobol, then surrogate"."""
         return ", then ".join(self._search.phases)
+
+    @property
+    def counts(self) -> float:
+        """Smallest gain of the objective that counts; 0 with two objectives."""
+        return self._judge.counts
+
+    @property
+    def possible_gain(self) -> float:
+        """What may still be gained at most, by the search's model or the objective's definition."""
+        return min(self._search.possible_gain, self._below_highest)
+
+    @property
+    def ended_by(self) -> End:
+        """Why a search that has ended did so."""
+        return "gain" if self._below_highest < self.counts else self._search.ended_by
+
+    @property
+    def _below_highest(self) -> float:
+        """How far the best objective so far is, at most, below what no design exceeds."""
+        return highest_objective(self._study.objective.goals[0], 1.0) - self._best_low
 
     @property
     def best(self) -> ConfirmedCandidate:
@@ -205,7 +226,8 @@ class Search:
         if weight is None:
             weight = draw_weights(self._study.optimizer.seed, len(self._search.points))
         searched = [trial for trial in self.trials if trial.stage == "search"]
-        return observe(searched, self._study.all_constraints, weight)
+        seen = observe(searched, self._study.all_constraints, weight)
+        return replace(seen, counts=self.counts)
 
     @cached_property
     def objective_model(self) -> SearchModel | None:
@@ -247,7 +269,7 @@ class Search:
         return Candidate(number, stage, point, self.space, replicas, first, bar)
 
     def _begin_search(self) -> Iterator[Candidate | None]:
-        while (point := self._search.ask()) is not None or self._asked:
+        while (point := self._next_point()) is not None or self._asked:
             if point is None:
                 yield None
             else:
@@ -257,11 +279,15 @@ class Search:
                 yield self._candidate("search", point, first=few, bar=bar)
         yield from self._confirm()
 
+    def _next_point(self) -> np.ndarray | None:
+        """Return the next point (d,) of the search; None if there is none yet, or none any more."""
+        return None if self._below_highest < self.counts else self._search.ask()
+
     @property
     def _best_low(self) -> float:
-        """What the best objective so far is at least: the highest lower end of all intervals."""
-        lows = (t.objective.low for t in self.trials if t.feasible and t.objective)
-        return max(lows, default=-np.inf)
+        """What the search's best objective is at least: the highest lower end of all intervals."""
+        searched = (one for one in self.trials if one.stage == "search" and one.feasible)
+        return max((one.objective.low for one in searched if one.objective), default=-np.inf)
 
     def _confirm(self) -> Iterator[Candidate | None]:
         """Ask for the start and the best candidates with new seeds and the design's own accuracy.
@@ -378,7 +404,7 @@ class Search:
         if asked.recorded is not None:
             in_file = candidate.stage == "confirm" and asked.recorded.objective is not None
             found = self._folder.evaluation(asked.recorded) if self._folder and in_file else None
-            asked.answer = self._read(found or asked.recorded.reason)
+            asked.answer = self._read(candidate, found or asked.recorded.reason)
         elif candidate.stage != "sweep" and not candidate.is_start:  # workers make those of a sweep
             asked.answer = _why_impossible(candidate)
         return asked
@@ -398,9 +424,9 @@ class Search:
             "tell in the order of ask"
         )
 
-    def _read(self, answer: Answer) -> Figures | InputError:
+    def _read(self, candidate: Candidate, answer: Answer) -> Figures | InputError:
         if isinstance(answer, Evaluation):
-            return simulated_figures(self._study, answer)
+            return simulated_figures(self._study, candidate, answer)
         if isinstance(answer, Mapping):
             return self._judge.measured(answer)
         return InputError(answer) if isinstance(answer, str) else answer

@@ -13,7 +13,7 @@ import numpy as np
 
 from chamberopt.common.errors import InputError, UnreadableError, WorkerLostError
 from chamberopt.common.estimate import Estimate, paired_difference
-from chamberopt.coverage.metrics import highest_objective, parse_objective
+from chamberopt.coverage.metrics import highest_objective
 from chamberopt.search.study.constraints import (
     FEASIBLE,
     INFEASIBLE,
@@ -23,7 +23,7 @@ from chamberopt.search.study.constraints import (
     exact,
 )
 from chamberopt.simulation.effort import narrows
-from chamberopt.simulation.estimates import weighted_sum
+from chamberopt.simulation.estimates import objective_estimate
 from chamberopt.simulation.evaluation import Evaluation
 
 if TYPE_CHECKING:
@@ -83,10 +83,10 @@ class Figures:
     evaluation: Evaluation | None = field(default=None, repr=False)
 
 
-def simulated_figures(study: Study, evaluation: Evaluation) -> Figures:
+def simulated_figures(study: Study, candidate: Candidate, evaluation: Evaluation) -> Figures:
     """Return the objectives and metrics of a simulated candidate from its evaluation."""
     metrics, (_, *others) = evaluation.metrics, study.objective.goals
-    more = (weighted_sum(parse_objective(name), metrics) for name in others)
+    more = (objective_estimate(name, metrics, candidate.design) for name in others)
     return Figures((evaluation.objective, *more), metrics, evaluation.replicas, evaluation)
 
 
@@ -186,7 +186,7 @@ class CandidateEvaluator:
 
         try:
             evaluation = self._evaluate(candidate)
-            goals = simulated_figures(self._study, evaluation).goals
+            goals = simulated_figures(self._study, candidate, evaluation).goals
             if not all(math.isfinite(goal.value) for goal in goals):
                 raise InputError(f"its objective is {goals[0].value}, not a number to compare")
         except (InputError, SceneError, SimulationError) as error:
@@ -235,7 +235,7 @@ class CandidateEvaluator:
         """
         if candidate.bar is not None and found.objective.high < candidate.bar:
             return True
-        figures = simulated_figures(self._study, found)
+        figures = simulated_figures(self._study, candidate, found)
         limits = self._study.all_constraints
         limited = limited_figures(self._study, candidate, figures)
         if candidate.stage == "confirm" and not found.resolution.has_places:

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 # Score of a candidate that cannot be simulated: this many units of the objective below the start.
 # It is finite, because NLopt's models fail with inf and NaN.
 FAILURE_PENALTY = 2.0
+COUNTS = 0.01  # gain that counts, in units of the objective, if the design asks for no accuracy
 
 
 class Judge:
@@ -46,6 +47,18 @@ class Judge:
         """Names of the figures that a candidate must have: objectives, and metrics with limits."""
         limited = (name for name in self._study.all_constraints if find_metric(name))
         return tuple(dict.fromkeys((*self._study.objective.goals, *limited)))
+
+    @property
+    def counts(self) -> float:
+        """Smallest gain of the objective that counts; 0 with two objectives, where any may.
+
+        It is the accuracy that the design asks for, else COUNTS, in units of the start's objective:
+        a share of 1, or of the start's time.
+        """
+        if len(self._study.objective.goals) > 1:
+            return 0.0
+        wanted = self._study.design.process.accuracy.objective_half_width
+        return (wanted or COUNTS) * self.unit
 
     def measured(self, told: Mapping[str, Estimate | float]) -> Figures:
         """Return the figures of a candidate that was measured instead of simulated.

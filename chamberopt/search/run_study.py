@@ -18,12 +18,13 @@ from chamberopt.common.errors import InputError, WorkerLostError
 from chamberopt.common.estimate import Estimate, estimate, paired_difference
 from chamberopt.common.files import write_text
 from chamberopt.common.progress import Progress
-from chamberopt.coverage.metrics import find_metric, parse_objective
+from chamberopt.coverage.metrics import parse_objective
 from chamberopt.design.load import save_design
 from chamberopt.peening.calibration_errors import evaluate_calibrated
 from chamberopt.search.ask_and_tell import Search
 from chamberopt.search.candidate import Candidate, CandidateEvaluator, ConfirmedCandidate, Simulator
 from chamberopt.search.optimiser.gaussian_process import one_thread
+from chamberopt.search.optimiser.point_search import End
 from chamberopt.search.sensitivity import Sensitivity, analyse_sensitivity
 from chamberopt.search.study.constraints import NOT_KNOWN
 from chamberopt.search.study.parameters import bound_at
@@ -42,7 +43,6 @@ Outcome = Evaluation | InputError
 Stop = Callable[[], bool]
 """Returns True when the user wants to stop the study."""
 
-COUNTS = 0.01  # gain of an objective from 0 to 1 that counts, if the design asks for no accuracy
 TOLERANCES = (
     "what the [tolerances] do to the best design: chamberopt simulate best.toml --tolerances"
 )
@@ -66,6 +66,11 @@ class StudyResult:
     confirmed: tuple[ConfirmedCandidate, ...]
     best: ConfirmedCandidate
     gain: Estimate  # objective of best minus start, from these paired replicas
+    ended_by: End  # why the search ended
+    counts: float  # smallest gain of the objective that counts; 0 if any does
+    # What more might have been gained at most, by the search's last model or the definition of the
+    # objective; infinite if neither tells.
+    possible_gain: float
     seconds: float  # wall-clock time of all evaluations, earlier runs included
     # Target of all candidates, shape (m,) bool, if the start determines it; None if each design
     # has its own.
@@ -74,8 +79,8 @@ class StudyResult:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Sentences on how tolerances changed the search, on best values at their bounds, and on a
-        start from which nothing is left to gain.
+        """Sentences on how tolerances changed the search, on best values at their bounds, and on
+        what is not left to gain.
         """
         lost = self.best.lost_to_tolerances
         which = "mean" if self.study.objective.over_tolerances == "mean" else "worst value"
@@ -90,21 +95,36 @@ class StudyResult:
 
     @property
     def _nothing_left(self) -> tuple[str, ...]:
-        """A sentence if no candidate is better than the start by what counts; else nothing."""
-        process, goals = self.study.design.process, self.study.objective.goals
-        counts = process.accuracy.objective_half_width or COUNTS
-        metrics = map(find_metric, parse_objective(goals[0]).terms)
-        of_shares = all(metric is not None and metric.highest <= 1.0 for metric in metrics)
-        if len(goals) > 1 or not of_shares or not self.gain.high < counts:
+        """A sentence if the search ended because no more could be gained, or if no candidate is
+        better than the start by what counts; else nothing.
+        """
+        counts, ended = self.counts, ""
+        if self.ended_by == "gain":
+            tried = sum(one.stage == "search" for one in self.trials)
+            ended = (
+                f"the search ended after {tried} candidates, as nothing within [vary] can be "
+                f"better than its best by more than {max(self.possible_gain, 0.0):.2g} (95 % sure)"
+            )
+        elif self.gain.high < counts:
+            most = max(self.gain.high, 0.0)
+            ended = f"no confirmed candidate is better than the start by more than {most:.2g}"
+        if not ended:
             return ()
-        time, soon = self.best.figures.metrics.get("time_to_98_s"), ""
-        if time is not None and time.has_number and time.high < process.treatment_time:
-            soon = f": it has full coverage after {time.value:.2g} of {process.treatment_time:g} s"
+        reason = f"{ended}, and less than {counts:.2g} does not count"
+        if not self.gain.high < counts:  # the search has gained all there is
+            return (reason,)
+        return (f"nothing left to gain here: {reason}; {self._instead}",)
+
+    @property
+    def _instead(self) -> str:
+        """What to ask for in the place of a gain that is not there."""
+        time = self.best.figures.metrics.get("time_to_98_s")
+        treatment = self.best.design.process.treatment_time
+        if time is None or not time.has_number or not time.high < treatment:
+            return "vary other parameters, or widen [vary]"
         return (
-            f"nothing left to gain here: no confirmed candidate is better than the start by more "
-            f"than {max(self.gain.high, 0.0):.2g}, and less than {counts:g} does not count; the "
-            "best may take less time or shot instead, which a study of minus_time_to_98_s finds "
-            f"(study.toml of chamberopt new){soon}",
+            f"it has full coverage after {time.value:.2g} of {treatment:g} s: ask for the shortest "
+            "time (objective minus_treatment_time_s), or how little shot or amplitude will do"
         )
 
     @property
@@ -170,7 +190,9 @@ def run_study(
     finally:  # after an error those that run are not waited for
         threads.shutdown(wait=False, cancel_futures=True)
     folder.recorded.require_end(len(search.trials))
-    best, start, model = search.best, search.confirmed[0], search.objective_model
+    best, start = search.best, search.confirmed[0]
+    # What an exact objective needs no model for is not what the parameters do to its limits.
+    model = None if parse_objective(study.objective.goals[0]).is_exact else search.objective_model
     is_gain = best is not start
     gain = paired_difference(best.goals[0], start.goals[0]) if is_gain else Estimate(0.0, 0.0)
     if is_gain and not (best.goals[0].has_number and start.goals[0].has_number):
@@ -185,6 +207,9 @@ def run_study(
         confirmed=search.confirmed,
         best=best,
         gain=gain,
+        ended_by=search.ended_by,
+        counts=search.counts,
+        possible_gain=search.possible_gain,
         seconds=folder.seconds,
         target=target,
         sensitivity=analyse_sensitivity(model, search.space, values, noise) if model else None,

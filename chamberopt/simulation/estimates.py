@@ -356,6 +356,16 @@ def strength_notes(
     )
 
 
+def objective_estimate(name: str, metrics: Mapping[str, Estimate], design: Design) -> Estimate:
+    """Return the estimate of an objective of a design. Its numbers are exact in all replicas."""
+    objective, known = parse_objective(name), dict(metrics)
+    count = max(len(one.pseudovalues) for one in metrics.values())
+    for term in objective.terms.keys() - known.keys():
+        value = design.value(term)
+        known[term] = Estimate(value, 0.0, (value,) * count)
+    return weighted_sum(objective, known)
+
+
 def weighted_sum(objective: ObjectiveFunction, metrics: dict[str, Estimate]) -> Estimate:
     """Return the estimate of an objective, the weighted sum of metrics.
 

@@ -25,17 +25,17 @@ from chamberopt.coverage.field.target_field import (
     require_touchable_zones,
     require_wide_gauge,
 )
-from chamberopt.coverage.metrics import parse_objective, require_metrics, require_target
+from chamberopt.coverage.metrics import require_metrics, require_target
 from chamberopt.simulation.effort import Effort
 from chamberopt.simulation.estimates import (
     SeenDents,
     estimate_metrics,
     estimate_zones,
     growth_for_dents,
+    objective_estimate,
     reach_notes,
     resolution_notes,
     strength_notes,
-    weighted_sum,
 )
 from chamberopt.simulation.evaluation import Evaluation
 from chamberopt.simulation.replicas import (
@@ -164,7 +164,7 @@ class _Run:
         found = estimate_metrics(target, hits, self.chamber, design)
         of_zones, zone_notes = estimate_zones(zones, hits, self.chamber, design)
         metrics = found.metrics | of_zones
-        objective = weighted_sum(parse_objective(plan.objective_name), metrics)
+        objective = objective_estimate(plan.objective_name, metrics, design)
         self.timings["simulate"] += simulated - began
         self.timings["coverage"] += time.perf_counter() - simulated
         field, done = target.field, len(replicas)

@@ -14,6 +14,10 @@ beliefs", INFORMS J. Comput. 21 (2009) 599. Notation (shape, name in the code):
     u      standard deviation of a score at x        (k,)    scatter: sqrt(c(x, x) + noise)
     z      standard normal outcome of the evaluation (16,)   outcomes: its quantiles
     KG(x)  mean over z of max(m(q) + c(x, q) z / u, m(x) + c(x, x) z / u) - max m(q)
+
+What may still be gained is at most max(m + 2 s) over all x less max(m - 2 s) over the points that
+were evaluated, s the model's standard deviation (A. Makarova et al., "Automatic Termination for
+Hyperparameter Optimization", Proc. 1st Int. Conf. on Automated Machine Learning, PMLR 188 (2022)).
 """
 
 from __future__ import annotations
@@ -42,6 +46,10 @@ CAUTION = 0.5
 # They are within the limits by MARGIN standard errors of an evaluation, with probability SURE: the
 # confirmation asks for its whole interval to be inside.
 MARGIN, SURE = 1.0, 0.8
+# How far the model may be wrong about what is left to gain, in its standard deviations; and the
+# probability of being within all limits below which a point promises nothing, and from which on it
+# counts as reached (benchmarks/stopping.py).
+DOUBT, UNLIKELY, LIKELY = 2.0, 0.05, 0.5
 SWAP = 0.3  # share of the levels beside a leader that are drawn anew
 STEP, TOLERANCE, MAX_CALLS = 0.05, 1e-3, 40
 
@@ -87,6 +95,22 @@ def recommend_points(model: SearchModel, seed: int) -> list[np.ndarray]:
         best_first = choices[np.argsort(-cautious_value(choices), kind="stable")]
         point = _rounded(_climb(cautious_value, best_first[:2], model.domain), model.domain)
     return [seen, point]
+
+
+def possible_gain(model: SearchModel, seed: int) -> float:
+    """Return by how much the best score may exceed the best of the evaluated points, at most.
+
+    The model is taken at its word up to DOUBT standard deviations. The gain is infinite if no
+    evaluated point is likely to be within all limits.
+    """
+    with one_thread():
+        reached = model.points[model.feasible(model.points) >= LIKELY]
+        if not len(reached):
+            return float("inf")
+        choices = _choices(model, np.random.default_rng(seed))
+        possible = np.vstack([reached, choices[model.feasible(choices) > UNLIKELY]])
+        (low, scatter), (high, doubt) = model.expected(reached), model.expected(possible)
+    return float((high + DOUBT * doubt).max() - (low - DOUBT * scatter).max())
 
 
 def _best(model: SearchModel) -> float:

@@ -6,15 +6,17 @@ evaluations, and each algorithm with its share of the budget is a phase of the s
 A search ends for one of these reasons:
 
 1. The budget is spent: what is left of `optimizer.evaluations` is less than a whole evaluation
-   (BudgetSpentError). A point that got only a few replicas, as it is clearly worse than the best
+   (SearchEndedError). A point that got only a few replicas, as it is clearly worse than the best
    point, costs a part of an evaluation. A point that cannot be simulated, or that geometry alone
    shows to be no better, costs nothing, until there are as many of these points as the budget.
 2. All points were evaluated, where every parameter has a finite number of values.
 3. It has converged: the last phase ends because the steps of its local algorithm are below
    `optimizer.tolerance` (nlopt_search.py), or rounds of local searches find no new point.
-4. The user stops it: run_study.py asks `stop()` before each evaluation, finishes those that run and
+4. Nothing is left to gain: by the model, no point is better than the best by as much as counts
+   (possible_gain in acquisition.py).
+5. The user stops it: run_study.py asks `stop()` before each evaluation, finishes those that run and
    raises KeyboardInterrupt. The study can be resumed.
-5. An error ends it: the start cannot be simulated, an algorithm cannot take the parameters, the
+6. An error ends it: the start cannot be simulated, an algorithm cannot take the parameters, the
    disk is full, or workers are lost. A candidate that cannot be simulated does not end it.
 
 A phase ends in the same ways, at its share of the budget.
@@ -25,14 +27,15 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Generator, Sequence
 from contextlib import closing, suppress
+from typing import Literal
 
 import numpy as np
 
-from chamberopt.search.optimiser.acquisition import propose_point
+from chamberopt.search.optimiser.acquisition import possible_gain, propose_point
 from chamberopt.search.optimiser.domain import Axis, Domain
 from chamberopt.search.optimiser.gaussian_process import MAX_POINTS
 from chamberopt.search.optimiser.nlopt_search import LOCAL, NloptThread
-from chamberopt.search.optimiser.search_model import Observations, SearchModel
+from chamberopt.search.optimiser.search_model import POINTS_PER_PARAMETER, Observations, SearchModel
 from chamberopt.search.study.schema import Optimizer, Phase
 
 # Two phases are not algorithms of NLopt: evenly spread points, and the model of the scores.
@@ -57,8 +60,12 @@ Wait = Generator[np.ndarray | None, None, None]
 """Yields points to evaluate, and None where it needs one more score first."""
 
 
-class BudgetSpentError(Exception):
-    """Raised inside an algorithm when the budget of its phase, or of the search, is spent."""
+End = Literal["budget", "values", "converged", "gain"]
+"""Why a search ended: reasons 1 to 4 above."""
+
+
+class SearchEndedError(Exception):
+    """Raised inside an algorithm when its phase, or the search, has no more points to evaluate."""
 
 
 class PointSearch:
@@ -68,7 +75,8 @@ class PointSearch:
     `settings.batch` at a time: the next point is proposed when all but the last `batch - 1` points
     have scores. Other algorithms take one point after another. The same seed and the same scores
     give the same search. `points` (d,) are all points that were asked for. `scores` are the scores
-    of the first of these points. `phases` are the algorithms that ran.
+    of the first of these points. `phases` are the algorithms that ran. `possible_gain` is what may
+    still be gained, at most, by the model's last look, and infinite before the first.
 
     Args:
         start: first point, shape (d,).
@@ -96,6 +104,7 @@ class PointSearch:
         self.points: list[np.ndarray] = []
         self.scores: list[float] = []
         self.phases: list[str] = []
+        self.possible_gain, self._counts = math.inf, 0.0
         self._steps = self._search([start, *begin_with])
 
     def ask(self) -> np.ndarray | None:
@@ -117,13 +126,22 @@ class PointSearch:
         self._costs.append(cost)
 
     @property
+    def ended_by(self) -> End:
+        """Why a search that has ended did so, if nobody stopped it."""
+        if self.possible_gain < self._counts:
+            return "gain"
+        if len(self.points) >= self._domain.size:
+            return "values"
+        return "budget" if self._whole_left(self._budget) < 1 else "converged"
+
+    @property
     def spent(self) -> float:
         """Cost of all points with scores, where an evaluation with all its replicas costs 1."""
         return sum(self._costs)
 
     def _search(self, first: Sequence[np.ndarray]) -> Wait:
         settings = self._settings
-        with closing(NloptThread(settings.seed)) as nlopt, suppress(BudgetSpentError):
+        with closing(NloptThread(settings.seed)) as nlopt, suppress(SearchEndedError):
             for point in first:
                 yield from self._evaluate(point, self._budget)
             for phase, end in self._plan():
@@ -187,8 +205,24 @@ class PointSearch:
             else:
                 is_rough = len(points) % ROUGH_STEP_INTERVAL == 0
                 factor = ROUGH_LENGTH_FACTOR if is_rough else 1.0
-                point = propose_point(SearchModel(self._domain, points, seen, factor), self._rng)
+                model = SearchModel(self._domain, points, seen, factor)
+                if not is_rough:
+                    self._require_gain(model, seen)
+                point = propose_point(model, self._rng)
             yield from self._evaluate(point, self._budget)
+
+    def _require_gain(self, model: SearchModel, seen: Observations) -> None:
+        """Raise SearchEndedError if nothing is left to gain that counts.
+
+        A model of fewer than POINTS_PER_PARAMETER points for each parameter does not tell.
+        """
+        if seen.counts and seen.simulated.sum() >= POINTS_PER_PARAMETER * len(self._domain):
+            self.possible_gain, self._counts = (
+                possible_gain(model, self._settings.seed),
+                seen.counts,
+            )
+            if self.possible_gain < self._counts:
+                raise SearchEndedError
 
     def _climb(self, algorithm: str, limit: int, step: float, nlopt: NloptThread) -> Wait:
         """Run an algorithm of NLopt from the best point so far, and yield each point to evaluate.
@@ -211,21 +245,21 @@ class PointSearch:
                     number = yield from self._evaluate(self._snapped(point), limit)
                     yield from self._wait()
                     point = run.send(self.scores[number])
-        except BudgetSpentError:
+        except SearchEndedError:
             if limit >= self._budget:
                 raise
 
     def _evaluate(self, point: np.ndarray, limit: int) -> Generator[np.ndarray | None, None, int]:
         """Ask for a point unless it was asked for already, and return its position in `points`.
 
-        Raises BudgetSpentError if the point is new and `limit` evaluations, or the whole budget,
+        Raises SearchEndedError if the point is new and `limit` evaluations, or the whole budget,
         are spent.
         """
         key = point.tobytes()
         if key not in self._numbers:
             yield from self._wait(self._settings.batch - 1)
             if not (yield from self._left(limit)):
-                raise BudgetSpentError
+                raise SearchEndedError
             self._numbers[key] = len(self.points)
             self.points.append(point)
             yield point
@@ -240,13 +274,17 @@ class PointSearch:
         if len(self.points) >= self._domain.size:
             return 0
         for _ in range(2):
-            free = max(0, self._costs.count(0.0) - self._budget)
-            running = len(self.points) - len(self.scores)
-            left = min(limit, self._budget) - math.fsum(self._costs) - free - running
-            if left > 1.0 - ROUNDING:
-                return int(left + ROUNDING)
+            if left := self._whole_left(limit):
+                return left
             yield from self._wait()
         return 0
+
+    def _whole_left(self, limit: int) -> int:
+        """Return how many more whole evaluations may begin if those that run cost 1 each."""
+        free = max(0, self._costs.count(0.0) - self._budget)
+        running = len(self.points) - len(self.scores)
+        left = min(limit, self._budget) - math.fsum(self._costs) - free - running
+        return max(0, int(left + ROUNDING))
 
     def _wait(self, running: int = 0) -> Wait:
         """Wait for scores until at most the last `running` points have none."""

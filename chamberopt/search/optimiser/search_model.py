@@ -49,6 +49,7 @@ class Observations:
     spared: which candidates were not simulated because geometry shows them to be no better, (n,)
         bool. Their scores are the largest scores that they can have. The other candidates without
         a simulation could not be simulated.
+    counts: smallest gain of the score that counts; 0 if any gain does.
     """
 
     scores: np.ndarray
@@ -56,6 +57,7 @@ class Observations:
     simulated: np.ndarray
     figures: tuple[LimitedFigure, ...] = ()
     spared: np.ndarray | None = None
+    counts: float = 0.0
 
 
 class SearchModel:

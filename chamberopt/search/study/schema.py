@@ -15,6 +15,7 @@ from chamberopt.coverage.metrics import (
     OBJECTIVES,
     RENAMED_OBJECTIVES,
     find_metric,
+    is_number,
     metric_problem,
     parse_objective,
     renamed_objective,
@@ -69,7 +70,7 @@ class Objective(FileTable):
     name: ObjectiveName = Field(default="uniform_coverage", description="what is maximised")
     sum: dict[str, float] = Field(
         default_factory=dict,
-        description="weighted sum of objectives and metrics, instead of a name",
+        description="weighted sum of objectives, metrics and numbers in [vary], instead of a name",
         json_schema_extra={
             "form": "{ NAME = WEIGHT, ... }, e.g. { uniform_coverage = 1.0, time_to_98_s = -0.001 }"
         },
@@ -89,7 +90,7 @@ class Objective(FileTable):
         for name in self.sum:
             if name in RENAMED_OBJECTIVES:
                 yield Problem(f"sum.{name}", renamed_objective(name))
-            elif name not in names and not find_metric(name):
+            elif name not in names and not find_metric(name) and not is_number(name):
                 text = f"not an objective or a metric; {toml_errors.did_you_mean(name, names)}"
                 yield Problem(f"sum.{name}", text)
         for name, weight in self.sum.items():
@@ -314,6 +315,28 @@ class Study(FileTable):
                 text = "only some of the shapes have it; not supported, leave it out"
                 yield Problem(f"constraints.{name}", text)
 
+    def _objective_problems(self, by_shape: Mapping[str, Design]) -> Iterator[Problem]:
+        field = "objective.sum" if self.objective.sum else "objective"
+        for goal in map(parse_objective, self.objective.goals):
+            for name in goal.terms:
+                varied = self.vary.get(name)
+                if problem := metric_problem(self.design, name):
+                    yield Problem(field, f"{name}: {problem}")
+                elif is_number(name) and (varied is None or varied.texts):
+                    text = f"{name} is a number of the design that does not vary; add it to [vary]"
+                    yield Problem(field, text)
+                elif is_number(name) and not all(has_key(one, name) for one in by_shape.values()):
+                    yield Problem(field, f"{name}: only some of the shapes have it; leave it out")
+            if not goal.is_exact:
+                continue
+            if not self.all_constraints and not self.objective.pareto:
+                text = "nothing is asked of the simulation; give limits in [constraints]"
+                yield Problem(field, f"given {goal.name}, but {text}")
+            key, accuracy = "objective_half_width", self.design.process.accuracy
+            if accuracy.objective_half_width is not None or key in self.search_accuracy:
+                text = f"the objective is exact, so no {key} tells how many replicas to take"
+                yield Problem(field, f"{text}; leave that out, and give replicas")
+
     def _problems(self) -> Iterator[Problem]:
         problems = self._shape_problems()
         yield from problems
@@ -361,11 +384,7 @@ class Study(FileTable):
         if self.objective.over_tolerances == "worst" and not self.design.tolerances:
             text = 'given "worst", but the design has no [tolerances]; add them, or leave it out'
             yield Problem("objective.over_tolerances", text)
-        for goal in self.objective.goals:
-            for name in parse_objective(goal).terms:
-                if problem := metric_problem(self.design, name):
-                    field = "objective.sum" if self.objective.sum else "objective"
-                    yield Problem(field, f"{name}: {problem}")
+        yield from self._objective_problems(by_shape)
         phases = [phase.algorithm for phase in self.optimizer.phases] or [self.optimizer.algorithm]
         if self.objective.pareto and not {"auto", "sobol", "surrogate"}.issuperset(phases):
             text = "given two objectives, which only auto, sobol and surrogate can search"

@@ -1,5 +1,6 @@
 """Scores of candidates, and the number of replicas that each candidate gets."""
 
+import shutil
 import threading
 import time
 from dataclasses import replace
@@ -10,8 +11,11 @@ import pytest
 
 from chamberopt.common.errors import InputError
 from chamberopt.common.estimate import estimate
+from chamberopt.common.executor import SerialExecutor
+from chamberopt.search.study import Study
 from chamberopt.search.trial_log import read_trials
-from tests.helpers.known_optima import bowl, bowl_shares, run_bowl
+from tests.helpers.known_optima import GEAR, NO_FRILLS, VARY, bowl, bowl_shares, run_bowl
+from tests.helpers.studies import run_in_folder
 from tests.helpers.synthetic import judged
 
 
@@ -78,17 +82,106 @@ def test_candidates_end_early_where_more_replicas_would_tell_nothing(tmp_path: P
     assert any(one.replicas == 8 for one in searched)
 
 
-def test_a_study_says_that_nothing_is_left_to_gain(tmp_path: Path) -> None:
-    def simulator(design, stream, replicas):
-        return judged(np.full(3, slope * bowl(bowl_shares(design))), time_to_98_s=30.0)
+def test_a_search_ends_where_nothing_is_left_to_gain(tmp_path: Path) -> None:
+    """The bowl is 0.98 high. Flat enough, its model tells; in the steep one all is spent."""
 
-    slope = 0.02  # no candidate is better by more
-    (note,) = run_bowl(tmp_path / "flat", simulator, {"evaluations": 6}).notes
-    assert note.startswith("nothing left to gain here: no confirmed candidate is better")
-    assert note.endswith("(study.toml of chamberopt new): it has full coverage after 30 of 120 s")
+    def simulator(design, stream, replicas):
+        noise = 1e-4 * np.array([-1.0, 0.0, 1.0])
+        return judged(slope * bowl(bowl_shares(design)) + noise, time_to_98_s=30.0)
+
+    slope = 0.005
+    flat = run_bowl(tmp_path / "flat", simulator, {"evaluations": 40})
+    searched = [one for one in flat.trials if one.stage == "search"]
+    assert flat.ended_by == "gain"
+    assert 8 <= len(searched) < 20  # four for each parameter are there before a model tells
+    assert 0.0 < flat.possible_gain < flat.counts == 0.01
+    (note,) = flat.notes
+    assert note.startswith(
+        f"nothing left to gain here: the search ended after {len(searched)} candidates, as nothing "
+    )
+    assert "less than 0.01 does not count" in note
+    assert "full coverage after 30 of 120 s: ask for the shortest time" in note
     slope = 1.0
-    steep = run_bowl(tmp_path / "steep", simulator, {"evaluations": 6})
-    assert not any("nothing left" in note for note in steep.notes)
+    steep = run_bowl(tmp_path / "steep", simulator, {"evaluations": 12})
+    assert steep.ended_by == "budget"
+    assert steep.notes == ()
+    # resumed, it ends where it ended
+    history = (tmp_path / "flat" / "history.jsonl").read_text().splitlines(keepends=True)
+    slope, cut = 0.005, tmp_path / "cut"
+    shutil.copytree(tmp_path / "flat", cut)
+    for left in (len(searched), 5):
+        (cut / "history.jsonl").write_text("".join(history[:left]))
+        again = run_bowl(cut, simulator, {"evaluations": 40})
+        assert (again.trials, again.notes) == (flat.trials, flat.notes)
+
+
+def test_the_unit_of_the_objective_decides_what_counts(tmp_path: Path) -> None:
+    """Ten times the objective, ten times the gain: the search ends after the same candidates."""
+
+    def ended_after(weight: float) -> int:
+        def simulator(design, stream, replicas):
+            return judged(weight * (0.02 * bowl(bowl_shares(design)) + np.array([0.0, 1e-4, 2e-4])))
+
+        tables = {"objective": {"sum": {"mean_coverage": weight}}}
+        done = run_bowl(tmp_path / f"{weight:g}", simulator, {"evaluations": 30}, **tables)
+        assert done.ended_by == "gain"
+        return sum(one.stage == "search" for one in done.trials)
+
+    assert ended_after(1.0) == ended_after(10.0)
+
+
+def test_a_start_as_good_as_can_be_ends_the_search_at_once(tmp_path: Path) -> None:
+    def simulator(design, stream, replicas):
+        return judged(np.full(3, 0.995), time_to_98_s=500.0)
+
+    for batch in (1, 3):
+        done = run_bowl(tmp_path / f"{batch}", simulator, {"batch": batch})
+        assert done.ended_by == "gain"
+        assert sum(one.stage == "search" for one in done.trials) == batch
+        assert done.possible_gain == pytest.approx(0.005)
+        assert done.notes[0].endswith("vary other parameters, or widen [vary]")
+
+
+@pytest.mark.parametrize("size", [1.0, 60.0])
+def test_the_shortest_time_that_meets_a_limit(tmp_path: Path, size: float) -> None:
+    """By Avrami's law the mean is 1 - exp(-k T): 0.95 takes ln 20 / k, the least at the bowl's end.
+
+    With the time in another unit it is the same search.
+    """
+    vary = VARY | {"process.treatment_time_s": (40.0 * size, 200.0 * size)}
+    rate = 0.05 / size  # 1/s where the bowl is 0.8: 74.9 s
+
+    def simulator(design, stream, replicas):
+        time = design.process.treatment_time
+        mean = -np.expm1(-rate * bowl(bowl_shares(design)) * time)
+        made = judged(np.full(3, -time), mean_coverage=mean)
+        near = mean + 1e-4 * np.array([-1.0, 0.0, 1.0])
+        return replace(made, metrics={**made.metrics, "mean_coverage": estimate(near)})
+
+    study = Study(
+        design=GEAR.changed({"process.treatment_time_s": 120.0 * size}),
+        vary=vary,
+        objective={"name": "minus_treatment_time_s"},
+        constraints={"mean_coverage": {"min": 0.95}},
+        optimizer={"evaluations": 30, "confirm": 4, "confirm_replicas": 4, **NO_FRILLS},
+    )
+    result = run_in_folder(study, tmp_path, SerialExecutor(), None, simulator)
+    least = np.log(20.0) / (0.8 * rate)
+    assert result.best.feasible
+    assert least < result.best.design.process.treatment_time < 1.1 * least
+    assert result.gain.value == pytest.approx(
+        120.0 * size - result.best.design.process.treatment_time
+    )
+
+
+def test_nothing_gained_by_a_spent_budget_is_said(tmp_path: Path) -> None:
+    def simulator(design, stream, replicas):
+        return judged(np.full(3, 0.005 * bowl(bowl_shares(design))))
+
+    done = run_bowl(tmp_path, simulator, {"evaluations": 6})
+    assert done.ended_by == "budget"
+    (note,) = done.notes
+    assert note.startswith("nothing left to gain here: no confirmed candidate is better than the")
 
 
 def test_a_batch_gives_the_same_trials_whichever_ends_first(tmp_path: Path) -> None:

@@ -72,7 +72,9 @@ def test_finds_a_known_optimum(tmp_path: Path) -> None:
     assert hill(shares(result.best.design)) > PEAK - 0.005
     assert result.gain.value == pytest.approx(hill(shares(result.best.design)) - hill(shares(GEAR)))
     assert result.improved
-    assert len([t for t in result.trials if t.stage == "search"]) == 40
+    assert result.ended_by == "gain"  # without noise the model soon knows where the hill ends
+    assert len([t for t in result.trials if t.stage == "search"]) < 40
+    assert PEAK - max(t.objective.value for t in result.trials) < result.counts
 
 
 @pytest.mark.long
@@ -355,7 +357,8 @@ def test_a_corner_of_the_bounds_that_is_no_design_is_a_penalty_with_the_reason(
     def simulator(design, stream, replicas):
         require_ball_count(design)
         x = (np.array([design.value(name) for name in vary]) - low) / (high - low)
-        return judged(PEAK - ((x - corner) ** 2).sum() + np.zeros(replicas or 8))
+        # so steep that something is left to gain until the evaluations are spent
+        return judged(PEAK - 100.0 * ((x - corner) ** 2).sum() + np.zeros(replicas or 8))
 
     settings = {"evaluations": 24, "confirm": 1, "confirm_replicas": 8, "first_replicas": 0}
     result = run(Study(design=GEAR, vary=vary, optimizer=settings), tmp_path, simulator)

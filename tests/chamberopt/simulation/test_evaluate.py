@@ -17,7 +17,13 @@ from chamberopt.coverage.part_impacts import Hits
 from chamberopt.design.design import validate
 from chamberopt.design.load import Design
 from chamberopt.simulation.effort import MIN_REPLICAS_TO_STOP
-from chamberopt.simulation.estimates import SeenDents, estimate_metrics, reach_notes, weighted_sum
+from chamberopt.simulation.estimates import (
+    SeenDents,
+    estimate_metrics,
+    objective_estimate,
+    reach_notes,
+    weighted_sum,
+)
 from chamberopt.simulation.evaluate import MAX_SPEED, ReplicaPlan, evaluate, prepare_target
 from chamberopt.simulation.replicas import ReplicaSet
 from tests.helpers.synthetic import evaluation_of, plane_chamber, plate_design, random_dents
@@ -117,6 +123,17 @@ def test_what_is_made_of_a_clipped_value_agrees_with_its_interval() -> None:
     assert np.mean(goal.pseudovalues) == pytest.approx(goal.value)
     gain = paired_difference(goal, estimate(0.5 * np.array(goal.pseudovalues)))
     assert np.mean(gain.pseudovalues) == pytest.approx(gain.value)
+
+
+def test_numbers_of_the_design_are_exact_terms_of_an_objective() -> None:
+    mean = estimate([0.7, 0.8, 0.75])
+    exact, mixed = (
+        objective_estimate(name, {"mean_coverage": mean}, DESIGN)
+        for name in ("minus_treatment_time_s", "2 mean_coverage + -0.01 process.treatment_time_s")
+    )
+    assert (exact.value, exact.half_width, exact.pseudovalues) == (-50.0, 0.0, (-50.0,) * 3)
+    assert mixed.value == pytest.approx(2.0 * 0.75 - 0.5)
+    assert mixed.half_width == pytest.approx(2.0 * mean.half_width)
 
 
 def test_an_objective_of_what_is_not_known_is_not_known() -> None:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from chamberopt.search.optimiser.acquisition import propose_point, recommend_points
+from chamberopt.search.optimiser.acquisition import possible_gain, propose_point, recommend_points
 from chamberopt.search.optimiser.domain import Axis, Domain
 from chamberopt.search.optimiser.search_model import LimitedFigure, Observations, SearchModel
 from tests.helpers.known_optima import PEAK, hill
@@ -26,6 +26,27 @@ def test_proposals_are_new_and_the_same_for_the_same_seed() -> None:
     one, two = (propose_point(model, np.random.default_rng(5)) for _ in range(2))
     np.testing.assert_array_equal(one, two)
     assert np.abs(points - one).max(axis=1).min() >= 0.005
+
+
+def test_what_may_be_gained_has_the_unit_of_the_score_and_shrinks_with_points() -> None:
+    points = np.random.default_rng(4).random((60, 3))
+    scores = np.array([hill(x) for x in points])
+    few, many = (possible_gain(model_of(points[:n], scores[:n]), 1) for n in (15, 60))
+    assert PEAK - scores.max() < many < 0.5 * few
+    twice = possible_gain(model_of(points, 2.0 * scores + 5.0), 1)
+    assert twice == pytest.approx(2.0 * many, rel=1e-4)
+
+
+def test_nothing_tells_the_gain_before_a_point_is_within_the_limits() -> None:
+    points = np.random.default_rng(4).random((30, 2))
+    above = LimitedFigure(1.0 + points[:, 0], np.full(30, 1e-4), -np.inf, 0.5)
+    assert possible_gain(model_of(points, points[:, 1], above), 1) == np.inf
+    below = LimitedFigure(points[:, 0], np.full(30, 1e-4), -np.inf, 0.5)
+    free, limited = (
+        possible_gain(model_of(points, points[:, 0], *one), 1) for one in ([], [below])
+    )
+    assert free < 0.2 < 0.5 < possible_gain(model_of(points, -points[:, 0], above), 1)
+    assert limited < 0.3
 
 
 def test_the_model_of_the_scores_recommends_the_hilltop() -> None:

@@ -38,6 +38,28 @@ def test_a_weighted_sum_is_of_objectives_and_metrics(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"vary": VARY}, "process.treatment_time_s is a number .* does not vary; add it"),
+        ({"constraints": {}}, "nothing is asked of the simulation; give limits"),
+        ({"search_accuracy": {"objective_half_width": 0.04}}, "exact, so no objective_half_width"),
+        ({"objective": {"sum": {"shot.mass": -1.0}}}, "not a number of a design; did you mean"),
+        ({"objective": {"sum": {"process.seed": -1.0}}}, "does not vary"),
+    ],
+)
+def test_an_objective_of_numbers_of_the_design_needs_limits(change: dict, said: str) -> None:
+    tables = {
+        "vary": VARY | {"process.treatment_time_s": (60.0, 600.0)},
+        "objective": {"name": "minus_treatment_time_s"},
+        "constraints": {"mean_coverage": {"min": 0.9}},
+    }
+    study = Study(design=GEAR, **tables)
+    assert study.objective.goals == ("minus_treatment_time_s",)
+    with pytest.raises(ValueError, match=said):
+        Study(design=GEAR, **{**tables, **change})
+
+
+@pytest.mark.parametrize(
     ("search_accuracy", "said"),
     [
         ({"replicas": 1}, r"search_accuracy.*replicas"),
