@@ -8,7 +8,6 @@ mesh do. They are therefore large inside and small along a curved border, and th
 the outline, not the mesh.
 """
 
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -181,31 +180,46 @@ def _lies_in_plane(mesh: _Triangles, triangle: int, seed: int, tolerance: float)
     return True
 
 
-def cover_with_quadrangles(outline: np.ndarray, area: float) -> np.ndarray | None:
-    """Cover the inside of an outline with few convex quadrangles.
+class Quadrangles(NamedTuple):
+    """Convex quadrangles that cover the insides of k outlines.
+
+    Attributes:
+        corners: positions [m], counter-clockwise, shape (q, 4, 2). A triangle has its last corner
+            twice.
+        outline: the outline that each belongs to, ascending, shape (q,).
+        covered: true for each outline that is covered, shape (k,).
+    """
+
+    corners: np.ndarray
+    outline: np.ndarray
+    covered: np.ndarray
+
+
+def cover_with_quadrangles(
+    segments: np.ndarray, outline: np.ndarray, areas: np.ndarray
+) -> Quadrangles:
+    """Cover the inside of each outline with few convex quadrangles.
 
     Args:
-        outline: segments of the border [m], shape (n, 2, 2), in any order. Loops of the
-            border inside other loops are holes.
-        area: area of the inside [m²]. A border that crosses itself has a different area.
-
-    Returns:
-        Corners [m], shape (k, 4, 2), counter-clockwise. A triangle has its last corner twice. The
-        result is None if the area does not match.
+        segments: segments of all borders [m], shape (n, 2, 2). Loops of a border inside other loops
+            of it are holes.
+        outline: the outline that each segment belongs to, ascending from 0 to k - 1, shape (n,).
+        areas: area of the inside of each outline [m²], (k,). An outline that crosses itself has a
+            different area, and is not covered.
     """
-    region = shapely.build_area(shapely.multilinestrings(shapely.linestrings(outline)))
-    region = shapely.simplify(region, STRAIGHT)
-    if region.is_empty or not region.is_valid:
-        return None
-    pieces = np.concatenate([_quadrangles(piece) for piece in _cut(region)])
-    one = _doubled_area(pieces[:, 0], pieces[:, 1], pieces[:, 2])
-    two = _doubled_area(pieces[:, 0], pieces[:, 2], pieces[:, 3])
-    covered = 0.5 * one + 0.5 * two
-    if abs(covered.sum() - area) > 1e-9 * area:
-        return None
-    longest = np.linalg.norm(np.roll(pieces, -1, axis=1) - pieces, axis=2).max(axis=1)
+    lines = shapely.multilinestrings(shapely.linestrings(segments), indices=outline)
+    regions = shapely.simplify(shapely.build_area(lines), STRAIGHT)
+    is_sound = ~shapely.is_empty(regions) & shapely.is_valid(regions)
+    corners, owner = _quadrangles(*_cut(regions[is_sound], np.flatnonzero(is_sound)))
+    one = _doubled_area(corners[:, 0], corners[:, 1], corners[:, 2])
+    two = _doubled_area(corners[:, 0], corners[:, 2], corners[:, 3])
+    size = 0.5 * one + 0.5 * two
+    covered = np.abs(np.bincount(owner, size, len(areas)) - areas) <= 1e-9 * areas
+    longest = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2).max(axis=1)
     # The overlap of neighbouring pieces covers a piece that is thinner than that.
-    return np.asarray(pieces[covered > STRAIGHT * longest])
+    kept = np.flatnonzero(is_sound[owner] & covered[owner] & (size > STRAIGHT * longest))
+    kept = kept[np.argsort(owner[kept], kind="stable")]
+    return Quadrangles(corners[kept], owner[kept], is_sound & covered)
 
 
 def _doubled_area(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
@@ -214,50 +228,80 @@ def _doubled_area(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
     return np.asarray(one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0])
 
 
-def _cut(region: shapely.Geometry) -> list[shapely.Geometry]:
-    """Cut a region into quarters, and each quarter again, until each piece has few corners."""
-    simple = []
-    todo = [(region, 0)]
-    while todo:
-        piece, depth = todo.pop()
-        for polygon in shapely.get_parts(piece):
-            if shapely.get_dimensions(polygon) < 2 or shapely.is_empty(polygon):
-                continue  # the quarter misses the piece, or touches it in a point or a line
-            corners = shapely.get_num_coordinates(polygon) - 1
-            if depth == MAX_HALVINGS or corners <= MAX_PIECE_CORNERS:
-                simple.append(polygon)
-                continue
-            x0, y0, x1, y1 = shapely.bounds(polygon)
-            # a strip is only cut across
-            wide, high = x1 - x0 >= 0.5 * (y1 - y0), y1 - y0 >= 0.5 * (x1 - x0)
-            x = [x0, 0.5 * (x0 + x1), x1] if wide else [x0, x1]
-            y = [y0, 0.5 * (y0 + y1), y1] if high else [y0, y1]
-            quarters = [
-                shapely.box(left, low, right, top)
-                for left, right in pairwise(x)
-                for low, top in pairwise(y)
-            ]
-            todo += [(part, depth + 1) for part in shapely.intersection(polygon, quarters)]
-    return simple
+def _cut(regions: np.ndarray, owner: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Cut regions into quarters, and each quarter again, until each piece has few corners.
+
+    Args:
+        regions: polygons with holes, (k,).
+        owner: a number of each region, (k,).
+    Returns:
+        The pieces, which are polygons, and the number of the region of each.
+    """
+    simple, owners = [], []
+    for depth in range(MAX_HALVINGS + 1):
+        parts, whole = shapely.get_parts(regions, return_index=True)
+        # a quarter may miss the piece, or touch it in a point or a line
+        solid = (shapely.get_dimensions(parts) == 2) & ~shapely.is_empty(parts)
+        parts, owner = parts[solid], owner[whole[solid]]
+        few = shapely.get_num_coordinates(parts) - 1 <= MAX_PIECE_CORNERS
+        few |= depth == MAX_HALVINGS
+        simple.append(parts[few])
+        owners.append(owner[few])
+        parts, owner = parts[~few], owner[~few]
+        if not len(parts):
+            break
+        x0, y0, x1, y1 = shapely.bounds(parts).T
+        # a strip is only cut across
+        wide, high = x1 - x0 >= 0.5 * (y1 - y0), y1 - y0 >= 0.5 * (x1 - x0)
+        x, y = np.where(wide, 0.5 * (x0 + x1), x1), np.where(high, 0.5 * (y0 + y1), y1)
+        quarters = [
+            (np.ones(len(parts), dtype=bool), shapely.box(x0, y0, x, y)),
+            (high, shapely.box(x0, y, x, y1)),
+            (wide, shapely.box(x, y0, x1, y)),
+            (wide & high, shapely.box(x, y, x1, y1)),
+        ]
+        regions = np.concatenate([shapely.intersection(parts[k], box[k]) for k, box in quarters])
+        owner = np.concatenate([owner[k] for k, _ in quarters])
+    return np.concatenate(simple), np.concatenate(owners)
 
 
-def _quadrangles(polygon: shapely.Geometry) -> np.ndarray:
-    """Return convex quadrangles (k, 4, 2) [m] that make up a polygon, with no corner added.
+def _quadrangles(polygons: np.ndarray, owner: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return convex quadrangles (q, 4, 2) [m] that make up polygons (n,), with no corner added.
 
     A cut that misses a corner by rounding leaves a side of 1e-17 m. Such a side has no direction
     and would shut balls out of the piece, so that its corner is left out.
+
+    Args:
+        owner: a number of each polygon, (n,).
+    Returns:
+        The quadrangles, and for each the number of its polygon, (q,).
     """
-    polygon = shapely.simplify(polygon, STRAIGHT)
-    ring = shapely.get_coordinates(shapely.orient_polygons(polygon))[:-1]
-    turns = _doubled_area(np.roll(ring, 1, axis=0), ring, np.roll(ring, -1, axis=0))
-    if shapely.get_num_interior_rings(polygon) == 0 and (turns >= 0.0).all():
-        last = len(ring) - 1  # a convex polygon becomes a fan of quadrangles
-        return np.array([ring[[0, k, k + 1, min(k + 2, last)]] for k in range(1, last, 2)])
-    parts = shapely.get_parts(shapely.constrained_delaunay_triangles(polygon))
-    corners = np.array(
-        [shapely.get_coordinates(shapely.orient_polygons(part))[:3] for part in parts]
+    polygons = shapely.orient_polygons(shapely.simplify(polygons, STRAIGHT))
+    ring, whole = shapely.get_coordinates(polygons, return_index=True)
+    count = np.bincount(whole, minlength=len(polygons)) - 1  # corners, if there is no hole
+    first = np.cumsum(count + 1) - count - 1
+    before, here = np.arange(len(ring)) - 1, np.flatnonzero(np.diff(whole, append=-1) == 0)
+    there = count > 0
+    before[first[there]] = (first + count - 1)[there]
+    turn = np.zeros(len(ring))
+    turn[here] = _doubled_area(ring[before[here]], ring[here], ring[here + 1])
+    convex = np.bincount(whole, turn < 0.0, len(polygons)) == 0
+    convex &= shapely.get_num_interior_rings(polygons) == 0
+    # a convex polygon becomes a fan of quadrangles
+    fans = np.where(convex, np.maximum(count - 1, 0) // 2, 0)
+    fan = np.repeat(np.arange(len(polygons)), fans)
+    k = 1 + 2 * (np.arange(len(fan)) - np.repeat(np.cumsum(fans) - fans, fans))
+    last = count[fan] - 1
+    at = np.stack([np.zeros_like(k), k, k + 1, np.minimum(k + 2, last)], axis=1)
+    corners = [ring[first[fan][:, None] + at]]
+    # all others become triangles; a piece that is only a line has none
+    others = np.flatnonzero(~convex)
+    triangles, of = shapely.get_parts(
+        shapely.constrained_delaunay_triangles(polygons[others]), return_index=True
     )
-    return corners.reshape(-1, 3, 2)[:, [0, 1, 2, 2]]  # empty for a piece that is only a line
+    tips = shapely.get_coordinates(shapely.orient_polygons(triangles)).reshape(-1, 4, 2)
+    corners.append(tips[:, [0, 1, 2, 2]])
+    return np.concatenate(corners), owner[np.concatenate([fan, others[of]])]
 
 
 class SurfaceTriangles(NamedTuple):

@@ -97,17 +97,10 @@ def _faces(surface: SurfaceTriangles, radius: float, border: SonotrodeBorder) ->
     """
     corners, flat_faces = surface.corners, surface.flat_faces
     of_triangle = flat_faces.of_triangle
-    each = [np.flatnonzero((surface.doubled > 0.0) & (of_triangle == LONE))]
-    pieces = [corners[each[0]][:, TRIANGLE]]
-    members = np.argsort(of_triangle, kind="stable")
-    first = np.searchsorted(of_triangle[members], np.arange(len(flat_faces.seed) + 1))
-    for k, outline in enumerate(flat_faces.outlines):
-        own = members[first[k] : first[k + 1]]
-        area = 0.5 * surface.doubled[own].sum()
-        few = _few_faces(corners, outline, flat_faces.frames[k], area)
-        every = corners[own][:, TRIANGLE]
-        pieces.append(every if few is None or _box_area(few) > _box_area(every) else few)
-        each.append(np.full(len(pieces[-1]), flat_faces.seed[k]))
+    lone = np.flatnonzero((surface.doubled > 0.0) & (of_triangle == LONE))
+    of_flat, face = _flat_pieces(surface)
+    pieces = [corners[lone][:, TRIANGLE], of_flat]
+    each = [lone, flat_faces.seed[face]]
     pieces.append(border.walls)
     each.append(border.above)
     triangle, corner = np.concatenate(each), np.concatenate(pieces)
@@ -136,32 +129,52 @@ def _faces(surface: SurfaceTriangles, radius: float, border: SonotrodeBorder) ->
     )
 
 
-def _few_faces(
-    corners: np.ndarray, outline: np.ndarray, frame: np.ndarray, area: float
-) -> np.ndarray | None:
-    """Return the corners (k, 4, 3) [m] of a few faces that cover a flat face of this area [m²].
+def _flat_pieces(surface: SurfaceTriangles) -> tuple[np.ndarray, np.ndarray]:
+    """Return the pieces (q, 4, 3) [m] that stand for the flat faces, and the flat face of each.
 
-    ``outline``, ``frame``: border and plane of the flat face, as in FlatFaces. The result is None
-    if the outline cannot be covered.
+    They are a few quadrangles, or the flat face's own triangles if an outline cannot be covered, or
+    if their boxes are smaller.
     """
-    origin, axes = frame[0], frame[1:]
-    start, end = corners[outline // 3, outline % 3], corners[outline // 3, (outline % 3 + 1) % 3]
-    faces = cover_with_quadrangles((np.stack([start, end], axis=1) - origin) @ axes.T, area)
-    if faces is None:
-        return None
-    pieces = origin + faces[:, ::-1] @ axes
-    sides = np.linalg.norm(pieces - np.roll(pieces, -1, axis=1), axis=2) > 0.0
+    corners, flat = surface.corners, surface.flat_faces
+    count = len(flat.outlines)
+    if not count:
+        return np.zeros((0, 4, 3)), np.zeros(0, dtype=np.int64)
+    members = np.flatnonzero(flat.of_triangle != LONE)
+    of_member = flat.of_triangle[members]
+    areas = 0.5 * np.bincount(of_member, surface.doubled[members], count)
+    border, of_edge = (
+        np.concatenate(flat.outlines),
+        np.repeat(np.arange(count), [len(one) for one in flat.outlines]),
+    )
+    ends = np.stack([corners[border // 3, (border % 3 + k) % 3] for k in (0, 1)], axis=1)
+    origin, axes = flat.frames[:, None, 0], flat.frames[:, 1:]
+    in_plane = (ends - origin[of_edge]) @ axes[of_edge].swapaxes(1, 2)
+    few = cover_with_quadrangles(in_plane, of_edge, areas)
+    place = origin[few.outline] + few.corners[:, ::-1] @ axes[few.outline]
+    sides = np.linalg.norm(place - np.roll(place, -1, axis=1), axis=2) > 0.0
     # a piece that rounding made a point or a line would have no borders
-    return np.asarray(pieces[sides.sum(axis=1) >= 3])
+    sound = sides.sum(axis=1) >= 3
+    place, of_place = place[sound], few.outline[sound]
+    triangles = corners[members][:, TRIANGLE]
+    boxes = [
+        np.bincount(face, _box_areas(one), count)
+        for face, one in ((of_place, place), (of_member, triangles))
+    ]
+    by_few = few.covered & (boxes[0] <= boxes[1])
+    kept, own = by_few[of_place], ~by_few[of_member]
+    pieces = np.concatenate([place[kept], triangles[own]])
+    face = np.concatenate([of_place[kept], of_member[own]])
+    in_order = np.argsort(face, kind="stable")
+    return pieces[in_order], face[in_order]
 
 
-def _box_area(pieces: np.ndarray) -> float:
-    """Return half the surface area [m²] of all boxes round pieces (k, 4, 3) [m] together.
+def _box_areas(pieces: np.ndarray) -> np.ndarray:
+    """Return half the surface area [m²] of the box round each of some pieces (k, 4, 3) [m], (k,).
 
-    It is a measure of how often flights enter the boxes.
+    It is a measure of how often flights enter the box.
     """
     x, y, z = np.ptp(pieces, axis=1).T
-    return float((x * y + y * z + z * x).sum())
+    return np.asarray(x * y + y * z + z * x)
 
 
 def _share_plane(numbers: np.ndarray, vibrating: np.ndarray) -> None:

@@ -11,7 +11,7 @@ import trimesh
 from sim_core import Balls, Gravity, Physics, Scene, TriangleMesh, simulate
 from sim_core.detect.ball_mesh import first_contact, new_scratch
 from sim_core.geometry import flat_faces
-from sim_core.geometry.flat_faces import LONE, FlatFaces, cover_with_quadrangles
+from sim_core.geometry.flat_faces import LONE, FlatFaces, Quadrangles, cover_with_quadrangles
 from sim_core.geometry.obstacle_set import ObstacleSet, build_obstacle_set
 from sim_core.numerics.vec3 import Flight, Vec3
 from sim_core.scene.invariants import clearance, contained
@@ -112,17 +112,56 @@ def outline(*rings: list[tuple[float, float]]) -> np.ndarray:
     )
 
 
+def some_star(seed: int, corners: int) -> np.ndarray:
+    rng = np.random.default_rng(seed)
+    angle = np.sort(rng.uniform(0.0, 2.0 * np.pi, corners))
+    return np.column_stack([np.cos(angle), np.sin(angle)]) * rng.uniform(0.6, 1.0, corners)[:, None]
+
+
+HOLE = np.array([[-0.1, -0.1], [0.2, -0.1], [0.2, 0.2], [-0.1, 0.2]])
+
+
+def cover(*outlines: np.ndarray, areas: list[float]) -> Quadrangles:
+    count = np.repeat(np.arange(len(outlines)), [len(one) for one in outlines])
+    return cover_with_quadrangles(np.concatenate(outlines), count, np.array(areas))
+
+
 def test_a_cover_fills_an_outline_with_holes_once() -> None:
-    rng = np.random.default_rng(3)
-    angle = np.sort(rng.uniform(0.0, 2.0 * np.pi, 200))
-    star = np.column_stack([np.cos(angle), np.sin(angle)]) * rng.uniform(0.6, 1.0, 200)[:, None]
-    hole = np.array([[-0.1, -0.1], [0.2, -0.1], [0.2, 0.2], [-0.1, 0.2]])
-    segments = outline(star.tolist(), hole.tolist())
-    region = shapely.Polygon(star, [hole])
-    faces = shapely.polygons(cover_with_quadrangles(segments, region.area))
+    star = some_star(3, 200)
+    region = shapely.Polygon(star, [HOLE])
+    found = cover(outline(star.tolist(), HOLE.tolist()), areas=[region.area])
+    assert found.covered.all()
+    faces = shapely.polygons(found.corners)
     assert shapely.area(faces).sum() == pytest.approx(region.area, rel=1e-12)
     assert shapely.union_all(faces).symmetric_difference(region).area < 1e-12
 
 
+def test_a_convex_outline_of_few_corners_is_a_fan() -> None:
+    angle = 2.0 * np.pi * np.arange(6) / 6
+    for corners, fans in ((3, 1), (4, 1), (5, 2), (6, 2)):
+        ring = np.column_stack([np.cos(angle), np.sin(angle)])[:corners]
+        area = shapely.Polygon(ring).area
+        found = cover(outline(ring.tolist()), areas=[area])
+        assert found.corners.shape == (fans, 4, 2)
+        assert shapely.area(shapely.polygons(found.corners)).sum() == pytest.approx(area)
+
+
+def test_outlines_are_covered_together_as_each_alone() -> None:
+    outlines = [
+        outline(some_star(4, 60).tolist(), HOLE.tolist()),
+        outline([(0, 0), (1, 1), (1, 0), (0, 1)]),  # crosses itself
+        outline(HOLE.tolist()),
+        outline([(0, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2)]),
+    ]
+    areas = [shapely.Polygon(some_star(4, 60), [HOLE]).area, 1.0, 0.09, 3.0]
+    whole = cover(*outlines, areas=areas)
+    assert whole.covered.tolist() == [True, False, True, True]
+    for k, one in enumerate(outlines):
+        alone = cover(one, areas=[areas[k]])
+        np.testing.assert_array_equal(alone.corners, whole.corners[whole.outline == k])
+
+
 def test_an_outline_that_crosses_itself_is_left_to_its_triangles() -> None:
-    assert cover_with_quadrangles(outline([(0, 0), (1, 1), (1, 0), (0, 1)]), 1.0) is None
+    found = cover(outline([(0, 0), (1, 1), (1, 0), (0, 1)]), areas=[1.0])
+    assert not found.covered.any()
+    assert not len(found.corners)
