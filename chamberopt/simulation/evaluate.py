@@ -124,8 +124,9 @@ class _Run:
         require_figures(design, chamber, mesh)
 
         def see() -> tuple[SeenDents, dict[str, SeenDents]]:
-            field = self.known.target or prepare_target(design, chamber, mesh)
-            return SeenDents.none(field), see_zones(design, chamber, mesh)
+            target = self.known.target or prepare_target(design, chamber, mesh)
+            self.known.target = target  # for more replicas of the candidate
+            return SeenDents.none(target), see_zones(design, chamber, mesh)
 
         # The dents of a replica are looked at while others are simulated, so that no worker waits.
         beside = ThreadPoolExecutor(1)

@@ -56,7 +56,7 @@ class ReplicaSet:
     """
 
     replicas: list[Replica] = field(default_factory=list)
-    target: TargetField | None = None  # by `prepare_target`; None if it was not called
+    target: TargetField | None = None  # by `prepare_target`; None until it is called
 
 
 def simulate_replicas(

@@ -71,6 +71,15 @@ class Symmetry:
             turns.append(other - sector[near])
         return np.concatenate(rows), (np.concatenate(turns) % self.copies).astype(int)
 
+    def reaches_sector(self, corners: np.ndarray, margin: float) -> np.ndarray:
+        """Return whether triangles (k, 3, 3) [m] may come closer to the sector than `margin` [m],
+        (k,) bool.
+        """
+        middle = corners.mean(axis=1)
+        size = np.linalg.norm(corners - middle[:, None], axis=2).max(axis=1)
+        beyond = np.abs(np.arctan2(middle[:, 1], middle[:, 0])) - 0.5 * self.step
+        return np.asarray(_off(beyond, np.hypot(middle[:, 0], middle[:, 1])) < margin + size)
+
     def on_each(self, face: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return a point on each smooth face: the middle of its largest triangle that bounds the
         cavity.

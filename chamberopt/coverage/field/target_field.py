@@ -95,7 +95,7 @@ class TargetField:
     pieces: CreasePieces
     has_windows: np.ndarray  # marks the part triangles whose dents can be in a window, (m,)
     touched: Places  # points that a ball can touch, spread evenly over the target
-    surface: SurfacePieces  # pieces of the target, or of the whole part
+    surface: SurfacePieces  # pieces of the target, or of the whole part, in and near the sector
     reach: Reach  # share of the target's area that a ball can touch, and its error
     symmetry: Symmetry | None  # None where no two places are alike
 
@@ -307,9 +307,8 @@ def find_target_field(chamber: Chamber, mesh: TriangleMesh, setting: WindowSetti
     touched, fits = _touched(chamber, mesh, area, face, setting)
     symmetry = find_symmetry(chamber, mesh) if setting.symmetric else None
     longest = _longest_side(setting, float(area.sum()), MAX_PIECES)
-    surface = surface_pieces(
-        part.corners_with_normals[part.target], face[part.target], mesh, ball, longest
-    )
+    wanted = _near_windows(symmetry, part.target, corners, radius)
+    surface = surface_pieces(part.corners_with_normals[wanted], face[wanted], mesh, ball, longest)
     return TargetField(
         setting=setting,
         faces=faces,
@@ -336,15 +335,28 @@ def with_whole_part(field: TargetField, chamber: Chamber, mesh: TriangleMesh) ->
     if not rest.any():
         return field
     area = float(chamber.part.area[rest].sum())
-    pieces = surface_pieces(
-        chamber.part.corners_with_normals[rest], field.face[rest], mesh, 0.5 * field.setting.ball,
-        _longest_side(field.setting, area, MAX_PIECES_OFF_TARGET),
-    )  # fmt: skip
+    wanted = _near_windows(field.symmetry, rest, field.corners, field.radius)
+    longest = _longest_side(field.setting, area, MAX_PIECES_OFF_TARGET)
+    corners, ball = chamber.part.corners_with_normals[wanted], 0.5 * field.setting.ball
+    pieces = surface_pieces(corners, field.face[wanted], mesh, ball, longest)
     return replace(
         field,
         has_windows=np.ones(len(rest), dtype=bool),
         surface=joined_pieces(field.surface, pieces),
     )
+
+
+def _near_windows(
+    symmetry: Symmetry | None, chosen: np.ndarray, corners: np.ndarray, radius: float
+) -> np.ndarray:
+    """Return those of the `chosen` triangles (m,) bool that windows of `radius` [m] may meet.
+
+    All windows lie in one sector of a symmetric chamber. The margin is twice the radius of the wide
+    windows.
+    """
+    if symmetry is None:
+        return chosen
+    return np.asarray(chosen & symmetry.reaches_sector(corners, 4.0 * radius))
 
 
 def _longest_side(setting: WindowSetting, area: float, most: float) -> float:

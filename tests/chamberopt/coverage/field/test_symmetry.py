@@ -7,6 +7,7 @@ import trimesh
 from chamberopt.chamber.build import Chamber, build_chamber
 from chamberopt.chamber.scene import chamber_mesh
 from chamberopt.coverage.coverage_from_impacts import find_footprints
+from chamberopt.coverage.field import target_field
 from chamberopt.coverage.field.symmetry import Symmetry, find_symmetry, turn_about_axis
 from chamberopt.coverage.field.target_field import WindowSetting, find_target_field
 from chamberopt.design.load import load_design
@@ -91,6 +92,37 @@ def test_dents_are_as_dense_and_their_windows_have_as_many_times_more() -> None:
     assert density[True].mean() == pytest.approx(density[False].mean(), rel=0.01)
     assert density[True].mean() == pytest.approx(2e8 * np.pi / 4.0 * 0.3e-3**2, rel=0.02)
     assert density[True].std() < 0.6 * density[False].std()  # half, of counts alone
+
+
+def test_windows_are_as_large_without_the_surface_beyond_their_sector(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """All of the cube can be touched, so no share of a piece is measured at places drawn anew."""
+    chamber = cube()
+    mesh, setting = chamber_mesh(chamber), SETTING._replace(symmetric=True)
+    near = find_target_field(chamber, mesh, setting)
+    monkeypatch.setattr(target_field, "_near_windows", lambda _, chosen, *rest: chosen)
+    everywhere = find_target_field(chamber, mesh, setting)
+    assert len(near.surface.area) < 0.5 * len(everywhere.surface.area)
+    for one, other in ((near.gauge, everywhere.gauge), (near.wide, everywhere.wide)):
+        np.testing.assert_array_equal(one.area, other.area)
+
+
+@pytest.mark.parametrize("copies", [2, 5, 16])
+def test_triangles_that_reach_the_sector_are_as_many_in_each_turn(copies: int) -> None:
+    """A triangle in the sector, or within the margin of it, is never left out."""
+    chamber, rng = cube(), np.random.default_rng(copies)
+    symmetry, margin = Symmetry(copies, chamber_mesh(chamber), chamber.source), 1e-3
+    corners = rng.uniform(-0.01, 0.01, (400, 1, 3)) + rng.normal(0.0, 5e-4, (400, 3, 3))
+    reaches = symmetry.reaches_sector(corners, margin)
+    shares = rng.dirichlet(np.ones(3), (400, 50))
+    places = np.einsum("kps,ksx->kpx", shares, corners)
+    angle, radius = np.arctan2(places[..., 1], places[..., 0]), np.hypot(*places[..., :2].T).T
+    beyond = np.clip(np.abs(angle) - np.pi / copies, 0.0, np.pi / 2)
+    inside = (radius * np.sin(beyond) < margin).any(axis=1)
+    assert reaches[inside].all()
+    assert inside.sum() > 20
+    assert (~reaches).any()
 
 
 def test_a_pattern_that_has_the_symmetry_stays_as_it_is() -> None:
