@@ -8,8 +8,9 @@ from the reference. All runs take turns, a replica each, so that a computer that
 all of them. The error against the number of replicas comes from batches of the reference's
 replicas.
 
-The study keeps to a budget of CPU seconds. A replica of the reference tells what each setting will
-take. Settings that the budget does not allow are left out, in the order of LEFT_OUT_FIRST.
+The study keeps to a budget of CPU seconds, and to the time by the clock that it takes on free
+cores. A replica of the reference tells what each setting will take. Settings that the budget does
+not allow are left out, in the order of LEFT_OUT_FIRST.
 """
 
 from __future__ import annotations
@@ -107,12 +108,16 @@ def require_budget(budget_s: float) -> None:
 
 def describe_cost(budget_s: float) -> str:
     """Return a sentence for the user on the cost of a study, to show before the study begins."""
-    cores = core_count()
-    wall = budget_s * (SERIAL + (1.0 - SERIAL) / cores)
     return (
-        f"about {plain(budget_s, 3)} CPU s (--budget-s), {plain(wall, 2)} s on {cores} free cores; "
-        "and compiling, once ever"
+        f"at most about {plain(budget_s, 3)} CPU s (--budget-s), and {plain(_wall(budget_s), 2)} s "
+        f"on {core_count()} cores: with fewer of them free it simulates less; and compiling, once "
+        "ever"
     )
+
+
+def _wall(cpu_s: float) -> float:
+    """Return the duration [s] of a study of so many CPU seconds if all cores are free."""
+    return cpu_s * (SERIAL + (1.0 - SERIAL) / core_count())
 
 
 def run_convergence_study(
@@ -133,8 +138,7 @@ def run_convergence_study(
             memory is too small; or a design cannot be evaluated.
     """
     require_budget(budget_s)
-    started = time.perf_counter()
-    study = _Study(design, budget_s, executor, prepare)
+    study = _Study(design, budget_s, executor, prepare, time.perf_counter())
     with step("building and timing the reference"):
         left_out = study.leave_out()
     if left_out:
@@ -149,6 +153,8 @@ def run_convergence_study(
     whole_evaluation, of_figures = study.time_evaluation(replicas[DESIGNED, ""])
     with step("simulating, CPU seconds") as progress:
         study.simulate(reference, [one for _, one in others], progress)
+    if study.is_late:
+        tell("the cores were not free, so less was simulated than the budget allows")
     with step("figures"):
         whole, sizes, resolved_s = study.figures_of_reference(reference, reference_key)
         found = [executor.submit(timed_figures, one, [range(one.started)]) for _, one in others]
@@ -169,7 +175,7 @@ def run_convergence_study(
         resolved_s=resolved_s,
         cost=cost,
         cpu_s=study.spent,
-        wall_s=time.perf_counter() - started,
+        wall_s=study.elapsed,
         left_out=left_out,
     )
 
@@ -182,6 +188,7 @@ class _Study:
     budget_s: float
     executor: Executor
     prepare: Callable[[Design, Chamber], None]
+    began: float  # by the clock [s]
     spent: float = 0.0  # CPU seconds, without compiling
     seconds: float = 0.0  # CPU seconds of a simulated second of the reference
     of_figures: float = 0.0  # CPU seconds of a point and simulated second, for the figures
@@ -189,6 +196,13 @@ class _Study:
     targets: dict[tuple[ChamberTable, WindowSetting], TargetField] = field(default_factory=dict)
     built: list[float] = field(default_factory=list)  # CPU seconds to build for each new design
     known: dict[str, Replicas] = field(default_factory=dict)
+    compiled: float = 0.0  # seconds by the clock that `prepare` took
+    is_late: bool = False  # whether the clock ended it before the CPU seconds were spent
+
+    @property
+    def elapsed(self) -> float:
+        """Duration so far [s], with compiling."""
+        return time.perf_counter() - self.began
 
     def replicas_of(self, design: Design) -> Replicas:
         """Return the replicas of a design, and build its chamber and windows if they are new.
@@ -215,7 +229,9 @@ class _Study:
             _ = target.gauge
         self.built.append(time.thread_time() - begin)
         self.spent += self.built[-1]
+        before = self.elapsed
         self.prepare(design, chamber)
+        self.compiled += self.elapsed - before
         found = Replicas(ReplicaSetting(design, chamber, mesh), self.targets[table, window])
         self.known[key] = found
         if is_new:
@@ -283,7 +299,8 @@ class _Study:
     def simulate(self, reference: Replicas, others: Sequence[Replicas], progress: Progress) -> None:
         """Simulate replicas in turns, until the budget is spent but for what the figures take.
 
-        The reference has MIN_REPLICAS and each other design MIN_ROUNDS in any case.
+        It ends earlier if the rest would end late by the clock, at the pace so far. The reference
+        has MIN_REPLICAS and each other design MIN_ROUNDS in any case.
         """
         waiting: deque[tuple[Replicas, Future[TimedReplica]]] = deque()
 
@@ -299,9 +316,12 @@ class _Study:
                 is_least = any(other.started < MIN_ROUNDS for other in others)
                 is_least |= reference.started < MIN_REPLICAS
                 likely = sum(self._cost_of(running.setting.design) for running, _ in waiting)
-                left = self.budget_s - OF_COMMAND - self.spent - likely
-                left -= self._cost_of_figures(reference, others)
-                if not is_least and (left < 0.0 or reference.started >= MAX_REPLICAS):
+                ahead = OF_COMMAND + likely + self._cost_of_figures(reference, others)
+                is_spent = self.spent + ahead > self.budget_s
+                late = (self.elapsed - self.compiled) * (1.0 + ahead / self.spent)
+                self.is_late = not is_spent and late > _wall(self.budget_s)
+                is_enough = is_spent or self.is_late or reference.started >= MAX_REPLICAS
+                if is_enough and not is_least:
                     break
                 task = self.executor.submit(simulate_timed, one.setting, one.target, one.started)
                 waiting.append((one, task))
