@@ -1,0 +1,173 @@
+"""How many seeded faults do the tests of a file catch?
+
+    python benchmarks/mutants.py --seeds 20 --first 0
+    python benchmarks/mutants.py --seeds 1 --first 7 --show
+
+Each seed draws a file of the program that has a file of tests of its own, and puts one fault into
+it: an operator or comparison becomes its opposite, a number grows by a half or to its successor, a
+term of a sum or a factor of a product is dropped, a condition is turned round. The tests of that
+file run on a copy of the program, without the fault and with it; a fault that they pass is
+missed. Faults that change nothing
+count as missed, so the share is a lower bound. Lines for people (messages, descriptions) get no
+faults. A fault in the simulator's compiled code takes minutes, as all is compiled anew.
+"""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import os
+import random
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+from benchmarks.table import print_table
+
+ROOT = Path(__file__).resolve().parents[1]
+COPIED = "chamberopt", "sim_core", "tests", "benchmarks", "designs", "studies", "docs"
+OPPOSITES: dict[type[ast.AST], type[ast.AST]] = {
+    ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Mult: ast.Div, ast.Div: ast.Mult, ast.Lt: ast.GtE,
+    ast.GtE: ast.Lt, ast.Gt: ast.LtE, ast.LtE: ast.Gt, ast.And: ast.Or, ast.Or: ast.And,
+    ast.Eq: ast.NotEq, ast.NotEq: ast.Eq,
+}  # fmt: skip
+LONGEST_S = 600.0  # of the tests of a file; a fault that makes them longer is caught
+
+
+def mirrored(packages: tuple[str, ...]) -> list[tuple[Path, Path]]:
+    """Files of the program with the tests of each, both relative to the root."""
+    pairs = []
+    for package in packages:
+        for path in sorted((ROOT / package).rglob("*.py")):
+            own = path.relative_to(ROOT)
+            test = Path("tests") / own.with_name(f"test_{own.name}")
+            if (ROOT / test).is_file():
+                pairs.append((own, test))
+    return pairs
+
+
+class Faults(ast.NodeTransformer):
+    """Puts the fault with a number into a tree; `count` is how many faults there can be."""
+
+    def __init__(self, chosen: int = -1) -> None:
+        self.count, self._chosen, self.text = 0, chosen, ""
+
+    def _is_chosen(self, node: ast.AST, text: str) -> bool:
+        self.count += 1
+        if self.count - 1 != self._chosen:
+            return False
+        self.text = f"line {getattr(node, 'lineno', '?')}: {text}"
+        return True
+
+    def visit_JoinedStr(self, node: ast.JoinedStr) -> ast.AST:
+        return node  # words
+
+    def visit_AnnAssign(self, node: ast.AnnAssign) -> ast.AST:
+        if node.value is not None:
+            node.value = self.visit(node.value)
+        return node
+
+    def visit_BinOp(self, node: ast.BinOp) -> ast.AST:
+        self.generic_visit(node)
+        before = ast.unparse(node)
+        if isinstance(node.op, (ast.Add, ast.Sub, ast.Mult)):
+            for kept in (node.left, node.right):
+                if self._is_chosen(node, f"{before} -> {ast.unparse(kept)}"):
+                    return kept
+        if opposite := OPPOSITES.get(type(node.op)):
+            changed = ast.BinOp(node.left, opposite(), node.right)  # type: ignore[arg-type]
+            if self._is_chosen(node, f"{before} -> {ast.unparse(changed)}"):
+                return ast.copy_location(changed, node)
+        return node
+
+    def visit_Compare(self, node: ast.Compare) -> ast.AST:
+        self.generic_visit(node)
+        opposite = OPPOSITES.get(type(node.ops[0]))
+        if opposite and self._is_chosen(node, f"{ast.unparse(node)} turned round"):
+            node.ops[0] = opposite()  # type: ignore[call-overload]
+        return node
+
+    def visit_BoolOp(self, node: ast.BoolOp) -> ast.AST:
+        self.generic_visit(node)
+        if self._is_chosen(node, f"{ast.unparse(node)}: and for or"):
+            node.op = OPPOSITES[type(node.op)]()  # type: ignore[assignment]
+        return node
+
+    def visit_Constant(self, node: ast.Constant) -> ast.AST:
+        if isinstance(node.value, bool) or not isinstance(node.value, (int, float)):
+            return node
+        is_whole = isinstance(node.value, int)
+        value = node.value + 1 if is_whole else (1.5 * node.value or 0.5)
+        if self._is_chosen(node, f"{node.value} -> {value}"):
+            return ast.copy_location(ast.Constant(value), node)
+        return node
+
+
+def with_fault(source: str, rng: random.Random) -> tuple[str, str]:
+    """The source with one fault, and what it is; two empty texts if there is nothing to change."""
+    counted = Faults()
+    counted.visit(ast.parse(source))
+    if not counted.count:
+        return "", ""
+    fault = Faults(rng.randrange(counted.count))
+    tree = ast.fix_missing_locations(fault.visit(ast.parse(source)))
+    return ast.unparse(tree), fault.text
+
+
+def drawn(seeds: range, packages: tuple[str, ...]) -> Iterator[tuple[int, Path, Path, str, str]]:
+    """For each seed a file, its tests, the file's text with a fault, and what the fault is."""
+    pairs = mirrored(packages)
+    for seed in seeds:
+        rng, text = random.Random(seed), ""
+        while not text:
+            own, test = rng.choice(pairs)
+            text, fault = with_fault((ROOT / own).read_text("utf-8"), rng)
+        yield seed, own, test, text, fault
+
+
+def is_caught(copy: Path, own: Path, test: Path, text: str) -> bool:
+    """Whether the tests fail with the fault in the copy, which is mended afterwards."""
+    (copy / own).write_text(text, "utf-8")
+    command = [sys.executable, "-m", "pytest", "-q", "-x", "-n", "1", str(test)]
+    environment = {**os.environ, "PYTHONPATH": str(copy)}
+    try:
+        ended = subprocess.run(
+            command, cwd=copy, env=environment, capture_output=True, timeout=LONGEST_S, check=False
+        )
+    except subprocess.TimeoutExpired:
+        return True
+    finally:
+        shutil.copy(ROOT / own, copy / own)
+    return ended.returncode != 0
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("--seeds", type=int, default=20)
+    parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("--packages", default="chamberopt,sim_core")
+    parser.add_argument("--show", action="store_true", help="tell the faults, run no tests")
+    options = parser.parse_args()
+    seeds = range(options.first, options.first + options.seeds)
+    faults, rows = drawn(seeds, tuple(options.packages.split(","))), []
+    with tempfile.TemporaryDirectory() as folder:
+        copy = Path(folder)
+        if not options.show:
+            for name in COPIED:
+                shutil.copytree(ROOT / name, copy / name)
+            shutil.copy(ROOT / "pyproject.toml", copy)
+        for seed, own, test, text, fault in faults:
+            if not options.show and is_caught(copy, own, test, (ROOT / own).read_text("utf-8")):
+                sys.exit(f"{test} fails without a fault")
+            caught = "not run" if options.show else is_caught(copy, own, test, text)
+            rows.append({"seed": seed, "file": own.as_posix(), "fault": fault, "caught": caught})
+            print(*rows[-1].values(), sep="  ", flush=True)
+    if not options.show:
+        print_table([{"faults": len(rows), "caught": sum(row["caught"] for row in rows)}])
+
+
+if __name__ == "__main__":
+    main()
