@@ -7,9 +7,9 @@ Each seed draws a file of the program that has a file of tests of its own, and p
 it: an operator or comparison becomes its opposite, a number grows by a half or to its successor, a
 term of a sum or a factor of a product is dropped, a condition is turned round. The tests of that
 file run on a copy of the program, without the fault and with it; a fault that they pass is
-missed. Faults that change nothing
-count as missed, so the share is a lower bound. Lines for people (messages, descriptions) get no
-faults. A fault in the simulator's compiled code takes minutes, as all is compiled anew.
+missed. Faults that change nothing count as missed, so the share is a lower bound. Lines for people
+(messages, descriptions) get no faults. A fault in the simulator's compiled code takes minutes, as
+all is compiled anew.
 """
 
 from __future__ import annotations
