@@ -4,6 +4,7 @@ import math
 
 import pytest
 
+from chamberopt.common.estimate import Estimate
 from chamberopt.documents.wording import Label, objective_label, plain, with_interval
 
 
@@ -60,3 +61,9 @@ def test_an_objective_that_is_a_metric_has_its_label() -> None:
         "target − 0.001 × time until 95 % of the target's area is 98 % covered [s])"
     )
     assert objective_label("of a later version").text == "of a later version"
+
+
+def test_a_label_converts_value_and_half_width_to_its_unit() -> None:
+    seconds = objective_label("-0.5 time_to_98_s")
+    shown = seconds.scale(Estimate(-35.0, 2.0, in_words="not resolved"))
+    assert (shown.value, shown.half_width, shown.in_words) == (70.0, 4.0, "not resolved")

@@ -3,7 +3,12 @@
 import numpy as np
 import pytest
 
-from chamberopt.search.optimiser.acquisition import possible_gain, propose_point, recommend_points
+from chamberopt.search.optimiser.acquisition import (
+    _knowledge_gradient,
+    possible_gain,
+    propose_point,
+    recommend_points,
+)
 from chamberopt.search.optimiser.domain import Axis, Domain
 from chamberopt.search.optimiser.search_model import LimitedFigure, Observations, SearchModel
 from tests.helpers.known_optima import PEAK, hill
@@ -26,6 +31,20 @@ def test_proposals_are_new_and_the_same_for_the_same_seed() -> None:
     one, two = (propose_point(model, np.random.default_rng(5)) for _ in range(2))
     np.testing.assert_array_equal(one, two)
     assert np.abs(points - one).max(axis=1).min() >= 0.005
+
+
+def test_an_evaluation_is_worth_the_mean_rise_of_the_best_mean() -> None:
+    """Against many normal outcomes of the evaluation: it moves the means of both leaders."""
+    points = np.array([[0.1, 0.1], [0.9, 0.9], [0.1, 0.9], [0.9, 0.1], [0.5, 0.5]])
+    model = model_of(points, np.array([1.0, 1.0, 0.0, 0.0, 0.2]))
+    at = points[:1]
+    gradient = float(np.exp(_knowledge_gradient(model, points[:2])(at)[0]))
+    own, noise = model.score(at)[1][0], model.score.noise
+    moves = model.covariance(at, points[:2])[0] / np.hypot(own, np.sqrt(noise))
+    draws = np.random.default_rng(0).normal(size=(200_000, 1))
+    means = model.expected(points[:2])[0]
+    exact = float((means + draws * moves).max(axis=1).mean() - means.max())
+    assert gradient == pytest.approx(exact, rel=0.1)
 
 
 def test_what_may_be_gained_has_the_unit_of_the_score_and_shrinks_with_points() -> None:
