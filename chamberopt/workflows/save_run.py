@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
     from chamberopt.design.load import Design
     from chamberopt.peening.range_result import Spreads, StudyRanges
+    from chamberopt.results.records import CandidateRecord
     from chamberopt.search.candidate import ConfirmedCandidate
     from chamberopt.search.run_study import StudyResult
     from chamberopt.search.run_sweep import SweepResult
@@ -41,7 +42,7 @@ def save_simulation(
     advice: Sequence[Advice] = (),
     warned: Sequence[str] | None = None,
     spreads: Spreads = NO_SPREADS,
-) -> list[str]:
+) -> tuple[CandidateRecord, list[str]]:
     """Save a simulation in a new or empty folder.
 
     Writes design.toml, coverage.vtp, part.vtp, hits.npz, arrays.npz, chamber.stl, chamber.vtp,
@@ -57,13 +58,15 @@ def save_simulation(
         spreads: effect of the design's tolerances, and ranges of what is not calibrated.
 
     Returns:
-        Remarks for the user, such as why a picture was skipped.
+        What result.json says, and remarks for the user, such as why a picture was skipped.
     """
     folder = make_output_folder(folder)
     with whole_or_nothing(folder):  # a folder without result.json is of no use
         completed = complete_result(design, chamber, evaluation)
-        write_result(folder, write_simulation(folder, completed, spreads), advice, warned)
-    return _draw_coverage([folder], [evaluation], [folder.resolve().name], folder / "coverage.png")
+        record = write_simulation(folder, completed, spreads)
+        write_result(folder, record, advice, warned)
+    picture = folder / "coverage.png"
+    return record, _draw_coverage([folder], [evaluation], [folder.resolve().name], picture)
 
 
 def save_study(

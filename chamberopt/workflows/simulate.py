@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
     from chamberopt.common.progress import Progress
     from chamberopt.design.load import Design
+    from chamberopt.results.records import CandidateRecord
     from chamberopt.simulation.advice import Advice
     from chamberopt.simulation.evaluation import Evaluation
     from sim_core import AnalyticCavity
@@ -106,6 +107,7 @@ class Simulated:
     design: the design with its optional physical effects chosen.
     advice: reasons for these effects, if the design left their choice to the program.
     spreads: effect of the design's tolerances, and ranges of what is not calibrated.
+    record: what its result.json says.
     remarks: remarks for the user, such as why a picture was skipped.
     """
 
@@ -114,6 +116,7 @@ class Simulated:
     evaluation: Evaluation
     spreads: Spreads
     advice: list[Advice]
+    record: CandidateRecord
     remarks: list[str]
 
 
@@ -160,8 +163,8 @@ def simulate_design(
             evaluation = replace(evaluation, notes=(*evaluation.notes, str(error)))
     spreads = Spreads(found, ranges)
     with teller.step("writing and drawing"):
-        remarks = save_simulation(folder, design, chamber, evaluation, advice, warnings, spreads)
-    return Simulated(design, chamber, evaluation, spreads, advice, remarks)
+        saved = save_simulation(folder, design, chamber, evaluation, advice, warnings, spreads)
+    return Simulated(design, chamber, evaluation, spreads, advice, *saved)
 
 
 def resolve_effects(

@@ -50,11 +50,12 @@ def simulate(
     from chamberopt.cli.teller import TerminalTeller
     from chamberopt.common.executor import open_executor
     from chamberopt.design.load import load_design
-    from chamberopt.documents.answer import answer_in
+    from chamberopt.documents.answer import answer
     from chamberopt.documents.ranges import range_lines
     from chamberopt.documents.terminal_lines import evaluation_lines, note_lines, zone_limit_lines
     from chamberopt.documents.tolerances import tolerance_lines
     from chamberopt.peening.tolerances import plan_tolerances
+    from chamberopt.results.load import Result
     from chamberopt.workflows.simulate import SimulationSettings, simulate_design
 
     candidate = load_design(design)
@@ -76,6 +77,7 @@ def simulate(
     found = done.spreads
     lines = [*evaluation_lines(done.evaluation, found.ranges), *range_lines(found.ranges)]
     lines += [*limits, *notes]
+    said = answer(Result(folder, done.design, done.record), None)
     if found.tolerances:
         lines += ["", *tolerance_lines(found.tolerances)]
-    console.print_result([*lines, "", answer_in(folder)], folder, json)
+    console.print_result([*lines, "", said], folder, json)
