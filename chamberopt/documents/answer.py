@@ -28,7 +28,7 @@ def answer_in(folder: Path) -> str:
         InputError: the folder has no usable result.
     """
     result = load_result(folder)
-    return answer(result, load_start(result) if result.study else None)
+    return answer(result, load_start(result))
 
 
 def answer(result: Result, start: Result | None) -> str:

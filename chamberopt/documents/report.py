@@ -87,7 +87,7 @@ def report(result: Result) -> Document:
         InputError: a file of the result is missing or damaged.
     """
     study, name = result.study, result.folder.resolve().name
-    start = load_start(result) if study else None
+    start = load_start(result)
     trials = load_trials(result.folder) if study else []
     of = {"result": result} if start is None else {START: start, "best": result}
     scene = part_scene(result, name)

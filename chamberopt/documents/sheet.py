@@ -184,7 +184,7 @@ def process_sheet(result: Result, face_mm: tuple[float, ...]) -> Document:
         face_mm: size of the sonotrode's face [mm].
     """
     record = result.record
-    start = load_start(result) if result.study else None
+    start = load_start(result)
     checks, calibrated = first_checks(result), calibrated_to(result)
     red = [Sentence(text, "warning") for text in (*alarms(result), *_wide_face(result, face_mm))]
     content: list[Block] = [*red, *setting_tables(result, face_mm), checks, *calibrated]

@@ -64,8 +64,7 @@ def shown(folders: Sequence[Path]) -> dict[str, object]:
     several = len(folders) > 1
     if not several:
         result = load_result(folders[0])
-        start = load_start(result) if result.study else None
-        html = section(answer_section(result, start), viewer) + html
+        html = section(answer_section(result, load_start(result)), viewer) + html
     text = terminal.text(comparison_lines(compare(folders))) if several else ""
     return {"content": content, "html": html, "comparison": text}
 

@@ -7,6 +7,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+from chamberopt.chamber.propose.proposed_target import SHAPES
 from chamberopt.chamber.propose.shop import load_shop
 from chamberopt.common.errors import InputError
 from chamberopt.common.files import check_new_file, write_bytes
@@ -21,7 +22,6 @@ from chamberopt.page.acts import Acts, free_folder, path_inside
 from chamberopt.page.started_commands import OneCommand
 
 PART_NAME = re.compile(r"\w[\w .,()+-]{0,150}")
-SHAPES = "cylinder", "box", "prism", "conformal"
 MOST_NAMES = 40  # names of a part's surfaces that the page lists
 
 
@@ -70,7 +70,6 @@ class Front:
             "suffixes": SUFFIXES,
             "designs": [name for name, kind in tables if kind == "design"],
             "shops": [name for name, kind in tables if kind == "shop"],
-            "units": tuple(METRES_PER),
             "alloys": [one.name for one in alloys()],
             "balls": [one.name for one in balls()],
             "shapes": SHAPES,
@@ -97,10 +96,9 @@ class Front:
         try:
             mesh = read_part_cached(path, unit)
         except UnknownUnitError as error:
-            return {"sizes": error.sizes, "unit": "", "size": "", "names": []}
+            return {"sizes": error.sizes, "size": "", "names": []}
         names = sorted(mesh.groups, key=lambda name: -int(mesh.groups[name].sum()))
-        size = format_box(mesh.size)
-        return {"sizes": {}, "unit": mesh.unit, "size": size, "names": names[:MOST_NAMES]}
+        return {"sizes": {}, "size": format_box(mesh.size), "names": names[:MOST_NAMES]}
 
     def propose(self, asked: Any) -> dict[str, object]:
         """Start the command `new` for a part of the folder, and return into which folder."""

@@ -8,6 +8,7 @@ import os
 import secrets
 import socket
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from urllib.parse import parse_qs
 
@@ -142,7 +143,8 @@ NONSENSE = (
     OSError,
 )
 MOST_BYTES, MOST_OF_PART = 2_000_000, 500_000_000  # bytes of a question, and of a part's file
-TOO_LONG, ASK = "this {} has more than {:g} MB; {}", "ask for less at a time"
+TOO_LONG = f"this question has more than {1e-6 * MOST_BYTES:g} MB; ask for less at a time"
+TOO_LARGE = f"this file has more than {1e-6 * MOST_OF_PART:g} MB; give a coarser mesh"
 
 
 def make_app(front: Front, port: int) -> OnePerson:
@@ -152,13 +154,13 @@ def make_app(front: Front, port: int) -> OnePerson:
     the pages, and for their files.
     """
 
-    async def answered(request: Request, most: int, act: Callable[[bytes], object]) -> Response:
+    async def answered(
+        request: Request, act: Callable[[bytes], object], most: int, too_long: str
+    ) -> Response:
         try:
             body = await _body(request, most) if request.method == "POST" else b""
             if body is None:
-                what = ("file", "give a coarser mesh") if most > MOST_BYTES else ("question", ASK)
-                text = TOO_LONG.format(what[0], 1e-6 * most, what[1])
-                return JSONResponse({"error": text}, 413, {"Connection": "close"})
+                return JSONResponse({"error": too_long}, 413, {"Connection": "close"})
             found = await run_in_threadpool(act, body)
         except ClientDisconnect:  # nobody waits for an answer
             return Response(status_code=400)
@@ -180,13 +182,14 @@ def make_app(front: Front, port: int) -> OnePerson:
             return getattr(page, name)(json.loads(body or b"{}"))
 
         async def answer(request: Request) -> Response:
-            return await answered(request, MOST_BYTES, act)
+            return await answered(request, act, MOST_BYTES, TOO_LONG)
 
         return Route(f"/{name}", answer, methods=[method])
 
     async def upload(request: Request) -> Response:
         name = request.query_params.get("name", "")
-        return await answered(request, MOST_OF_PART, lambda body: front.upload(name, body))
+        act = partial(front.upload, name)
+        return await answered(request, act, MOST_OF_PART, TOO_LARGE)
 
     async def page(_: Request) -> Response:
         return FileResponse(BROWSER / ("index.html" if front.acts else "front.html"))

@@ -140,10 +140,15 @@ def load_result(path: str | Path) -> Result:
         return Result(folder, design, record)
 
 
-def load_start(study: Result) -> Result:
-    """Return the result of the design with which a study began, from the study's folder `start`."""
-    with _damage_explained(study.folder / START):
-        return load_result(require_plain_folder(study.folder / START, RESTORE))
+def load_start(result: Result) -> Result | None:
+    """Return the result of the design with which a study began, from the study's folder `start`.
+
+    It is None for a result that is no study's.
+    """
+    if result.study is None:
+        return None
+    with _damage_explained(result.folder / START):
+        return load_result(require_plain_folder(result.folder / START, RESTORE))
 
 
 def load_trials(folder: Path) -> list[Trial]:

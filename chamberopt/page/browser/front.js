@@ -6,13 +6,14 @@ const find = (id) => document.getElementById(id);
 const option = (text) => element("option", { textContent: text, value: text });
 const known = { part: "", unit: "" };
 
-async function show(part = "") {
+// Show what the folder has, with a part chosen, by default the one that the page begins with; give its name.
+async function show(part) {
   const here = await ask("/front");
   find("folder").textContent = here.folder;
   find("file").accept = here.suffixes.join(",");
   find("part").replaceChildren(element("option", { value: "", textContent: "choose…" }), ...here.parts.map(option));
   find("here").hidden = !here.parts.length;
-  find("part").value = part;
+  find("part").value = part ?? here.first;
   for (const [id, names] of [["material", here.alloys], ["shot", here.balls], ["shape", here.shapes], ["shop", here.shops]])
     find(id).replaceChildren(find(id).options[0], ...names.map(option));
   find("of-shop").hidden = !here.shops.length;
@@ -22,6 +23,7 @@ async function show(part = "") {
     button.addEventListener("click", () => attempt(() => open(name)));
     return element("li", {}, button, ` ${name}`);
   }));
+  return find("part").value;
 }
 
 async function open(design) {
@@ -105,8 +107,4 @@ find("propose").addEventListener("click", () => attempt(async () => {
   await show(known.part);
 }));
 find("stop").addEventListener("click", () => attempt(() => ask("/stop", {})));
-attempt(async () => {
-  const { first } = await ask("/front");
-  await show(first);
-  await look(first);
-}).then(() => { document.body.dataset.ready = "yes"; });
+attempt(async () => look(await show())).then(() => { document.body.dataset.ready = "yes"; });

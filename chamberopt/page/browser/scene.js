@@ -61,8 +61,8 @@ function walls(answer) {
   const surface = (name, triangles, [colour, opacity]) =>
     view.surface(name, { points: answer.points.slice(), triangles: triangles.slice(), colour, opacity });
   surface("walls", answer.walls, [part.glass, CLEAR]);
-  const [colour, opacity] = [part.legend.at(-1)[1], FACE]; // from below the part is seen through it
-  surface("sonotrode", answer.sonotrode, [colour, view.camera.position.z < 0 ? 0.15 : opacity]);
+  const opacity = view.camera.position.z < 0 ? 0.15 : FACE; // from below the part is seen through it
+  surface("sonotrode", answer.sonotrode, [part.legend.at(-1)[1], opacity]);
   view.lines("edges", answer.edges.slice(), part.edges);
 }
 
