@@ -31,16 +31,17 @@ from chamberopt.search.candidate import (
     Candidate,
     ConfirmedCandidate,
     Figures,
+    RefusedError,
     close_to_best,
     limited_figures,
     simulated_figures,
 )
 from chamberopt.search.judge import Judge
-from chamberopt.search.observe import FIRST_OBJECTIVE, observe
+from chamberopt.search.observe import FIRST_OBJECTIVE, fit_model, observe
 from chamberopt.search.optimiser.acquisition import recommend_points
 from chamberopt.search.optimiser.point_search import PARETO_PHASES, End, PointSearch
 from chamberopt.search.optimiser.scalarisation import draw_weights
-from chamberopt.search.optimiser.search_model import POINTS_PER_PARAMETER, Observations, SearchModel
+from chamberopt.search.optimiser.search_model import Observations, SearchModel
 from chamberopt.search.study.constraints import NOT_KNOWN, assess_feasibility
 from chamberopt.search.study.parameters import ParameterSpace
 from chamberopt.search.trial_log import HISTORY, Trial
@@ -239,21 +240,10 @@ class Search:
         return self._model(FIRST_OBJECTIVE, learns_bounds=True)
 
     def _model(self, weight: np.ndarray, learns_bounds: bool = False) -> SearchModel | None:
-        """Return a model of the score, fitted to all trials of the search.
-
-        Return None if the points are too few, or if all their scores are equal.
-
-        Args:
-            weight: weights of two objectives in the score, (2,).
-            learns_bounds: whether the model also learns the largest possible score of candidates
-                that were not simulated.
-        """
-        seen = self.observations(weight)
-        scores = seen.scores[seen.simulated]
-        if len(scores) < POINTS_PER_PARAMETER * len(self.space.names) or np.ptp(scores) == 0.0:
-            return None
-        points = np.array(self._search.points)
-        return SearchModel(self.space.domain, points, seen, learns_bounds=learns_bounds)
+        """Return a model of the score, fitted to all trials of the search; see `fit_model`."""
+        searched = [trial for trial in self.trials if trial.stage == "search"]
+        limits = self._study.all_constraints
+        return fit_model(self.space.domain, searched, limits, weight, learns_bounds)
 
     # Questions. None where the candidates that are out must be told first.
 
@@ -488,5 +478,5 @@ def _why_impossible(candidate: Candidate) -> InputError | None:
     except UnreadableError:
         raise
     except InputError as error:
-        return error
+        return RefusedError(str(error))
     return None

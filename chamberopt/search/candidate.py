@@ -158,7 +158,11 @@ def close_to_best(confirmed: Sequence[ConfirmedCandidate]) -> list[ConfirmedCand
     return [best, *close] if close else []
 
 
-class NoPromiseError(InputError):
+class RefusedError(InputError):
+    """Raised for a candidate that its geometry rules out before anything is simulated."""
+
+
+class NoPromiseError(RefusedError):
     """Raised for a candidate not worth a simulation, as its objective cannot exceed `highest`."""
 
     def __init__(self, text: str, highest: float) -> None:
@@ -244,7 +248,7 @@ class CandidateEvaluator:
         return is_known and not any(map(narrows, figures.goals))
 
     def _require_buildable(self, design: Design) -> None:
-        """Raise InputError if a candidate's chamber has a gap in which balls jam or get in nowhere.
+        """Raise RefusedError if a candidate has no chamber, or one with a gap in which balls jam.
 
         It is found by geometry, without a simulation.
         """
@@ -253,10 +257,12 @@ class CandidateEvaluator:
         find_fault = getattr(self._simulator, "unbuildable", None)
         try:
             fault = find_fault(design) if find_fault is not None else ""
-        except SceneError as error:
-            raise InputError(str(error)) from None
+        except UnreadableError:
+            raise
+        except (InputError, SceneError) as error:
+            raise RefusedError(str(error)) from None
         if fault:
-            raise InputError(f"not simulated: {fault}")
+            raise RefusedError(f"not simulated: {fault}")
 
     def _require_promise(self, design: Design, bar: float | None) -> None:
         """Raise NoPromiseError if a candidate is clearly worse than the best candidate so far.

@@ -14,6 +14,7 @@ from chamberopt.search.candidate import (
     Candidate,
     Figures,
     NoPromiseError,
+    RefusedError,
     evaluation_cost,
     limited_figures,
 )
@@ -96,7 +97,10 @@ class Judge:
         if isinstance(answer, InputError):
             highest = answer.highest if isinstance(answer, NoPromiseError) else None
             score = worst if highest is None else highest
-            return replace(failed, reason=str(answer), score=score, highest=highest)
+            refused = isinstance(answer, RefusedError)
+            return replace(
+                failed, reason=str(answer), score=score, highest=highest, refused=refused
+            )
         unit = self.unit_of(answer) if candidate.is_start else self.unit
         figures = limited_figures(self._study, candidate, answer)
         constraints = self._study.all_constraints

@@ -1,4 +1,4 @@
-"""Collect what the models of a search learn from its trials: scores, and figures with limits."""
+"""Fit the models of a search to its trials: to their scores, and to figures with limits."""
 
 from __future__ import annotations
 
@@ -12,10 +12,16 @@ from chamberopt.common.estimate import CONFIDENCE, Estimate, normal_quantile, st
 from chamberopt.coverage.coverage_intervals import NOT_RESOLVED
 from chamberopt.search.optimiser.gaussian_process import moderate_variances
 from chamberopt.search.optimiser.scalarisation import scalarise
-from chamberopt.search.optimiser.search_model import LimitedFigure, Observations
+from chamberopt.search.optimiser.search_model import (
+    POINTS_PER_PARAMETER,
+    LimitedFigure,
+    Observations,
+    SearchModel,
+)
 from chamberopt.search.study.constraints import Limits, exact
 
 if TYPE_CHECKING:
+    from chamberopt.search.optimiser.domain import Domain
     from chamberopt.search.trial_log import Trial
 
 # A figure counts as at most so many times as far outside its limit as the median candidate is away
@@ -47,6 +53,32 @@ def observe(
     limited = ((name, limits) for name, limits in constraints.items() if name in known)
     figures = (_limited_figure(name, limits, trials) for name, limits in limited)
     return Observations(score, variance, simulated, tuple(figures), spared)
+
+
+def fit_model(
+    domain: Domain,
+    trials: Sequence[Trial],
+    constraints: Mapping[str, Limits],
+    weight: np.ndarray = FIRST_OBJECTIVE,
+    learns_bounds: bool = False,
+) -> SearchModel | None:
+    """Return a model of the score, fitted to the trials of a search.
+
+    Return None if the points are too few, or if all their scores are equal.
+
+    Args:
+        domain: which values each parameter can have.
+        weight: weights of two objectives in the score, (2,).
+        learns_bounds: whether the model also learns the largest possible score of candidates that
+            were not simulated.
+    """
+    if not any(trial.goals for trial in trials):
+        return None
+    seen, points = observe(trials, constraints, weight), np.array([one.point for one in trials])
+    scores = seen.scores[seen.simulated]
+    if len(scores) < POINTS_PER_PARAMETER * points.shape[1] or np.ptp(scores) == 0.0:
+        return None
+    return SearchModel(domain, points, seen, learns_bounds=learns_bounds)
 
 
 def _limited_figure(name: str, limits: Limits, trials: Sequence[Trial]) -> LimitedFigure:

@@ -38,6 +38,7 @@ class Trial:
     reason: str  # why the candidate is not feasible, else ""
     replicas: int | None = None  # that were simulated; None when the evaluation failed
     highest: float | None = None  # largest objective by reach alone, if that spared a simulation
+    refused: bool = False  # whether geometry ruled the candidate out before any simulation
 
     @property
     def objective(self) -> Estimate | None:
@@ -64,6 +65,8 @@ class Trial:
             "feasible": self.feasible,
             "reason": self.reason,
             "metrics": {name: metric.interval_json() for name, metric in self.metrics.items()},
+            # Only where it is so: rows of before the key stay as they were written.
+            **({"refused": True} if self.refused else {}),
         }
 
     @classmethod
@@ -91,6 +94,7 @@ class Trial:
             reason=str(row["reason"]),
             replicas=None if row["replicas"] is None else int(row["replicas"]),
             highest=None if row["highest"] is None else float(row["highest"]),
+            refused=bool(row.get("refused", False)),
         )
         if trial.row() != row:  # a text or true in the place of a number, or words of its own
             raise ValueError("not as it was written")
