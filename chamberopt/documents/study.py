@@ -140,7 +140,7 @@ def search_section(result: Result, trials: Sequence[Trial]) -> Section | None:
     if not trials:
         return None
     label = objective_label(result.objective_name)
-    candidates = [_evaluated(one, label) for one in trials]
+    candidates = [evaluated(one, label) for one in trials]
     figure, tooltips = convergence_figure(candidates, label.with_unit, label.factor < 0.0)
     caption = (
         "The objective of every evaluation in its order. The answer rests on the last ones, which "
@@ -155,7 +155,25 @@ def search_section(result: Result, trials: Sequence[Trial]) -> Section | None:
     return Section("How the search went", content)
 
 
-def _evaluated(one: Trial, label: Label) -> EvaluatedCandidate:
+def tried_sentence(trials: Sequence[Trial]) -> str:
+    """Return a sentence on what became of all candidates of a search."""
+    search = [one for one in trials if one.stage != "confirm"]
+    if not search:
+        return "No candidate has been evaluated yet."
+    refused = sum(one.refused or one.highest is not None for one in search)
+    simulated = sum(bool(one.goals) for one in search)
+    again = sum(bool(one.goals) for one in trials) - simulated
+    said = [f"{len(search)} proposed", f"{refused} refused by geometry before any simulation"]
+    said.append(f"{simulated} simulated")
+    if others := len(search) - refused - simulated:
+        said.append(f"{others} that could not be simulated")
+    if again:
+        said.append(f"{again} confirmed with new seeds")
+    return f"{', '.join(said)}."
+
+
+def evaluated(one: Trial, label: Label) -> EvaluatedCandidate:
+    """Return a trial as charts show it, in the unit of the objective's label."""
     objective = one.objective
     if objective is not None:
         half_width = finite_or_none(objective.half_width) or 0.0
@@ -280,7 +298,7 @@ def influence_sentences(study: StudyRecord, rows: Sequence[Influence], label: La
     """
     model, count = study.model, study.evaluations - study.failed
     if not model:
-        return [_reason_without_model(study.evaluations, study.failed, len(study.vary))]
+        return [reason_without_model(study.evaluations, study.failed, len(study.vary))]
     said, first = [], rows[0]
     if first.surely:
         said.append(
@@ -327,7 +345,13 @@ def _shares(rows: Sequence[Influence]) -> str:
     )
 
 
-def _reason_without_model(count: int, failed: int, parameters: int) -> str:
+def reason_without_model(count: int, failed: int, parameters: int) -> str:
+    """Return a sentence on why a study has no model of its evaluations.
+
+    Args:
+        count: number of evaluations, of which `failed` were not simulated.
+        parameters: number of varied parameters.
+    """
     needed = POINTS_PER_PARAMETER * parameters
     if count - failed < needed:
         evaluations = f"{count} evaluations" + (

@@ -5,13 +5,20 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from contextlib import suppress
-from itertools import count
+from itertools import count, product
 from pathlib import Path
 from typing import Any
 
 from chamberopt.chamber.propose.text import study_lines
 from chamberopt.common.errors import InputError
-from chamberopt.common.files import check_new_file, is_new_or_empty, remove_file, write_text
+from chamberopt.common.files import (
+    INPUTS,
+    RESULT,
+    check_new_file,
+    is_new_or_empty,
+    remove_file,
+    write_text,
+)
 from chamberopt.common.toml_fields import read_toml
 from chamberopt.design.load import is_study
 from chamberopt.documents.comparison import comparison_lines
@@ -19,8 +26,15 @@ from chamberopt.documents.report import answer_section
 from chamberopt.page.answers import part_answer, shape_answer
 from chamberopt.page.checker import Checker
 from chamberopt.page.edited_file import EditedFile, custom_shape, design_fields
+from chamberopt.page.further_study import write_further_study
 from chamberopt.page.picking import Picker
 from chamberopt.page.started_commands import OneCommand
+from chamberopt.page.study_answers import (
+    candidate_answer,
+    candidates_answer,
+    model_answer,
+    version,
+)
 from chamberopt.printers import terminal
 from chamberopt.printers.html import section
 from chamberopt.printers.report_page import REPORT, parts_content, viewer
@@ -28,28 +42,30 @@ from chamberopt.printers.sheet_page import SHEET
 from chamberopt.results.compare.comparison import compare
 from chamberopt.results.load import load_result, load_start, summary
 from chamberopt.search.study import load_study
+from chamberopt.search.study_folder import STUDY, is_finished, is_study_folder, read_inputs
 
-RESULT = "result.json"
 DEEPEST = 4  # levels of folders below the design's folder that are searched for results
 
 
 def list_results(folder: Path) -> list[dict[str, object]]:
-    """List all results below a folder, the newest first, each with its figures in a line."""
-    found = []
-    for depth in range(1, DEEPEST + 1):
-        found += list(folder.glob("/".join(["*"] * depth + [RESULT])))
+    """List all results and studies below a folder, the newest first, with figures in a line."""
+    found: dict[Path, float] = {}
+    for depth, name in product(range(1, DEEPEST + 1), (INPUTS, RESULT)):
+        for file in folder.glob("/".join(["*"] * depth + [name])):
+            found[file.parent] = max(found.get(file.parent, 0.0), file.lstat().st_mtime)
     rows = []
-    for file in sorted(found, key=lambda one: one.lstat().st_mtime, reverse=True):
-        where = file.parent
+    for where in sorted(found, key=lambda one: found[one], reverse=True):
         if not where.resolve().is_relative_to(folder):
             continue  # a link to elsewhere
         row: dict[str, Any] = {"folder": where.relative_to(folder).as_posix()}
         row |= {name: (where / name).is_file() for name in (REPORT, SHEET)}
+        row["is_study"] = is_study_folder(where)
         try:
-            result = load_result(where)
-            row["text"] = summary(result)
+            row["text"] = summary(load_result(where))
         except InputError as error:
-            row["text"], row["unusable"] = str(error), True
+            unfinished = row["is_study"] and not is_finished(where)
+            row["text"] = "a study that has not finished" if unfinished else str(error)
+            row["unusable"] = True
         rows.append(row)
     return rows
 
@@ -201,14 +217,80 @@ class Acts:
             folder = self._free_folder(f"{what.stem}-sweep" if sweeps else what.stem)
             arguments = [command, name, *sweeps, "--out", folder]
             shows = "" if sweeps else folder
-        return {"result": shows, **self._command.start(arguments, self._path.parent)}
+        return self._command.start(arguments, self._path.parent, shows)
+
+    def candidates(self, asked: Any) -> dict[str, object]:
+        """Return the candidates of a study; only the version if the page has seen this one."""
+        folder = self.inside(str(asked["folder"]))
+        if asked.get("seen") == version(folder):
+            return {"version": asked["seen"]}
+        return candidates_answer(folder)
+
+    def candidate(self, asked: Any) -> dict[str, object]:
+        folder, design = self.inside(str(asked["folder"])), self._file(asked).design
+        return candidate_answer(folder, int(asked["number"]), design)
+
+    def model(self, asked: Any) -> dict[str, Any]:
+        folder = self.inside(str(asked["folder"]))
+        if not (folder / STUDY).is_file():
+            return {"reason": "There are no evaluations yet."}
+        self._refuse_shape(self.inside(str(folder / STUDY)))
+        return model_answer(folder)
+
+    def resume(self, asked: Any) -> dict[str, object]:
+        """Start the command that goes on with the study or sweep of a folder."""
+        folder = self.inside(str(asked["folder"]))
+        name, out = f"./{self._study_of(folder)}", folder.relative_to(self._path.parent).as_posix()
+        plan = read_inputs(folder).plan
+        arguments = ["run", name]
+        if plan is not None:
+            seed = [] if plan.get("seed") is None else ["--seed", str(int(plan["seed"]))]
+            method = {"grid": "--grid", "sobol": "--sobol"}[plan["method"]]
+            arguments = ["sweep", name, method, str(int(plan["count"])), *seed]
+        shows = "" if plan else out
+        return self._command.start([*arguments, f"--out={out}"], self._path.parent, shows)
+
+    def more(self, asked: Any) -> dict[str, object]:
+        """Start a further study of the same question, which begins with the best so far.
+
+        What a study asks for depends on its budget, so a study cannot get a larger one. The further
+        study has points of its own.
+        """
+        folder = self.inside(str(asked["folder"]))
+        before = self.inside(self._study_of(folder))
+        path = write_further_study(before, folder, int(asked["evaluations"]))
+        try:
+            load_study(path)
+        except InputError:
+            remove_file(path)
+            raise
+        return self.start({"command": "run", "of": path.name})
+
+    def _study_of(self, folder: Path) -> str:
+        """Return the name of the study file beside the design that began in a folder."""
+        inputs = read_inputs(folder)
+        for row in _files_beside(self._path):
+            if row["kind"] == "study":
+                path = self.inside(row["name"])
+                with suppress(InputError):
+                    self._refuse_shape(path)
+                    if inputs.is_of(load_study(path)):
+                        return row["name"]
+        raise InputError(
+            f"{folder.name}: no study file here asks what this study asked, so its file or design "
+            "was changed since; restore it, or run the study anew"
+        )
 
     def _refuse_shape(self, file: Path) -> None:
         """Raise InputError if a design or study would run a Python file that is not trusted."""
-        data = read_toml(file, "design")[1]
-        if is_study(data) and isinstance(data.get("design"), str):
-            data = read_toml(file.parent / data["design"], "design")[1]
-        shape = custom_shape(data)
+        tables = [read_toml(file, "design")[1]]
+        if is_study(tables[0]):
+            first = tables[0].get("begin_with")
+            named = [tables[0].get("design"), *(first if isinstance(first, list) else [])]
+            tables = [
+                read_toml(file.parent / one, "design")[1] for one in named if isinstance(one, str)
+            ]
+        shape = next(filter(None, map(custom_shape, tables)), "")
         if shape and not self._trusted:
             raise InputError(
                 f"{file.name}: runs the Python file {shape}, which may do anything; start it from "

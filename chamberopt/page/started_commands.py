@@ -24,8 +24,8 @@ COMMAND = (
 class StartedCommand:
     """A chamberopt command that runs in a folder, and the lines that it has printed so far."""
 
-    def __init__(self, arguments: Sequence[str], folder: Path) -> None:
-        self.arguments = list(arguments)
+    def __init__(self, arguments: Sequence[str], folder: Path, result: str = "") -> None:
+        self.arguments, self._result = list(arguments), result
         self._lines: list[str] = []
         self._steps: dict[str, dict[str, Any]] = {}
         self._process = start_python(
@@ -46,13 +46,15 @@ class StartedCommand:
     def status(self) -> dict[str, object]:
         """Return what the page shows of the command: printed lines and progress of its steps.
 
-        The value `exit` is the exit status of the command, or None while it runs.
+        The value `exit` is the exit status of the command, or None while it runs. `result` is the
+        folder of the result that it will leave, if any.
         """
         code = self._process.poll()
         if code is not None:
             self._reader.join(5.0)
         return {
             "command": f"chamberopt {' '.join(self.arguments)}",
+            "result": self._result,
             "steps": [] if code is not None else list(self._steps.values()),
             "lines": self._lines[-MOST_LINES:],
             "exit": code,
@@ -108,15 +110,21 @@ class OneCommand:
         self._command: StartedCommand | None = None
         self._starting = Lock()
 
-    def start(self, arguments: Sequence[str], folder: Path) -> dict[str, object]:
-        """Start a command in a folder, and return its status; `StartedCommand` has the arguments.
+    def start(
+        self, arguments: Sequence[str], folder: Path, result: str = ""
+    ) -> dict[str, object]:
+        """Start a command in a folder, and return its status.
+
+        Args:
+            arguments: those of the command line.
+            result: folder of the result that the command will leave, if any.
 
         Raises InputError if a command is running.
         """
         with self._starting:
             if self._command is not None and self._command.status()["exit"] is None:
                 raise InputError("a command is running; stop it first, or wait for its end")
-            self._command = StartedCommand(arguments, folder)
+            self._command = StartedCommand(arguments, folder, result)
             return self._command.status()
 
     def status(self) -> dict[str, object]:

@@ -131,6 +131,16 @@ def analyse_sensitivity(
     return Sensitivity(tuple(slices), noise, expected, together)
 
 
+def is_supported(search: SearchModel, one: Slice) -> np.ndarray:
+    """Return where evaluations support the model's curve of a slice, (k,) bool.
+
+    There they explain at least half of the variance that the score has from place to place.
+    """
+    deviation = one.half_width / NORMAL_95
+    supported: np.ndarray = (deviation**2 <= 0.5 * search.score.signal) & ~one.or_worse
+    return supported
+
+
 def _with_best_of_its_own(
     search: SearchModel, line: np.ndarray, at: np.ndarray, sample: np.ndarray
 ) -> np.ndarray:

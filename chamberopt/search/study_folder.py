@@ -11,7 +11,7 @@ import json
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -33,7 +33,8 @@ from chamberopt.common.limits import MAX_RESULT_BYTES, read_limited
 from chamberopt.common.versions import program_versions
 from chamberopt.coverage.metrics import metric_names
 from chamberopt.design.design import Design
-from chamberopt.search.study.parameters import ParameterSpace
+from chamberopt.search.study.parameters import ParameterSpace, Varied, Vary
+from chamberopt.search.study.schema import Objective
 from chamberopt.search.trial_log import HISTORY, TIMINGS, JsonLines, Trial, read_seconds, trials_of
 from chamberopt.simulation.advice import Advice
 from chamberopt.simulation.evaluation import Evaluation, load_evaluation, save_evaluation
@@ -156,6 +157,59 @@ def require_same_inputs(
     _require_same(before, now, title, remedy)
 
 
+@dataclass(frozen=True)
+class StudyInputs:
+    """What a study asks, as its folder tells without its design's files.
+
+    vary: the values that each varied parameter may have, by dotted name.
+    goals: the objectives.
+    plan: the plan of a sweep; None for a search.
+    study: the whole study as JSON values, with digests of files.
+    """
+
+    vary: dict[str, Varied]
+    goals: tuple[str, ...]
+    plan: dict[str, Any] | None
+    study: dict[str, Any]
+
+    def is_of(self, study: Study) -> bool:
+        """Return whether these are the inputs of a study, so that the study can be resumed."""
+        now = study_inputs(study)["study"]
+        return not _changed_names({"study": self.study}, {"study": now})
+
+    def differences(self, design: Design) -> list[str]:
+        """Return the names of values in which a design differs from that of this study.
+
+        What varies, and how accurately is simulated, is left out.
+        """
+        now = _with_digests(design.model_dump(mode="json"))
+        left_out = ("ranges", "process.accuracy", *self.vary)
+        return [
+            name
+            for name in _changed_names(self.study["design"], now)
+            if not name.startswith(left_out) and not any(v.startswith(f"{name}.") for v in left_out)
+        ]
+
+
+def read_inputs(folder: Path) -> StudyInputs:
+    """Return what the study of a folder asks. Raises InputError if the folder is no study's."""
+    path = folder / INPUTS
+    if not path.is_file():
+        raise InputError(f"{folder}: no study was begun in it; give a study's results folder")
+    data: dict[str, Any] = _read_json(path)
+    try:
+        study, plan = data["study"], data["sweep"]
+        vary = TypeAdapter(dict[str, Vary]).validate_python(study["vary"])
+        goals = Objective.model_validate(study["objective"]).goals
+        if not isinstance(study["design"], dict) or not isinstance(plan, dict | None):
+            raise TypeError("not a table")
+        return StudyInputs(vary, goals, plan, study)
+    except ValidationError as error:
+        raise _damaged(path, first_wrong_value(error)) from None
+    except (LookupError, TypeError, ValueError, InputError) as error:
+        raise _damaged(path, error) from None
+
+
 def require_same_files(design: Design, before: Mapping[str, Any], folder: Path) -> None:
     """Raise InputError if a file that the design names has changed since the study began."""
     title = f"{folder}: changed while the study ran, so the running evaluations are not kept:"
@@ -175,20 +229,27 @@ def _require_same(
         title: first line of the message.
         remedy: last line of the message.
     """
-    old, new = (
-        {name: value for name, value in _flatten(one).items() if not name.startswith(RANGES)}
-        for one in (before, now)
-    )
+    old, new = _flatten(before), _flatten(now)
     changed = [
         f"{name}: was {_format(old, name)}, is {_format(new, name)}"
-        for name in {**old, **new}
-        if name not in old or name not in new or old[name] != new[name]
+        for name in _changed_names(before, now)
     ]
     if len(changed) > MAX_DIFFERENCES:
         hidden = len(changed) - MAX_DIFFERENCES
         changed = [*changed[:MAX_DIFFERENCES], f"and {hidden} more"]
     if changed:
         raise InputError("\n  ".join([title, *changed]) + f"\n{remedy}")
+
+
+def _changed_names(before: Mapping[str, object], now: Mapping[str, object]) -> list[str]:
+    """Return the dotted names of values in which two tables differ, but for a study's ranges."""
+    old, new = _flatten(before), _flatten(now)
+    return [
+        name
+        for name in {**old, **new}
+        if not name.startswith(RANGES)
+        and (name not in old or name not in new or old[name] != new[name])
+    ]
 
 
 def _with_digests(value: object) -> Any:

@@ -3,6 +3,7 @@ import { makeFields, showValues } from "./fields.js";
 import { fillSurfaces, fillTarget, showChosen } from "./target.js";
 import { fillRun, follow } from "./run.js";
 import { closeResults } from "./results.js";
+import "./study.js";
 import { ask, attempt, element, isUnsaved, listen, read, say, state, undo, unpack } from "./state.js";
 import { inUnits, inWords } from "./words.js";
 import { showCavity, showPart, showShape, showState } from "./scene.js";
@@ -22,15 +23,15 @@ let asking = false, asked = null, timer = 0, round = 0;
 async function followShape() {
   if (asking) return;
   asking = true;
-  while (asked !== state.changes) {
-    const changes = asked = state.changes;
+  while (asked !== state.shown) {
+    const changes = asked = state.shown;
     try {
       const answer = unpack(await ask("/shape", { changes }));
       refuse("");
       if (answer.state.length !== fillTarget.part.triangles.length / 3) await showPartOf(); // its file has changed
       showShape(answer);
       document.body.dataset.shape = String(Number(document.body.dataset.shape ?? 0) + 1);
-    } catch (error) { if (asked === state.changes) refuse(error.message); }
+    } catch (error) { if (asked === state.shown) refuse(error.message); }
   }
   asking = false;
 }
@@ -43,7 +44,7 @@ function followCavity() {
   const mine = ++round;
   timer = setTimeout(async () => {
     try {
-      const buffer = await ask("/cavity", { changes: state.changes });
+      const buffer = await ask("/cavity", { changes: state.shown });
       if (mine !== round) return;
       const cavity = unpack(buffer, 4);
       showCavity(cavity);
@@ -98,7 +99,8 @@ listen((what) => {
     fillSurfaces();
     showChosen();
   }
-  find("unsaved").textContent = isUnsaved() ? "not saved yet" : "";
+  if (state.showing) closeResults(); // so that the chamber is seen
+  find("unsaved").textContent = state.showing || (isUnsaved() ? "not saved yet" : "");
   find("save").disabled = !isUnsaved();
   find("undo").disabled = !state.past.length;
   followShape();

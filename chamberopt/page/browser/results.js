@@ -1,6 +1,7 @@
 // Results below the design's folder: in 3D, one or two side by side, with report and process sheet.
 import { ask, attempt, element } from "./state.js";
 import { start } from "./run.js";
+import { followStudy } from "./study.js";
 
 const find = (id) => document.getElementById(id), list = find("result-list");
 const FILES = [["report", "report.html", "report"], ["sheet", "process_sheet.pdf", "process sheet"]];
@@ -10,6 +11,11 @@ async function refresh() {
   list.replaceChildren(...rows.map((row) => {
     const tick = element("input", { type: "checkbox", value: row.folder, disabled: Boolean(row.unusable) });
     const item = element("li", {}, element("label", {}, tick, ` ${row.folder}`), element("small", { textContent: row.text }));
+    if (row.is_study) {
+      const button = element("button", { textContent: "see its candidates" });
+      button.addEventListener("click", () => { closeResults(); followStudy(row.folder); });
+      item.append(button, " ");
+    }
     for (const [command, file, name] of row.unusable ? [] : FILES) {
       const button = element("button", { textContent: row[file] ? name : `make the ${name}` });
       button.addEventListener("click", () => attempt(() => open(command, row.folder, file, row[file])));

@@ -33,12 +33,25 @@ export async function start(command, of) {
   return { exit: await follow(started), result: started.result };
 }
 
+// Follow a command to its end, and tell what it has left.
+export async function followToEnd(started) {
+  const exit = await follow(started);
+  document.dispatchEvent(new CustomEvent("ended", { detail: exit === 0 ? started.result : "" }));
+}
+
+// Folder of the study that runs now, or "".
+export const running = () => study;
+let study = "";
+
 // Show a command that runs, by default what the server has started last, and give its exit status.
 export const follow = async (started) => (await followed(show, started))?.exit ?? null;
 
-function show({ command, steps, lines, exit }) {
+function show({ command, result, steps, lines, exit }) {
+  const before = study;
+  study = exit === null && command.startsWith("chamberopt run ") ? result : "";
+  if (study && study !== before) document.dispatchEvent(new CustomEvent("running", { detail: study }));
   find("stop").disabled = exit !== null;
-  const now = exit === null ? "running" : exit === 0 ? "finished" : `ended with exit status ${exit}`;
+  const now = exit === null ? "running" : exit === 0 ? "finished" : exit === 130 ? "stopped" : `ended with exit status ${exit}`;
   find("progress").replaceChildren(element("p", { title: command }, element("b", { textContent: now })), ...bars(steps));
   find("printed").textContent = lines.join("\n");
   find("printed-fold").hidden = !lines.length;
@@ -47,8 +60,7 @@ function show({ command, steps, lines, exit }) {
 
 for (const button of document.querySelectorAll("[data-command]")) button.addEventListener("click", () => attempt(async () => {
   if (isUnsaved()) throw new Error("there are unsaved changes: commands use the saved file, so save or undo them first");
-  const { exit, result } = await start(button.dataset.command, find("of").value);
-  document.dispatchEvent(new CustomEvent("ended", { detail: exit === 0 ? result : "" }));
+  await followToEnd(await ask("/start", { command: button.dataset.command, of: find("of").value, points: find("points").value }));
 }));
 find("stop").addEventListener("click", () => attempt(() => ask("/stop", {})));
 find("write-study").addEventListener("click", () => attempt(async () => {

@@ -1,6 +1,6 @@
 // What the page knows: the file as read, changes not yet saved, and questions to the server.
 const listeners = [];
-export const state = { file: null, changes: {}, past: [] };
+export const state = { file: null, changes: {}, past: [], shown: {}, showing: "" };
 export const listen = (hear) => listeners.push(hear);
 const tell = (what) => { for (const hear of listeners) hear(what); };
 
@@ -41,6 +41,7 @@ export async function read(path = "/read", question = {}, before = () => {}) {
   await before();
   state.changes = {};
   state.past = [];
+  showChanges();
   tell("read");
 }
 
@@ -55,6 +56,7 @@ export function change(values, move = "") {
   state.changes = { ...state.changes, ...values };
   for (const name of Object.keys(values))
     if (state.file.fields.some((one) => one.name === name) && state.changes[name] === original(name)) delete state.changes[name];
+  showChanges();
   tell("changed");
 }
 
@@ -65,6 +67,16 @@ export function undo() {
   say("");
   state.changes = state.past.pop();
   state.move = "";
+  showChanges();
+  tell("changed");
+}
+
+// What the view shows: the design with its changes, or with other values for a look, which change nothing.
+function showChanges() { Object.assign(state, { shown: state.changes, showing: "" }); }
+export function show(values, words = "") {
+  if (!values && !state.showing) return;
+  if (values) Object.assign(state, { shown: { ...state.changes, ...values }, showing: words });
+  else showChanges();
   tell("changed");
 }
 

@@ -7,6 +7,11 @@ export const unitOf = (name) => UNITS[UNIT.exec(name)?.[1]] ?? "";
 // "sonotrode_distance_mm" is "Sonotrode distance"; symbols such as C0 stay.
 export const inWords = (name) => name.replace(UNIT, "").replace("_pv", ", peak to valley").replace(/_/g, " ")
   .replace(/^[a-z]{3}/, (first) => first[0].toUpperCase() + first.slice(1));
+// "chamber.height_mm" is "Chamber height [mm]", and "part.offset_mm.0" "Part offset, x [mm]".
+export function named(name) {
+  const axis = /(?:deg|mm)\.([012])$/.exec(name)?.[1], words = inWords(name.replace(/\./g, " ").replace(/ (?=[012]$)/, "."));
+  return `${words}${axis ? `, ${"xyz"[axis]}` : ""}${unitOf(name) ? ` [${unitOf(name)}]` : ""}`;
+}
 // A fact with its unit: numbers to four digits, shares as per cent.
 export function inUnits(name, fact) {
   const number = (x) => typeof x !== "number" ? String(x)

@@ -132,9 +132,7 @@ def draw_convergence(
         axes.plot(failed, np.full(len(failed), 0.02), "|", color=GREY, clip_on=False,
                   label="not simulated", transform=axes.get_xaxis_transform())  # fmt: skip
     if feasible:
-        best = np.minimum if smaller_is_better else np.maximum
-        values = best.accumulate([one.objective.value for one in feasible if one.objective])
-        numbers = [one.number for one in feasible]
+        numbers, values = best_so_far(feasible, smaller_is_better)
         axes.step([*numbers, search[-1].number], [*values, values[-1]], where="post", color=BLUE,
                   alpha=0.5, label="best so far (as searched)")  # fmt: skip
     if confirmed:
@@ -145,6 +143,19 @@ def draw_convergence(
         axes.set_ylim(*value_range(shown))
     style_axes(axes, "evaluation", y_label)
     return tooltips
+
+
+def best_so_far(
+    candidates: Sequence[EvaluatedCandidate], smaller_is_better: bool
+) -> tuple[list[int], list[float]]:
+    """Return the number of each feasible candidate of a search, and the best objective until it.
+
+    Confirmations are left out: the best of a few would look like a fall.
+    """
+    found = [(one.number, one.objective.value) for one in candidates
+             if one.stage != "confirm" and one.feasible and one.objective]  # fmt: skip
+    best = np.minimum if smaller_is_better else np.maximum
+    return [number for number, _ in found], best.accumulate([y for _, y in found]).tolist()
 
 
 def _point(candidate: EvaluatedCandidate) -> tuple[int, float, float]:

@@ -67,7 +67,8 @@ Misfit = Callable[[np.ndarray], tuple[float, np.ndarray]]  # and its gradient
 class GaussianProcess:
     """A smooth model of scores over points of the unit cube, fitted when it is made.
 
-    Its attribute `noise` is the variance of one evaluation's score.
+    Its attribute `noise` is the variance of one evaluation's score, and `signal` the variance of
+    the noiseless score from place to place.
 
     Args:
         points: points with scores, shape (n, d); only the best MAX_POINTS are used.
@@ -108,7 +109,8 @@ class GaussianProcess:
             self._inverse = np.linalg.inv(process.L_)
         varying = process.kernel_.k1.k2
         self._signal, self._lengths = varying.k1.constant_value, varying.k2.length_scale
-        self._weights = process.alpha_
+        self.signal = float(self._signal) * self._spread**2
+        self._weights, self._values = process.alpha_, values
         self.noise = float(known.mean() + process.kernel_.k2.noise_level * self._spread**2)
 
     def __call__(self, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -118,6 +120,18 @@ class GaussianProcess:
         variance = np.maximum(TREND + self._signal - explained, 1e-12)
         mean = self._centre + self._spread * (kernel @ self._weights)
         return mean, self._spread * np.sqrt(variance)
+
+    def left_out(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return mean and standard deviation of the score at each of `points` by the other points.
+
+        The hyperparameters are those of all points, and the noise of the score itself is in the
+        deviation. Both have the shape (n,).
+
+        Source: section 5.4.2 of the source above, equation 5.12.
+        """
+        own = (self._inverse**2).sum(axis=0)  # the diagonal of K⁻¹ = L⁻ᵀ L⁻¹
+        mean = self._centre + self._spread * (self._values - self._weights / own)
+        return mean, self._spread / np.sqrt(own)
 
     def covariance(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
         """Return the covariance (k, m) of the noiseless scores at points a (k, d) and b (m, d)."""
