@@ -29,12 +29,7 @@ from chamberopt.page.edited_file import EditedFile, custom_shape, design_fields
 from chamberopt.page.further_study import write_further_study
 from chamberopt.page.picking import Picker
 from chamberopt.page.started_commands import OneCommand
-from chamberopt.page.study_answers import (
-    candidate_answer,
-    candidates_answer,
-    model_answer,
-    version,
-)
+from chamberopt.page.study_answers import candidate_answer, candidates_answer, model_answer, version
 from chamberopt.printers import terminal
 from chamberopt.printers.html import section
 from chamberopt.printers.report_page import REPORT, parts_content, viewer
@@ -234,7 +229,9 @@ class Acts:
         folder = self.inside(str(asked["folder"]))
         if not (folder / STUDY).is_file():
             return {"reason": "There are no evaluations yet."}
-        self._refuse_shape(self.inside(str(folder / STUDY)))
+        for name in _named_designs(self.inside(str(folder / STUDY))):
+            self.inside(str(folder / name))
+        self._refuse_shape(folder / STUDY)
         return model_answer(folder)
 
     def resume(self, asked: Any) -> dict[str, object]:
@@ -283,13 +280,8 @@ class Acts:
 
     def _refuse_shape(self, file: Path) -> None:
         """Raise InputError if a design or study would run a Python file that is not trusted."""
-        tables = [read_toml(file, "design")[1]]
-        if is_study(tables[0]):
-            first = tables[0].get("begin_with")
-            named = [tables[0].get("design"), *(first if isinstance(first, list) else [])]
-            tables = [
-                read_toml(file.parent / one, "design")[1] for one in named if isinstance(one, str)
-            ]
+        files = [file, *(file.parent / name for name in _named_designs(file))]
+        tables = [read_toml(one, "design")[1] for one in files]
         shape = next(filter(None, map(custom_shape, tables)), "")
         if shape and not self._trusted:
             raise InputError(
@@ -331,6 +323,16 @@ def free_folder(folder: Path, name: Path) -> str:
     """Return the first new or empty folder of NAME, NAME-2 and so on in a folder."""
     tried = (name.with_name(f"{name.name}-{k}") if k > 1 else name for k in count(1))
     return next(one for one in tried if is_new_or_empty(folder / one)).as_posix()
+
+
+def _named_designs(file: Path) -> list[str]:
+    """Return the design files that a study names; none for a design."""
+    data = read_toml(file, "design")[1]
+    if not is_study(data):
+        return []
+    first = data.get("begin_with")
+    named = [data.get("design"), *(first if isinstance(first, list) else [])]
+    return [one for one in named if isinstance(one, str)]
 
 
 def _files_beside(design: Path) -> list[dict[str, str]]:

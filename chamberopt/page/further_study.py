@@ -38,7 +38,7 @@ def write_further_study(before: Path, folder: Path, evaluations: int) -> Path:
     if "optimizer" not in document:
         document["optimizer"] = tomlkit.table()
     settings = document["optimizer"]
-    settings["evaluations"], settings["seed"] = evaluations, int(settings.get("seed", 1)) + 1  # type: ignore[index, union-attr]
+    settings["evaluations"], settings["seed"] = evaluations, int(settings.get("seed", 1)) + 1
     path = check_new_file(_free_name(before))
     write_text(path, tomlkit.dumps(document))
     return path

@@ -110,9 +110,7 @@ class OneCommand:
         self._command: StartedCommand | None = None
         self._starting = Lock()
 
-    def start(
-        self, arguments: Sequence[str], folder: Path, result: str = ""
-    ) -> dict[str, object]:
+    def start(self, arguments: Sequence[str], folder: Path, result: str = "") -> dict[str, object]:
         """Start a command in a folder, and return its status.
 
         Args:

@@ -16,14 +16,7 @@ from chamberopt.coverage.metrics import parse_objective
 from chamberopt.design.design import Design
 from chamberopt.documents.study import evaluated, reason_without_model, tried_sentence
 from chamberopt.documents.wording import Label, metric_label, objective_label, per_cent
-from chamberopt.pictures.charts.colours import (
-    BLUE,
-    COVERAGE_MAP,
-    GREEN,
-    GREY,
-    ORANGE,
-    hex_colours,
-)
+from chamberopt.pictures.charts.colours import BLUE, COVERAGE_MAP, GREEN, GREY, ORANGE, hex_colours
 from chamberopt.pictures.charts.figure_style import value_range
 from chamberopt.pictures.charts.study import best_so_far
 from chamberopt.search.observe import fit_model
@@ -193,7 +186,9 @@ def _kind(trial: Trial) -> str:
 
 def _interval(estimate: Estimate | None) -> list[float] | None:
     """Return value and half-width; the half-width is 0 where it is not known, as in charts."""
-    return estimate and [estimate.value, finite_or_none(estimate.half_width) or 0.0]
+    if estimate is None:
+        return None
+    return [estimate.value, finite_or_none(estimate.half_width) or 0.0]
 
 
 def _second(trial: Trial, labels: Sequence[Label]) -> Estimate | None:

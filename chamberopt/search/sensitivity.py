@@ -134,10 +134,11 @@ def analyse_sensitivity(
 def is_supported(search: SearchModel, one: Slice) -> np.ndarray:
     """Return where evaluations support the model's curve of a slice, (k,) bool.
 
-    There they explain at least half of the variance that the score has from place to place.
+    There they explain at least three quarters of the variance that the score has from place to
+    place, and the model has more than an upper limit.
     """
-    deviation = one.half_width / NORMAL_95
-    supported: np.ndarray = (deviation**2 <= 0.5 * search.score.signal) & ~one.or_worse
+    variance = (one.half_width / NORMAL_95) ** 2
+    supported: np.ndarray = (variance <= 0.25 * search.score.signal) & ~one.or_worse
     return supported
 
 

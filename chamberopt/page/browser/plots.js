@@ -83,20 +83,20 @@ export class Plot {
 }
 
 // Parallel coordinates: an axis for each number, and a line for each candidate.
-export function parallel({ width, height, axes, candidates, colourOf }) {
-  const top = 34, bottom = height - 22, across = (k) => 60 + k * (width - 120) / Math.max(1, axes.length - 1);
+export function parallel({ width, height, axes, candidates, colourOf, chosen }) {
+  const top = 34, bottom = height - 22, across = (k) => 20 + k * (width - 60) / Math.max(1, axes.length - 1);
   const drawing = svg("svg", { width, height, role: "img" }, svg("title", {}, "all numbers of each candidate"));
   const scales = axes.map((one) => scaleOf(one, bottom, top));
   for (const one of candidates) {
     const places = axes.map(({ name }, k) => [across(k), scales[k](one.values[name])]).filter(([, y]) => y !== null);
     const path = { points: places.map((place) => place.join(",")).join(" "), fill: "none" };
     drawing.append(svg("g", { class: "candidate", "data-number": one.number, stroke: colourOf(one) },
-      svg("polyline", { ...path, "stroke-width": 1.3, ...(one.objective ? {} : { "stroke-dasharray": "3 3" }) }),
+      svg("polyline", { ...path, "stroke-width": one.number === chosen ? 4 : 1.3, ...(one.objective ? {} : { "stroke-dasharray": "3 3" }) }),
       svg("polyline", { ...path, class: "target" }), svg("title", {}, one.tip)));
   }
   axes.forEach((one, k) => {
     drawing.append(svg("line", { x1: across(k), x2: across(k), y1: top, y2: bottom, class: "axis" }),
-      svg("text", { x: across(k), y: k % 2 ? 25 : 11, "text-anchor": "middle", class: "name" }, one.label));
+      svg("text", { x: across(k), y: k % 2 ? 25 : 11, "text-anchor": k === 0 ? "start" : k === axes.length - 1 ? "end" : "middle", class: "name" }, one.label));
     for (const at of one.texts?.length ? one.texts : [one.low, one.high])
       drawing.append(svg("text", { x: across(k) + 4, y: scales[k](at) + (at === one.low ? 12 : -3) }, String(at)));
   });

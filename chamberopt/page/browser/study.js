@@ -63,78 +63,95 @@ function prepared(now) {
   for (const one of now.candidates) {
     const figure = one.objective ? `: ${short(one.objective[0])}${one.objective[1] ? ` ± ${short(one.objective[1])}` : ""}` : "";
     one.tip = [`candidate ${one.number}, ${WORDS[one.kind]}${figure}`, ...axes.map(({ name, label }) => `${label}: ${one.values[name]}`)].join("\n");
-    one.mark = { colour: now.colours[one.is_start ? "start" : one.kind], cross: !["simulated", "confirmed"].includes(one.kind) };
+    one.mark = { colour: now.colours[one.is_start ? "start" : one.kind], cross: isCross(one.kind) };
   }
   return { ...now, axes };
 }
-const short = (x) => String(Number(x.toPrecision(4)));
+const isCross = (kind) => !["simulated", "confirmed"].includes(kind);
+const short = (x) => String(Number(x.toPrecision(3)));
 const mark = (one) => ({ ...one.mark, ring: one.number === chosen ? "#1c2226" : one.is_start ? data.colours.start : "" });
 
+// Width of a plot [px]: that of the panel, or half of it.
+const wide = () => Math.max(320, find("study-of").clientWidth);
+const half = () => wide() < 520 ? wide() : Math.min(400, wide() / 2 - 5);
+const searched = () => data.candidates.filter((one) => one.kind !== "confirmed");
+const objectiveAxis = () => ({ low: data.range[0], high: data.range[1], label: data.objectives[0] });
+const title = (text) => element("h3", { textContent: text });
+const soft = (text) => element("p", { className: "soft", textContent: text });
+const figure = (caption, ...inner) => element("figure", {}, element("figcaption", { textContent: caption }), ...inner);
+
 function draw() {
-  const wide = Math.max(320, find("study-of").clientWidth), narrow = wide < 520 ? wide : Math.min(400, wide / 2 - 5);
-  const { candidates, axes, objectives: [objective, second], colours } = data, [low, high] = data.range;
-  const searched = candidates.filter((one) => one.kind !== "confirmed"), y = { low, high, label: objective };
-  const figure = (caption, ...inner) => element("figure", {}, element("figcaption", { textContent: caption }), ...inner);
-  const last = candidates.length + 0.5;
+  const shares = new Map((model?.shares ?? []).map(([name, share, text]) => [name, { share, text }]));
+  const axes = data.axes.toSorted((a, b) => (shares.get(b.name)?.share ?? 0) - (shares.get(a.name)?.share ?? 0));
+  find("study-of").replaceChildren(...inOrder(), ...overEach(axes, shares), ...(axes.length > 1 ? [...overTwo(axes), ...overAll()] : []),
+    ...(data.objectives.length > 1 ? front() : []), ...(model?.check?.rows?.length ? check() : []));
+}
 
-  const order = new Plot({ width: wide, height: 220, x: { low: 0.5, high: last, label: "candidate", whole: true }, y, title: "objective of each candidate" });
-  order.steps(data.best, last, colours.simulated);
-  for (const one of candidates) order.candidate(one, one.number, one.objective, mark(one));
-  const legend = Object.entries(WORDS).filter(([kind]) => candidates.some((one) => one.kind === kind)).map(([kind, text]) => [colours[kind], kind === "simulated" || kind === "confirmed" ? "●" : "✕", text]);
-  const parts = [figure("Every candidate in its order, with its 95 % interval; the line is the best so far, as searched.", order.drawing,
-    element("ul", { className: "marks" }, ...[[colours.start, "●", "the start"], ...legend].map(([colour, sign, text]) => {
-      const item = element("li", { textContent: text }), patch = element("b", { textContent: sign });
-      patch.style.color = colour;
-      item.prepend(patch, " ");
-      return item;
+function inOrder() {
+  const { candidates, colours } = data, last = candidates.length + 0.5;
+  const plot = new Plot({ width: wide(), height: 220, x: { low: 0.5, high: last, label: "candidate", whole: true }, y: objectiveAxis(), title: "objective of each candidate" });
+  plot.steps(data.best, last, colours.simulated);
+  for (const one of candidates) plot.candidate(one, one.number, one.objective, mark(one));
+  const kinds = Object.keys(WORDS).filter((kind) => candidates.some((one) => one.kind === kind));
+  const marks = [[colours.start, false, "the start"], ...kinds.map((kind) => [colours[kind], isCross(kind), WORDS[kind]])];
+  return [figure("Every candidate in its order, with its 95 % interval; the line is the best so far, as searched.", plot.drawing,
+    element("ul", { className: "marks" }, ...marks.map(([colour, cross, text]) => {
+      const sign = element("b", { textContent: cross ? "✕" : "●" });
+      sign.style.color = colour;
+      return element("li", {}, sign, ` ${text}`);
     })))];
+}
 
-  const shares = new Map((model?.shares ?? []).map(([name, share, text]) => [name, [share, text]]));
-  const sorted = axes.toSorted((a, b) => (shares.get(b.name)?.[0] ?? 0) - (shares.get(a.name)?.[0] ?? 0));
-  parts.push(element("h3", { textContent: "Over each number" }), element("p", { className: "soft", textContent: model === null ? "The model is being fitted …" : model.reason
-    || `The curve is the model's, the other numbers as in candidate ${model.best}, with its 95 % band; none where the evaluations do not support it. The share is that of the objective's variance over the bounds.` }),
-  element("div", { className: "slices" }, ...sorted.map((axis) => {
-    const plot = new Plot({ width: narrow, height: 220, x: axis, y, title: `objective over ${axis.label}` });
-    if (!axis.texts.length) plot.curve(model?.slices?.[axis.name] ?? [], colours.model);
-    for (const one of searched) plot.candidate(one, one.values[axis.name], one.objective, mark(one));
-    const share = shares.get(axis.name);
-    return figure(share ? `${axis.label}: ${share[1]} of the variance alone` : axis.label, plot.drawing);
-  })));
+function overEach(axes, shares) {
+  const said = !model ? "The model is being fitted …" : model.reason || `The curve is the model's, the other numbers as in candidate ${model.best}, with its 95 % band; `
+    + "there is none where the evaluations do not support it. The share is that of the objective's variance over the bounds.";
+  return [title("Over each number"), soft(said), element("div", { className: "slices" }, ...axes.map((axis) => {
+    const plot = new Plot({ width: half(), height: 220, x: axis, y: objectiveAxis(), title: `objective over ${axis.label}` });
+    if (!axis.texts.length) plot.curve(model?.slices?.[axis.name] ?? [], data.colours.model);
+    for (const one of searched()) plot.candidate(one, one.values[axis.name], one.objective, mark(one));
+    const known = shares.get(axis.name);
+    const drawn = figure(known ? `${axis.label}: ${known.text} of the variance alone` : axis.label, plot.drawing);
+    drawn.style.width = `${half()}px`; // a long caption is broken
+    return drawn;
+  }))];
+}
 
-  if (axes.length > 1) {
-    const [a, b] = ["across", "upwards"].map((id, k) => {
-      const select = element("select", { id }, ...sorted.map((one) => element("option", { value: one.name, textContent: one.label })));
-      select.value = pair[k] ?? sorted[k].name;
-      select.addEventListener("change", () => { pair[k] = select.value; draw(); });
-      return select;
-    });
-    const axisOf = (select) => axes.find((one) => one.name === select.value);
-    const plot = new Plot({ width: wide, height: 300, x: axisOf(a), y: axisOf(b), title: "candidates over two numbers" });
-    for (const one of searched) plot.candidate(one, one.values[a.value], [one.values[b.value], 0], { ...mark(one), colour: colourOf(one) });
-    parts.push(element("h3", { textContent: "Over two numbers" }), element("p", {}, "across ", a, " upwards ", b), figure("Coloured by the objective; a cross was not simulated, or misses a constraint.", plot.drawing, colourBar()),
-      element("h3", { textContent: "All numbers" }), figure("A line for each candidate, coloured by the objective; dashed: not simulated.",
-        parallel({ width: wide, height: 260, axes, candidates: searched, colourOf }), colourBar()));
-  }
-  if (second) {
-    const range = (k) => searched.flatMap((one) => (k ? one.second : one.objective)?.[0] ?? []);
-    const axis = (k, label) => ({ low: Math.min(...range(k)), high: Math.max(...range(k)), label });
-    if (range(1).length > 1) {
-      const plot = new Plot({ width: wide, height: 300, x: axis(0, objective), y: axis(1, second), title: "one objective against the other" });
-      const on = data.front.map((number) => candidates[number - 1]);
-      plot.line(on.map((one) => [one.objective[0], one.second[0]]), colours.confirmed, { "stroke-dasharray": "5 3" });
-      for (const one of searched) if (one.second) plot.candidate(one, one.objective[0], one.second, mark(one));
-      parts.push(element("h3", { textContent: "The Pareto front" }), figure("One objective against the other; the line joins the candidates that no other beats in both, as searched.", plot.drawing));
-    }
-  }
-  if (model?.check?.rows?.length) {
-    const rows = model.check.rows, ends = rows.flatMap(([, value, told, half]) => [value, told - half, told + half]);
-    const both = { low: Math.min(...ends), high: Math.max(...ends) };
-    const plot = new Plot({ width: narrow, height: 320, x: { ...both, label: `simulated: ${objective}` }, y: { ...both, label: `by the others: ${objective}` }, title: "check of the model" });
-    plot.line([[both.low, both.low], [both.high, both.high]], colours.missed);
-    for (const [number, value, told, half] of rows) plot.candidate(candidates[number - 1], value, [told, half], mark(candidates[number - 1]));
-    parts.push(element("h3", { textContent: "How good the model is" }), figure(model.check.sentence, plot.drawing));
-  }
-  find("study-of").replaceChildren(...parts);
+function overTwo(axes) {
+  const selects = [0, 1].map((k) => {
+    const select = element("select", { id: ["across", "upwards"][k] }, ...axes.map((one) => element("option", { value: one.name, textContent: one.label })));
+    select.value = pair[k] ?? axes[k].name;
+    select.addEventListener("change", () => { pair[k] = select.value; draw(); });
+    return select;
+  });
+  const [x, y] = selects.map((select) => axes.find((one) => one.name === select.value));
+  const plot = new Plot({ width: wide(), height: 300, x, y, title: "candidates over two numbers" });
+  for (const one of searched()) plot.candidate(one, one.values[x.name], [one.values[y.name], 0], { ...mark(one), colour: colourOf(one) });
+  return [title("Over two numbers"), element("p", {}, "across ", selects[0], " upwards ", selects[1]),
+    figure("Coloured by the objective; a cross was not simulated, or misses a constraint.", plot.drawing, colourBar())];
+}
+
+function overAll() {
+  const lines = parallel({ width: wide(), height: 260, axes: data.axes, candidates: searched(), colourOf, chosen });
+  return [title("All numbers"), figure("A line for each candidate, coloured by the objective; dashed: not simulated.", lines, colourBar())];
+}
+
+function front() {
+  const both = searched().filter((one) => one.second), [first, second] = data.objectives;
+  if (both.length < 2) return [];
+  const axis = (values, label) => ({ name: label, low: Math.min(...values), high: Math.max(...values), label });
+  const plot = new Plot({ width: wide(), height: 300, x: axis(both.map((one) => one.objective[0]), first), y: axis(both.map((one) => one.second[0]), second), title: "one objective against the other" });
+  plot.line(data.front.map((number) => data.candidates[number - 1]).map((one) => [one.objective[0], one.second[0]]), data.colours.confirmed, { "stroke-dasharray": "5 3" });
+  for (const one of both) plot.candidate(one, one.objective[0], one.second, mark(one));
+  return [title("The Pareto front"), figure("One objective against the other; the line joins the candidates that no other beats in both, as searched.", plot.drawing)];
+}
+
+function check() {
+  const rows = model.check.rows, ends = rows.flatMap(([, value, told, within]) => [value, told - within, told + within]);
+  const low = Math.min(...ends), high = Math.max(...ends), [objective] = data.objectives;
+  const plot = new Plot({ width: half(), height: 320, x: { low, high, label: `${objective}, simulated` }, y: { low, high, label: "by the other candidates" }, title: "check of the model" });
+  plot.line([[low, low], [high, high]], data.colours.missed);
+  for (const [number, value, told, within] of rows) plot.candidate(data.candidates[number - 1], value, [told, within], mark(data.candidates[number - 1]));
+  return [title("How good the model is"), figure(model.check.sentence, plot.drawing)];
 }
 
 // Colour of a candidate by its objective, along the values that the search has met.

@@ -101,6 +101,14 @@ def test_a_report_cannot_use_the_server(served: Served) -> None:
         ("/study", {"name": "-x.toml", "vary": {}, "evaluations": 3}, "give a name of letters"),
         ("/cavity", {"changes": {"part.offset_mm.0": 100}}, "part.offset_mm"),
         ("/reach", {"number": -5}, None),
+        ("/candidates", {"folder": "../other"}, "outside the folder"),
+        ("/candidates", {"folder": "/etc"}, "outside the folder"),
+        ("/candidates", {"folder": "."}, "no study was begun"),
+        ("/candidate", {"folder": ".", "number": 1}, "no study was begun"),
+        ("/model", {"folder": "../other"}, "outside the folder"),
+        ("/resume", {"folder": "../other"}, "outside the folder"),
+        ("/resume", {"folder": "."}, "no study was begun"),
+        ("/more", {"folder": ".", "evaluations": 5}, "no study was begun"),
     ],
 )
 def test_a_wrong_question_is_answered_in_words(

@@ -7,7 +7,7 @@ import pytest
 
 from chamberopt.pictures.charts.study import slices_picture
 from chamberopt.search.optimiser.search_model import LimitedFigure, Observations, SearchModel
-from chamberopt.search.sensitivity import Sensitivity, analyse_sensitivity
+from chamberopt.search.sensitivity import Sensitivity, analyse_sensitivity, is_supported
 from chamberopt.search.study import Study
 from chamberopt.search.study.parameters import ParameterSpace
 from tests.helpers.known_optima import GEAR, VARY, bowl, bowl_shares, run_bowl
@@ -73,6 +73,18 @@ def test_a_range_ends_at_values_that_the_parameter_can_have() -> None:
     got = analyse(points, scores, space, {"chamber.height_mm": 45.0}, noise=0.5)
     assert got.slices[0].flat == pytest.approx((40.0, 50.0))  # 4 (x - 0.5)² = 0.5 at 0.15 and 0.85
     assert got.together == 1.0
+
+
+def test_a_curve_is_supported_where_evaluations_are() -> None:
+    points = 0.5 * np.random.default_rng(1).random((20, 1))  # up to 11 of 1 to 21
+    space = ParameterSpace(GEAR, Study(design=GEAR, vary={"shot.mass_g": (1.0, 21.0)}).vary)
+    scores = np.sin(12.0 * points[:, 0])
+    seen = Observations(scores, np.zeros(20), np.ones(20, dtype=bool))
+    model = SearchModel(space.domain, points, seen)
+    (one,) = analyse_sensitivity(model, space, {"shot.mass_g": 3.0}, 0.1).slices
+    supported = is_supported(model, one)
+    assert supported[one.values < 10.0].all()
+    assert not supported[one.values > 17.0].any()
 
 
 def test_effects_that_only_add_up_are_all_of_the_variance() -> None:

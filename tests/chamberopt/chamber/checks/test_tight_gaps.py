@@ -9,8 +9,7 @@ import pytest
 import trimesh
 
 from chamberopt.chamber.checks.tight_gaps import tight_gaps
-from chamberopt.common.errors import InputError
-from chamberopt.search.candidate import Candidate, CandidateEvaluator
+from chamberopt.search.candidate import Candidate, CandidateEvaluator, RefusedError
 from tests.helpers.synthetic import chamber_round
 
 
@@ -47,6 +46,6 @@ def test_a_search_refuses_such_a_candidate_in_words_without_a_simulation() -> No
     space: Any = SimpleNamespace(design_at=lambda _: "design", values_at=lambda _: {})
     candidate = Candidate(3, "search", np.zeros(1), space)
     answer = CandidateEvaluator(study, simulator).evaluate(candidate)
-    assert isinstance(answer, InputError)
+    assert isinstance(answer, RefusedError)
     assert str(answer) == "not simulated: the gap of design"
     assert not CandidateEvaluator(study, simulator).has_promise(candidate)

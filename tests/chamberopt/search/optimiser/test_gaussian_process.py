@@ -22,6 +22,23 @@ def test_the_model_holds_the_truth_in_its_interval() -> None:
     )
 
 
+def test_a_score_is_told_by_the_others_as_if_it_were_not_there() -> None:
+    rng = np.random.default_rng(8)
+    points = rng.random((20, 2))
+    scores = np.array([bowl(x) for x in points]) + rng.normal(0.0, 0.05, 20)
+    model = GaussianProcess(points, scores, np.full(20, 0.05**2))
+    mean, deviation = model.left_out()
+    covariance = np.linalg.inv(model._inverse.T @ model._inverse)
+    values = (scores - scores.mean()) / scores.std()
+    for k in range(20):
+        rest = np.arange(20) != k
+        weights = np.linalg.solve(covariance[np.ix_(rest, rest)], covariance[rest, k])
+        variance = covariance[k, k] - weights @ covariance[rest, k]
+        expected = scores.mean() + scores.std() * weights @ values[rest]
+        np.testing.assert_allclose(mean[k], expected, rtol=1e-6)
+        np.testing.assert_allclose(deviation[k], scores.std() * np.sqrt(variance), rtol=1e-6)
+
+
 @pytest.mark.parametrize("length_factor", [1.0, 0.5])
 def test_a_running_evaluation_takes_away_uncertainty_only(length_factor: float) -> None:
     """Its mean is the same; its variance is that of one more noisy score, in closed form."""

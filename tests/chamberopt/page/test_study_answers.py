@@ -1,0 +1,177 @@
+"""What the page shows of a study is what its log says, and damaged logs are refused in words."""
+
+import json
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from chamberopt.common.errors import InputError
+from chamberopt.design.load import load_design
+from chamberopt.page.acts import Acts, list_results
+from chamberopt.page.study_answers import candidate_answer, candidates_answer, model_answer
+from chamberopt.search.study import load_study
+from chamberopt.search.trial_log import read_trials
+from tests.helpers.results.followed_study import BUDGET, followed_study
+
+
+@pytest.fixture(scope="module")
+def out(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return followed_study(tmp_path_factory.mktemp("followed"))
+
+
+@pytest.fixture
+def copy(out: Path, tmp_path: Path) -> Path:
+    """The results folder in a copy of the design's folder."""
+    shutil.copytree(out.parents[1], tmp_path / "copy")
+    return tmp_path / "copy" / "results" / "study"
+
+
+def rewritten(folder: Path, row: int, **values: Any) -> None:
+    """Replace values in one row of the trial log."""
+    log = folder / "history.jsonl"
+    rows = [json.loads(line) for line in log.read_text().splitlines()]
+    rows[row] |= values
+    log.write_text("".join(json.dumps(one) + "\n" for one in rows))
+
+
+def test_every_candidate_is_there_as_the_log_has_it(out: Path) -> None:
+    answer: Any = json.loads(json.dumps(candidates_answer(out), allow_nan=False))
+    trials = read_trials(out)
+    assert not answer["finished"]
+    assert answer["objectives"] == ["uniform coverage"]
+    assert [one["name"] for one in answer["varied"]] == ["chamber.height_mm", "shot.mass_g"]
+    assert [one["values"] for one in answer["candidates"]] == [one.parameters for one in trials]
+    kinds = [one["kind"] for one in answer["candidates"]]
+    assert answer["sentence"] == (
+        f"{BUDGET} proposed, {kinds.count('refused')} refused by geometry before any simulation, "
+        f"{kinds.count('simulated')} simulated, 2 confirmed with new seeds."
+    )
+    assert kinds.count("refused") > 0
+    assert [one["is_start"] for one in answer["candidates"]].index(True) == 0
+    for one, trial in zip(answer["candidates"], trials, strict=True):
+        assert (one["objective"] is None) == (not trial.goals)
+    scores = [one.goals[0].value for one in trials if one.goals and one.stage == "search"]
+    assert [best for _, best in answer["best"]] == np.maximum.accumulate(scores).tolist()
+
+
+def test_figures_of_a_candidate_are_in_words_with_units_and_intervals(out: Path) -> None:
+    design = load_design(out.parents[1] / "design.toml")
+    answer: Any = candidate_answer(out, 1, design)
+    assert answer["values"] == {"chamber.height_mm": 30.0, "shot.mass_g": 3.0}
+    figures = dict(answer["figures"])
+    assert "±" in next(text for name, text in figures.items() if name.startswith("uniform"))
+    assert figures["mean coverage of the target"] == "50 %"
+    assert answer["differs"] == []
+    other = design.changed({"sonotrode.amplitude_um": 20, "chamber.height_mm": 33})
+    assert candidate_answer(out, 1, other)["differs"] == ["sonotrode.amplitude_um"]
+    with pytest.raises(InputError, match="not a candidate of study"):
+        candidate_answer(out, 99, design)
+
+
+def test_the_model_comes_with_its_check_or_the_reason_why_there_is_none(copy: Path) -> None:
+    answer = json.loads(json.dumps(model_answer(copy), allow_nan=False))
+    assert not answer["reason"]
+    assert {name for name, *_ in answer["shares"]} == set(answer["slices"])
+    check = answer["check"]
+    simulated = [one for one in read_trials(copy) if one.goals and one.stage == "search"]
+    assert [row[1] for row in check["rows"]] == [one.goals[0].value for one in simulated]
+    inside = sum(abs(value - told) <= half for _, value, told, half in check["rows"])
+    assert f"{inside} of {len(simulated)} lie within" in check["sentence"]
+    log = copy / "history.jsonl"
+    log.write_text("".join(log.read_text().splitlines(keepends=True)[:5]))
+    assert "too few" in model_answer(copy)["reason"]
+
+
+def test_an_unfinished_study_is_listed(copy: Path) -> None:
+    (row,) = list_results(copy.parents[1])
+    assert row["is_study"]
+    assert row["unusable"]
+    assert row["text"] == "a study that has not finished"
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        {"objective": None, "goals": "<b>"},
+        {"parameters": {"<img src=x>": 1.0, "shot.mass_g": 3.0}},
+        {"point": [0.5]},
+        {"point": [float("nan"), 0.5]},
+        {"score": float("inf")},
+        {"number": 7},
+        {"refused": False},
+    ],
+)
+def test_a_hostile_log_is_refused_in_words(copy: Path, values: dict[str, Any]) -> None:
+    rewritten(copy, 0, **values)
+    for answer in (candidates_answer, model_answer):
+        with pytest.raises(InputError, match="damaged row"):
+            answer(copy)
+
+
+@pytest.mark.parametrize("text", ["{}", "[]", '{"study": {"vary": {"a": [1]}}, "sweep": null}'])
+def test_damaged_inputs_are_refused_in_words(copy: Path, text: str) -> None:
+    (copy / "inputs.json").write_text(text)
+    with pytest.raises(InputError, match="damaged"):
+        candidates_answer(copy)
+
+
+class Commands:
+    """In the place of the command that a page starts: what it would be."""
+
+    def start(self, arguments: list[str], folder: Path, result: str = "") -> dict[str, object]:
+        return {"arguments": arguments, "result": result}
+
+
+@pytest.fixture
+def acts(copy: Path) -> Iterator[Acts]:
+    made = Acts(copy.parents[1] / "design.toml", False, Commands())  # type: ignore[arg-type]
+    yield made
+    made.close()
+
+
+def test_a_study_is_resumed_and_gone_on_with(acts: Acts, copy: Path) -> None:
+    asked, folder = {"folder": "results/study"}, copy.parents[1]
+    (folder / "a.toml").write_text((folder / "study.toml").read_text().replace("[2, 4]", "[1, 4]"))
+    started = {"arguments": ["run", "./study.toml", "--out=results/study"]}
+    assert acts.resume(asked) == {**started, "result": "results/study"}
+    seen = acts.candidates(asked)["version"]
+    assert acts.candidates({**asked, "seen": seen}) == {"version": seen}
+
+    further = ["run", "./study-2.toml", "--out", "results/study-2"]
+    assert acts.more({**asked, "evaluations": 5})["arguments"] == further
+    study = load_study(folder / "study-2.toml")
+    best = max(read_trials(copy), key=lambda one: (one.stage == "search", one.score))
+    assert study.begin_with == (best.parameters,)
+    assert (study.optimizer.evaluations, study.optimizer.seed) == (5, 2)
+    assert study.vary == load_study(folder / "study.toml").vary
+    assert acts.more({**asked, "evaluations": 5})["arguments"][1] == "./study-3.toml"
+    with pytest.raises(InputError, match="evaluations"):
+        acts.more({**asked, "evaluations": 1})
+    assert not (folder / "study-4.toml").exists()
+
+    (folder / "study.toml").unlink()
+    with pytest.raises(InputError, match="no study file here asks what this study asked"):
+        acts.resume(asked)
+
+
+def test_a_folder_runs_no_python_file(acts: Acts, copy: Path) -> None:
+    ran = copy / "ran"
+    (copy / "shape.py").write_text(f"open({str(ran)!r}, 'w').close()")
+    design = (copy / "design.toml").read_text().replace('"cylinder"', '"shape.py"')
+    (copy / "other.toml").write_text(design)
+    study = (copy / "study.toml").read_text()
+    for text in (
+        study.replace('"design.toml"', '"other.toml"'),
+        study.replace("begin_with = []", 'begin_with = ["other.toml"]'),
+    ):
+        (copy / "study.toml").write_text(text)
+        with pytest.raises(InputError, match="runs the Python file"):
+            acts.model({"folder": "results/study"})
+    (copy / "study.toml").write_text(study.replace('"design.toml"', '"../../../design.toml"'))
+    with pytest.raises(InputError, match="outside the folder"):
+        acts.model({"folder": "results/study"})
+    assert not ran.exists()

@@ -1,0 +1,77 @@
+"""A study is followed in a real browser: new candidates appear, and each one's chamber is shown."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from tests.chamberopt.page.browser_page import Page
+from tests.chamberopt.page.conftest import Served
+from tests.helpers.results.browser import WAIT, chromium, expect, needs_chromium
+from tests.helpers.results.followed_study import followed_study
+
+pytestmark = needs_chromium
+FIRST = 4  # candidates that are there when the page is opened
+
+
+@pytest.fixture(scope="module")
+def out(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return followed_study(tmp_path_factory.mktemp("followed"))
+
+
+@pytest.fixture(scope="module")
+def opened(out: Path) -> Iterator[Page]:
+    served = Served(out.parents[1], "design.toml")
+    with chromium() as browser:
+        yield Page(browser, served)
+    served.process.kill()
+    served.process.communicate()
+
+
+def test_a_study_is_followed_and_a_candidate_taken(opened: Page, out: Path) -> None:
+    page, log = opened.page, out / "history.jsonl"
+    rows = log.read_text().splitlines(keepends=True)
+    log.write_text("".join(rows[:FIRST]))
+    opened.tab("results")
+    page.click("text=see its candidates")
+    opened.wait(f"data-followed='{FIRST}'")
+    expect(page.locator("#study-of")).to_contain_text("too few to tell")
+    assert page.locator("#study-of .curve").count() == 0
+    with log.open("a") as file:  # as the study goes on
+        file.writelines(rows[FIRST:])
+    opened.wait(f"data-followed='{len(rows)}'")
+    assert "refused by geometry before any simulation" in page.locator("#tried").text_content()
+    order = page.locator("#study-of figure").first
+    assert order.locator(".candidate").count() == len(rows)
+    assert page.locator("#study-of .curve").count() > 0
+    assert page.locator("#study-of .band").count() == page.locator("#study-of .curve").count()
+    assert "[mm]" in page.locator("#study-of .slices").text_content()
+    assert "height_mm" not in page.locator("#study-view").text_content()
+
+    order.locator(".candidate[data-number='2'] .target").click()
+    opened.wait("data-candidate='2'")
+    card = page.locator("#chosen-candidate")
+    expect(card).to_contain_text("Chamber height [mm]")
+    expect(card).to_contain_text("±")
+    opened.wait("data-checked=reach")
+    height = float(card.locator("td").first.text_content())
+    assert height != 30
+    # its chamber is shown, and the design stays as it is until the numbers are taken
+    assert float(opened.facts()["reach.target_reachable_mm2"]) > 0
+    expect(page.locator("#unsaved")).to_have_text("candidate 2 is shown")
+    shown = page.evaluate(
+        """async () => {
+        const { view } = await import("/browser/scene.js");
+        const at = view.get("walls").geometry.getAttribute("position");
+        return Math.max(...Array.from({ length: at.count }, (_, k) => at.getZ(k)));
+    }"""
+    )
+    assert shown == pytest.approx(height, abs=1e-3)
+    assert float(page.locator('[id="chamber.height_mm"]').input_value()) == 30
+    page.click("#take")
+    expect(page.locator("#unsaved")).to_have_text("not saved yet")
+    assert float(page.locator('[id="chamber.height_mm"]').input_value()) == height
+    assert opened.saved().chamber.height_mm == height
+    page.click("#close-study")
+    expect(page.locator("#study-view")).to_be_hidden(timeout=WAIT)
+    assert opened.errors == []
