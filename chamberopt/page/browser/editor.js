@@ -3,7 +3,7 @@ import { makeFields, showValues } from "./fields.js";
 import { fillSurfaces, fillTarget, showChosen } from "./target.js";
 import { fillRun, follow } from "./run.js";
 import { closeResults } from "./results.js";
-import "./study.js";
+import "./study/study.js";
 import { ask, attempt, element, isUnsaved, listen, read, say, state, undo, unpack } from "./state.js";
 import { inUnits, inWords } from "./words.js";
 import { showCavity, showPart, showShape, showState } from "./scene.js";

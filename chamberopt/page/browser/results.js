@@ -1,7 +1,7 @@
 // Results below the design's folder: in 3D, one or two side by side, with report and process sheet.
 import { ask, attempt, element } from "./state.js";
 import { start } from "./run.js";
-import { followStudy } from "./study.js";
+import { followStudy } from "./study/study.js";
 
 const find = (id) => document.getElementById(id), list = find("result-list");
 const FILES = [["report", "report.html", "report"], ["sheet", "process_sheet.pdf", "process sheet"]];

@@ -1,8 +1,8 @@
 // Following a study: its candidates as plots while it runs and afterwards, and each one's chamber in the view.
-import { ask, attempt, change, element, say, show } from "./state.js";
-import { followToEnd, running } from "./run.js";
+import { ask, attempt, change, element, say, show } from "../state.js";
+import { followToEnd, running } from "../run.js";
 import { Plot, parallel } from "./plots.js";
-import { named } from "./words.js";
+import { named } from "../words.js";
 
 const EVERY = 2000; // ms between looks at a study
 const find = (id) => document.getElementById(id);
