@@ -155,6 +155,7 @@ NO_PLACE = (
 )
 TREATMENT_S, HALF_WIDTH, MOST_REPLICAS = 300.0, 0.02, 24
 REPLICAS = 10  # the fewest that a wanted half-width takes
+BLOCKS = "LARGER THAN ONE SONOTRODE: several side by side, driven alike"
 START = "a start, NOT MEASURED by a pilot"
 
 Tables = dict[str, dict[str, Any]]
@@ -523,7 +524,7 @@ def _place(
         found.append((placed, floor))
     if refused and not found:
         raise refused
-    return min(found, key=lambda one: (one[1].lean, one[1].too_large))
+    return min(found, key=lambda one: one[1].excess)
 
 
 def _hanging(
@@ -537,7 +538,8 @@ def _hanging(
 
     def is_carried(pose: Turns) -> bool:
         try:
-            return math.isfinite(_place(mesh, target, pose, ball, wanted, 1.0)[1].lean)
+            floor = _place(mesh, target, pose, ball, wanted, 1.0)[1]
+            return math.isfinite(floor.lean) and floor.blocks is None
         except InputError:
             return False
 
@@ -555,8 +557,11 @@ def _round(posed: np.ndarray) -> float:
 
 def _floor_tables(floor: Floor) -> Tables:
     """Return the tables of the design file that follow from the floor: chamber and sonotrode."""
-    sizes, one = floor.sizes, floor.sonotrode
+    sizes, one = floor.sizes, floor.face.sonotrode
     key, amplitude = one.amplitude_nearest(AMPLITUDE_UM)
+    sonotrode: dict[str, Any] = {"frequency_khz": one.frequency_khz, key: amplitude}
+    if floor.blocks is not None:
+        sonotrode["blocks"] = floor.blocks.model_dump(mode="json")
     return {
         "chamber": {
             "shape": sizes.shape,
@@ -564,12 +569,12 @@ def _floor_tables(floor: Floor) -> Tables:
             "height_mm": round(1e3 * sizes.height, 3),
             "sonotrode_distance_mm": round(1e3 * sizes.distance, 3),
         },
-        "sonotrode": {"frequency_khz": one.frequency_khz, key: amplitude},
+        "sonotrode": sonotrode,
     }
 
 
 def _floor_reasons(floor: Floor) -> dict[str, str]:
-    sizes, one = floor.sizes, floor.sonotrode
+    sizes, one = floor.sizes, floor.face.sonotrode
     first = next(key for key in sizes.plan if key.endswith("_mm"))
     where = "; the part goes out through it" if sizes.through_ceiling else ""
     key, _ = one.amplitude_nearest(AMPLITUDE_UM)
@@ -582,6 +587,7 @@ def _floor_reasons(floor: Floor) -> dict[str, str]:
         "chamber.height_mm": f"sonotrode to ceiling{where}",
         "chamber.sonotrode_distance_mm": "mean sonotrode face to the part's lowest point",
         **({"sonotrode.frequency_khz": one.note} if one.note else {}),
+        **({"sonotrode.blocks": BLOCKS} if floor.blocks is not None else {}),
         f"sonotrode.{key}": f"{kind}; one that the sonotrode can set",
     }
 
