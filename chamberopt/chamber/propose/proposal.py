@@ -153,7 +153,7 @@ NO_PLACE = (
     "no flat face beside the target looks up or aside and has room for a holder",
     "all of it is to be peened; leave out of [part.target] the face to hold it by",
 )
-TREATMENT_S, HALF_WIDTH, MOST_REPLICAS = 300.0, 0.02, 24
+TREATMENT_S, HALF_WIDTH, MOST_REPLICAS = 300.0, 0.03, 24
 REPLICAS = 10  # the fewest that a wanted half-width takes
 BLOCKS = "LARGER THAN ONE SONOTRODE: several side by side, driven alike"
 START = "a start, NOT MEASURED by a pilot"
@@ -251,7 +251,7 @@ def propose(
         "effects.roughness": "rms slope of faces that shot has dented",
         "process.treatment_time_s": f"{START}: the report has coverage over time",
         "process.accuracy.simulated_time_s": f"{START}: results say what is resolved",
-        "process.accuracy.objective_half_width": "replicas are added until it is so sure",
+        "process.accuracy.objective_half_width": "until it is so sure; of a time: this share",
     }
     best: tuple[Proposal, Floor] | None = None
     refused: InputError | None = None
