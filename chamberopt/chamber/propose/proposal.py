@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -33,6 +34,7 @@ from chamberopt.chamber.propose.proposed_target import (
     Sizes,
     Surface,
     Target,
+    middle_in_plan,
     propose_sizes,
     propose_target,
     shape_for,
@@ -253,18 +255,22 @@ def propose(
         "process.accuracy.simulated_time_s": f"{START}: results say what is resolved",
         "process.accuracy.objective_half_width": "until it is so sure; of a time: this share",
     }
-    best: tuple[Proposal, Floor] | None = None
-    refused: InputError | None = None
-    with step("building and checking the chamber") as progress:
+
+    def built(is_local: bool) -> tuple[Proposal, Floor]:
+        """Return the proposal with the least room that is free of gaps, else of fewest faults."""
+        best: tuple[Proposal, Floor] | None = None
+        refused: InputError | None = None
         for number, wider in enumerate(WIDER):
             progress(number, len(WIDER), None)
             try:
-                placed, floor = _place(mesh, target, turns, diameter, wanted, wider)
-                tables["part"] = {**tables["part"], "rotate_deg": list(placed)}
-                tables |= _floor_tables(floor)
-                pose = {"part.rotate_deg": f"{pose_in_words(mesh, known, placed)}: {pose_reason}"}
-                why = {**reasons, **pose, **_floor_reasons(floor)}
-                made = _checked({**tables}, why, floor, known, mesh, wanted.shop)
+                placed, floor = _place(mesh, target, turns, diameter, wanted, wider, is_local)
+                pose = {"rotate_deg": list(placed)}
+                if any(floor.offset_mm):
+                    pose["offset_mm"] = list(floor.offset_mm)
+                own = {**tables, "part": {**tables["part"], **pose}, **_floor_tables(floor)}
+                words = {"part.rotate_deg": f"{pose_in_words(mesh, known, placed)}: {pose_reason}"}
+                why = {**reasons, **words, **_floor_reasons(floor, is_local)}
+                made = _checked(own, why, floor, known, mesh, wanted.shop)
             except UnreadableError:
                 raise
             except InputError as error:
@@ -274,11 +280,19 @@ def propose(
                 best = made, floor
             if not any(word in text for text in made.warnings for word in ("gap", "side wall")):
                 break
-    if best is None:
-        assert refused is not None
-        raise refused
-    made, floor = best
-    if not floor.sizes.through_ceiling:
+        if best is None:
+            assert refused is not None
+            raise refused
+        return best
+
+    with step("building and checking the chamber") as progress:
+        made, floor = built(is_local=False)
+        if not floor.is_one_sonotrode:
+            with suppress(InputError):
+                local = built(is_local=True)
+                if local[1].is_one_sonotrode and _faults(local[0]) <= _faults(made):
+                    made, floor = local
+    if made.chamber.pieces_in_air:
         with step("choosing what holds the part") as progress:
             made = _held(made, floor, target, end, wanted.shop, progress)
     return _only_touched(_masked(made, floor, wanted.shop), floor, wanted.shop)
@@ -488,7 +502,13 @@ def _part_alone(tables: Tables) -> Part:
 
 
 def _place(
-    mesh: PartMesh, target: Target, turns: Turns, ball: float, wanted: Wanted, wider: float
+    mesh: PartMesh,
+    target: Target,
+    turns: Turns,
+    ball: float,
+    wanted: Wanted,
+    wider: float,
+    is_local: bool = False,
 ) -> tuple[Turns, Floor]:
     """Return the turns of a part [degrees] and the sizes of a chamber round it on a sonotrode.
 
@@ -499,18 +519,21 @@ def _place(
         turns: turns that bring the target down; the part may still be turned about z.
         ball: diameter of the balls [m].
         wider: factor on the room round the part.
+        is_local: true for a chamber round the target, whose walls the part goes out through.
     Raises:
         InputError: the shop has no sonotrode for it, or no chamber so large.
     """
     square, found = square_to_walls(mesh.vertices, turns), []
     suits = shape_for(np.ptp(mesh.vertices @ rotation_matrix(square).T, axis=0))
     refused: InputError | None = None
-    for shape in dict.fromkeys([wanted.shape] if wanted.shape else ["cylinder", suits]):
+    usual = ["box"] if is_local else ["cylinder", suits]
+    for shape in dict.fromkeys([wanted.shape] if wanted.shape else usual):
         placed = square if shape == "box" else turns
         posed = mesh.vertices @ rotation_matrix(placed).T
         posed[:, 2] -= posed[:, 2].min()
-        top = float(posed[mesh.triangles[target.triangles], 2].max())
-        sizes, shop = propose_sizes(posed, top, ball, shape, wider), wanted.shop
+        on_target = posed[np.unique(mesh.triangles[target.triangles])]
+        top, around = float(on_target[:, 2].max()), on_target if is_local else None
+        sizes, shop = propose_sizes(posed, top, ball, shape, wider, around), wanted.shop
         try:
             floor = floor_on_sonotrode(sizes, _round(posed), shop or usual_shop(), shop is None)
             if shop is not None:
@@ -518,6 +541,9 @@ def _place(
                 if highest < room.height - room.distance:  # a higher lid takes in the whole part
                     room = replace(room, through_ceiling=False, top=highest)
                 floor = floor._replace(sizes=room)
+            if is_local:
+                x, y = 1e3 * (middle_in_plan(posed) - middle_in_plan(on_target))
+                floor = floor._replace(offset_mm=(round(float(x), 1), round(float(y), 1)))
         except InputError as error:
             refused = refused or error
             continue
@@ -538,8 +564,7 @@ def _hanging(
 
     def is_carried(pose: Turns) -> bool:
         try:
-            floor = _place(mesh, target, pose, ball, wanted, 1.0)[1]
-            return math.isfinite(floor.lean) and floor.blocks is None
+            return _place(mesh, target, pose, ball, wanted, 1.0)[1].is_one_sonotrode
         except InputError:
             return False
 
@@ -573,20 +598,22 @@ def _floor_tables(floor: Floor) -> Tables:
     }
 
 
-def _floor_reasons(floor: Floor) -> dict[str, str]:
+def _floor_reasons(floor: Floor, is_local: bool) -> dict[str, str]:
     sizes, one = floor.sizes, floor.face.sonotrode
     first = next(key for key in sizes.plan if key.endswith("_mm"))
     where = "; the part goes out through it" if sizes.through_ceiling else ""
+    beside = "target, and the part goes out through the walls" if is_local else "part"
     key, _ = one.amplitude_nearest(AMPLITUDE_UM)
     kind = (
         "ZERO-TO-PEAK, half of" if key == "amplitude_um" else "PEAK-TO-VALLEY, twice zero-to-peak"
     )
     kind += " peak-to-valley" if key == "amplitude_um" else ""
     return {
-        f"chamber.{first}": f"leaves {1e3 * sizes.gap:.3g} mm beside the part; {floor.reason}",
+        f"chamber.{first}": f"leaves {1e3 * sizes.gap:.3g} mm beside the {beside}; {floor.reason}",
         "chamber.height_mm": f"sonotrode to ceiling{where}",
         "chamber.sonotrode_distance_mm": "mean sonotrode face to the part's lowest point",
         **({"sonotrode.frequency_khz": one.note} if one.note else {}),
+        **({"part.offset_mm": "the target in the middle"} if any(floor.offset_mm) else {}),
         **({"sonotrode.blocks": BLOCKS} if floor.blocks is not None else {}),
         f"sonotrode.{key}": f"{kind}; one that the sonotrode can set",
     }

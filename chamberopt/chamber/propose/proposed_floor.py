@@ -43,6 +43,12 @@ class Floor(NamedTuple):
     reason: str  # for the chamber's size in plan
     lean: float = 0.0  # of the walls [degrees]; infinite if no sonotrode is large enough
     too_large: float = 0.0  # area of a floor for which no sonotrode is large enough [m²]
+    offset_mm: tuple[float, float] = (0.0, 0.0)  # of the part, so that its target is on the axis
+
+    @property
+    def is_one_sonotrode(self) -> bool:
+        """Whether one sonotrode carries the chamber."""
+        return math.isfinite(self.lean) and self.blocks is None
 
     @property
     def blocks(self) -> Blocks | None:
