@@ -338,7 +338,8 @@ def _fixtures(result: Result) -> Iterator[Row]:
     faces = {"holder": holder.at if holder else None, "mask": mask.at if mask else None}
     for name, one in result.record.chamber.fixtures.items():
         size = size_in_words(one.kind, one.size_mm)
-        text = f"{one.kind} {size or 'up to the wall'}"
+        flush = "flush with their rims" if one.kind == "plugs" else "up to the wall"
+        text = f"{one.kind} {size or flush}"
         if one.length_mm:
             text += f", {plain(one.length_mm)} mm long"
         if one.place_mm and holder is not None:

@@ -29,7 +29,7 @@ from chamberopt.chamber.propose.proposed_balls import charge_of, fit_sizes, prop
 from chamberopt.chamber.propose.proposed_end import HeldEnd, held_end
 from chamberopt.chamber.propose.proposed_floor import Floor, floor_on_sonotrode, require_room
 from chamberopt.chamber.propose.proposed_holder import end_holder, holder_choices
-from chamberopt.chamber.propose.proposed_mask import to_be_masked
+from chamberopt.chamber.propose.proposed_mask import are_holes, to_be_masked
 from chamberopt.chamber.propose.proposed_target import (
     Sizes,
     Surface,
@@ -369,9 +369,12 @@ def _masked(bare: Proposal, floor: Floor, shop: Shop | None) -> Proposal:
     if not names:
         return bare
     after = "holder" if "holder" in bare.tables else "sonotrode"
-    keys = {"thickness_mm": USUAL_SHELL_MM, "at": {"surface": names}}
-    text = f"a bush or a cap on {', '.join(names)}: not to be peened, by the name"
-    reasons = {**bare.reasons, "mask.thickness_mm": text}
+    first, value, what = "thickness_mm", USUAL_SHELL_MM, "a cap on"
+    if are_holes(bare.mesh, bare.known, names):
+        first, value, what = "plugs", True, "in"
+    keys = {first: value, "at": {"surface": names}}
+    text = f"{what} {', '.join(names)}: not to be peened, by the name"
+    reasons = {**bare.reasons, f"mask.{first}": text}
     tables = _with_table(bare.tables, after, "mask", keys)
     try:
         made = _checked_at_extremes(tables, reasons, floor, bare, shop)
