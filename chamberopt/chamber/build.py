@@ -180,6 +180,7 @@ def build_chamber(design: Design, target: np.ndarray | None = None) -> Chamber:
     traced = cavity.trace(room)
     on_part = traced.tags == TAG_PART
     _refuse_free_edges(design, room, traced.tags)
+    _refuse_bare_floor(design, room, traced.tags)
     _refuse_wide_swings(design, room, traced.tags)
     area = areas(room.vertices, room.triangles)
     exposed = np.bincount(traced.source[on_part], area[on_part], len(part.triangles))
@@ -282,6 +283,26 @@ def _refuse_free_edges(design: Design, room: SolidSurface, tags: np.ndarray) -> 
             f"sonotrode: its face has a free edge at {format_point(border)}: walls must rise from "
             "it all round, as a moving edge is not supported; let it fill the floor of the room, "
             "or of a well, from wall to wall"
+        )
+
+
+def _refuse_bare_floor(design: Design, room: SolidSurface, tags: np.ndarray) -> None:
+    """Raise InputError if the floor is larger than the blocks of which it is made.
+
+    Args:
+        room: surface of the cavity.
+        tags: kind of surface of its triangles (part, sonotrode or wall), (k,).
+    """
+    blocks = design.sonotrode.blocks
+    if blocks is None:
+        return
+    floor = 1e3 * room.vertices[np.unique(room.triangles[tags == TAG_SONOTRODE]), :2]
+    half = np.abs(floor).max(axis=0)
+    if (half > 0.5 * np.array(blocks.sides_mm) + 1e3 * MIN_HEIGHT).any():
+        x, y = 2.0 * half
+        raise InputError(
+            f"sonotrode.blocks: {blocks.in_words}, but the floor needs {x:.4g} × {y:.4g} mm about "
+            "the axis; give more or larger blocks, or a smaller floor"
         )
 
 

@@ -2,7 +2,8 @@
 
 A holder is a prism along the holder's axis, which points out of the room: round (rod, collar) or
 rectangular (plate). It ends inside the wall. A mask is what faces of the part sweep, either along
-their own normals by the thickness of a shell, or along an axis into the wall.
+their own normals by the thickness of a shell, or along an axis into the wall; or it is plugs, the
+convex hulls of the walls of holes.
 
       ======= wall ======
          |  holder  |         ^ axis      z: along the axis, from the origin of the chamber's frame
@@ -45,7 +46,14 @@ from chamberopt.geometry.outline import (
     radii,
 )
 from chamberopt.geometry.solids import intersect, overlap_volume, split_bodies, unite
-from chamberopt.geometry.triangles import area_vectors, areas, swept, unit_vectors
+from chamberopt.geometry.triangles import (
+    area_vectors,
+    areas,
+    connected_pieces,
+    side_pairs,
+    swept,
+    unit_vectors,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -68,7 +76,7 @@ CREASE = 0.01
 class Fixture:
     """A holder or a mask as it stands in the room, without what is in the part or in the wall."""
 
-    kind: str  # as in the design; of a mask "shell", or "filled" up to the wall
+    kind: str  # as in the design; of a mask "shell", "plugs", or "filled" up to the wall
     size: tuple[float, ...]  # [m]: a diameter, two sides, or the thickness of a shell
     length: float  # along its axis, from its end at the part to the wall [m]; 0 for a shell
     # Of a holder: middle of its end at the part, in the chamber's frame [m], (3,).
@@ -373,6 +381,8 @@ def _mask(design: Design, part: Part, filled: CavitySolid) -> _Made:
     mask = design.mask
     assert mask is not None
     chosen = chosen_on_part(design, mask.at, "mask.at")
+    if mask.plugs:
+        return _Made(_plugs(part, chosen), chosen, "plugs", (), 0.0)
     axis = None if mask.axis is None else unit_vectors(np.array(mask.axis, dtype=float))
     covered = chosen
     if axis is not None:
@@ -403,6 +413,47 @@ def _mask(design: Design, part: Part, filled: CavitySolid) -> _Made:
             f"each other; {remedy}"
         )
     return _Made([surface], covered, "shell" if axis is None else "filled", size, length)
+
+
+def _plugs(part: Part, chosen: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Return the surfaces of plugs that fill holes of the part to their rims.
+
+    Raises InputError if some of the chosen faces are no walls of a hole.
+    """
+    import trimesh
+
+    plugs = []
+    for piece in pieces_of(part.triangles, chosen):
+        used, numbers = np.unique(part.triangles[piece], return_inverse=True)
+        triangles, vertices = numbers.reshape(-1, 3), part.vertices[used]
+        if not is_hole(vertices, triangles):
+            first = part.elements[piece[0]]
+            raise InputError(
+                f"mask.plugs: the faces of mask.at near {format_point(vertices.mean(axis=0))} "
+                f"(triangle {first}) are no walls of a hole; leave them out, or give "
+                "mask.thickness_mm"
+            )
+        hull = trimesh.convex.convex_hull(vertices - _offsets(vertices, triangles, SINK))
+        plugs.append((np.asarray(hull.vertices), np.asarray(hull.faces)))
+    return plugs
+
+
+def pieces_of(triangles: np.ndarray, chosen: np.ndarray) -> list[np.ndarray]:
+    """Return the rows of the triangles of each connected piece of those chosen, (m,) bool."""
+    rows = np.flatnonzero(chosen)
+    one, two = (side_pairs(triangles) // 3).T
+    inside = chosen[one] & chosen[two]
+    number = np.cumsum(chosen) - 1
+    piece = connected_pieces(number[one[inside]], number[two[inside]], len(rows))[1]
+    return [rows[piece == k] for k in range(piece.max() + 1)] if len(rows) else []
+
+
+def is_hole(vertices: np.ndarray, triangles: np.ndarray) -> bool:
+    """Return whether faces of a part look towards their own middle, as the wall of a hole does."""
+    vectors, middles = area_vectors(vertices, triangles), vertices[triangles].mean(axis=1)
+    weight = np.linalg.norm(vectors, axis=1)
+    inward = np.average(middles, axis=0, weights=weight) - middles
+    return bool((inward * vectors).sum() > 0.0)
 
 
 def _offsets(vertices: np.ndarray, triangles: np.ndarray, thickness: float) -> np.ndarray:

@@ -9,7 +9,7 @@ design. A design may lack some metrics: `metric_problem` gives the reason.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -20,6 +20,7 @@ from chamberopt.common.errors import InputError
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
+    from chamberopt.common.estimate import Estimate
     from chamberopt.coverage.part_impacts import TargetImpacts
     from chamberopt.design.load import Design
 
@@ -322,6 +323,24 @@ def parse_objective(name: str) -> ObjectiveFunction:
         for metric, share in of_part.items():
             terms[metric] = terms.get(metric, 0.0) + factor * share
     return ObjectiveFunction(name, "weighted sum", terms)
+
+
+def unit_of_objective(name: str, metrics: Mapping[str, Estimate], value: Estimate) -> float:
+    """Return the size of the largest term of an objective, in which gains and accuracy count.
+
+    The size of a term is its weight if its metric is between 0 and 1. Else it is the weight times
+    the size of the metric, or of the objective if the metric was not measured.
+
+    Args:
+        metrics: estimates of the metrics by name.
+        value: the objective itself.
+    """
+    sizes = []
+    for term, weight in parse_objective(name).terms.items():
+        metric, figure = find_metric(term), metrics.get(term, value)
+        is_share = metric is not None and metric.highest <= 1.0
+        sizes.append(abs(weight) * (1.0 if is_share else abs(figure.value)))
+    return max(sizes) or 1.0
 
 
 def highest_uniform_coverage(reachable: float) -> float:

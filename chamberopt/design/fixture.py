@@ -94,7 +94,7 @@ class Holder(FileTable):
 
 
 class Mask(FileTable):
-    """A cover that keeps the shot from faces of the part: a shell on them, or all up to a wall."""
+    """What keeps the shot from faces of the part: a shell, plugs, or all up to a wall."""
 
     at: Selection = Field(description="faces that it covers, by the keys of [part.target]")
     thickness_mm: float | None = quantity(
@@ -106,11 +106,19 @@ class Mask(FileTable):
         None,
     )
 
+    plugs: bool = Field(
+        default=False,
+        description="no shell, but the holes whose walls these faces are are filled to their rims",
+    )
+
     def _problems(self) -> Iterator[Problem]:
         yield from _no_condition(self.at)
         if self.axis is not None and self.thickness_mm is not None:
             text = "given beside axis, along which the mask goes on to the wall; leave one out"
             yield Problem("thickness_mm", text)
+        for key in ("axis", "thickness_mm"):
+            if self.plugs and getattr(self, key) is not None:
+                yield Problem(key, "given beside plugs, which fill their holes; leave one out")
 
     @property
     def thickness(self) -> float:

@@ -29,7 +29,11 @@ class Accuracy(FileTable):
     simulated_time_s: float = quantity(1e-4, 10000, "s", "of each replica, after warm-up", 1.0)
     warmup_time_s: float = quantity(0, 10000, "s", "simulated first and not counted", 0.2)
     objective_half_width: float | None = quantity(
-        1e-4, 0.5, "", "wanted half-width of the objective's 95 % interval", None
+        1e-4,
+        0.5,
+        "",
+        "wanted half-width of the objective's 95 % interval; of a time as a share of it",
+        None,
     )
     max_replicas: int = quantity(3, 100000, "", "limit for objective_half_width", 200)
     points: int = quantity(

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
 MAX_POINTS = 50  # points of a profile
 MAX_SHARE = 2.0
+MAX_BLOCKS = 20  # in a row
 LEAST_LARGEST = 0.1  # of the shares: with less, amplitude_um is not that of the face
 POINTS = (
     "pairs [mm from the middle, share], from 0 to the rim, e.g. [[0, 1], [20, 0.97], [35, 0.9]]"
@@ -184,13 +185,61 @@ class VibratingFace(FileTable):
         return self.peak_speed if profile is None else self.peak_speed * profile.rms
 
 
+class Blocks(FileTable):
+    """Equal blocks side by side on the chamber's axis, each a sonotrode, which make up the floor.
+
+    They are simulated as one face that moves alike all over. No ball enters the joints.
+    """
+
+    size_mm: Pair = list_field("two numbers [x, y] in mm", "sides of one block")
+    columns: int = Field(1, ge=1, le=MAX_BLOCKS, description="of blocks, side by side along x")
+    rows: int = Field(1, ge=1, le=MAX_BLOCKS, description="of blocks, side by side along y")
+
+    def _problems(self) -> Iterator[Problem]:
+        if not all(5.0 <= one <= 2000.0 for one in self.size_mm):
+            yield Problem("size_mm", f"given {list(self.size_mm)}; allowed: 5 to 2000 mm each")
+
+    @property
+    def sides_mm(self) -> tuple[float, float]:
+        """Lengths of all blocks together along x and y."""
+        return self.columns * self.size_mm[0], self.rows * self.size_mm[1]
+
+    @property
+    def joints_mm(self) -> tuple[list[float], list[float]]:
+        """Places of the joints between columns along x, and between rows along y."""
+        (x, y), (long, wide) = self.size_mm, self.sides_mm
+        return (
+            [k * x - 0.5 * long for k in range(1, self.columns)],
+            [k * y - 0.5 * wide for k in range(1, self.rows)],
+        )
+
+    @property
+    def in_words(self) -> str:
+        """Number and size, such as 4 blocks of 80 × 80 mm side by side, 2 × 2."""
+        x, y = self.size_mm
+        count = self.columns * self.rows
+        return f"{count} blocks of {x:g} × {y:g} mm side by side, {self.columns} × {self.rows}"
+
+
 class Sonotrode(VibratingFace):
     """The first sonotrode, which is the vibrating floor of the chamber."""
+
+    blocks: Blocks | None = Field(
+        default=None,
+        description="blocks of which the floor is made: { size_mm = [80, 80], columns = 2 }; "
+        "absent: the floor is one sonotrode",
+    )
 
     motion: Literal["sinusoidal", "random_phase"] = Field(
         default="sinusoidal",
         description="how the face moves: in time, or each ball meets it at a random phase",
     )
+
+    def _problems(self) -> Iterator[Problem]:
+        yield from super()._problems()
+        if self.blocks is not None and self.amplitude_profile is not None:
+            text = "given beside blocks, each of which has its own: not supported; leave one out"
+            yield Problem("amplitude_profile", text)
 
 
 class FurtherSonotrode(PlacedBore, VibratingFace):

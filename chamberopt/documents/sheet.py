@@ -65,7 +65,9 @@ def alarms(result: Result) -> Iterator[str]:
 
 def _wide_face(result: Result, face_mm: tuple[float, ...]) -> Iterator[str]:
     """Yield a sentence if the face is larger than usual, and its amplitude was not measured."""
-    if max(face_mm) > WIDEST_FACE and result.design.sonotrode.amplitude_profile is None:
+    blocks = result.design.sonotrode.blocks
+    widest = max(face_mm if blocks is None else blocks.size_mm)
+    if widest > WIDEST_FACE and result.design.sonotrode.amplitude_profile is None:
         yield (
             f"The face, {_face(face_mm)}, is larger than usual sonotrodes, and was simulated as "
             "one that moves alike all over. If yours is smaller, set several side by side or peen "
@@ -336,7 +338,8 @@ def _fixtures(result: Result) -> Iterator[Row]:
     faces = {"holder": holder.at if holder else None, "mask": mask.at if mask else None}
     for name, one in result.record.chamber.fixtures.items():
         size = size_in_words(one.kind, one.size_mm)
-        text = f"{one.kind} {size or 'up to the wall'}"
+        flush = "flush with their rims" if one.kind == "plugs" else "up to the wall"
+        text = f"{one.kind} {size or flush}"
         if one.length_mm:
             text += f", {plain(one.length_mm)} mm long"
         if one.place_mm and holder is not None:
@@ -372,6 +375,8 @@ def _key_row(key: str, value: Any) -> Row:
 def _sonotrode(result: Result, face_mm: tuple[float, ...]) -> Iterator[Row]:
     design = result.design
     yield "face in the chamber", _face(face_mm)
+    if design.sonotrode.blocks is not None:
+        yield "made of", f"{design.sonotrode.blocks.in_words}, driven alike: simulated as one face"
     yield "frequency", f"{plain(design.sonotrode.frequency_khz)} kHz"
     yield "amplitude", _amplitude(design.sonotrode)
     yield "peak speed of the face", f"{plain(design.sonotrode.peak_speed, 3)} m/s"

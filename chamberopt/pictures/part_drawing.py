@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from chamberopt.chamber.build import Chamber
+    from chamberopt.design.sonotrode import Blocks
 
 # All lengths are in mm on the page.
 
@@ -153,6 +154,7 @@ def draw_chamber(
     top: float,
     size: Point,
     limits: Limits = MappingProxyType({}),
+    blocks: Blocks | None = None,
 ) -> str:
     """Draw sections and plan of a chamber on a page, and return what they are, with their scale.
 
@@ -161,6 +163,7 @@ def draw_chamber(
         left, top: upper left corner of the drawing.
         size: width and height that it may have.
         limits: what the keys of [chamber] may be, for dimensions that show one of them.
+        blocks: of which the floor is made, whose joints the plan shows.
     """
     mm = 1e3 * chamber.vertices
     low, high = mm.min(axis=0), mm.max(axis=0)
@@ -184,9 +187,12 @@ def draw_chamber(
     corner = np.array([x + BESIDE, middle - 0.5 * deep + 1.0])
     view = View(0, scale, corner, low[:2], high[:2], np.zeros(2))
     _draw_plan(axes, chamber, view, planes, limits)
+    if blocks is not None:
+        _draw_joints(axes, chamber, view, blocks)
     text = f"{plain(scale)}:1" if scale >= 1.0 else f"1:{plain(1.0 / scale)}"
     what = "Section A–A" if len(planes) == 1 else "Sections A–A and B–B"
-    return f"{what} and plan, scale {text}"
+    joints = "" if blocks is None else ", dashed: the joints of the floor's blocks"
+    return f"{what} and plan, scale {text}{joints}"
 
 
 def _fit(
@@ -346,6 +352,20 @@ def _draw_plan(
         elif len(face_size_mm(chamber)) > 1:
             dimension(axes, (left, bottom), (right, bottom), 9.5, text)
     _label(axes, left, top + (6.5 if is_upright else 2.5), "plan: x to the right, y up")
+
+
+def _draw_joints(axes: Axes, chamber: Chamber, view: View, blocks: Blocks) -> None:
+    """Draw the joints between the blocks of which the floor is made, as far as the floor goes."""
+    face = chamber.triangles[chamber.tags == TAG_SONOTRODE]
+    area = inside(1e3 * chamber.vertices[border_edges(face)][:, :, :2])
+    assert area is not None
+    floor = type(area)(view.place(area.vertices), area.codes)
+    for axis, places in enumerate(blocks.joints_mm):
+        for at in places:
+            ends = np.array([view.low, view.high])
+            ends[:, axis] = at
+            (line,) = axes.plot(*view.place(ends).T, color=BLUE, lw=0.8, ls=(0, (6, 2)))
+            line.set_clip_path(floor, axes.transData)
 
 
 def _fill(axes: Axes, view: View, lines: np.ndarray, window: Rectangle, **look: Any) -> None:

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from matplotlib.font_manager import FontProperties
 
     from chamberopt.chamber.build import Chamber
+    from chamberopt.design.sonotrode import Blocks
 
 SHEET = "process_sheet.pdf"
 CREATOR = "chamberopt process sheet"  # marks a sheet, so that a newer sheet may replace it
@@ -232,13 +233,16 @@ def write_sheet(result: str | Path, path: str | Path | None = None) -> tuple[Pat
     with claim_file(path):
         chamber = load_chamber(loaded)
         sheet = process_sheet(loaded, face_size_mm(chamber))
-        pages = draw_sheet(sheet, chamber, chamber_limits(loaded))
+        pages = draw_sheet(sheet, chamber, chamber_limits(loaded), loaded.design.sonotrode.blocks)
         _save(path, pages, sheet.name)
     return path, sheet
 
 
 def draw_sheet(
-    sheet: Document, chamber: Chamber, limits: Limits = MappingProxyType({})
+    sheet: Document,
+    chamber: Chamber,
+    limits: Limits = MappingProxyType({}),
+    blocks: Blocks | None = None,
 ) -> list[Figure]:
     """Return a process sheet as figures of its pages.
 
@@ -248,6 +252,7 @@ def draw_sheet(
     Args:
         sheet: a document as process_sheet makes it.
         limits: what the keys of [chamber] may be, for the drawing's dimensions.
+        blocks: of which the chamber's floor is made.
     """
     ignore_settings_here()
     first, further, block = sheet.sections
@@ -266,7 +271,7 @@ def draw_sheet(
         if room >= DRAWING_PER_PT * size:
             break
     tall = min(MOST_DRAWING, room) - CAPTION
-    views = draw_chamber(axes, chamber, MARGIN, top, (INNER, tall), limits)
+    views = draw_chamber(axes, chamber, MARGIN, top, (INNER, tall), limits, blocks)
     Writer(axes, 6.0).write(f"{views}, {LEGEND}", MARGIN, top - tall, INNER, colour=DARK_GREY)
     _content(Writer(axes, size, most), shown, top - tall - CAPTION)
     if not alone:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from chamberopt.common.errors import InputError
 from chamberopt.common.estimate import Estimate
-from chamberopt.coverage.metrics import find_metric, parse_objective
+from chamberopt.coverage.metrics import find_metric, unit_of_objective
 from chamberopt.search.candidate import (
     Candidate,
     Figures,
@@ -60,6 +60,11 @@ class Judge:
             return 0.0
         wanted = self._study.design.process.accuracy.objective_half_width
         return (wanted or COUNTS) * self.unit
+
+    def unit_of(self, figures: Figures) -> float:
+        """Return the unit of the first objective of a candidate with these figures."""
+        name, objective = self._study.objective.goals[0], figures.goals[0]
+        return unit_of_objective(name, figures.metrics, objective)
 
     def measured(self, told: Mapping[str, Estimate | float]) -> Figures:
         """Return the figures of a candidate that was measured instead of simulated.
@@ -124,19 +129,6 @@ class Judge:
             reason="; ".join(violations),
             replicas=answer.replicas,
         )
-
-    def unit_of(self, figures: Figures) -> float:
-        """Return the size of the largest term of the first objective, the unit of penalties.
-
-        The size of a term is its weight if its metric is between 0 and 1. Else it is the weight
-        times the size of the metric, or of the objective if the metric was not measured.
-        """
-        sizes = []
-        for name, weight in parse_objective(self._study.objective.goals[0]).terms.items():
-            metric, figure = find_metric(name), figures.metrics.get(name, figures.goals[0])
-            is_share = metric is not None and metric.highest <= 1.0
-            sizes.append(abs(weight) * (1.0 if is_share else abs(figure.value)))
-        return max(sizes) or 1.0
 
 
 def _finite(name: str, given: Estimate | float) -> Estimate:

@@ -4,7 +4,7 @@ Notation
     n    number of replicas so far
     h    half-width of a figure's interval from these replicas               (figure.half_width)
     c    part of h that all replicas share: the choice of the points         (shared_half_width)
-    w    half-width that is wanted
+    w    half-width that is wanted: of a share, or of another figure as a share of its value
 
 Replicas narrow what they do not share: h² - c² falls as 1 / n. Where c is nearly all of h, more
 replicas bring nothing. Where a figure has no interval yet, as its windows (discs of the target)
@@ -65,7 +65,8 @@ class Effort:
     first: number of replicas before the first look at the interval.
     most: largest number of replicas.
     points: number of windows in which coverage is measured.
-    wanted: half-width of the interval to reach; None if the number of replicas was given.
+    wanted: half-width of the interval to reach, in units of the figure; None if the number of
+        replicas was given.
     """
 
     first: int
@@ -87,7 +88,9 @@ class Effort:
         most = accuracy.max_replicas
         return cls(min(max(first, MIN_REPLICAS_TO_STOP), most), most, accuracy.points, wanted)
 
-    def after(self, done: int, figure: Estimate, growth: float, last: Step) -> Step:
+    def after(
+        self, done: int, figure: Estimate, growth: float, last: Step, unit: float = 1.0
+    ) -> Step:
         """Return how many replicas the next look takes, or why there is none.
 
         Nothing but the results of the replicas decides, so that it is the same on all computers.
@@ -98,10 +101,11 @@ class Effort:
             growth: factor on the replicas that gives the figure the dents that it needs; 1 or less
                 if it has them, infinite if this cannot be told.
             last: the step that led to these replicas.
+            unit: what the wanted half-width counts in: 1 for a share, else the size of the figure.
         """
-        wanted = self.wanted
-        if wanted is None:
+        if self.wanted is None:
             return Step(done, "replicas")
+        wanted = self.wanted * (unit if math.isfinite(unit) else 1.0)
         width, shared = figure.half_width, shared_half_width(figure.shared)
         is_known = math.isfinite(width)
         if width <= wanted:
@@ -123,7 +127,7 @@ class Effort:
     def _by_points(self, done: int, wanted: float, width: float, shared: float) -> str:
         remedy = points_remedy(self.points, shared, wanted)
         return (
-            f"the wanted accuracy of ± {wanted:g} was not reached: after {done} replicas it is "
+            f"the wanted accuracy of ± {wanted:.3g} was not reached: after {done} replicas it is "
             f"± {width:.2g}, of which ± {shared:.2g} come from the choice of the points of the "
             f"windows, so that more replicas bring nothing; {remedy}"
         )
@@ -139,7 +143,7 @@ class Effort:
             elif done < needed < math.inf:
                 reached += f", and about {math.ceil(needed)} replicas would be needed"
         return (
-            f"the wanted accuracy of ± {wanted:g} was not reached: the simulation stopped at "
+            f"the wanted accuracy of ± {wanted:.3g} was not reached: the simulation stopped at "
             f"process.accuracy.max_replicas = {done}{reached}; raise {remedy}"
         )
 
@@ -163,7 +167,7 @@ def _growth(width: float, shared: float, wanted: float) -> float:
 
 
 def _reached(done: int, wanted: float, width: float, last: Step) -> str:
-    reached = f"the wanted accuracy of ± {wanted:g} was reached after {done} replicas"
+    reached = f"the wanted accuracy of ± {wanted:.3g} was reached after {done} replicas"
     if not last.for_dents:
         return reached
     return (

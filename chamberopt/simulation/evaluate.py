@@ -25,7 +25,7 @@ from chamberopt.coverage.field.target_field import (
     require_touchable_zones,
     require_wide_gauge,
 )
-from chamberopt.coverage.metrics import require_metrics, require_target
+from chamberopt.coverage.metrics import require_metrics, require_target, unit_of_objective
 from chamberopt.simulation.effort import Effort
 from chamberopt.simulation.estimates import (
     SeenDents,
@@ -170,7 +170,8 @@ class _Run:
         self.timings["coverage"] += time.perf_counter() - simulated
         field, done = target.field, len(replicas)
         growth = growth_for_dents(plan.objective_name, found.resolution)
-        self.step = self.effort.after(done, objective, growth, self.step)
+        unit = unit_of_objective(plan.objective_name, metrics, objective)
+        self.step = self.effort.after(done, objective, growth, self.step, unit)
         return Evaluation(
             objective_name=plan.objective_name,
             objective=objective,

@@ -389,9 +389,12 @@ def _tolerance_facts(design: Design) -> dict[str, Facts]:
 def _side_wall_warnings(design: Design, chamber: Chamber) -> list[str]:
     """Return a warning if the part goes out through the side wall, else an empty list.
 
-    There is no warning for a part that closes the chamber like a lid, turns (its joint is a round
-    shaft), has a hole or a bore for its fixture, or is drawn with its chamber.
+    There is no warning for a part whose whole target is in the chamber, that closes the chamber
+    like a lid, turns (its joint is a round shaft), has a hole or a bore for its fixture, or is
+    drawn with its chamber.
     """
+    if hidden_share(chamber) < 1e-3:
+        return []
     turns, drawn = design.effects.part_turn is not None, design.chamber.setup() is not None
     names = surface_names(chamber)
     held = design.holder is not None and design.holder.kind == "bore"

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -28,11 +29,12 @@ from chamberopt.chamber.propose.proposed_balls import charge_of, fit_sizes, prop
 from chamberopt.chamber.propose.proposed_end import HeldEnd, held_end
 from chamberopt.chamber.propose.proposed_floor import Floor, floor_on_sonotrode, require_room
 from chamberopt.chamber.propose.proposed_holder import end_holder, holder_choices
-from chamberopt.chamber.propose.proposed_mask import to_be_masked
+from chamberopt.chamber.propose.proposed_mask import are_holes, to_be_masked
 from chamberopt.chamber.propose.proposed_target import (
     Sizes,
     Surface,
     Target,
+    middle_in_plan,
     propose_sizes,
     propose_target,
     shape_for,
@@ -153,8 +155,9 @@ NO_PLACE = (
     "no flat face beside the target looks up or aside and has room for a holder",
     "all of it is to be peened; leave out of [part.target] the face to hold it by",
 )
-TREATMENT_S, HALF_WIDTH, MOST_REPLICAS = 300.0, 0.02, 24
+TREATMENT_S, HALF_WIDTH, MOST_REPLICAS = 300.0, 0.03, 24
 REPLICAS = 10  # the fewest that a wanted half-width takes
+BLOCKS = "LARGER THAN ONE SONOTRODE: several side by side, driven alike"
 START = "a start, NOT MEASURED by a pilot"
 
 Tables = dict[str, dict[str, Any]]
@@ -250,20 +253,24 @@ def propose(
         "effects.roughness": "rms slope of faces that shot has dented",
         "process.treatment_time_s": f"{START}: the report has coverage over time",
         "process.accuracy.simulated_time_s": f"{START}: results say what is resolved",
-        "process.accuracy.objective_half_width": "replicas are added until it is so sure",
+        "process.accuracy.objective_half_width": "until it is so sure; of a time: this share",
     }
-    best: tuple[Proposal, Floor] | None = None
-    refused: InputError | None = None
-    with step("building and checking the chamber") as progress:
+
+    def built(is_local: bool) -> tuple[Proposal, Floor]:
+        """Return the proposal with the least room that is free of gaps, else of fewest faults."""
+        best: tuple[Proposal, Floor] | None = None
+        refused: InputError | None = None
         for number, wider in enumerate(WIDER):
             progress(number, len(WIDER), None)
             try:
-                placed, floor = _place(mesh, target, turns, diameter, wanted, wider)
-                tables["part"] = {**tables["part"], "rotate_deg": list(placed)}
-                tables |= _floor_tables(floor)
-                pose = {"part.rotate_deg": f"{pose_in_words(mesh, known, placed)}: {pose_reason}"}
-                why = {**reasons, **pose, **_floor_reasons(floor)}
-                made = _checked({**tables}, why, floor, known, mesh, wanted.shop)
+                placed, floor = _place(mesh, target, turns, diameter, wanted, wider, is_local)
+                pose = {"rotate_deg": list(placed)}
+                if any(floor.offset_mm):
+                    pose["offset_mm"] = list(floor.offset_mm)
+                own = {**tables, "part": {**tables["part"], **pose}, **_floor_tables(floor)}
+                words = {"part.rotate_deg": f"{pose_in_words(mesh, known, placed)}: {pose_reason}"}
+                why = {**reasons, **words, **_floor_reasons(floor, is_local)}
+                made = _checked(own, why, floor, known, mesh, wanted.shop)
             except UnreadableError:
                 raise
             except InputError as error:
@@ -273,11 +280,19 @@ def propose(
                 best = made, floor
             if not any(word in text for text in made.warnings for word in ("gap", "side wall")):
                 break
-    if best is None:
-        assert refused is not None
-        raise refused
-    made, floor = best
-    if not floor.sizes.through_ceiling:
+        if best is None:
+            assert refused is not None
+            raise refused
+        return best
+
+    with step("building and checking the chamber") as progress:
+        made, floor = built(is_local=False)
+        if not floor.is_one_sonotrode:
+            with suppress(InputError):
+                local = built(is_local=True)
+                if local[1].is_one_sonotrode and _faults(local[0]) <= _faults(made):
+                    made, floor = local
+    if made.chamber.pieces_in_air:
         with step("choosing what holds the part") as progress:
             made = _held(made, floor, target, end, wanted.shop, progress)
     return _only_touched(_masked(made, floor, wanted.shop), floor, wanted.shop)
@@ -354,9 +369,12 @@ def _masked(bare: Proposal, floor: Floor, shop: Shop | None) -> Proposal:
     if not names:
         return bare
     after = "holder" if "holder" in bare.tables else "sonotrode"
-    keys = {"thickness_mm": USUAL_SHELL_MM, "at": {"surface": names}}
-    text = f"a bush or a cap on {', '.join(names)}: not to be peened, by the name"
-    reasons = {**bare.reasons, "mask.thickness_mm": text}
+    first, value, what = "thickness_mm", USUAL_SHELL_MM, "a cap on"
+    if are_holes(bare.mesh, bare.known, names):
+        first, value, what = "plugs", True, "in"
+    keys = {first: value, "at": {"surface": names}}
+    text = f"{what} {', '.join(names)}: not to be peened, by the name"
+    reasons = {**bare.reasons, f"mask.{first}": text}
     tables = _with_table(bare.tables, after, "mask", keys)
     try:
         made = _checked_at_extremes(tables, reasons, floor, bare, shop)
@@ -487,7 +505,13 @@ def _part_alone(tables: Tables) -> Part:
 
 
 def _place(
-    mesh: PartMesh, target: Target, turns: Turns, ball: float, wanted: Wanted, wider: float
+    mesh: PartMesh,
+    target: Target,
+    turns: Turns,
+    ball: float,
+    wanted: Wanted,
+    wider: float,
+    is_local: bool = False,
 ) -> tuple[Turns, Floor]:
     """Return the turns of a part [degrees] and the sizes of a chamber round it on a sonotrode.
 
@@ -498,18 +522,21 @@ def _place(
         turns: turns that bring the target down; the part may still be turned about z.
         ball: diameter of the balls [m].
         wider: factor on the room round the part.
+        is_local: true for a chamber round the target, whose walls the part goes out through.
     Raises:
         InputError: the shop has no sonotrode for it, or no chamber so large.
     """
     square, found = square_to_walls(mesh.vertices, turns), []
     suits = shape_for(np.ptp(mesh.vertices @ rotation_matrix(square).T, axis=0))
     refused: InputError | None = None
-    for shape in dict.fromkeys([wanted.shape] if wanted.shape else ["cylinder", suits]):
+    usual = ["box"] if is_local else ["cylinder", suits]
+    for shape in dict.fromkeys([wanted.shape] if wanted.shape else usual):
         placed = square if shape == "box" else turns
         posed = mesh.vertices @ rotation_matrix(placed).T
         posed[:, 2] -= posed[:, 2].min()
-        top = float(posed[mesh.triangles[target.triangles], 2].max())
-        sizes, shop = propose_sizes(posed, top, ball, shape, wider), wanted.shop
+        on_target = posed[np.unique(mesh.triangles[target.triangles])]
+        top, around = float(on_target[:, 2].max()), on_target if is_local else None
+        sizes, shop = propose_sizes(posed, top, ball, shape, wider, around), wanted.shop
         try:
             floor = floor_on_sonotrode(sizes, _round(posed), shop or usual_shop(), shop is None)
             if shop is not None:
@@ -517,13 +544,16 @@ def _place(
                 if highest < room.height - room.distance:  # a higher lid takes in the whole part
                     room = replace(room, through_ceiling=False, top=highest)
                 floor = floor._replace(sizes=room)
+            if is_local:
+                x, y = 1e3 * (middle_in_plan(posed) - middle_in_plan(on_target))
+                floor = floor._replace(offset_mm=(round(float(x), 1), round(float(y), 1)))
         except InputError as error:
             refused = refused or error
             continue
         found.append((placed, floor))
     if refused and not found:
         raise refused
-    return min(found, key=lambda one: (one[1].lean, one[1].too_large))
+    return min(found, key=lambda one: one[1].excess)
 
 
 def _hanging(
@@ -537,7 +567,7 @@ def _hanging(
 
     def is_carried(pose: Turns) -> bool:
         try:
-            return math.isfinite(_place(mesh, target, pose, ball, wanted, 1.0)[1].lean)
+            return _place(mesh, target, pose, ball, wanted, 1.0)[1].is_one_sonotrode
         except InputError:
             return False
 
@@ -555,8 +585,11 @@ def _round(posed: np.ndarray) -> float:
 
 def _floor_tables(floor: Floor) -> Tables:
     """Return the tables of the design file that follow from the floor: chamber and sonotrode."""
-    sizes, one = floor.sizes, floor.sonotrode
+    sizes, one = floor.sizes, floor.face.sonotrode
     key, amplitude = one.amplitude_nearest(AMPLITUDE_UM)
+    sonotrode: dict[str, Any] = {"frequency_khz": one.frequency_khz, key: amplitude}
+    if floor.blocks is not None:
+        sonotrode["blocks"] = floor.blocks.model_dump(mode="json")
     return {
         "chamber": {
             "shape": sizes.shape,
@@ -564,24 +597,27 @@ def _floor_tables(floor: Floor) -> Tables:
             "height_mm": round(1e3 * sizes.height, 3),
             "sonotrode_distance_mm": round(1e3 * sizes.distance, 3),
         },
-        "sonotrode": {"frequency_khz": one.frequency_khz, key: amplitude},
+        "sonotrode": sonotrode,
     }
 
 
-def _floor_reasons(floor: Floor) -> dict[str, str]:
-    sizes, one = floor.sizes, floor.sonotrode
+def _floor_reasons(floor: Floor, is_local: bool) -> dict[str, str]:
+    sizes, one = floor.sizes, floor.face.sonotrode
     first = next(key for key in sizes.plan if key.endswith("_mm"))
     where = "; the part goes out through it" if sizes.through_ceiling else ""
+    beside = "target, and the part goes out through the walls" if is_local else "part"
     key, _ = one.amplitude_nearest(AMPLITUDE_UM)
     kind = (
         "ZERO-TO-PEAK, half of" if key == "amplitude_um" else "PEAK-TO-VALLEY, twice zero-to-peak"
     )
     kind += " peak-to-valley" if key == "amplitude_um" else ""
     return {
-        f"chamber.{first}": f"leaves {1e3 * sizes.gap:.3g} mm beside the part; {floor.reason}",
+        f"chamber.{first}": f"leaves {1e3 * sizes.gap:.3g} mm beside the {beside}; {floor.reason}",
         "chamber.height_mm": f"sonotrode to ceiling{where}",
         "chamber.sonotrode_distance_mm": "mean sonotrode face to the part's lowest point",
         **({"sonotrode.frequency_khz": one.note} if one.note else {}),
+        **({"part.offset_mm": "the target in the middle"} if any(floor.offset_mm) else {}),
+        **({"sonotrode.blocks": BLOCKS} if floor.blocks is not None else {}),
         f"sonotrode.{key}": f"{kind}; one that the sonotrode can set",
     }
 

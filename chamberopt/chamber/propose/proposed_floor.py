@@ -23,13 +23,15 @@ from typing import NamedTuple
 import numpy as np
 
 from chamberopt.chamber.propose.proposed_target import Sizes
-from chamberopt.chamber.propose.shop import Shop, ShopSonotrode
+from chamberopt.chamber.propose.shop import Face, Shop
 from chamberopt.common.errors import InputError
+from chamberopt.design.sonotrode import Blocks
 
 TIGHTER = 0.6  # share of the room beside the part that is left, so that the walls stand upright
 STEEPEST = 30.0  # degrees: walls that lean more throw the balls up rather than inwards
 FARTHER = 1.5  # factor by which the sonotrode's distance may grow, so that walls lean less
 WIDEST = 25e-3  # m: how far a leaning wall may move out up to the ceiling
+HELD = 1e-9  # m: a floor that must move in by no more lies within a face
 WHOLE = 1.25  # a face up to so much larger than the wanted floor becomes the whole floor
 
 
@@ -37,16 +39,38 @@ class Floor(NamedTuple):
     """The sizes of a chamber on a sonotrode of a shop."""
 
     sizes: Sizes
-    sonotrode: ShopSonotrode
+    face: Face
     reason: str  # for the chamber's size in plan
     lean: float = 0.0  # of the walls [degrees]; infinite if no sonotrode is large enough
     too_large: float = 0.0  # area of a floor for which no sonotrode is large enough [m²]
+    offset_mm: tuple[float, float] = (0.0, 0.0)  # of the part, so that its target is on the axis
+
+    @property
+    def is_one_sonotrode(self) -> bool:
+        """Whether one sonotrode carries the chamber."""
+        return math.isfinite(self.lean) and self.blocks is None
+
+    @property
+    def blocks(self) -> Blocks | None:
+        """Blocks of which the floor is made, as they lie in the chamber; None for one sonotrode."""
+        blocks = self.face.blocks
+        if blocks is None or not _is_turned(self.sizes):
+            return blocks
+        x, y = blocks.size_mm
+        return Blocks(size_mm=(y, x), columns=blocks.rows, rows=blocks.columns)
+
+    @property
+    def excess(self) -> tuple[float, ...]:
+        """How far the floor is from one upright over one sonotrode; less is better."""
+        count = 1 if self.blocks is None else self.blocks.columns * self.blocks.rows
+        return math.isinf(self.lean), count, self.lean, self.too_large
 
 
 def floor_on_sonotrode(sizes: Sizes, round_part: float, shop: Shop, may_exceed: bool) -> Floor:
     """Return the sizes of a chamber that stands on the most suitable sonotrode of a shop.
 
-    It is the smallest that holds the wanted floor, else the one on which the walls lean least.
+    It is the smallest that holds the wanted floor, else the one on which the walls lean least, else
+    the fewest blocks side by side that hold it.
 
     Args:
         sizes: the wanted sizes.
@@ -56,14 +80,13 @@ def floor_on_sonotrode(sizes: Sizes, round_part: float, shop: Shop, may_exceed: 
         InputError: the shop has no sonotrode for it.
     """
     sizes = _as_wide_as_high(sizes, shop)
-    moves = [(_move(sizes, round_part, one), one) for one in shop.sonotrodes]
-    held = [(_area(one), k) for k, (move, one) in enumerate(moves) if move <= 1e-9]
-    if held:
-        return _over_the_face(sizes, shop, shop.sonotrodes[min(held)[1]])
-    move, sonotrode = min(moves, key=lambda one: one[0])
-    if move <= (1.0 - TIGHTER) * sizes.gap and sizes.shape != "conformal":
-        tight = replace(sizes, plan=_moved(sizes, move, sonotrode), gap=sizes.gap - move)
-        return _over_the_face(tight, shop, sonotrode)
+    moves = [(_move(sizes, round_part, one), one) for one in map(Face, shop.sonotrodes)]
+    if held := [one for move, one in moves if move <= HELD]:
+        return _over_the_face(sizes, shop, min(held, key=lambda one: one.area_mm2))
+    move, face = min(moves, key=lambda one: one[0])
+    tighter = 0.0 if sizes.shape == "conformal" else (1.0 - TIGHTER) * sizes.gap
+    if move <= tighter:
+        return _over_the_face(_tight(sizes, move, face), shop, face)
     far = min(
         max(sizes.distance, move / math.tan(math.radians(STEEPEST))), FARTHER * sizes.distance
     )
@@ -72,19 +95,23 @@ def floor_on_sonotrode(sizes: Sizes, round_part: float, shop: Shop, may_exceed: 
     rise = (sizes.height + far - sizes.distance) * move / far
     if sizes.shape != "conformal" and angle <= STEEPEST + 0.5 and rise <= WIDEST:
         height = sizes.height + far - sizes.distance
-        return _leaning(replace(sizes, distance=far, height=height), move, angle, sonotrode)
+        return _leaning(replace(sizes, distance=far, height=height), move, angle, face)
+    floors = [(one.area_mm2, _move(sizes, round_part, one), one) for one in shop.floors_of_blocks()]
+    if near := [one for one in floors if one[1] <= max(tighter, HELD)]:
+        _, out, face = min(near, key=lambda one: one[0])
+        return _over_the_face(_tight(sizes, out, face) if out > HELD else sizes, shop, face)
     sides = _sides(sizes, round_part)
     wanted = " x ".join(f"{1e3 * one:.4g}" for one in sides)
     ways = (
         "peen it a strip at a time, each in a chamber of its own (cut the part down to it), "
-        "set several sonotrodes side by side, or take a larger one"
+        "set several sonotrodes side by side ([[sonotrodes]] pieces), or take a larger one"
     )
-    text = f"the floor of {wanted} mm is larger than the largest sonotrode, {sonotrode.in_words}"
+    text = f"the floor of {wanted} mm is larger than the largest face, {face.in_words}"
     if not may_exceed:
         raise InputError(f"--shop: {text}, also with walls that lean by {STEEPEST:g}°: {ways}")
-    usual = "usual ones: discs of 40 to 80 mm (chamberopt shop --example; give yours by --shop)"
+    usual = "usual ones: chamberopt shop --example; give yours by --shop"
     reason = f"LARGER THAN USUAL SONOTRODES, simulated as one face: {ways}; {usual}"
-    return Floor(sizes, sonotrode, reason, math.inf, math.prod(sides))
+    return Floor(sizes, face, reason, math.inf, math.prod(sides))
 
 
 def _as_wide_as_high(sizes: Sizes, shop: Shop) -> Sizes:
@@ -120,24 +147,19 @@ def _sides(sizes: Sizes, round_part: float) -> tuple[float, float]:
     return (2.0 * _radius(sizes, round_part),) * 2
 
 
-def _area(sonotrode: ShopSonotrode) -> float:
-    length, width = sonotrode.sides_mm
-    return length * width
-
-
-def _move(sizes: Sizes, round_part: float, sonotrode: ShopSonotrode) -> float:
+def _move(sizes: Sizes, round_part: float, face: Face) -> float:
     """Return how far the walls of the wanted floor must move in to stand on a face [m].
 
     It is at most 0 if the floor lies within the face, and infinite if no floor of this form does.
     A box whose walls move in by t has the half diagonal r at x + y - 2 t = sqrt(2 r² - (x - y)²).
     """
-    length, width = (5e-4 * one for one in sonotrode.sides_mm)
+    length, width = (5e-4 * one for one in face.sides_mm)
     if sizes.shape != "box":
         radius = _radius(sizes, round_part)
         inner = math.cos(math.pi / int(sizes.plan["sides"])) if sizes.shape == "prism" else 1.0
         return inner * (radius - width)
     x, y = _half(sizes)
-    if sonotrode.size_mm is not None:
+    if face.sonotrode.size_mm is not None:
         across, along = (width, length) if x < y else (length, width)
         return max(x - across, y - along)
     square = 2.0 * width**2 - (x - y) ** 2
@@ -145,42 +167,59 @@ def _move(sizes: Sizes, round_part: float, sonotrode: ShopSonotrode) -> float:
     return move if move < 0.8 * min(x, y) else math.inf
 
 
-def _moved(sizes: Sizes, move: float, sonotrode: ShopSonotrode) -> dict[str, float | str]:
+def _moved(sizes: Sizes, move: float, face: Face) -> dict[str, float | str]:
     """Return the keys of the floor with its walls moved in by some length [m] onto a face."""
     if sizes.shape == "cylinder":
-        return {**sizes.plan, "diameter_mm": sonotrode.sides_mm[1]}
+        return {**sizes.plan, "diameter_mm": face.sides_mm[1]}
     plan = {key: one for key, one in sizes.plan.items() if key.endswith("_mm")}
     inside = {key: math.floor(10.0 * float(one) - 2e4 * move) / 10.0 for key, one in plan.items()}
     return {**sizes.plan, **inside}
 
 
-def _over_the_face(sizes: Sizes, shop: Shop, sonotrode: ShopSonotrode) -> Floor:
+def _tight(sizes: Sizes, move: float, face: Face) -> Sizes:
+    """Return sizes with less room beside the part, so that the floor lies within a face."""
+    plan = _moved(sizes, move, face)
+    if sizes.shape == "box" and face.sonotrode.size_mm is not None:  # only where it is too wide
+        sides = zip(plan, _along(sizes, face), strict=True)
+        plan = {key: min(float(sizes.plan[key]), side) for key, side in sides}
+    return replace(sizes, plan=plan, gap=sizes.gap - move)
+
+
+def _over_the_face(sizes: Sizes, shop: Shop, face: Face) -> Floor:
     """Return a floor that is the whole face, if the face is little larger, else a part of it."""
     clear = f"{shop.clearance_mm:g} mm clear"
-    face = dict(zip(("length_mm", "width_mm"), sonotrode.sides_mm, strict=True))
-    if sizes.shape == "box" and sizes.plan["length_mm"] < sizes.plan["width_mm"]:  # type: ignore[operator]
-        face = dict(zip(face, reversed(face.values()), strict=True))
+    plan = dict(zip(("length_mm", "width_mm"), _along(sizes, face), strict=True))
     if sizes.shape == "cylinder":
-        face = {"diameter_mm": sonotrode.sides_mm[0]}
-    alike = (sizes.shape, sonotrode.size_mm is None) in (("cylinder", True), ("box", False))
-    if alike and all(face[key] <= WHOLE * float(sizes.plan[key]) for key in face):
-        more = min(face[key] - float(sizes.plan[key]) for key in face)
-        wider = replace(sizes, plan={**sizes.plan, **face}, gap=sizes.gap + 5e-4 * more)
-        reason = f"the face of sonotrode {sonotrode.in_words}, the wall round it {clear}"
-        return Floor(wider, sonotrode, reason)
-    reason = f"on sonotrode {sonotrode.in_words}: the wall ends over its face, {clear}"
-    return Floor(sizes, sonotrode, reason)
+        plan = {"diameter_mm": face.sides_mm[0]}
+    is_disc = face.sonotrode.size_mm is None
+    alike = (sizes.shape, is_disc) in (("cylinder", True), ("box", False))
+    if alike and all(plan[key] <= WHOLE * float(sizes.plan[key]) for key in plan):
+        more = min(plan[key] - float(sizes.plan[key]) for key in plan)
+        wider = replace(sizes, plan={**sizes.plan, **plan}, gap=sizes.gap + 5e-4 * more)
+        return Floor(wider, face, f"the face of {face.in_words}, the wall round it {clear}")
+    return Floor(sizes, face, f"on {face.in_words}: the wall ends over its face, {clear}")
 
 
-def _leaning(sizes: Sizes, move: float, angle: float, sonotrode: ShopSonotrode) -> Floor:
+def _along(sizes: Sizes, face: Face) -> tuple[float, float]:
+    """Return the sides [mm] of a face as it lies under a floor, along x and y."""
+    long, wide = face.sides_mm
+    return (wide, long) if _is_turned(sizes) else (long, wide)
+
+
+def _is_turned(sizes: Sizes) -> bool:
+    """Return whether the longer side of a face must lie along y."""
+    return sizes.shape == "box" and float(sizes.plan["length_mm"]) < float(sizes.plan["width_mm"])
+
+
+def _leaning(sizes: Sizes, move: float, angle: float, face: Face) -> Floor:
     """Return a floor that is smaller than the room, with walls that lean out from it."""
     lean = float(math.ceil(angle))
-    plan = {**_moved(sizes, move, sonotrode), "inclination_deg": lean}
+    plan = {**_moved(sizes, move, face), "inclination_deg": lean}
     reason = (
-        f"the floor is sonotrode {sonotrode.in_words}; its walls lean out by {lean:g}°, to be wide "
+        f"the floor is {face.in_words}; its walls lean out by {lean:g}°, to be wide "
         "enough where the part is"
     )
-    return Floor(replace(sizes, plan=plan), sonotrode, reason, lean)
+    return Floor(replace(sizes, plan=plan), face, reason, lean)
 
 
 def require_room(sizes: Sizes, shop: Shop) -> Sizes:

@@ -59,7 +59,12 @@ def shape_for(box: np.ndarray) -> str:
 
 
 def propose_sizes(
-    vertices: np.ndarray, target_top: float, ball: float, shape: str, wider: float = 1.0
+    vertices: np.ndarray,
+    target_top: float,
+    ball: float,
+    shape: str,
+    wider: float = 1.0,
+    target: np.ndarray | None = None,
 ) -> Sizes:
     """Return the sizes of a chamber of the named shape, with room for balls round the part.
 
@@ -68,6 +73,8 @@ def propose_sizes(
         target_top: height of the target's highest point [m].
         ball: diameter of a ball [m].
         wider: factor on the room beside, below and above the part.
+        target: vertices of the target alone [m], shape (k, 3), for a chamber round the target whose
+            walls the part goes out through; None for one round the part.
     """
     top = float(vertices[:, 2].max())
     width = float(np.ptp(vertices[:, :2], axis=0).max())
@@ -78,9 +85,8 @@ def propose_sizes(
     through = top > target_top + 2.0 * above
     below = target_top if through else top
     height = 1e-3 * _up_mm(distance + below + above)
-    inside = vertices[vertices[:, 2] <= height - distance + 1e-9]
-    # The box of the whole part is centred on the axis.
-    middle = 0.5 * (vertices[:, :2].min(axis=0) + vertices[:, :2].max(axis=0))
+    inside = vertices[vertices[:, 2] <= height - distance + 1e-9] if target is None else target
+    middle = middle_in_plan(vertices if target is None else target)  # on the chamber's axis
     half = np.abs(inside[:, :2] - middle).max(axis=0)
     gap = max(SIDE_GAP * ball, GAP_SHARE * 2.0 * float(half.max()), MIN_GAP) * wider
     radius = float(np.linalg.norm(inside[:, :2] - middle, axis=1).max())
@@ -92,6 +98,11 @@ def propose_sizes(
         "conformal": {"outline": "hull", "gap_mm": _up_mm(gap)},
     }
     return Sizes(shape, plans[shape], distance, height, gap, through, below)
+
+
+def middle_in_plan(points: np.ndarray) -> np.ndarray:
+    """Return the middle of the box round points (n, 3), seen from above, (2,)."""
+    return np.asarray(0.5 * (points[:, :2].min(axis=0) + points[:, :2].max(axis=0)))
 
 
 def _up_mm(length: float) -> float:

@@ -6,9 +6,11 @@ file, `usual_shop` stands in: usual sizes, with their sources in usual_shop.toml
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
+from itertools import product
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 from pydantic import Field
 
@@ -18,6 +20,7 @@ from chamberopt.common.toml_errors import Problem
 from chamberopt.common.toml_fields import Pair, Several, Triple, list_field, quantity, read_toml
 from chamberopt.design.design import validate
 from chamberopt.design.materials import ball, ball_sizes, balls, find
+from chamberopt.design.sonotrode import MAX_BLOCKS, Blocks
 from chamberopt.design.table_base import FileTable
 
 EXAMPLE = Path(__file__).with_name("usual_shop.toml")
@@ -36,6 +39,7 @@ class ShopSonotrode(FileTable):
     amplitudes_um: Numbers | None = list_field(f"1 to {MOST} numbers", "zero-to-peak", None)
     amplitudes_pv_um: Numbers | None = list_field(f"1 to {MOST} numbers", "peak-to-valley", None)
     note: str = Field(default="", max_length=300, description="such as its own resonance")
+    pieces: int = Field(default=1, ge=1, le=MAX_BLOCKS, description="blocks to set side by side")
 
     def _problems(self) -> Iterator[Problem]:
         for key in ("name", "note"):  # a line break would end the design's comment
@@ -45,6 +49,9 @@ class ShopSonotrode(FileTable):
             yield Problem("diameter_mm", "give it for a disc, or size_mm for a block: one of them")
         if self.size_mm is not None and not all(5.0 <= one <= 2000.0 for one in self.size_mm):
             yield Problem("size_mm", f"given {list(self.size_mm)}; allowed: 5 to 2000 mm each")
+        if self.pieces > 1 and self.size_mm is None:
+            text = "given for a disc; only blocks (size_mm) make up one floor side by side"
+            yield Problem("pieces", text)
         given = [key for key in AMPLITUDES if getattr(self, key) is not None]
         if len(given) != 1:
             text = "give amplitudes_um (zero-to-peak) or amplitudes_pv_um, one of them"
@@ -81,6 +88,30 @@ class ShopSonotrode(FileTable):
         """Name and size, such as "disc A" (70 mm)."""
         size = " x ".join(f"{one:g}" for one in dict.fromkeys(self.sides_mm))
         return f'"{self.name}" ({size} mm)'
+
+
+class Face(NamedTuple):
+    """A face of a shop on which a chamber can stand: one sonotrode, or blocks side by side."""
+
+    sonotrode: ShopSonotrode
+    blocks: Blocks | None = None  # the longer side along x
+
+    @property
+    def sides_mm(self) -> tuple[float, float]:
+        """Length and width of the face; of a disc twice its diameter."""
+        return self.sonotrode.sides_mm if self.blocks is None else self.blocks.sides_mm
+
+    @property
+    def area_mm2(self) -> float:
+        """Length times width of the face."""
+        return math.prod(self.sides_mm)
+
+    @property
+    def in_words(self) -> str:
+        """Name and size."""
+        if self.blocks is None:
+            return f"sonotrode {self.sonotrode.in_words}"
+        return f"{self.blocks.in_words} ({self.sonotrode.name})"
 
 
 class StockBalls(FileTable):
@@ -120,6 +151,16 @@ class Shop(FileTable):
         if not all(2.0 <= one <= 2000.0 for one in self.heights_mm):
             text = f"given {list(self.heights_mm)}; allowed: 2 to 2000 mm each"
             yield Problem("heights_mm", text)
+
+    def floors_of_blocks(self) -> Iterator[Face]:
+        """Yield the faces that the shop's blocks make side by side, no wider than long."""
+        for one in self.sonotrodes:
+            for columns, rows in product(range(1, one.pieces + 1), repeat=2):
+                if 1 < columns * rows <= one.pieces:
+                    for size in {one.sides_mm, one.sides_mm[::-1]}:
+                        blocks = Blocks(size_mm=size, columns=columns, rows=rows)
+                        if blocks.sides_mm[0] >= blocks.sides_mm[1]:
+                            yield Face(one, blocks)
 
     def stock_mm(self, material: str) -> tuple[float, ...]:
         """Return the diameters [mm] in stock of balls of a material, in ascending order.

@@ -38,7 +38,7 @@ FASTEST = Goal(
     "98 % everywhere in the shortest time",
     "minus_time_to_98_s",
     "minus the time after which 95 % of the target's area has 98 %",
-    f"max_replicas = {SEARCH_REPLICAS}  # objective_half_width would be in seconds",
+    f"max_replicas = {SEARCH_REPLICAS}  # alike for all candidates, to rank them",
 )
 
 

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from textwrap import wrap
@@ -113,10 +114,10 @@ def shot(name: str | None = None, /, *, json: Json = False) -> None:
         print_json({"balls": rows, "grades": [one.model_dump() for one in grades()]})
         return
     keys = list(UNITS)[:4]
-    head, table = ["", *(UNITS[key] for key in keys), "v0 m/s", "grades"], []
+    head, table = ["", *(UNITS[key] for key in keys), "v0 m/s", "grades", "read in"], []
     for one in listed:
         numbers = (*(getattr(one, key) for key in keys), speeds[one.name])
-        table.append([one.name, *map(_text, numbers), " ".join(one.grades)])
+        table.append([one.name, *map(_text, numbers), " ".join(one.grades), one.kind])
     lines = ["", "v0: of two such balls. Diameters [mm] in which they are sold:"]
     for one in listed:
         lines += _wrapped(f"{one.name}: {', '.join(map(_text, one.sizes_mm))}")
@@ -158,15 +159,25 @@ def _friction(metals: Iterable[str]) -> Iterator[Table | str]:
 
 
 def _sources(listed: Sequence[Alloy | Ball]) -> list[str]:
-    lines = []
+    """Return the source of each row, after the counts of rows by the kind of their source."""
+    counts = Counter(one.origin for one in listed).most_common()
+    text = "; ".join(f"{count} {origin}" for origin, count in counts)
+    lines = _wrapped(f"{len(listed)} rows: {text}", "") if len(listed) > 1 else []
     for one in listed:
         lines.append(f"{one.name} ({', '.join(one.also)}): {one.condition}, {one.origin}")
         lines += _wrapped(one.source)
     return lines
 
 
-def _wrapped(text: str) -> list[str]:
-    return wrap(text, 100, initial_indent="    ", subsequent_indent="    ")
+def _wrapped(text: str, indent: str = "    ") -> list[str]:
+    return wrap(  # an address stays in one piece
+        text,
+        100,
+        initial_indent=indent,
+        subsequent_indent=indent,
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
 
 
 def _text(number: float | None) -> str:

@@ -82,13 +82,13 @@ class Named(FileTable):
     E_GPa: float = quantity(1, 1500, "GPa", "Young's modulus")
     poisson: float = quantity(0, 0.5, "", "Poisson's ratio")
     kind: Literal["data sheet", "standard", "handbook", "supplier", "by heart"] = Field(
-        description="kind of text that hardness or strengths were read in"
+        description="kind of text that hardness, strengths or (glass) elasticity were read in"
     )
     source: str = Field(description="what was read where; what is by heart is not verified")
 
     @property
     def origin(self) -> str:
-        """Return in words how hardness or strengths are known."""
+        """Return in words how hardness, strengths or (of glass) elasticity are known."""
         return ORIGINS[self.kind]
 
     @property

@@ -38,6 +38,11 @@ def parts(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("parts")
     trimesh.creation.box(BOX).export(folder / "box.stl")
     trimesh.creation.cylinder(RADIUS, LONG, sections=64).export(folder / "shaft.stl")
+    holes = [trimesh.creation.cylinder(2.0, 20.0, sections=64) for _ in range(2)]
+    holes[0].apply_translation((-5.0, 0.0, 0.0))
+    holes[1].apply_translation((5.0, 0.0, 10.0))  # blind: it ends in the middle of the box
+    drilled = trimesh.boolean.difference([trimesh.creation.box(BOX), *holes], engine="manifold")
+    drilled.export(folder / "drilled.stl")
     return folder
 
 
@@ -278,6 +283,22 @@ def test_what_cannot_be_held_or_masked_is_refused(
 ) -> None:
     with pytest.raises(InputError, match=message):
         build_chamber(design(parts, mesh, **tables))
+
+
+def test_plugs_fill_holes_to_their_rims(parts: Path) -> None:
+    """The room is that round the box without its holes, through or blind; bottoms stay covered."""
+    wall = {"box_mm": [[-8, -3, -4.1], [8, 3, 4.1]], "direction": (0, 0, 1), "angle_deg": (80, 100)}
+    made = build_chamber(design(parts, "drilled", mask={"at": wall, "plugs": True}))
+    sound(made)
+    assert 1e9 * made.volume == pytest.approx(np.prod(ROOM) - np.prod(BOX), abs=0.1)
+    mask = made.fixtures["mask"]
+    assert mask.kind == "plugs"
+    assert 1e6 * mask.covered == pytest.approx(12 * 64 * 4 * np.sin(np.pi / 64) + polygon(4), 1e-3)
+    sides = {"direction": (0, 0, 1), "angle_deg": (80, 100)}
+    with pytest.raises(InputError, match=r"mask.plugs: the faces of mask.at near .* no walls of a"):
+        build_chamber(design(parts, "drilled", mask={"at": sides, "plugs": True}))
+    with pytest.raises(InputError, match="given beside plugs"):
+        design(parts, "drilled", mask={"at": wall, "plugs": True, "thickness_mm": 1.0})
 
 
 def test_a_shell_that_crosses_itself_is_refused(parts: Path) -> None:

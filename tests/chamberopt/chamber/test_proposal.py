@@ -1,6 +1,7 @@
 """What `chamberopt new` proposes: a charge and ranges that a study takes, the target, the text."""
 
 import tomllib
+from collections.abc import Sequence
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -12,8 +13,14 @@ from shapely import Polygon
 from chamberopt.chamber.part import chosen_triangles
 from chamberopt.chamber.propose.left_out import find_left_out
 from chamberopt.chamber.propose.pose import pose_in_words
-from chamberopt.chamber.propose.proposal import _shot, propose_charge, propose_ranges
-from chamberopt.chamber.propose.proposed_target import Sizes, propose_target, surfaces
+from chamberopt.chamber.propose.proposal import (
+    Wanted,
+    _shot,
+    propose,
+    propose_charge,
+    propose_ranges,
+)
+from chamberopt.chamber.propose.proposed_target import Sizes, Surface, propose_target, surfaces
 from chamberopt.chamber.propose.shop import StockBalls, usual_shop
 from chamberopt.chamber.propose.text import design_text
 from chamberopt.design.part import Target
@@ -178,6 +185,30 @@ def test_what_faces_away_is_offered_for_leaving_out(tmp_path: Path) -> None:
     left = chosen_triangles(mesh, Target.model_validate(table))
     assert (left == target.triangles & ~heels).all()
     assert table["reachable"]
+
+
+def _lowest(known: Sequence[Surface]) -> list[str]:
+    """Name the face whose place is the lowest in the part's file."""
+    return [min(known, key=lambda one: one.keys["faces"][0]["at_mm"][2]).name]
+
+
+def test_a_small_target_of_a_large_part_gets_a_chamber_of_its_own(tmp_path: Path) -> None:
+    """The part goes out through its walls, and its target is in the middle of one sonotrode."""
+    plate = trimesh.creation.box((0.2, 0.06, 0.01))
+    pad = trimesh.creation.box((0.02, 0.02, 0.006))
+    pad.apply_translation((0.05, 0.0, -0.008))
+    whole = trimesh.boolean.union([plate, pad], engine="manifold")
+    whole.export(tmp_path / "plate.stl")
+    made = propose(tmp_path / "plate.stl", Wanted(unit="m"), _lowest)
+    part, chamber = made.design.part, made.chamber
+    assert made.design.sonotrode.blocks is None
+    assert part.offset_mm == (-50.0, 0.0)
+    assert np.ptp(chamber.vertices[:, :2], axis=0).max() < 0.08
+    target = chamber.part.vertices[chamber.part.triangles[chamber.part.target]]
+    assert np.abs(target[..., :2].mean(axis=(0, 1))).max() < 1e-6
+    assert chamber.pieces_in_air == 0
+    assert "holder" not in made.tables
+    assert not [text for text in made.warnings if "side wall" in text]
 
 
 def test_faces_do_not_take_a_name_of_the_file() -> None:

@@ -185,12 +185,24 @@ def test_the_catalogue_is_printed(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["materials"]) == 0
     printed = capsys.readouterr().out
     assert all(one.name in printed for one in alloys())
+    by_heart = sum(one.kind == "by heart" for one in alloys())
+    counts = printed.partition(f"\n{len(alloys())} rows: ")[2].partition("Ti-6Al-4V")[0]
+    assert f"{by_heart} by heart, not verified" in " ".join(counts.split())
+    # an address can be copied in one piece
+    addresses = [word for one in alloys() for word in one.source.split() if "/" in word]
+    assert len(addresses) > 20
+    assert all(address in printed for address in addresses)
     assert main(["shot", "WC", "--json"]) == 0
     (row,) = json.loads(capsys.readouterr().out)["balls"]
     assert row["name"] == "tungsten_carbide"
     assert row["v0_m_s"] == 1.1
     assert main(["shot"]) == 0
-    assert "0.4, 0.5, 0.6" in capsys.readouterr().out
+    printed = capsys.readouterr().out
+    assert "0.4, 0.5, 0.6" in printed
+    assert "G40 G100 G200  data sheet" in printed
+    assert f"\n{len(balls())} rows: " in printed
+    assert main(["shot", "glass"]) == 0
+    assert "rows: " not in capsys.readouterr().out
     assert main(["materials", "Ti65"]) == 2
     assert "did you mean 'Ti64'?" in capsys.readouterr().err
 

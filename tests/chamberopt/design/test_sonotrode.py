@@ -1,4 +1,4 @@
-"""Amplitude over a sonotrode's face in a design: numbers, words, scene and refusals."""
+"""Amplitude over a sonotrode's face, and blocks of which the floor is made."""
 
 import numpy as np
 import pytest
@@ -117,3 +117,16 @@ def test_a_further_sonotrode_bends_about_its_own_middle(rigid) -> None:
     profile = {**profile, "middle_mm": [1.0, 0.0]}
     with pytest.raises(InputError, match=r"amplitude_profile.middle_mm: given for a further"):
         rigid.changed({"sonotrodes": [{**face, "amplitude_profile": profile}]})
+
+
+def test_a_floor_of_blocks_is_simulated_as_one_face(rigid, mesh) -> None:
+    width = rigid.value("chamber.diameter_mm")
+    blocks = {"size_mm": [0.5 * width, width], "columns": 2}
+    made = rigid.changed({"sonotrode.blocks": blocks})
+    assert made.sonotrode.blocks.joints_mm == ([0.0], [])
+    assert made.sonotrode.blocks.in_words.startswith("2 blocks of")
+    np.testing.assert_array_equal(build_chamber(made).vertices, build_chamber(rigid).vertices)
+    with pytest.raises(InputError, match=r"sonotrode.blocks: 2 blocks .* but the floor needs"):
+        build_chamber(rigid.changed({"sonotrode.blocks": {**blocks, "size_mm": [10.0, width]}}))
+    with pytest.raises(InputError, match="each of which has its own: not supported"):
+        bent(made)

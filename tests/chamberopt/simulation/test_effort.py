@@ -31,6 +31,16 @@ def test_how_many_replicas_come_next() -> None:
     assert next_count(10, 0.011, shared=0.008) == 16  # part of it stays
 
 
+def test_the_wanted_accuracy_of_a_time_is_a_share_of_it() -> None:
+    """The next replicas are the same whether a time is in seconds or a part of a second."""
+    for unit in (1.0, 1800.0):
+        time = Estimate(-unit, 0.013 * unit)
+        assert ASKED.after(10, time, 1.0, Step(10), unit).replicas == 17
+        end = ASKED.after(20, replace(time, half_width=0.0099 * unit), 1.0, Step(20), unit)
+        assert end.stopped_by == "accuracy"
+    assert "± 18 was reached" in end.note
+
+
 def test_replicas_for_dents_are_as_many_as_their_number_asks_for() -> None:
     """Without an interval the dents foretell the number, however far it is."""
     unknown = figure(math.inf)

@@ -16,8 +16,10 @@ from chamberopt.chamber.propose.proposed_target import Sizes
 from chamberopt.chamber.propose.shop import Shop, example_text, load_shop, usual_shop
 from chamberopt.cli import main
 from chamberopt.common.errors import InputError
+from chamberopt.design.sonotrode import Blocks
 
 DISC = {"name": "D", "diameter_mm": 60.0, "frequency_khz": 20.0, "amplitudes_um": [20.0, 30.0]}
+SQUARE = {**DISC, "name": "S", "diameter_mm": None, "size_mm": [60.0, 50.0], "pieces": 4}
 BLOCK = {"name": "B", "size_mm": [120.0, 50.0], "frequency_khz": 20.0, "amplitudes_pv_um": [50.0]}
 
 
@@ -79,10 +81,36 @@ def test_walls_lean_out_of_a_face_that_is_small(plan: dict[str, float | str], sh
     assert all(one + out >= float(plan[key]) - 0.1 for one, key in zip(own, plan, strict=True))
 
 
+@pytest.mark.parametrize(
+    ("plan", "shape", "grid"),
+    [
+        ({"length_mm": 118.0, "width_mm": 55.0}, "box", ((50.0, 60.0), 3, 1)),
+        ({"length_mm": 55.0, "width_mm": 118.0}, "box", ((60.0, 50.0), 1, 3)),  # its long side: y
+        ({"length_mm": 190.0, "width_mm": 52.0}, "box", ((50.0, 60.0), 4, 1)),
+        ({"diameter_mm": 98.0}, "cylinder", ((60.0, 50.0), 2, 2)),
+    ],
+)
+def test_blocks_side_by_side_carry_what_no_sonotrode_does(
+    plan: dict[str, float | str], shape: str, grid: tuple[tuple[float, float], int, int]
+) -> None:
+    found = floor(plan, shape, shop(DISC, SQUARE), gap=0.001)
+    assert found.lean == 0.0
+    size, columns, rows = grid
+    assert found.blocks == Blocks(size_mm=size, columns=columns, rows=rows)
+
+
+def test_a_floor_is_made_narrower_where_that_saves_blocks() -> None:
+    plan: dict[str, float | str] = {"length_mm": 170.0, "width_mm": 66.0}
+    found = floor(plan, "box", shop(DISC, SQUARE), gap=0.01)
+    assert found.sizes.plan == {"length_mm": 200.0, "width_mm": 60.0}
+    assert found.blocks == Blocks(size_mm=(50.0, 60.0), columns=4, rows=1)
+    assert found.sizes.gap == pytest.approx(0.01 - 3e-3 + 0.0)
+
+
 def test_what_no_sonotrode_holds_is_refused_with_a_way_out() -> None:
     with pytest.raises(InputError, match=r"floor of 190 x 96 mm is larger than the largest.*strip"):
         floor({"length_mm": 190.0, "width_mm": 96.0}, "box", shop(DISC, BLOCK))
-    sizes = Sizes("box", {"length_mm": 190.0, "width_mm": 96.0}, 0.015, 0.05, 0.01, False, 0.03)
+    sizes = Sizes("box", {"length_mm": 290.0, "width_mm": 196.0}, 0.015, 0.05, 0.01, False, 0.03)
     unknown = floor_on_sonotrode(sizes, 0.02, usual_shop(), may_exceed=True)
     assert math.isinf(unknown.lean)
     assert "LARGER THAN USUAL SONOTRODES" in unknown.reason
@@ -120,6 +148,11 @@ def test_amplitudes_are_those_that_a_sonotrode_can_set() -> None:
         (
             '[[sonotrodes]]\nname = "A"\ndiameter_mm = 60\nfrequency_khz = 20',
             "give amplitudes_um (zero-to-peak) or amplitudes_pv_um",
+        ),
+        (
+            '[[sonotrodes]]\nname = "A"\ndiameter_mm = 60\npieces = 2\nfrequency_khz = 20\n'
+            "amplitudes_um = [9]",
+            "pieces: given for a disc; only blocks",
         ),
         (
             '[[sonotrodes]]\nname = "A"\ndiameter_mm = 60\nfrequency_khz = 20\n'
