@@ -1,9 +1,11 @@
 """The pictures of docs/page.md: the program's page as a browser shows it.
 
     python benchmarks/page_pictures.py designs/parts/fir_tree.step FIR_TREE
+    python benchmarks/page_pictures.py results/quickstart
 
 A part is dropped on the front page, which proposes a design for one of its surfaces and opens it.
-Writes docs/images/page_front.png, page.png and page_target.png. Needs `pip install playwright` and
+Writes docs/images/page_front.png, page.png and page_target.png. With the results folder of
+studies/quickstart.toml: the study's candidates, page_study.png. Needs `pip install playwright` and
 a Chromium on PATH, as report_picture.py.
 """
 
@@ -11,8 +13,11 @@ import shutil
 import signal
 import subprocess
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 from playwright.sync_api import sync_playwright
 
@@ -25,19 +30,53 @@ READY, KNOWN, ENDED = "body[data-ready]", "body[data-known=all]", "body[data-end
 CHECKED = "body[data-checked=reach]"
 
 
-def page_pictures(part: Path, target: str, folder: Path) -> None:
-    """The proposal on the front page, and the page of the design: its numbers, and its target."""
-    with TemporaryDirectory() as place, sync_playwright() as session:
+@contextmanager
+def opened(folder: Path, *file: str, height: int = 820) -> Iterator[Any]:
+    """The page of a folder, or of a file in it, in a browser."""
+    with sync_playwright() as session:
         server = subprocess.Popen(
-            [sys.executable, "-m", "chamberopt", "edit"],
-            cwd=place, stdout=subprocess.PIPE, text=True,
+            [sys.executable, "-m", "chamberopt", "edit", *file],
+            cwd=folder, stdout=subprocess.PIPE, text=True,
         )  # fmt: skip
         assert server.stdout is not None
         address = server.stdout.readline().split(" is at ")[1].strip()
         browser = session.chromium.launch(executable_path=shutil.which("chromium"), args=SOFTWARE)
-        page = browser.new_page(viewport={"width": 1400, "height": 820})
+        page = browser.new_page(viewport={"width": 1400, "height": height})
         page.goto(address)
         page.wait_for_selector(READY, timeout=120_000)
+        yield page
+        browser.close()
+        server.send_signal(signal.SIGINT)
+        server.wait()
+
+
+def study_picture(study: Path, folder: Path) -> None:
+    """The candidates of the quickstart, with the chamber of the best of its search."""
+    with TemporaryDirectory() as place:
+        here = Path(place) / "gear"
+        shutil.copytree("designs", here, ignore=shutil.ignore_patterns("results"))
+        shutil.copytree("designs/parts", here / "designs" / "parts")  # where the study has its part
+        shutil.copytree(study, here / "results" / study.name)
+        with opened(here, "gear.toml", height=1250) as page:
+            page.wait_for_selector(CHECKED, timeout=120_000)
+            page.click("nav [data-tab=results]")
+            page.click("text=see its candidates")
+            page.wait_for_selector("body[data-followed]", timeout=120_000)
+            marks = page.locator("#study-of figure").first.locator(".candidate circle.target")
+            lowest = marks.evaluate_all(
+                "all => all.map(one => Number(one.getAttribute('cy'))).reduce("
+                "(best, y, k, all) => y < all[best] ? k : best, 0)"
+            )  # on the screen; the best objective
+            marks.nth(lowest).click()
+            page.wait_for_selector("body[data-candidate]")
+            page.wait_for_selector(CHECKED, timeout=120_000)
+            page.wait_for_timeout(1000)
+            page.screenshot(path=folder / "page_study.png")
+
+
+def page_pictures(part: Path, target: str, folder: Path) -> None:
+    """The proposal on the front page, and the page of the design: its numbers, and its target."""
+    with TemporaryDirectory() as place, opened(Path(place)) as page:
         page.set_input_files("#file", part)
         page.wait_for_selector(KNOWN, timeout=120_000)
         page.check(f"#names input[value={target}]")
@@ -53,11 +92,11 @@ def page_pictures(part: Path, target: str, folder: Path) -> None:
         page.click("nav [data-tab=target]")
         page.wait_for_timeout(500)
         page.screenshot(path=folder / "page_target.png")
-        browser.close()
-        server.send_signal(signal.SIGINT)
-        server.wait()
 
 
 if __name__ == "__main__":
-    page_pictures(Path(sys.argv[1]), sys.argv[2], IMAGES)
+    if Path(sys.argv[1]).is_dir():
+        study_picture(Path(sys.argv[1]), IMAGES)
+    else:
+        page_pictures(Path(sys.argv[1]), sys.argv[2], IMAGES)
     print(f"pictures in {IMAGES}")

@@ -180,13 +180,14 @@ class StudyInputs:
     def differences(self, design: Design) -> list[str]:
         """Return the names of values in which a design differs from that of this study.
 
-        What varies, and how accurately is simulated, is left out.
+        What varies, and how accurately is simulated, is left out. So are values that the program
+        did not know when the study began.
         """
-        now = _with_digests(design.model_dump(mode="json"))
+        before, now = self.study["design"], _with_digests(design.model_dump(mode="json"))
         left_out = ("ranges", "process.accuracy", *self.vary)
         return [
             name
-            for name in _changed_names(self.study["design"], now)
+            for name in sorted(_flatten(before).keys() & set(_changed_names(before, now)))
             if not name.startswith(left_out) and not any(v.startswith(f"{name}.") for v in left_out)
         ]
 

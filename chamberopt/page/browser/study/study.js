@@ -41,7 +41,7 @@ async function look() {
       data = prepared(now);
       find("tried").textContent = find("study-sentence").textContent = data.sentence;
       draw();
-      model = await ask("/model", { folder: mine });
+      model = await ask("/model", { folder: mine }).catch(({ message }) => ({ reason: message })); // its design may be elsewhere
       if (mine !== folder) return;
       draw();
       document.body.dataset.followed = String(data.candidates.length);
