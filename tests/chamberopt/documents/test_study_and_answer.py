@@ -8,7 +8,7 @@ import pytest
 
 from chamberopt.common.estimate import Estimate
 from chamberopt.documents.answer import answer, answer_lines
-from chamberopt.documents.study import influence_sentences, influences
+from chamberopt.documents.study import influence_sentences, influences, tried_sentence
 from chamberopt.documents.wording import Label, objective_label
 from chamberopt.results.records import (
     BestRecord,
@@ -21,6 +21,7 @@ from chamberopt.results.records import (
     ZoneLimit,
     ZoneRecord,
 )
+from chamberopt.search.trial_log import Trial
 
 
 def a_study(model: ModelRecord | None = None, **other: object) -> StudyRecord:
@@ -50,6 +51,20 @@ def a_model(mean: list[float], half_width: list[float]) -> ModelRecord:
     )
     expected = Estimate(mean[0], half_width[0])
     return ModelRecord(noise=0.01, expected=expected, together=1.0, parameters={"x": curve})
+
+
+def test_a_sentence_says_what_became_of_each_candidate() -> None:
+    def trial(stage: str = "search", **other: object) -> Trial:
+        values = {"stage": stage, "goals": (), "refused": False, "highest": None, **other}
+        return SimpleNamespace(**values)  # type: ignore[return-value]
+
+    simulated = {"goals": (Estimate(0.5, 0.1),)}
+    trials = [trial(**simulated), trial(refused=True), trial(highest=0.4, refused=True), trial()]
+    assert tried_sentence([*trials, trial("confirm", **simulated)]) == (
+        "4 proposed, 2 refused by geometry before any simulation, 1 simulated, "
+        "1 that could not be simulated, 1 confirmed with new seeds."
+    )
+    assert tried_sentence([]) == "No candidate has been evaluated yet."
 
 
 def test_the_cost_of_moving_a_parameter_has_an_interval() -> None:
