@@ -84,13 +84,7 @@ async function click(event) {
   find("down").setAttribute("aria-pressed", "false");
 }
 
-let from = null; // a click is not a turn of the view
-view.renderer.domElement.addEventListener("pointerdown", (event) => { from = [event.clientX, event.clientY]; });
-view.renderer.domElement.addEventListener("pointerup", (event) => {
-  if (event.button === 0 && from && Math.hypot(event.clientX - from[0], event.clientY - from[1]) < 4) {
-    clicks = clicks.then(() => attempt(() => click(event)));
-  }
-});
+view.hearClicks((event) => { clicks = clicks.then(() => attempt(() => click(event))); });
 find("down").addEventListener("click", () => find("down").setAttribute("aria-pressed", find("down").getAttribute("aria-pressed") !== "true"));
 find("add-zone").addEventListener("click", () => attempt(async () => {
   if (!find("zone").value.trim()) throw new Error("give the new zone a name first");
