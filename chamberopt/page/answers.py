@@ -19,11 +19,12 @@ from chamberopt.chamber.checks.check import (
     with_clearance,
 )
 from chamberopt.chamber.part import preview_part
+from chamberopt.chamber.propose.proposed_target import named_surfaces
 from chamberopt.chamber.reach import reached_part_share
 from chamberopt.chamber.scene import chamber_mesh
 from chamberopt.design.design import Design
 from chamberopt.design.shape_surface import TAG_PART, TAG_WALL, is_sonotrode
-from chamberopt.geometry.triangles import areas, border_edges, sharp_edges
+from chamberopt.geometry.triangles import border_edges, sharp_edges
 from chamberopt.pictures.charts.colours import EDGES, KINDS
 
 # Where a triangle of the part is: numbers of these kinds.
@@ -36,15 +37,7 @@ ARRAY_TYPES = {"f": "<f4", "i": "<u4", "u": "<u4", "b": "u1"}
 def part_answer(design: Design) -> bytes:
     """Return the part as its file has it [mm], its named surfaces with areas, and the colours."""
     mesh = preview_part(design).mesh
-    size = areas(mesh.vertices, mesh.triangles)
-    names = [
-        {
-            "name": name,
-            "triangles": int(own.sum()),
-            "area_mm2": round(1e6 * float(size[own].sum()), 2),
-        }
-        for name, own in mesh.groups.items()
-    ]
+    names = [[one.name, one.text] for one in named_surfaces(mesh)]
     box = [round(1e3 * float(side), 4) for side in mesh.size]
     head = {"names": names, "box_mm": box, "unit": mesh.unit, "notes": list(mesh.notes)}
     head |= {"kinds": KINDS, "states": STATES, "edges": EDGES}

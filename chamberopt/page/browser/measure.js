@@ -4,6 +4,7 @@ class Measure {
   static NEAR = 9; // pixels from a corner or edge at which a click is moved onto it
   static SHARP = Math.cos(20 * Math.PI / 180); // between triangles at an edge
   static PARALLEL = Math.cos(0.5 * Math.PI / 180);
+  static ASIDE = [[0, 0], [6, 0], [-6, 0], [0, 6], [0, -6]]; // where edges are looked for too: a click may just miss a body
   #first = null;
 
   // tell: called with what was measured, or what to do.
@@ -61,39 +62,49 @@ class Measure {
   }
 
   // The place that a click means, on a corner or edge if one is near: { place, normal: null at an edge }; null for none.
-  // Walls and sonotrode are seen through from behind.
   static place(view, event) {
+    const seen = Measure.ASIDE.map(([x, y]) => Measure.#met(view, { clientX: event.clientX + x, clientY: event.clientY + y }));
+    const edges = seen.flatMap((hit) => hit ? Measure.#edges(view, hit) : []).map(({ place, isEnd }) => {
+      const [x, y] = view.onScreen(place), away = Math.hypot(x - event.clientX, y - event.clientY);
+      return { place, away, order: isEnd ? away - Measure.NEAR : away }; // a corner near it is meant
+    }).filter(({ place, away }) => away < Measure.NEAR && !view.section.hides(place)).sort((a, b) => a.order - b.order);
+    return edges.length ? { place: edges[0].place, normal: null } : seen[0];
+  }
+
+  // What a click meets: a body that is cut, or a surface. Walls and sonotrode are seen through from behind.
+  static #met(view, event) {
     const { section } = view, ray = view.ray(event), cut = section.on ? ray.intersectPlane(section.plane, new THREE.Vector3()) : null;
-    const isCut = cut && ray.direction.dot(section.plane.normal) > 0 && section.bodyAt(cut);
-    const hit = isCut ? { place: cut, normal: section.plane.normal.clone() } : view.hits(event, Object.keys(Section.SURFACES).filter((name) => view.get(name)?.visible))
-      .find(({ name, normal }) => Section.SURFACES[name][2] !== "shell" || normal.dot(ray.direction) > 0);
-    if (!hit) return null;
-    const far = view.camera.position.distanceTo(hit.place);
-    const near = Measure.NEAR * 2 * Math.tan(view.camera.fov * Math.PI / 360) * far / view.element.clientHeight;
-    let best = null;
-    const look = (ends, matrix) => {
-      const found = Measure.nearest(ends, matrix, hit.place, near);
-      if (found && (!best || found.away < best.away)) best = found;
-    };
-    if (hit.name) { const mesh = view.get(hit.name); look(Measure.sharp(mesh), mesh.matrixWorld); }
-    for (const ends of section.outlines) look(ends, new THREE.Matrix4());
-    return best && !section.hides(best.place) ? { place: best.place, normal: null } : { place: hit.place, normal: hit.normal };
+    if (cut && ray.direction.dot(section.plane.normal) > 0 && section.bodyAt(cut)) return { place: cut, normal: section.plane.normal.clone() };
+    return view.hits(event, Object.keys(Section.SURFACES).filter((name) => view.get(name)?.visible))
+      .find(({ name, normal }) => Section.SURFACES[name][2] !== "shell" || normal.dot(ray.direction) > 0) ?? null;
+  }
+
+  // Places on edges and on the outlines of a section, near what a click meets.
+  static #edges(view, { name, place }) {
+    const far = view.camera.position.distanceTo(place);
+    const near = 4 * Measure.NEAR * Math.tan(view.camera.fov * Math.PI / 360) * far / view.element.clientHeight;
+    const found = view.section.outlines.map((ends) => Measure.nearest(ends, place, near));
+    if (name) {
+      const { matrixWorld } = view.get(name), own = place.clone().applyMatrix4(matrixWorld.clone().invert());
+      const edge = Measure.nearest(Measure.sharp(view.get(name)), own, near);
+      if (edge) found.push({ ...edge, place: edge.place.applyMatrix4(matrixWorld) });
+    }
+    return found.filter(Boolean);
   }
 
   // The place on lines that is nearest to a place, at most `near` away; the end of a line goes first.
-  static nearest(ends, matrix, place, near) {
-    const a = new THREE.Vector3(), b = new THREE.Vector3(), own = place.clone().applyMatrix4(matrix.clone().invert());
+  static nearest(ends, place, near) {
+    const a = new THREE.Vector3(), b = new THREE.Vector3();
     let best = null;
     for (let i = 0; i < ends.length; i += 6) {
       a.fromArray(ends, i);
       b.fromArray(ends, i + 3);
-      const way = b.clone().sub(a), share = Math.min(Math.max(own.clone().sub(a).dot(way) / (way.lengthSq() || 1), 0), 1);
+      const way = b.clone().sub(a), share = Math.min(Math.max(place.clone().sub(a).dot(way) / (way.lengthSq() || 1), 0), 1);
       for (const one of [a, b, way.multiplyScalar(share).add(a)]) {
-        const isEnd = one !== way, away = one.distanceTo(own) - (isEnd ? 0 : -near); // an end near it is meant
-        if (away < (isEnd ? near : 2 * near) && (!best || away < best.away)) best = { place: one.clone(), away };
+        const isEnd = one !== way, away = one.distanceTo(place) + (isEnd ? 0 : near / 2);
+        if (away < (isEnd ? near / 2 : 1.5 * near) && (!best || away < best.away)) best = { place: one.clone(), away, isEnd };
       }
     }
-    best?.place.applyMatrix4(matrix);
     return best;
   }
 

@@ -8,10 +8,10 @@ let newZone = false;
 
 export function fillTarget() {
   fillSurfaces();
-  find("names").replaceChildren(...fillTarget.part.names.map((one) => {
-    const button = element("button", { textContent: one.name, title: "make it the target" });
-    button.addEventListener("click", () => choose(one.name));
-    return element("li", {}, button, ` ${one.area_mm2} mm², ${one.triangles} triangles`);
+  find("names").replaceChildren(...fillTarget.part.names.map(([name, text]) => {
+    const button = element("button", { textContent: name, title: "make it the target" });
+    button.addEventListener("click", () => choose(name));
+    return element("li", {}, button, ` ${text}`);
   }));
   if (!fillTarget.part.names.length) find("names").append(element("li", { textContent: "none" }));
   showChosen();

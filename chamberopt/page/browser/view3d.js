@@ -193,6 +193,12 @@ class View3D {
 
   ray(event) { return this.#caster(event).ray; }
 
+  // Where a place is in the window: [clientX, clientY].
+  onScreen(place) {
+    const box = this.renderer.domElement.getBoundingClientRect(), at = place.clone().project(this.camera);
+    return [box.left + (at.x + 1) / 2 * box.width, box.top + (1 - at.y) / 2 * box.height];
+  }
+
   // What a pointer event meets of the surfaces of these names that a section leaves, the nearest first:
   // { name, triangle, corner: its closest point, place, normal }.
   hits(event, names) {
