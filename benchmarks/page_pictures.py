@@ -3,8 +3,8 @@
     python benchmarks/page_pictures.py designs/parts/fir_tree.step FIR_TREE
 
 A part is dropped on the front page, which proposes a design for one of its surfaces and opens it.
-Writes docs/images/page_front.png, page.png and page_target.png. Needs `pip install playwright` and
-a Chromium on PATH, as report_picture.py.
+Writes docs/images/page_front.png, page.png, page_target.png and page_section.png.
+Needs `pip install playwright` and a Chromium on PATH, as report_picture.py.
 """
 
 import shutil
@@ -26,7 +26,7 @@ CHECKED = "body[data-checked=reach]"
 
 
 def page_pictures(part: Path, target: str, folder: Path) -> None:
-    """The proposal on the front page, and the page of the design: its numbers, and its target."""
+    """The proposal on the front page, and the page of the design: numbers, target, a section."""
     with TemporaryDirectory() as place, sync_playwright() as session:
         server = subprocess.Popen(
             [sys.executable, "-m", "chamberopt", "edit"],
@@ -53,6 +53,11 @@ def page_pictures(part: Path, target: str, folder: Path) -> None:
         page.click("nav [data-tab=target]")
         page.wait_for_timeout(500)
         page.screenshot(path=folder / "page_target.png")
+        page.click("nav [data-tab=numbers]")
+        page.click(".tools >> text=Section")
+        page.select_option(".tools select", "y")
+        page.wait_for_timeout(500)
+        page.screenshot(path=folder / "page_section.png")
         browser.close()
         server.send_signal(signal.SIGINT)
         server.wait()

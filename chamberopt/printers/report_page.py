@@ -195,8 +195,7 @@ def viewer(scenes: Sequence[PartScene]) -> str:
         f'value="{now:g}"><output id="at" for="time"></output></span></div>'
         f'<div class="panels">{panels}</div><ul id="kinds" class="legend"></ul>'
         '<div id="label" role="status" hidden></div>'
-        '<div id="places" hidden><h3>Places kept</h3><div class="wide"><table></table></div>'
-        "<button>Copy the list</button> <button>Empty it</button></div>"
+        '<div id="places" hidden></div>'
         f"{html.paragraph(HELP, 'soft')}{remarks}"
         "<noscript><p>A script draws the part in 3D; this browser does not run it.</p></noscript>"
     )

@@ -152,30 +152,32 @@ function showParts({ quantities, scenes, scales, kinds }) {
     label.style.top = `${Math.max(top, 4)}px`;
   }
 
-  // Places that were clicked, a row each.
-  const kept = [], places = find("places");
+  // Places that were clicked, a row each, and buttons to copy and to empty their list.
+  const kept = [], places = find("places"), parts = ["h3", "div", "button", "button"].map((tag) => document.createElement(tag));
+  const [title, wide, copy, empty] = parts;
+  [title, copy, empty].forEach((one, i) => { one.textContent = ["Places kept", "Copy the list", "Empty it"][i]; });
+  wide.className = "wide";
+  places.replaceChildren(title, wide, copy, " ", empty);
   function showKept() {
     const names = [...new Set(kept.flatMap((one) => one.map(([name]) => name)))];
-    const table = document.createElement("table"), head = table.createTHead().insertRow();
+    const table = document.createElement("table"), head = table.createTHead().insertRow(), body = table.createTBody();
     for (const name of names) head.append(Object.assign(document.createElement("th"), { textContent: name }));
-    const body = table.createTBody();
     for (const one of kept) {
       const row = body.insertRow(), values = new Map(one);
       for (const name of names) row.insertCell().textContent = values.get(name) ?? "";
     }
-    places.querySelector("table").replaceWith(table);
+    wide.replaceChildren(table);
     places.hidden = !kept.length;
   }
   function keep(event, i) {
-    const { rows, title } = known(event, i) ?? {};
+    const { rows, title: triangle } = known(event, i) ?? {};
     if (!rows) return;
-    kept.push([...(scenes.length > 1 ? [["result", scenes[i].title]] : []), ["triangle", title], ...rows]);
+    kept.push([...(scenes.length > 1 ? [["result", scenes[i].title]] : []), ["triangle", triangle], ...rows]);
     showKept();
   }
-  const [copy, empty] = places.querySelectorAll("button");
   empty.addEventListener("click", () => { kept.length = 0; showKept(); });
   copy.addEventListener("click", () => { // as a sheet of numbers takes it; a page of a file may have no clipboard
-    const text = [...places.querySelectorAll("tr")].map((row) => [...row.cells].map((cell) => cell.textContent).join("\t")).join("\n");
+    const text = [...wide.querySelectorAll("tr")].map((row) => [...row.cells].map((cell) => cell.textContent).join("\t")).join("\n");
     const area = Object.assign(document.createElement("textarea"), { value: text });
     places.append(area);
     area.select();
