@@ -21,7 +21,7 @@ class Tools {
     this.flip = make("button", { textContent: "Flip", title: "show the other side" });
     this.told = make("output", {});
     this.controls = make("span", { hidden: true, className: "cut" }, this.by, this.slider, make("label", {}, this.at, " mm"), this.flip);
-    this.element = make("div", { className: "tools" }, this.section, this.controls, this.measure, this.told);
+    this.element = make("div", { className: "tools" }, this.section, this.measure, this.controls, this.told);
     this.ruler = new Measure(views, (text) => { this.told.textContent = text; });
     for (const button of [this.section, this.measure]) button.setAttribute("aria-pressed", "false");
     this.section.addEventListener("click", () => this.#turn(this.section.ariaPressed !== "true"));

@@ -28,8 +28,8 @@ export function onPage(text) {
   let at = 0;
   for (const { 0: found, index } of text.matchAll(KEY)) {
     if (FILE.test(found)) continue;
-    const words = OPTIONS[found.slice(2)] ?? found.split(".").reverse()
-      .map((step) => /^\d+$/.test(step) ? Number(step) + 1 : inWords(step).replace(/^[A-Z](?![A-Z0-9])/, (first) => first.toLowerCase())).join(" of ");
+    const words = OPTIONS[found.slice(2)] ?? found.replace(/^effects\./, "").split(".").reverse()
+      .map((step) => /^\d+$/.test(step) ? Number(step) + 1 : inWords(step).replace(/^[A-Z](?![A-Z0-9])/, (first) => first.toLowerCase())).join(" of the ");
     made.push(text.slice(at, index), Object.assign(document.createElement("abbr"), { textContent: words, title: found }));
     at = index + found.length;
   }

@@ -108,11 +108,11 @@ def test_a_slider_moves_and_is_undone_as_one(opened: Page) -> None:
 
 def test_what_is_refused_is_said_and_the_newest_counts(opened: Page) -> None:
     opened.put("chamber.height_mm", 4)
-    expect(opened.page.locator("#error")).to_contain_text("not below height of chamber = 4")
-    key = opened.page.locator("#error abbr", has_text="height of chamber").first
+    expect(opened.page.locator("#error")).to_contain_text("not below height of the chamber = 4")
+    key = opened.page.locator("#error abbr", has_text="height of the chamber").first
     assert key.get_attribute("title") == "chamber.height_mm"
     opened.page.click("#save")
-    expect(opened.page.locator("#message")).to_contain_text("sonotrode distance of chamber")
+    expect(opened.page.locator("#message")).to_contain_text("sonotrode distance of the chamber")
     assert "height_mm = 36" in (opened.served.folder / "design.toml").read_text()
     opened.page.click("#undo")
     expect(opened.page.locator("#error")).to_be_hidden()
