@@ -4,9 +4,9 @@
     python benchmarks/page_pictures.py results/quickstart
 
 A part is dropped on the front page, which proposes a design for one of its surfaces and opens it.
-Writes docs/images/page_front.png, page.png and page_target.png. With the results folder of
-studies/quickstart.toml: the study's candidates, page_study.png. Needs `pip install playwright` and
-a Chromium on PATH, as report_picture.py.
+Writes docs/images/page_front.png, page.png, page_target.png and page_section.png. With the results
+folder of studies/quickstart.toml: the study's candidates, page_study.png. Needs `pip install
+playwright` and a Chromium on PATH, as report_picture.py.
 """
 
 import shutil
@@ -92,6 +92,11 @@ def page_pictures(part: Path, target: str, folder: Path) -> None:
         page.click("nav [data-tab=target]")
         page.wait_for_timeout(500)
         page.screenshot(path=folder / "page_target.png")
+        page.click("nav [data-tab=numbers]")
+        page.click(".tools >> text=Section")
+        page.select_option(".tools select", "y")
+        page.wait_for_timeout(500)
+        page.screenshot(path=folder / "page_section.png")
 
 
 if __name__ == "__main__":

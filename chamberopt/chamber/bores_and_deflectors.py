@@ -152,6 +152,12 @@ def fitting_names(design: Design) -> list[str]:
     return names + [name for name, is_given in given.items() if is_given]
 
 
+def on_deflectors(design: Design, fitting: np.ndarray) -> np.ndarray:
+    """Return True for triangles on a deflector, by their indices into `fitting_names`, (k,)."""
+    first = len(design.chamber.holes)
+    return (fitting >= first) & (fitting < first + len(design.chamber.deflectors))
+
+
 @dataclass(frozen=True)
 class CavitySolid:
     """The cavity as a solid, and the solids from which it was made.

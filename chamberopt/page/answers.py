@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from chamberopt.chamber.build import build_chamber
+from chamberopt.chamber.bores_and_deflectors import on_deflectors
+from chamberopt.chamber.build import Chamber, build_chamber
 from chamberopt.chamber.checks.check import (
     describe,
     first_facts,
@@ -18,51 +19,29 @@ from chamberopt.chamber.checks.check import (
     with_clearance,
 )
 from chamberopt.chamber.part import preview_part
+from chamberopt.chamber.propose.proposed_target import named_surfaces
 from chamberopt.chamber.reach import reached_part_share
 from chamberopt.chamber.scene import chamber_mesh
 from chamberopt.design.design import Design
-from chamberopt.design.shape_surface import TAG_PART, is_sonotrode
-from chamberopt.geometry.triangles import areas, sharp_edges
-from chamberopt.pictures.charts.colours import (
-    BLUE,
-    EDGES,
-    GLASS,
-    OUTSIDE,
-    PART_GREY,
-    SKY,
-    SONOTRODE,
-    UNREACHED,
-)
+from chamberopt.design.shape_surface import TAG_PART, TAG_WALL, is_sonotrode
+from chamberopt.geometry.triangles import border_edges, sharp_edges
+from chamberopt.pictures.charts.colours import EDGES, KINDS
 
-# Kinds of the part's triangles; their names and colours, and those of the sonotrode.
+# Where a triangle of the part is: numbers of these kinds.
+STATES = "rest", "target", "outside", "unreached", "zone"
 REST, TARGET, BEYOND, MISSED, ZONE = range(5)
-LEGEND = (
-    ("rest of the part", PART_GREY),
-    ("target", BLUE),
-    ("target outside the chamber", OUTSIDE),
-    ("target that no ball touches", UNREACHED),
-    ("zone", SKY),
-    ("sonotrode", SONOTRODE),
-)
 # Types of arrays that Three.js takes; single precision is about 1e-5 mm.
-KINDS = {"f": "<f4", "i": "<u4", "u": "<u4", "b": "u1"}
+ARRAY_TYPES = {"f": "<f4", "i": "<u4", "u": "<u4", "b": "u1"}
 
 
 def part_answer(design: Design) -> bytes:
     """Return the part as its file has it [mm], its named surfaces with areas, and the colours."""
     mesh = preview_part(design).mesh
-    size = areas(mesh.vertices, mesh.triangles)
-    names = [
-        {
-            "name": name,
-            "triangles": int(own.sum()),
-            "area_mm2": round(1e6 * float(size[own].sum()), 2),
-        }
-        for name, own in mesh.groups.items()
-    ]
+    names = [[one.name, one.text] for one in named_surfaces(mesh)]
     box = [round(1e3 * float(side), 4) for side in mesh.size]
     head = {"names": names, "box_mm": box, "unit": mesh.unit, "notes": list(mesh.notes)}
-    head |= {"legend": LEGEND, "glass": GLASS, "edges": EDGES}
+    head |= {"kinds": KINDS, "states": STATES, "edges": EDGES}
+    head |= {"closed": not len(border_edges(mesh.triangles))}  # or a piece of a drawn set-up
     return packed(head, points=1e3 * mesh.vertices, triangles=mesh.triangles)
 
 
@@ -102,7 +81,7 @@ def check_answers(design: Design) -> Iterator[bytes]:
     remeshed = part.file is not None and part.file.original is not None
     own = {"part_points": 1e3 * part.vertices, "part_triangles": part.triangles} if remeshed else {}
     surface = _surface(chamber.vertices, chamber.triangles, chamber.tags)
-    yield packed(head, **surface, state=state, **own)
+    yield packed(head, **{**surface, **_bodies(design, chamber)}, state=state, **own)
 
     reach = shot_reach(design, chamber)
     facts = describe(design, chamber, reach)
@@ -133,6 +112,22 @@ def _surface(
     }
 
 
+def _bodies(design: Design, chamber: Chamber) -> dict[str, np.ndarray]:
+    """Return the walls of a chamber, its deflectors, and its closed holder and mask [mm].
+
+    They are apart, because a section fills each in a way and a colour of its own.
+    """
+    found, walls = {}, chamber.tags == TAG_WALL
+    if chamber.fitting is not None:
+        deflectors = walls & on_deflectors(design, chamber.fitting)
+        found["deflectors"] = chamber.triangles[deflectors]
+        walls &= ~deflectors
+    for name, fixture in chamber.fixtures.items():
+        walls &= ~chamber.on_fixture(name)
+        found |= {f"{name}_points": 1e3 * fixture.vertices, f"{name}_triangles": fixture.triangles}
+    return {"walls": chamber.triangles[walls], **found}
+
+
 def packed(head: Mapping[str, object], **arrays: np.ndarray) -> bytes:
     """Return an answer to the page as bytes, with texts and numbers (`head`) and arrays.
 
@@ -142,7 +137,7 @@ def packed(head: Mapping[str, object], **arrays: np.ndarray) -> bytes:
     blocks = []
     for values in arrays.values():
         flat = np.ascontiguousarray(values).ravel()
-        kind = "u1" if flat.dtype == np.uint8 else KINDS[flat.dtype.kind]
+        kind = "u1" if flat.dtype == np.uint8 else ARRAY_TYPES[flat.dtype.kind]
         blocks.append((kind, len(flat), flat.astype(kind).tobytes()))
     layout = {name: block[:2] for name, block in zip(arrays, blocks, strict=True)}
     text = json.dumps({**head, "arrays": layout}).encode()

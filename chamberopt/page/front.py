@@ -7,7 +7,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from chamberopt.chamber.propose.proposed_target import SHAPES
+from chamberopt.chamber.propose.proposed_target import SHAPES, named_surfaces
 from chamberopt.chamber.propose.shop import load_shop
 from chamberopt.common.errors import InputError
 from chamberopt.common.files import check_new_file, write_bytes
@@ -86,7 +86,7 @@ class Front:
         return {"part": name}
 
     def look(self, asked: Any) -> dict[str, object]:
-        """Return a part's size and the names of its surfaces; its possible sizes by unit.
+        """Return a part's size and its surfaces' names and areas; its possible sizes by unit.
 
         The sizes by unit are empty where the file states its unit, or `asked` gives it.
         """
@@ -97,8 +97,8 @@ class Front:
             mesh = read_part_cached(path, unit)
         except UnknownUnitError as error:
             return {"sizes": error.sizes, "size": "", "names": []}
-        names = sorted(mesh.groups, key=lambda name: -int(mesh.groups[name].sum()))
-        return {"sizes": {}, "size": format_box(mesh.size), "names": names[:MOST_NAMES]}
+        names = [[one.name, one.text] for one in named_surfaces(mesh)[:MOST_NAMES]]
+        return {"sizes": {}, "size": format_box(mesh.size), "names": names}
 
     def propose(self, asked: Any) -> dict[str, object]:
         """Start the command `new` for a part of the folder, and return into which folder."""

@@ -10,7 +10,7 @@ import numpy as np
 
 from chamberopt.pictures.actors import FAULT, NO_RENDER, add_edges
 from chamberopt.pictures.camera import cells_of, near_directions, near_views, pushed_back, seen_area
-from chamberopt.pictures.charts.colours import BLUE, FIXTURE_COLOURS, OUTSIDE, PART_GREY, SONOTRODE
+from chamberopt.pictures.charts.colours import BLUE, KINDS
 from chamberopt.pictures.panels import BORDER, SIZE, choose_views, near_panels, part_panels
 from chamberopt.pictures.picture_page import Panel, Row, write_page
 from chamberopt.pictures.subprocess_drawing import draw_in_subprocess, picture_path
@@ -30,17 +30,17 @@ if TYPE_CHECKING:
 
 PLAIN, MARKED, MISSED, BEYOND = range(4)
 COLOURS = {
-    PLAIN: (PART_GREY, "not in the target"),
-    MARKED: (BLUE, "target"),
-    MISSED: (FAULT, "target that hardly a ball can touch"),
-    BEYOND: (OUTSIDE, "target outside the chamber"),
-}
+    state: (KINDS[name].colour, KINDS[name].label)
+    for state, name in (
+        (PLAIN, "rest"), (MARKED, "target"), (MISSED, "unreached"), (BEYOND, "outside"),
+    )
+}  # fmt: skip
 # Restitution of a thin part over that of a rigid one, by bands, and their colours: greens, which
 # mean nothing else in the picture.
 BANDS = (0.5, 0.7, 0.9, 0.98)
 SOFTER = "times the restitution of a rigid part, where the target is thin"
 BAND_COLOURS = {
-    PLAIN: (PART_GREY, "not in the target"),
+    PLAIN: COLOURS[PLAIN],
     1: ("#00441b", f"below 0.5 {SOFTER}"),
     2: ("#238b45", "0.5 to 0.7"),
     3: ("#74c476", "0.7 to 0.9"),
@@ -98,8 +98,8 @@ def render_part(job: dict[str, Any]) -> None:
     part, shown = _coloured(job, kinds)
     legend = [COLOURS[k] for k in np.unique(np.concatenate([kind for _, kind in shown]))]
     if job["chamber"] is not None:
-        fixtures = [(FIXTURE_COLOURS[name], name) for name in fixture_marks(job["chamber"])]
-        legend = [(SONOTRODE, "sonotrode"), *fixtures, *legend]
+        others = [KINDS[name] for name in ("sonotrode", *fixture_marks(job["chamber"]))]
+        legend = [*((kind.colour, kind.label) for kind in others), *legend]
     legend = legend if not len(edges) else [(FAULT, "what the message tells of")]
     rows = [Row(job["title"], _panels(job, part, shown, COLOURS))]
     if softness is not None:

@@ -14,21 +14,15 @@ from typing import Any
 
 import numpy as np
 
+from chamberopt.chamber.bores_and_deflectors import on_deflectors
 from chamberopt.design.shape_surface import TAG_PART, TAG_WALL, is_sonotrode
-from chamberopt.pictures.charts.colours import (
-    EDGES,
-    FEW_DENTS,
-    FIXTURE_COLOURS,
-    GLASS,
-    PART_GREY,
-    SONOTRODE,
-    UNREACHED,
-)
+from chamberopt.geometry.triangles import border_edges
+from chamberopt.pictures.charts.colours import EDGES
 from chamberopt.pictures.drawn_part import DrawnPart, point_areas
 from chamberopt.pictures.quantities import QUANTITIES
 from chamberopt.results.arrays_file import load_result_arrays
 from chamberopt.results.load import Result
-from chamberopt.results.vtp_files import Surface, fixture_marks
+from chamberopt.results.vtp_files import MM, ZONE, Surface, fixture_marks
 
 # A triangle takes about 80 bytes of the page. Up to this number the page stays below 60 MB.
 MAX_TRIANGLES = 600_000
@@ -87,11 +81,17 @@ def part_scene(result: Result, title: str, max_triangles: int = MAX_TRIANGLES) -
         )
         rest = None
     chamber = arrays.cavity
+    fitting = arrays.chamber.fitting
+    on_deflector = np.zeros(chamber.n_cells, dtype=bool)
+    if fitting is not None:
+        on_deflector = on_deflectors(result.design, fitting)
     eye = _eye(np.asarray(whole.face_normals) * np.asarray(whole["area"])[:, None])
     # The part's triangle around each point, and the values of each triangle.
     triangles, row = np.unique(target["triangle"], return_inverse=True)
     of_point = np.zeros(target.n_points, dtype=int)
     of_point[np.asarray(target.regular_faces)] = row.reshape(-1, 1)
+    zones = [zone.name for zone in result.design.zones] if ZONE in arrays.elements else []
+    is_closed = not len(border_edges(arrays.chamber.part.triangles))  # or drawn as a piece
     data = {
         "title": title,
         "treatment": result.design.process.treatment_time,
@@ -115,7 +115,14 @@ def part_scene(result: Result, title: str, max_triangles: int = MAX_TRIANGLES) -
         "number": _packed(triangles, "<i4"),
         "element": _packed(arrays.elements["element"][triangles], "<i4"),
         "impacts": _packed(arrays.elements["impacts"][triangles], "<i4"),
-        "surfaces": _surfaces(part, rest, chamber, eye),
+        "zone": _packed(arrays.elements[ZONE][triangles] if zones else triangles[:0], "<i4"),
+        "zones": zones,
+        "surfaces": _surfaces(part, rest, chamber, on_deflector, eye)
+        | {
+            name: _shape(MM * one.vertices, one.triangles) | {"kind": name}
+            for name, one in arrays.chamber.fixtures.items()
+        },
+        "whole": is_closed and rest is not None,  # so that a section can fill the part
         "edges": {"ends": _packed(_edges(chamber, np.asarray(chamber["tag"]))), "colour": EDGES},
         "view": _view(chamber, eye),
     }
@@ -133,40 +140,51 @@ def quantities_in_all(scenes: Sequence[dict[str, Any]]) -> list[dict[str, str]]:
 
 
 def _surfaces(
-    part: DrawnPart, rest: Surface | None, chamber: Surface, eye: np.ndarray
+    part: DrawnPart,
+    rest: Surface | None,
+    chamber: Surface,
+    on_deflector: np.ndarray,
+    eye: np.ndarray,
 ) -> dict[str, dict[str, object]]:
-    """Return the surfaces that view3d.js draws, by name.
+    """Return the surfaces that view3d.js draws, by name, but for holder and mask.
 
     The names are part (the target with enough dents), few (the target with too few dents),
-    unreached (the target that no ball can touch), rest (the rest of the part), sonotrode, holder,
-    mask, and glass (the walls).
+    unreached (the target that no ball can touch), rest (the rest of the part), sonotrode,
+    deflectors, and walls. The colour of each is that of its kind, but for part.
+
+    Args:
+        on_deflector: which triangles of the cavity are of a deflector, (k,).
+        eye: direction to the camera.
     """
     tags = np.asarray(chamber["tag"])
-    fixtures = fixture_marks(chamber)
-    glass = (tags == TAG_WALL) & ~np.any([tags < 0, *fixtures.values()], axis=0)
+    walls = (tags == TAG_WALL) & ~np.any([tags < 0, *fixture_marks(chamber).values()], axis=0)
     target, resolved = part.target, np.asarray(part.target["resolved"])
     corners = target.regular_faces
     found: dict[str, dict[str, Any]] = {
         "part": {"points": _packed(target.points), "triangles": _packed(corners[resolved], "<i4")},
         # These surfaces share the points of the part, which the page carries once.
-        "few": {"triangles": _packed(corners[~resolved], "<i4"), "colour": FEW_DENTS},
+        "few": {"triangles": _packed(corners[~resolved], "<i4"), "kind": "few"},
     }
-    walls = {
-        "sonotrode": (is_sonotrode(tags), SONOTRODE, 0.55 if eye[2] > 0.0 else 0.08),
-        "glass": (glass, GLASS, 0.13),
-        **{name: (own, FIXTURE_COLOURS[name], 1.0) for name, own in fixtures.items()},
+    around: dict[str, tuple[np.ndarray, str, float]] = {
+        "sonotrode": (is_sonotrode(tags), "sonotrode", 0.55 if eye[2] > 0.0 else 0.08),
+        "deflectors": (walls & on_deflector, "wall", 0.13),
+        "walls": (walls & ~on_deflector, "wall", 0.13),
     }
-    others = [("unreached", part.unreached, UNREACHED, 1.0), ("rest", rest, PART_GREY, 1.0)]
+    others = [("unreached", part.unreached, "unreached", 1.0), ("rest", rest, "rest", 1.0)]
     others += [
         (name, chamber.extract_cells(here).extract_surface(algorithm="dataset_surface"), *look)
-        for name, (here, *look) in walls.items()
+        for name, (here, *look) in around.items()
+        if here.any()
     ]
-    for name, surface, colour, opacity in others:
+    for name, surface, kind, opacity in others:
         if surface is not None and surface.n_cells:
-            shape = _packed(surface.points), _packed(surface.regular_faces, "<i4")
-            look = {"colour": colour, "opacity": opacity}
-            found[name] = {"points": shape[0], "triangles": shape[1], **look}
+            shape = _shape(surface.points, surface.regular_faces)
+            found[name] = {**shape, "kind": kind, "opacity": opacity}
     return found
+
+
+def _shape(points: np.ndarray, triangles: np.ndarray) -> dict[str, object]:
+    return {"points": _packed(points), "triangles": _packed(triangles, "<i4")}
 
 
 def _eye(normal: np.ndarray) -> np.ndarray:

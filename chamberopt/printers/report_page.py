@@ -13,7 +13,7 @@ from chamberopt.common.errors import InputError
 from chamberopt.common.files import claim_file, read_file, require_place, write_text
 from chamberopt.documents.document import Document, Items, PartView, Section
 from chamberopt.documents.report import report
-from chamberopt.pictures.charts.colours import hex_colours
+from chamberopt.pictures.charts.colours import KINDS, hex_colours
 from chamberopt.pictures.part3d import PartScene, part_scene, quantities_in_all
 from chamberopt.printers import html
 from chamberopt.results.load import START, Result, load_result, summary
@@ -25,11 +25,11 @@ POLICY = (
     "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; "
     "img-src data: blob:; worker-src blob:; font-src data:; base-uri 'none'; form-action 'none'"
 )
-SCRIPTS = "three/three.min.js", "view3d.js", "part.js"
+VIEW = "view/view3d.js", "view/section.js", "view/measure.js", "view/tools.js"
+SCRIPTS = "three/three.min.js", *VIEW, "part.js"
 HELP = (
-    "Drag to turn, use the wheel to zoom, point at the target to see its numbers there. "
-    "Grey: not in the target. Brown: out of the reach of the shot. "
-    "Dark grey: too few dents were simulated to tell."
+    "Drag to turn, use the wheel to zoom, point at the target to see its numbers there; a click "
+    "keeps them in a list."
 )
 
 
@@ -194,7 +194,9 @@ def viewer(scenes: Sequence[PartScene]) -> str:
         '<span id="times"><label for="time">after</label>'
         f'<input type="range" id="time" min="0" max="{last:g}" step="{now / 60.0:.15g}" '
         f'value="{now:g}"><output id="at" for="time"></output></span></div>'
-        f'<div class="panels">{panels}</div><div id="label" role="status" hidden></div>'
+        f'<div class="panels">{panels}</div><ul id="kinds" class="legend"></ul>'
+        '<div id="label" role="status" hidden></div>'
+        '<div id="places" hidden></div>'
         f"{html.paragraph(HELP, 'soft')}{remarks}"
         "<noscript><p>A script draws the part in 3D; this browser does not run it.</p></noscript>"
     )
@@ -223,10 +225,10 @@ def write_page(path: Path, title: str, body: str, scenes: Sequence[PartScene]) -
 
 
 def _content(drawn: Sequence[dict[str, object]]) -> dict[str, object]:
-    """Return the data for the script part.js: parts in 3D, quantities to show, and colours."""
+    """Return the data for part.js: parts in 3D, quantities, colour scales and kinds of surface."""
     quantities = quantities_in_all(drawn)
     scales = {name: hex_colours(name) for name in {one["colours"] for one in quantities}}
-    return {"quantities": quantities, "scenes": drawn, "scales": scales}
+    return {"quantities": quantities, "scenes": drawn, "scales": scales, "kinds": KINDS}
 
 
 @cache

@@ -49,15 +49,33 @@ if TYPE_CHECKING:
 
 POINTS_PER_WINDOW = 4  # points on an area of one window, for the values of a triangle
 MAX_POINTS = 300_000
-MAX_PAIRS = 50_000_000  # pairs of a window and a dent, of 12 bytes each, in memory at once
+MAX_PAIRS = 10_000_000  # pairs of a window and a dent, of 12 bytes each, in memory at once
 WIDEST = 0.5  # widest interval of a coverage that is drawn in a colour, about ± 25 %
 HIGH_SPEED = 0.9  # share of the impacts that are not faster than p90_normal_speed
 
 
-def _some_at_once(dents: int, windows: int) -> Iterator[slice]:
-    """Return slices of the dents; a slice's pairs of a dent and a window fit into memory."""
-    step = max(1, MAX_PAIRS // max(windows, 1))
-    return (slice(first, first + step) for first in range(0, dents, step))
+class _Portions:
+    """Divides dents into slices whose pairs of a dent and a window fit into memory.
+
+    The first slice would fit if each of its dents were in all windows. The next one is at most
+    twice as large, and such that its pairs fit twice if it has as many a dent as the last.
+    """
+
+    def __init__(self, windows: int) -> None:
+        self._step = self._least = max(1, MAX_PAIRS // max(windows, 1))
+
+    def of(self, dents: int) -> Iterator[slice]:
+        """Yield slices of all dents."""
+        end = 0
+        while end < dents:
+            some = slice(end, min(end + self._step, dents))
+            end = some.stop
+            yield some
+
+    def learn(self, some: slice, pairs: int) -> None:
+        """Choose the size of the next slice by the number of pairs of one."""
+        fits = (some.stop - some.start) * MAX_PAIRS // (2 * max(pairs, 1))
+        self._step = max(self._least, min(2 * self._step, fits))
 
 
 class PartField:
@@ -230,10 +248,12 @@ class PartField:
         from chamberopt.coverage.field.windows import add_powers
 
         sums, largest = np.zeros((len(gauge.area), 3)), 0.0
+        portions = _Portions(len(gauge.area))
         for hits, located in zip(self._hits, self._located, strict=True):
-            for some in _some_at_once(len(located.edge), len(gauge.area)):
+            for some in portions.of(len(located.edge)):
                 found = find_footprints(self.field, gauge, located.select(some))
                 add_powers(found.point, found.weight, sums)
+                portions.learn(some, len(found.point))
             largest = max(largest, float(hits.dent.max(initial=0.0)))
         dents, share, squares = sums.T
         one_more = np.pi / 4.0 * largest**2 / gauge.area

@@ -172,6 +172,14 @@ def surfaces(mesh: PartMesh) -> list[Surface]:
 
     First are the surfaces that the file names, then faces, each the largest first.
     """
+    return named_surfaces(mesh) + _faces(mesh)
+
+
+def named_surfaces(mesh: PartMesh) -> list[Surface]:
+    """Return the surfaces that a part's file names, the largest first.
+
+    Of several names of the same triangles the plainest is taken, a colour or a number last.
+    """
     area = areas(mesh.vertices, mesh.triangles)
     named: dict[bytes, Surface] = {}
 
@@ -185,7 +193,7 @@ def surfaces(mesh: PartMesh) -> list[Surface]:
             named[marked.tobytes()] = replace(same, colour=same.colour or colour)
         elif marked.any():
             named[marked.tobytes()] = replace(_named(mesh, name, marked), colour=colour)
-    return sorted(named.values(), key=lambda one: -area[one.triangles].sum()) + _faces(mesh)
+    return sorted(named.values(), key=lambda one: -area[one.triangles].sum())
 
 
 def propose_target(mesh: PartMesh, known: Sequence[Surface], wanted: Iterable[str]) -> Target:

@@ -5,7 +5,7 @@ import { fillRun, follow } from "./run.js";
 import { closeResults } from "./results.js";
 import "./study/study.js";
 import { ask, attempt, element, isUnsaved, listen, read, say, state, undo, unpack } from "./state.js";
-import { inUnits, inWords } from "./words.js";
+import { inUnits, inWords, onPage } from "./words.js";
 import { showCavity, showPart, showShape, showState } from "./scene.js";
 
 const find = (id) => document.getElementById(id);
@@ -65,12 +65,12 @@ function followCavity() {
 }
 
 function refuse(text) {
-  find("error").textContent = text;
+  find("error").replaceChildren(...onPage(text));
   find("error").hidden = !text;
 }
 
 function sayOf({ facts, warnings, notes }) {
-  const list = (texts) => texts.map((text) => element("li", { textContent: text }));
+  const list = (texts) => texts.map((text) => element("li", {}, ...onPage(text)));
   find("warnings").replaceChildren(...list(warnings));
   find("notes").replaceChildren(...list(notes));
   const rows = [];

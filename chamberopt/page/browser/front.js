@@ -1,6 +1,7 @@
 // The front page: a part's file, what is known of it, and the design that `new` proposes.
 import { ask, attempt, element, say } from "./state.js";
 import { bars, followed } from "./steps.js";
+import { onPage } from "./words.js";
 
 const find = (id) => document.getElementById(id);
 const option = (text) => element("option", { textContent: text, value: text });
@@ -49,8 +50,8 @@ async function look(part, unit = "") {
       return element("span", {}, button, " ");
     }));
     find("names").hidden = !seen.names.length;
-    find("names").replaceChildren(find("names").firstElementChild, ...seen.names.map((name) =>
-      element("label", {}, element("input", { type: "checkbox", value: name }), ` ${name}`)));
+    find("names").replaceChildren(find("names").firstElementChild, ...seen.names.map(([name, text]) =>
+      element("label", {}, element("input", { type: "checkbox", value: name }), ` ${name}: ${text}`)));
     find("known").textContent = sizes.length ? "" : `${part} measures ${seen.size}.`;
     find("propose").disabled = sizes.length > 0;
     document.body.dataset.known = sizes.length ? "sizes" : "all";
@@ -81,11 +82,11 @@ function tell({ steps, lines, exit }) {
   const remarks = (kind) => lines.filter((line) => line.startsWith(kind)).map((line) => line.slice(kind.length));
   find("stop").hidden = exit !== null;
   find("progress").replaceChildren(...bars(steps));
-  find("warnings").replaceChildren(...remarks("warning: ").map((text) => element("li", { textContent: text })));
+  find("warnings").replaceChildren(...remarks("warning: ").map((text) => element("li", {}, ...onPage(text))));
   find("printed").textContent = lines.join("\n");
   find("printed-fold").hidden = !lines.length;
   find("error").hidden = !exit;
-  find("error").textContent = exit ? lines.join("\n") : "";
+  find("error").replaceChildren(...(exit ? onPage(lines.join("\n")) : []));
 }
 
 find("propose").addEventListener("click", () => attempt(async () => {

@@ -1,7 +1,7 @@
 // The part in 3D: colours it by a quantity or by the coverage at a time, and shows the numbers at a point.
 "use strict";
 // Fills the panels #part-0, #part-1 ... of a page with scenes, which the controls on it serve together.
-function showParts({ quantities, scenes, scales }) {
+function showParts({ quantities, scenes, scales, kinds }) {
   const find = (id) => document.getElementById(id);
   const controls = { quantity: find("quantity"), time: find("time"), fit: find("fit"), glass: find("glass") };
   const label = find("label");
@@ -11,7 +11,7 @@ function showParts({ quantities, scenes, scales }) {
   for (const scene of scenes) {
     for (const table of [scene.columns, scene.own])
       for (const name of Object.keys(table)) table[name] = new Float32Array(bytes(table[name]));
-    for (const name of ["triangle", "number", "element", "impacts"]) scene[name] = new Int32Array(bytes(scene[name]));
+    for (const name of ["triangle", "number", "element", "impacts", "zone"]) scene[name] = new Int32Array(bytes(scene[name]));
     for (const surface of Object.values(scene.surfaces)) {
       if (surface.points) surface.points = new Float32Array(bytes(surface.points));
       surface.triangles = new Uint32Array(bytes(surface.triangles));
@@ -87,11 +87,15 @@ function showParts({ quantities, scenes, scales }) {
     stage.className = "stage";
     panels[i].append(stage);
     const view = new View3D(stage);
-    for (const [name, surface] of Object.entries(scene.surfaces)) view.surface(name, { ...surface, scale: name === "part" });
+    view.kinds = kinds;
+    for (const [name, surface] of Object.entries(scene.surfaces))
+      view.surface(name, { ...surface, scale: name === "part", open: SOLID.includes(name) && !scene.whole });
     view.lines("edges", new Float32Array(bytes(scene.edges.ends)), scene.edges.colour);
     view.look(scene.view);
     return view;
   });
+  new Tools(views, controls.quantity.closest(".controls"));
+  Tools.legend(find("kinds"), views, kinds);
 
   let waiting = false; // a slider moves faster than a large part can be coloured
   function recolour() {
@@ -110,22 +114,30 @@ function showParts({ quantities, scenes, scales }) {
     });
   }
 
-  function point(event, i) {
-    const hit = event.buttons ? null : views[i].at(event, SOLID), scene = scenes[i];
-    label.hidden = !hit || !["part", "few"].includes(hit.name);
-    if (label.hidden) return;
+  // What is known where the pointer is on the target of a scene: names and values; null elsewhere.
+  function known(event, i) {
+    const hit = event.buttons || views[i].tool ? null : views[i].at(event, SOLID), scene = scenes[i];
+    if (!hit || !["part", "few"].includes(hit.name)) return null;
     const k = hit.corner, t = scene.triangle[k];
     const rows = quantities.map((one) => {
       const now = one.name === "coverage";
       const value = now ? covered(scene.columns.density[k], scene) : scene.columns[one.name][k];
       return [now ? `coverage after ${number(seconds())} s` : one.label, `${number(value)} ${one.unit}`];
     });
+    rows.unshift(["place x, y, z", Measure.at(hit.place)]);
+    if (scene.zones.length) rows.splice(1, 0, ["zone", scene.zones[scene.zone[t] - 1] ?? "none"]);
     rows.push([`coverage of the triangle after ${number(scene.treatment)} s`, `${number(scene.own.coverage[t])} %`],
       ["width of its 95 % interval", `${number(scene.own.interval[t])} %`],
       ["simulated impacts on the triangle", String(scene.impacts[t])]);
+    return { rows, title: `element ${scene.element[t]}, triangle ${scene.number[t]} of the part` };
+  }
+
+  function point(event, i) {
+    const { rows, title } = known(event, i) ?? {};
+    label.hidden = !rows;
+    if (label.hidden) return;
     const table = document.createElement("table");
-    const caption = table.createCaption();
-    caption.textContent = `element ${scene.element[t]}, triangle ${scene.number[t]} of the part`;
+    table.createCaption().textContent = title;
     for (const [name, value] of rows) {
       const row = table.insertRow();
       row.insertCell().textContent = name;
@@ -140,7 +152,40 @@ function showParts({ quantities, scenes, scales }) {
     label.style.top = `${Math.max(top, 4)}px`;
   }
 
+  // Places that were clicked, a row each, and buttons to copy and to empty their list.
+  const kept = [], places = find("places"), parts = ["h3", "div", "button", "button"].map((tag) => document.createElement(tag));
+  const [title, wide, copy, empty] = parts;
+  [title, copy, empty].forEach((one, i) => { one.textContent = ["Places kept", "Copy the list", "Empty it"][i]; });
+  wide.className = "wide";
+  places.replaceChildren(title, wide, copy, " ", empty);
+  function showKept() {
+    const names = [...new Set(kept.flatMap((one) => one.map(([name]) => name)))];
+    const table = document.createElement("table"), head = table.createTHead().insertRow(), body = table.createTBody();
+    for (const name of names) head.append(Object.assign(document.createElement("th"), { textContent: name }));
+    for (const one of kept) {
+      const row = body.insertRow(), values = new Map(one);
+      for (const name of names) row.insertCell().textContent = values.get(name) ?? "";
+    }
+    wide.replaceChildren(table);
+    places.hidden = !kept.length;
+  }
+  function keep(event, i) {
+    const { rows, title: triangle } = known(event, i) ?? {};
+    if (!rows) return;
+    kept.push([...(scenes.length > 1 ? [["result", scenes[i].title]] : []), ["triangle", triangle], ...rows]);
+    showKept();
+  }
+  empty.addEventListener("click", () => { kept.length = 0; showKept(); });
+  copy.addEventListener("click", () => { // as a sheet of numbers takes it; a page of a file may have no clipboard
+    const text = [...wide.querySelectorAll("tr")].map((row) => [...row.cells].map((cell) => cell.textContent).join("\t")).join("\n");
+    const area = Object.assign(document.createElement("textarea"), { value: text });
+    places.append(area);
+    area.select();
+    if (document.execCommand("copy")) area.remove(); // else it stays, to be copied by hand
+  });
+
   views.forEach((view, i) => {
+    view.hearClicks((event) => keep(event, i));
     panels[i].addEventListener("pointermove", (event) => point(event, i));
     panels[i].addEventListener("pointerleave", () => { label.hidden = true; });
     panels[i].addEventListener("dblclick", () => view.look(scenes[i].view));
@@ -150,7 +195,7 @@ function showParts({ quantities, scenes, scales }) {
   controls.fit.addEventListener("change", recolour);
   controls.time.addEventListener("input", recolour);
   controls.glass.addEventListener("change", () => {
-    for (const view of views) view.show(["sonotrode", "glass", "edges", "holder", "mask"], controls.glass.checked);
+    for (const view of views) view.show(["sonotrode", "walls", "deflectors", "edges", "holder", "mask"], controls.glass.checked);
   });
   recolour();
   return views;

@@ -2,19 +2,16 @@
 import { change, endMove, unpack, value } from "./state.js";
 
 const CLEAR = 0.16, FACE = 0.6; // opacity of walls and sonotrode
+const BODIES = ["deflectors", "holder", "mask"]; // that not every chamber has
 export const view = new View3D(document.getElementById("view"));
+new Tools([view], document.getElementById("tools"));
 let part = null, handles = null, grip = null, placed = null, coloured = [];
 
 export function showPart(buffer) {
   part = unpack(buffer);
-  view.surface("part", { points: part.points.slice(), triangles: part.triangles.slice() });
+  Tools.legend(document.getElementById("legend"), [view], part.kinds);
+  view.surface("part", { points: part.points.slice(), triangles: part.triangles.slice(), open: !part.closed });
   placed = null;
-  document.getElementById("legend").replaceChildren(...part.legend.map(([name, colour]) => {
-    const item = document.createElement("li"), patch = document.createElement("i");
-    patch.style.background = colour;
-    item.append(patch, name);
-    return item;
-  }));
   return part;
 }
 
@@ -25,7 +22,7 @@ export function showShape(answer) {
   mesh.matrix.set(r[0], r[1], r[2], s[0], r[3], r[4], r[5], s[1], r[6], r[7], r[8], s[2], 0, 0, 0, 1);
   mesh.matrixWorldNeedsUpdate = true;
   mesh.visible = true;
-  view.remove("remeshed");
+  for (const name of ["remeshed", ...BODIES]) view.remove(name); // until the cavity is cut anew
   colour("part", answer.state);
   walls(answer);
   const first = !placed;
@@ -39,8 +36,9 @@ export function showShape(answer) {
 export function showCavity(answer) {
   walls(answer);
   if (answer.part_points) {
-    view.surface("remeshed", { points: answer.part_points.slice(), triangles: answer.part_triangles.slice() });
+    view.surface("remeshed", { points: answer.part_points.slice(), triangles: answer.part_triangles.slice(), open: !part.closed });
     view.get("part").visible = false;
+    view.section.change();
   }
   showState(answer.state);
 }
@@ -51,18 +49,21 @@ function colour(name, state) {
   const mesh = view.get(name);
   if (coloured[0] === mesh && coloured[1].every((kind, k) => kind === state[k])) return;
   coloured = [mesh, state];
-  const rgb = part.legend.map(([, hex]) => [1, 3, 5].map((k) => parseInt(hex.slice(k, k + 2), 16) / 255));
+  mesh.userData.kinds = [...new Set(state)].map((kind) => part.states[kind]);
+  const rgb = part.states.map((kind) => part.kinds[kind][1]).map((hex) => [1, 3, 5].map((k) => parseInt(hex.slice(k, k + 2), 16) / 255));
   const colours = new Float32Array(3 * state.length);
   state.forEach((kind, k) => colours.set(rgb[kind], 3 * k));
   view.colourTriangles(name, colours);
 }
 
 function walls(answer) {
-  const surface = (name, triangles, [colour, opacity]) =>
-    view.surface(name, { points: answer.points.slice(), triangles: triangles.slice(), colour, opacity });
-  surface("walls", answer.walls, [part.glass, CLEAR]);
-  const opacity = view.camera.position.z < 0 ? 0.15 : FACE; // from below the part is seen through it
-  surface("sonotrode", answer.sonotrode, [part.legend.at(-1)[1], opacity]);
+  const surface = (name, kind, opacity, triangles, points = answer.points) => {
+    if (triangles?.length) view.surface(name, { points: points.slice(), triangles: triangles.slice(), kind, opacity });
+  };
+  surface("walls", "wall", CLEAR, answer.walls);
+  surface("deflectors", "wall", CLEAR, answer.deflectors);
+  surface("sonotrode", "sonotrode", view.camera.position.z < 0 ? 0.15 : FACE, answer.sonotrode); // from below the part is seen through it
+  for (const name of ["holder", "mask"]) surface(name, name, 1, answer[`${name}_triangles`], answer[`${name}_points`]);
   view.lines("edges", answer.edges.slice(), part.edges);
 }
 

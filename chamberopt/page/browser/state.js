@@ -1,4 +1,6 @@
 // What the page knows: the file as read, changes not yet saved, and questions to the server.
+import { onPage } from "./words.js";
+
 const listeners = [];
 export const state = { file: null, changes: {}, past: [], shown: {}, showing: "" };
 export const listen = (hear) => listeners.push(hear);
@@ -85,7 +87,7 @@ export const isUnsaved = () => Object.keys(state.changes).length > 0;
 let fading = 0;
 export function say(text, good = false) {
   const box = document.getElementById("message");
-  box.textContent = text;
+  box.replaceChildren(...onPage(text));
   box.className = good ? "good" : "";
   box.hidden = !text;
   clearTimeout(fading);

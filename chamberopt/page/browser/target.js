@@ -8,10 +8,10 @@ let newZone = false;
 
 export function fillTarget() {
   fillSurfaces();
-  find("names").replaceChildren(...fillTarget.part.names.map((one) => {
-    const button = element("button", { textContent: one.name, title: "make it the target" });
-    button.addEventListener("click", () => choose(one.name));
-    return element("li", {}, button, ` ${one.area_mm2} mm², ${one.triangles} triangles`);
+  find("names").replaceChildren(...fillTarget.part.names.map(([name, text]) => {
+    const button = element("button", { textContent: name, title: "make it the target" });
+    button.addEventListener("click", () => choose(name));
+    return element("li", {}, button, ` ${text}`);
   }));
   if (!fillTarget.part.names.length) find("names").append(element("li", { textContent: "none" }));
   showChosen();
@@ -84,13 +84,7 @@ async function click(event) {
   find("down").setAttribute("aria-pressed", "false");
 }
 
-let from = null; // a click is not a turn of the view
-view.renderer.domElement.addEventListener("pointerdown", (event) => { from = [event.clientX, event.clientY]; });
-view.renderer.domElement.addEventListener("pointerup", (event) => {
-  if (event.button === 0 && from && Math.hypot(event.clientX - from[0], event.clientY - from[1]) < 4) {
-    clicks = clicks.then(() => attempt(() => click(event)));
-  }
-});
+view.hearClicks((event) => { clicks = clicks.then(() => attempt(() => click(event))); });
 find("down").addEventListener("click", () => find("down").setAttribute("aria-pressed", find("down").getAttribute("aria-pressed") !== "true"));
 find("add-zone").addEventListener("click", () => attempt(async () => {
   if (!find("zone").value.trim()) throw new Error("give the new zone a name first");

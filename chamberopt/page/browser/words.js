@@ -19,3 +19,24 @@ export function inUnits(name, fact) {
   const text = Array.isArray(fact) ? fact.map(number).join(", ") : number(fact);
   return unitOf(name) ? `${text} ${unitOf(name)}` : text;
 }
+
+// What options of the command line are called on the page.
+const OPTIONS = { target: "what is peened", unit: "the unit of the part", material: "alloy of the part", shot: "balls",
+  shape: "form of the chamber", shop: "what your shop has", "no-pilot": "without simulating some seconds" };
+const TABLES = "part|chamber|shot|sonotrode|sonotrodes|materials|effects|process|holder|mask|zones|tolerances|ranges";
+const KEY = new RegExp(`(?<![\\w./])(?:${TABLES})(?:\\.\\w+)+|--(?:${Object.keys(OPTIONS).join("|")})(?![\\w-])`, "g");
+const FILE = /\.(?:toml|json|html|pdf|png|st[lp]|step|obj|ply|3mf|off|nas|bdf|dat|fem|inp|msh|data|vt[kpu]|vtkhdf)$/i; // no key
+
+// A message of the program for the page: keys and options in words, with what they are in a file as a tip.
+export function onPage(text) {
+  const made = [];
+  let at = 0;
+  for (const { 0: found, index } of text.matchAll(KEY)) {
+    if (FILE.test(found)) continue;
+    const words = OPTIONS[found.slice(2)] ?? found.replace(/^effects\./, "").split(".").reverse()
+      .map((step) => /^\d+$/.test(step) ? Number(step) + 1 : inWords(step).replace(/^[A-Z](?![A-Z0-9])/, (first) => first.toLowerCase())).join(" of the ");
+    made.push(text.slice(at, index), Object.assign(document.createElement("abbr"), { textContent: words, title: found }));
+    at = index + found.length;
+  }
+  return [...made, text.slice(at)];
+}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
     from matplotlib.colors import Colormap
@@ -18,11 +18,34 @@ COVERAGE_MAP, COUNT_MAP, WIDTH_MAP = "viridis", "cividis", "magma"
 DIFFERENCE_MAP = "PuOr"
 # Places of the target with too few simulated dents, out of the balls' reach, and outside the
 # chamber.
-FEW_DENTS, UNREACHED, OUTSIDE = "#6c737a", "#a9714f", PURPLE
+FEW_DENTS, UNREACHED, OUTSIDE = "#45464a", "#a9714f", "#7a2a80"
 
 # The part beside its target, the room's walls with their edges, and the sonotrode.
-PART_GREY, GLASS, EDGES, SONOTRODE = "#b9bec4", "#9fc3dd", "#6f8796", "#e08a2e"
-FIXTURE_COLOURS = {"holder": "#7f8a96", "mask": "#d9c9a3"}
+PART_GREY, GLASS, EDGES, SONOTRODE = "#bcc1c6", "#9be0ff", "#6f8796", "#e08a2e"
+FIXTURE_COLOURS = {"holder": "#7f7d78", "mask": "#f0d8a0"}
+
+
+class Kind(NamedTuple):
+    """What a legend says of a kind of surface, and its colour."""
+
+    label: str
+    colour: str
+
+
+# Kinds of surfaces of a part in its chamber, by name. Colour-blind readers too can tell any two of
+# them apart, which a test checks.
+KINDS = {
+    "rest": Kind("not in the target", PART_GREY),
+    "target": Kind("target", BLUE),
+    "few": Kind("target with too few simulated dents", FEW_DENTS),
+    "unreached": Kind("target that hardly a ball can touch", UNREACHED),
+    "outside": Kind("target outside the chamber", OUTSIDE),
+    "zone": Kind("zone", SKY),
+    "sonotrode": Kind("sonotrode", SONOTRODE),
+    "holder": Kind("holder", FIXTURE_COLOURS["holder"]),
+    "mask": Kind("mask", FIXTURE_COLOURS["mask"]),
+    "wall": Kind("chamber wall", GLASS),
+}
 
 # Colours and line styles of compared results.
 _COLOURS = (BLUE, ORANGE, GREEN, PURPLE, BLACK, YELLOW, SKY, GREY)

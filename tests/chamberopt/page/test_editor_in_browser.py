@@ -3,10 +3,13 @@
 import json
 from collections.abc import Iterator
 
+import numpy as np
 import pytest
+from matplotlib.colors import to_rgb
 
 from chamberopt.cli import main
-from tests.chamberopt.page.browser_page import Page
+from chamberopt.pictures.charts.colours import KINDS
+from tests.chamberopt.page.browser_page import ON_SCREEN, SIDE, Page
 from tests.chamberopt.page.conftest import Served
 from tests.helpers.results.browser import WAIT, chromium, expect, needs_chromium
 
@@ -38,6 +41,53 @@ def test_a_number_changes_the_shape_the_facts_and_one_line(opened: Page) -> None
         assert float(said[f"{table}.{name}"]) == facts[table][name]
 
 
+def test_a_section_is_filled_in_the_colours_of_the_legend(opened: Page) -> None:
+    """The part is a cube of 16 mm in a cylinder of 40 mm, whose wall is 1.7 mm thick there."""
+    page, legend = opened.page, opened.page.locator("#legend")
+    page.click(".tools >> text=Section")
+    page.select_option(".tools select", "z")
+    page.fill(".tools input[type=number]", "20")
+    kinds = ["not in the target", "target", "sonotrode", "chamber wall"]
+    assert legend.locator("li").all_text_contents() == kinds
+    page.wait_for_timeout(500)
+    within, wall, air = page.evaluate(ON_SCREEN, [[3, 4, 20], [20.8, 0, 20], [14, 0, 20]])
+    colours = {name: np.array(to_rgb(kind.colour)) * 255 for name, kind in KINDS.items()}
+    assert opened.pixel(*within) == pytest.approx(colours["rest"], abs=2)
+    assert opened.pixel(*wall) == pytest.approx(colours["wall"], abs=2)
+    assert np.abs(opened.pixel(*air) - colours["rest"]).max() > 5
+    page.click(".tools >> text=Flip")
+    page.click(".tools >> text=Section")
+    assert page.evaluate(
+        """async () => { const { view } = await import("/browser/scene.js");
+        const shell = Section.shell(view.get("sonotrode").geometry, 2), { index } = shell;
+        const corner = (i) => new THREE.Vector3().fromBufferAttribute(shell.attributes.position, i);
+        let volume = 0;
+        for (let k = 0; k < index.count; k += 3) {
+          const [a, b, c] = [0, 1, 2].map((i) => corner(index.array[k + i]));
+          volume += a.dot(b.cross(c)) / 6;
+        }
+        return volume; }"""
+    ) == pytest.approx(2 * np.pi * 20**2, rel=2e-3)
+
+
+def test_two_clicks_measure(opened: Page) -> None:
+    page, told = opened.page, opened.page.locator(".tools output")
+    page.click(".tools >> text=Measure")
+    for x, y in page.evaluate(SIDE):
+        page.mouse.click(x, y)
+    expect(told).to_contain_text("16 mm (x ")
+    page.keyboard.press("Escape")
+    expect(told).to_be_empty()
+    two = """(normals) => Measure.words(...normals.map((normal, i) => ({
+      place: new THREE.Vector3(3 * i, 4 * i, 0), normal: new THREE.Vector3(...normal) })))"""
+    assert page.evaluate(two, [[0, 1, 0], [0, -1, 0]]) == [
+        "5 mm (x 3, y 4, z 0)",
+        "parallel faces, 4 mm apart",
+    ]
+    assert page.evaluate(two, [[0, 1, 0], [0.6, 0.8, 0]])[1] == "faces at 36.87°"
+    assert page.evaluate(two, [[0, 0, 1], [0, 0, 1]]) == ["5 mm (x 3, y 4, z 0)"]
+
+
 def test_a_slider_moves_and_is_undone_as_one(opened: Page) -> None:
     slider = opened.page.locator(".field", has=opened.page.locator('[id="shot.mass_g"]'))
     slider = slider.locator("input[type=range]")
@@ -58,9 +108,11 @@ def test_a_slider_moves_and_is_undone_as_one(opened: Page) -> None:
 
 def test_what_is_refused_is_said_and_the_newest_counts(opened: Page) -> None:
     opened.put("chamber.height_mm", 4)
-    expect(opened.page.locator("#error")).to_contain_text("not below chamber.height_mm = 4")
+    expect(opened.page.locator("#error")).to_contain_text("not below height of the chamber = 4")
+    key = opened.page.locator("#error abbr", has_text="height of the chamber").first
+    assert key.get_attribute("title") == "chamber.height_mm"
     opened.page.click("#save")
-    expect(opened.page.locator("#message")).to_contain_text("chamber.sonotrode_distance_mm")
+    expect(opened.page.locator("#message")).to_contain_text("sonotrode distance of the chamber")
     assert "height_mm = 36" in (opened.served.folder / "design.toml").read_text()
     opened.page.click("#undo")
     expect(opened.page.locator("#error")).to_be_hidden()

@@ -2,6 +2,7 @@
 
 import http.client
 import json
+import shutil
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -12,6 +13,7 @@ import trimesh
 
 from chamberopt.design.load import load_design
 from tests.chamberopt.page.conftest import Served
+from tests.hunt.meshes import ROOT
 
 PROPOSED = {
     "part": "box.stl", "unit": "mm", "material": "", "shot": "steel", "shape": "", "target": [],
@@ -47,6 +49,10 @@ def test_a_part_becomes_a_design_that_opens(front: Served, tmp_path: Path) -> No
     sizes = front.ask("/look", known)["sizes"]
     assert sizes["mm"] == "30 x 20 x 10 mm"
     assert front.ask("/look", known | {"unit": "cm"})["size"] == "300 x 200 x 100 mm"
+    shutil.copy(ROOT / "designs/parts/fir_tree.step", tmp_path)
+    names = front.ask("/look", {"part": "fir_tree.step", "unit": ""})["names"]
+    assert ["FIR_TREE", "1796 mm²"] in names
+    assert "#ff0000" not in dict(names)  # the colour of just this surface
     started = front.ask("/propose", PROPOSED | known | {"unit": "mm", "material": "IN718"})
     assert started["out"] == "part"
     assert "running" in front.ask("/propose", PROPOSED)["error"]

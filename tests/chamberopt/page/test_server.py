@@ -27,7 +27,13 @@ def head(answer: bytes) -> dict[str, Any]:
 
 def test_only_the_one_who_has_the_token_is_served(served: Served) -> None:
     assert served.get("/").status == 200
-    for path in ("/", "/results", "/browser/editor.js", "/browser/view3d.js", "/files/design.png"):
+    for path in (
+        "/",
+        "/results",
+        "/browser/editor.js",
+        "/browser/view/view3d.js",
+        "/files/design.png",
+    ):
         assert served.get(path, cookie="").status == 403
     assert served.get("/?token=guessed", cookie="").status == 403
     assert served.get("/", cookie=served.cookie + "x").status == 403

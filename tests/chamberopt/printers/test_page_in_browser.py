@@ -118,8 +118,23 @@ def test_pointing_at_the_target_shows_its_numbers_and_the_triangles(shown: OpenP
                 assert "simulated impacts on the triangle" in told
                 for unit in ("%", "1/mm²", "m/s", "°"):
                     assert unit in told
+                shown.page.mouse.down()  # a click keeps them
+                shown.page.mouse.up()
+                assert shown.page.locator("#places tbody tr").count() == 1
+                assert shown.page.locator("#places").is_visible()
                 return
     pytest.fail("no triangle of the target answered to the pointer")
+
+
+def test_a_section_shows_the_inside_of_the_part(shown: OpenPage) -> None:
+    shown.page.mouse.move(1, 1)  # away from the target, whose numbers would lie over it
+    before = shown.pixels()
+    shown.page.click(".tools >> text=Section")
+    cut = shown.pixels()
+    assert np.abs(cut - before).max() > 0.2
+    assert "chamber wall" in shown.page.locator("#kinds").inner_text()
+    shown.page.click(".tools >> text=Section")
+    assert np.abs(shown.pixels() - before).max() < 0.02
 
 
 def test_the_chamber_can_be_hidden_and_folded_text_opens(shown: OpenPage) -> None:

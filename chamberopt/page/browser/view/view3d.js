@@ -5,13 +5,16 @@ class View3D {
   #meshes = new Map();
   #waiting = false;
   #heard = [];
+  #clicked = [];
+  #kinds = { now: "", hear: null };
 
   // The element is filled by the view, and has its size.
   constructor(element) {
     this.element = element;
-    const renderer = this.renderer = new THREE.WebGLRenderer({ antialias: true, alpha: true });
+    const renderer = this.renderer = new THREE.WebGLRenderer({ antialias: true, alpha: true, stencil: true });
     renderer.outputColorSpace = THREE.LinearSRGBColorSpace;
     renderer.autoClear = false;
+    renderer.localClippingEnabled = true;
     renderer.setPixelRatio(devicePixelRatio);
     element.append(renderer.domElement);
     this.scene = new THREE.Scene();
@@ -29,6 +32,15 @@ class View3D {
     }
     this.triadCamera = new THREE.PerspectiveCamera(30, 1, 0.1, 20);
     this.triadCamera.up.set(0, 0, 1);
+    this.section = new Section(this);
+    this.kinds = {}; // label and colour of each kind of surface
+    this.tool = null; // what takes a click instead of those who wait for clicks
+    let from = null; // a click is not a turn of the view
+    renderer.domElement.addEventListener("pointerdown", (event) => { from = [event.clientX, event.clientY]; });
+    renderer.domElement.addEventListener("pointerup", (event) => {
+      if (event.button !== 0 || !from || Math.hypot(event.clientX - from[0], event.clientY - from[1]) >= 4) return;
+      for (const hear of this.tool ? [this.tool] : this.#clicked) hear(event);
+    });
     new ResizeObserver(() => this.#resize()).observe(element);
     this.#resize();
   }
@@ -56,7 +68,9 @@ class View3D {
 
   // Replace a surface. triangles: three numbers of points each; colours: of each triangle, as [r, g, b] in 0..1 one after
   // the other. Where `scale` is set, values between 0 and 1 at the points are its colours (see `paint`).
-  surface(name, { points, triangles, colour = "#ffffff", opacity = 1, scale = false }) {
+  // Else its kind gives its colour. A section does not fill the body of an open surface.
+  surface(name, { points, triangles, kind = "", opacity = 1, scale = false, open = false }) {
+    const colour = this.kinds[kind]?.[1] ?? "#ffffff";
     this.remove(name);
     const geometry = new THREE.BufferGeometry();
     geometry.setAttribute("position", new THREE.BufferAttribute(points, 3));
@@ -67,7 +81,9 @@ class View3D {
     // Where surfaces lie on each other, the solid one is in front.
     if (see) Object.assign(material, { polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1 });
     if (scale) geometry.setAttribute("uv", new THREE.BufferAttribute(new Float32Array(points.length / 3 * 2).fill(0.5), 2));
-    return this.#keep(name, new THREE.Mesh(geometry, material));
+    const mesh = new THREE.Mesh(geometry, material);
+    Object.assign(mesh.userData, { kinds: kind ? [kind] : [], open, points, index: triangles });
+    return this.#keep(name, mesh);
   }
 
   // Colour each triangle of a surface; it then has three points of its own.
@@ -116,8 +132,38 @@ class View3D {
   #keep(name, mesh) {
     this.#meshes.set(name, { mesh });
     this.scene.add(mesh);
+    this.section.take(name, mesh);
     this.draw();
     return mesh;
+  }
+
+  // Names and surfaces, lines and texts.
+  all() { return [...this.#meshes].map(([name, { mesh }]) => [name, mesh]); }
+
+  // Box round the surfaces that a section cuts: { low, high }.
+  extent() {
+    const low = new THREE.Vector3(Infinity, Infinity, Infinity), high = low.clone().negate(), corner = new THREE.Vector3();
+    for (const [name, mesh] of this.all()) {
+      if (!(name in Section.SURFACES) || !mesh.visible) continue;
+      if (!mesh.geometry.boundingBox) mesh.geometry.computeBoundingBox();
+      const ends = [mesh.geometry.boundingBox.min, mesh.geometry.boundingBox.max];
+      mesh.updateWorldMatrix(true, false);
+      for (let k = 0; k < 8; k++) {
+        corner.set(ends[k & 1].x, ends[k >> 1 & 1].y, ends[k >> 2].z).applyMatrix4(mesh.matrixWorld);
+        low.min(corner);
+        high.max(corner);
+      }
+    }
+    return { low: low.toArray(), high: high.toArray() };
+  }
+
+  // Call with each click into the view that no tool takes.
+  hearClicks(hear) { this.#clicked.push(hear); }
+
+  // Call with the kinds that are to be seen, now and whenever they are others.
+  hearKinds(hear) {
+    this.#kinds = { now: "", hear };
+    this.draw();
   }
 
   get(name) { return this.#meshes.get(name)?.mesh; }
@@ -128,28 +174,47 @@ class View3D {
     mesh.traverse((one) => { one.geometry?.dispose(); one.material?.map?.dispose(); one.material?.dispose(); });
     mesh.removeFromParent();
     this.#meshes.delete(name);
+    if (name in Section.SURFACES) this.section.change();
     this.draw();
   }
 
   show(names, visible) {
     for (const name of names) if (this.get(name)) this.get(name).visible = visible;
+    this.section.change();
     this.draw();
   }
 
-  // The surface of these names that a pointer event meets first: { name, triangle, corner: its closest point, place }.
-  at(event, names) {
-    const box = this.renderer.domElement.getBoundingClientRect(), ray = new THREE.Raycaster();
-    ray.setFromCamera(new THREE.Vector2((event.clientX - box.left) / box.width * 2 - 1,
+  #caster(event) {
+    const box = this.renderer.domElement.getBoundingClientRect(), caster = new THREE.Raycaster();
+    caster.setFromCamera(new THREE.Vector2((event.clientX - box.left) / box.width * 2 - 1,
       1 - (event.clientY - box.top) / box.height * 2), this.camera);
-    const meshes = names.map((name) => this.get(name)).filter(Boolean);
-    const hit = ray.intersectObjects(meshes, false)[0];
-    if (!hit) return null;
-    const name = names.find((one) => this.get(one) === hit.object), position = hit.object.geometry.getAttribute("position");
-    const place = hit.object.worldToLocal(hit.point.clone());
-    const far = (i) => new THREE.Vector3().fromBufferAttribute(position, i).distanceTo(place);
-    const corner = [hit.face.a, hit.face.b, hit.face.c].reduce((best, i) => far(i) < far(best) ? i : best);
-    return { name, triangle: hit.faceIndex, corner, place: hit.point };
+    return caster;
   }
+
+  ray(event) { return this.#caster(event).ray; }
+
+  // Where a place is in the window: [clientX, clientY].
+  onScreen(place) {
+    const box = this.renderer.domElement.getBoundingClientRect(), at = place.clone().project(this.camera);
+    return [box.left + (at.x + 1) / 2 * box.width, box.top + (1 - at.y) / 2 * box.height];
+  }
+
+  // What a pointer event meets of the surfaces of these names that a section leaves, the nearest first:
+  // { name, triangle, corner: its closest point, place, normal }.
+  hits(event, names) {
+    const meshes = names.map((name) => this.get(name)).filter(Boolean);
+    return this.#caster(event).intersectObjects(meshes, false).filter(({ point }) => !this.section.hides(point)).map((hit) => {
+      const name = names.find((one) => this.get(one) === hit.object), position = hit.object.geometry.getAttribute("position");
+      const place = hit.object.worldToLocal(hit.point.clone());
+      const far = (i) => new THREE.Vector3().fromBufferAttribute(position, i).distanceTo(place);
+      const corner = [hit.face.a, hit.face.b, hit.face.c].reduce((best, i) => far(i) < far(best) ? i : best);
+      const normal = hit.face.normal.clone().transformDirection(hit.object.matrixWorld);
+      return { name, triangle: hit.faceIndex, corner, place: hit.point, normal };
+    });
+  }
+
+  // The surface of these names that a pointer event meets first, as of `hits`, or null.
+  at(event, names) { return this.hits(event, names)[0] ?? null; }
 
   // Look at a place from an eye; what is within `size` of it fills the view.
   look({ middle, eye, size }) {
@@ -193,6 +258,8 @@ class View3D {
 
   #render() {
     if (!this.renderer.domElement.isConnected) return;
+    this.section.refresh();
+    this.#tellKinds();
     const { renderer, camera } = this, { clientWidth: width, clientHeight: height } = this.element, corner = 84;
     renderer.setViewport(0, 0, width, height);
     renderer.clear();
@@ -202,6 +269,14 @@ class View3D {
     this.triadCamera.position.copy(camera.position).sub(this.orbit.target).setLength(7);
     this.triadCamera.lookAt(0, 0, 0);
     renderer.render(this.triad, this.triadCamera);
+  }
+
+  #tellKinds() {
+    const there = this.all().filter(([, mesh]) => mesh.visible).flatMap(([, mesh]) => mesh.userData.kinds ?? []);
+    const kinds = [...new Set([...there, ...this.section.kinds()])], now = kinds.sort().join();
+    if (!this.#kinds.hear || now === this.#kinds.now) return;
+    this.#kinds.now = now;
+    this.#kinds.hear(kinds);
   }
 
   // Give up what the view holds of the graphics card: a browser allows a page a few views.

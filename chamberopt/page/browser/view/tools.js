@@ -1,0 +1,108 @@
+// The tools of views in 3D: a section with its slider, measuring, and the legend of the kinds that are there.
+"use strict";
+class Tools {
+  #cut = { normal: [0, -1, 0], low: -1, high: 1 };
+  #isFlipped = false;
+
+  // Views that a section and measuring serve together; the controls are put into `place`.
+  constructor(views, place) {
+    const make = (tag, properties, ...inner) => {
+      const made = Object.assign(document.createElement(tag), properties);
+      made.append(...inner);
+      return made;
+    };
+    this.views = views;
+    this.section = make("button", { textContent: "Section", title: "cut the view by a plane" });
+    this.measure = make("button", { textContent: "Measure", title: "distance of two clicks; Escape ends it" });
+    this.by = make("select", { title: "across which axis, or through which face" },
+      ...[["x", "across x"], ["y", "across y"], ["z", "across z"], ["face", "through a face"]].map(([value, textContent]) => make("option", { value, textContent })));
+    this.slider = make("input", { type: "range", ariaLabel: "place of the section" });
+    this.at = make("input", { type: "number", step: "any", ariaLabel: "place of the section in mm" });
+    this.flip = make("button", { textContent: "Flip", title: "show the other side" });
+    this.told = make("output", {});
+    this.controls = make("span", { hidden: true, className: "cut" }, this.by, this.slider, make("label", {}, this.at, " mm"), this.flip);
+    this.element = make("div", { className: "tools" }, this.section, this.measure, this.controls, this.told);
+    this.ruler = new Measure(views, (text) => { this.told.textContent = text; });
+    for (const button of [this.section, this.measure]) button.setAttribute("aria-pressed", "false");
+    this.section.addEventListener("click", () => this.#turn(this.section.ariaPressed !== "true"));
+    this.measure.addEventListener("click", () => this.#measure(this.measure.ariaPressed !== "true"));
+    this.by.addEventListener("change", () => this.#begin());
+    this.slider.addEventListener("input", () => { this.at.value = this.slider.value; this.#apply(); });
+    this.at.addEventListener("input", () => { this.slider.value = this.at.value; this.#apply(); });
+    this.flip.addEventListener("click", () => { this.#isFlipped = !this.#isFlipped; this.#apply(); });
+    place.append(this.element);
+    const hear = (event) => {
+      if (!this.element.isConnected) removeEventListener("keydown", hear);
+      else if (event.key === "Escape") this.#measure(false);
+    };
+    addEventListener("keydown", hear);
+  }
+
+  #measure(on) {
+    this.measure.ariaPressed = String(on);
+    if (on && this.by.value === "face" && !this.#cut.place) this.by.value = "y"; // no face is waited for
+    if (on) this.ruler.start(); else this.ruler.end();
+  }
+
+  #turn(on) {
+    this.section.ariaPressed = String(on);
+    this.controls.hidden = !on;
+    if (on) this.#begin();
+    else for (const view of this.views) view.section.off();
+  }
+
+  // Cut in the middle, so that the eye sees the section, or wait for the click on a face.
+  #begin() {
+    const { by } = this, [first] = this.views, axis = ["x", "y", "z"].indexOf(by.value);
+    this.#isFlipped = false;
+    if (axis < 0) { this.#waitForFace(); return; }
+    const normal = [0, 0, 0], { low, high } = first.extent();
+    normal[axis] = first.camera.position.getComponent(axis) > first.orbit.target.getComponent(axis) ? -1 : 1;
+    this.#cut = { normal, sign: normal[axis], from: 0 };
+    this.#range(low[axis], high[axis], (low[axis] + high[axis]) / 2);
+  }
+
+  #waitForFace() {
+    this.#measure(false);
+    this.#cut.place = null;
+    this.told.textContent = "click a face";
+    for (const view of this.views) view.tool = (event) => {
+      const hit = Measure.place(view, event);
+      if (!hit?.normal) { this.told.textContent = "no face is there: click inside one"; return; }
+      for (const one of this.views) one.tool = null;
+      this.told.textContent = "";
+      const normal = hit.normal.clone().multiplyScalar(hit.normal.dot(view.ray(event).direction) > 0 ? 1 : -1), { size } = view.home;
+      this.#cut = { normal: normal.toArray(), sign: 1, from: normal.dot(hit.place), place: hit.place };
+      this.#range(-size / 2, size / 2, 1e-4 * size); // just behind the face
+    };
+  }
+
+  #range(low, high, at) {
+    Object.assign(this.slider, { min: low, max: high, step: 10 ** Math.floor(Math.log10((high - low) / 200)) });
+    this.slider.value = this.at.value = Number(at.toPrecision(3));
+    this.#apply();
+  }
+
+  #apply() {
+    const { normal, sign, from } = this.#cut, way = this.#isFlipped ? -1 : 1;
+    const distance = from + sign * Number(this.at.value);
+    for (const view of this.views) view.section.cut(normal.map((x) => way * x), way * distance);
+  }
+
+  // Write the kinds that views have now into a list, and keep it so.
+  static legend(list, views, kinds) {
+    const now = views.map(() => []);
+    views.forEach((view, i) => {
+      view.kinds = kinds;
+      view.hearKinds((names) => {
+        now[i] = names;
+        list.replaceChildren(...Object.entries(kinds).filter(([name]) => now.flat().includes(name)).map(([, [label, colour]]) => {
+          const item = document.createElement("li"), patch = document.createElement("i");
+          patch.style.background = colour;
+          item.append(patch, label);
+          return item;
+        }));
+      });
+    });
+  }
+}
