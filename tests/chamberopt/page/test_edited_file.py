@@ -110,7 +110,7 @@ def test_every_number_has_its_bounds_unit_and_description(file: EditedFile) -> N
     assert rows["part.offset_mm.0"]["value"] == 1.0
     assert rows["sonotrode.motion"]["choices"] == ("sinusoidal", "random_phase")
     for name in file.design.numbers():
-        tables = ("effects.part_turn", "sonotrode.amplitude_profile")
+        tables = ("effects.part_turn", "sonotrode.amplitude_profile", "sonotrode.blocks")
         absent = name.startswith(tables) and name[-1].isdecimal()
         if not absent and not name.startswith(
             ("part.target", "zones", "tolerances", "holder.", "mask.")
