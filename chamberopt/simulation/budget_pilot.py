@@ -1,34 +1,64 @@
 """Measure by a short run how fast a proposed design dents its target, and what simulating costs.
 
 The run is at the slow end of what is known of friction, with windows (discs in which dents are
-counted) so wide that few impacts resolve them. It is bounded by its collisions, never by a clock,
-so that the same design has the same result on any computer.
+counted) as narrow as its dents resolve: wide ones even out the least covered places, whose time
+is sought. It is bounded by its collisions, never by a clock, so that the same design has the same
+result on any computer.
 """
 
 from __future__ import annotations
 
 import math
 from concurrent.futures import Executor
-from typing import TYPE_CHECKING
+from dataclasses import replace
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
 
 from chamberopt.chamber.propose.proposed_budget import WIDEST, Measured
 from chamberopt.chamber.scene import chamber_mesh
 from chamberopt.common.errors import InputError
+from chamberopt.common.executor import share
 from chamberopt.common.progress import Progress
 from chamberopt.coverage.metrics import NEVER, exposed_target
 from chamberopt.design.ranges import variants
 from chamberopt.simulation.evaluate import ReplicaPlan, evaluate, require_figures
-from chamberopt.simulation.replicas import ReplicaSet, ReplicaSetting, simulate_replicas
+from chamberopt.simulation.evaluation import Evaluation
+from chamberopt.simulation.replicas import (
+    Replica,
+    ReplicaSet,
+    ReplicaSetting,
+    replica_of,
+    run_in_order,
+    simulate_seed,
+)
+from chamberopt.simulation.settling import settled_after
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
     from chamberopt.design.load import Design
 
 REPLICAS = 4
-WARMUP = 0.1  # s: balls cross the chamber some times
-FIRST_TIME, GROWTH = 0.025, 4.0  # s of each replica; over that of the run before
-DENTS = 100  # in a wide window
-COLLISIONS = 2e6  # of all replicas: a run that would have more is not begun, unless it is the first
+FIRST_TIME, GROWTH = 0.125, 4.0  # s of each replica; over that of the run before
+DENTS = 300  # in a wide window, after which no longer run is begun
+FEW = 40.0  # dents in the median of the narrowest windows; 25 are needed (proposed_budget)
+# Of all replicas: a run that would have more is not begun, unless it is the first. The second is
+# for a shot that still slows down.
+COLLISIONS, UNSETTLED = 2e6, 8e6
+
+
+class _TimedReplica(NamedTuple):
+    """A replica, and the times of its impacts on the part [s], (k,)."""
+
+    replica: Replica
+    time: np.ndarray
+
+
+def _timed_replica(setting: ReplicaSetting, seed: int) -> _TimedReplica:
+    """Simulate one replica with this seed."""
+    result = simulate_seed(*setting, seed)
+    on_part = setting.chamber.source[result.impacts.triangle] >= 0
+    return _TimedReplica(replica_of(setting, result), np.asarray(result.impacts.time)[on_part])
 
 
 def at_slow_end(design: Design) -> tuple[Design, bool]:
@@ -53,36 +83,75 @@ def measure_budget(
         accuracy = {
             "replicas": REPLICAS,
             "simulated_time_s": time,
-            "warmup_time_s": WARMUP,
+            "warmup_time_s": 0.0,
             "gauge_mm2": max(1.0, 1e6 * WIDEST * area),
             "objective_half_width": None,
         }
         slow = slow.changed({f"process.accuracy.{key}": one for key, one in accuracy.items()})
         require_figures(slow, chamber, mesh)
-        replicas = simulate_replicas(ReplicaSetting(slow, chamber, mesh), executor, progress)
-        hits = sum(int(target[one.hits.triangle].sum()) for one in replicas)
-        collisions = sum(one.collisions["total"] for one in replicas)
-        if hits >= DENTS / WIDEST or GROWTH * collisions > COLLISIONS:
+        setting = share(executor, ReplicaSetting(slow, chamber, mesh))
+        how = slow.process.seed, executor, "search", range(REPLICAS), REPLICAS
+        timed = []
+        for one in run_in_order(_timed_replica, setting, *how):
+            timed.append(one)
+            if progress:
+                progress(len(timed), REPLICAS, None)
+        on = [target[one.replica.hits.triangle] for one in timed]
+        sizes = [
+            np.square(one.replica.hits.dent[rows]) for one, rows in zip(timed, on, strict=True)
+        ]
+        times = [one.time[rows] for one, rows in zip(timed, on, strict=True)]
+        warmup, settled = settled_after(np.concatenate(times), np.concatenate(sizes), time)
+        hits = sum(map(len, times))
+        collisions = sum(one.replica.collisions["total"] for one in timed)
+        most = COLLISIONS if settled else UNSETTLED
+        if (settled and hits >= DENTS / WIDEST) or GROWTH * collisions > most:
             break
         time *= GROWTH
-    found = evaluate(
-        slow, chamber, executor, plan=ReplicaPlan(count=REPLICAS), known=ReplicaSet(replicas)
-    )
+    replicas = [
+        replace(one.replica, hits=one.replica.hits.select(one.time > warmup), halves=None)
+        for one in timed
+    ]
+    recorded = {"simulated_time_s": time - warmup, "warmup_time_s": warmup}
+    slow = slow.changed({f"process.accuracy.{key}": one for key, one in recorded.items()})
+    found = _seen(slow, chamber, executor, replicas)
+    narrow = slow.process.accuracy.gauge_mm2 * FEW / max(found.resolution.dents, 1.0)
+    if narrow < slow.process.accuracy.gauge_mm2:
+        narrower = slow.changed({"process.accuracy.gauge_mm2": max(1.0, narrow)})
+        again = _seen(narrower, chamber, executor, replicas)
+        if _resolved(again) or not _resolved(found):
+            slow, found = narrower, again
     places, mean = found.metrics["time_to_98_s"], found.metrics["exposure"].value
     dents, simulated = found.resolution.dents, found.simulated_time
     if not dents or not mean > 0.0:
         raise InputError(f"the shot hardly hits the target in {simulated:.3g} simulated s")
-    resolved = math.isfinite(places.half_width) and places.value < NEVER
+    resolved = _resolved(found)
     mean_time = slow.process.treatment_time / mean
     return Measured(
         dent_rate=dents / (simulated * slow.process.accuracy.gauge),
-        collision_rate=collisions / (simulated + REPLICAS * WARMUP),
+        collision_rate=collisions / (REPLICAS * time),
         time_to_98=places.value if resolved else mean_time,
         places=resolved,
         spread=places.half_width if resolved else math.inf,
         friction=friction,
         dents_for_mean=found.resolution.needed_for_mean / slow.process.treatment_time,
         target=area,
-        simulated=simulated,
+        simulated=REPLICAS * time,
         mean_time=mean_time,
+        warmup=warmup,
+        settled=settled,
     )
+
+
+def _seen(
+    design: Design, chamber: Chamber, executor: Executor, replicas: list[Replica]
+) -> Evaluation:
+    """Return the figures of replicas in windows of the design's size."""
+    plan, known = ReplicaPlan(count=REPLICAS), ReplicaSet(list(replicas))
+    return evaluate(design, chamber, executor, plan=plan, known=known)
+
+
+def _resolved(found: Evaluation) -> bool:
+    """Return whether the time of single places is known."""
+    places = found.metrics["time_to_98_s"]
+    return math.isfinite(places.half_width) and places.value < NEVER

@@ -45,6 +45,7 @@ from chamberopt.simulation.replicas import (
     simulate_replica,
 )
 from chamberopt.simulation.resting_balls import resting_notes
+from chamberopt.simulation.settling import settling_notes
 from chamberopt.simulation.trapped_balls import trapped_notes, trapped_shares
 
 if TYPE_CHECKING:
@@ -204,6 +205,7 @@ class _Run:
                 *stress_notes(design.materials.part),
                 *resting_notes([one.resting for one in replicas if one.resting], done),
                 *trapped_notes([one.trapped for one in replicas], design),
+                *settling_notes([one.halves for one in replicas if one.halves], design),
             ),
             zones={name: one.field.reachable for name, one in zones.items()},
             stream=plan.stream,

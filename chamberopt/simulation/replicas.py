@@ -17,6 +17,7 @@ from chamberopt.common.errors import WorkerLostError
 from chamberopt.common.executor import share
 from chamberopt.coverage.part_impacts import Hits, hits_on_part
 from chamberopt.simulation.resting_balls import RestingBalls, find_resting_balls
+from chamberopt.simulation.settling import dented_halves
 from chamberopt.simulation.trapped_balls import TrappedBalls, find_trapped_balls
 
 if TYPE_CHECKING:
@@ -46,6 +47,8 @@ class Replica:
     resting: RestingBalls | None  # the balls at rest at its end; None if there are none
     trapped: TrappedBalls  # balls that hopped on one spot or rattled in a gap
     hits: Hits
+    # What was dented on the target in its two halves, as of `dented_halves`; None if not known.
+    halves: tuple[float, float] | None = None
 
 
 @dataclass
@@ -121,8 +124,12 @@ def _result(number: int, future: Future[T]) -> T:
 
 def simulate_replica(setting: ReplicaSetting, seed: int) -> Replica:
     """Simulate one replica with this seed, and return its balls and its impacts on the part."""
-    design, chamber, mesh = setting
-    result = simulate_seed(design, chamber, mesh, seed)
+    return replica_of(setting, simulate_seed(*setting, seed))
+
+
+def replica_of(setting: ReplicaSetting, result: SimulationResult) -> Replica:
+    """Return what is kept of a simulated replica."""
+    design, chamber, _ = setting
     impacts, part_turns = result.impacts, design.effects.part_turn is not None
     return Replica(
         collisions={
@@ -132,6 +139,7 @@ def simulate_replica(setting: ReplicaSetting, seed: int) -> Replica:
         resting=find_resting_balls(result.resting, design.shot.diameters, chamber, part_turns),
         trapped=find_trapped_balls(result, design.process.recorded_time, chamber, part_turns),
         hits=hits_on_part(impacts, chamber, design),
+        halves=dented_halves(impacts, chamber, design),
     )
 
 

@@ -21,6 +21,9 @@ SLOWER = 2.0  # times as slow as the start: candidates of a search that are stil
 COLLISIONS = 2e7
 MINUTES = 6.0
 LEAST_TIME, MOST_TIME = 0.1, 1000.0  # s, of each replica
+LEAST_WARMUP = 0.2  # s: balls cross the chamber some times
+UNSETTLED = "the shot still slowed down at the end of the pilot: results say whether it has settled"
+SLOW_TO_SETTLE = "until then the shot still slowed down, by a pilot"
 USUAL_GAUGE = 1e-6  # m²: wider only where the time would be too long
 WIDEST = 0.02  # of the target's area
 # What is set on a machine [s]: above them quarters of an hour, below them whole seconds.
@@ -50,6 +53,8 @@ class Measured(NamedTuple):
         target: area of the target [m²].
         simulated: simulated time of all replicas of the pilot [s].
         mean_time: after which the target is 98 % covered on average [s].
+        warmup: after which the shot no longer slowed down [s].
+        settled: this is known; otherwise it is half of the pilot.
     """
 
     dent_rate: float
@@ -62,6 +67,8 @@ class Measured(NamedTuple):
     target: float
     simulated: float
     mean_time: float
+    warmup: float = 0.0
+    settled: bool = True
 
 
 class Budget(NamedTuple):
@@ -70,6 +77,7 @@ class Budget(NamedTuple):
     treatment: float  # [s]
     time: float  # [s]
     gauge_mm2: float
+    warmup: float  # [s], of each replica
     reasons: dict[str, str]  # by dotted name
     search_time: float  # [s], as in Proposal
 
@@ -93,11 +101,16 @@ def propose_budget(found: Measured) -> Budget:
         "process.treatment_time_s": _said_of_treatment(found),
         "process.accuracy.simulated_time_s": expected + (few if dents * gauge < needed else ""),
     }
+    warmup = _rounded_up(max(LEAST_WARMUP, found.warmup))
+    if not found.settled:
+        reasons["process.accuracy.warmup_time_s"] = UNSETTLED
+    elif warmup > LEAST_WARMUP:
+        reasons["process.accuracy.warmup_time_s"] = SLOW_TO_SETTLE
     if gauge > 1.0:
         reasons["process.accuracy.gauge_mm2"] = wider
     # The time to 98 % takes DENTS alone, where the mean takes more. A slow candidate has fewer.
     share = min(1.0, SLOWER * DENTS / (dents * gauge)) if found.places else 1.0
-    return Budget(treatment, time, gauge, reasons, REPLICAS * time * share)
+    return Budget(treatment, time, gauge, warmup, reasons, REPLICAS * time * share)
 
 
 def with_budget(made: Proposal, budget: Budget) -> Proposal:
@@ -106,6 +119,7 @@ def with_budget(made: Proposal, budget: Budget) -> Proposal:
         "process.treatment_time_s": budget.treatment,
         "process.accuracy.simulated_time_s": budget.time,
         "process.accuracy.gauge_mm2": budget.gauge_mm2,
+        "process.accuracy.warmup_time_s": budget.warmup,
     }
     tables = {name: dict(table) for name, table in made.tables.items()}
     for name, value in values.items():
