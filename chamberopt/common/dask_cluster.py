@@ -1,6 +1,6 @@
 """Run replicas and candidates on a Dask cluster.
 
-Only this file imports the package `distributed`; pip install chamberopt[dask] installs it.
+Only this file imports the package `distributed`; pip install chamberopt[cluster] installs it.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ class DaskExecutor(Executor):
         try:
             import distributed
         except ImportError:
-            text = "needs Dask, which is not installed; pip install 'chamberopt[dask]'"
+            text = "needs Dask, which is not installed; pip install 'chamberopt[cluster]'"
             raise InputError(f"--cluster: {text}") from None
         quiet = "distributed", "distributed.client", "tornado", "tornado.application", "asyncio"
         for name in quiet:

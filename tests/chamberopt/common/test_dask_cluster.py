@@ -33,7 +33,7 @@ from tests.helpers.studies import sweep_in_folder
 from tests.helpers.synthetic import plate_design
 
 distributed = pytest.importorskip(
-    "distributed", reason="Dask is not installed: pip install 'chamberopt[dask]'"
+    "distributed", reason="Dask is not installed: pip install 'chamberopt[cluster]'"
 )
 
 ROOT = Path(__file__).parents[3]
