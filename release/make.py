@@ -28,7 +28,7 @@ PLACES = {
     "release/recipe.yaml": (r'^  version: ".*"$', '  version: "{version}"'),
     "CITATION.cff": (
         r"^version: .*$(\ndate-released: .*$)?",
-        "version: {version}\ndate-released: {day}",
+        "version: {version}\ndate-released: '{day}'",
     ),
     "CHANGELOG.md": (f"^{UNRELEASED}", UNRELEASED + "\n## {version} ({day})\n"),
 }

@@ -175,7 +175,7 @@ def interrupt_with_parent() -> None:
     """
 
     def interrupt() -> None:
-        if os.name == "posix":
+        if sys.platform != "win32":
             os.kill(os.getpid(), signal.SIGINT)
         else:
             _thread.interrupt_main()

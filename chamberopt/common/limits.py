@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 import math
 import os
+import sys
+from contextlib import suppress
 from pathlib import Path
 
 from chamberopt.common.errors import InputError, UnreadableError
@@ -59,13 +61,14 @@ def read_limited(path: Path, most: int, what: str, follow: bool = False) -> byte
 
 def limit_memory() -> None:
     """Limit the memory of this process to MAX_READER_BYTES, if the operating system can do so."""
-    try:
-        import resource
-    except ImportError:  # Windows
+    if sys.platform == "win32":
         return
+    import resource
+
     _, hard = resource.getrlimit(resource.RLIMIT_AS)
     most = MAX_READER_BYTES if hard == resource.RLIM_INFINITY else min(MAX_READER_BYTES, hard)
-    resource.setrlimit(resource.RLIMIT_AS, (most, hard))
+    with suppress(ValueError, OSError):  # macOS refuses a limit below what it has mapped
+        resource.setrlimit(resource.RLIMIT_AS, (most, hard))
 
 
 def limit_cpu_time(seconds: float) -> None:
@@ -73,10 +76,10 @@ def limit_cpu_time(seconds: float) -> None:
 
     Systems without such a limit (Windows) do nothing.
     """
-    try:
-        import resource
-    except ImportError:  # Windows
+    if sys.platform == "win32":
         return
+    import resource
+
     _, hard = resource.getrlimit(resource.RLIMIT_CPU)
     most = math.ceil(min(seconds, MAX_CPU_S))
     resource.setrlimit(resource.RLIMIT_CPU, (min(most, hard) if hard >= 0 else most, hard))
@@ -85,10 +88,10 @@ def limit_cpu_time(seconds: float) -> None:
 
 def raise_cpu_time(seconds: float) -> None:
     """Add `seconds` to the CPU time that this process may use, if its CPU time is limited."""
-    try:
-        import resource
-    except ImportError:
+    if sys.platform == "win32":
         return
+    import resource
+
     soft, _ = resource.getrlimit(resource.RLIMIT_CPU)
     if soft != resource.RLIM_INFINITY:
         limit_cpu_time(soft + seconds)

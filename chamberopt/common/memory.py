@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import sys
 import threading
 import weakref
 from collections.abc import Iterator
@@ -41,7 +42,9 @@ def _free_of_machine() -> float:
             if line.startswith("MemAvailable:"):
                 return 1024.0 * int(line.split()[1])
     # macOS has no such file and tells only its total memory. Windows tells neither.
-    with suppress(AttributeError, OSError, ValueError):
+    if sys.platform == "win32":
+        return math.inf
+    with suppress(OSError, ValueError):
         pages = os.sysconf("SC_PHYS_PAGES")
         return float(pages * os.sysconf("SC_PAGE_SIZE"))
     return math.inf

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import hmac
 import json
-import os
 import secrets
 import socket
+import sys
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -250,7 +250,7 @@ def serve(
     """
     front = Front(folder, file, trusted)
     listening = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
-    if os.name == "posix":  # takes a port just left; Windows would share a port in use
+    if sys.platform != "win32":  # takes a port just left; Windows would share a port in use
         listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
         try:

@@ -6,6 +6,7 @@ import json
 import os
 import signal
 import subprocess
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 from threading import Lock, Thread
@@ -34,7 +35,10 @@ class StartedCommand:
             "--progress",
             "jsonl",
             cwd=folder,
-            start_new_session=True,  # Ctrl-C is for the server, which tells the command once
+            # Ctrl-C is for the server, which tells the command once. Windows has groups for it.
+            start_new_session=True,
+            creationflags=getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0),
+            env={**os.environ, "PYTHONIOENCODING": "utf-8"},  # pipes of Windows have another
             stderr=subprocess.STDOUT,
             text=True,
             encoding="utf-8",
@@ -63,7 +67,7 @@ class StartedCommand:
     def stop(self) -> None:
         """Interrupt the command as Ctrl-C does."""
         if self._process.poll() is None:
-            if os.name == "posix":
+            if sys.platform != "win32":
                 self._process.send_signal(signal.SIGINT)
             else:
                 self._close_pipe()
@@ -74,7 +78,7 @@ class StartedCommand:
         try:
             self._process.wait(2.0 * GRACE_S)
         except subprocess.TimeoutExpired:
-            if os.name == "posix":
+            if sys.platform != "win32":
                 os.killpg(self._process.pid, signal.SIGKILL)
             self._process.kill()
 

@@ -88,8 +88,11 @@ class CheckedCache(FunctionCache):
     def _lock(self, sig: object = None) -> None:
         """Lock the code of a signature, or without one the index of the function's code.
 
-        After MAX_WAIT_S the process goes on without the lock.
+        After MAX_WAIT_S the process goes on without the lock. On Windows there are no locks:
+        processes that start together compile the same twice.
         """
+        if sys.platform == "win32":
+            return
         file, until = _lock_file(self._cache_file._cache_path), time.monotonic() + MAX_WAIT_S
         while file is not None and time.monotonic() < until:
             try:
@@ -102,6 +105,8 @@ class CheckedCache(FunctionCache):
                 return
 
     def _unlock(self, sig: object = None) -> None:
+        if sys.platform == "win32":
+            return
         file = _lock_file(self._cache_file._cache_path)
         if file is not None:
             with suppress(OSError):
@@ -115,9 +120,7 @@ class CheckedCache(FunctionCache):
 
 @cache
 def _lock_file(folder: str) -> BinaryIO | None:
-    """Open the empty file whose bytes are locked. None without locks, and in a removed folder."""
-    if sys.platform == "win32":
-        return None
+    """Open the empty file whose bytes are locked. None in a removed folder."""
     try:
         return open(Path(folder, "locks"), "ab")
     except OSError:

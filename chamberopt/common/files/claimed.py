@@ -148,7 +148,7 @@ def _only_writer(lock_file: Path, output: Path, remedy: str, wait: float = 0.0) 
             with suppress(OSError):
                 folder.remove(name)
             os.close(lock)
-            if os.name == "nt":  # Windows removes no open file
+            if sys.platform == "win32":  # which removes no open file
                 with suppress(OSError):
                     folder.remove(name)
 
@@ -177,7 +177,8 @@ def _locked(folder: OpenFolder, name: str) -> int | None:
                 return None
             # the file was made here, because a holder writes its name
             if os.fstat(file).st_size == 0:
-                folder.remove(name)
+                with suppress(OSError):  # Windows removes no open file
+                    folder.remove(name)
             raise
         finally:
             if not keep:
