@@ -23,9 +23,6 @@ from numba.core.caching import (
     UserProvidedCacheLocator,
 )
 
-if sys.platform != "win32":
-    import fcntl
-
 DIGEST_BYTES = 32
 MAX_WAIT_S = 60.0  # for a process that compiles the same; it may have been stopped
 
@@ -93,6 +90,8 @@ class CheckedCache(FunctionCache):
         """
         if sys.platform == "win32":
             return
+        import fcntl
+
         file, until = _lock_file(self._cache_file._cache_path), time.monotonic() + MAX_WAIT_S
         while file is not None and time.monotonic() < until:
             try:
@@ -107,6 +106,8 @@ class CheckedCache(FunctionCache):
     def _unlock(self, sig: object = None) -> None:
         if sys.platform == "win32":
             return
+        import fcntl
+
         file = _lock_file(self._cache_file._cache_path)
         if file is not None:
             with suppress(OSError):
