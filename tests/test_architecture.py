@@ -35,8 +35,8 @@ ORDER = {
     "chamberopt/coverage": "dents part_impacts+metrics field coverage_from_impacts "
     "percentile coverage_intervals strength strength_intervals compression",
     "chamberopt/simulation": "resting_balls trapped_balls settling effort replicas evaluation "
-    "estimates evaluate time_curve field_values variations advice effect_pilot+budget_pilot error_law "
-    "numerical_parameters+timed_replicas convergence recommendation",
+    "estimates evaluate time_curve field_values variations advice effect_pilot+budget_pilot "
+    "error_law numerical_parameters+timed_replicas convergence recommendation",
     "chamberopt/peening": "strip+calibration_errors kirk_fit+strip_holder responses "
     "tolerance_result range_result tolerances+ranges measured probes virtual_strip posterior "
     "setups calibrate next_measurement",
