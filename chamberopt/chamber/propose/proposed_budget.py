@@ -32,8 +32,8 @@ SET_TIMES = (
     *(10, 15, 20, 30, 45, 60, 90, 120, 180, 240, 300, 360, 420, 480, 540, 600),
     *(720, 900, 1200, 1500, 1800, 2400, 3000, 3600),
 )
-# Factors on the pilot's time. Its wide windows even out the least covered places; where it resolves
-# none, they lag behind the target on average: 326 s against 290 s and 133 s in a joint's chamber.
+# Factors on the pilot's time, which is short. Where it resolves no single places, the least covered
+# ones lag behind the target on average: 326 s against 133 s in a joint's chamber.
 MORE, LAGGING = 1.3, 2.0
 LONG = 1800.0  # s
 UNEVEN = 1.5  # time of single places over that of the target on average, from which on they rule
