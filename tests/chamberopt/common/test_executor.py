@@ -162,7 +162,7 @@ def test_invalid_workers_are_refused(
 
 def test_without_dask_the_remedy_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "distributed", None)
-    with pytest.raises(InputError, match=r"pip install 'chamberopt\[dask\]'"):
+    with pytest.raises(InputError, match=r"pip install 'chamberopt\[cluster\]'"):
         open_executor(None, "tcp://127.0.0.1:8786")
 
 
