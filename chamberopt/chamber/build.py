@@ -63,6 +63,7 @@ if TYPE_CHECKING:
 # ball's path a hundred times as much.
 MAX_ROTATION = 1e-3
 MIN_ROOM = 1e-13  # [m³], a fifth of the smallest ball: less is rounding, and worth no note
+NOTED_HIDDEN = 1e-3  # share of a surface outside the cavity from which on it is told
 TARGET = "the target"
 
 
@@ -450,7 +451,7 @@ def _hidden_notes(chamber: Chamber) -> list[str]:
         f"{hidden:.1%} of the area of {name} is outside the cavity and counts as not covered; "
         f"narrow {selection_of(name)} to what is to be peened, or enlarge the chamber"
         for name, hidden in shares.items()
-        if hidden >= 1e-3
+        if hidden >= NOTED_HIDDEN
     ]
 
 

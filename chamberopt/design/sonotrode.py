@@ -205,6 +205,11 @@ class Blocks(FileTable):
         return self.columns * self.size_mm[0], self.rows * self.size_mm[1]
 
     @property
+    def count(self) -> int:
+        """Number of all blocks."""
+        return self.columns * self.rows
+
+    @property
     def joints_mm(self) -> tuple[list[float], list[float]]:
         """Places of the joints between columns along x, and between rows along y."""
         (x, y), (long, wide) = self.size_mm, self.sides_mm
@@ -217,8 +222,8 @@ class Blocks(FileTable):
     def in_words(self) -> str:
         """Number and size, such as 4 blocks of 80 × 80 mm side by side, 2 × 2."""
         x, y = self.size_mm
-        count = self.columns * self.rows
-        return f"{count} blocks of {x:g} × {y:g} mm side by side, {self.columns} × {self.rows}"
+        grid = f"{self.columns} × {self.rows}"
+        return f"{self.count} blocks of {x:g} × {y:g} mm side by side, {grid}"
 
 
 class Sonotrode(VibratingFace):

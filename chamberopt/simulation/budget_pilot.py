@@ -31,6 +31,7 @@ from chamberopt.simulation.replicas import (
     replica_of,
     run_in_order,
     simulate_seed,
+    times_on_part,
 )
 from chamberopt.simulation.settling import settled_after
 
@@ -57,8 +58,7 @@ class _TimedReplica(NamedTuple):
 def _timed_replica(setting: ReplicaSetting, seed: int) -> _TimedReplica:
     """Simulate one replica with this seed."""
     result = simulate_seed(*setting, seed)
-    on_part = setting.chamber.source[result.impacts.triangle] >= 0
-    return _TimedReplica(replica_of(setting, result), np.asarray(result.impacts.time)[on_part])
+    return _TimedReplica(replica_of(setting, result), times_on_part(setting.chamber, result))
 
 
 def at_slow_end(design: Design) -> tuple[Design, bool]:

@@ -8,6 +8,8 @@ from concurrent.futures import Executor, Future
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
+import numpy as np
+
 from chamberopt.chamber.analytic import impacts_on_chamber
 from chamberopt.chamber.flexure import flexure_of_surfaces
 from chamberopt.chamber.part import turning_axis
@@ -130,17 +132,24 @@ def simulate_replica(setting: ReplicaSetting, seed: int) -> Replica:
 def replica_of(setting: ReplicaSetting, result: SimulationResult) -> Replica:
     """Return what is kept of a simulated replica."""
     design, chamber, _ = setting
-    impacts, part_turns = result.impacts, design.effects.part_turn is not None
+    part_turns, end = design.effects.part_turn is not None, design.process.recorded_time
+    hits, time = hits_on_part(result.impacts, chamber, design), times_on_part(chamber, result)
     return Replica(
         collisions={
             kind: int(getattr(result.collisions, kind))
             for kind in ("walls", "balls", "sonotrode", "total")
         },
         resting=find_resting_balls(result.resting, design.shot.diameters, chamber, part_turns),
-        trapped=find_trapped_balls(result, design.process.recorded_time, chamber, part_turns),
-        hits=hits_on_part(impacts, chamber, design),
-        halves=dented_halves(impacts, chamber, design),
+        trapped=find_trapped_balls(result, end, chamber, part_turns),
+        hits=hits,
+        halves=dented_halves(hits, time, chamber.part.target, end),
     )
+
+
+def times_on_part(chamber: Chamber, result: SimulationResult) -> np.ndarray:
+    """Return the time [s] of each impact on the part, in the order of a replica's hits, (k,)."""
+    impacts = result.impacts
+    return np.asarray(impacts.time[chamber.source[impacts.triangle] >= 0])
 
 
 def simulate_seed(

@@ -16,12 +16,10 @@ import numpy as np
 
 from chamberopt.common.estimate import estimate
 from chamberopt.common.number_text import estimate_text
-from chamberopt.coverage.dents import dent_diameters
 
 if TYPE_CHECKING:
-    from chamberopt.chamber.build import Chamber
+    from chamberopt.coverage.part_impacts import Hits
     from chamberopt.design.load import Design
-    from sim_core import ImpactLog
 
 CONFIDENCE = 0.99  # that the halves differ, as the note is seldom wanted
 LEAST = 0.01  # relative difference of the halves that is worth a note
@@ -30,11 +28,19 @@ SIGMAS = 2.0  # of the scatter of a pilot's rate, beside SETTLED
 SHORTEST = 0.1  # s: shortest warm-up that a pilot is asked for
 
 
-def dented_halves(impacts: ImpactLog, chamber: Chamber, design: Design) -> tuple[float, float]:
-    """Return the squared diameters of dents on the target [m²] in both halves of a replica."""
-    on = chamber.on_target[impacts.triangle]
-    size = np.square(dent_diameters(impacts, chamber, design), where=on, out=np.zeros(len(on)))
-    late = np.asarray(impacts.time) > 0.5 * design.process.recorded_time
+def dented_halves(
+    hits: Hits, time: np.ndarray, target: np.ndarray, end: float
+) -> tuple[float, float]:
+    """Return the squared diameters of dents on the target [m²] in both halves of a replica.
+
+    Args:
+        hits: the impacts on the part.
+        time: of each of them [s], (k,).
+        target: marks the triangles of the target, (m,).
+        end: of the replica [s].
+    """
+    size = np.where(target[hits.triangle], hits.dent, 0.0) ** 2
+    late = time > 0.5 * end
     return float(size[~late].sum()), float(size[late].sum())
 
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from chamberopt.chamber.build import hidden_share, selection_of
+from chamberopt.chamber.build import NOTED_HIDDEN, hidden_share, selection_of
 from chamberopt.chamber.checks.calibration import calibration_warnings
 from chamberopt.chamber.checks.fillets import facet_warnings, fillet_warnings, touched_by_curvature
 from chamberopt.chamber.checks.gaps import (
@@ -393,7 +393,7 @@ def _side_wall_warnings(design: Design, chamber: Chamber) -> list[str]:
     like a lid, turns (its joint is a round shaft), has a hole or a bore for its fixture, or is
     drawn with its chamber.
     """
-    if hidden_share(chamber) < 1e-3:
+    if hidden_share(chamber) < NOTED_HIDDEN:
         return []
     turns, drawn = design.effects.part_turn is not None, design.chamber.setup() is not None
     names = surface_names(chamber)

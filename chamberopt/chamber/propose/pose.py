@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from chamberopt.chamber.propose.proposed_target import LONG
 from chamberopt.geometry.triangles import area_vectors, rotation_matrix, unit_vectors
 
 if TYPE_CHECKING:
@@ -29,9 +30,8 @@ Turns = tuple[float, float, float]
 # pose as drawn, of turns by multiples of 90 and of 45 degrees, and of turns by steps of 15 and 5.
 AS_DRAWN, ALONG_AXIS, DIAGONAL = 0.10, 0.08, 0.05
 OF_STEP = {15.0: 0.02, 5.0: 0.01}
-# What a long part may lose by hanging, where no sonotrode is large enough for it lying, and its
-# least length over its width.
-HANGING, LONG = 0.15, 1.6
+# What a long part may lose by hanging, where no sonotrode is large enough for it lying.
+HANGING = 0.15
 LOW = 0.05  # advantage of a target at the part's lower end over a target at its upper end
 FLAT = 0.999  # length of the mean unit normal of a target that counts as flat
 LEVEL_DEG = 0.5  # a flat face is level if it is tilted by less

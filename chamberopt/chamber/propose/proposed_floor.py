@@ -48,7 +48,7 @@ class Floor(NamedTuple):
     @property
     def is_one_sonotrode(self) -> bool:
         """Whether one sonotrode carries the chamber."""
-        return math.isfinite(self.lean) and self.blocks is None
+        return math.isfinite(self.lean) and self.face.blocks is None
 
     @property
     def blocks(self) -> Blocks | None:
@@ -62,7 +62,7 @@ class Floor(NamedTuple):
     @property
     def excess(self) -> tuple[float, ...]:
         """How far the floor is from one upright over one sonotrode; less is better."""
-        count = 1 if self.blocks is None else self.blocks.columns * self.blocks.rows
+        count = 1 if self.face.blocks is None else self.face.blocks.count
         return math.isinf(self.lean), count, self.lean, self.too_large
 
 
@@ -153,15 +153,15 @@ def _move(sizes: Sizes, round_part: float, face: Face) -> float:
     It is at most 0 if the floor lies within the face, and infinite if no floor of this form does.
     A box whose walls move in by t has the half diagonal r at x + y - 2 t = sqrt(2 r² - (x - y)²).
     """
-    length, width = (5e-4 * one for one in face.sides_mm)
+    width = 5e-4 * face.sides_mm[1]
     if sizes.shape != "box":
         radius = _radius(sizes, round_part)
         inner = math.cos(math.pi / int(sizes.plan["sides"])) if sizes.shape == "prism" else 1.0
         return inner * (radius - width)
     x, y = _half(sizes)
     if face.sonotrode.size_mm is not None:
-        across, along = (width, length) if x < y else (length, width)
-        return max(x - across, y - along)
+        along_x, along_y = (5e-4 * one for one in _along(sizes, face))
+        return max(x - along_x, y - along_y)
     square = 2.0 * width**2 - (x - y) ** 2
     move = 0.5 * (x + y - math.sqrt(square)) if square > 0.0 else math.inf
     return move if move < 0.8 * min(x, y) else math.inf
