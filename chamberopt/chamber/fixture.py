@@ -1,9 +1,9 @@
 """Cut what holds and what masks the part out of the cavity of its chamber.
 
-A holder is a prism along the holder's axis, which points out of the room: round (rod, collar) or
-rectangular (plate). It ends inside the wall. A mask is what faces of the part sweep, either along
-their own normals by the thickness of a shell, or along an axis into the wall; or it is plugs, the
-convex hulls of the walls of holes.
+A holder is a prism along the holder's axis, which points out of the room: round (rod, collar,
+arbor) or rectangular (plate). It ends inside the wall. A mask is what faces of the part sweep,
+either along their own normals by the thickness of a shell, or along an axis into the wall; or it is
+plugs, the convex hulls of the walls of holes.
 
       ======= wall ======
          |  holder  |         ^ axis      z: along the axis, from the origin of the chamber's frame
@@ -65,6 +65,7 @@ SINK = 1e-6  # m: depth of a holder's end in the part, so that rounding leaves n
 FARTHEST = 1e-3  # share of the part's extent: what reaches farthest, without `holder.at`
 OF_FACE = 0.8  # diameter of a rod, over that of the widest circle in its face
 ROUND_FACE = 1.25  # diameter of a collar, over that of the narrowest circle round its faces
+ACROSS = 0.2  # largest mean cosine between the axis of an arbor and the normals of its hole's walls
 ON_AXIS = 1e-5  # m: a holder this close to the axis about which the part turns is on it
 # Longest way of a vertex of a shell over its thickness: the shell is cut off over sharper edges.
 MITRE = 2.0
@@ -219,6 +220,8 @@ def _holder(design: Design, part: Part, filled: CavitySolid) -> _Made:
             "holder.at: seen along holder.axis these faces have no area; give faces that look "
             "along it, or that go round it"
         )
+    if holder.kind == "arbor":
+        return _arbor(design, part, filled, frame, hull, clamped)
     if holder.kind == "plate":
         middle, sides, turn = narrowest_rectangle(hull)
         usual = sides if holder.grip_mm is None else ROUND_FACE * sides
@@ -236,7 +239,7 @@ def _holder(design: Design, part: Part, filled: CavitySolid) -> _Made:
     heights = _heights_under(outline, faces)
     collar = holder.kind == "collar"
     low = float(faces[..., 2].min() if collar or not heights.size else heights.min())
-    wall, end = _way_out(filled, frame, middle, outline, low)
+    wall, end = (low + way for way in _way_out(filled, frame, middle, outline, low))
     top = min(float(faces[..., 2].max() if collar or not heights.size else heights.max()), wall)
     start = low if holder.grip_mm is None else top - 1e-3 * holder.grip_mm
     if collar and start > top - SINK:
@@ -261,6 +264,54 @@ def _holder(design: Design, part: Part, filled: CavitySolid) -> _Made:
     return _Made(solids, clamped, holder.kind, tuple(map(float, size)), wall - start, place)
 
 
+def _arbor(
+    design: Design,
+    part: Part,
+    filled: CavitySolid,
+    frame: np.ndarray,
+    hull: np.ndarray,
+    clamped: np.ndarray,
+) -> _Made:
+    """Return a shaft that fills a hole of the part and goes on to the wall, perhaps with flanges.
+
+    Raises InputError if the clamped faces are no walls of a hole along the holder's axis.
+
+    Args:
+        frame: two axes across the holder's, and this, (3, 3).
+        hull: corners of the hole's section [m], (n, 2).
+        clamped: marks the triangles of the hole's walls, (m,).
+    """
+    holder = design.holder
+    assert holder is not None
+    walls = part.triangles[clamped]
+    vectors = area_vectors(part.vertices, walls)
+    along = np.abs(vectors @ frame[2]).sum() / np.linalg.norm(vectors, axis=1).sum()
+    if along > ACROSS or not is_hole(part.vertices, walls):
+        raise InputError(
+            "holder.at: these faces are no walls of a hole along holder.axis = "
+            f"{list(holder.axis)}; give the walls of one hole, and its axis in the chamber's frame"
+        )
+    middle = centroid(hull)
+    radius = float(radii(hull, middle)[1]) + SINK
+    outline = _circle(middle, 2.0 * radius / np.cos(np.pi / SIDES))
+    _refuse_off_axis(design, part, frame[2], frame.T[:, :2] @ middle)
+    places = part.vertices[walls] @ frame[2]
+    low, high = float(places.min()), float(places.max())
+    wall, end = (high + way for way in _way_out(filled, frame, middle, outline, high))
+    start = bottom = low
+    if holder.both_sides:
+        other = frame * [[1.0], [1.0], [-1.0]]
+        start, bottom = (low - way for way in _way_out(filled, other, middle, outline, -low))
+    solids = [_prism(frame, outline, bottom, end)]
+    if holder.diameter_mm is not None and holder.thickness_mm is not None:
+        flange, thick = _circle(middle, 1e-3 * holder.diameter_mm), 1e-3 * holder.thickness_mm
+        solids.append(_prism(frame, flange, high - SINK, min(high + thick, end)))
+        if holder.both_sides:
+            solids.append(_prism(frame, flange, max(low - thick, bottom), low + SINK))
+    place = tuple(map(float, np.array([*middle, start]) @ frame))
+    return _Made(solids, clamped, holder.kind, (2.0 * radius,), wall - start, place)
+
+
 def _clamped(design: Design, part: Part, axis: np.ndarray) -> np.ndarray:
     """Mark the triangles (m,) of the part that the holder clamps.
 
@@ -275,7 +326,7 @@ def _clamped(design: Design, part: Part, axis: np.ndarray) -> np.ndarray:
         near = height > height.max() - FARTHEST * np.ptp(height)
         chosen = near.all(axis=1) if near.all(axis=1).any() else near.any(axis=1)
     facing = area_vectors(part.vertices, part.triangles[chosen]).sum(axis=0) @ axis
-    if holder.kind != "collar" and facing <= 0.0:
+    if holder.kind in ("rod", "plate") and facing <= 0.0:
         raise InputError(
             f"holder.at: these faces do not look along holder.axis = {list(holder.axis)}, the way "
             "out of the room in the chamber's frame; give other faces, or another axis"
@@ -310,9 +361,9 @@ def _refuse_off_axis(design: Design, part: Part, axis: np.ndarray, middle: np.nd
 def _way_out(
     filled: CavitySolid, frame: np.ndarray, middle: np.ndarray, outline: np.ndarray, low: float
 ) -> tuple[float, float]:
-    """Return where the holder's axis meets the wall, and where all of the holder is in the wall.
+    """Return how far the wall is along the axis, and from where all of the holder is in the wall.
 
-    Both are places along the axis [m]. Raises InputError if the axis does not lead out of the room.
+    Both are lengths from the start [m]. Raises InputError if the axis does not lead out.
 
     Args:
         middle: place of the axis across it [m], (2,).
@@ -330,7 +381,7 @@ def _way_out(
             "along this way; give faces inside the room, and the way out of it in the chamber's "
             "frame"
         )
-    return low + float(distance[0]), low + float(distance[leaving].max()) + DEPTH_IN_ROOM
+    return float(distance[0]), float(distance[leaving].max()) + DEPTH_IN_ROOM
 
 
 def _prism(

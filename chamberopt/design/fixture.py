@@ -24,6 +24,7 @@ HOLDER_KEYS = {
     "rod": ("at", "diameter_mm"),
     "collar": ("at", "diameter_mm", "grip_mm"),
     "plate": ("at", "size_mm", "grip_mm", "thickness_mm", "diameter_mm"),
+    "arbor": ("at", "both_sides", "diameter_mm", "thickness_mm"),
     "bore": ("clearance_mm",),
 }
 
@@ -40,10 +41,13 @@ class Holder(FileTable):
     """A body that holds the part and goes out through the chamber's wall, along its axis.
 
     A rod stands on a face of the part, a collar goes round an end or a shaft, and a plate is a
-    block on a face, or round a root. In a bore the part itself goes out through the wall.
+    block on a face, or round a root. An arbor is a shaft through a hole of the part. In a bore the
+    part itself goes out through the wall.
     """
 
-    kind: Literal["rod", "collar", "plate", "bore"] = Field(description="what holds the part")
+    kind: Literal["rod", "collar", "plate", "arbor", "bore"] = Field(
+        description="what holds the part"
+    )
     at: Selection | None = Field(
         default=None,
         description="faces that it clamps, by the keys of [part.target]; absent: what reaches "
@@ -66,7 +70,12 @@ class Holder(FileTable):
         None,
     )  # fmt: skip
     thickness_mm: float | None = quantity(
-        0.1, 2000, "mm", "of a plate that a rod carries; absent: up to the wall", None
+        0.1, 2000, "mm",
+        "of a plate that a rod carries; absent: up to the wall; of an arbor's flanges", None,
+    )  # fmt: skip
+    both_sides: bool = Field(
+        default=False,
+        description="an arbor goes out of the room at both ends, not along axis alone",
     )
     clearance_mm: float = quantity(0, 100, "mm", "of a bore, all round the part", 0.0)
 
@@ -76,14 +85,19 @@ class Holder(FileTable):
         for name, field in type(self).model_fields.items():
             is_given = getattr(self, name) != field.default
             if is_given and name not in (*allowed, "kind", "axis"):
-                text = f"not of a {self.kind}, which may have {' and '.join(allowed)}; leave it out"
-                yield Problem(name, text)
+                may = f'of kind "{self.kind}", which may have {" and ".join(allowed)}'
+                yield Problem(name, f"not {may}; leave it out")
         if self.size_mm is not None and not all(0.1 <= side <= 2000 for side in self.size_mm):
             text = f"given {list(self.size_mm)}; each side must be from 0.1 to 2000 mm"
             yield Problem("size_mm", text)
         if self.kind == "plate" and self.diameter_mm and self.thickness_mm is None:
             text = "given without thickness_mm: a rod carries only a plate of given thickness"
             yield Problem("diameter_mm", f"{text}; give both or neither")
+        if self.kind == "arbor" and (self.diameter_mm is None) != (self.thickness_mm is None):
+            lone = "diameter_mm" if self.thickness_mm is None else "thickness_mm"
+            yield Problem(lone, "given alone: the flanges of an arbor need both; give both or none")
+        if self.kind == "arbor" and self.at is None:
+            yield Problem("at", "missing: an arbor needs to know its hole; choose the hole's walls")
 
     @property
     def direction(self) -> tuple[float, float, float]:
@@ -143,7 +157,7 @@ def fixture_problems(
         return
     if turns and holder.kind == "plate":
         text = 'given "plate" for a part that turns: only a round holder can turn; give "collar"'
-        yield Problem("holder.kind", f'{text} or "rod"')
+        yield Problem("holder.kind", f'{text}, "rod" or "arbor"')
     # The part may lie against one side of its bore. The whole play is then on the other side.
     most = 0.5 * WIDEST_GAP * balls_mm
     if holder.clearance_mm > most:

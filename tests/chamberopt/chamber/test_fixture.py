@@ -254,7 +254,7 @@ def test_a_rod_may_come_from_a_side_wall(parts: Path, facing: tuple[float, ...])
         ("box", {"holder": {"kind": "bore"}}, r"holder\.kind: given \"bore\", but .* no wall"),
         ("shaft", {"holder": {"kind": "rod"}}, r"holder\.axis: from \(0, 0, 75\) mm, .* no wall"),
         ("box", {"holder": {"kind": "collar"}}, r"holder\.grip_mm: missing: .* level"),
-        ("box", {"holder": {"kind": "rod", "grip_mm": 3.0}}, r"holder\.grip_mm: not of a rod"),
+        ("box", {"holder": {"kind": "rod", "grip_mm": 3.0}}, r'holder\.grip_mm: not of kind "rod"'),
         ("box", {"holder": {"kind": "plate", "size_mm": (0.0, 5.0)}}, r"holder\.size_mm: given"),
         ("box", {"holder": {"kind": "plate", "diameter_mm": 5.0}}, r"diameter_mm: .* give both"),
         ("box", {"holder": {"kind": "plate", "thickness_mm": 300.0}},
@@ -334,6 +334,91 @@ def test_a_round_holder_on_the_axis_turns_with_the_part(parts: Path) -> None:
     chamber = build_chamber(turning)
 
     require_turnable(turning, chamber_mesh(chamber), turning_axis(turning, chamber.part))
+
+
+THROUGH = {"box_mm": ((-7.1, -2.1, -3.9), (-2.9, 2.1, 3.9))}  # the walls of the box's hole
+END = {"box_mm": ((9.9, -7.0, -5.0), (11.0, 7.0, 5.0))}
+FLANGES = {"diameter_mm": 5.0, "thickness_mm": 2.0}
+
+
+def around(diameter: float) -> float:
+    """Area of the 64-sided polygon round a circle [mm²]."""
+    return 64 * (diameter / 2) ** 2 * np.tan(np.pi / 64)
+
+
+@pytest.mark.parametrize(
+    ("turns", "axis", "both", "outside", "flanges"),
+    [
+        ((0, 0, 0), (0, 0, 1), False, ABOVE, 1),
+        ((90, 0, 0), (0, 1, 0), False, 0.5 * (ROOM[1] - BOX[2]), 1),
+        ((90, 0, 0), (0, -1, 0), True, ROOM[1] - BOX[2], 2),
+    ],
+)
+@pytest.mark.parametrize("given", [{}, FLANGES])
+def test_an_arbor_fills_its_hole_and_goes_out(
+    parts: Path,
+    turns: tuple[float, ...],
+    axis: tuple[float, ...],
+    both: bool,
+    outside: float,
+    flanges: int,
+    given: dict[str, float],
+) -> None:
+    """The room with an arbor lacks the hole, the shaft from the part to the wall, and flanges.
+
+    The hole and the shaft that fills it are 64-sided polygons in and round a circle of 4 mm.
+    """
+    holder = {"kind": "arbor", "at": THROUGH, "axis": axis, "both_sides": both, **given}
+    where = {"rotate_deg": turns, "target": END}
+    free = build_chamber(design(parts, "drilled", part=where))
+    chamber = build_chamber(design(parts, "drilled", part=where, holder=holder))
+
+    sound(chamber)
+    assert chamber.pieces_in_air == 0
+    shaft = around(4.0 + 2 * SUNK)
+    wide = polygon(5.0) - shaft if given else 0.0
+    expected = 8 * polygon(4.0) + outside * shaft + 2 * flanges * wide
+    assert 1e9 * (free.volume - chamber.volume) == pytest.approx(expected, rel=2e-3)
+    one = chamber.fixtures["holder"]
+    assert one.size == pytest.approx((4.002e-3,), rel=1e-6)
+    assert 1e3 * one.length == pytest.approx(8 + outside, abs=2 * SUNK)
+
+
+def test_an_arbor_turns_with_the_part_about_its_own_axis(parts: Path) -> None:
+    holder = {"kind": "arbor", "at": THROUGH, "axis": (0, 1, 0), "both_sides": True}
+    for through, why in ((-5.0, None), (0.0, r"holder: its axis is 5 mm beside that of effects")):
+        given = design(
+            parts,
+            "drilled",
+            part={"rotate_deg": (90, 0, 0), "target": END},
+            holder=holder,
+            effects={"part_turn": {"rpm": 30.0, "through_mm": (through, 0, 0)}},
+        )
+        if why:
+            with pytest.raises(InputError, match=why):
+                build_chamber(given)
+            continue
+        chamber = build_chamber(given)
+        require_turnable(given, chamber_mesh(chamber), turning_axis(given, chamber.part))
+
+
+@pytest.mark.parametrize(
+    ("holder", "message"),
+    [
+        ({"at": UP}, r"holder\.at: these faces are no walls of a hole along holder\.axis"),
+        ({"at": ROUND}, r"holder\.at: these faces are no walls of a hole"),
+        ({"at": THROUGH, "axis": (1, 0, 0)}, r"holder\.at: these faces are no walls of a hole"),
+        ({"at": THROUGH, "axis": (0, 0, -1)}, r"holder: the face of \[sonotrode\] would hit it"),
+        ({}, r"holder\.at: missing: an arbor needs to know its hole"),
+        ({"at": THROUGH, "diameter_mm": 6.0}, r"holder\.diameter_mm: given alone: the flanges"),
+        ({"at": THROUGH, "grip_mm": 6.0}, r'holder\.grip_mm: not of kind "arbor"'),
+    ],
+)
+def test_an_arbor_needs_a_hole(parts: Path, holder: dict[str, Any], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        build_chamber(
+            design(parts, "drilled", part={"target": END}, holder={"kind": "arbor", **holder})
+        )
 
 
 def test_checks_name_holder_and_mask(parts: Path) -> None:
