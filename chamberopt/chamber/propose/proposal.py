@@ -25,6 +25,7 @@ from chamberopt.chamber.propose.pose import (
     propose_pose,
     square_to_walls,
 )
+from chamberopt.chamber.propose.proposed_arbor import Bore, find_bores, turning_bore, turning_pose
 from chamberopt.chamber.propose.proposed_balls import charge_of, fit_sizes, propose_ball
 from chamberopt.chamber.propose.proposed_end import HeldEnd, held_end
 from chamberopt.chamber.propose.proposed_floor import Floor, floor_on_sonotrode, require_room
@@ -256,19 +257,34 @@ def propose(
         "process.accuracy.objective_half_width": "until it is so sure; of a time: this share",
     }
 
-    def built(is_local: bool) -> tuple[Proposal, Floor]:
-        """Return the proposal with the least room that is free of gaps, else of fewest faults."""
+    bores = find_bores(mesh, target.triangles)
+
+    def built(is_local: bool, turning: Bore | None = None) -> tuple[Proposal, Floor]:
+        """Return the proposal with the least room that is free of gaps, else of fewest faults.
+
+        Args:
+            is_local: true for a chamber round the target, whose walls the part goes out through.
+            turning: a bore about whose axis, which is then level, the part turns.
+        """
         best: tuple[Proposal, Floor] | None = None
         refused: InputError | None = None
         for number, wider in enumerate(WIDER):
             progress(number, len(WIDER), None)
             try:
-                placed, floor = _place(mesh, target, turns, diameter, wanted, wider, is_local)
+                own, pose_why, placed, form = dict(tables), pose_reason, turns, wanted
+                if turning is not None:
+                    placed, turn = turning_pose(turning, mesh)
+                    own["effects"] = {**own["effects"], "part_turn": turn}
+                    pose_why = (
+                        "on its axis, about which it turns, so that all of it passes the shot"
+                    )
+                    form = replace(wanted, shape=wanted.shape or "box")
+                placed, floor = _place(mesh, target, placed, diameter, form, wider, is_local)
                 pose = {"rotate_deg": list(placed)}
                 if any(floor.offset_mm):
                     pose["offset_mm"] = list(floor.offset_mm)
-                own = {**tables, "part": {**tables["part"], **pose}, **_floor_tables(floor)}
-                words = {"part.rotate_deg": f"{pose_in_words(mesh, known, placed)}: {pose_reason}"}
+                own |= {"part": {**tables["part"], **pose}, **_floor_tables(floor)}
+                words = {"part.rotate_deg": f"{pose_in_words(mesh, known, placed)}: {pose_why}"}
                 why = {**reasons, **words, **_floor_reasons(floor, is_local)}
                 made = _checked(own, why, floor, known, mesh, wanted.shop)
             except UnreadableError:
@@ -294,7 +310,15 @@ def propose(
                     made, floor = local
     if made.chamber.pieces_in_air:
         with step("choosing what holds the part") as progress:
-            made = _held(made, floor, target, end, wanted.shop, progress)
+            made = _held(made, floor, target, end, bores, wanted.shop, progress)
+    turning = turning_bore(bores, mesh, target.triangles)
+    if turning is not None and (_faults(made) > (0, 0) or not floor.is_one_sonotrode):
+        with step("trying it on its axis, turning") as progress, suppress(InputError):
+            other, its_floor = built(is_local=False, turning=turning)
+            other = _held(other, its_floor, target, None, [turning], wanted.shop, progress)
+            better = (*_faults(other), *its_floor.excess) < (*_faults(made), *floor.excess)
+            if better and "holder" in other.tables:
+                made, floor = other, its_floor
     return _only_touched(_masked(made, floor, wanted.shop), floor, wanted.shop)
 
 
@@ -319,6 +343,7 @@ def _held(
     floor: Floor,
     target: Target,
     end: HeldEnd | None,
+    bores: Sequence[Bore],
     shop: Shop | None,
     progress: Progress,
 ) -> Proposal:
@@ -330,9 +355,10 @@ def _held(
     Args:
         free: the proposal without a holder.
         end: an end that is left out of the target to hold the part by, if there is one.
+        bores: bores that may take an arbor.
     """
     diameter, turns = free.design.shot.diameter, free.design.part.rotate_deg
-    choices = holder_choices(free.mesh, target.triangles, turns, diameter)[:MOST_HOLDERS]
+    choices = holder_choices(free.mesh, target.triangles, turns, diameter, bores)[:MOST_HOLDERS]
     if end is not None:
         one = end_holder(free.mesh, target.triangles, turns, diameter, end.triangles)
         choices = choices if one is None else [one._replace(keys={**one.keys, "at": end.at})]

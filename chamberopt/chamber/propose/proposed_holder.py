@@ -1,8 +1,8 @@
 """Propose what holds a part in its chamber: a holder on faces that are not to be peened.
 
-Every flat face that does not look down may carry a holder along its normal, to the ceiling or to
-the side wall. An end or a root is enclosed; any other face carries a rod, or a block if it is long
-and a rod would be slim.
+An end or a root is enclosed, where it points up or aside. A bore takes an arbor. Where neither is
+free, a flat face that does not look down carries a rod along its normal, to the ceiling or to the
+side wall, or a block if it is long and a rod would be slim.
 
        |   holder   |
        |   _______  |         ^ axis
@@ -15,11 +15,13 @@ and a rod would be slim.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from chamberopt.chamber.fixture import OF_FACE
+from chamberopt.chamber.propose.proposed_arbor import Bore, arbor_through
 from chamberopt.common.number_text import plain
 from chamberopt.geometry.faces import Faces
 from chamberopt.geometry.meshes.part_mesh import PartMesh
@@ -47,6 +49,8 @@ SEAT, EDGE = 0.05, 0.3
 # A block stands on a face of at least this length over its width, which fills its rectangle.
 LONG_FACE, FILLED = 1.6, 0.9
 OPPOSITE = 0.5  # cosine from which on a face is opposite to the target
+UPRIGHT = 0.999  # cosine from which on an axis of the part's file is one of the chamber's
+MARGIN_MM = 1.0  # of boxes round the part
 
 
 class HolderChoice(NamedTuple):
@@ -54,6 +58,11 @@ class HolderChoice(NamedTuple):
 
     keys: dict[str, Any]
     reason: str
+
+    @property
+    def is_round_an_end(self) -> bool:
+        """Whether it encloses an end of the part."""
+        return "grip_mm" in self.keys
 
 
 class _Seen(NamedTuple):
@@ -78,19 +87,70 @@ class _Seen(NamedTuple):
 
 
 def holder_choices(
-    mesh: PartMesh, target: np.ndarray, turns: tuple[float, float, float], ball: float
+    mesh: PartMesh,
+    target: np.ndarray,
+    turns: tuple[float, float, float],
+    ball: float,
+    bores: Sequence[Bore] = (),
 ) -> list[HolderChoice]:
-    """Return the holders that may hold a part, the best first; none if no face can carry one.
+    """Return the holders that may hold a part, the best first; none if nothing can carry one.
 
-    Ends that point up come first, then rods on the highest faces, then rods and ends at the side,
-    of these first on faces opposite to the target, then the thickest. Slim rods come last.
+    What encloses an end that points up comes first, then arbors, what encloses an end at the side,
+    and rods on the highest faces. Then come rods at the side, of these first on faces opposite to
+    the target, then the thickest. Slim holders come last.
 
     Args:
         target: marks the triangles to be peened, (m,).
         turns: turns of the part in the chamber [degrees].
         ball: diameter of a ball [m].
+        bores: bores of the part that may take an arbor, the best first.
     """
     posed = mesh.vertices @ rotation_matrix(turns).T
+    away = -area_vectors(posed, mesh.triangles)[target].sum(axis=0)
+    width = float(np.sort(np.ptp(posed, axis=0))[1])
+    found: list[tuple[tuple[float, ...], HolderChoice]] = []
+
+    def offer(one: HolderChoice, *order: float, thick: float) -> None:
+        up = "axis" not in one.keys
+        place = 1.0 if one.keys["kind"] == "arbor" else 0.0 if up else 2.0
+        if place != 1.0 and not one.is_round_an_end:
+            place = 3.0 + float(not up)
+        slim = one.keys["kind"] in ("rod", "arbor") and thick < SLIM * width
+        found.append(((slim, place, *order, -thick), one))
+
+    for bore in bores:
+        if made := arbor_through(bore, mesh, target, turns, ball):
+            offer(HolderChoice(*made), thick=2.0 * bore.radius)
+    for axis in np.array([[0, 0, 1], [1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0]], dtype=float):
+        if (jaw := _jaw(mesh, target, turns, axis, CLEAR * ball)) is not None:
+            opposite = axis @ away > OPPOSITE * np.linalg.norm(away)
+            offer(jaw, float(not opposite), 1.0, thick=0.0)
+    for one in _on_flat_faces(mesh, target, posed, ball):
+        keys = one.choice.keys
+        thick = 1e-3 * keys.get("diameter_mm", min(keys.get("size_mm", [0.0])))
+        opposite = one.axis @ away > OPPOSITE * np.linalg.norm(away)
+        order = (-one.level_mm, 0.0) if "axis" not in keys else (float(not opposite), 0.0)
+        offer(one.choice, *order, thick=thick)
+    return [one for _, one in sorted(found, key=lambda one: one[0])]
+
+
+class _OnFace(NamedTuple):
+    """A holder on a flat face, which looks along the axis (3,) at some level along it [mm]."""
+
+    choice: HolderChoice
+    axis: np.ndarray
+    level_mm: float
+
+
+def _on_flat_faces(
+    mesh: PartMesh, target: np.ndarray, posed: np.ndarray, ball: float
+) -> Iterator[_OnFace]:
+    """Yield holders on the flat faces of a part that look up or aside.
+
+    Args:
+        target, ball: those of holder_choices.
+        posed: the part's vertices in its pose [m], (n, 3).
+    """
     faces = Faces(mesh.vertices, mesh.triangles, FLAT_DEG)
     vectors = area_vectors(posed, mesh.triangles)
     sums = np.stack([np.bincount(faces.of_triangle, one) for one in vectors.T], axis=1)
@@ -98,9 +158,7 @@ def holder_choices(
     flat = np.linalg.norm(sums, axis=1) > math.cos(math.radians(FLAT_DEG)) * faces.area
     free = np.bincount(faces.of_triangle, target) == 0.0
     usable = np.flatnonzero(flat & free & (sums[:, 2] > LEVEL * faces.area))
-    away = -vectors[target].sum(axis=0)
     width = float(np.sort(np.ptp(posed, axis=0))[1])
-    found: list[tuple[tuple[float, ...], int, HolderChoice]] = []
     for face in usable[np.argsort(-faces.area[usable], kind="stable")][:MOST_FACES]:
         normal = np.round(sums[face] / np.linalg.norm(sums[face]), 4) + 0.0
         up = bool(normal[2] > UP)
@@ -114,20 +172,53 @@ def holder_choices(
         place = [round(1e3 * float(x), 3) + 0.0 for x in faces.place(face)]
         at: dict[str, Any] = {"at": {"faces": [{"at_mm": place, "crease_deg": FLAT_DEG}]}}
         at |= {} if up else {"axis": axis.tolist()}
-        opposite = axis @ away > OPPOSITE * np.linalg.norm(away)
-        order = (-round(1e3 * seen.level), 0) if up else (-int(opposite), 0)
         on_face = _rod(seen, float(faces.area[face]))
         if on_face is None or 1e-3 * on_face.keys["diameter_mm"] < SLIM * width:
             on_face = _block(seen, float(faces.area[face])) or on_face
         for made in (_around_end(seen), on_face):
-            if made is None:
-                continue
-            thick = 1e-3 * made.keys.get("diameter_mm", min(made.keys.get("size_mm", [0.0])))
-            is_rod = "grip_mm" not in made.keys
-            slim = made.keys["kind"] == "rod" and thick < SLIM * width
-            rank = (slim, not up, is_rod == up, *order, -thick)
-            found.append((rank, len(found), HolderChoice({**made.keys, **at}, made.reason)))
-    return [one for _, _, one in sorted(found, key=lambda one: one[:2])]
+            if made is not None:
+                choice = made._replace(keys={**made.keys, **at})
+                yield _OnFace(choice, axis, float(round(1e3 * seen.level)))
+
+
+def _jaw(
+    mesh: PartMesh,
+    target: np.ndarray,
+    turns: tuple[float, float, float],
+    axis: np.ndarray,
+    clear: float,
+) -> HolderChoice | None:
+    """Return a jaw round the end of a part that points along an axis; None if the target is there.
+
+    The end is chosen by a box, so that it may have any form. The axis must be one of the file's.
+
+    Args:
+        target, turns: those of holder_choices.
+        axis: unit vector in the chamber's frame, (3,).
+        clear: least distance from the target [m].
+    """
+    turn = rotation_matrix(turns)
+    of_file = turn.T @ axis
+    k = int(np.abs(of_file).argmax())
+    if abs(of_file[k]) < UPRIGHT:
+        return None
+    corners = (mesh.vertices @ turn.T @ frame_along(axis).T)[mesh.triangles]
+    heights = corners[..., 2]
+    top = float(heights.max())
+    cut = max(float(heights[target].max()) + clear, top - LONGEST * float(np.ptp(heights)))
+    end = heights.mean(axis=1) > cut
+    hull = convex_hull(corners[end].reshape(-1, 3)[:, :2]) if end.any() else None
+    if hull is None:
+        return None
+    up = bool(axis[2] > UP)
+    made = _around_end(_Seen(corners, end, target, hull, clear, "up" if up else "aside"))
+    if made is None:
+        return None
+    box = 1e3 * np.array([mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)])
+    box += MARGIN_MM * np.array([[-1.0], [1.0]])
+    box[int(of_file[k] < 0.0), k] = 1e3 * cut * np.sign(of_file[k])
+    at: dict[str, Any] = {"at": {"box_mm": np.round(box, 3).tolist()}}
+    return made._replace(keys={**made.keys, **at, **({} if up else {"axis": axis.tolist()})})
 
 
 def end_holder(

@@ -1,0 +1,168 @@
+"""Find the bores of a part that an arbor may go through, and the one about which it may turn."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from chamberopt.chamber.fixture import ACROSS, is_hole
+from chamberopt.chamber.propose.pose import Turns, square_to_walls, turns_down
+from chamberopt.chamber.propose.proposed_target import CREASE_DEG
+from chamberopt.geometry.faces import Faces
+from chamberopt.geometry.meshes.part_mesh import PartMesh
+from chamberopt.geometry.outline import centroid, convex_hull, frame_along, radii
+from chamberopt.geometry.triangles import (
+    area_vectors,
+    areas,
+    closest_on_each,
+    rotation_matrix,
+    unit_vectors,
+)
+
+CLOSED = 0.02  # sum of a bore's area vectors over its area: it goes all round
+ROUND, FREE = 0.95, 0.95  # least radius in a bore, and of the free way through, over its radius
+THINNEST = 4e-3  # m: of a bore whose arbor holds a part
+MOST_BORES = 6  # that are looked at, the widest
+# Of flanges: diameter over the bore's, least of it, and thickness over the bore's diameter and [m].
+FLANGE, LEAST_FLANGE, THICK, THINNEST_FLANGE = 1.6, 1.2, 0.1, 2e-3
+UPRIGHT, LEVEL = 0.999, 0.02  # cosines with the vertical of an axis that is upright, and level
+# A part turns about a bore's axis if its target looks the same all round: largest difference of the
+# spread of its normals over their mean, their mean along any way, and the middle's distance from
+# the axis over the target's radius. Its target must lie outside most of the part.
+ALIKE, MEAN, CENTRAL, OUTSIDE = 0.05, 0.03, 0.03, 0.6
+SHORT = 1.0  # largest length along the axis over the diameter: longer parts stand or lie
+RPM = 60.0
+
+
+class Bore(NamedTuple):
+    """A round hole that goes through a part, in the part file's frame."""
+
+    triangles: np.ndarray  # marks those of its wall, (m,)
+    at_mm: tuple[float, ...]  # a point on the wall, by which to choose it
+    point: np.ndarray  # on its axis, (3,) [m]
+    axis: np.ndarray  # unit vector, (3,)
+    radius: float  # [m]
+
+
+def find_bores(mesh: PartMesh, target: np.ndarray) -> list[Bore]:
+    """Return the bores of a part that are no part of its target, the widest first.
+
+    Args:
+        target: marks the triangles to be peened, (m,).
+    """
+    faces = Faces(mesh.vertices, mesh.triangles, CREASE_DEG)
+    vectors = area_vectors(mesh.vertices, mesh.triangles)
+    sums = np.stack([np.bincount(faces.of_triangle, one) for one in vectors.T], axis=1)
+    closed = np.linalg.norm(sums, axis=1) < CLOSED * faces.area
+    free = np.bincount(faces.of_triangle, target) == 0.0
+    found = []
+    for face in map(int, np.flatnonzero(closed & free)):
+        own = faces.of_triangle == face
+        spread, axes = np.linalg.eigh(vectors[own].T @ unit_vectors(vectors[own]))
+        along = np.abs(vectors[own] @ axes[:, 0]).sum() / faces.area[face]
+        if along > 0.5 * ACROSS or spread[1] < 0.5 * spread[2] * (1.0 - ALIKE):
+            continue
+        bore = _bore(mesh, own, axes[:, 0], faces.place(face))
+        if bore is not None:
+            found.append(bore)
+    return sorted(found, key=lambda one: -one.radius)[:MOST_BORES]
+
+
+def _bore(mesh: PartMesh, own: np.ndarray, axis: np.ndarray, place: np.ndarray) -> Bore | None:
+    """Return the bore with these triangles as its wall; None if it is none, or not free."""
+    axis = np.round(axis * np.sign(axis[np.abs(axis).argmax()]), 6)
+    frame = frame_along(axis / np.linalg.norm(axis))
+    corners = (mesh.vertices @ frame.T)[mesh.triangles]
+    hull = convex_hull(corners[own].reshape(-1, 3)[:, :2])
+    if hull is None or not is_hole(mesh.vertices, mesh.triangles[own]):
+        return None
+    middle = centroid(hull)
+    inner, outer = radii(hull, middle)
+    flat = corners * [1.0, 1.0, 0.0]
+    point = np.broadcast_to(np.r_[middle, 0.0], (int((~own).sum()), 3))
+    away = np.linalg.norm(closest_on_each(flat[~own], point) - point, axis=1)
+    if inner < ROUND * outer or away.min(initial=math.inf) < FREE * inner or outer < THINNEST / 2:
+        return None
+    height = float(corners[own][..., 2].mean())
+    at_mm = tuple(round(1e3 * float(x), 3) + 0.0 for x in place)
+    return Bore(own, at_mm, np.r_[middle, height] @ frame, frame[2], outer)
+
+
+def arbor_through(
+    bore: Bore, mesh: PartMesh, target: np.ndarray, turns: Turns, ball: float
+) -> tuple[dict[str, Any], str] | None:
+    """Return the keys of [holder] of an arbor through a bore, and the reason for it.
+
+    An upright one goes out through the ceiling, a level one through both side walls. The result is
+    None for another axis, or if the arbor would hide some of the target.
+
+    Args:
+        target: marks the triangles to be peened, (m,).
+        ball: diameter of a ball [m], which must get past the arbor to the target.
+    """
+    axis = rotation_matrix(turns) @ bore.axis
+    frame = frame_along(bore.axis)
+    corners = (mesh.vertices @ frame.T)[mesh.triangles[target]] * [1.0, 1.0, 0.0]
+    point = np.broadcast_to((frame @ bore.point) * [1.0, 1.0, 0.0], (len(corners), 3))
+    away = np.linalg.norm(closest_on_each(corners, point) - point, axis=1).min(initial=math.inf)
+    if away < bore.radius + ball:
+        return None
+    wall = {"at_mm": list(bore.at_mm), "crease_deg": CREASE_DEG}
+    keys: dict[str, Any] = {"kind": "arbor", "at": {"faces": [wall]}}
+    if abs(axis[2]) > UPRIGHT:
+        where = "up through the ceiling"
+    elif abs(axis[2]) < LEVEL:
+        level = np.round(axis * [1.0, 1.0, 0.0], 4) + 0.0
+        keys |= {"axis": level.tolist(), "both_sides": True}
+        where = "through both side walls"
+    else:
+        return None
+    flange = math.floor(2e3 * 2.0 * min(FLANGE * bore.radius, away - ball)) / 2.0
+    if 1e-3 * flange > 2.0 * LEAST_FLANGE * bore.radius:
+        thick = max(THINNEST_FLANGE, 2.0 * THICK * bore.radius)
+        keys |= {"diameter_mm": flange, "thickness_mm": math.ceil(2e3 * thick - 1e-6) / 2.0}
+    text = f"through the bore of {2e3 * bore.radius:.4g} mm, which is not peened, and {where}"
+    return keys, text
+
+
+def turning_bore(bores: list[Bore], mesh: PartMesh, target: np.ndarray) -> Bore | None:
+    """Return the bore about whose axis a part turns, so that all of its target passes the shot.
+
+    It is None unless the target is a ring at the outside of a short part, alike all round, such as
+    the teeth of a gear or the slots of a disc.
+
+    Args:
+        target: marks the triangles to be peened, (m,).
+    """
+    weight = areas(mesh.vertices, mesh.triangles)[target]
+    weight = weight / weight.sum()
+    normal = unit_vectors(area_vectors(mesh.vertices, mesh.triangles))[target]
+    middles = mesh.vertices[mesh.triangles[target]].mean(axis=1)
+    for bore in bores:
+        frame = frame_along(bore.axis)
+        across, places = normal @ frame[:2].T, (middles - bore.point) @ frame[:2].T
+        low, high = np.linalg.eigvalsh((weight[:, None] * across).T @ across)
+        radius = np.linalg.norm(places, axis=1)
+        whole = (mesh.vertices - bore.point) @ frame.T
+        outer = float(np.linalg.norm(whole[:, :2], axis=1).max())
+        is_ring = (
+            high - low < ALIKE * (high + low)
+            and np.linalg.norm(weight @ across) < MEAN
+            and np.linalg.norm(weight @ places) < CENTRAL * (weight @ radius)
+            and weight @ radius > OUTSIDE * outer
+        )
+        if is_ring and np.ptp(whole[:, 2]) < SHORT * 2.0 * outer:
+            return bore
+    return None
+
+
+def turning_pose(bore: Bore, mesh: PartMesh) -> tuple[Turns, dict[str, Any]]:
+    """Return turns that lay a bore's axis level along the room's width, and effects.part_turn."""
+    down = np.eye(3)[np.abs(bore.axis).argmin()]
+    down = unit_vectors((bore.axis @ down) * bore.axis - down)
+    turns = square_to_walls(mesh.vertices, turns_down(down))
+    axis = [round(float(x), 6) + 0.0 for x in bore.axis]
+    through = [round(1e3 * float(x), 4) + 0.0 for x in bore.point]
+    return turns, {"rpm": RPM, "axis": axis, "through_mm": through}
