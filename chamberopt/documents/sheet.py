@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from pathlib import PurePath
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from chamberopt.common.estimate import Estimate
 from chamberopt.common.number_text import estimate_text, percent
 from chamberopt.coverage.coverage_intervals import NOT_RESOLVED
 from chamberopt.design.calibration import why_no_intensity
+from chamberopt.design.fixture import WIDEST_GAP
 from chamberopt.design.materials import alloys, find
 from chamberopt.design.tolerances import tolerance_box
 from chamberopt.documents.answer import answer, answer_lines
@@ -26,6 +28,7 @@ from chamberopt.documents.wording import metric_label, plain
 from chamberopt.results.load import load_start
 
 if TYPE_CHECKING:
+    from chamberopt.chamber.checks.openings import Opening
     from chamberopt.design.sonotrode import VibratingFace
     from chamberopt.documents.coverage import Figure
     from chamberopt.results.load import Result
@@ -176,20 +179,27 @@ KINDS = ("arc heights", "coverage", "dent diameters", "ball drops", "amplitude",
 Row = tuple[str, str]  # a name and its value, or "" and a sentence
 
 
-def process_sheet(result: Result, face_mm: tuple[float, ...]) -> Document:
+class AsBuilt(NamedTuple):
+    """What a sheet says of the built chamber that its design does not give in numbers."""
+
+    face_mm: tuple[float, ...]  # of the sonotrode: a diameter, or two sides
+    openings: Sequence[Opening] = ()  # through which the part goes out
+
+
+def process_sheet(result: Result, built: AsBuilt) -> Document:
     """Return the process sheet of a result as a document.
 
     Its sections are the first page, with sentences of the kind "warning" for the top; tables that
     may go on further pages; and the title block, where a name without a value is to be filled in.
 
-    Args:
-        face_mm: size of the sonotrode's face [mm].
     """
     record = result.record
     start = load_start(result)
     checks, calibrated = first_checks(result), calibrated_to(result)
-    red = [Sentence(text, "warning") for text in (*alarms(result), *_wide_face(result, face_mm))]
-    content: list[Block] = [*red, *setting_tables(result, face_mm), checks, *calibrated]
+    red = [
+        Sentence(text, "warning") for text in (*alarms(result), *_wide_face(result, built.face_mm))
+    ]
+    content: list[Block] = [*red, *setting_tables(result, built), checks, *calibrated]
     name = f"{result.design.part.mesh_path.name}: {result.folder.resolve().name}"
     block = Table("", (), [*title_block(result, name).items()], numbers=False)
     return Document(
@@ -227,18 +237,15 @@ def chamber_limits(result: Result) -> dict[str, tuple[float, float, float]]:
     }
 
 
-def setting_tables(result: Result, face_mm: tuple[float, ...]) -> list[Table]:
+def setting_tables(result: Result, built: AsBuilt) -> list[Table]:
     """Return tables on the part, the chamber, its settings and the figures to expect.
 
     A row with an empty name holds a sentence.
-
-    Args:
-        face_mm: size of the sonotrode's face [mm].
     """
     return _tables([
         ("Part and pose", _part(result)),
-        ("Chamber", _chamber(result)),
-        ("Sonotrode", _sonotrode(result, face_mm)),
+        ("Chamber", _chamber(result, built.openings)),
+        ("Sonotrode", _sonotrode(result, built.face_mm)),
         ("Shot", _shot(result)),
         ("Made with", _identity(result)),
         ("Peening, and what to expect", _expected(result)),
@@ -306,7 +313,7 @@ def _limited(result: Result, name: str, text: str) -> str:
     return text if ends is None else f"{text} ({' to '.join(map(plain, ends))})"
 
 
-def _chamber(result: Result) -> Iterator[Row]:
+def _chamber(result: Result, openings: Sequence[Opening]) -> Iterator[Row]:
     table = result.design.chamber.model_dump(mode="json", exclude_none=True)
     yield "shape", PurePath(table.pop("shape")).name
     for key in ("sonotrode_distance_mm", "facets", "mesh", "unit"):
@@ -321,20 +328,32 @@ def _chamber(result: Result) -> Iterator[Row]:
     for what, several in counted.items():
         if several:
             yield what, f"{len(several)}: see the report"
-    yield from _fixtures(result)
+    yield from _fixtures(result, openings)
+    ball = 1e3 * min(result.design.shot.diameters)
+    widest = f"{plain(math.floor(100.0 * WIDEST_GAP * ball) / 100.0)} mm"
+    yield "gaps", f"of joints and openings, and round the sonotrode: at most {widest}, or sealed"
     if volume := result.record.chamber.volume_mm3:
         yield "free volume", f"{plain(1e-3 * volume)} cm³"
 
 
-def _fixtures(result: Result) -> Iterator[Row]:
-    """Yield a row on what holds the part, and one on what masks it."""
+def _fixtures(result: Result, openings: Sequence[Opening]) -> Iterator[Row]:
+    """Yield rows on what holds the part, where it goes out, and what masks it."""
     holder = result.design.holder
     if holder is not None and holder.kind == "bore":
         play = f"{plain(holder.clearance_mm)} mm of clearance all round"
         yield "holder", f"the part's own end in a bore, {play if holder.clearance_mm else 'tight'}"
-    if holder is None and not result.record.chamber.pieces_in_air:
-        yield "holder", "none: the part goes out through the wall; clamp it there"
     mask = result.design.mask
+    if holder is None and not result.record.chamber.pieces_in_air:
+        padded = mask is not None and mask.axis is not None and not openings
+        out = "the mask clamps it" if padded else "the part goes out through the wall"
+        yield "holder", f"none: {out}{'' if padded else '; clamp it there'}"
+    rows = []
+    for way in openings:
+        sides, place = ([plain(round(1e3 * x, 1) + 0.0) for x in t] for t in (way.size, way.place))
+        out = f"the part stands out by {plain(1e3 * way.beyond, 2)} mm: clamp it there"
+        text = f"{' × '.join(sides)} mm in {way.wall} round ({', '.join(place)}) mm; {out}"
+        rows.append(("opening", text))
+    yield from _first(rows, "openings")
     faces = {"holder": holder.at if holder else None, "mask": mask.at if mask else None}
     for name, one in result.record.chamber.fixtures.items():
         size = size_in_words(one.kind, one.size_mm)

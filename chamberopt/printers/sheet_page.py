@@ -13,9 +13,10 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
+from chamberopt.chamber.checks.openings import find_openings
 from chamberopt.common.files import claim_file, write_bytes
 from chamberopt.documents.document import Block, Document, Section, Sentence, Table
-from chamberopt.documents.sheet import chamber_limits, process_sheet
+from chamberopt.documents.sheet import AsBuilt, chamber_limits, process_sheet
 from chamberopt.pictures.charts.colours import BLACK, DARK_GREY, GREY
 from chamberopt.pictures.charts.figure_style import ignore_settings_here
 from chamberopt.pictures.part_drawing import LEGEND, RASTER, Limits, draw_chamber
@@ -232,7 +233,7 @@ def write_sheet(result: str | Path, path: str | Path | None = None) -> tuple[Pat
     path = require_free_page(loaded.folder / SHEET if path is None else path, SHEET_FILE)
     with claim_file(path):
         chamber = load_chamber(loaded)
-        sheet = process_sheet(loaded, face_size_mm(chamber))
+        sheet = process_sheet(loaded, AsBuilt(face_size_mm(chamber), find_openings(chamber)))
         pages = draw_sheet(sheet, chamber, chamber_limits(loaded), loaded.design.sonotrode.blocks)
         _save(path, pages, sheet.name)
     return path, sheet

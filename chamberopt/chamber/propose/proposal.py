@@ -30,8 +30,9 @@ from chamberopt.chamber.propose.proposed_balls import charge_of, fit_sizes, prop
 from chamberopt.chamber.propose.proposed_end import HeldEnd, held_end
 from chamberopt.chamber.propose.proposed_floor import Floor, floor_on_sonotrode, require_room
 from chamberopt.chamber.propose.proposed_holder import end_holder, holder_choices
-from chamberopt.chamber.propose.proposed_mask import are_holes, to_be_masked
+from chamberopt.chamber.propose.proposed_mask import are_holes, pads, to_be_masked
 from chamberopt.chamber.propose.proposed_target import (
+    LONG,
     Sizes,
     Surface,
     Target,
@@ -50,7 +51,7 @@ from chamberopt.common.errors import InputError, UnreadableError
 from chamberopt.common.progress import Progress, step
 from chamberopt.common.toml_fields import MAX_COORDINATE_MM, allowed_range
 from chamberopt.design.design import Design, validate
-from chamberopt.design.fixture import USUAL_SHELL_MM
+from chamberopt.design.fixture import USUAL_SHELL_MM, WIDEST_GAP, Holder
 from chamberopt.design.materials import CATALOGUE, USUAL, alloy, ball, balls
 from chamberopt.design.shape_surface import TAG_SONOTRODE
 from chamberopt.design.shapes.base import ParametricChamber
@@ -105,9 +106,10 @@ def propose_ranges(
         ball_mass: mass of one ball [kg].
     """
     distance, height = round(1e3 * sizes.distance), round(1e3 * sizes.height)
-    far = round(1.25 * distance)
     near = max(round(0.4 * distance), math.ceil(2.0 * ball_mm))
     # The ceiling stays above the part even when the part is highest, so that no ball is caught.
+    under = math.floor(height - 1e3 * sizes.top - 2.0 * ball_mm)
+    far = max(distance, min(round(1.25 * distance), under))
     low = math.ceil(far + 1e3 * sizes.top + 2.0 * ball_mm)
     high = min(round(1.5 * height), LARGEST_MM)
     digit = _second_digit(mass_g)
@@ -160,6 +162,7 @@ TREATMENT_S, HALF_WIDTH, MOST_REPLICAS = 300.0, 0.03, 24
 REPLICAS = 10  # the fewest that a wanted half-width takes
 BLOCKS = "LARGER THAN ONE SONOTRODE: several side by side, driven alike"
 START = "a start, NOT MEASURED by a pilot"
+ON_END = "on end, as no sonotrode is large enough for it lying"
 
 Tables = dict[str, dict[str, Any]]
 """Tables of a design file by dotted name, as TOML values."""
@@ -206,8 +209,7 @@ def propose(
     Raises:
         InputError: the part cannot be used, or no chamber can be built round it.
     """
-    part_alloy, shop = alloy(wanted.alloy or USUAL_PART).name, wanted.shop or usual_shop()
-    shot, shot_reason = _shot(wanted.shot, part_alloy, shop)
+    _shot(wanted.shot, alloy(wanted.alloy or USUAL_PART).name, wanted.shop or usual_shop())
     with step("reading the part"):
         mesh = _read(path, wanted.unit)
         known = surfaces(mesh)
@@ -216,6 +218,38 @@ def propose(
     _require_near_origin(path, target)
     turns, pose_reason = propose_pose(mesh.vertices, mesh.triangles, target.triangles)
     end = None if asked else held_end(mesh, target, turns)
+    made = _proposed(path, wanted, mesh, known, target, turns, pose_reason, end)
+    if asked or end is not None or not _hangs_by_a_face(made):
+        return made
+    end = held_end(mesh, target, made.design.part.rotate_deg, of_any=True)
+    if end is not None:
+        with suppress(InputError):
+            other = _proposed(path, wanted, mesh, known, target, turns, ON_END, end)
+            if "holder" in other.tables and _faults(other) <= _faults(made):
+                return other
+    return made
+
+
+def _proposed(
+    path: Path,
+    wanted: Wanted,
+    mesh: PartMesh,
+    known: Sequence[Surface],
+    target: Target,
+    turns: Turns,
+    pose_reason: str,
+    end: HeldEnd | None,
+) -> Proposal:
+    """Return a proposal for a target of a part.
+
+    Raises InputError if no chamber can be built round it.
+
+    Args:
+        turns, pose_reason: the pose that suits the target [degrees], and why.
+        end: an end that is left out of the target, and the pose in which the part is held by it.
+    """
+    part_alloy, shop = alloy(wanted.alloy or USUAL_PART).name, wanted.shop or usual_shop()
+    shot, shot_reason = _shot(wanted.shot, part_alloy, shop)
     if end is not None:
         target, turns = end.target, end.turns
     tables: Tables = {
@@ -239,7 +273,7 @@ def propose(
         diameter, ball_reason = _ball_diameter(tables, wanted, shop)
     tables["shot"]["diameter_mm"] = round(1e3 * diameter, 4)
     if end is None and (hanging := _hanging(mesh, target, turns, diameter, wanted)):
-        turns, pose_reason = hanging, "on end, as no sonotrode is large enough for it lying"
+        turns, pose_reason = hanging, ON_END
     reasons = {
         "part.unit": ("GUESSED: " if any(GUESSED in note for note in mesh.notes) else "")
         + f"the part measures {format_box(mesh.size)}",
@@ -311,6 +345,8 @@ def propose(
     if made.chamber.pieces_in_air:
         with step("choosing what holds the part") as progress:
             made = _held(made, floor, target, end, bores, wanted.shop, progress)
+    else:
+        made = _clamped_outside(made, floor, wanted.shop)
     turning = turning_bore(bores, mesh, target.triangles)
     if turning is not None and (_faults(made) > (0, 0) or not floor.is_one_sonotrode):
         with step("trying it on its axis, turning") as progress, suppress(InputError):
@@ -319,7 +355,8 @@ def propose(
             better = (*_faults(other), *its_floor.excess) < (*_faults(made), *floor.excess)
             if better and "holder" in other.tables:
                 made, floor = other, its_floor
-    return _only_touched(_masked(made, floor, wanted.shop), floor, wanted.shop)
+    made = _padded(_masked(made, floor, wanted.shop), floor, target, wanted.shop)
+    return _only_touched(made, floor, wanted.shop)
 
 
 def _only_touched(made: Proposal, floor: Floor, shop: Shop | None) -> Proposal:
@@ -386,13 +423,73 @@ def _held(
     return replace(free, reasons={**free.reasons, "chamber.height_mm": text})
 
 
+def _clamped_outside(made: Proposal, floor: Floor, shop: Shop | None) -> Proposal:
+    """Return a proposal whose part, which goes out of the chamber, is held where it does."""
+    most_mm = math.floor(50.0 * WIDEST_GAP * 1e3 * made.design.shot.diameter) / 100.0
+    tables = _with_table(
+        made.tables, "sonotrode", "holder", {"kind": "bore", "clearance_mm": most_mm}
+    )
+    text = "the part's own end, clamped outside; balls wedge in more play than this, so seal it"
+    reasons = {**made.reasons, "holder.kind": text}
+    return _checked(tables, reasons, floor, made.known, made.mesh, shop)
+
+
+def _hangs_by_a_face(made: Proposal) -> bool:
+    """Return whether a long part hangs by nothing but a holder that stands on one of its faces."""
+    if made.design.holder is not None and is_firm(made.design.holder):
+        return False
+    sides = np.ptp(made.chamber.part.vertices, axis=0)
+    return bool(sides[2] > LONG * sides[:2].max())
+
+
+def is_firm(holder: Holder) -> bool:
+    """Return whether a holder holds a part by itself, as one that stands on a face does not."""
+    return holder.kind in ("arbor", "bore") or holder.grip_mm is not None
+
+
+def _padded(made: Proposal, floor: Floor, target: Target, shop: Shop | None) -> Proposal:
+    """Return a proposal with a pad on the level top of a part on which balls would come to rest.
+
+    The pad goes up to the ceiling, against which it clamps the part, so that a holder which stands
+    on a face is left out. Where a pad would do harm, the proposal stays as it is.
+    """
+    rests = any("come to rest on the part" in text for text in made.warnings)
+    if "mask" in made.tables or not rests:
+        return made
+    diameter, turns = made.design.shot.diameter, made.design.part.rotate_deg
+    bare = {name: one for name, one in made.tables.items() if name != "holder"}
+    choices = [made.tables] if _hangs_by_a_face(made) else [bare, made.tables]
+    if made.design.holder is not None and is_firm(made.design.holder):
+        choices.reverse()
+    for at in pads(made.mesh, target.triangles, turns, diameter):
+        for tables in choices:
+            after = "holder" if "holder" in tables else "sonotrode"
+            own = _with_table(tables, after, "mask", {"axis": [0.0, 0.0, 1.0], "at": at})
+            text = "a pad on the level top, up to the ceiling, clamps the part: no ball lies there"
+            height = "sonotrode to ceiling; a pad on the part's top goes on to it"
+            reasons = {**made.reasons, "mask.axis": text, "chamber.height_mm": height}
+            if "holder" not in own:
+                reasons.pop("holder.kind", None)
+            try:
+                other = _checked_at_extremes(own, reasons, floor, made, shop)
+            except UnreadableError:
+                raise
+            except InputError:
+                continue
+            hidden = touched_share(made) - touched_share(other)
+            is_held = not other.chamber.pieces_in_air
+            if is_held and hidden <= HIDDEN and _faults(other) < _faults(made):
+                return other
+    return made
+
+
 def _masked(bare: Proposal, floor: Floor, shop: Shop | None) -> Proposal:
     """Return a proposal with a mask on what must not be peened, where that does no harm.
 
     Harm is that of a holder. Where it would do some, the surfaces stay bare and are named.
     """
     names = to_be_masked(bare.design, bare.chamber, bare.known)
-    if not names:
+    if not names or bare.design.effects.part_turn is not None:
         return bare
     after = "holder" if "holder" in bare.tables else "sonotrode"
     first, value, what = "thickness_mm", USUAL_SHELL_MM, "a cap on"
@@ -420,8 +517,10 @@ def _checked_at_extremes(
     Raises InputError if a chamber cannot be built with them somewhere in the ranges of the study.
     """
     other = _checked(tables, reasons, floor, made.known, made.mesh, shop)
+    # Where the part no longer goes out, a study leaves a candidate out: no reason against a mask.
+    free = {"holder": None} if other.design.holder and other.design.holder.kind == "bore" else {}
     for extreme in _extremes(other.bounds):
-        build_chamber(other.design.changed(extreme))
+        build_chamber(other.design.changed({**extreme, **free}))
     return other
 
 

@@ -1,7 +1,7 @@
 """Leave an end of a part out of its target, to hold it there, where all of it would be peened.
 
 A part without names and without sharp edges, such as a scan or an implant, has one face. Its target
-is all of it, and no fixture could hold it.
+is all of it, and no fixture could hold it. The broad sides of a leaf spring reach both of its ends.
 """
 
 from __future__ import annotations
@@ -33,18 +33,19 @@ class HeldEnd(NamedTuple):
     triangles: np.ndarray  # marks those of the end, (m,)
 
 
-def held_end(mesh: PartMesh, target: Target, turns: Turns) -> HeldEnd | None:
+def held_end(mesh: PartMesh, target: Target, turns: Turns, of_any: bool = False) -> HeldEnd | None:
     """Return the slimmer end of a part, if all of the part would be peened, else None.
 
     Args:
         target: the target that was proposed.
+        of_any: true to return it also if not all of the part would be peened.
         turns: the pose that was proposed for it [degrees]. No end is chosen where no axis of the
             part's file is upright in it.
     """
     area, up = areas(mesh.vertices, mesh.triangles), rotation_matrix(turns)[2]
     axis = int(np.abs(up).argmax())
     is_whole = area[target.triangles].sum() > NEARLY_ALL * area.sum()
-    if not is_whole or abs(up[axis]) < UPRIGHT:
+    if not (is_whole or of_any) or abs(up[axis]) < UPRIGHT:
         return None
     places = mesh.vertices[:, axis] * np.sign(up[axis])
     length = float(np.ptp(places))

@@ -49,6 +49,7 @@ SEAT, EDGE = 0.05, 0.3
 # A block stands on a face of at least this length over its width, which fills its rectangle.
 LONG_FACE, FILLED = 1.6, 0.9
 OPPOSITE = 0.5  # cosine from which on a face is opposite to the target
+ALONG = 0.02  # largest mean cosine between the walls of a bore and its axis
 UPRIGHT = 0.999  # cosine from which on an axis of the part's file is one of the chamber's
 MARGIN_MM = 1.0  # of boxes round the part
 
@@ -121,11 +122,15 @@ def holder_choices(
     for bore in bores:
         if made := arbor_through(bore, mesh, target, turns, ball):
             offer(HolderChoice(*made), thick=2.0 * bore.radius)
+    on_faces = list(_on_flat_faces(mesh, target, posed, ball, bores))
+    closed = [one.axis for one in on_faces if one.choice.is_round_an_end]
     for axis in np.array([[0, 0, 1], [1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0]], dtype=float):
+        if any(axis @ other > UPRIGHT for other in closed):
+            continue
         if (jaw := _jaw(mesh, target, turns, axis, CLEAR * ball)) is not None:
             opposite = axis @ away > OPPOSITE * np.linalg.norm(away)
             offer(jaw, float(not opposite), 1.0, thick=0.0)
-    for one in _on_flat_faces(mesh, target, posed, ball):
+    for one in on_faces:
         keys = one.choice.keys
         thick = 1e-3 * keys.get("diameter_mm", min(keys.get("size_mm", [0.0])))
         opposite = one.axis @ away > OPPOSITE * np.linalg.norm(away)
@@ -143,12 +148,12 @@ class _OnFace(NamedTuple):
 
 
 def _on_flat_faces(
-    mesh: PartMesh, target: np.ndarray, posed: np.ndarray, ball: float
+    mesh: PartMesh, target: np.ndarray, posed: np.ndarray, ball: float, bores: Sequence[Bore]
 ) -> Iterator[_OnFace]:
     """Yield holders on the flat faces of a part that look up or aside.
 
     Args:
-        target, ball: those of holder_choices.
+        target, ball, bores: those of holder_choices.
         posed: the part's vertices in its pose [m], (n, 3).
     """
     faces = Faces(mesh.vertices, mesh.triangles, FLAT_DEG)
@@ -175,10 +180,35 @@ def _on_flat_faces(
         on_face = _rod(seen, float(faces.area[face]))
         if on_face is None or 1e-3 * on_face.keys["diameter_mm"] < SLIM * width:
             on_face = _block(seen, float(faces.area[face])) or on_face
+        through = _bolts(seen, axis, posed, mesh.triangles, bores)
         for made in (_around_end(seen), on_face):
             if made is not None:
-                choice = made._replace(keys={**made.keys, **at})
+                bolted = "" if made.is_round_an_end else through
+                choice = HolderChoice({**made.keys, **at}, f"{made.reason}{bolted}")
                 yield _OnFace(choice, axis, float(round(1e3 * seen.level)))
+
+
+def _bolts(
+    seen: _Seen, axis: np.ndarray, posed: np.ndarray, triangles: np.ndarray, bores: Sequence[Bore]
+) -> str:
+    """Return words for the holes of a flat face that take bolts; empty if it has none.
+
+    Args:
+        axis: unit normal of the face in the chamber's frame, (3,).
+        posed: the part's vertices in its pose [m], (n, 3), of which its triangles are made, (m, 3).
+    """
+    sizes = []
+    for bore in bores:
+        walls = area_vectors(posed, triangles[bore.triangles])
+        across = np.abs(walls @ axis).sum() < ALONG * np.linalg.norm(walls, axis=1).sum()
+        heights = seen.corners[bore.triangles][..., 2]
+        if across and heights.max() > seen.level - HIGHER:
+            sizes.append(plain(2e3 * bore.radius, 3))
+    if not sizes:
+        return ""
+    return (
+        f"; bolts through its hole{'s' if len(sizes) > 1 else ''} of {', '.join(sizes)} mm hold it"
+    )
 
 
 def _jaw(

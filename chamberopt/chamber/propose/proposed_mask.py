@@ -1,20 +1,27 @@
-"""Propose a mask on surfaces of a part that must not be peened, as their names say."""
+"""Propose a mask: on surfaces that must not be peened, or on a level top where balls would lie."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
 from chamberopt.chamber.build import Chamber
 from chamberopt.chamber.fixture import is_hole, pieces_of
 from chamberopt.chamber.part import chosen_on_part
+from chamberopt.chamber.propose.pose import Turns
 from chamberopt.chamber.propose.proposed_target import Surface
 from chamberopt.design.design import Design
 from chamberopt.design.part import Selection
+from chamberopt.geometry.faces import Faces
 from chamberopt.geometry.meshes.part_mesh import PartMesh
+from chamberopt.geometry.triangles import area_vectors, rotation_matrix
 
+FLAT_DEG = 1.0  # largest angle in a flat face
+STRAIGHT_UP = 0.9998  # cosine from which on a face is level: balls lie on it
+MOST_PADS = 8  # faces under one pad
 MET = 0.5  # share of a surface in the chamber from which on the shot meets it
 # Names of what fits to other parts, whose size and finish shot would change.
 NEVER = re.compile(
@@ -42,3 +49,25 @@ def to_be_masked(design: Design, chamber: Chamber, known: Sequence[Surface]) -> 
     """Return the names of surfaces that the shot meets and that must not be peened."""
     named = [one for one in known if "surface" in one.keys and NEVER.search(one.name)]
     return [one.name for one in named if is_met(design, chamber, one)]
+
+
+def pads(mesh: PartMesh, target: np.ndarray, turns: Turns, ball: float) -> list[dict[str, Any]]:
+    """Return keys that choose the level faces on which balls would lie, the most faces first.
+
+    A pad on them fills the room up to the ceiling. No face of the target is among them.
+
+    Args:
+        target: marks the triangles to be peened, (m,).
+        turns: turns of the part in the chamber [degrees].
+        ball: diameter of a ball [m].
+    """
+    faces = Faces(mesh.vertices, mesh.triangles, FLAT_DEG)
+    posed = mesh.vertices @ rotation_matrix(turns).T
+    up = np.bincount(faces.of_triangle, area_vectors(posed, mesh.triangles)[:, 2])
+    free = np.bincount(faces.of_triangle, target) == 0.0
+    level = free & (up > STRAIGHT_UP * faces.area) & (faces.area > ball * ball)
+    found = np.flatnonzero(level)
+    found = found[np.argsort(-faces.area[found], kind="stable")][:MOST_PADS]
+    places = [[round(1e3 * float(x), 3) + 0.0 for x in faces.place(int(one))] for one in found]
+    keys = [{"at_mm": place, "crease_deg": FLAT_DEG} for place in places]
+    return [{"faces": one} for one in (keys, keys[:1])[: len(keys)] if one]

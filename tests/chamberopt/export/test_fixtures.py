@@ -8,7 +8,7 @@ import trimesh
 from chamberopt.chamber.build import build_chamber
 from chamberopt.common.errors import InputError
 from chamberopt.design.design import Design, validate
-from chamberopt.documents.sheet import process_sheet
+from chamberopt.documents.sheet import AsBuilt, process_sheet
 from chamberopt.export.chamber_files import write_3mf, write_fixtures, write_stl_per_surface
 from chamberopt.results.arrays_file import load_chamber
 from chamberopt.results.load import load_result
@@ -57,7 +57,7 @@ def test_holder_and_mask_are_saved_exported_and_said(tmp_path: Path) -> None:
     assert names == {"part", "sonotrode", "wall", "holder", "mask"}
     write_3mf(folder, tmp_path / "chamber.3mf")
 
-    sheet = process_sheet(result, (60.0, 50.0))
+    sheet = process_sheet(result, AsBuilt((60.0, 50.0)))
     content = sheet.sections[0].content
     tables = {one.caption: dict(one.rows) for one in content if getattr(one, "caption", "")}
     assert tables["Chamber"]["holder"] == (

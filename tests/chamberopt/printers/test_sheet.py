@@ -19,6 +19,7 @@ from chamberopt.design.shape_surface import TAG_SONOTRODE
 from chamberopt.documents.coverage import figures
 from chamberopt.documents.document import Document, Section, Sentence, Table
 from chamberopt.documents.sheet import (
+    AsBuilt,
     alarms,
     chamber_limits,
     first_checks,
@@ -59,7 +60,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def rows_of(result: Result) -> dict[str, dict[str, str]]:
     """What the sheet says: value by name by title; sentences under ""."""
     found: dict[str, dict[str, str]] = {}
-    for table in (*setting_tables(result, (50.0,)), *limit_tables(result)):
+    for table in (*setting_tables(result, AsBuilt((50.0,))), *limit_tables(result)):
         rows = found[table.caption] = {}
         for name, value in table.rows:
             rows[name] = f"{rows[name]} {value}" if name in rows else value
@@ -182,7 +183,7 @@ def require_apart(boxes: list[tuple[str, np.ndarray]]) -> None:
 @pytest.mark.parametrize("much", [False, True])
 def test_nothing_overlaps_or_is_cut_off(folder: Path, much: bool) -> None:
     result = load_result(folder)
-    content = [*setting_tables(result, (50.0,)), first_checks(result)]
+    content = [*setting_tables(result, AsBuilt((50.0,))), first_checks(result)]
     name, answer = "a name", "An answer."
     if much:
         name, answer = 30 * "name ", 40 * "answer "
@@ -228,11 +229,11 @@ def test_what_forbids_to_use_it_is_in_red(folder: Path) -> None:
     assert metric_label("p05_coverage").text in told
     metrics["strength_um"] = metrics["p05_coverage"]
     assert [text for text in alarms(result) if "Too few dents" in text] == [told]  # no strips
-    content = process_sheet(result, (50.0,)).sections[0].content
+    content = process_sheet(result, AsBuilt((50.0,))).sections[0].content
     assert content[0] == Sentence(told, "warning")
     (wide,) = [
         one.text
-        for one in process_sheet(result, (130.0,)).sections[0].content
+        for one in process_sheet(result, AsBuilt((130.0,))).sections[0].content
         if isinstance(one, Sentence) and "larger than usual" in one.text
     ]
     assert "The face, Ø 130 mm, is larger than usual sonotrodes" in wide

@@ -14,7 +14,7 @@ from chamberopt.common.executor import SerialExecutor
 from chamberopt.design.ranges import unknowns
 from chamberopt.documents.ranges import range_texts
 from chamberopt.documents.report import report
-from chamberopt.documents.sheet import cautions, process_sheet
+from chamberopt.documents.sheet import AsBuilt, cautions, process_sheet
 from chamberopt.documents.terminal_lines import evaluation_lines, study_lines
 from chamberopt.documents.wording import metric_label
 from chamberopt.peening.range_result import Spreads
@@ -92,7 +92,7 @@ def test_the_sheet_says_the_time_at_the_slow_end(folder: Path) -> None:
     time = result.metrics["time_to_98_s"]
     slow = result.record.ranges.figures["time_to_98_s"].high
     assert slow.value == pytest.approx(2.0 * time.value, rel=0.1)
-    rows = process_sheet(result, (50.0,)).sections[0].content
+    rows = process_sheet(result, AsBuilt((50.0,))).sections[0].content
     expected = next(one for one in rows if getattr(one, "caption", "").startswith("Peening, and"))
     (text,) = [cell for name, cell in expected.rows if name.endswith(", at the slow end")]
     assert text == metric_label("time_to_98_s").format(slow)

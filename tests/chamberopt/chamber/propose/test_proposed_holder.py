@@ -125,6 +125,35 @@ def test_a_thin_plate_is_held_by_a_block_on_its_end() -> None:
     assert (first.keys["kind"], sorted(first.keys["size_mm"])) == ("plate", [4.0, 32.0])
 
 
+def test_a_jaw_holds_an_end_of_any_form_beside_the_target() -> None:
+    """A bar with a round end: a jaw grips 0.4 of its length, or up to two balls from the target."""
+    bar = Manifold.cube((60, 20, 10)) + Manifold.cylinder(10, 10, circular_segments=64).translate(
+        [60, 10, 0]
+    )
+    body = solid(bar).subdivide_to_size(4.0)
+    x = body.triangles_center[:, 0]
+    for reach in (10.0, 50.0):
+        target = x < reach
+        edge = body.triangles[target][..., 0].max()
+        (jaw,) = (one for one in choices_of(body, target) if one.is_round_an_end)
+        assert (jaw.keys["kind"], jaw.keys["axis"]) == ("plate", [1.0, 0.0, 0.0])
+        assert jaw.keys["grip_mm"] == pytest.approx(min(28, 70 - edge - 2), abs=0.11)
+        assert jaw.keys["size_mm"] == [24.0, 14.0]
+        (low, _), (high, _) = (one[:2] for one in jaw.keys["at"]["box_mm"])
+        assert low == pytest.approx(70 - jaw.keys["grip_mm"], abs=0.11)
+        assert high > 70.0
+
+
+def test_a_leaf_is_held_by_an_end_left_out_of_its_target(tmp_path: Path) -> None:
+    """Broad sides reach both ends: a block on the edge of the upper one alone holds no leaf."""
+    trimesh.creation.box((170, 5, 36)).subdivide_to_size(6.0).export(tmp_path / "leaf.stl")
+    made = propose(tmp_path / "leaf.stl", Wanted("mm"), lambda _: [])
+    assert made.design.holder is not None
+    assert made.design.holder.grip_mm is not None
+    assert "to hold it by" in made.reasons["part.target"]
+    assert made.design.part.target.box_mm is not None
+
+
 def test_a_part_that_is_all_target_is_held_by_its_slimmer_end() -> None:
     """A rod of 10 x 60 mm with a ball of 20 mm at its upper end, which is turned down."""
     body = solid(

@@ -1,0 +1,54 @@
+"""Openings through which the part goes out: bodies whose openings are known."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from chamberopt.chamber.build import Chamber, build_chamber
+from chamberopt.chamber.checks.openings import find_openings
+from chamberopt.design.design import Design, validate
+from chamberopt.design.load import load_design
+
+DESIGNS = Path(__file__).resolve().parents[4] / "designs"
+
+
+def chamber_of(folder: Path, body: trimesh.Trimesh, **part: object) -> Chamber:
+    """A body in mm, 15 mm over the floor of a box of 60 x 50 x 40 mm; its underside is peened."""
+    body.export(folder / "body.stl")
+    data = load_design(DESIGNS / "gear.toml").model_dump()
+    down = {"direction": (0, 0, -1), "angle_deg": (0, 30)}
+    given = {"mesh": str(folder / "body.stl"), "unit": "mm", "target": down, "smoothing": "off"}
+    sizes = {"length_mm": 60.0, "width_mm": 50.0, "height_mm": 40.0, "sonotrode_distance_mm": 15.0}
+    chamber = {"shape": "box", **sizes}
+    return build_chamber(validate(Design, {**data, "part": {**given, **part}, "chamber": chamber}))
+
+
+def test_a_bar_through_both_side_walls_and_a_post_through_the_ceiling(tmp_path: Path) -> None:
+    bar = trimesh.creation.box((100, 12, 8))
+    post = trimesh.creation.box((6, 4, 50))
+    post.apply_translation((0, 0, 21))  # from the bar's underside at z = -4 to z = 46
+    body = trimesh.boolean.union([bar, post], engine="manifold")
+    up, *aside = find_openings(chamber_of(tmp_path, body))[::-1]
+
+    assert up.wall == "the ceiling"
+    assert 1e3 * np.array([*up.size, *up.place]) == pytest.approx([6, 4, 0, 0, 40], abs=1e-6)
+    assert 1e3 * up.beyond == pytest.approx(15 + 50 - 40)
+    assert [one.wall for one in aside] == ["the wall"] * 2
+    for one in aside:
+        assert 1e3 * np.array(one.size) == pytest.approx([12, 8], abs=1e-6)
+        assert 1e3 * np.abs(one.place) == pytest.approx([30, 0, 19], abs=1e-6)
+        assert 1e3 * one.beyond == pytest.approx(20)
+
+
+def test_a_pipe_has_one_opening_and_a_part_in_the_air_none(tmp_path: Path) -> None:
+    pipe = trimesh.creation.annulus(6.0, 8.0, 60.0, sections=64)
+    plate = trimesh.creation.cylinder(8.0, 2.0, sections=64)
+    plate.apply_translation((0, 0, -29))
+    closed = trimesh.boolean.union([pipe, plate], engine="manifold")
+    (one,) = find_openings(chamber_of(tmp_path, closed))
+
+    assert 1e3 * np.array(one.size) == pytest.approx([16, 16], abs=0.05)
+    assert 1e3 * one.beyond == pytest.approx(15 + 60 - 40)
+    assert find_openings(chamber_of(tmp_path, trimesh.creation.box((20, 12, 8)))) == []

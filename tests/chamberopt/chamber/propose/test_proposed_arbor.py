@@ -1,0 +1,123 @@
+"""Bores that take an arbor, and parts that turn about one: bodies whose bores are known."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from manifold3d import Manifold, OpType
+
+from chamberopt.chamber.propose.proposal import Wanted, propose
+from chamberopt.chamber.propose.proposed_arbor import (
+    arbor_through,
+    find_bores,
+    turning_bore,
+    turning_pose,
+)
+from chamberopt.chamber.propose.proposed_holder import holder_choices
+from chamberopt.geometry.meshes.part_mesh import PartMesh
+from chamberopt.geometry.meshes.raw_mesh import number_by_position
+from chamberopt.geometry.triangles import rotation_matrix
+from tests.helpers.more_parts import MORE_PARTS
+
+BALL = 1e-3
+
+
+def part_of(body: Manifold) -> tuple[PartMesh, trimesh.Trimesh]:
+    """A body in mm as a part, and as a mesh of trimesh."""
+    made = body.to_mesh()
+    mesh = trimesh.Trimesh(made.vert_properties, made.tri_verts, process=False)
+    numbering = number_by_position(len(mesh.faces))
+    vertices = 1e-3 * np.asarray(mesh.vertices)
+    return PartMesh(vertices, mesh.faces.astype(np.int32), numbering, (), "", {}), mesh
+
+
+def drum(radius: float, height: float, sides: int = 64) -> Manifold:
+    return Manifold.cylinder(height, radius, circular_segments=sides)
+
+
+def ring(outer: float, inner: float, height: float) -> Manifold:
+    """A drum with a hole through its middle, which goes on beyond both ends."""
+    return drum(outer, height) - drum(inner, 3 * height).translate([0, 0, -height])
+
+
+def test_bores_are_round_free_and_go_through() -> None:
+    """Of a plate: a hole of 8 mm counts; a blind, a square, a thin and a blocked one do not."""
+    plate = Manifold.cube((120, 40, 10))
+    plate -= drum(4, 30).translate([20, 20, -10])
+    plate -= drum(4, 8).translate([40, 20, 5])  # blind
+    plate -= Manifold.cube((8, 8, 30)).translate([56, 16, -10])
+    plate -= drum(1, 30).translate([80, 20, -10])
+    plate -= drum(5, 30).translate([100, 20, -10])
+    plate += Manifold.cube((20, 2, 2)).translate([90, 19, 20])  # in the way of the last
+    plate += Manifold.cube((2, 2, 22)).translate([89, 19, 0])
+    mesh, _ = part_of(plate)
+    nothing = np.zeros(len(mesh.triangles), dtype=bool)
+
+    (bore,) = find_bores(mesh, nothing)
+    assert bore.radius == pytest.approx(4e-3, rel=1e-3)
+    assert 1e3 * bore.point == pytest.approx([20, 20, 5], abs=1e-3)
+    assert np.abs(bore.axis) == pytest.approx([0, 0, 1])
+    assert find_bores(mesh, bore.triangles) == []  # it is to be peened
+
+
+@pytest.mark.parametrize(
+    ("turns", "axis"), [((0, 0, 0), None), ((90, 0, 0), 1), ((0, 90, 0), 0), ((40, 0, 0), ())]
+)
+def test_an_arbor_goes_up_or_aside(turns: tuple[float, ...], axis: int | tuple[()] | None) -> None:
+    """Flanges of 1.6 bores, but a ball away from the target; none for an axis that leans."""
+    mesh, body = part_of(ring(30, 10, 12))
+    outside = np.hypot(*body.triangles_center[:, :2].T) > 29.0
+    (bore,) = find_bores(mesh, outside)
+    made = arbor_through(bore, mesh, outside, turns, BALL)
+    if axis == ():
+        assert made is None
+        return
+    assert made is not None
+    keys, _ = made
+    assert (keys["kind"], keys["diameter_mm"], keys["thickness_mm"]) == ("arbor", 32.0, 2.0)
+    assert keys.get("both_sides", False) == (axis is not None)
+    if axis is not None:
+        assert abs(keys["axis"][axis]) == 1.0
+    near = np.hypot(*body.triangles_center[:, :2].T) > 10.5
+    assert arbor_through(bore, mesh, near & ~bore.triangles, turns, BALL) is None
+
+
+def test_a_ring_of_alike_teeth_turns_about_its_bore() -> None:
+    """A toothed disc turns; with half of its teeth as target, or none outside, it does not."""
+    teeth = [
+        Manifold.cube((6, 3, 12)).translate([28, -1.5, 0]).rotate([0, 0, 360 / 16 * k])
+        for k in range(16)
+    ]
+    gear = Manifold.batch_boolean([ring(30, 10, 12), *teeth], OpType.Add)
+    mesh, body = part_of(gear)
+    middle = body.triangles_center
+    outside = (np.hypot(*middle[:, :2].T) > 29.0) & (np.abs(body.face_normals[:, 2]) < 0.5)
+    bores = find_bores(mesh, outside)
+    bore = turning_bore(bores, mesh, outside)
+    assert bore is not None
+    assert turning_bore(bores, mesh, outside & (middle[:, 0] > 0.0)) is None
+    inside = np.hypot(*middle[:, :2].T) < 29.0
+    assert turning_bore(bores, mesh, inside & ~bore.triangles) is None
+
+    turns, turn = turning_pose(bore, mesh)
+    level = rotation_matrix(turns) @ bore.axis
+    assert np.abs(level) == pytest.approx([0, 1, 0], abs=1e-6)  # across the room's length
+    assert np.abs(turn["axis"]) == pytest.approx([0, 0, 1])
+    assert turn["through_mm"][:2] == pytest.approx([0, 0], abs=1e-3)
+    first = holder_choices(mesh, outside, turns, BALL, bores)[0]
+    assert first.keys["kind"] == "arbor"
+    assert first.keys["both_sides"]
+
+
+def test_a_disc_on_whose_web_balls_would_lie_turns_on_an_arbor(tmp_path: Path) -> None:
+    part = MORE_PARTS["turbine_disc"].write(tmp_path)
+    made = propose(part, Wanted("m"), lambda _: [])
+    turn, holder = made.design.effects.part_turn, made.design.holder
+    assert turn is not None
+    assert holder is not None
+    assert (holder.kind, holder.both_sides) == ("arbor", True)
+    assert abs(holder.axis[2]) < 1e-6
+    assert not made.warnings
+    assert made.design.sonotrode.blocks is not None
+    assert made.design.sonotrode.blocks.count == 2  # lying it takes four
