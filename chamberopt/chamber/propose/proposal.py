@@ -90,7 +90,7 @@ def propose_charge(floor: float, diameter: float, ball_mass: float) -> tuple[flo
         return most, "the most that is supported, less than half a layer of balls"
     mass = min(float(f"{wanted:.2g}"), most)
     if count < full:
-        return mass, "less than half a layer of balls, as more take hours to simulate"
+        return mass, f"{CAPPED}, as more take hours to simulate"
     return mass, "half a layer of balls on the sonotrode"
 
 
@@ -161,6 +161,7 @@ NO_PLACE = (
 TREATMENT_S, HALF_WIDTH, MOST_REPLICAS = 300.0, 0.03, 24
 REPLICAS = 10  # the fewest that a wanted half-width takes
 BLOCKS = "LARGER THAN ONE SONOTRODE: several side by side, driven alike"
+CAPPED = "less than half a layer of balls"
 START = "a start, NOT MEASURED by a pilot"
 ON_END = "on end, as no sonotrode is large enough for it lying"
 
@@ -337,10 +338,11 @@ def _proposed(
 
     with step("building and checking the chamber") as progress:
         made, floor = built(is_local=False)
-        if not floor.is_one_sonotrode:
+        if not floor.is_one_sonotrode or _is_capped(made):
             with suppress(InputError):
                 local = built(is_local=True)
-                if local[1].is_one_sonotrode and _faults(local[0]) <= _faults(made):
+                fits = local[1].is_one_sonotrode and not _is_capped(local[0])
+                if fits and _faults(local[0]) <= _faults(made):
                     made, floor = local
     if made.chamber.pieces_in_air:
         with step("choosing what holds the part") as progress:
@@ -357,6 +359,11 @@ def _proposed(
                 made, floor = other, its_floor
     made = _padded(_masked(made, floor, wanted.shop), floor, target, wanted.shop)
     return _only_touched(made, floor, wanted.shop)
+
+
+def _is_capped(made: Proposal) -> bool:
+    """Return whether a chamber holds fewer balls than it should, as more take too long."""
+    return made.reasons["shot.mass_g"].startswith(CAPPED)
 
 
 def _only_touched(made: Proposal, floor: Floor, shop: Shop | None) -> Proposal:
