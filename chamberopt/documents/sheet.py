@@ -44,7 +44,8 @@ JAMMED = 0.01  # least share of the shot's time, or of the impacts, in gaps that
 def alarms(result: Result) -> Iterator[str]:
     """Yield the reasons not to use the sheet as it stands.
 
-    They are figures that are not resolved, balls that jam, and a time that leaves the target bare.
+    They are figures that are not resolved, balls that jam, a shot that had not settled, and a time
+    that leaves the target bare.
     """
     told = _expected_figures(result)
     if result.design.calibration is None:  # without one they are rough, resolved or not
@@ -62,6 +63,13 @@ def alarms(result: Result) -> Iterator[str]:
             f"{percent(trapped.rattling_time)} of the shot at any time, and "
             f"{percent(trapped.rattling_impacts)} of the impacts on the part. The report has the "
             "place: choose other balls, or close or widen the gap."
+        )
+    if excess := result.record.first_half_excess:
+        yield (
+            "The shot had not settled when recording began: the target was dented by "
+            f"{percent(abs(excess))} {'more' if excess > 0.0 else 'less'} in the first half of the "
+            "simulated time than in the second. Simulate with a longer "
+            "process.accuracy.warmup_time_s before this is built."
         )
     yield from _bare(result)
 

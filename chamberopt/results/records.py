@@ -393,6 +393,9 @@ class CandidateRecord(ResultRecord):
     collisions: dict[str, Count]
     timings_s: dict[str, Positive]
     trapped: TrappedRecord | None = None  # None if not known
+    # Share by which the target was dented more in the first halves of the replicas: the shot had
+    # not settled. None if it had, or it is not known.
+    first_half_excess: float | None = None
     chamber: ChamberRecord
     design: dict[str, Any]
     part_sha256: Digest

@@ -214,6 +214,7 @@ def _write_candidate(folder: Path, candidate: CandidateResult, **more: Any) -> C
         collisions=evaluation.collisions,
         timings_s={step: round(seconds, 3) for step, seconds in evaluation.timings.items()},
         trapped=TrappedRecord(**evaluation.trapped) if evaluation.trapped else None,
+        first_half_excess=evaluation.first_half_excess,
         chamber=ChamberRecord(
             volume_mm3=chamber.volume * 1e9,
             target_exposed_area_mm2=float(chamber.exposed_area[target].sum() * 1e6),

@@ -45,7 +45,7 @@ from chamberopt.simulation.replicas import (
     simulate_replica,
 )
 from chamberopt.simulation.resting_balls import resting_notes
-from chamberopt.simulation.settling import settling_notes
+from chamberopt.simulation.settling import first_half_excess, settling_notes
 from chamberopt.simulation.trapped_balls import trapped_notes, trapped_shares
 
 if TYPE_CHECKING:
@@ -173,6 +173,7 @@ class _Run:
         growth = growth_for_dents(plan.objective_name, found.resolution)
         unit = unit_of_objective(plan.objective_name, metrics, objective)
         self.step = self.effort.after(done, objective, growth, self.step, unit)
+        excess = first_half_excess([one.halves for one in replicas if one.halves])
         return Evaluation(
             objective_name=plan.objective_name,
             objective=objective,
@@ -205,13 +206,14 @@ class _Run:
                 *stress_notes(design.materials.part),
                 *resting_notes([one.resting for one in replicas if one.resting], done),
                 *trapped_notes([one.trapped for one in replicas], design),
-                *settling_notes([one.halves for one in replicas if one.halves], design),
+                *settling_notes(excess, design),
             ),
             zones={name: one.field.reachable for name, one in zones.items()},
             stream=plan.stream,
             stopped_by=self.step.stopped_by or "replicas",
             analytic=self.cavity is not None,
             trapped=trapped_shares([one.trapped for one in replicas]),
+            first_half_excess=None if excess is None else excess.value,
         )
 
 

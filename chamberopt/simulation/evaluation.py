@@ -49,6 +49,9 @@ class Evaluation:
     # Shares of hopping and of rattling balls, by the names in trapped_balls.py. Empty if they are
     # not known.
     trapped: dict[str, float] = field(default_factory=dict)
+    # By what share the target was dented more in the first halves of the replicas than in the
+    # second, where that is more than noise: the shot had not settled. None if it is not.
+    first_half_excess: float | None = None
     analytic: bool = False  # whether it ran in an exact cavity instead of the chamber's mesh
 
 
@@ -92,6 +95,7 @@ def _require_sound(found: Evaluation) -> None:
         found.objective.value, found.reachable, found.crease_share, found.simulated_time,
         needed.dents, needed.needed_for_mean, needed.needed_for_places, needed.simulated_time,
         *found.timings.values(), *found.collisions.values(), *found.trapped.values(),
+        found.first_half_excess or 0.0,
         *(one.bias for one in estimates),
         *(x for one in estimates for x in (*one.pseudovalues, *one.shared)),
     ]  # fmt: skip

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from chamberopt.common.estimate import estimate
+from chamberopt.common.estimate import Estimate, estimate
 from chamberopt.common.number_text import estimate_text
 
 if TYPE_CHECKING:
@@ -44,17 +44,28 @@ def dented_halves(
     return float(size[~late].sum()), float(size[late].sum())
 
 
-def settling_notes(halves: Sequence[tuple[float, float]], design: Design) -> tuple[str, ...]:
-    """Return a note if the target was dented faster, or slower, in the first halves of replicas.
+def first_half_excess(halves: Sequence[tuple[float, float]]) -> Estimate | None:
+    """Return by what share the target was dented more in the first halves of the replicas.
+
+    It is None unless it differs from 0 by more than noise.
 
     Args:
         halves: of each replica, as of `dented_halves`.
     """
     both = np.array(halves, dtype=float)
     if len(both) < 2 or not both[:, 1].sum() > 0.0:
-        return ()
+        return None
     change = estimate((both[:, 0] - both[:, 1]) / both[:, 1].mean(), confidence=CONFIDENCE)
-    if abs(change.value) < max(LEAST, change.half_width):
+    return None if abs(change.value) < max(LEAST, change.half_width) else change
+
+
+def settling_notes(change: Estimate | None, design: Design) -> tuple[str, ...]:
+    """Return a note if the target was dented faster, or slower, in the first halves of replicas.
+
+    Args:
+        change: as of `first_half_excess`.
+    """
+    if change is None:
         return ()
     accuracy = design.process.accuracy
     enough = float(f"{accuracy.warmup_time_s + 0.5 * accuracy.simulated_time_s:.2g}")

@@ -216,6 +216,10 @@ def test_what_forbids_to_use_it_is_in_red(folder: Path) -> None:
     record = result.record.model_copy(update={"trapped": jammed})
     (told,) = [text for text in alarms(replace(result, record=record)) if "rattle" in text]
     assert "12 % of the shot at any time, and 48 % of the impacts" in told
+    assert not any("settled" in text for text in alarms(result))
+    lively = result.record.model_copy(update={"first_half_excess": 0.12})
+    (told,) = [text for text in alarms(replace(result, record=lively)) if "not settled" in text]
+    assert "dented by 12 % more in the first half" in told
     metrics = result.metrics
     metrics.update(mean_coverage=Estimate(0.57, 0.03), time_to_98_s=Estimate(900.0, 50.0))
     assert [text for text in alarms(result) if "too short" in text] == [

@@ -8,7 +8,7 @@ from chamberopt.chamber.replica_seed import replica_seed
 from chamberopt.chamber.scene import chamber_mesh
 from chamberopt.coverage.dents import dent_diameters
 from chamberopt.simulation.replicas import ReplicaSetting, simulate_replica, simulate_seed
-from chamberopt.simulation.settling import settled_after, settling_notes
+from chamberopt.simulation.settling import first_half_excess, settled_after, settling_notes
 from tests.helpers.synthetic import plate_design
 
 PLATE = plate_design().changed({"process.accuracy.simulated_time_s": 0.3})
@@ -41,16 +41,16 @@ def test_a_pilot_that_is_too_short_knows_nothing() -> None:
 def test_halves_that_differ_by_more_than_noise_are_told() -> None:
     rng = np.random.default_rng(2)
     same = rng.poisson(10_000, (10, 2)).astype(float)
-    assert settling_notes([tuple(one) for one in same], PLATE) == ()
+    assert settling_notes(first_half_excess([tuple(one) for one in same]), PLATE) == ()
     first = same * [1.05, 1.0]
-    (note,) = settling_notes([tuple(one) for one in first], PLATE)
+    (note,) = settling_notes(first_half_excess([tuple(one) for one in first]), PLATE)
     assert "NOT SETTLED" in note
     assert "more in the first half" in note
     assert "from 0.2 to 0.35 or more" in note
-    (note,) = settling_notes([tuple(one) for one in same * [1.0, 1.05]], PLATE)
+    (note,) = settling_notes(first_half_excess([tuple(one) for one in same * [1.0, 1.05]]), PLATE)
     assert "less in the first half" in note
-    assert settling_notes([(1.05, 1.0)], PLATE) == ()  # nothing is known of the noise
-    assert settling_notes([(0.0, 0.0)] * 3, PLATE) == ()
+    assert first_half_excess([(1.05, 1.0)]) is None  # nothing is known of the noise
+    assert first_half_excess([(0.0, 0.0)] * 3) is None
 
 
 def test_the_halves_of_a_replica_are_all_that_it_dents_on_the_target() -> None:
