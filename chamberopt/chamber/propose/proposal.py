@@ -17,6 +17,7 @@ import numpy as np
 from chamberopt.chamber.build import Chamber, build_chamber
 from chamberopt.chamber.checks.check import shot_reach, warnings
 from chamberopt.chamber.checks.jams import JamGap, gaps_in_reach, jam_gaps
+from chamberopt.chamber.checks.place_names import one_of
 from chamberopt.chamber.part import Part, posed_part
 from chamberopt.chamber.propose.pose import (
     Turns,
@@ -376,7 +377,11 @@ def _only_touched(made: Proposal, floor: Floor, shop: Shop | None) -> Proposal:
     if not LEAST_LEFT < hidden < MOST_LEFT:
         return made
     target = {**made.tables["part.target"], "reachable": True}
-    text = f"leaves out the {hidden:.1%} that no ball touches here"
+    part = made.chamber.part
+    touched = reached_part_share(made.reach, made.chamber.source, len(part.triangles))
+    left = np.where(part.target, (1.0 - touched) * part.area, 0.0)
+    place = one_of(part.vertices[part.triangles].mean(axis=1), left)
+    text = f"leaves out the {hidden:.1%} that no ball touches here, such as at {place}"
     reasons = {**made.reasons, "part.target.reachable": text}
     tables = {**made.tables, "part.target": target}
     return _checked(tables, reasons, floor, made.known, made.mesh, shop)
