@@ -11,8 +11,9 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from chamberopt.chamber.build import Chamber
-    from chamberopt.chamber.propose.proposal import Proposal
+    from chamberopt.chamber.propose.proposal import Proposal, Wanted
     from chamberopt.common.progress import Progress
+    from chamberopt.design.intensity import PredictedIntensity, WantedIntensity
     from chamberopt.design.load import Design
     from chamberopt.results.load import Result
     from chamberopt.results.rebuild import RebuiltReplica
@@ -82,6 +83,31 @@ def advise_effects(design: Design, chamber: Chamber) -> list[dict[str, object]]:
     return [advice_record(one).as_json() for one in advice]
 
 
+def with_intensity(
+    made: Proposal, wanted: Wanted, intensity: WantedIntensity, again: Callable[[float], Proposal]
+) -> Proposal:
+    """Return a proposal with balls and an amplitude for a wanted Almen intensity, by pilot runs.
+
+    Args:
+        again: proposes the design with balls of another diameter [mm].
+    Raises:
+        InputError: no pilot tells the intensity.
+    """
+    from chamberopt.chamber.propose.proposed_intensity import propose_intensity
+    from chamberopt.common.executor import local_executor
+    from chamberopt.common.progress import step
+    from chamberopt.peening.intensity_pilot import predict_intensity
+
+    compile_with_message(made.design, made.chamber)
+    with local_executor() as executor:
+
+        def simulate(one: Proposal) -> PredictedIntensity | None:
+            with step("pilot run of the intensity") as progress:
+                return predict_intensity(one.design, one.chamber, executor, progress)
+
+        return propose_intensity(made, wanted, intensity, again, simulate)
+
+
 def with_pilot(made: Proposal) -> Proposal:
     """Return a proposal whose treatment time and budget follow from a short simulation.
 
@@ -101,7 +127,7 @@ def with_pilot(made: Proposal) -> Proposal:
     except (InputError, SimulationError) as error:
         print_remarks([f"warning: no pilot, treatment and simulated time are starts: {error}"])
         return made
-    return with_budget(made, propose_budget(found))
+    return with_budget(made, propose_budget(found, made.design.process.coverage_percent))
 
 
 def seconds_of(progress: Progress, whole: float) -> Callable[[float], None]:

@@ -48,6 +48,7 @@ MAX_SONOTRODES = 50
 SHAPE = "chamber.shape"
 NOT_VARIED = (
     "calibration.", "zones.", "ranges.", "part.tessellation.", "holder.at.", "mask.at.",
+    "process.intensity_mmA.", "process.coverage_percent",
 )  # fmt: skip
 
 
@@ -276,7 +277,7 @@ class Design(FileTable):
                 "a setting of the simulation, not of the chamber; it cannot vary, see "
                 "[search_accuracy]"
             )
-        if name.startswith("zones."):
+        if name.startswith(("zones.", "process.intensity_mmA.", "process.coverage_percent")):
             return "what is asked of the design, not a choice of it; it cannot vary"
         return "" if name in numbers else "a whole number cannot vary; leave it out"
 

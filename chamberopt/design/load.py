@@ -47,7 +47,8 @@ def with_paths_from(folder: Path, value: Any) -> Any:
     if isinstance(value, Mapping):
         return {
             name: _relative(inner, folder)
-            if isinstance(inner, str) and (name == "mesh" or (name == "shape" and is_custom(inner)))
+            if isinstance(inner, str)
+            and (name in ("mesh", "calibration") or (name == "shape" and is_custom(inner)))
             else with_paths_from(folder, inner)
             for name, inner in value.items()
         }

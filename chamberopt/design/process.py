@@ -6,7 +6,7 @@ from typing import ClassVar
 from pydantic import Field
 
 from chamberopt.common.toml_errors import Problem
-from chamberopt.common.toml_fields import quantity
+from chamberopt.common.toml_fields import Pair, list_field, quantity
 from chamberopt.design.table_base import SI, FileTable
 
 MIN_POINTS, MAX_POINTS = 1_000, 1_000_000  # limits on the number of coverage windows
@@ -66,7 +66,20 @@ class Process(FileTable):
 
     treatment_time_s: float = quantity(0.01, 1e6, "s", "peening time the coverage is predicted for")
     seed: int = quantity(0, 2**63 - 1, "", "same seed, same result", 1)
+    intensity_mmA: Pair | None = list_field(  # noqa: N815
+        "two numbers [low, high], 0 < low < high",
+        "the Almen intensity that is wanted, mean over the target",
+        None,
+    )
+    coverage_percent: float | None = quantity(
+        100, 1000, "%", "that is wanted: 100 is the time to 98 %, 200 twice that time", None
+    )
     accuracy: Accuracy = Field(default_factory=Accuracy, description="replicas and their length")
+
+    def _problems(self) -> Iterator[Problem]:
+        if self.intensity_mmA is not None and not 0 < self.intensity_mmA[0] < self.intensity_mmA[1]:
+            text = f"given {list(self.intensity_mmA)}; allowed: [low, high] with 0 < low < high"
+            yield Problem("intensity_mmA", text)
 
     @property
     def recorded_time(self) -> float:

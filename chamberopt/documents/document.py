@@ -130,7 +130,7 @@ class AnswerLine:
     warns: True if the sentence is a warning, e.g. that a limit is not certainly met.
     """
 
-    about: Literal["zone", "best", "start", "other", "calibration", "ranges"]
+    about: Literal["zone", "best", "start", "other", "calibration", "ranges", "process"]
     text: str
     warns: bool
 

@@ -15,6 +15,7 @@ from chamberopt.common.number_text import estimate_text, percent
 from chamberopt.coverage.coverage_intervals import NOT_RESOLVED
 from chamberopt.design.calibration import why_no_intensity
 from chamberopt.design.fixture import WIDEST_GAP
+from chamberopt.design.intensity import PredictedIntensity
 from chamberopt.design.materials import alloys, find
 from chamberopt.design.tolerances import tolerance_box
 from chamberopt.documents.answer import answer, answer_lines
@@ -24,6 +25,7 @@ from chamberopt.documents.ranges import groups_text, slow_end_is_late, time_at_s
 from chamberopt.documents.report import limits_of_intervals, notes_of
 from chamberopt.documents.study import exposed_target
 from chamberopt.documents.tolerances import sheet_rows
+from chamberopt.documents.wanted import wanted_lines, wanted_rows
 from chamberopt.documents.wording import metric_label, plain
 from chamberopt.results.load import load_start
 
@@ -44,8 +46,9 @@ JAMMED = 0.01  # least share of the shot's time, or of the impacts, in gaps that
 def alarms(result: Result) -> Iterator[str]:
     """Yield the reasons not to use the sheet as it stands.
 
-    They are figures that are not resolved, balls that jam, a shot that had not settled, and a time
-    that leaves the target bare.
+    They are figures that are not resolved, balls that jam, a shot that had not settled, a time that
+    leaves the target bare or is too short for the wanted coverage, and an intensity outside of its
+    range.
     """
     told = _expected_figures(result)
     if result.design.calibration is None:  # without one they are rough, resolved or not
@@ -72,6 +75,7 @@ def alarms(result: Result) -> Iterator[str]:
             "process.accuracy.warmup_time_s before this is built."
         )
     yield from _bare(result)
+    yield from (one.text for one in wanted_lines(result.design, result.metrics) if one.warns)
 
 
 def _wide_face(result: Result, face_mm: tuple[float, ...]) -> Iterator[str]:
@@ -450,13 +454,15 @@ def _expected(result: Result) -> Iterator[Row]:
     """
     time = f"{plain(result.design.process.treatment_time)} s"
     yield "peening time", _limited(result, "process.treatment_time_s", time)
+    yield from wanted_rows(result)
     calibration = result.design.calibration
     for row in _expected_figures(result):
         more = f"; range {row.range_with_unit}" if row.range_text else ""
         yield row.label.text, f"{row.label.format(row.result)}{more}"
     if slow := time_at_slow_end(result):
         yield f"{metric_label(TIME).text}, at the slow end", slow
-    if reason := why_no_intensity(calibration):
+    wanted = result.design.process.intensity_mmA
+    if wanted is None and (reason := why_no_intensity(calibration)):
         yield "", f"{reason[0].upper()}{reason[1:]}."
     for one in answer_lines(result):
         if one.about in ("best", "calibration", "ranges"):  # zones have their own block
@@ -549,7 +555,11 @@ def _checks(result: Result) -> Iterator[Row]:
     intensity = result.metrics.get("almen_intensity")
     if intensity is None:
         strips = "A strips at 4 or 5 times, for chamberopt calibrate"
-        yield strips, "not known before: calibrates to mmA"
+        rough = PredictedIntensity.of(result.metrics, calibration)
+        known = "not known before"
+        if rough is not None and design.process.intensity_mmA is not None:
+            known = f"{plain(rough.value, 2)} mmA, x/÷ {plain(rough.factor, 2)}"
+        yield strips, f"{known}: calibrates to mmA"
     else:
         text = metric_label("almen_intensity").format(intensity)
         yield "intensity by A strips at the target", text

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from chamberopt.common.number_text import counted, estimate_text, plain
 from chamberopt.documents.ranges import at_ends_text, range_lines, range_texts
+from chamberopt.documents.wanted import wanted_lines
 from chamberopt.search.study.constraints import judge_zones
 
 if TYPE_CHECKING:
@@ -53,6 +54,12 @@ def zone_limit_lines(design: Design, evaluation: Evaluation) -> list[str]:
     ]
 
 
+def process_lines(design: Design, evaluation: Evaluation) -> list[str]:
+    """Return a line on the wanted intensity and on the wanted coverage, if there are any."""
+    lines = wanted_lines(design, evaluation.metrics)
+    return [f"warning: {one.text}" if one.warns else one.text for one in lines]
+
+
 def note_lines(notes: Iterable[str]) -> list[str]:
     """Return a line for each note, with the word "note" before it."""
     return [f"note: {note}" for note in notes]
@@ -79,7 +86,8 @@ def study_lines(result: StudyResult, ranges: StudyRanges | None = None) -> list[
         lines.append(f"{name:34}{''.join(values)}")
     of_both = (ranges.start, ranges.best) if ranges else (None, None)
     for title, one, found in zip(("start", "best"), (start, best), of_both, strict=True):
-        limits = zone_limit_lines(one.design, one.evaluation)
+        limits = process_lines(one.design, one.evaluation)
+        limits += zone_limit_lines(one.design, one.evaluation)
         lines += ["", title, *evaluation_lines(one.evaluation, found), *range_lines(found), *limits]
     verdict = "better than the start" if result.improved else "within the noise of the start"
     if result.gain.in_words:

@@ -23,6 +23,7 @@ import numpy as np
 from chamberopt.chamber.build import build_chamber
 from chamberopt.common.files import make_folder
 from chamberopt.common.versions import package_versions
+from chamberopt.design.almen_strip import USUAL_K, USUAL_K_LOG_SD
 from chamberopt.design.calibration import OF_STRIPS, PARAMETERS, WHOLE_STRIP, Calibration, Parameter
 from chamberopt.peening.calibration_errors import SIMULATED
 from chamberopt.peening.measured import (
@@ -58,7 +59,7 @@ PRIORS: dict[Parameter, tuple[float, float]] = {
     "v0": (1.0, 0.70),
     "mu": (1.0, 0.30),
     "hardness": (1.0, 0.20),
-    "K": (13.5, 0.90),
+    "K": (USUAL_K, USUAL_K_LOG_SD),
     "beta": (1.0, 0.40),
 }
 # Least and largest step of a run from the centre; between these, a step is a standard deviation.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -23,6 +24,7 @@ from chamberopt.chamber.reach import Reach, find_reach, reached_part_share
 from chamberopt.chamber.replica_seed import replica_seed
 from chamberopt.chamber.scene import build_scene, chamber_mesh, require_ball_count, require_turnable
 from chamberopt.common.number_text import plain
+from chamberopt.design.almen_strip import USUAL_K_LOG_SD
 from chamberopt.design.shape_surface import TAG_PART, TAG_SONOTRODE, TAG_WALL, is_sonotrode
 from chamberopt.design.tolerances import require_tolerances, tolerance_box
 from chamberopt.geometry.triangles import areas, edge_keys, sides_of, tetrahedron_volumes
@@ -171,6 +173,7 @@ def notes(design: Design, chamber: Chamber) -> list[str]:
     return [
         *chamber.notes,
         *_place_notes(design),
+        *_intensity_notes(design),
         *friction_notes(design),
         *amplitude_notes(design),
         *(ledge.message for ledge in find_ledges(design, chamber) if not ledge.level),
@@ -267,6 +270,22 @@ def _place_notes(design: Design) -> list[str]:
     if design.chamber.setup() is not None or any(design.part.offset):
         return []
     return ["the middle of the part's box is on the chamber's axis; part.offset_mm moves it"]
+
+
+def _intensity_notes(design: Design) -> list[str]:
+    """Return a note on how the wanted Almen intensity will be judged, if the design has one."""
+    wanted, calibration = design.process.intensity_mmA, design.calibration
+    if wanted is None:
+        return []
+    how = f"only to a factor of {math.exp(USUAL_K_LOG_SD):.2g} until strips are measured"
+    if calibration is not None and calibration.has_strips:
+        how = "by the design's calibration"
+        if calibration.not_mmA:
+            how = f"not: the calibration has arc heights of a {calibration.strips}"
+    return [
+        f"process.intensity_mmA = [{wanted[0]:g}, {wanted[1]:g}] is wanted of the mean over the "
+        f"target: chamberopt simulate predicts it, {how}"
+    ]
 
 
 def friction_notes(design: Design) -> list[str]:

@@ -27,7 +27,13 @@ from chamberopt.chamber.propose.pose import (
     square_to_walls,
 )
 from chamberopt.chamber.propose.proposed_arbor import Bore, find_bores, turning_bore, turning_pose
-from chamberopt.chamber.propose.proposed_balls import charge_of, fit_sizes, propose_ball
+from chamberopt.chamber.propose.proposed_balls import (
+    MOST_BALLS,
+    charge_of,
+    fit_sizes,
+    propose_ball,
+    sizes_to_try,
+)
 from chamberopt.chamber.propose.proposed_end import HeldEnd, held_end
 from chamberopt.chamber.propose.proposed_floor import Floor, floor_on_sonotrode, require_room
 from chamberopt.chamber.propose.proposed_holder import end_holder, holder_choices
@@ -45,7 +51,7 @@ from chamberopt.chamber.propose.proposed_target import (
 )
 from chamberopt.chamber.propose.proposed_tolerances import REASON as OF_LENGTHS
 from chamberopt.chamber.propose.proposed_tolerances import propose_tolerances
-from chamberopt.chamber.propose.shop import Shop, usual_shop
+from chamberopt.chamber.propose.shop import Shop, ShopSonotrode, usual_shop
 from chamberopt.chamber.reach import Reach, reached_part_share
 from chamberopt.chamber.scene import MAX_BALLS
 from chamberopt.common.errors import InputError, UnreadableError
@@ -144,8 +150,6 @@ def _heaviest_g(ball_mass: float) -> float:
     return float(f"{digit * math.floor(most / digit + 1e-9):.6g}")
 
 
-LARGEST_BALL = 3e-3  # m: larger balls are in use, but they are few and slow to cover
-MOST_BALLS = 10_000  # of a charge: more take hours to simulate
 WIDER = (1.0, 1.4, 2.0)  # factors on the room round the part that are tried
 AMPLITUDE_UM = 40.0  # zero-to-peak; the nearest that the sonotrode can set is taken
 USUAL_PART, WALL, SONOTRODE = "42CrMo4", "100Cr6", "Ti-6Al-4V"  # of the catalogue
@@ -180,6 +184,8 @@ class Wanted:
     shot: str = ""  # material of the balls
     ball_mm: float | None = None
     shop: Shop | None = None  # what the shop has; usual sizes if it is not known
+    calibration: Path | None = None  # file of the machine's calibration
+    coverage: float | None = None  # [%], 200 is twice the time to 98 %
 
 
 @dataclass(frozen=True)
@@ -196,6 +202,7 @@ class Proposal:
     reach: Reach
     warnings: tuple[str, ...]
     jams: tuple[JamGap, ...]  # gaps of chamber and part in which the balls jam
+    sonotrode: ShopSonotrode  # whose face carries the chamber
     # Of all replicas of a candidate [s], to know the time in which its target is covered; None if
     # no pilot ran, or balls do not touch enough of the target.
     search_time: float | None = None
@@ -255,6 +262,7 @@ def _proposed(
     if end is not None:
         target, turns = end.target, end.turns
     tables: Tables = {
+        **({"": {"calibration": str(wanted.calibration.resolve())}} if wanted.calibration else {}),
         "part": {"mesh": str(path.resolve()), "unit": mesh.unit, "rotate_deg": list(turns)},
         "part.target": target.keys,
         "chamber": {},
@@ -262,7 +270,11 @@ def _proposed(
         "shot": {"mass_g": 1.0, "diameter_mm": 1.0, "material": shot},
         "materials": {"part": part_alloy, "wall": WALL, "sonotrode": SONOTRODE},
         "effects": {"gravity": True, "friction": CATALOGUE, "roughness": USUAL},
-        "process": {"treatment_time_s": TREATMENT_S, "seed": 1},
+        "process": {
+            "treatment_time_s": TREATMENT_S,
+            "seed": 1,
+            **({"coverage_percent": wanted.coverage} if wanted.coverage else {}),
+        },
         "process.accuracy": {
             "replicas": REPLICAS,
             "simulated_time_s": 1.0,
@@ -624,11 +636,7 @@ def _ball_diameter(tables: Tables, wanted: Wanted, shop: Shop) -> tuple[float, s
             raise InputError(f"--ball-mm: given {wanted.ball_mm:g}, but {text}; give one of them")
         return 1e-3 * wanted.ball_mm, "as asked"
     part = _part_alone(tables)
-    sides = np.sort(np.ptp(part.vertices, axis=0))[1:]
-    least = math.sqrt(charge_of(float(sides.prod()), 1.0) / MOST_BALLS)
-    sold = [1e-3 * size for size in stock if 1e-3 * size <= LARGEST_BALL] or [1e-3 * stock[0]]
-    sizes = [size for size in sold if size >= least] or sold[-1:]
-    return propose_ball(fit_sizes(part, sizes))
+    return propose_ball(fit_sizes(part, sizes_to_try(part, stock)))
 
 
 def _part_alone(tables: Tables) -> Part:
@@ -831,6 +839,7 @@ def _checked(
         reach=reach,
         warnings=found,
         jams=tuple(jam_gaps(chamber, diameter, gaps_in_reach(reach))),
+        sonotrode=floor.face.sonotrode,
     )
 
 
@@ -839,7 +848,7 @@ def _nested(tables: Tables) -> dict[str, object]:
     nested: dict[str, Any] = {}
     for name, values in tables.items():
         table = nested
-        for key in name.split("."):
+        for key in filter(None, name.split(".")):  # "" is the file's top, above all tables
             table = table.setdefault(key, {})
         table.update(values)
     return nested

@@ -28,6 +28,8 @@ AS_GOOD = 0.05  # share of the target's area within which two sizes serve alike
 # of small balls make weak dents, are hard to get back from a chamber, and are slow to simulate.
 MANY = 3000
 MOST_LISTED = 5  # sizes in a reason
+LARGEST_BALL = 3e-3  # m: larger balls are in use, but they are few and slow to cover
+MOST_BALLS = 10_000  # of a charge: more take hours to simulate
 # Layers of balls in the charge, and share of a plane under a full layer. Twice a quarter of a layer
 # peened 1.7 to 1.8 times as fast in pilots of three chambers, four times as much no faster still.
 LAYER, PACKED = 0.5, 0.9069
@@ -48,6 +50,18 @@ class SizeFit:
 def charge_of(area: float, diameter: float) -> float:
     """Return the number of balls in the charge of a face [m²], for their diameter [m]."""
     return LAYER * PACKED * area / (math.pi / 4.0 * diameter**2)
+
+
+def sizes_to_try(part: Part, stock_mm: Sequence[float]) -> list[float]:
+    """Return the diameters [m], in ascending order, of which a ball for a posed part is chosen.
+
+    Args:
+        stock_mm: diameters that there are [mm], in ascending order.
+    """
+    sides = np.sort(np.ptp(part.vertices, axis=0))[1:]
+    least = math.sqrt(charge_of(float(sides.prod()), 1.0) / MOST_BALLS)
+    sold = [1e-3 * one for one in stock_mm if 1e-3 * one <= LARGEST_BALL] or [1e-3 * stock_mm[0]]
+    return [size for size in sold if size >= least] or sold[-1:]
 
 
 def fit_sizes(part: Part, diameters: Sequence[float]) -> list[SizeFit]:
@@ -89,6 +103,27 @@ def fit_sizes(part: Part, diameters: Sequence[float]) -> list[SizeFit]:
         count = round(charge_of(float(np.sort(np.ptp(part.vertices, axis=0))[1:].prod()), one))
         fits.append(SizeFit(one, touch, serve, bool(suits), jam, count))
     return fits
+
+
+def serving_sizes(fits: Sequence[SizeFit]) -> list[float]:
+    """Return the diameters [m] of the proposed ball, and of the smaller balls that serve as well.
+
+    Sizes that take very many balls are left out.
+
+    Args:
+        fits: sizes in ascending order.
+    """
+    largest = propose_ball(fits)[0]
+    best = next(one for one in fits if one.diameter == largest)
+    return [
+        one.diameter
+        for one in fits
+        if one.diameter <= largest
+        and one.count <= max(MANY, best.count)
+        and (bool(best.jam) or not one.jam)
+        and one.touched >= best.touched - MISSED
+        and one.served >= best.served - AS_GOOD
+    ]
 
 
 def propose_ball(fits: Sequence[SizeFit]) -> tuple[float, str]:

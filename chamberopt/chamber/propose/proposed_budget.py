@@ -82,9 +82,14 @@ class Budget(NamedTuple):
     search_time: float  # [s], as in Proposal
 
 
-def propose_budget(found: Measured) -> Budget:
-    """Return the budget with which single places of the target are probably resolved."""
-    treatment = settable((MORE if found.places else LAGGING) * found.time_to_98)
+def propose_budget(found: Measured, coverage_percent: float | None = None) -> Budget:
+    """Return the budget with which single places of the target are probably resolved.
+
+    Args:
+        coverage_percent: wanted coverage; 200 is twice the time to 98 %.
+    """
+    times = (coverage_percent or 100.0) / 100.0
+    treatment = settable(times * (MORE if found.places else LAGGING) * found.time_to_98)
     needed = max(MARGIN * DENTS, found.dents_for_mean * treatment)
     enough = needed / (REPLICAS * found.dent_rate * USUAL_GAUGE)
     most = COLLISIONS / (REPLICAS * found.collision_rate)
@@ -98,7 +103,7 @@ def propose_budget(found: Measured) -> Budget:
     few = f": TOO FEW within {MINUTES:g} minutes on two cores; give more"
     wider = f"WIDER than the usual 1 mm²: enough dents within {MINUTES:g} minutes on two cores"
     reasons = {
-        "process.treatment_time_s": _said_of_treatment(found),
+        "process.treatment_time_s": _said_of_treatment(found, treatment, coverage_percent),
         "process.accuracy.simulated_time_s": expected + (few if dents * gauge < needed else ""),
     }
     warmup = _rounded_up(max(LEAST_WARMUP, found.warmup))
@@ -140,8 +145,13 @@ def settable(seconds: float) -> float:
     return float(next(one for one in SET_TIMES if one >= seconds))
 
 
-def _said_of_treatment(found: Measured) -> str:
-    """Return in words from what the proposed treatment time follows."""
+def _said_of_treatment(found: Measured, treatment: float, coverage_percent: float | None) -> str:
+    """Return in words from what the proposed treatment time follows.
+
+    Args:
+        treatment: the treatment time [s].
+        coverage_percent: wanted coverage, if one was asked for.
+    """
     spread = f" ± {_plain(found.spread, 1)}" if math.isfinite(found.spread) else ""
     what = "95 % of the target is 98 % covered"
     if not found.places:
@@ -149,9 +159,15 @@ def _said_of_treatment(found: Measured) -> str:
     friction = " at the slow end of friction" if found.friction else ""
     more = f", and {MORE - 1.0:.0%} more" if found.places else f", times {LAGGING:g}"
     long = f"; LONG: {_said_of_long(found)}" if found.time_to_98 > LONG else ""
+    wanted = ""
+    if coverage_percent is not None:
+        times = _plain(coverage_percent / 100.0, 3)
+        wanted = f", {times} times that for the {coverage_percent:g} % that is asked for"
+    multiple = _plain(treatment / found.time_to_98, 2)
     return (
         f"an estimate, rounded up: after about {_plain(found.time_to_98, 2)}{spread} s {what}"
-        f"{friction}, by a pilot of {_plain(found.simulated, 2)} simulated s{more}{long}"
+        f"{friction}, by a pilot of {_plain(found.simulated, 2)} simulated s{wanted}{more}: "
+        f"{multiple} times the time to 98 %{long}"
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -12,7 +13,8 @@ from chamberopt.chamber.propose.left_out import LeftOut
 from chamberopt.chamber.propose.proposal import Proposal
 from chamberopt.chamber.propose.proposed_target import Surface
 from chamberopt.common.errors import one_line
-from chamberopt.design.load import with_paths_from
+from chamberopt.design.almen_strip import USUAL_K, USUAL_K_LOG_SD
+from chamberopt.design.load import Design, with_paths_from
 
 MAX_LISTED = 20  # surfaces in a comment
 EVALUATIONS, SEARCH_HALF_WIDTH = 20, 0.04
@@ -55,7 +57,8 @@ def design_text(proposal: Proposal, folder: Path, left_out: Sequence[LeftOut] = 
     lines = [f"# A first chamber for {one_line(name)}, {rules}"]
     for table, values in tables.items():
         reason = proposal.reasons.get(table)
-        lines += ["", f"[{table}]" + (f"  # {one_line(reason)}" if reason else "")]
+        title = f"[{table}]" + (f"  # {one_line(reason)}" if reason else "")
+        lines += ["", title] if table else [""]  # "" is the file's top, above all tables
         quoted = {f'"{key}"' if "." in key else key: one for key, one in values.items()}
         lines += _values(quoted, table, proposal.reasons)
         if table == "part.target":
@@ -76,11 +79,11 @@ def study_texts(proposal: Proposal, design: str) -> dict[str, str]:
         design: name of the design file, in the same folder.
     """
     start = {name: f"now {proposal.design.value(name):g}" for name in proposal.bounds}
-    process = proposal.design.process
+    process, limits = proposal.design.process, _intensity_limits(proposal.design)
 
     def text(goal: Goal, time: float) -> str:
         each = time / SEARCH_REPLICAS
-        return study_lines(design, proposal.bounds, start, goal=goal, time=each)
+        return study_lines(design, proposal.bounds, start, goal=goal, time=each) + limits
 
     # as many dents as the design's own replicas have
     even = text(MOST_EVEN, process.accuracy.replicas * process.accuracy.simulated_time_s)
@@ -133,6 +136,23 @@ def study_lines(
         goal.accuracy,
     ]
     return "\n".join(lines) + "\n"
+
+
+def _intensity_limits(design: Design) -> str:
+    """Return lines of a study file that hold candidates to the wanted intensity, or "".
+
+    Without measured strips they are comments: the range of the strength is known to a factor.
+    """
+    wanted = design.process.intensity_mmA
+    if wanted is None:
+        return ""
+    if not design.why_no_intensity:
+        limits = _line("almen_intensity", dict(zip(("min", "max"), wanted, strict=True)))
+        return f"\n[constraints]\n{limits}  # mmA, the wanted intensity\n"
+    ends = (float(f"{1e3 * one / USUAL_K:.3g}") for one in wanted)
+    limits = _line("strength_um", dict(zip(("min", "max"), ends, strict=True)))
+    text = f"the wanted intensity, if {USUAL_K:g} mmA/mm hold: x/÷ {math.exp(USUAL_K_LOG_SD):.2g}"
+    return f"\n# [constraints]  # to hold candidates to it\n# {limits}  # {text}\n"
 
 
 def _values(values: Mapping[str, object], table: str, reasons: Mapping[str, str]) -> list[str]:

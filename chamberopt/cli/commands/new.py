@@ -34,6 +34,9 @@ def new(
     shot: str = "",
     ball_mm: float | None = None,
     shop: Path | None = None,
+    intensity: str | None = None,
+    coverage: float | None = None,
+    calibration: Path | None = None,
     unit: Literal["um", "mm", "cm", "m", "in", "guess"] | None = None,
     pilot: bool = True,
     out: Out = None,
@@ -60,6 +63,15 @@ def new(
     shop
         A file of the sonotrodes, balls and sizes of chambers that your shop has; nothing else is
         proposed. `chamberopt shop --example` prints one. By default usual sizes.
+    intensity
+        The Almen intensity that is wanted, in mm: a range such as 0.15-0.20A (A, N or C strips), or
+        0.20+-0.02A. Balls that suit the target and an amplitude of the sonotrode are chosen for it
+        by pilot runs.
+    coverage
+        The coverage that is wanted, in per cent: 100 is the time to 98 %, 200 twice that time.
+    calibration
+        File of the machine's calibration, from `chamberopt calibrate`. Without one an intensity is
+        a rough estimate.
     unit
         Of the numbers in the part's file; by default what the file states. Where it states none and
         several are possible, `new` asks, or stops if nobody can answer; guess takes the likeliest.
@@ -73,11 +85,13 @@ def new(
     from chamberopt.chamber.propose.shop import load_shop
     from chamberopt.chamber.propose.text import design_text, study_texts
     from chamberopt.cli.commands.check import draw_target
-    from chamberopt.cli.prepare import with_pilot
+    from chamberopt.cli.prepare import with_intensity, with_pilot
     from chamberopt.common.errors import InputError
     from chamberopt.common.files import claim_folder, whole_or_nothing, write_text
     from chamberopt.common.progress import step
     from chamberopt.common.toml_fields import allowed_range
+    from chamberopt.design.intensity import WantedIntensity
+    from chamberopt.design.process import Process
     from chamberopt.design.shot import ShotSize
     from chamberopt.geometry.meshes.units import STATED, UnknownUnitError
     from chamberopt.results.vtp_files import pyvista
@@ -87,14 +101,24 @@ def new(
     if ball_mm is not None and not low <= ball_mm <= high:
         allowed = f"from {low:g} to {high:g} mm"
         raise InputError(f"--ball-mm: given {ball_mm:g}; allowed: {allowed}")
+    low, high = allowed_range(Process.model_fields["coverage_percent"])
+    if coverage is not None and not low <= coverage <= high:
+        raise InputError(f"--coverage: given {coverage:g}; allowed: from {low:g} to {high:g} %")
+    asked = None if intensity is None else WantedIntensity.parse(intensity)
+    if asked and not pilot:
+        raise InputError("--intensity: it takes pilot runs; leave out --no-pilot")
     if PICK in target and not sys.stdin.isatty():
         raise InputError("--target: pick asks, and nobody answers here; give names or faces")
 
     of_shop = None if shop is None else load_shop(shop)
-    wanted = Wanted(unit or STATED, shape, material, shot, ball_mm, of_shop)
+    wanted = Wanted(unit or STATED, shape, material, shot, ball_mm, of_shop, calibration, coverage)
+
+    chosen: Sequence[str] = target
 
     def choose(known: Sequence[Surface]) -> Sequence[str]:
-        return _picked(known) if PICK in target else target
+        nonlocal chosen
+        chosen = _picked(known) if PICK in target else target
+        return chosen
 
     out = out or Path(part.stem if part.suffix else f"{part.name}_chamber")
     with claim_folder(out):
@@ -104,7 +128,14 @@ def new(
     except UnknownUnitError as error:
         if not sys.stdin.isatty():
             raise
-        made = propose(part, replace(wanted, unit=_asked_unit(part, error.sizes)), choose)
+        wanted = replace(wanted, unit=_asked_unit(part, error.sizes))
+        made = propose(part, wanted, choose)
+    if asked:
+
+        def again(ball_mm: float) -> Proposal:
+            return propose(part, replace(wanted, ball_mm=ball_mm), lambda _: chosen)
+
+        made = with_intensity(made, wanted, asked, again)
     left_out = find_left_out(made)
     pyvista()  # before the folder is claimed: Ctrl-C during an import would leave the folder behind
     with claim_folder(out) as folder, whole_or_nothing(folder):

@@ -52,7 +52,12 @@ def simulate(
     from chamberopt.design.load import load_design
     from chamberopt.documents.answer import answer
     from chamberopt.documents.ranges import range_lines
-    from chamberopt.documents.terminal_lines import evaluation_lines, note_lines, zone_limit_lines
+    from chamberopt.documents.terminal_lines import (
+        evaluation_lines,
+        note_lines,
+        process_lines,
+        zone_limit_lines,
+    )
     from chamberopt.documents.tolerances import tolerance_lines
     from chamberopt.peening.tolerances import plan_tolerances
     from chamberopt.results.load import Result
@@ -73,7 +78,8 @@ def simulate(
         done = simulate_design(candidate, folder, executor, TerminalTeller(), settings)
     console.print_remarks(done.remarks)
     notes = note_lines([*map(str, done.advice), *done.chamber.notes, *done.evaluation.notes])
-    limits = zone_limit_lines(done.design, done.evaluation)
+    limits = process_lines(done.design, done.evaluation)
+    limits += zone_limit_lines(done.design, done.evaluation)
     found = done.spreads
     lines = [*evaluation_lines(done.evaluation, found.ranges), *range_lines(found.ranges)]
     lines += [*limits, *notes]

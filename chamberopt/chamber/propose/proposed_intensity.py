@@ -1,0 +1,249 @@
+"""Choose the balls and the amplitude that give a wanted Almen intensity, from pilot simulations.
+
+Notation
+    D   diameter of the balls
+    A   amplitude of the sonotrode
+    I   Almen intensity, in proportion to peening strength
+
+    I ~ D^p A^q        p = BALL_POWER, q = AMPLITUDE_POWER
+
+The strength of an impact of speed v is d²/D ~ D v (1 - e²)^(1/2), by Kirk's formula of the dent d
+(coverage/dents.py). Where restitution e is constant and the balls are fast enough for gravity to
+matter little, all speeds go with that of the sonotrode, so that p = q = 1. As e falls with speed,
+fast shot gains less, and q is a little less. The law only says which pilot to run next: what is
+proposed was simulated itself.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+from chamberopt.chamber.propose.proposal import Proposal, Wanted
+from chamberopt.chamber.propose.proposed_balls import fit_sizes, serving_sizes, sizes_to_try
+from chamberopt.chamber.propose.shop import ShopSonotrode, usual_shop
+from chamberopt.common.errors import InputError
+from chamberopt.common.number_text import plain
+from chamberopt.design.intensity import Comparison, PredictedIntensity, WantedIntensity
+
+BALL_POWER, AMPLITUDE_POWER = 1.0, 0.9
+MOST_PILOTS = 5
+# Settings in the middle half of the range, by logarithms, count as equally good.
+MIDDLE = 0.5
+MOST_LISTED = 3  # other settings in a reason
+
+
+class Setting(NamedTuple):
+    """What a shop can set for an intensity: diameter of the balls [mm], and amplitude [µm]."""
+
+    ball_mm: float
+    amplitude_um: float  # zero-to-peak
+
+    @property
+    def in_words(self) -> str:
+        """Both with their units."""
+        return f"{self.ball_mm:g} mm at {self.amplitude_um:g} µm"
+
+
+def settings_of(made: Proposal, wanted: Wanted) -> list[Setting]:
+    """Return the balls that the geometry allows, each with all amplitudes of the sonotrode."""
+    balls = [1e3 * made.design.shot.diameter]
+    if wanted.ball_mm is None:
+        stock = (wanted.shop or usual_shop()).stock_mm(made.tables["shot"]["material"])
+        part = made.chamber.part
+        balls = [1e3 * one for one in serving_sizes(fit_sizes(part, sizes_to_try(part, stock)))]
+    amplitudes = _amplitudes(made.sonotrode)[1]
+    return [Setting(round(ball, 4), one) for ball in balls for one in amplitudes]
+
+
+def setting_of(made: Proposal) -> Setting:
+    """Return the balls and the amplitude of a proposal."""
+    return Setting(made.tables["shot"]["diameter_mm"], made.design.sonotrode.zero_to_peak_um)
+
+
+def _amplitudes(one: ShopSonotrode) -> tuple[str, dict[float, float]]:
+    """Return the design's key of a sonotrode's amplitudes, and its values by zero-to-peak [µm]."""
+    if one.amplitudes_um is not None:
+        return "amplitude_um", {value: value for value in one.amplitudes_um}
+    assert one.amplitudes_pv_um is not None
+    return "amplitude_pv_um", {0.5 * value: value for value in one.amplitudes_pv_um}
+
+
+def expected_intensity(setting: Setting, simulated: Mapping[Setting, float]) -> float:
+    """Return the intensity [mmA] of a setting, by the law from the simulated one nearest to it.
+
+    Args:
+        simulated: intensities of settings that were simulated [mmA], at least one.
+    """
+
+    def distance(other: Setting) -> float:
+        return sum(abs(math.log(a / b)) for a, b in zip(setting, other, strict=True))
+
+    near = min(simulated, key=distance)
+    return simulated[near] * _ratio(setting, near)
+
+
+def _ratio(setting: Setting, other: Setting) -> float:
+    """Return by the law the intensity of a setting over that of another one."""
+    balls, amplitudes = (one / two for one, two in zip(setting, other, strict=True))
+    return math.pow(balls, BALL_POWER) * math.pow(amplitudes, AMPLITUDE_POWER)
+
+
+def choose(
+    wanted: WantedIntensity, settings: Sequence[Setting], simulated: Mapping[Setting, float]
+) -> Setting:
+    """Return the setting for an intensity: of the largest amplitude in the middle of the range.
+
+    The same intensity takes the less time the larger the amplitude, with smaller balls. Where no
+    setting is in the middle half of the range, it is the one nearest to the middle.
+    """
+    off = {
+        one: abs(math.log(max(expected_intensity(one, simulated), 1e-9) / wanted.middle))
+        for one in settings
+    }
+    half = 0.5 * MIDDLE * math.log(wanted.high / wanted.low)
+    middle = [one for one in settings if off[one] <= half]
+    if middle:
+        return max(middle, key=lambda one: (one.amplitude_um, -off[one]))
+    return min(settings, key=lambda one: off[one])
+
+
+def propose_intensity(
+    made: Proposal,
+    wanted: Wanted,
+    intensity: WantedIntensity,
+    again: Callable[[float], Proposal],
+    simulate: Callable[[Proposal], PredictedIntensity | None],
+) -> Proposal:
+    """Return a proposal with balls and an amplitude for a wanted intensity, and the reasons.
+
+    Args:
+        made: the proposal by geometry alone.
+        again: proposes the design with other balls, by their diameter [mm].
+        simulate: predicts the intensity of a proposal by a pilot; None if it is not resolved.
+    Raises:
+        InputError: no pilot resolved the strength.
+    """
+    calibration = made.design.calibration
+    if calibration is not None and calibration.not_mmA:
+        text = f"the calibration has arc heights of a {calibration.strips}, which are not mmA"
+        raise InputError(f"--calibration: {text}; calibrate with whole strips")
+    settings, by_ball = settings_of(made, wanted), {setting_of(made).ball_mm: made}
+    reason = made.reasons["shot.diameter_mm"]
+    found: dict[Setting, PredictedIntensity] = {}
+    chosen = setting_of(made)
+    while chosen not in found:
+        try:
+            one = by_ball.get(chosen.ball_mm) or again(chosen.ball_mm)
+        except InputError:  # no chamber with these balls
+            settings = [one for one in settings if one.ball_mm != chosen.ball_mm]
+            chosen = choose(intensity, settings, _values(found))
+            continue
+        by_ball[chosen.ball_mm] = one
+        one = _with_amplitude(one, chosen)
+        if setting_of(one) != chosen:  # another sonotrode carries the chamber for these balls
+            settings = [setting_of(one), *(x for x in settings if x != chosen)]
+            chosen = setting_of(one)
+            if chosen in found:
+                chosen = choose(intensity, settings, _values(found))
+                continue
+        predicted = simulate(one)
+        if predicted is None:
+            if not found:
+                text = "the shot hardly dents a strip in a pilot, so its intensity is not known"
+                raise InputError(f"--intensity: {text}; give --ball-mm, or leave --intensity out")
+            settings = [one for one in settings if one != chosen]
+        else:
+            found[chosen] = predicted
+        tried = len(found) >= MOST_PILOTS
+        chosen = choose(intensity, [*found] if tried else settings, _values(found))
+    one, others = by_ball[chosen.ball_mm], [x for x in settings if x != chosen]
+    return _told(
+        _with_amplitude(one, chosen), intensity, found[chosen], _other(intensity, others, found),
+        reason,
+    )  # fmt: skip
+
+
+def with_prediction(
+    made: Proposal, wanted: WantedIntensity, predicted: PredictedIntensity, more: str = ""
+) -> Proposal:
+    """Return a proposal with its wanted intensity, and in the reason the predicted one."""
+    found = Comparison.with_prediction((wanted.low, wanted.high), predicted)
+    text = f"{wanted.text}; predicted {found.predicted}; {found.in_words}{more}"
+    reasons = {**made.reasons, "process.intensity_mmA": text}
+    ends = {"intensity_mmA": [wanted.low, wanted.high]}
+    tables = {**made.tables, "process": {**made.tables["process"], **ends}}
+    design = made.design.changed({"process.intensity_mmA": (wanted.low, wanted.high)})
+    return replace(made, tables=tables, reasons=reasons, design=design)
+
+
+def _told(
+    made: Proposal,
+    wanted: WantedIntensity,
+    predicted: PredictedIntensity,
+    others: str,
+    by_geometry: str,
+) -> Proposal:
+    """Return a proposal with the reasons for its balls and its amplitude.
+
+    Args:
+        others: further settings in the range, in words.
+        by_geometry: reason for the balls that geometry alone would have given.
+    """
+    key = _amplitudes(made.sonotrode)[0]
+    off, more = wanted.off(predicted.value), others
+    if off:
+        more = f"; NO BALLS AND AMPLITUDE THAT THERE ARE GIVE IT: {_needed(made, off)}"
+    reasons = dict(made.reasons)
+    reasons[f"sonotrode.{key}"] += ", chosen for the intensity"
+    ball = "chosen for the intensity"
+    if made.reasons["shot.diameter_mm"] == by_geometry:
+        ball = f"{by_geometry}; {ball}"
+    else:
+        ball += f", among balls that serve the target; the largest of them: {by_geometry}"
+    reasons["shot.diameter_mm"] = ball
+    return with_prediction(replace(made, reasons=reasons), wanted, predicted, more)
+
+
+def _needed(made: Proposal, off: float) -> str:
+    """Return in words what would bring an intensity into its range.
+
+    Args:
+        off: logarithm of the factor by which the intensity lies off.
+    """
+    now = setting_of(made)
+    amplitude = now.amplitude_um * math.exp(-off / AMPLITUDE_POWER)
+    ball = now.ball_mm * math.exp(-off / BALL_POWER)
+    allowed = "larger than" if off < 0.0 else "smaller than"
+    return (
+        f"it takes an amplitude of about {plain(amplitude, 2)} µm zero-to-peak, or balls of about "
+        f"{plain(ball, 2)} mm, {allowed} are proposed here (--ball-mm takes others)"
+    )
+
+
+def _other(
+    wanted: WantedIntensity,
+    settings: Sequence[Setting],
+    found: Mapping[Setting, PredictedIntensity],
+) -> str:
+    """Return in words other settings whose intensity is expected in the range."""
+    simulated = _values(found)
+    inside = [one for one in settings if not wanted.off(expected_intensity(one, simulated))]
+    inside.sort(key=lambda one: abs(math.log(expected_intensity(one, simulated) / wanted.middle)))
+    listed = ", ".join(one.in_words for one in inside[:MOST_LISTED])
+    return f"; others expected in it: {listed}" if inside else ""
+
+
+def _values(found: Mapping[Setting, PredictedIntensity]) -> dict[Setting, float]:
+    return {setting: one.value for setting, one in found.items()}
+
+
+def _with_amplitude(made: Proposal, setting: Setting) -> Proposal:
+    """Return a proposal with the amplitude of a setting that its sonotrode has."""
+    key, values = _amplitudes(made.sonotrode)
+    near = min(values, key=lambda one: abs(one - setting.amplitude_um))
+    tables = {**made.tables, "sonotrode": {**made.tables["sonotrode"], key: values[near]}}
+    design = made.design.changed({f"sonotrode.{key}": values[near]})
+    return replace(made, tables=tables, design=design)

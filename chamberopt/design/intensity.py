@@ -1,0 +1,220 @@
+"""The Almen intensity that a specification asks for, and how a predicted one compares with it.
+
+Notation
+    S   peening strength [µm]                   (coverage/strength.py)
+    K   Almen intensity over S [mmA/mm]
+    I   predicted Almen intensity, K S [mmA]
+
+Strips that were measured give K and its error (calibration.py). Until then K is the usual value,
+which is known to a factor: ln K has the standard deviation USUAL_K_LOG_SD. The 95 % interval of I
+is then I exp(± 1.96 sd), with sd² the sum of the squares of that and of the relative error of S.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, cast
+
+from chamberopt.common.errors import InputError
+from chamberopt.common.estimate import Estimate
+from chamberopt.common.number_text import plain, with_interval
+from chamberopt.design.almen_strip import OVER_A, USUAL_K, USUAL_K_LOG_SD, StripType
+
+if TYPE_CHECKING:
+    from chamberopt.design.calibration import Calibration
+
+Z = 1.96  # standard deviations to either end of a 95 % interval
+# A single intensity stands for itself and what lies above it: SAE AMS 2430, 3.11.1, as quoted (see
+# docs/peening.md): - 0, + 30 % or + 0.003 in, whichever is the greater.
+ABOVE_SHARE, ABOVE_MM = 0.30, 0.0762
+# mm on the strip of its type. Inches and thousandths of an inch lie outside.
+LEAST_MM, MOST_MM = 0.03, 1.5
+INSIDE, OUTSIDE = "inside", "outside"
+NOT_DECIDED = "not decided"
+UNTIL = "an estimate until strips are measured: chamberopt calibrate"
+FORM = (
+    "a range such as 0.15-0.20A, a value with its tolerance such as 0.20+-0.02A, or a value such "
+    "as 0.15A (to 30 % or 0.076 mm above it, by SAE AMS 2430); in mm of an A, N or C strip"
+)
+_NUMBER = r"(\d+\.?\d*|\.\d+)"
+_GIVEN = re.compile(
+    rf"\s*{_NUMBER}\s*(?:(-|–|to|\+-|\+/-|±)\s*{_NUMBER})?\s*(?:mm)?\s*([NAC])\s*", re.IGNORECASE
+)
+
+
+@dataclass(frozen=True)
+class WantedIntensity:
+    """The range of the Almen intensity [mmA] that is wanted, and how it was given."""
+
+    low: float
+    high: float
+    text: str = ""
+
+    @classmethod
+    def parse(cls, given: str) -> WantedIntensity:
+        """Return the range that a text such as 0.15-0.20A stands for.
+
+        Strips of the types N and C are converted to A: h_A = h_N / 3 = 3.5 h_C (almen_strip.py).
+
+        Raises InputError if the text has another form, or its numbers are no mm.
+        """
+        found = _GIVEN.fullmatch(given)
+        if found is None:
+            raise InputError(f"--intensity: given {given!r}; allowed: {FORM}")
+        first, sign, second, letter = found.groups()
+        low, text = float(first), ""
+        if sign is None:
+            high = low + max(ABOVE_SHARE * low, ABOVE_MM)
+            text = ", by SAE AMS 2430 to 30 % or 0.076 mm above it"
+        elif sign.lower() in ("-", "–", "to"):
+            high = float(second)
+        else:
+            low, high = low - float(second), low + float(second)
+        if not LEAST_MM <= low <= high <= MOST_MM:
+            inches = f"; 0.006 in are {0.006 * 25.4:.2f} mm" if sign is None or low <= high else ""
+            raise InputError(
+                f"--intensity: given {given!r}, which is {low:g} to {high:g} mm; allowed: "
+                f"{LEAST_MM:g} to {MOST_MM:g} mm, the lower end first{inches}"
+            )
+        if low == high:
+            raise InputError(f"--intensity: given {given!r}, a range without width; widen it")
+        strip = cast(StripType, letter.upper())
+        low, high = (float(f"{one / OVER_A[strip]:.3g}") for one in (low, high))
+        if strip != "A":
+            text += f", converted from {strip} strips roughly"
+        return cls(low, high, f"asked: {given.strip()}{text}")
+
+    @property
+    def middle(self) -> float:
+        """Geometric middle of the range [mmA]."""
+        return math.sqrt(self.low * self.high)
+
+    def off(self, intensity: float) -> float:
+        """Return the logarithm of the factor by which an intensity lies off the range; 0 in it.
+
+        It is negative below the range.
+        """
+        if intensity <= 0.0:
+            return -math.inf
+        if self.low <= intensity <= self.high:
+            return 0.0
+        return math.log(intensity / (self.low if intensity < self.low else self.high))
+
+
+@dataclass(frozen=True)
+class PredictedIntensity:
+    """A predicted Almen intensity [mmA], with its 95 % interval.
+
+    factor: one standard deviation is a multiplication or division by it; 1 if strips were measured.
+    """
+
+    value: float
+    low: float
+    high: float
+    factor: float = 1.0
+
+    @classmethod
+    def of(
+        cls, metrics: Mapping[str, Estimate], calibration: Calibration | None
+    ) -> PredictedIntensity | None:
+        """Return the prediction that follows from the metrics of a simulation.
+
+        It is None if strength is not resolved, or if the arc heights that the machine is calibrated
+        to are not those of whole strips.
+        """
+        if calibration is not None and calibration.not_mmA:
+            return None
+        if calibration is not None and calibration.has_strips:
+            return cls._measured(metrics.get("almen_intensity"))
+        return cls.estimated(metrics.get("strength_um"))
+
+    @classmethod
+    def _measured(cls, one: Estimate | None) -> PredictedIntensity | None:
+        if one is None or one.in_words or not math.isfinite(one.half_width):
+            return None
+        return cls(one.value, max(one.low, 0.0), one.high)
+
+    @classmethod
+    def estimated(cls, strength_um: Estimate | None) -> PredictedIntensity | None:
+        """Return the prediction by the usual K, or None if the strength is not resolved or 0."""
+        one = strength_um
+        if one is None or one.in_words or not math.isfinite(one.half_width) or one.value <= 0.0:
+            return None
+        value = 1e-3 * USUAL_K * one.value
+        sd = math.hypot(USUAL_K_LOG_SD, one.half_width / (Z * one.value))
+        return cls(value, value * math.exp(-Z * sd), value * math.exp(Z * sd), math.exp(sd))
+
+    def standing(self, wanted: tuple[float, float]) -> str:
+        """Return where the whole 95 % interval lies: INSIDE a range, OUTSIDE it, or NOT_DECIDED.
+
+        Args:
+            wanted: lower and upper end of the range [mmA].
+        """
+        low, high = wanted
+        if low <= self.low and self.high <= high:
+            return INSIDE
+        return OUTSIDE if self.high < low or self.low > high else NOT_DECIDED
+
+    @property
+    def in_words(self) -> str:
+        """The value with its band, as "0.18 mmA, x/÷ 2.5 (...)"."""
+        if self.factor == 1.0:
+            return with_interval(self.value, self.high - self.value, "mmA")
+        value, low, high, factor = (
+            plain(one, 2) for one in (self.value, self.low, self.high, self.factor)
+        )
+        return (
+            f"{value} mmA, x/÷ {factor} (one standard deviation; at 95 % {low} to {high} mmA): "
+            f"{UNTIL}"
+        )
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """A simulated intensity beside the wanted range.
+
+    standing: INSIDE, OUTSIDE or NOT_DECIDED.
+    in_words: the standing, with the place of the predicted value where it is not decided.
+    predicted: the prediction in words, or why there is none.
+    """
+
+    standing: str
+    in_words: str
+    predicted: str
+
+    @classmethod
+    def of(
+        cls,
+        wanted: tuple[float, float],
+        metrics: Mapping[str, Estimate],
+        calibration: Calibration | None,
+    ) -> Comparison:
+        """Return the comparison for the metrics of a simulation.
+
+        Args:
+            wanted: lower and upper end of the range [mmA].
+        """
+        found = PredictedIntensity.of(metrics, calibration)
+        if found is not None:
+            return cls.with_prediction(wanted, found)
+        why = "too few dents were simulated to tell the strength"
+        if calibration is not None and calibration.not_mmA:
+            why = f"the calibration has arc heights of a {calibration.strips}, not mmA"
+        return cls(NOT_DECIDED, NOT_DECIDED, f"not known: {why}")
+
+    @classmethod
+    def with_prediction(
+        cls, wanted: tuple[float, float], predicted: PredictedIntensity
+    ) -> Comparison:
+        """Return the comparison for a prediction that is known."""
+        standing = predicted.standing(wanted)
+        words = f"{standing} with the whole interval"
+        if standing == NOT_DECIDED:
+            where = INSIDE if wanted[0] <= predicted.value <= wanted[1] else OUTSIDE
+            words = f"{NOT_DECIDED}: the value is {where}, the interval is not"
+            if where == OUTSIDE:
+                words = f"{NOT_DECIDED}: the value is {where}, the interval not wholly"
+        return cls(standing, words, predicted.in_words)

@@ -1,0 +1,189 @@
+"""Balls and amplitudes for a wanted intensity, on machines whose law is known."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+import trimesh
+
+from chamberopt.chamber.propose.proposal import Proposal, Wanted, propose
+from chamberopt.chamber.propose.proposed_balls import SizeFit, serving_sizes
+from chamberopt.chamber.propose.proposed_budget import Measured, propose_budget
+from chamberopt.chamber.propose.proposed_intensity import (
+    AMPLITUDE_POWER,
+    MOST_PILOTS,
+    Setting,
+    choose,
+    expected_intensity,
+    propose_intensity,
+    setting_of,
+    settings_of,
+)
+from chamberopt.chamber.propose.shop import Shop, load_shop
+from chamberopt.chamber.propose.text import design_text, study_texts
+from chamberopt.common.errors import InputError
+from chamberopt.common.estimate import Estimate
+from chamberopt.design.design import validate
+from chamberopt.design.intensity import PredictedIntensity, WantedIntensity
+from chamberopt.design.load import load_design
+
+BALLS, AMPLITUDES = (1.0, 1.5, 2.0, 3.0), (20.0, 25.0, 30.0, 40.0)
+SETTINGS = [Setting(ball, amplitude) for ball in BALLS for amplitude in AMPLITUDES]
+
+
+def fit(diameter_mm: float, **changed: Any) -> SizeFit:
+    return replace(SizeFit(1e-3 * diameter_mm, 0.98, 0.95, True, 0.0, 500), **changed)
+
+
+def test_the_law_goes_with_the_ball_and_nearly_with_the_amplitude() -> None:
+    simulated = {Setting(2.0, 30.0): 0.20}
+    assert expected_intensity(Setting(2.0, 30.0), simulated) == 0.20
+    assert expected_intensity(Setting(3.0, 30.0), simulated) == pytest.approx(0.30)
+    lower = expected_intensity(Setting(2.0, 20.0), simulated)
+    assert lower == pytest.approx(0.20 * (2.0 / 3.0) ** AMPLITUDE_POWER)
+    nearer = simulated | {Setting(3.0, 25.0): 0.40}
+    assert expected_intensity(Setting(3.0, 20.0), nearer) == pytest.approx(0.40 * 0.8**0.9)
+
+
+def test_of_settings_in_the_middle_the_largest_amplitude_is_chosen() -> None:
+    """With I = D A / 200 mmA both 2 mm at 20 µm and 1 mm at 40 µm give 0.2 mmA."""
+    simulated = {one: one.ball_mm * one.amplitude_um / 200.0 for one in SETTINGS}
+    assert choose(WantedIntensity(0.15, 0.25), SETTINGS, simulated) == Setting(1.0, 40.0)
+    # 0.29 mmA lie at the edge of this range, 0.3 mmA in its middle.
+    assert choose(WantedIntensity(0.28, 0.32), SETTINGS, simulated) == Setting(1.5, 40.0)
+
+
+@pytest.mark.parametrize(
+    ("wanted", "nearest"), [((0.8, 0.9), Setting(3.0, 40.0)), ((0.03, 0.05), Setting(1.0, 20.0))]
+)
+def test_where_none_gives_it_the_nearest_is_chosen(
+    wanted: tuple[float, float], nearest: Setting
+) -> None:
+    simulated = {one: one.ball_mm * one.amplitude_um / 200.0 for one in SETTINGS}
+    assert choose(WantedIntensity(*wanted), SETTINGS, simulated) == nearest
+
+
+def test_balls_that_serve_less_or_jam_or_are_too_many_are_not_tried() -> None:
+    fits = [fit(0.5, count=9000), fit(1), fit(1.5, jam=1.5e-3), fit(2), fit(3, served=0.5)]
+    assert serving_sizes([replace(one, suits=one.served > 0.9) for one in fits]) == [1e-3, 2e-3]
+
+
+@dataclass
+class Machine:
+    """A machine with I = level D^p A^q [mmA, mm, µm], and the pilots that were run on it."""
+
+    level: float
+    p: float = 1.0
+    q: float = 0.9
+    pilots: int = 0
+
+    def simulate(self, made: Proposal) -> PredictedIntensity | None:
+        self.pilots += 1
+        one = setting_of(made)
+        value = self.level * one.ball_mm**self.p * one.amplitude_um**self.q
+        return PredictedIntensity.estimated(Estimate(value / 13.5e-3, 0.0))
+
+
+@pytest.fixture(scope="module")
+def plate(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("plate") / "plate.stl"
+    trimesh.creation.box((40, 40, 8)).export(path)
+    return path
+
+
+@pytest.fixture(scope="module")
+def shop(tmp_path_factory: pytest.TempPathFactory) -> Shop:
+    path = tmp_path_factory.mktemp("shop") / "shop.toml"
+    path.write_text(
+        '[[sonotrodes]]\nname = "one"\ndiameter_mm = 70\nfrequency_khz = 20\n'
+        "amplitudes_pv_um = [40, 50, 60, 80]\n"
+        '[[balls]]\nmaterial = "steel"\ndiameters_mm = [1, 1.5, 2, 3]\n'
+    )
+    return load_shop(path)
+
+
+@pytest.mark.parametrize("given", ["0.10-0.15A", "0.20-0.25A", "0.35-0.45A"])
+@pytest.mark.parametrize("machine", [(2.0e-3, 1.0, 0.9), (2.0e-3, 1.0, 0.5), (1.2e-3, 1.3, 1.0)])
+def test_machines_of_other_laws_are_found_by_pilots(
+    plate: Path, shop: Shop, given: str, machine: tuple[float, float, float]
+) -> None:
+    wanted, intensity, law = (
+        Wanted("mm", shop=shop),
+        WantedIntensity.parse(given),
+        Machine(*machine),
+    )
+    bare = propose(plate, wanted, lambda _: [])
+
+    def again(ball_mm: float) -> Proposal:
+        return propose(plate, replace(wanted, ball_mm=ball_mm), lambda _: [])
+
+    made = propose_intensity(bare, wanted, intensity, again, law.simulate)
+    assert 1 <= law.pilots <= MOST_PILOTS
+    one = setting_of(made)
+    assert one in settings_of(bare, wanted)  # of the shop's balls and its amplitudes
+    assert made.tables["sonotrode"]["amplitude_pv_um"] == 2.0 * one.amplitude_um
+    value = law.level * one.ball_mm**law.p * one.amplitude_um**law.q
+    reach = [
+        law.level * x.ball_mm**law.p * x.amplitude_um**law.q for x in settings_of(bare, wanted)
+    ]
+    if any(not intensity.off(x) for x in reach):
+        assert not intensity.off(value)
+        assert "the value is inside" in made.reasons["process.intensity_mmA"]
+    else:
+        assert "NO BALLS AND AMPLITUDE" in made.reasons["process.intensity_mmA"]
+    assert made.design.process.intensity_mmA == (intensity.low, intensity.high)
+
+
+def test_what_is_written_loads_and_has_the_band_beside_the_value(
+    plate: Path, shop: Shop, tmp_path: Path
+) -> None:
+    wanted = Wanted("mm", ball_mm=2.0, shop=shop, coverage=200.0)
+    bare = propose(plate, wanted, lambda _: [])
+    assert {one.ball_mm for one in settings_of(bare, wanted)} == {2.0}  # as asked
+    far = WantedIntensity.parse("1.0-1.2A")
+    made = propose_intensity(bare, wanted, far, lambda _: bare, Machine(2.0e-3).simulate)
+    reason = made.reasons["process.intensity_mmA"]
+    assert "it takes an amplitude of about" in reason
+    assert "x/÷ 2.5" in reason
+    (tmp_path / "design.toml").write_text(design_text(made, tmp_path))
+    design = load_design(tmp_path / "design.toml")
+    assert design.process.intensity_mmA == (1.0, 1.2)
+    assert design.process.coverage_percent == 200.0
+    study = study_texts(made, "design.toml")["study.toml"]
+    assert "# strength_um = { min = 74.1, max = 88.9 }" in study  # 1e3 / 13.5
+    assert "\n[constraints]" not in study
+
+
+def test_a_shot_that_dents_no_strip_is_refused(plate: Path, shop: Shop) -> None:
+    wanted = Wanted("mm", shop=shop)
+    bare = propose(plate, wanted, lambda _: [])
+    intensity = WantedIntensity.parse("0.2-0.3A")
+    with pytest.raises(InputError, match="--intensity: the shot hardly dents a strip"):
+        propose_intensity(bare, wanted, intensity, lambda _: bare, lambda _: None)
+
+
+@pytest.mark.parametrize(("percent", "longer"), [(None, 1.0), (100.0, 1.0), (200.0, 2.0)])
+def test_the_time_is_the_wanted_multiple_of_that_to_98(
+    percent: float | None, longer: float
+) -> None:
+    found = Measured(1e6, 1e4, 1000.0, True, 10.0, False, 0.0, 1e-3, 4.0, 900.0)
+    budget = propose_budget(found, percent)
+    assert budget.treatment >= 1.3 * longer * 1000.0
+    reason = budget.reasons["process.treatment_time_s"]
+    assert f"{budget.treatment / 1000.0:.2g} times the time to 98 %" in reason
+    assert ("2 times that for the 200 %" in reason) == (longer == 2.0)
+
+
+def test_a_wanted_intensity_that_is_no_range_is_named() -> None:
+    from chamberopt.design.process import Process
+
+    for given in ((0.2, 0.15), (0.0, 0.2), (-1.0, 0.2)):
+        with pytest.raises(InputError, match="intensity_mmA: given"):
+            validate(Process, {"treatment_time_s": 10.0, "intensity_mmA": given})
+    with pytest.raises(InputError, match="coverage_percent"):
+        validate(Process, {"treatment_time_s": 10.0, "coverage_percent": 50.0})
+
+
+def test_a_setting_has_its_units() -> None:
+    assert Setting(1.5, 27.5).in_words == "1.5 mm at 27.5 µm"
