@@ -12,8 +12,9 @@ if TYPE_CHECKING:
 
     from chamberopt.chamber.build import Chamber
     from chamberopt.chamber.propose.proposal import Proposal, Wanted
+    from chamberopt.chamber.propose.proposed_intensity import IntensityPilot
     from chamberopt.common.progress import Progress
-    from chamberopt.design.intensity import PredictedIntensity, WantedIntensity
+    from chamberopt.design.intensity import WantedIntensity
     from chamberopt.design.load import Design
     from chamberopt.results.load import Result
     from chamberopt.results.rebuild import RebuiltReplica
@@ -101,7 +102,7 @@ def with_intensity(
     compile_with_message(made.design, made.chamber)
     with local_executor() as executor:
 
-        def simulate(one: Proposal) -> PredictedIntensity | None:
+        def simulate(one: Proposal) -> IntensityPilot | None:
             with step("pilot run of the intensity") as progress:
                 return predict_intensity(one.design, one.chamber, executor, progress)
 
@@ -127,7 +128,8 @@ def with_pilot(made: Proposal) -> Proposal:
     except (InputError, SimulationError) as error:
         print_remarks([f"warning: no pilot, treatment and simulated time are starts: {error}"])
         return made
-    return with_budget(made, propose_budget(found, made.design.process.coverage_percent))
+    percent = made.design.process.coverage_percent
+    return with_budget(made, propose_budget(found, percent, made.strength_dents))
 
 
 def seconds_of(progress: Progress, whole: float) -> Callable[[float], None]:

@@ -206,6 +206,8 @@ class Proposal:
     # Of all replicas of a candidate [s], to know the time in which its target is covered; None if
     # no pilot ran, or balls do not touch enough of the target.
     search_time: float | None = None
+    # Dents in a window that the peening strength takes, by a pilot; 0 if no intensity is wanted.
+    strength_dents: float = 0.0
 
 
 def propose(

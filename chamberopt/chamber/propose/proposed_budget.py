@@ -82,15 +82,18 @@ class Budget(NamedTuple):
     search_time: float  # [s], as in Proposal
 
 
-def propose_budget(found: Measured, coverage_percent: float | None = None) -> Budget:
+def propose_budget(
+    found: Measured, coverage_percent: float | None = None, strength_dents: float = 0.0
+) -> Budget:
     """Return the budget with which single places of the target are probably resolved.
 
     Args:
         coverage_percent: wanted coverage; 200 is twice the time to 98 %.
+        strength_dents: dents in the median window that the peening strength takes, if it counts.
     """
     times = (coverage_percent or 100.0) / 100.0
     treatment = settable(times * (MORE if found.places else LAGGING) * found.time_to_98)
-    needed = max(MARGIN * DENTS, found.dents_for_mean * treatment)
+    needed = max(MARGIN * DENTS, found.dents_for_mean * treatment, strength_dents)
     enough = needed / (REPLICAS * found.dent_rate * USUAL_GAUGE)
     most = COLLISIONS / (REPLICAS * found.collision_rate)
     time = _rounded_up(min(max(enough, LEAST_TIME), max(most, LEAST_TIME), MOST_TIME))
@@ -114,7 +117,8 @@ def propose_budget(found: Measured, coverage_percent: float | None = None) -> Bu
     if gauge > 1.0:
         reasons["process.accuracy.gauge_mm2"] = wider
     # The time to 98 % takes DENTS alone, where the mean takes more. A slow candidate has fewer.
-    share = min(1.0, SLOWER * DENTS / (dents * gauge)) if found.places else 1.0
+    least = max(DENTS, strength_dents)
+    share = min(1.0, SLOWER * least / (dents * gauge)) if found.places else 1.0
     return Budget(treatment, time, gauge, warmup, reasons, REPLICAS * time * share)
 
 

@@ -47,6 +47,18 @@ class Setting(NamedTuple):
         return f"{self.ball_mm:g} mm at {self.amplitude_um:g} µm"
 
 
+class IntensityPilot(NamedTuple):
+    """What a pilot run tells of a proposal's intensity.
+
+    Attributes:
+        predicted: the intensity.
+        dents: in the median window, which strength takes to be resolved in it.
+    """
+
+    predicted: PredictedIntensity
+    dents: float
+
+
 def settings_of(made: Proposal, wanted: Wanted) -> list[Setting]:
     """Return the balls that the geometry allows, each with all amplitudes of the sonotrode."""
     balls = [1e3 * made.design.shot.diameter]
@@ -115,14 +127,14 @@ def propose_intensity(
     wanted: Wanted,
     intensity: WantedIntensity,
     again: Callable[[float], Proposal],
-    simulate: Callable[[Proposal], PredictedIntensity | None],
+    simulate: Callable[[Proposal], IntensityPilot | None],
 ) -> Proposal:
     """Return a proposal with balls and an amplitude for a wanted intensity, and the reasons.
 
     Args:
         made: the proposal by geometry alone.
         again: proposes the design with other balls, by their diameter [mm].
-        simulate: predicts the intensity of a proposal by a pilot; None if it is not resolved.
+        simulate: runs a pilot of a proposal; None if its intensity is not resolved.
     Raises:
         InputError: no pilot resolved the strength.
     """
@@ -132,7 +144,7 @@ def propose_intensity(
         raise InputError(f"--calibration: {text}; calibrate with whole strips")
     settings, by_ball = settings_of(made, wanted), {setting_of(made).ball_mm: made}
     reason = made.reasons["shot.diameter_mm"]
-    found: dict[Setting, PredictedIntensity] = {}
+    found: dict[Setting, IntensityPilot] = {}
     chosen = setting_of(made)
     while chosen not in found:
         try:
@@ -159,11 +171,10 @@ def propose_intensity(
             found[chosen] = predicted
         tried = len(found) >= MOST_PILOTS
         chosen = choose(intensity, [*found] if tried else settings, _values(found))
-    one, others = by_ball[chosen.ball_mm], [x for x in settings if x != chosen]
-    return _told(
-        _with_amplitude(one, chosen), intensity, found[chosen], _other(intensity, others, found),
-        reason,
-    )  # fmt: skip
+    one = replace(by_ball[chosen.ball_mm], strength_dents=found[chosen].dents)
+    others = _other(intensity, [x for x in settings if x != chosen], found)
+    told = _with_amplitude(one, chosen), intensity, found[chosen].predicted
+    return _told(*told, others, reason)
 
 
 def with_prediction(
@@ -224,9 +235,7 @@ def _needed(made: Proposal, off: float) -> str:
 
 
 def _other(
-    wanted: WantedIntensity,
-    settings: Sequence[Setting],
-    found: Mapping[Setting, PredictedIntensity],
+    wanted: WantedIntensity, settings: Sequence[Setting], found: Mapping[Setting, IntensityPilot]
 ) -> str:
     """Return in words other settings whose intensity is expected in the range."""
     simulated = _values(found)
@@ -236,8 +245,8 @@ def _other(
     return f"; others expected in it: {listed}" if inside else ""
 
 
-def _values(found: Mapping[Setting, PredictedIntensity]) -> dict[Setting, float]:
-    return {setting: one.value for setting, one in found.items()}
+def _values(found: Mapping[Setting, IntensityPilot]) -> dict[Setting, float]:
+    return {setting: one.predicted.value for setting, one in found.items()}
 
 
 def _with_amplitude(made: Proposal, setting: Setting) -> Proposal:

@@ -13,6 +13,7 @@ from chamberopt.chamber.propose.proposed_budget import Measured, propose_budget
 from chamberopt.chamber.propose.proposed_intensity import (
     AMPLITUDE_POWER,
     MOST_PILOTS,
+    IntensityPilot,
     Setting,
     choose,
     expected_intensity,
@@ -78,11 +79,12 @@ class Machine:
     q: float = 0.9
     pilots: int = 0
 
-    def simulate(self, made: Proposal) -> PredictedIntensity | None:
+    def simulate(self, made: Proposal) -> IntensityPilot | None:
         self.pilots += 1
         one = setting_of(made)
         value = self.level * one.ball_mm**self.p * one.amplitude_um**self.q
-        return PredictedIntensity.estimated(Estimate(value / 13.5e-3, 0.0))
+        predicted = PredictedIntensity.estimated(Estimate(value / 13.5e-3, 0.0))
+        return None if predicted is None else IntensityPilot(predicted, 100.0)
 
 
 @pytest.fixture(scope="module")
