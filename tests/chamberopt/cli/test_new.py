@@ -113,6 +113,11 @@ def test_new_writes_a_design_and_a_study_that_are_accepted(
         (["--unit", "m"], "with --unit = 'm' the part measures"),
         (["--ball-mm", "900"], "--ball-mm: given 900; allowed: from 0.1 to 20 mm"),
         (["--shop", "nowhere.toml"], "nowhere.toml: no such shop file"),
+        (["--intensity", "0.15-0.20"], "--intensity: given '0.15-0.20'; allowed: a range such as"),
+        (["--intensity", "0.006-0.010A"], "0.006 in are 0.15 mm"),
+        (["--intensity", "0.2A", "--no-pilot"], "--intensity: it takes pilot runs"),
+        (["--coverage", "50"], "--coverage: given 50; allowed: from 100 to 1000 %"),
+        (["--calibration", "nowhere.toml"], "nowhere.toml: no such calibration file"),
     ],
 )
 def test_what_new_cannot_use_is_told(

@@ -134,7 +134,9 @@ def test_constraints_that_are_not_certainly_met_are_in_the_answer() -> None:
         start=StartRecord.model_construct(parameters={"x": 2}),
         confirmed=confirmed,
     )
-    design = SimpleNamespace(calibration=SimpleNamespace(misfits=[misfit], not_mmA=""))
+    process = SimpleNamespace(intensity_mmA=None, coverage_percent=None)
+    calibration = SimpleNamespace(misfits=[misfit], not_mmA="")
+    design = SimpleNamespace(calibration=calibration, process=process)
     result: Any = SimpleNamespace(
         study=study,
         record=SimpleNamespace(zones=zones, ranges=None),

@@ -1,5 +1,6 @@
 """Balls and amplitudes for a wanted intensity, on machines whose law is known."""
 
+import math
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -28,6 +29,7 @@ from chamberopt.common.estimate import Estimate
 from chamberopt.design.design import validate
 from chamberopt.design.intensity import PredictedIntensity, WantedIntensity
 from chamberopt.design.load import load_design
+from chamberopt.search.study import load_study
 
 BALLS, AMPLITUDES = (1.0, 1.5, 2.0, 3.0), (20.0, 25.0, 30.0, 40.0)
 SETTINGS = [Setting(ball, amplitude) for ball in BALLS for amplitude in AMPLITUDES]
@@ -155,6 +157,42 @@ def test_what_is_written_loads_and_has_the_band_beside_the_value(
     study = study_texts(made, "design.toml")["study.toml"]
     assert "# strength_um = { min = 74.1, max = 88.9 }" in study  # 1e3 / 13.5
     assert "\n[constraints]" not in study
+
+
+def test_a_calibration_is_named_in_the_design_and_limits_the_study(
+    plate: Path, shop: Shop, tmp_path: Path
+) -> None:
+    machine = tmp_path / "machines" / "machine.toml"
+    machine.parent.mkdir()
+    machine.write_text(
+        'program = "0.2"\nparameters = ["K", "beta"]\nlog_mean = [2.5, 0.0]\n'
+        "log_covariance = [[1e-4, 0.0], [0.0, 1e-4]]\namplitude_um = [20.0, 40.0]\n"
+        "ball_diameter_mm = [1.0, 3.0]\nball_density_kg_m3 = 7810.0\n"
+    )
+    wanted = Wanted("mm", shop=shop, calibration=machine)
+    bare = propose(plate, wanted, lambda _: [])
+    intensity = WantedIntensity.parse("0.17-0.23A")
+
+    def simulate(_: Proposal) -> IntensityPilot:
+        return IntensityPilot(PredictedIntensity(0.20, 0.19, 0.21), 100.0)
+
+    made = propose_intensity(bare, wanted, intensity, lambda _: bare, simulate)
+    text = made.reasons["process.intensity_mmA"]
+    assert "predicted 0.200 ± 0.010 mmA; inside with the whole interval" in text
+    folder = tmp_path / "proposed"
+    folder.mkdir()
+    (folder / "design.toml").write_text(design_text(made, folder))
+    assert 'calibration = "../machines/machine.toml"' in (folder / "design.toml").read_text()
+    design = load_design(folder / "design.toml")
+    assert design.calibration is not None
+    assert design.calibration.factor("K") == pytest.approx(math.exp(2.5))
+    (folder / "study.toml").write_text(study_texts(made, "design.toml")["study.toml"])
+    limits = load_study(folder / "study.toml").constraints["almen_intensity"]
+    assert (limits.min, limits.max) == (0.17, 0.23)
+    machine.write_text(machine.read_text() + 'strips = "disc of 40 mm"\n')
+    discs = propose(plate, wanted, lambda _: [])
+    with pytest.raises(InputError, match=r"--calibration: .* a disc of 40 mm, which are not mmA"):
+        propose_intensity(discs, wanted, intensity, lambda _: discs, simulate)
 
 
 def test_a_shot_that_dents_no_strip_is_refused(plate: Path, shop: Shop) -> None:

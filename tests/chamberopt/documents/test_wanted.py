@@ -1,0 +1,78 @@
+"""The wanted intensity and coverage, in words beside what was simulated."""
+
+import math
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from chamberopt.common.estimate import Estimate
+from chamberopt.documents.wanted import coverage_standing, time_text, wanted_lines, wanted_rows
+
+TIME = Estimate(100.0, 10.0)
+
+
+def a_design(
+    time: float, percent: float | None = None, wanted: tuple[float, float] | None = None
+) -> Any:
+    """A design of an uncalibrated machine, as far as these texts read it."""
+    process = SimpleNamespace(treatment_time=time, coverage_percent=percent, intensity_mmA=wanted)
+    return SimpleNamespace(process=process, calibration=None)
+
+
+@pytest.mark.parametrize(
+    ("time", "percent", "standing"),
+    [
+        (111.0, 100.0, "met"),  # above the upper end, 110 s
+        (105.0, 100.0, "not decided"),
+        (89.0, 100.0, "not met"),
+        (221.0, 200.0, "met"),
+        (200.0, 200.0, "not decided"),
+        (179.0, 200.0, "not met"),
+        (150.0, 200.0, "not met"),
+    ],
+)
+def test_coverage_is_a_multiple_of_the_time_to_98(
+    time: float, percent: float, standing: str
+) -> None:
+    design = a_design(time, percent)
+    assert coverage_standing(design, {"time_to_98_s": TIME}) == standing
+    (line,) = wanted_lines(design, {"time_to_98_s": TIME})
+    assert line.warns == (standing == "not met")
+    assert f"{percent:g} %: {percent / 100:g} × the time to 98 %: {standing}" in line.text
+    assert f"{time / 100.0:.2g} × the 100 ± 10 s after which" in line.text
+
+
+@pytest.mark.parametrize(
+    ("time", "standing"),
+    [
+        (Estimate(100.0, math.inf, in_words="not resolved"), "not decided"),
+        (Estimate(1e6, 0.0, in_words="never"), "not met"),
+    ],
+)
+def test_a_time_without_a_number_gives_no_multiple(time: Estimate, standing: str) -> None:
+    design, metrics = a_design(300.0, 200.0), {"time_to_98_s": time}
+    assert time_text(design, metrics) == ""
+    assert coverage_standing(design, metrics) == standing
+    (line,) = wanted_lines(design, metrics)
+    assert "a multiple that is not known" in line.text
+
+
+def test_the_sheet_has_the_band_beside_the_predicted_intensity() -> None:
+    metrics = {"time_to_98_s": TIME, "strength_um": Estimate(13.0, 0.2)}
+    result: Any = SimpleNamespace(design=a_design(250.0, 200.0, (0.15, 0.2)), metrics=metrics)
+    rows = dict(wanted_rows(result))
+    assert rows["that is"].startswith("2.5 × the 100 ± 10 s")
+    assert rows["coverage wanted"] == "200 %: 2 × the time to 98 %; met"
+    assert rows["intensity wanted"].startswith("0.15 to 0.2 mmA, mean over the target; not decided")
+    assert rows["intensity predicted"].startswith("0.18 mmA, x/÷ 2.5")
+    bare: Any = SimpleNamespace(design=a_design(250.0), metrics=metrics)
+    assert [*dict(wanted_rows(bare))] == ["that is"]
+    assert wanted_lines(bare.design, metrics) == []
+
+
+def test_an_intensity_that_is_certainly_outside_is_a_warning() -> None:
+    far = {"strength_um": Estimate(1.1, 0.05)}
+    (line,) = wanted_lines(a_design(250.0, wanted=(0.15, 0.2)), far)
+    assert line.warns
+    assert "0.15 to 0.2 mmA: outside with the whole interval; predicted 0.015 mmA" in line.text
