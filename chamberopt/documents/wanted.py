@@ -35,14 +35,13 @@ def coverage_text(design: Design) -> str:
 def time_text(design: Design, metrics: Mapping[str, Estimate]) -> str:
     """Return the peening time as a multiple of the time to 98 %, "" if that is not known.
 
-    An example is "2.1 × the 143 ± 5 s after which 95 % of the target's area is 98 % covered".
+    An example is "2.1 × the time to 98 % on 95 % of the target's area, 143 ± 5 s".
     """
     time, planned = metrics.get(TIME), design.process.treatment_time
     if time is None or time.in_words or not 0.0 < time.low < time.high < float("inf"):
         return ""
-    multiple = plain(planned / time.value, 2)
-    after = metric_label(TIME).format(time)
-    return f"{multiple} × the {after} after which 95 % of the target's area is 98 % covered"
+    multiple, after = plain(planned / time.value, 2), metric_label(TIME).format(time)
+    return f"{multiple} × the time to 98 % on 95 % of the target's area, {after}"
 
 
 def coverage_standing(design: Design, metrics: Mapping[str, Estimate]) -> str:

@@ -40,7 +40,8 @@ def test_coverage_is_a_multiple_of_the_time_to_98(
     (line,) = wanted_lines(design, {"time_to_98_s": TIME})
     assert line.warns == (standing == "not met")
     assert f"{percent:g} %: {percent / 100:g} × the time to 98 %: {standing}" in line.text
-    assert f"{time / 100.0:.2g} × the 100 ± 10 s after which" in line.text
+    assert f"{time / 100.0:.2g} × the time to 98 % on 95 % of the" in line.text
+    assert "area, 100 ± 10 s" in line.text
 
 
 @pytest.mark.parametrize(
@@ -62,7 +63,7 @@ def test_the_sheet_has_the_band_beside_the_predicted_intensity() -> None:
     metrics = {"time_to_98_s": TIME, "strength_um": Estimate(13.0, 0.2)}
     result: Any = SimpleNamespace(design=a_design(250.0, 200.0, (0.15, 0.2)), metrics=metrics)
     rows = dict(wanted_rows(result))
-    assert rows["that is"].startswith("2.5 × the 100 ± 10 s")
+    assert rows["that is"].startswith("2.5 × the time to 98 %")
     assert rows["coverage wanted"] == "200 %: 2 × the time to 98 %; met"
     assert rows["intensity wanted"].startswith("0.15 to 0.2 mmA, mean over the target; not decided")
     assert rows["intensity predicted"].startswith("0.18 mmA, x/÷ 2.5")
