@@ -114,7 +114,7 @@ def with_pilot(made: Proposal) -> Proposal:
 
     Where that cannot run, the proposal stays as it is, and a warning gives the reason.
     """
-    from chamberopt.chamber.propose.proposed_budget import propose_budget, with_budget
+    from chamberopt.chamber.propose.proposed_budget import Asked, propose_budget, with_budget
     from chamberopt.common.errors import InputError
     from chamberopt.common.executor import local_executor
     from chamberopt.common.progress import step
@@ -128,8 +128,9 @@ def with_pilot(made: Proposal) -> Proposal:
     except (InputError, SimulationError) as error:
         print_remarks([f"warning: no pilot, treatment and simulated time are starts: {error}"])
         return made
-    percent = made.design.process.coverage_percent
-    return with_budget(made, propose_budget(found, percent, made.strength_dents))
+    is_limited = not made.design.why_no_intensity
+    asked = Asked(made.design.process.coverage_percent, made.strength_dents, is_limited)
+    return with_budget(made, propose_budget(found, asked))
 
 
 def seconds_of(progress: Progress, whole: float) -> Callable[[float], None]:

@@ -82,15 +82,23 @@ class Budget(NamedTuple):
     search_time: float  # [s], as in Proposal
 
 
-def propose_budget(
-    found: Measured, coverage_percent: float | None = None, strength_dents: float = 0.0
-) -> Budget:
-    """Return the budget with which single places of the target are probably resolved.
+class Asked(NamedTuple):
+    """What is asked of the budget beside the time to 98 %.
 
-    Args:
+    Attributes:
         coverage_percent: wanted coverage; 200 is twice the time to 98 %.
         strength_dents: dents in the median window that the peening strength takes, if it counts.
+        in_search: strength counts in the search too, as a study limits it.
     """
+
+    coverage_percent: float | None = None
+    strength_dents: float = 0.0
+    in_search: bool = False
+
+
+def propose_budget(found: Measured, asked: Asked | None = None) -> Budget:
+    """Return the budget with which single places of the target are probably resolved."""
+    coverage_percent, strength_dents, in_search = asked or Asked()
     times = (coverage_percent or 100.0) / 100.0
     treatment = settable(times * (MORE if found.places else LAGGING) * found.time_to_98)
     needed = max(MARGIN * DENTS, found.dents_for_mean * treatment, strength_dents)
@@ -117,8 +125,8 @@ def propose_budget(
     if gauge > 1.0:
         reasons["process.accuracy.gauge_mm2"] = wider
     # The time to 98 % takes DENTS alone, where the mean takes more. A slow candidate has fewer.
-    least = max(DENTS, strength_dents)
-    share = min(1.0, SLOWER * least / (dents * gauge)) if found.places else 1.0
+    least = max(SLOWER * DENTS, strength_dents if in_search else 0.0)
+    share = min(1.0, least / (dents * gauge)) if found.places else 1.0
     return Budget(treatment, time, gauge, warmup, reasons, REPLICAS * time * share)
 
 

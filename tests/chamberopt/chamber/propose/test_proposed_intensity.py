@@ -10,7 +10,7 @@ import trimesh
 
 from chamberopt.chamber.propose.proposal import Proposal, Wanted, propose
 from chamberopt.chamber.propose.proposed_balls import SizeFit, serving_sizes
-from chamberopt.chamber.propose.proposed_budget import Measured, propose_budget
+from chamberopt.chamber.propose.proposed_budget import Asked, Measured, propose_budget
 from chamberopt.chamber.propose.proposed_intensity import (
     AMPLITUDE_POWER,
     MOST_PILOTS,
@@ -208,11 +208,26 @@ def test_the_time_is_the_wanted_multiple_of_that_to_98(
     percent: float | None, longer: float
 ) -> None:
     found = Measured(1e6, 1e4, 1000.0, True, 10.0, False, 0.0, 1e-3, 4.0, 900.0)
-    budget = propose_budget(found, percent)
+    budget = propose_budget(found, Asked(percent))
     assert budget.treatment >= 1.3 * longer * 1000.0
     reason = budget.reasons["process.treatment_time_s"]
     assert f"{budget.treatment / 1000.0:.2g} times the time to 98 %" in reason
     assert ("2 times that for the 200 %" in reason) == (longer == 2.0)
+
+
+def test_a_wanted_intensity_is_simulated_until_its_strength_is_resolved() -> None:
+    """2,000 dents a window, in windows of 1 mm² where 1 dent falls in a second of all replicas."""
+    found = Measured(1e6, 1e3, 1000.0, True, 10.0, False, 0.0, 1e-3, 4.0, 900.0)
+    bare, strong, limited = (
+        propose_budget(found, one) for one in (None, Asked(None, 2e3), Asked(None, 2e3, True))
+    )
+    dents = [10.0 * one.time * one.gauge_mm2 for one in (bare, strong, limited)]
+    assert 32.5 <= dents[0] < 100.0
+    assert dents[1] >= 2e3
+    assert strong[:4] == limited[:4]
+    assert bare.search_time == pytest.approx(50.0, rel=0.01)  # twice the 25 that a time takes
+    assert strong.search_time == pytest.approx(50.0 / strong.gauge_mm2, rel=0.01)
+    assert limited.search_time == pytest.approx(2e3 / limited.gauge_mm2, rel=0.01)
 
 
 def test_a_wanted_intensity_that_is_no_range_is_named() -> None:
