@@ -145,7 +145,7 @@ def propose_intensity(
     settings, by_ball = settings_of(made, wanted), {setting_of(made).ball_mm: made}
     reason = made.reasons["shot.diameter_mm"]
     found: dict[Setting, IntensityPilot] = {}
-    chosen = setting_of(made)
+    chosen, pilots = setting_of(made), 0
     while chosen not in found:
         try:
             one = by_ball.get(chosen.ball_mm) or again(chosen.ball_mm)
@@ -161,7 +161,7 @@ def propose_intensity(
             if chosen in found:
                 chosen = choose(intensity, settings, _values(found))
                 continue
-        predicted = simulate(one)
+        predicted, pilots = simulate(one), pilots + 1
         if predicted is None:
             if not found:
                 text = "the shot hardly dents a strip in a pilot, so its intensity is not known"
@@ -169,15 +169,15 @@ def propose_intensity(
             settings = [one for one in settings if one != chosen]
         else:
             found[chosen] = predicted
-        tried = len(found) >= MOST_PILOTS
-        chosen = choose(intensity, [*found] if tried else settings, _values(found))
+        left = settings if pilots < MOST_PILOTS else [*found]
+        chosen = choose(intensity, left, _values(found))
     one = replace(by_ball[chosen.ball_mm], strength_dents=found[chosen].dents)
     others = _other(intensity, [x for x in settings if x != chosen], found)
     told = _with_amplitude(one, chosen), intensity, found[chosen].predicted
     return _told(*told, others, reason)
 
 
-def with_prediction(
+def _with_prediction(
     made: Proposal, wanted: WantedIntensity, predicted: PredictedIntensity, more: str = ""
 ) -> Proposal:
     """Return a proposal with its wanted intensity, and in the reason the predicted one."""
@@ -215,7 +215,7 @@ def _told(
     else:
         ball += f", among balls that serve the target; the largest of them: {by_geometry}"
     reasons["shot.diameter_mm"] = ball
-    return with_prediction(replace(made, reasons=reasons), wanted, predicted, more)
+    return _with_prediction(replace(made, reasons=reasons), wanted, predicted, more)
 
 
 def _needed(made: Proposal, off: float) -> str:

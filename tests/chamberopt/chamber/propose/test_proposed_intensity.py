@@ -195,6 +195,22 @@ def test_a_calibration_is_named_in_the_design_and_limits_the_study(
         propose_intensity(discs, wanted, intensity, lambda _: discs, simulate)
 
 
+def test_settings_that_are_not_resolved_are_given_up(plate: Path, shop: Shop) -> None:
+    """Only the first pilot tells anything: its setting is proposed, and said to be far off."""
+    wanted, runs = Wanted("mm", ball_mm=2.0, shop=shop), []
+    bare = propose(plate, wanted, lambda _: [])
+
+    def simulate(made: Proposal) -> IntensityPilot | None:
+        runs.append(setting_of(made))
+        return Machine(2.0e-3).simulate(made) if len(runs) == 1 else None
+
+    far = WantedIntensity.parse("0.04-0.05A")
+    made = propose_intensity(bare, wanted, far, lambda _: bare, simulate)
+    assert setting_of(made) == runs[0]
+    assert len(runs) == len(set(runs)) <= MOST_PILOTS
+    assert "NO BALLS AND AMPLITUDE" in made.reasons["process.intensity_mmA"]
+
+
 def test_a_shot_that_dents_no_strip_is_refused(plate: Path, shop: Shop) -> None:
     wanted = Wanted("mm", shop=shop)
     bare = propose(plate, wanted, lambda _: [])
