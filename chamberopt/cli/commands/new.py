@@ -80,8 +80,9 @@ def new(
         takes seconds, and the first time minutes to compile the simulator.
     """
     import chamberopt.pictures.part  # noqa: F401  # imported before the folder is claimed
+    from chamberopt.chamber.propose.first_design import propose
     from chamberopt.chamber.propose.left_out import find_left_out
-    from chamberopt.chamber.propose.proposal import Wanted, propose
+    from chamberopt.chamber.propose.proposal import Wanted
     from chamberopt.chamber.propose.shop import load_shop
     from chamberopt.chamber.propose.text import design_text, study_texts
     from chamberopt.cli.commands.check import draw_target

@@ -11,15 +11,10 @@ import trimesh
 from shapely import Polygon
 
 from chamberopt.chamber.part import chosen_triangles
+from chamberopt.chamber.propose.first_design import _shot, propose
 from chamberopt.chamber.propose.left_out import find_left_out
 from chamberopt.chamber.propose.pose import pose_in_words
-from chamberopt.chamber.propose.proposal import (
-    Wanted,
-    _shot,
-    propose,
-    propose_charge,
-    propose_ranges,
-)
+from chamberopt.chamber.propose.proposal import Wanted, propose_charge, propose_ranges
 from chamberopt.chamber.propose.proposed_target import Sizes, Surface, propose_target, surfaces
 from chamberopt.chamber.propose.shop import StockBalls, usual_shop
 from chamberopt.chamber.propose.text import design_text

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 import trimesh
 
+from chamberopt.chamber.propose.first_design import propose
 from chamberopt.chamber.propose.pose import hanging_pose, propose_pose, square_to_walls
-from chamberopt.chamber.propose.proposal import Proposal, Wanted, propose
+from chamberopt.chamber.propose.proposal import Proposal, Wanted
 from chamberopt.chamber.propose.proposed_budget import Measured
 from chamberopt.chamber.propose.proposed_target import propose_target, surfaces
 from chamberopt.cli import main
@@ -195,7 +196,7 @@ def test_a_guess_is_said_and_no_folder_is_held_while_the_design_is_made(
         held.extend(Path().glob("out*"))
         return propose(*given)
 
-    monkeypatch.setattr("chamberopt.chamber.propose.proposal.propose", watched)
+    monkeypatch.setattr("chamberopt.chamber.propose.first_design.propose", watched)
     monkeypatch.setattr("chamberopt.cli.commands.check.draw_target", lambda *_: None)
     assert main(["new", "box.stl", "--unit", "guess", "--out", "out", "--no-pilot"]) == 0
     said = capfd.readouterr()
@@ -229,7 +230,7 @@ def test_a_unit_that_cannot_be_known_is_asked_for(
     def only_read(path: Path, wanted: Wanted, _: object) -> None:
         raise InputError(f"measures {read_part(path, wanted.unit).size[0]:.3f} m")
 
-    monkeypatch.setattr("chamberopt.chamber.propose.proposal.propose", only_read)
+    monkeypatch.setattr("chamberopt.chamber.propose.first_design.propose", only_read)
     for answer, said in (("in\n", "measures 0.127 m"), ("ft\n", "given 'ft'"), ("", "no answer")):
         monkeypatch.setattr("sys.stdin", Nobody(answer))
         assert main(["new", "bracket.stl"]) == 2

@@ -7,7 +7,8 @@ import pytest
 import trimesh
 from manifold3d import Manifold, OpType
 
-from chamberopt.chamber.propose.proposal import Wanted, propose
+from chamberopt.chamber.propose.first_design import propose
+from chamberopt.chamber.propose.proposal import Wanted
 from chamberopt.chamber.propose.proposed_arbor import (
     arbor_through,
     find_bores,

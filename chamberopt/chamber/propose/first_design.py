@@ -1,0 +1,434 @@
+"""Propose a whole design for a part, with a wider chamber if its own check warns of gaps.
+
+Every number comes from a rule of thumb, with its reason beside it. A study then varies the numbers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from chamberopt.chamber.part import Part, posed_part
+from chamberopt.chamber.propose.held_proposal import (
+    clamped_outside,
+    hangs_by_a_face,
+    held,
+    masked,
+    only_touched,
+    padded,
+)
+from chamberopt.chamber.propose.pose import (
+    Turns,
+    hanging_pose,
+    pose_in_words,
+    propose_pose,
+    square_to_walls,
+)
+from chamberopt.chamber.propose.proposal import (
+    LARGEST_MM,
+    REPLICAS,
+    Proposal,
+    Tables,
+    Wanted,
+    checked,
+    faults,
+    is_capped,
+    nested,
+)
+from chamberopt.chamber.propose.proposed_arbor import Bore, find_bores, turning_bore, turning_pose
+from chamberopt.chamber.propose.proposed_balls import fit_sizes, propose_ball, sizes_to_try
+from chamberopt.chamber.propose.proposed_end import HeldEnd, held_end
+from chamberopt.chamber.propose.proposed_floor import Floor, floor_on_sonotrode, require_room
+from chamberopt.chamber.propose.proposed_target import (
+    Surface,
+    Target,
+    middle_in_plan,
+    propose_sizes,
+    propose_target,
+    shape_for,
+    surfaces,
+)
+from chamberopt.chamber.propose.shop import Shop, usual_shop
+from chamberopt.common.errors import InputError, UnreadableError
+from chamberopt.common.progress import step
+from chamberopt.common.toml_fields import MAX_COORDINATE_MM
+from chamberopt.design.design import Design, validate
+from chamberopt.design.materials import CATALOGUE, USUAL, alloy, ball, balls
+from chamberopt.geometry.meshes.part_mesh import PartMesh, read_part
+from chamberopt.geometry.meshes.surface_error import format_box
+from chamberopt.geometry.meshes.units import GUESSED
+from chamberopt.geometry.triangles import rotation_matrix
+
+WIDER = (1.0, 1.4, 2.0)  # factors on the room round the part that are tried
+AMPLITUDE_UM = 40.0  # zero-to-peak; the nearest that the sonotrode can set is taken
+USUAL_PART, WALL, SONOTRODE = "42CrMo4", "100Cr6", "Ti-6Al-4V"  # of the catalogue
+# Materials of balls, and least hardness of steel balls over the part's. A part as hard as they are
+# is hardly dented: in pilots of a gear of 650 HB tungsten carbide left 9 times the dents.
+STEEL, HARD, HARDER = "steel", "tungsten_carbide", 1.25
+TREATMENT_S, HALF_WIDTH, MOST_REPLICAS = 300.0, 0.03, 24
+BLOCKS = "LARGER THAN ONE SONOTRODE: several side by side, driven alike"
+START = "a start, NOT MEASURED by a pilot"
+ON_END = "on end, as no sonotrode is large enough for it lying"
+
+
+def propose(
+    path: Path, wanted: Wanted, choose: Callable[[Sequence[Surface]], Sequence[str]]
+) -> Proposal:
+    """Propose a design for the part in a file.
+
+    Args:
+        choose: function that picks the names of the surfaces to peen from all surfaces.
+    Raises:
+        InputError: the part cannot be used, or no chamber can be built round it.
+    """
+    _shot(wanted.shot, alloy(wanted.alloy or USUAL_PART).name, wanted.shop or usual_shop())
+    with step("reading the part"):
+        mesh = _read(path, wanted.unit)
+        known = surfaces(mesh)
+    asked = choose(known)
+    target = propose_target(mesh, known, asked)
+    _require_near_origin(path, target)
+    turns, pose_reason = propose_pose(mesh.vertices, mesh.triangles, target.triangles)
+    end = None if asked else held_end(mesh, target, turns)
+    made = _proposed(path, wanted, mesh, known, target, turns, pose_reason, end)
+    if asked or end is not None or not hangs_by_a_face(made):
+        return made
+    end = held_end(mesh, target, made.design.part.rotate_deg, of_any=True)
+    if end is not None:
+        with suppress(InputError):
+            other = _proposed(path, wanted, mesh, known, target, turns, ON_END, end)
+            if "holder" in other.tables and faults(other) <= faults(made):
+                return other
+    return made
+
+
+def _proposed(
+    path: Path,
+    wanted: Wanted,
+    mesh: PartMesh,
+    known: Sequence[Surface],
+    target: Target,
+    turns: Turns,
+    pose_reason: str,
+    end: HeldEnd | None,
+) -> Proposal:
+    """Return a proposal for a target of a part.
+
+    Raises InputError if no chamber can be built round it.
+
+    Args:
+        turns, pose_reason: the pose that suits the target [degrees], and why.
+        end: an end that is left out of the target, and the pose in which the part is held by it.
+    """
+    part_alloy, shop = alloy(wanted.alloy or USUAL_PART).name, wanted.shop or usual_shop()
+    shot, shot_reason = _shot(wanted.shot, part_alloy, shop)
+    if end is not None:
+        target, turns = end.target, end.turns
+    tables: Tables = {
+        **({"": {"calibration": str(wanted.calibration.resolve())}} if wanted.calibration else {}),
+        "part": {"mesh": str(path.resolve()), "unit": mesh.unit, "rotate_deg": list(turns)},
+        "part.target": target.keys,
+        "chamber": {},
+        "sonotrode": {},
+        "shot": {"mass_g": 1.0, "diameter_mm": 1.0, "material": shot},
+        "materials": {"part": part_alloy, "wall": WALL, "sonotrode": SONOTRODE},
+        "effects": {"gravity": True, "friction": CATALOGUE, "roughness": USUAL},
+        "process": {
+            "treatment_time_s": TREATMENT_S,
+            "seed": 1,
+            **({"coverage_percent": wanted.coverage} if wanted.coverage else {}),
+        },
+        "process.accuracy": {
+            "replicas": REPLICAS,
+            "simulated_time_s": 1.0,
+            "warmup_time_s": 0.2,
+            "objective_half_width": HALF_WIDTH,
+            "max_replicas": MOST_REPLICAS,
+        },
+    }
+    with step("choosing the balls"):
+        diameter, ball_reason = _ball_diameter(tables, wanted, shop)
+    tables["shot"]["diameter_mm"] = round(1e3 * diameter, 4)
+    if end is None and (hanging := _hanging(mesh, target, turns, diameter, wanted)):
+        turns, pose_reason = hanging, ON_END
+    reasons = {
+        "part.unit": ("GUESSED: " if any(GUESSED in note for note in mesh.notes) else "")
+        + f"the part measures {format_box(mesh.size)}",
+        "part.target": target.reason,
+        "shot.diameter_mm": ball_reason,
+        **({"shot.material": shot_reason} if shot_reason else {}),
+        "materials.part": "C0 and v0 are computed: to be calibrated"
+        if wanted.alloy
+        else "NOT KNOWN, a guess: chamberopt materials lists alloys",
+        "materials.wall": "hardened, as soft walls slow the balls; give yours",
+        "effects.friction": "mu of these balls on these metals, dry: chamberopt materials",
+        "effects.roughness": "rms slope of faces that shot has dented",
+        "process.treatment_time_s": f"{START}: the report has coverage over time",
+        "process.accuracy.simulated_time_s": f"{START}: results say what is resolved",
+        "process.accuracy.objective_half_width": "until it is so sure; of a time: this share",
+    }
+
+    bores = find_bores(mesh, target.triangles)
+
+    def built(is_local: bool, turning: Bore | None = None) -> tuple[Proposal, Floor]:
+        """Return the proposal with the least room that is free of gaps, else of fewest faults.
+
+        Args:
+            is_local: true for a chamber round the target, whose walls the part goes out through.
+            turning: a bore about whose axis, which is then level, the part turns.
+        """
+        best: tuple[Proposal, Floor] | None = None
+        refused: InputError | None = None
+        for number, wider in enumerate(WIDER):
+            progress(number, len(WIDER), None)
+            try:
+                own, pose_why, placed, form = dict(tables), pose_reason, turns, wanted
+                if turning is not None:
+                    placed, turn = turning_pose(turning, mesh)
+                    own["effects"] = {**own["effects"], "part_turn": turn}
+                    pose_why = (
+                        "on its axis, about which it turns, so that all of it passes the shot"
+                    )
+                    form = replace(wanted, shape=wanted.shape or "box")
+                placed, floor = _place(mesh, target, placed, diameter, form, wider, is_local)
+                pose = {"rotate_deg": list(placed)}
+                if any(floor.offset_mm):
+                    pose["offset_mm"] = list(floor.offset_mm)
+                own |= {"part": {**tables["part"], **pose}, **_floor_tables(floor)}
+                words = {"part.rotate_deg": f"{pose_in_words(mesh, known, placed)}: {pose_why}"}
+                why = {**reasons, **words, **_floor_reasons(floor, is_local)}
+                made = checked(own, why, floor, known, mesh, wanted.shop)
+            except UnreadableError:
+                raise
+            except InputError as error:
+                refused = refused or error
+                continue
+            if best is None or faults(made) < faults(best[0]):
+                best = made, floor
+            if not any(word in text for text in made.warnings for word in ("gap", "side wall")):
+                break
+        if best is None:
+            assert refused is not None
+            raise refused
+        return best
+
+    with step("building and checking the chamber") as progress:
+        made, floor = built(is_local=False)
+        if not floor.is_one_sonotrode or is_capped(made):
+            with suppress(InputError):
+                local = built(is_local=True)
+                fits = local[1].is_one_sonotrode and not is_capped(local[0])
+                if fits and faults(local[0]) <= faults(made):
+                    made, floor = local
+    if made.chamber.pieces_in_air:
+        with step("choosing what holds the part") as progress:
+            made = held(made, floor, target, end, bores, wanted.shop, progress)
+    else:
+        made = clamped_outside(made, floor, wanted.shop)
+    turning = turning_bore(bores, mesh, target.triangles)
+    if turning is not None and (faults(made) > (0, 0) or not floor.is_one_sonotrode):
+        with step("trying it on its axis, turning") as progress, suppress(InputError):
+            other, its_floor = built(is_local=False, turning=turning)
+            other = held(other, its_floor, target, None, [turning], wanted.shop, progress)
+            better = (*faults(other), *its_floor.excess) < (*faults(made), *floor.excess)
+            if better and "holder" in other.tables:
+                made, floor = other, its_floor
+    made = padded(masked(made, floor, wanted.shop), floor, target, wanted.shop)
+    return only_touched(made, floor, wanted.shop)
+
+
+def _shot(name: str, part: str, shop: Shop) -> tuple[str, str]:
+    """Return the material of the balls, and why they are not of steel, or an empty text.
+
+    Raises InputError if a wanted material is unknown, or its hardness and so its restitution is
+    not known.
+
+    Args:
+        name: the wanted material; if it is empty, steel, or a harder one for a hard part.
+        part: the part's alloy.
+    """
+    if name and ball(name).hardness_HB is None:
+        known = ", ".join(one.name for one in balls() if one.hardness_HB is not None)
+        text = "the hardness of these balls is not known, and their restitution follows from it"
+        raise InputError(f"--shot: given {name!r}; {text}; give one of {known}")
+    hardness = alloy(part).hardness_HB
+    if name or (ball(STEEL).hardness_HB or 0.0) >= HARDER * hardness or not _has(shop, HARD):
+        return ball(name or STEEL).name, ""
+    return HARD, f"harder than the part, of {hardness:g} HB, which steel balls hardly dent"
+
+
+def _has(shop: Shop, material: str) -> bool:
+    """Return whether a shop has balls of a material."""
+    return not shop.balls or any(ball(one.material).name == material for one in shop.balls)
+
+
+def _read(path: Path, unit: str) -> PartMesh:
+    """Return the part in a file. Messages name the option --unit, not the design's part.unit."""
+    try:
+        mesh = read_part(path, unit)
+    except InputError as error:
+        error.args = (str(error).replace("part.unit", "--unit"),)
+        raise
+    return replace(mesh, notes=tuple(note.replace("part.unit", "--unit") for note in mesh.notes))
+
+
+def _require_near_origin(path: Path, target: Target) -> None:
+    """Raise InputError if a face of the target has larger coordinates than a design may have."""
+    far = max((abs(x) for face in target.keys.get("faces", ()) for x in face["at_mm"]), default=0)
+    if far > MAX_COORDINATE_MM:
+        text = f"the part is {1e-3 * far:.4g} m from the origin of its file"
+        most = f"at most {1e-3 * MAX_COORDINATE_MM:g} m are allowed"
+        raise InputError(f"{path}: {text}, {most}; move it to the origin in CAD and export again")
+
+
+def _ball_diameter(tables: Tables, wanted: Wanted, shop: Shop) -> tuple[float, str]:
+    """Return the wanted or proposed diameter of the balls [m], and the reason for it.
+
+    Raises InputError if the shop does not have the wanted balls.
+
+    Args:
+        tables: tables of the design file, of which those of the part and the shot count.
+    """
+    material = tables["shot"]["material"]
+    stock = shop.stock_mm(material)
+    if wanted.ball_mm is not None:
+        if wanted.shop is not None and wanted.ball_mm not in stock:
+            have = ", ".join(f"{one:g}" for one in stock)
+            text = f"the shop's stock of {material} has {have} mm"
+            raise InputError(f"--ball-mm: given {wanted.ball_mm:g}, but {text}; give one of them")
+        return 1e-3 * wanted.ball_mm, "as asked"
+    part = _part_alone(tables)
+    return propose_ball(fit_sizes(part, sizes_to_try(part, stock)))
+
+
+def _part_alone(tables: Tables) -> Part:
+    """Return the posed part of a design's tables, with its curved surfaces, without a chamber."""
+    room: dict[str, Any] = {"shape": "cylinder", "diameter_mm": LARGEST_MM, "height_mm": LARGEST_MM}
+    alone: Tables = {
+        "chamber": {**room, "sonotrode_distance_mm": 100.0},
+        "sonotrode": {"frequency_khz": 20.0, "amplitude_um": AMPLITUDE_UM},
+    }
+    return posed_part(validate(Design, nested({**tables, **alone})))[0]
+
+
+def _place(
+    mesh: PartMesh,
+    target: Target,
+    turns: Turns,
+    ball: float,
+    wanted: Wanted,
+    wider: float,
+    is_local: bool = False,
+) -> tuple[Turns, Floor]:
+    """Return the turns of a part [degrees] and the sizes of a chamber round it on a sonotrode.
+
+    The form of the chamber is the wanted one, else a cylinder where a sonotrode carries it. Else it
+    is that whose walls lean less, or the smaller one: a cylinder, or the form that suits the part.
+
+    Args:
+        turns: turns that bring the target down; the part may still be turned about z.
+        ball: diameter of the balls [m].
+        wider: factor on the room round the part.
+        is_local: true for a chamber round the target, whose walls the part goes out through.
+    Raises:
+        InputError: the shop has no sonotrode for it, or no chamber so large.
+    """
+    square, found = square_to_walls(mesh.vertices, turns), []
+    suits = shape_for(np.ptp(mesh.vertices @ rotation_matrix(square).T, axis=0))
+    refused: InputError | None = None
+    usual = ["box"] if is_local else ["cylinder", suits]
+    for shape in dict.fromkeys([wanted.shape] if wanted.shape else usual):
+        placed = square if shape == "box" else turns
+        posed = mesh.vertices @ rotation_matrix(placed).T
+        posed[:, 2] -= posed[:, 2].min()
+        on_target = posed[np.unique(mesh.triangles[target.triangles])]
+        top, around = float(on_target[:, 2].max()), on_target if is_local else None
+        sizes, shop = propose_sizes(posed, top, ball, shape, wider, around), wanted.shop
+        try:
+            floor = floor_on_sonotrode(sizes, _round(posed), shop or usual_shop(), shop is None)
+            if shop is not None:
+                room, highest = require_room(floor.sizes, shop), float(posed[:, 2].max())
+                if highest < room.height - room.distance:  # a higher lid takes in the whole part
+                    room = replace(room, through_ceiling=False, top=highest)
+                floor = floor._replace(sizes=room)
+            if is_local:
+                x, y = 1e3 * (middle_in_plan(posed) - middle_in_plan(on_target))
+                floor = floor._replace(offset_mm=(round(float(x), 1), round(float(y), 1)))
+        except InputError as error:
+            refused = refused or error
+            continue
+        found.append((placed, floor))
+    if refused and not found:
+        raise refused
+    return min(found, key=lambda one: one[1].excess)
+
+
+def _hanging(
+    mesh: PartMesh, target: Target, turns: Turns, ball: float, wanted: Wanted
+) -> Turns | None:
+    """Return turns with which the part hangs on end, if only then a sonotrode carries the chamber.
+
+    Args:
+        turns, ball, wanted: as of _place.
+    """
+
+    def is_carried(pose: Turns) -> bool:
+        try:
+            return _place(mesh, target, pose, ball, wanted, 1.0)[1].is_one_sonotrode
+        except InputError:
+            return False
+
+    hanging = hanging_pose(mesh.vertices, mesh.triangles, target.triangles, turns)
+    needed = hanging is not None and not is_carried(turns) and is_carried(hanging)
+    return hanging if needed else None
+
+
+def _round(posed: np.ndarray) -> float:
+    """Return the radius [m] of the part about the middle of its box, seen from above."""
+    plan = posed[:, :2]
+    middle = 0.5 * (plan.min(axis=0) + plan.max(axis=0))
+    return float(np.linalg.norm(plan - middle, axis=1).max())
+
+
+def _floor_tables(floor: Floor) -> Tables:
+    """Return the tables of the design file that follow from the floor: chamber and sonotrode."""
+    sizes, one = floor.sizes, floor.face.sonotrode
+    key, amplitude = one.amplitude_nearest(AMPLITUDE_UM)
+    sonotrode: dict[str, Any] = {"frequency_khz": one.frequency_khz, key: amplitude}
+    if floor.blocks is not None:
+        sonotrode["blocks"] = floor.blocks.model_dump(mode="json")
+    return {
+        "chamber": {
+            "shape": sizes.shape,
+            **sizes.plan,
+            "height_mm": round(1e3 * sizes.height, 3),
+            "sonotrode_distance_mm": round(1e3 * sizes.distance, 3),
+        },
+        "sonotrode": sonotrode,
+    }
+
+
+def _floor_reasons(floor: Floor, is_local: bool) -> dict[str, str]:
+    sizes, one = floor.sizes, floor.face.sonotrode
+    first = next(key for key in sizes.plan if key.endswith("_mm"))
+    where = "; the part goes out through it" if sizes.through_ceiling else ""
+    beside = "target, and the part goes out through the walls" if is_local else "part"
+    key, _ = one.amplitude_nearest(AMPLITUDE_UM)
+    kind = (
+        "ZERO-TO-PEAK, half of" if key == "amplitude_um" else "PEAK-TO-VALLEY, twice zero-to-peak"
+    )
+    kind += " peak-to-valley" if key == "amplitude_um" else ""
+    return {
+        f"chamber.{first}": f"leaves {1e3 * sizes.gap:.3g} mm beside the {beside}; {floor.reason}",
+        "chamber.height_mm": f"sonotrode to ceiling{where}",
+        "chamber.sonotrode_distance_mm": "mean sonotrode face to the part's lowest point",
+        **({"sonotrode.frequency_khz": one.note} if one.note else {}),
+        **({"part.offset_mm": "the target in the middle"} if any(floor.offset_mm) else {}),
+        **({"sonotrode.blocks": BLOCKS} if floor.blocks is not None else {}),
+        f"sonotrode.{key}": f"{kind}; one that the sonotrode can set",
+    }

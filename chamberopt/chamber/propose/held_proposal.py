@@ -1,0 +1,222 @@
+"""Hold a proposed part, and mask it: holders, arbors, pads and plugs that do no harm."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from chamberopt.chamber.build import build_chamber
+from chamberopt.chamber.checks.place_names import one_of
+from chamberopt.chamber.propose.proposal import Proposal, Tables, checked, faults, touched_share
+from chamberopt.chamber.propose.proposed_arbor import Bore
+from chamberopt.chamber.propose.proposed_end import HeldEnd
+from chamberopt.chamber.propose.proposed_floor import Floor
+from chamberopt.chamber.propose.proposed_holder import end_holder, holder_choices
+from chamberopt.chamber.propose.proposed_mask import are_holes, pads, to_be_masked
+from chamberopt.chamber.propose.proposed_target import LONG, Target
+from chamberopt.chamber.propose.shop import Shop
+from chamberopt.chamber.reach import reached_part_share
+from chamberopt.common.errors import InputError, UnreadableError
+from chamberopt.common.progress import Progress
+from chamberopt.design.fixture import USUAL_SHELL_MM, WIDEST_GAP, Holder
+
+MOST_HOLDERS = 6  # that are tried
+HIDDEN = 0.005  # share of the target that a holder may keep from the balls
+LEAST_LEFT, MOST_LEFT = 0.005, 0.15  # share of the target that is left out if no ball touches it
+NO_PLACE = (
+    "no flat face beside the target looks up or aside and has room for a holder",
+    "all of it is to be peened; leave out of [part.target] the face to hold it by",
+)
+
+
+def held(
+    free: Proposal,
+    floor: Floor,
+    target: Target,
+    end: HeldEnd | None,
+    bores: Sequence[Bore],
+    shop: Shop | None,
+    progress: Progress,
+) -> Proposal:
+    """Return a proposal with the first holder that does no harm, or without one and the reason.
+
+    A holder does harm if no chamber can be built with it somewhere in the ranges of the study, if
+    balls jam beside it, or if it keeps the balls from some of the target.
+
+    Args:
+        free: the proposal without a holder.
+        end: an end that is left out of the target to hold the part by, if there is one.
+        bores: bores that may take an arbor.
+    """
+    diameter, turns = free.design.shot.diameter, free.design.part.rotate_deg
+    choices = holder_choices(free.mesh, target.triangles, turns, diameter, bores)[:MOST_HOLDERS]
+    if end is not None:
+        one = end_holder(free.mesh, target.triangles, turns, diameter, end.triangles)
+        choices = choices if one is None else [one._replace(keys={**one.keys, "at": end.at})]
+    why = "" if choices else NO_PLACE[bool(target.triangles.all())]
+    for number, one in enumerate(choices):
+        progress(number, len(choices), None)
+        tables = _with_table(free.tables, "sonotrode", "holder", one.keys)
+        height = "sonotrode to ceiling; what holds the part goes on to the wall"
+        reasons = {**free.reasons, "holder.kind": one.reason, "chamber.height_mm": height}
+        try:
+            made = _checked_at_extremes(tables, reasons, floor, free, shop)
+        except UnreadableError:
+            raise
+        except InputError as error:
+            why = why or str(error)
+            continue
+        if touched_share(free) - touched_share(made) > HIDDEN:
+            why = why or "a holder would keep the balls from some of the target"
+        elif faults(made) > faults(free):
+            new = [text for text in made.warnings if text not in free.warnings]
+            why = why or f"a {one.keys['kind']} would bring a warning: {(new or made.warnings)[0]}"
+        else:
+            return made
+    text = f"sonotrode to ceiling; NOTHING HOLDS THE PART: {why}"
+    return replace(free, reasons={**free.reasons, "chamber.height_mm": text})
+
+
+def clamped_outside(made: Proposal, floor: Floor, shop: Shop | None) -> Proposal:
+    """Return a proposal whose part, which goes out of the chamber, is held where it does."""
+    most_mm = math.floor(50.0 * WIDEST_GAP * 1e3 * made.design.shot.diameter) / 100.0
+    tables = _with_table(
+        made.tables, "sonotrode", "holder", {"kind": "bore", "clearance_mm": most_mm}
+    )
+    text = "the part's own end, clamped outside; balls wedge in more play than this, so seal it"
+    reasons = {**made.reasons, "holder.kind": text}
+    return checked(tables, reasons, floor, made.known, made.mesh, shop)
+
+
+def hangs_by_a_face(made: Proposal) -> bool:
+    """Return whether a long part hangs by nothing but a holder that stands on one of its faces."""
+    if made.design.holder is not None and is_firm(made.design.holder):
+        return False
+    sides = np.ptp(made.chamber.part.vertices, axis=0)
+    return bool(sides[2] > LONG * sides[:2].max())
+
+
+def is_firm(holder: Holder) -> bool:
+    """Return whether a holder holds a part by itself, as one that stands on a face does not."""
+    return holder.kind in ("arbor", "bore") or holder.grip_mm is not None
+
+
+def padded(made: Proposal, floor: Floor, target: Target, shop: Shop | None) -> Proposal:
+    """Return a proposal with a pad on the level top of a part on which balls would come to rest.
+
+    The pad goes up to the ceiling, against which it clamps the part, so that a holder which stands
+    on a face is left out. Where a pad would do harm, the proposal stays as it is.
+    """
+    rests = any("come to rest on the part" in text for text in made.warnings)
+    if "mask" in made.tables or not rests:
+        return made
+    diameter, turns = made.design.shot.diameter, made.design.part.rotate_deg
+    bare = {name: one for name, one in made.tables.items() if name != "holder"}
+    choices = [made.tables] if hangs_by_a_face(made) else [bare, made.tables]
+    if made.design.holder is not None and is_firm(made.design.holder):
+        choices.reverse()
+    for at in pads(made.mesh, target.triangles, turns, diameter):
+        for tables in choices:
+            after = "holder" if "holder" in tables else "sonotrode"
+            own = _with_table(tables, after, "mask", {"axis": [0.0, 0.0, 1.0], "at": at})
+            text = "a pad on the level top, up to the ceiling, clamps the part: no ball lies there"
+            height = "sonotrode to ceiling; a pad on the part's top goes on to it"
+            reasons = {**made.reasons, "mask.axis": text, "chamber.height_mm": height}
+            if "holder" not in own:
+                reasons.pop("holder.kind", None)
+            try:
+                other = _checked_at_extremes(own, reasons, floor, made, shop)
+            except UnreadableError:
+                raise
+            except InputError:
+                continue
+            hidden = touched_share(made) - touched_share(other)
+            is_held = not other.chamber.pieces_in_air
+            if is_held and hidden <= HIDDEN and faults(other) < faults(made):
+                return other
+    return made
+
+
+def masked(bare: Proposal, floor: Floor, shop: Shop | None) -> Proposal:
+    """Return a proposal with a mask on what must not be peened, where that does no harm.
+
+    Harm is that of a holder. Where it would do some, the surfaces stay bare and are named.
+    """
+    names = to_be_masked(bare.design, bare.chamber, bare.known)
+    if not names or bare.design.effects.part_turn is not None:
+        return bare
+    after = "holder" if "holder" in bare.tables else "sonotrode"
+    first, value, what = "thickness_mm", USUAL_SHELL_MM, "a cap on"
+    if are_holes(bare.mesh, bare.known, names):
+        first, value, what = "plugs", True, "in"
+    keys = {first: value, "at": {"surface": names}}
+    text = f"{what} {', '.join(names)}: not to be peened, by the name"
+    reasons = {**bare.reasons, f"mask.{first}": text}
+    tables = _with_table(bare.tables, after, "mask", keys)
+    try:
+        made = _checked_at_extremes(tables, reasons, floor, bare, shop)
+    except UnreadableError:
+        raise
+    except InputError:
+        return bare
+    hidden = touched_share(bare) - touched_share(made)
+    return bare if hidden > HIDDEN or faults(made) > faults(bare) else made
+
+
+def only_touched(made: Proposal, floor: Floor, shop: Shop | None) -> Proposal:
+    """Return a proposal whose target leaves out what no ball touches, if that is little of it.
+
+    The time until 95 % of the target is covered would be that of the few places beside it. Where
+    it is much, the user is left to choose other balls or another target.
+    """
+    hidden = 1.0 - touched_share(made)
+    if not LEAST_LEFT < hidden < MOST_LEFT:
+        return made
+    target = {**made.tables["part.target"], "reachable": True}
+    part = made.chamber.part
+    touched = reached_part_share(made.reach, made.chamber.source, len(part.triangles))
+    left = np.where(part.target, (1.0 - touched) * part.area, 0.0)
+    place = one_of(part.vertices[part.triangles].mean(axis=1), left)
+    text = f"leaves out the {hidden:.1%} that no ball touches here, such as at {place}"
+    reasons = {**made.reasons, "part.target.reachable": text}
+    tables = {**made.tables, "part.target": target}
+    return checked(tables, reasons, floor, made.known, made.mesh, shop)
+
+
+def _checked_at_extremes(
+    tables: Tables, reasons: dict[str, str], floor: Floor, made: Proposal, shop: Shop | None
+) -> Proposal:
+    """Return a proposal with these tables in the place of one's own.
+
+    Raises InputError if a chamber cannot be built with them somewhere in the ranges of the study.
+    """
+    other = checked(tables, reasons, floor, made.known, made.mesh, shop)
+    # Where the part no longer goes out, a study leaves a candidate out: no reason against a mask.
+    free = {"holder": None} if other.design.holder and other.design.holder.kind == "bore" else {}
+    for extreme in _extremes(other.bounds):
+        build_chamber(other.design.changed({**extreme, **free}))
+    return other
+
+
+def _with_table(tables: Tables, after: str, name: str, values: dict[str, Any]) -> Tables:
+    """Return tables with one more after that of some name."""
+    added: Tables = {}
+    for key, one in tables.items():
+        added |= {key: one, name: values} if key == after else {key: one}
+    return added
+
+
+def _extremes(bounds: dict[str, dict[str, Any]]) -> list[dict[str, Any]]:
+    """Return the lowest room of a study with the part high in it, and the opposite."""
+    ends = {
+        name: sorted(one.get("choose", (one.get("low"), one.get("high"))))
+        for name, one in bounds.items()
+        if name.startswith("chamber.")
+    }
+    distance = "chamber.sonotrode_distance_mm"
+    low, high = ({name: one[k] for name, one in ends.items()} for k in (0, -1))
+    return [{**low, distance: high[distance]}, {**high, distance: low[distance]}]
