@@ -41,6 +41,7 @@ from chamberopt.geometry.meshes.surface_error import format_point
 from chamberopt.geometry.outline import (
     centroid,
     convex_hull,
+    fitted_circle,
     frame_along,
     narrowest_rectangle,
     radii,
@@ -291,7 +292,7 @@ def _arbor(
             "holder.at: these faces are no walls of a hole along holder.axis = "
             f"{list(holder.axis)}; give the walls of one hole, and its axis in the chamber's frame"
         )
-    middle = centroid(hull)
+    middle = fitted_circle(hull)[0]
     radius = float(radii(hull, middle)[1]) + SINK
     outline = _circle(middle, 2.0 * radius / np.cos(np.pi / SIDES))
     _refuse_off_axis(design, part, frame[2], frame.T[:, :2] @ middle)

@@ -58,3 +58,30 @@ def narrowest_rectangle(hull: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.nd
     if sides[0] < sides[1]:
         sides, own = sides[::-1], np.array([own[1], -own[0]])
     return middle, sides, own
+
+
+def fitted_circle(points: np.ndarray) -> tuple[np.ndarray, float]:
+    """Return the middle (2,) and the radius of the circle that fits points (p, 2) best.
+
+    Source: I. Kåsa, IEEE Trans. Instrum. Meas. 25 (1976) 8: |p|² = 2 p m + c by least squares.
+    """
+    origin = points.mean(axis=0)
+    off = points - origin
+    rows = np.c_[2.0 * off, np.ones(len(off))]
+    x, y, c = np.linalg.lstsq(rows, (off * off).sum(axis=1), rcond=None)[0]
+    return origin + np.array([x, y]), float(np.sqrt(c + x * x + y * y))
+
+
+def distances_in_plan(corners: np.ndarray, point: np.ndarray) -> np.ndarray:
+    """Return how far each triangle (n, 3, 2) is from a point (2,), 0 where it holds it, (n,).
+
+    Triangles may be seen edge on.
+    """
+    off = corners - point
+    along = np.roll(off, -1, axis=1) - off
+    square = np.maximum((along * along).sum(axis=2), 1e-300)
+    share = np.clip(-(off * along).sum(axis=2) / square, 0.0, 1.0)
+    least = np.linalg.norm(off + share[..., None] * along, axis=2).min(axis=1, initial=np.inf)
+    side = along[..., 0] * off[..., 1] - along[..., 1] * off[..., 0]
+    holds = (side > 0.0).all(axis=1) | (side < 0.0).all(axis=1)
+    return np.where(holds, 0.0, least)

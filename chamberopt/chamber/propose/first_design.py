@@ -231,14 +231,14 @@ def _proposed(
     else:
         made = clamped_outside(made, floor, wanted.shop)
     turning = turning_bore(bores, mesh, target.triangles)
-    if turning is not None and (faults(made) > (0, 0) or not floor.is_one_sonotrode):
+    if turning is not None:
         with step("trying it on its axis, turning") as progress, suppress(InputError):
             other, its_floor = built(is_local=False, turning=turning)
             other = held(other, its_floor, target, None, [turning], wanted.shop, progress)
-            better = (*faults(other), *its_floor.excess) < (*faults(made), *floor.excess)
-            if better and "holder" in other.tables:
+            as_good = (*faults(other), *its_floor.excess) <= (*faults(made), *floor.excess)
+            if as_good and "holder" in other.tables:
                 made, floor = other, its_floor
-    made = padded(masked(made, floor, wanted.shop), floor, target, wanted.shop)
+    made = padded(masked(made, floor, bores, wanted.shop), floor, target, wanted.shop)
     return only_touched(made, floor, wanted.shop)
 
 

@@ -16,7 +16,7 @@ from chamberopt.chamber.propose.proposed_arbor import Bore
 from chamberopt.chamber.propose.proposed_end import HeldEnd
 from chamberopt.chamber.propose.proposed_floor import Floor
 from chamberopt.chamber.propose.proposed_holder import end_holder, holder_choices
-from chamberopt.chamber.propose.proposed_mask import are_holes, pads, to_be_masked
+from chamberopt.chamber.propose.proposed_mask import are_holes, pads, to_be_masked, to_be_plugged
 from chamberopt.chamber.propose.proposed_target import LONG, Target
 from chamberopt.chamber.propose.shop import Shop
 from chamberopt.chamber.reach import reached_part_share
@@ -87,7 +87,7 @@ def clamped_outside(made: Proposal, floor: Floor, shop: Shop | None) -> Proposal
     tables = _with_table(
         made.tables, "sonotrode", "holder", {"kind": "bore", "clearance_mm": most_mm}
     )
-    text = "the part's own end, clamped outside; balls wedge in more play than this, so seal it"
+    text = "the part's own end, clamped outside in a split wall; play, or a soft lip that seals it"
     reasons = {**made.reasons, "holder.kind": text}
     return checked(tables, reasons, floor, made.known, made.mesh, shop)
 
@@ -123,7 +123,7 @@ def padded(made: Proposal, floor: Floor, target: Target, shop: Shop | None) -> P
         for tables in choices:
             after = "holder" if "holder" in tables else "sonotrode"
             own = _with_table(tables, after, "mask", {"axis": [0.0, 0.0, 1.0], "at": at})
-            text = "a pad on the level top, up to the ceiling, clamps the part: no ball lies there"
+            text = "a pad on the level top, up to the ceiling: no ball lies there; screw it on"
             height = "sonotrode to ceiling; a pad on the part's top goes on to it"
             reasons = {**made.reasons, "mask.axis": text, "chamber.height_mm": height}
             if "holder" not in own:
@@ -141,21 +141,25 @@ def padded(made: Proposal, floor: Floor, target: Target, shop: Shop | None) -> P
     return made
 
 
-def masked(bare: Proposal, floor: Floor, shop: Shop | None) -> Proposal:
+def masked(bare: Proposal, floor: Floor, bores: Sequence[Bore], shop: Shop | None) -> Proposal:
     """Return a proposal with a mask on what must not be peened, where that does no harm.
 
-    Harm is that of a holder. Where it would do some, the surfaces stay bare and are named.
+    Holes are plugged, also those that a wall cuts and through which balls would leave. Harm is that
+    of a holder. Where a mask would do some, the surfaces stay bare and are named.
     """
     names = to_be_masked(bare.design, bare.chamber, bare.known)
-    if not names or bare.design.effects.part_turn is not None:
+    holes = to_be_plugged(bare.design, bare.chamber, bores, names)
+    if not (names or holes) or bare.design.effects.part_turn is not None:
         return bare
     after = "holder" if "holder" in bare.tables else "sonotrode"
-    first, value, what = "thickness_mm", USUAL_SHELL_MM, "a cap on"
-    if are_holes(bare.mesh, bare.known, names):
-        first, value, what = "plugs", True, "in"
-    keys = {first: value, "at": {"surface": names}}
-    text = f"{what} {', '.join(names)}: not to be peened, by the name"
-    reasons = {**bare.reasons, f"mask.{first}": text}
+    if holes and are_holes(bare.mesh, bare.known, names, holes):
+        sizes = ", ".join(f"{2e3 * one.radius:.3g}" for one in holes)
+        text = f"in holes of {sizes} mm, not to be peened, or open to the outside"
+        keys: dict[str, Any] = {"plugs": True, "at": {"faces": [one.wall for one in holes]}}
+    else:
+        text = f"a cap on {', '.join(names)}: not to be peened, by the name"
+        keys = {"thickness_mm": USUAL_SHELL_MM, "at": {"surface": names}}
+    reasons = {**bare.reasons, f"mask.{next(iter(keys))}": text}
     tables = _with_table(bare.tables, after, "mask", keys)
     try:
         made = _checked_at_extremes(tables, reasons, floor, bare, shop)

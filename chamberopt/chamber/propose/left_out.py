@@ -57,6 +57,6 @@ def find_left_out(proposal: Proposal) -> list[LeftOut]:
         found.append(LeftOut({"reachable": True}, f"the {hidden:.0%} that no ball touches here"))
     seldom = [one for one in proposal.known if SELDOM.search(one.name)]
     if names := [one.name for one in seldom if is_met(proposal.design, chamber, one)]:
-        text = f"the shot also meets {', '.join(names)}, seldom peened: [mask] keeps it off"
+        text = f"NOT MASKED: the shot also meets {', '.join(names)}, seldom peened; give a [mask]"
         found.append(LeftOut({}, f"{text} (docs/chambers.md)"))
     return found

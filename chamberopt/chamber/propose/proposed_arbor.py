@@ -12,19 +12,19 @@ from chamberopt.chamber.propose.pose import Turns, square_to_walls, turns_down
 from chamberopt.chamber.propose.proposed_target import CREASE_DEG
 from chamberopt.geometry.faces import Faces
 from chamberopt.geometry.meshes.part_mesh import PartMesh
-from chamberopt.geometry.outline import centroid, convex_hull, frame_along, radii
-from chamberopt.geometry.triangles import (
-    area_vectors,
-    areas,
-    closest_on_each,
-    rotation_matrix,
-    unit_vectors,
+from chamberopt.geometry.outline import (
+    convex_hull,
+    distances_in_plan,
+    fitted_circle,
+    frame_along,
+    radii,
 )
+from chamberopt.geometry.triangles import area_vectors, areas, rotation_matrix, unit_vectors
 
-CLOSED = 0.02  # sum of a bore's area vectors over its area: it goes all round
-ROUND, FREE = 0.95, 0.95  # least radius in a bore, and of the free way through, over its radius
+# A keyway may interrupt the wall of a bore: largest sum of its area vectors over its area, and
+# least radius in its outline over that round it. FREE is that of the way through.
+OPEN, ROUND, FREE = 0.2, 0.9, 0.95
 THINNEST = 4e-3  # m: of a bore whose arbor holds a part
-MOST_BORES = 6  # that are looked at, the widest
 # Of flanges: diameter over the bore's, least of it, and thickness over the bore's diameter and [m].
 FLANGE, LEAST_FLANGE, THICK, THINNEST_FLANGE = 1.6, 1.2, 0.1, 2e-3
 UPRIGHT, LEVEL = 0.999, 0.02  # cosines with the vertical of an axis that is upright, and level
@@ -45,6 +45,11 @@ class Bore(NamedTuple):
     axis: np.ndarray  # unit vector, (3,)
     radius: float  # [m]
 
+    @property
+    def wall(self) -> dict[str, Any]:
+        """Keys that choose its wall, as an entry of `faces`."""
+        return {"at_mm": list(self.at_mm), "crease_deg": CREASE_DEG}
+
 
 def find_bores(mesh: PartMesh, target: np.ndarray) -> list[Bore]:
     """Return the bores of a part that are no part of its target, the widest first.
@@ -55,19 +60,19 @@ def find_bores(mesh: PartMesh, target: np.ndarray) -> list[Bore]:
     faces = Faces(mesh.vertices, mesh.triangles, CREASE_DEG)
     vectors = area_vectors(mesh.vertices, mesh.triangles)
     sums = np.stack([np.bincount(faces.of_triangle, one) for one in vectors.T], axis=1)
-    closed = np.linalg.norm(sums, axis=1) < CLOSED * faces.area
+    closed = np.linalg.norm(sums, axis=1) < OPEN * faces.area
     free = np.bincount(faces.of_triangle, target) == 0.0
     found = []
     for face in map(int, np.flatnonzero(closed & free)):
         own = faces.of_triangle == face
         spread, axes = np.linalg.eigh(vectors[own].T @ unit_vectors(vectors[own]))
         along = np.abs(vectors[own] @ axes[:, 0]).sum() / faces.area[face]
-        if along > 0.5 * ACROSS or spread[1] < 0.5 * spread[2] * (1.0 - ALIKE):
+        if along > 0.5 * ACROSS or spread[1] < 0.5 * spread[2]:
             continue
         bore = _bore(mesh, own, axes[:, 0], faces.place(face))
         if bore is not None:
             found.append(bore)
-    return sorted(found, key=lambda one: -one.radius)[:MOST_BORES]
+    return sorted(found, key=lambda one: -one.radius)
 
 
 def _bore(mesh: PartMesh, own: np.ndarray, axis: np.ndarray, place: np.ndarray) -> Bore | None:
@@ -78,11 +83,9 @@ def _bore(mesh: PartMesh, own: np.ndarray, axis: np.ndarray, place: np.ndarray) 
     hull = convex_hull(corners[own].reshape(-1, 3)[:, :2])
     if hull is None or not is_hole(mesh.vertices, mesh.triangles[own]):
         return None
-    middle = centroid(hull)
+    middle = fitted_circle(hull)[0]
     inner, outer = radii(hull, middle)
-    flat = corners * [1.0, 1.0, 0.0]
-    point = np.broadcast_to(np.r_[middle, 0.0], (int((~own).sum()), 3))
-    away = np.linalg.norm(closest_on_each(flat[~own], point) - point, axis=1)
+    away = distances_in_plan(corners[~own][..., :2], middle)
     if inner < ROUND * outer or away.min(initial=math.inf) < FREE * inner or outer < THINNEST / 2:
         return None
     height = float(corners[own][..., 2].mean())
@@ -104,13 +107,11 @@ def arbor_through(
     """
     axis = rotation_matrix(turns) @ bore.axis
     frame = frame_along(bore.axis)
-    corners = (mesh.vertices @ frame.T)[mesh.triangles[target]] * [1.0, 1.0, 0.0]
-    point = np.broadcast_to((frame @ bore.point) * [1.0, 1.0, 0.0], (len(corners), 3))
-    away = np.linalg.norm(closest_on_each(corners, point) - point, axis=1).min(initial=math.inf)
+    corners = (mesh.vertices @ frame.T)[mesh.triangles[target]][..., :2]
+    away = float(distances_in_plan(corners, (frame @ bore.point)[:2]).min(initial=math.inf))
     if away < bore.radius + ball:
         return None
-    wall = {"at_mm": list(bore.at_mm), "crease_deg": CREASE_DEG}
-    keys: dict[str, Any] = {"kind": "arbor", "at": {"faces": [wall]}}
+    keys: dict[str, Any] = {"kind": "arbor", "at": {"faces": [bore.wall]}}
     if abs(axis[2]) > UPRIGHT:
         where = "up through the ceiling"
     elif abs(axis[2]) < LEVEL:

@@ -15,10 +15,12 @@ from chamberopt.chamber.propose.proposed_target import Target
 from chamberopt.design.shapes.outlines import area_inside
 from chamberopt.geometry.meshes.part_mesh import PartMesh
 from chamberopt.geometry.outline import convex_hull
-from chamberopt.geometry.triangles import areas, rotation_matrix
+from chamberopt.geometry.triangles import areas, rotation_matrix, sides_of
 
 NEARLY_ALL = 0.95  # share of the part's area from which on its target is all of it
-END = 0.15  # length of the end over the part's
+END, LONG_END = 0.15, 0.25  # length of the end over the part's, the latter if no end is straight
+TIP, STRAIGHT = 0.25, 0.8  # of an end: near its tip, and width there over that where it begins
+ALIKE = 0.05  # difference of that from which on it decides which end is held
 UPRIGHT = 0.999  # cosine from which on an axis of the part's file is upright
 SLIMMER = 0.8  # area of the lower end over the upper one's, below which the part is turned over
 MARGIN_MM = 1.0  # of boxes round the part
@@ -34,7 +36,7 @@ class HeldEnd(NamedTuple):
 
 
 def held_end(mesh: PartMesh, target: Target, turns: Turns, of_any: bool = False) -> HeldEnd | None:
-    """Return the slimmer end of a part, if all of the part would be peened, else None.
+    """Return the straighter or slimmer end of a part, if all of it would be peened, else None.
 
     Args:
         target: the target that was proposed.
@@ -50,25 +52,51 @@ def held_end(mesh: PartMesh, target: Target, turns: Turns, of_any: bool = False)
     places = mesh.vertices[:, axis] * np.sign(up[axis])
     length = float(np.ptp(places))
 
-    def size(rows: np.ndarray) -> float:
+    def straight(way: float, share: float) -> float:
+        """Width of an end near its tip over that where it begins, from 0 to 1."""
+        tip = float((way * places).max())
+        near, far = (
+            _width(mesh, way * places, tip - part * share * length, axis) for part in (TIP, 1.0)
+        )
+        return min(near / far, 1.0) if far > 0.0 else 0.0
+
+    def size(way: float) -> float:
         """Area of an end as it is seen along the axis [m²]."""
-        hull = convex_hull(np.delete(mesh.vertices[rows], axis, axis=1))
+        inside = way * places > (way * places).max() - END * length
+        hull = convex_hull(np.delete(mesh.vertices[inside], axis, axis=1))
         return 0.0 if hull is None else area_inside(hull)
 
-    upper = places > places.max() - END * length
-    lower = places < places.min() + END * length
-    if size(lower) < SLIMMER * size(upper):
+    # A straight end is held better than one that narrows to its tip, and a slim one better still.
+    share = END if max(straight(1.0, END), straight(-1.0, END)) > STRAIGHT else LONG_END
+    upper, lower = (straight(way, share) for way in (1.0, -1.0))
+    slimmer = size(-1.0) < SLIMMER * size(1.0)
+    if slimmer if abs(upper - lower) < ALIKE else lower > upper:
         up = -up
         turns = turns_down(-np.sign(up[axis]) * np.eye(3)[axis])
     box = 1e3 * np.array([mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)])
     box += MARGIN_MM * np.array([[-1.0], [1.0]])
     is_top = int(up[axis] > 0.0)
-    cut = box[is_top, axis] - (2 * is_top - 1) * (MARGIN_MM + 1e3 * END * length)
+    cut = box[is_top, axis] - (2 * is_top - 1) * (MARGIN_MM + 1e3 * share * length)
     rest, end = box.copy(), box.copy()
     rest[is_top, axis] = end[1 - is_top, axis] = cut
     middle = 1e3 * mesh.vertices[mesh.triangles].mean(axis=1)[:, axis]
     of_end = middle > cut if is_top else middle < cut
     keys = {**target.keys, "box_mm": np.round(rest, 3).tolist()}
-    reason = f"{target.reason}; but for an end, {END:.0%} of its length, to hold it by"
+    reason = f"{target.reason}; but for an end, {share:.0%} of its length, to hold it by"
     left = Target(keys, target.triangles & ~of_end, reason)
     return HeldEnd(left, turns, {"box_mm": np.round(end, 3).tolist()}, of_end)
+
+
+def _width(mesh: PartMesh, places: np.ndarray, at: float, axis: int) -> float:
+    """Return the width [m] of the section of a part in a plane across an axis of its file.
+
+    Args:
+        places: place of each vertex along the axis [m], (n,).
+        at: place of the plane [m].
+    """
+    one, two = sides_of(mesh.triangles).T
+    cut = (places[one] < at) & (places[two] >= at)
+    one, two = one[cut], two[cut]
+    share = ((at - places[one]) / (places[two] - places[one]))[:, None]
+    points = mesh.vertices[one] + share * (mesh.vertices[two] - mesh.vertices[one])
+    return float(np.ptp(np.delete(points, axis, axis=1), axis=0).min()) if len(points) else 0.0

@@ -28,11 +28,13 @@ from chamberopt.geometry.meshes.part_mesh import PartMesh
 from chamberopt.geometry.outline import (
     centroid,
     convex_hull,
+    distances_in_plan,
+    fitted_circle,
     frame_along,
     narrowest_rectangle,
     radii,
 )
-from chamberopt.geometry.triangles import area_vectors, closest_on_each, rotation_matrix
+from chamberopt.geometry.triangles import area_vectors, rotation_matrix
 
 FLAT_DEG = 1.0  # largest angle in a flat face: fillets beside it are no part of it
 MOST_FACES = 40  # flat faces that are looked at, the largest
@@ -42,6 +44,8 @@ CLEAR = 2.0  # ball diameters between a holder and the target, so that balls get
 # Of an end that is enclosed: how much wider it may get, over its outermost face; least length over
 # its width; most length over the part's.
 WIDER, SHORTEST, LONGEST = 2.0, 0.25, 0.4
+# An end narrows if its outer TIP, a share of the grip, is slimmer than STRAIGHT of the whole grip.
+TIP, STRAIGHT = 0.25, 0.8
 WALL = 2e-3  # m: of a collar or block round an end
 THINNEST, SLIM = 2e-3, 0.15  # of a rod: m, and over the part's width: slim ones come last
 # Over the radius of a face: least seat of a rod round a hole in it, and least edge beside a target.
@@ -178,37 +182,61 @@ def _on_flat_faces(
         at: dict[str, Any] = {"at": {"faces": [{"at_mm": place, "crease_deg": FLAT_DEG}]}}
         at |= {} if up else {"axis": axis.tolist()}
         on_face = _rod(seen, float(faces.area[face]))
+        holes = _holes(seen, axis, posed, mesh.triangles, bores)
         if on_face is None or 1e-3 * on_face.keys["diameter_mm"] < SLIM * width:
-            on_face = _block(seen, float(faces.area[face])) or on_face
-        through = _bolts(seen, axis, posed, mesh.triangles, bores)
+            on_face = _block(seen, float(faces.area[face]), LONG_FACE) or on_face
+        elif holes and (block := _block(seen, float(faces.area[face]), 1.0)) is not None:
+            more = len(_bolts(seen, block, holes)) > len(_bolts(seen, on_face, holes))
+            on_face = block if more else on_face
         for made in (_around_end(seen), on_face):
             if made is not None:
-                bolted = "" if made.is_round_an_end else through
-                choice = HolderChoice({**made.keys, **at}, f"{made.reason}{bolted}")
+                bolts = [] if made.is_round_an_end else _bolts(seen, made, holes)
+                choice = HolderChoice({**made.keys, **at}, f"{made.reason}{_in_words(bolts)}")
                 yield _OnFace(choice, axis, float(round(1e3 * seen.level)))
 
 
-def _bolts(
+class _Hole(NamedTuple):
+    """A hole that opens in a flat face, as it is seen along the normal of the face."""
+
+    middle: np.ndarray  # (2,) [m]
+    radius: float  # [m]
+
+
+def _holes(
     seen: _Seen, axis: np.ndarray, posed: np.ndarray, triangles: np.ndarray, bores: Sequence[Bore]
-) -> str:
-    """Return words for the holes of a flat face that take bolts; empty if it has none.
+) -> list[_Hole]:
+    """Return the bores that open in a flat face.
 
     Args:
         axis: unit normal of the face in the chamber's frame, (3,).
         posed: the part's vertices in its pose [m], (n, 3), of which its triangles are made, (m, 3).
     """
-    sizes = []
+    found = []
     for bore in bores:
         walls = area_vectors(posed, triangles[bore.triangles])
         across = np.abs(walls @ axis).sum() < ALONG * np.linalg.norm(walls, axis=1).sum()
-        heights = seen.corners[bore.triangles][..., 2]
-        if across and heights.max() > seen.level - HIGHER:
-            sizes.append(plain(2e3 * bore.radius, 3))
-    if not sizes:
+        corners = seen.corners[bore.triangles].reshape(-1, 3)
+        if across and corners[:, 2].max() > seen.level - HIGHER:
+            found.append(_Hole(*fitted_circle(corners[:, :2])))
+    return found
+
+
+def _bolts(seen: _Seen, holder: HolderChoice, holes: Sequence[_Hole]) -> list[_Hole]:
+    """Return those holes of a face over which a rod or block stands, so that bolts hold it."""
+    if holder.keys["kind"] == "rod":
+        middle, reach = centroid(seen.hull), 5e-4 * holder.keys["diameter_mm"]
+        return [h for h in holes if np.linalg.norm(h.middle - middle) + h.radius < reach]
+    middle, _, axes = narrowest_rectangle(seen.hull)
+    half = 5e-4 * np.array(holder.keys["size_mm"])
+    return [h for h in holes if (np.abs(axes @ (h.middle - middle)) + h.radius < half).all()]
+
+
+def _in_words(bolts: Sequence[_Hole]) -> str:
+    """Return words for bolts that hold a rod or block; empty if there are none."""
+    if not bolts:
         return ""
-    return (
-        f"; bolts through its hole{'s' if len(sizes) > 1 else ''} of {', '.join(sizes)} mm hold it"
-    )
+    sizes = ", ".join(plain(2e3 * one.radius, 3) for one in bolts)
+    return f"; bolts through its hole{'s' if len(bolts) > 1 else ''} of {sizes} mm hold it"
 
 
 def _jaw(
@@ -294,18 +322,27 @@ def _around_end(seen: _Seen) -> HolderChoice | None:
     needed = 2.0 * aside[highest > level - grip].max(axis=0, initial=0.0)
     if grip < SHORTEST * needed.min() or grip <= 0.0:
         return None
+    tip = 2.0 * aside[highest > level - TIP * grip].max(axis=0, initial=0.0)
     outside = [math.ceil(2e3 * (one + 2.0 * WALL) - 1e-6) / 2.0 for one in needed]
     size = {"diameter_mm": outside[0]} if is_round else {"size_mm": outside}
     beyond = plain(1e3 * (level - grip - target_top), 2)
     text = f"round the end that points {seen.where}, which is not peened; the target begins"
+    if (tip < STRAIGHT * needed).any():
+        beyond += " mm beyond it; IT NARROWS TO ITS TIP: jaws of its form, or potted"
+    else:
+        beyond += " mm beyond it"
     keys = {"kind": "collar" if is_round else "plate", **size, "grip_mm": round(1e3 * grip, 1)}
-    return HolderChoice(keys, f"{text} {beyond} mm beyond it")
+    return HolderChoice(keys, f"{text} {beyond}")
 
 
-def _block(seen: _Seen, area: float) -> HolderChoice | None:
-    """Return a block on a long face [m²] that fills its rectangle; None if there is no room."""
+def _block(seen: _Seen, area: float, long: float) -> HolderChoice | None:
+    """Return a block on a face [m²] that fills its rectangle; None if there is no room.
+
+    Args:
+        long: least length of the face over its width.
+    """
     middle, sides, axes = narrowest_rectangle(seen.hull)
-    if sides.max() < LONG_FACE * sides.min() or area < FILLED * sides.prod():
+    if sides.max() < long * sides.min() or area < FILLED * sides.prod():
         return None
     along = np.abs((seen.corners[..., :2] - middle) @ axes.T).min(axis=1)  # (m, 2)
     higher = ~seen.face & (seen.highest > seen.level + HIGHER)
@@ -314,21 +351,18 @@ def _block(seen: _Seen, area: float) -> HolderChoice | None:
         return None
     if 1e-3 * min(size_mm) < THINNEST:
         return None
-    text = f"on a long flat face of {plain(1e6 * area, 3)} mm² that looks {seen.where} and is not "
+    text = f"on a flat face of {plain(1e6 * area, 3)} mm² that looks {seen.where} and is not "
     return HolderChoice({"kind": "plate", "size_mm": size_mm}, f"{text}peened; it fits the face")
 
 
 def _rod(seen: _Seen, area: float) -> HolderChoice | None:
     """Return a rod on the face, of some area [m²]; None if there is no room for one."""
     middle, level, highest = centroid(seen.hull), seen.level, seen.highest
-    flat = seen.corners * [1.0, 1.0, 0.0]
-    point = np.r_[middle, 0.0]
+    away = distances_in_plan(seen.corners[..., :2], middle)
 
     def distance(rows: np.ndarray) -> float:
         """Return how far the marked triangles (m,) are from the rod's axis [m]."""
-        points = np.broadcast_to(point, (int(rows.sum()), 3))
-        away = np.linalg.norm(closest_on_each(flat[rows], points) - point, axis=1)
-        return float(away.min(initial=math.inf))
+        return float(away[rows].min(initial=math.inf))
 
     inner, hole = radii(seen.hull, middle)[0], distance(seen.face)
     in_the_way = distance(~seen.face & (highest > level + HIGHER)) - seen.clear

@@ -9,19 +9,20 @@ from typing import Any
 import numpy as np
 
 from chamberopt.chamber.build import Chamber
-from chamberopt.chamber.fixture import is_hole, pieces_of
 from chamberopt.chamber.part import chosen_on_part
 from chamberopt.chamber.propose.pose import Turns
+from chamberopt.chamber.propose.proposed_arbor import Bore
 from chamberopt.chamber.propose.proposed_target import Surface
 from chamberopt.design.design import Design
 from chamberopt.design.part import Selection
 from chamberopt.geometry.faces import Faces
 from chamberopt.geometry.meshes.part_mesh import PartMesh
-from chamberopt.geometry.triangles import area_vectors, rotation_matrix
+from chamberopt.geometry.triangles import area_vectors, areas, rotation_matrix
 
 FLAT_DEG = 1.0  # largest angle in a flat face
 STRAIGHT_UP = 0.9998  # cosine from which on a face is level: balls lie on it
 MOST_PADS = 8  # faces under one pad
+MOSTLY = 0.9  # share of an area that counts as all of it
 MET = 0.5  # share of a surface in the chamber from which on the shot meets it
 # Names of what fits to other parts, whose size and finish shot would change.
 NEVER = re.compile(
@@ -38,11 +39,31 @@ def is_met(design: Design, chamber: Chamber, surface: Surface) -> bool:
     return bool(inside > MET * chamber.part.area[rows].sum())
 
 
-def are_holes(mesh: PartMesh, known: Sequence[Surface], names: Sequence[str]) -> bool:
-    """Return whether all surfaces of these names are walls of holes, which plugs fill."""
-    chosen = np.any([one.triangles for one in known if one.name in names], axis=0)
-    pieces = pieces_of(mesh.triangles, chosen)
-    return all(is_hole(mesh.vertices, mesh.triangles[rows]) for rows in pieces)
+def are_holes(
+    mesh: PartMesh, known: Sequence[Surface], names: Sequence[str], holes: Sequence[Bore]
+) -> bool:
+    """Return whether surfaces of these names are no more than the walls of holes."""
+    area = areas(mesh.vertices, mesh.triangles)
+    chosen = np.any([one.triangles for one in known if one.name in names] or [area < 0.0], axis=0)
+    walls = np.any([one.triangles for one in holes], axis=0)
+    return bool(area[chosen & ~walls].sum() <= (1.0 - MOSTLY) * area[chosen].sum())
+
+
+def to_be_plugged(
+    design: Design, chamber: Chamber, bores: Sequence[Bore], names: Sequence[str]
+) -> list[Bore]:
+    """Return the bores that bear one of these names, or that the chamber's wall cuts."""
+    found, area = [], chamber.part.area
+    named = np.zeros(len(area), dtype=bool)
+    if names:
+        named = chosen_on_part(design, Selection.model_validate({"surface": list(names)}), "")
+    for bore in bores:
+        rows = chosen_on_part(design, Selection.model_validate({"faces": [bore.wall]}), "")
+        whole, inside = area[rows].sum(), chamber.exposed_area[rows].sum()
+        is_named = area[rows & named].sum() > MOSTLY * whole
+        if is_named or (1.0 - MOSTLY) * whole < inside < MOSTLY * whole:
+            found.append(bore)
+    return found
 
 
 def to_be_masked(design: Design, chamber: Chamber, known: Sequence[Surface]) -> list[str]:

@@ -208,7 +208,7 @@ def test_a_guess_is_said_and_no_folder_is_held_while_the_design_is_made(
     assert made == ["design.toml", "study.toml"]
     assert load_study("out/study.toml").objective.name == "uniform_coverage"
     assert "# GUESSED: the part measures" in Path("out/design.toml").read_text(encoding="utf-8")
-    assert "a pad on the level top, up to the ceiling, clamps the part" in said.out
+    assert "a pad on the level top, up to the ceiling: no ball lies there" in said.out
     design = load_design("out/design.toml")
     assert design.mask is not None
     assert design.holder is None

@@ -204,5 +204,5 @@ def test_what_is_seldom_peened_is_named_or_masked(tmp_path: Path, side: str) -> 
         return
     (said,) = left_out
     assert made.design.mask is None
-    assert said.text.startswith("the shot also meets FLANGE, seldom peened: [mask]")
+    assert said.text.startswith("NOT MASKED: the shot also meets FLANGE")
     assert f"# {said.text}" in text
