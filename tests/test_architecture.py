@@ -25,7 +25,7 @@ ORDER = {
     "part_mesh",
     "chamberopt/design": (
         "shape_surface+table_base materials shapes effects+part+process+shot+sonotrode "
-        "almen_strip+calibration+fixture+flexure+ranges+tolerances+zones design+intensity load"
+        "almen_strip+calibration+fixture+flexure+ranges+tolerances+zones stress design load"
     ),
     "chamberopt/chamber": (
         "replica_seed bores_and_deflectors thin_part part fixture+reach+largest_ball build "
@@ -33,7 +33,7 @@ ORDER = {
         "flexure+scene analytic checks propose"
     ),
     "chamberopt/coverage": "dents part_impacts+metrics field coverage_from_impacts "
-    "percentile coverage_intervals strength strength_intervals compression",
+    "percentile coverage_intervals strength strength_intervals stress_law stress_profile",
     "chamberopt/simulation": "resting_balls trapped_balls settling effort replicas evaluation "
     "estimates evaluate time_curve field_values variations advice effect_pilot+budget_pilot "
     "error_law numerical_parameters+timed_replicas convergence recommendation",

@@ -27,8 +27,6 @@ CONFIDENCE = 0.95
 # Position in Estimate.shared of the first error of a calibration. The errors by the choice of
 # points come before.
 FIRST_OF_CALIBRATION = 16
-# Position of the error of effects left out for the part's metal under this shot, such as its depth.
-OF_METAL = FIRST_OF_CALIBRATION - 1
 ZERO_TOLERANCE = 1e-12  # a smaller value is a rounding error of zero
 
 
@@ -144,17 +142,6 @@ class Estimate:
         scatter = estimate(self.pseudovalues, shared=self.shared).half_width
         wider = math.hypot(scatter, shared_half_width(errors))
         return replace(self, shared=shared, half_width=self.half_width - scatter + wider)
-
-    def of_another_metal(self) -> Estimate:
-        """Return the estimate, marked as of another metal than the estimates it is compared with.
-
-        The error by the part's metal moves to another position of `shared`, so that it does not
-        cancel in differences.
-        """
-        if len(self.shared) <= OF_METAL:
-            return self
-        before, own = self.shared[: OF_METAL - 1], self.shared[OF_METAL]
-        return replace(self, shared=(*before, own, 0.0, *self.shared[OF_METAL + 1 :]))
 
     @classmethod
     def from_interval_json(cls, data: Mapping[str, Any]) -> Estimate:

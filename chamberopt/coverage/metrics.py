@@ -17,6 +17,7 @@ import numpy as np
 
 from chamberopt.common import toml_errors
 from chamberopt.common.errors import InputError
+from chamberopt.design.stress import NO_STRESS
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
@@ -89,6 +90,10 @@ def _impacts_per_mm2_s(impacts: TargetImpacts, design: Design) -> float:
 
 def _why_no_intensity(design: Design) -> str:
     return design.why_no_intensity
+
+
+def _why_no_stress(design: Design) -> str:
+    return "" if design.stress else NO_STRESS
 
 
 def _shot_count(impacts: TargetImpacts, design: Design) -> float:
@@ -187,6 +192,28 @@ METRICS = {
         ),
         Metric("saturation_time_s", "s", "saturation time of a strip", 0.0, of_places=True),
         Metric("compression_depth_um", "µm", "estimated depth of compression", 0.0, of_places=True),
+        Metric(
+            "surface_stress_MPa",
+            "MPa",
+            "estimated residual stress at the surface",
+            of_places=True,
+            lacking=_why_no_stress,
+        ),
+        Metric(
+            "peak_stress_MPa",
+            "MPa",
+            "estimated largest compressive residual stress",
+            of_places=True,
+            lacking=_why_no_stress,
+        ),
+        Metric(
+            "peak_stress_depth_um",
+            "µm",
+            "estimated depth of the largest compressive stress",
+            0.0,
+            of_places=True,
+            lacking=_why_no_stress,
+        ),
         Metric(
             "mean_normal_speed_m_s",
             "m/s",

@@ -18,7 +18,7 @@ limits it. For equal impacts h is the curve a (1 - exp(-b t)) of D. Kirk, "Almen
 solver program", The Shot Peener, 2005. The Almen intensity is S times a constant that a set of
 strips calibrates. The impacts are those on the part, and the dents are the dents that these impacts
 would leave in the strip's steel. The same sum with s = d, on the part's own metal, gives the depth
-of compression (compression.py).
+of compression and the residual stress (stress_profile.py).
 """
 
 from __future__ import annotations

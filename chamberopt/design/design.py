@@ -38,6 +38,7 @@ from chamberopt.design.shapes.custom import RecordedShape, load_custom_shape
 from chamberopt.design.shapes.imported import IMPORTED, Imported
 from chamberopt.design.shot import ShotTable
 from chamberopt.design.sonotrode import FurtherSonotrode, Sonotrode
+from chamberopt.design.stress import StressTable, stress_problems
 from chamberopt.design.table_base import MAX_NAMES, STRICT, FileTable
 from chamberopt.design.tolerances import FORM as TOLERANCE_FORM
 from chamberopt.design.tolerances import Tolerance, tolerance_problems
@@ -47,8 +48,7 @@ from chamberopt.design.zones import MAX_ZONES, Zone, zone_problems
 MAX_SONOTRODES = 50
 SHAPE = "chamber.shape"
 NOT_VARIED = (
-    "calibration.", "zones.", "ranges.", "part.tessellation.", "holder.at.", "mask.at.",
-    "process.intensity_mmA.", "process.coverage_percent",
+    "calibration.", "zones.", "ranges.", "part.tessellation.", "holder.at.", "mask.at.", "stress.",
 )  # fmt: skip
 
 
@@ -85,6 +85,9 @@ class Design(FileTable):
     )
     ranges: Ranges | None = Field(
         default=None, description="how well numbers are known that are not calibrated"
+    )
+    stress: StressTable | None = Field(
+        default=None, description="asks for the residual stress under the peened surface"
     )
 
     @pydantic.model_validator(mode="wrap")
@@ -162,6 +165,7 @@ class Design(FileTable):
         yield from zone_problems(self.zones, self.calibration)
         yield from calibration_problems(self)
         yield from flexure_problems(self)
+        yield from stress_problems(self)
         balls_mm, turns = 1e3 * min(self.shot.diameters), self.effects.part_turn is not None
         yield from fixture_problems(self.holder, self.mask, balls_mm, turns)
         if self.sonotrodes and self.sonotrode.motion == "random_phase":

@@ -33,6 +33,7 @@ COLUMNS = {
     "almen_intensity_mmA": ("Almen intensity, mmA", "dents"),
     "saturation_time_s": ("saturation time of an Almen strip, s", "dents"),
     "compression_depth_um": ("estimated depth of compression, micrometres", "dents"),
+    "surface_stress_MPa": ("estimated residual stress at the surface, MPa", "dents"),
     "moved_um": ("distance of the smooth surface from the facets, micrometres", "area"),
     "impacts": ("number of simulated impacts", "sum"),
     "dents": ("number of simulated dents", "sum"),

@@ -49,6 +49,7 @@ QUANTITIES = {
         Quantity("almen", "Almen intensity", "mmA", "almen_intensity_mmA"),
         Quantity("saturation", "saturation time of a strip", "s", "saturation_time_s"),
         Quantity("depth", "estimated depth of compression", "µm", "compression_depth_um"),
+        Quantity("stress", "estimated stress at the surface", "MPa", "surface_stress_MPa"),
         Quantity("moved", "surface from the file's facets", "µm", "moved_um", 1.0, WIDTH_MAP),
         Quantity("zones", "zone", "", "zone"),
     )

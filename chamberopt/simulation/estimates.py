@@ -6,7 +6,7 @@ Notation
     y_j   pseudo-value of batch j: g S(all) - (g - 1) S(all but j)
 
 Coverage, the time to full coverage and figures of strength have estimators of their own
-(coverage_intervals.py, percentile.py, strength_intervals.py and compression.py in coverage). The
+(coverage_intervals.py, percentile.py, strength_intervals.py and stress_profile.py in coverage). The
 other metrics are ratios of sums: the delete-one jackknife over batches corrects their bias of order
 1/g and gives the standard error (B. Efron and R. J. Tibshirani, "An Introduction to the Bootstrap",
 Chapman & Hall 1993, chapter 11).
@@ -25,7 +25,6 @@ from chamberopt.chamber.build import TARGET
 from chamberopt.chamber.checks.gaps import MIN_MISSED_SHARE
 from chamberopt.common.estimate import Estimate, estimate, shared_half_width, sum_of_shared
 from chamberopt.common.number_text import plain, share_in_words
-from chamberopt.coverage.compression import compression_estimate
 from chamberopt.coverage.coverage_from_impacts import (
     Prints,
     batches_of,
@@ -53,6 +52,7 @@ from chamberopt.coverage.metrics import (
 from chamberopt.coverage.part_impacts import Hits, TargetImpacts
 from chamberopt.coverage.percentile import in_order, sum_dents, time_to_98
 from chamberopt.coverage.strength_intervals import strength_estimates
+from chamberopt.coverage.stress_profile import stress_estimates
 from chamberopt.design.calibration import calibrated_strip
 
 if TYPE_CHECKING:
@@ -165,9 +165,7 @@ def raw_estimates(seen: SeenDents, design: Design) -> tuple[dict[str, Estimate],
     shot = design.shot.density, calibrated_strip(design.shot, design.calibration)
     found |= strength_estimates(seen.field, batches, process.recorded_time, *shot)
     found |= _calibrated(found, design.calibration)
-    if not design.materials.part.hardens_strongly:
-        times = process.recorded_time, process.treatment_time
-        found["compression_depth_um"] = compression_estimate(seen.field, batches, *times)
+    found |= stress_estimates(seen.field, batches, design, found)
     return found, resolution
 
 

@@ -15,7 +15,6 @@ from chamberopt.chamber.checks.fillets import facet_warnings
 from chamberopt.chamber.scene import chamber_mesh
 from chamberopt.common.executor import share
 from chamberopt.common.progress import Progress
-from chamberopt.coverage.compression import stress_notes
 from chamberopt.coverage.dents import dent_diameter
 from chamberopt.coverage.field.target_field import (
     TargetField,
@@ -26,6 +25,7 @@ from chamberopt.coverage.field.target_field import (
     require_wide_gauge,
 )
 from chamberopt.coverage.metrics import require_metrics, require_target, unit_of_objective
+from chamberopt.coverage.stress_profile import stress_notes
 from chamberopt.simulation.effort import Effort
 from chamberopt.simulation.estimates import (
     SeenDents,
@@ -203,7 +203,7 @@ class _Run:
                 *resolution_notes(found.resolution),
                 *strength_notes(found.metrics, found.resolution),
                 *zone_notes,
-                *stress_notes(design.materials.part),
+                *stress_notes(design),
                 *resting_notes([one.resting for one in replicas if one.resting], done),
                 *trapped_notes([one.trapped for one in replicas], design),
                 *settling_notes(excess, design),

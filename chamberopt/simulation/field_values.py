@@ -19,7 +19,6 @@ import numpy as np
 
 from chamberopt.chamber.scene import chamber_mesh
 from chamberopt.common.estimate import CONFIDENCE
-from chamberopt.coverage.compression import compression_depth
 from chamberopt.coverage.coverage_from_impacts import (
     coverage_from_dent_density,
     find_footprints,
@@ -33,6 +32,13 @@ from chamberopt.coverage.strength import (
     levels,
     saturated_strength,
     strip_dents,
+)
+from chamberopt.coverage.stress_profile import (
+    dented_by_size,
+    depth_of_compression,
+    level_layers,
+    share_by_level,
+    stress_model,
 )
 from chamberopt.design.calibration import calibrated_strip
 from chamberopt.simulation.evaluate import prepare_target
@@ -148,7 +154,8 @@ class PartField:
             mean_dent_um: mean diameter of the dents [µm].
             strength_um, saturation_time_s: peening strength S [µm] and T, see coverage/strength.py.
             almen_intensity_mmA: [mmA]; only where the design has a calibration to strips.
-            compression_depth_um: [µm], see coverage/compression.py; absent for some metals.
+            compression_depth_um: [µm], see coverage/stress_profile.py; absent for some metals.
+            surface_stress_MPa: residual stress at the surface [MPa]; where the design asks for it.
             moved_um: distance of the surface from the file's facets [µm]; absent if none moved.
         """
         gauge = gauge or self.field.gauge_round(places, self.field.radius)
@@ -315,9 +322,22 @@ class PartField:
         if calibration is not None and calibration.has_strips:
             found["almen_intensity_mmA"] = calibration.intensity_mmA(1.0) * found["strength_um"]
             found["saturation_time_s"] /= calibration.factor("beta")
-        if not metal.hardens_strongly:
-            depth = compression_depth(by_size, self._scale, widest)
-            found["compression_depth_um"] = 1e6 * depth
+        return found if metal.hardens_strongly else found | self._layer(by_size, widest)
+
+    def _layer(self, by_size: np.ndarray, widest: float) -> dict[str, np.ndarray]:
+        """Return the depth of the compressed layer in each window and, where the design asks for
+        it, the stress at the surface, by name.
+
+        Args:
+            by_size: dented area over area of each window, by level of dent diameter, (p, LEVELS).
+            widest: dent diameter at the upper end of the levels [m].
+        """
+        share, model = share_by_level(by_size, self._scale), stress_model(self._design)
+        depth = depth_of_compression(share.sum(axis=1), widest)
+        found = {"compression_depth_um": 1e6 * np.asarray(depth)}
+        if model is not None and widest > 0.0:
+            layers = level_layers(model, widest, dented_by_size([self._in_sector], widest, model))
+            found["surface_stress_MPa"] = 1e-6 * (share @ layers.stress[:, 0])
         return found
 
 

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 MAX_POINTS = 200  # points of a table
 # Tensile over yield strength. It is 2 for 316L, whose layer is 1.6 times as deep as the estimate of
-# coverage/compression.py. It is 1.1 to 1.4 for the steels and alloys that agree with the estimate.
+# coverage/stress_profile.py. It is 1.1 to 1.4 for the metals that agree with the estimate.
 STRONG_HARDENING = 1.6
 ALLOY = "name in the catalogue (chamberopt materials), whose numbers hold where none are given"
 POINTS = "pairs [v in m/s, e] with ascending v, e.g. [[0.1, 0.97], [1, 0.9], [5, 0.6]]"

@@ -15,6 +15,8 @@ import numpy as np
 
 from chamberopt.common.errors import InputError
 from chamberopt.common.estimate import Estimate
+from chamberopt.coverage.metrics import parse_objective
+from chamberopt.coverage.stress_profile import stress_bands
 from chamberopt.design.shapes.base import is_custom
 from chamberopt.results.compare.difference import Difference, confidence_of_each, difference
 from chamberopt.results.load import Result, load_result
@@ -213,19 +215,39 @@ def part_unit(result: Result) -> str:
 def _difference(name: str, first: Result, other: Result, confidence: float) -> Difference:
     of_goal = name == first.objective_name
     after, before = (one.objective if of_goal else one.metrics[name] for one in (other, first))
-    if _metal(other.design) != _metal(first.design):
-        after = after.of_another_metal()
     found = difference(after, before, other.seeds == first.seeds, confidence)
+    if _metal(other.design) != _metal(first.design):
+        found = _of_two_metals(found, [_by_the_law(name, one) for one in (other, first)])
     if found.time_ratio is None:
         return found
     # An estimate stores batches of replicas, not the number of replicas.
     return replace(found, replicas=math.ceil(found.time_ratio * other.record.replicas))
 
 
+def _by_the_law(name: str, result: Result) -> float:
+    """Return by how much the law of the compressed layer may be wrong in a figure, or 0."""
+    terms = parse_objective(name).terms if name == result.objective_name else {name: 1.0}
+    bands = stress_bands(result.design)
+    errors = (
+        weight * (bands[plain] - 1.0) * result.metrics[term].value
+        for term, weight in terms.items()
+        if (plain := term.rpartition(".")[2]) in bands and term in result.metrics
+    )
+    return sum(map(abs, errors))
+
+
+def _of_two_metals(found: Difference, errors: Sequence[float]) -> Difference:
+    """Return a difference with an interval that holds the errors of the law for both metals."""
+    if not any(errors):
+        return found
+    half_width = math.hypot(found.half_width, *errors)
+    return replace(found, half_width=half_width, time_ratio=None, replicas=None)
+
+
 def _metal(design: Design) -> tuple[object, ...]:
     """Return the part material and the density and sizes of the balls, to be compared.
 
-    Such results share the error of the dent size, so it cancels in their difference.
+    Such results share the errors of the law of the compressed layer, as a factor on both.
     """
     return design.materials.part, design.shot.density, set(design.shot.diameters)
 

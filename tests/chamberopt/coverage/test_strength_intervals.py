@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from chamberopt.chamber.scene import chamber_mesh
-from chamberopt.common.estimate import Estimate, paired_difference
-from chamberopt.coverage.compression import ERROR, OF_DENT, compression_estimate, stress_notes
+from chamberopt.common.estimate import Estimate
 from chamberopt.coverage.field.surface_points import Reach
 from chamberopt.coverage.field.target_field import TargetField, WindowSetting, find_target_field
 from chamberopt.coverage.part_impacts import Hits
@@ -171,43 +170,3 @@ def test_twice_the_simulated_time_saturates_in_twice_the_time() -> None:
     # All balls have one speed, so that each place comes to 0.9 of one strength.
     strength = strip_dents(batches[0][0], density, strip)[1][0]
     assert one["strength_um"].value == pytest.approx(0.9e6 * strength, rel=0.03)
-
-
-def test_the_layer_of_equal_dents_grows_as_their_coverage() -> None:
-    """z = 1.1 d (1 - exp(-L t)), and its interval holds the 30 % of the estimate itself."""
-    rng, field, d = np.random.default_rng(11), plane_field(), 0.2e-3
-    batches = [[plane_dents(rng, 7.5, np.array([d]))] for _ in range(8)]
-    rate = 60.0e6 * np.pi / 4.0 * d**2  # dented area over area, in 8 s
-    for time in (1.0, 8.0, 80.0):
-        found = compression_estimate(field, batches, 1.0, time)
-        exact = 1e6 * OF_DENT * d * -np.expm1(-rate * time / 8.0)
-        assert found.value == pytest.approx(exact, rel=0.03)
-        assert ERROR * found.value < found.half_width < 0.4 * found.value
-
-
-def test_the_error_of_the_depth_is_common_to_two_designs_of_one_metal() -> None:
-    """Their difference has 30 % of itself, and replicas; with another metal 30 % of each."""
-    rng, field, d = np.random.default_rng(11), plane_field(), 0.2e-3
-    batches = [[plane_dents(rng, 7.5, np.array([d]))] for _ in range(8)]
-    short, long = (compression_estimate(field, batches, 1.0, time) for time in (8.0, 9.0))
-    assert short.beyond_scatter == pytest.approx(short.bias)
-    gap = paired_difference(long, short)
-    own = ERROR * gap.value
-    assert own < gap.half_width < 2.0 * own + long.bias + short.bias
-    assert gap.half_width < 0.1 * long.value
-    apart = paired_difference(long.of_another_metal(), short)
-    assert apart.half_width > ERROR * np.hypot(long.value, short.value)
-    assert short.of_another_metal().half_width == short.half_width
-
-
-def test_a_metal_that_hardens_strongly_gets_no_depth() -> None:
-    """Tensile over yield strength of 316L is 2, of a quenched steel 1.1."""
-    part = DESIGN.materials.part
-    assert not stress_notes(part)
-    assert not part.hardens_strongly
-    hard = part.model_copy(update={"yield_MPa": 900.0, "tensile_MPa": 1000.0})
-    assert stress_notes(hard) == stress_notes(hard.model_copy(update={"yield_MPa": None}))
-    assert "500 to 700 MPa" in stress_notes(hard)[0]
-    soft = part.model_copy(update={"yield_MPa": 290.0, "tensile_MPa": 580.0})
-    assert soft.hardens_strongly
-    assert "cannot be estimated" in stress_notes(soft)[1]
