@@ -10,12 +10,13 @@ import numpy as np
 import pytest
 import trimesh
 
-from benchmarks import analytic, flights, wall_query, who_meets_whom
+from benchmarks import analytic, flights, stress_profiles, wall_query, who_meets_whom
 from benchmarks.analytic_runs import INSCRIBED, PEENED, Run, fit, hotelling
 from benchmarks.gas import sample_gas
 from benchmarks.scenes import DIAMETER
 from benchmarks.structures.mesh_obstacles import build_shell
 from chamberopt.common.estimate import Estimate
+from chamberopt.coverage.stress_profile import BANDS
 from chamberopt.design.load import load_design
 from sim_core.loop.spatial_blocks import MIN_BALLS
 from tests.helpers.scenes.cavities import box_around
@@ -112,3 +113,13 @@ def test_the_fit_finds_the_order_it_is_given() -> None:
     assert k == pytest.approx(-INSCRIBED)
     assert 0.0 < half_width < 0.1
     assert p == pytest.approx(1.0)
+
+
+def test_the_bands_of_the_stress_law_hold_what_was_published() -> None:
+    """Seven profiles, of which two were read; the bands are not smaller than they ask for."""
+    kinds = [one.kind for one in stress_profiles.PROFILES]
+    assert kinds.count(stress_profiles.READ) == 2
+    assert len(kinds) == 7
+    for name, logs in stress_profiles.ratios().items():
+        assert stress_profiles.factor(logs) <= BANDS[name] <= 1.15 * stress_profiles.factor(logs)
+        assert np.abs(logs).max() <= np.log(BANDS[name])
