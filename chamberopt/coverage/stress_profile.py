@@ -23,7 +23,7 @@ band is a factor on it by which the law may be wrong, the same for all designs o
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -319,6 +319,28 @@ def surface_profile(seen: LayerHistograms, peening_time: float) -> SurfaceProfil
     return SurfaceProfile(
         1e6 * seen.layers.depth, stress, half_width, share @ seen.layers.eigenstrain
     )
+
+
+def band_of_profile(
+    depth: np.ndarray, stress: np.ndarray, bands: Mapping[str, float]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the lowest and the highest stress at each depth by the bands of the law, (n,) each.
+
+    The law may be wrong by a factor on all depths, and by one on the stress that goes from that of
+    the surface to that of the largest stress. The ends are those of the four corners, at the
+    nearest depths that they have.
+
+    Args:
+        depth: from 0 on, (n,), in any unit, as the stress (n,).
+        bands: the factors by the name of their figure.
+    """
+    at = float(depth[stress.argmin()])
+    inside = np.minimum(depth / at, 1.0) if at > 0.0 else np.ones(len(depth))
+    size = bands[SURFACE] + (bands[PEAK] - bands[SURFACE]) * inside
+    wider = (bands[DEPTH], 1.0 / bands[DEPTH], 1.0)
+    moved = [np.interp(depth / one, depth, stress) for one in wider]
+    corners = np.array([x * one for one in moved for x in (size, 1.0 / size)])
+    return corners.min(axis=0), corners.max(axis=0)
 
 
 def why_not_known(found: dict[str, Estimate], seen: LayerHistograms, model: StressModel) -> str:

@@ -132,6 +132,42 @@ class ZoneRecord(Table):
     limits: list[ZoneLimit]
 
 
+class ProfileRecord(Table):
+    """Mean residual stress under a surface, by depth; compression is negative.
+
+    half_width_MPa: of the 95 % interval by the scatter of the replicas; empty if there is none.
+    eigenstrain: strain in both directions of the surface that would leave this stress.
+    """
+
+    depth_um: Curve
+    stress_MPa: Curve  # noqa: N815
+    half_width_MPa: list[Positive]  # noqa: N815
+    eigenstrain: Curve
+
+    @model_validator(mode="after")
+    def _is_as_long(self) -> Self:
+        if len({len(self.depth_um), len(self.stress_MPa), len(self.eigenstrain)}) > 1:
+            raise ValueError("curves of different lengths")
+        if len(self.half_width_MPa) not in (0, len(self.depth_um)):
+            raise ValueError("half_width_MPa: of another length")
+        return self
+
+
+class StressRecord(Table):
+    """Residual stress under the peened surface, by an estimate.
+
+    thickness_mm: of the plate in which it is; None for a thick part.
+    peened: how the plate is peened and held.
+    bands: factor by which the law may be wrong in each figure, more or less.
+    profiles: under the target, by the name "the target", and under zones.
+    """
+
+    thickness_mm: Positive | None
+    peened: str
+    bands: dict[str, Annotated[float, Field(ge=1.0)]]
+    profiles: dict[str, ProfileRecord]
+
+
 class FixtureRecord(Table):
     """A holder or a mask.
 
@@ -404,6 +440,7 @@ class CandidateRecord(ResultRecord):
     study: StudyRecord | None = None
     tolerances: ToleranceResult | None = None
     ranges: RangeResult | None = None  # None if nobody has simulated them
+    stress: StressRecord | None = None  # None if the design does not ask for it
 
     _units = field_serializer("metrics")(_with_units)
 

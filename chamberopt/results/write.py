@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,6 +14,7 @@ from chamberopt.common.files import RESULT, make_folder, write_text
 from chamberopt.common.versions import versions
 from chamberopt.coverage.metrics import exposed_target
 from chamberopt.coverage.part_impacts import HITS_FILE, save_hits, sort_hits_by_triangle
+from chamberopt.coverage.stress_profile import stress_bands
 from chamberopt.design.load import Design, save_design, with_paths_from
 from chamberopt.peening.range_result import Spreads
 from chamberopt.results.arrays_file import ResultArrays, save_result_arrays
@@ -33,9 +35,11 @@ from chamberopt.results.records import (
     ModelRecord,
     Needed,
     Objective,
+    ProfileRecord,
     ResultRecord,
     SliceRecord,
     StartRecord,
+    StressRecord,
     StudyRecord,
     SweepFacts,
     SweepRecord,
@@ -196,6 +200,8 @@ def _write_candidate(folder: Path, candidate: CandidateResult, **more: Any) -> C
     target = exposed_target(chamber)
     if design.zones:
         more["zones"] = _about_zones(design, chamber, evaluation)
+    if design.stress:
+        more["stress"] = _about_stress(design, candidate)
     if chamber.shape_sha256:
         more["shape_sha256"] = chamber.shape_sha256
     return CandidateRecord(
@@ -247,6 +253,26 @@ def _about_fixtures(chamber: Chamber) -> dict[str, Any]:
         for name, one in chamber.fixtures.items()
     }
     return {"fixtures": fixtures} if fixtures else {}
+
+
+def _about_stress(design: Design, candidate: CandidateResult) -> StressRecord:
+    """Return the record of the residual stress that a design asks for."""
+    assert design.stress is not None
+    profiles = {
+        name: ProfileRecord(
+            depth_um=one.depth_um.tolist(),
+            stress_MPa=one.stress_MPa.tolist(),
+            half_width_MPa=[x for x in one.half_width_MPa.tolist() if math.isfinite(x)],
+            eigenstrain=one.eigenstrain.tolist(),
+        )
+        for name, one in candidate.stress.items()
+    }
+    return StressRecord(
+        thickness_mm=design.stress.thickness_mm,
+        peened=design.stress.peened,
+        bands=stress_bands(design),
+        profiles=profiles,
+    )
 
 
 def _about_zones(design: Design, chamber: Chamber, evaluation: Evaluation) -> list[ZoneRecord]:

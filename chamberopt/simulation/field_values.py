@@ -10,18 +10,20 @@ Notation
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from chamberopt.chamber.build import TARGET
 from chamberopt.chamber.scene import chamber_mesh
 from chamberopt.common.estimate import CONFIDENCE
 from chamberopt.coverage.coverage_from_impacts import (
     coverage_from_dent_density,
     find_footprints,
+    in_batches,
     locate_dents,
 )
 from chamberopt.coverage.field.surface_points import ball_fits, spread_within
@@ -34,11 +36,14 @@ from chamberopt.coverage.strength import (
     strip_dents,
 )
 from chamberopt.coverage.stress_profile import (
+    SURFACE,
     dented_by_size,
     depth_of_compression,
+    layer_histograms,
     level_layers,
     share_by_level,
     stress_model,
+    surface_profile,
 )
 from chamberopt.design.calibration import calibrated_strip
 from chamberopt.simulation.evaluate import prepare_target
@@ -48,8 +53,10 @@ from sim_core import TriangleMesh, closest_points
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
+    from chamberopt.common.estimate import Estimate
     from chamberopt.coverage.field.display_mesh import DisplayField
     from chamberopt.coverage.field.smooth_faces import Places
+    from chamberopt.coverage.stress_profile import SurfaceProfile
     from chamberopt.design.load import Design
     from chamberopt.simulation.evaluation import Evaluation
 
@@ -171,6 +178,32 @@ class PartField:
             "resolved": enough.astype(float),
             **self._moved(places),
         }
+
+    def stress_profiles(self, metrics: Mapping[str, Estimate]) -> dict[str, SurfaceProfile]:
+        """Return the stress under the target and under each zone, by "the target" or its name.
+
+        A surface whose stress is not told, for example because it is not covered, is left out. The
+        result is empty if the design does not ask for stress.
+
+        Args:
+            metrics: those of the evaluation.
+        """
+        model, process, zones = stress_model(self._design), self._design.process, {}
+        if model is None:
+            return {}
+        for name in self._chamber.part.zones:
+            zones[name] = prepare_target(self._design, self._chamber.on_zone(name), self._mesh)
+        profiles = {}
+        for name, surface in {TARGET: self.target, **zones}.items():
+            figure = SURFACE if name == TARGET else f"{name}.{SURFACE}"
+            if metrics[figure].in_words:
+                continue
+            batches = in_batches([surface.in_sector(hits) for hits in self._hits])
+            seen = layer_histograms(surface, batches, process.recorded_time, model)
+            found = surface_profile(seen, process.treatment_time)
+            if found is not None:
+                profiles[name] = found
+        return profiles
 
     def _moved(self, places: Places) -> dict[str, np.ndarray]:
         """Return how far smoothing has moved the surface at each point [µm], named moved_um.
@@ -403,6 +436,8 @@ class CandidateResult:
     element_values: dict[str, np.ndarray]  # of each triangle of the part, by name, (m,) each
     display: DisplayField  # fields at the vertices of a mesh to draw
     time_curve: list[dict[str, float]]  # coverage against peening time, a row a time
+    # Residual stress under the target and each zone, if the design asks for it.
+    stress: dict[str, SurfaceProfile] = field(default_factory=dict)
 
 
 def complete_result(design: Design, chamber: Chamber, evaluation: Evaluation) -> CandidateResult:
@@ -424,4 +459,5 @@ def complete_result(design: Design, chamber: Chamber, evaluation: Evaluation) ->
             element_values=element_values.result(),
             display=display.result(),
             time_curve=time_curve,
+            stress=seen.stress_profiles(evaluation.metrics),
         )
