@@ -98,6 +98,18 @@ FORMATS = {
         (".3mf",),
         "chamber_files.write_3mf",
     ),
+    "stress-csv": ExportFormat(
+        "stress.csv",
+        "residual stress and eigenstrain by depth, under target and zones",
+        (".csv",),
+        "stress.write_stress_table",
+    ),
+    "stress-shells": ExportFormat(
+        "stress_shells.inp",
+        "the same as layers of composite shells, for CalculiX and Abaqus",
+        (".inp", ".inc"),
+        "stress.write_shell_layers",
+    ),
     "tolerances-csv": ExportFormat(
         "tolerances.csv",
         "what each tolerance does to each figure",
