@@ -38,8 +38,8 @@ ORDER = {
     "estimates evaluate time_curve field_values variations advice effect_pilot+budget_pilot "
     "error_law numerical_parameters+timed_replicas convergence recommendation",
     "chamberopt/peening": "strip+calibration_errors kirk_fit+strip_holder responses "
-    "tolerance_result range_result tolerances+ranges+intensity_pilot measured probes virtual_strip "
-    "posterior setups calibrate next_measurement",
+    "tolerance_result range_result tolerances+ranges measured probes virtual_strip posterior "
+    "setups profile_fit calibrate next_measurement",
     "chamberopt/search": "study+optimiser trial_log study_folder "
     "sensitivity+observe+candidate judge ask_and_tell run_study pareto+run_sweep",
     "chamberopt/results": (

@@ -141,11 +141,10 @@ def _under_dent(
     stress = again / 3.0 * (1.0 + nu) / (1.0 - nu)
     full = max(FULL_AT, float(share[stress.argmax()]))
     stress = np.maximum.accumulate(stress[::-1])[::-1]
-    least = min(1.0, AT_SURFACE * factors.surface / factors.peak)
-    near = least + (1.0 - least) * 0.5 * (1.0 - np.cos(np.pi * np.minimum(share / full, 1.0)))
-    # a surface that is to have more than the layer below has it in the whole layer
-    size = max(factors.peak, AT_SURFACE * factors.surface)
-    strain = size * stress * near / metal.biaxial_modulus
+    # with factors it may be more than 1, and the stress largest at the surface
+    first = AT_SURFACE * factors.surface / factors.peak
+    near = first + (1.0 - first) * 0.5 * (1.0 - np.cos(np.pi * np.minimum(share / full, 1.0)))
+    strain = factors.peak * stress * near / metal.biaxial_modulus
     layer = OF_DENT * dent * factors.depth
     return np.asarray(np.interp(depth / layer, share, strain, right=0.0))
 

@@ -29,7 +29,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from chamberopt.common.estimate import Estimate, estimate, jackknife
+from chamberopt.common.estimate import CONFIDENCE, Estimate, estimate, jackknife, normal_quantile
 from chamberopt.coverage.dents import dent_diameter
 from chamberopt.coverage.metrics import FULL_COVERAGE
 from chamberopt.coverage.strength import LEVELS, area_of_dent, ball_diameter, dent_rates, levels
@@ -48,6 +48,7 @@ from chamberopt.design.flexure import plate_metals
 if TYPE_CHECKING:
     from chamberopt.coverage.field.target_field import TargetField
     from chamberopt.coverage.part_impacts import Hits
+    from chamberopt.design.calibration import LawCalibration
     from chamberopt.design.load import Design
     from chamberopt.design.materials import PartMaterial
 
@@ -58,6 +59,10 @@ OF_STRESS = SURFACE, PEAK, PEAK_DEPTH
 # Factors within which 95 % of measured values lie, as far as seven published profiles tell: rms of
 # the logarithm by Student's t, rounded up (benchmarks/stress_profiles.py).
 BANDS = {DEPTH: 1.6, SURFACE: 1.9, PEAK: 1.6, PEAK_DEPTH: 4.0}
+OF_LAW = DEPTH, PEAK, SURFACE  # figures that the factors of a calibration move, in their order
+# Standard deviation of a factor's logarithm that a measured profile does not take away, from one
+# shot, intensity and laboratory to another: 20 %, by judgement.
+CARRIED = math.log(1.2) / 1.96
 PEAK_STRESS = 0.5, 0.7  # peak compressive stress over tensile strength, at almost any intensity
 WIDEST_DENT = 0.4  # over the ball's diameter, up to which the law was compared with anything
 THINNEST = 3.0  # thickness of a plate over the depth of compression
@@ -134,14 +139,32 @@ def stress_model(design: Design) -> StressModel | None:
     )
     height = asked.thickness_mm
     plate = None if height is None else Plate(1e-3 * height, asked.peened)
+    factors = law_factors(design)
     balls = tuple(diameter for diameter, _ in design.shot.sizes)
-    return StressModel(metal, part, balls, design.shot.density, plate)
+    return StressModel(metal, part, balls, design.shot.density, plate, factors)
 
 
 def stress_bands(design: Design) -> dict[str, float]:
     """Return the factor by which the law may be wrong in each figure of the compressed layer."""
-    asked = BANDS if design.stress else {DEPTH: BANDS[DEPTH]}
-    return {} if design.materials.part.hardens_strongly else asked
+    if design.materials.part.hardens_strongly:
+        return {}
+    known, measured = dict(BANDS), _law_of(design)
+    if measured is not None:
+        for name, row, k in zip(OF_LAW, measured.log_covariance, range(len(OF_LAW)), strict=True):
+            sd = math.hypot(math.sqrt(row[k]), CARRIED)
+            known[name] = math.exp(normal_quantile(CONFIDENCE) * sd)
+    return known if design.stress else {DEPTH: known[DEPTH]}
+
+
+def law_factors(design: Design) -> LawFactors:
+    """Return the factors on the law by measured profiles of the design's metal; 1 without any."""
+    measured = _law_of(design)
+    return AS_IS if measured is None else LawFactors(*map(math.exp, measured.log_mean))
+
+
+def _law_of(design: Design) -> LawCalibration | None:
+    calibration = design.calibration
+    return None if calibration is None else calibration.law_of(design.materials.part)
 
 
 def level_layers(model: StressModel, highest: float, sizes: np.ndarray) -> LevelLayers:
@@ -375,8 +398,7 @@ def stress_estimates(
         return {}
     model, process = stress_model(design), design.process
     seen = layer_histograms(field, batches, process.recorded_time, model)
-    factors = AS_IS if model is None else model.factors
-    layer = layer_estimates(seen, process.treatment_time, factors)
+    layer = layer_estimates(seen, process.treatment_time, law_factors(design))
     if model is None:
         return layer
     if seen.layers is None:
@@ -393,7 +415,7 @@ def stress_notes(design: Design) -> tuple[str, ...]:
     """
     notes, metal = [], design.materials.part
     if bands := stress_bands(design):
-        known = ", ".join(f"{name} by a factor of {band:g}" for name, band in bands.items())
+        known = ", ".join(f"{name} by a factor of {band:.3g}" for name, band in bands.items())
         notes.append(
             f"beyond its interval, the law may be wrong in {known}, more or less, in all designs "
             "with this metal and shot alike: their ratios are better known"

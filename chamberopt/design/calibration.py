@@ -38,6 +38,7 @@ if TYPE_CHECKING:
 
 Parameter = Literal["amplitude", "C0", "v0", "mu", "hardness", "K", "beta"]
 PARAMETERS: tuple[Parameter, ...] = get_args(Parameter)
+LAW = "depth", "peak", "surface"  # factors on the law of residual stress
 OF_STRIPS: tuple[Parameter, ...] = ("K", "beta")
 MAX_LOG = 10.0
 # Standard error of ln T by effects that the model leaves out, such as dents after the strongest
@@ -68,6 +69,27 @@ class Misfit(FileTable):
     )
 
 
+class LawCalibration(FileTable):
+    """Factors on the law of residual stress, by measured profiles of one metal.
+
+    They are on depths, on the largest stress and on that at the surface, in this order.
+    """
+
+    metal: str = Field(description="of the coupon, with its strengths")
+    log_mean: Several[float] = list_field("3 numbers", "means of their logarithms")
+    log_covariance: Several[Several[float]] = list_field("3 lists of 3 numbers", "of these")
+    misfit: Misfit
+
+    def _problems(self) -> Iterator[Problem]:
+        if len(self.log_mean) != len(LAW) or max(map(abs, self.log_mean)) > MAX_LOG:
+            text = f"allowed: {len(LAW)} numbers from -{MAX_LOG:g} to {MAX_LOG:g}"
+            yield Problem("log_mean", f"given {list(self.log_mean)}; {text}")
+        if [len(row) for row in self.log_covariance] != [len(LAW)] * len(LAW):
+            yield Problem("log_covariance", f"is not {len(LAW)} rows of {len(LAW)} numbers")
+        elif np.linalg.eigvalsh(np.array(self.log_covariance)).min() < -ROUNDING:
+            yield Problem("log_covariance", "is not positive semi-definite, as covariances are")
+
+
 class Calibration(FileTable):
     """Calibrated values of one machine, with their uncertainty."""
 
@@ -90,6 +112,9 @@ class Calibration(FileTable):
         default=WHOLE_STRIP, description="what was measured: arc heights and K are those of one"
     )
     misfits: Several[Misfit] = list_field("a list of tables", "by kind of measurement", ())
+    stress: Several[LawCalibration] = list_field(
+        "a list of tables", "factors on the law of residual stress, by metal", ()
+    )
 
     def _problems(self) -> Iterator[Problem]:
         count = len(self.parameters)
@@ -152,6 +177,10 @@ class Calibration(FileTable):
             "it was made, not of a whole strip"
         )
 
+    def law_of(self, part: PartMaterial) -> LawCalibration | None:
+        """Return the factors on the law of residual stress for a metal; None if not measured."""
+        return next((one for one in self.stress if one.metal == law_metal(part)), None)
+
     @property
     def has_strips(self) -> bool:
         """True if arc heights were measured. Without them there is no Almen intensity."""
@@ -186,6 +215,12 @@ class Calibration(FileTable):
         """
         slope = np.array([slopes.get(name, 0.0) for name in PARAMETERS])
         return *(self._triangle.T @ slope).tolist(), of_model
+
+
+def law_metal(part: PartMaterial) -> str:
+    """Return the name of a metal for the law of residual stress, with what the law takes of it."""
+    strengths = f"{part.yield_MPa or 0.0:g} to {part.tensile_MPa or 0.0:g} MPa"
+    return f"{part.alloy or 'metal'}, {part.hardness_HB:g} HB, {strengths}"
 
 
 def why_no_intensity(calibration: Calibration | None) -> str:

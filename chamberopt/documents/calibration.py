@@ -11,6 +11,7 @@ import numpy as np
 from chamberopt.common.number_text import plain
 from chamberopt.design.calibration import TIME_ERROR, Parameter
 from chamberopt.peening.measured import falls
+from chamberopt.peening.profile_fit import law_prior
 
 if TYPE_CHECKING:
     from chamberopt.peening.calibrate import Calibrated
@@ -51,6 +52,19 @@ def calibration_lines(found: Calibrated, predictions: Sequence[Prediction]) -> l
             "the picture, check the measurements and what the design assumes"
         )  # fmt: skip
         text = f"chi² = {plain(one.chi2, 2)} of {one.values} value{'s' * (one.values > 1)}"
+        lines.append(f"{one.kind:32}{text:30}{verdict}")
+    for law in table.stress:
+        lines += ["", f"the law of residual stress for {law.metal}"]
+        for k, words in enumerate(("depths", "largest stress", "stress at the surface")):
+            before = _value(0.0, float(law_prior().sd[k]), "")
+            now = _value(law.log_mean[k], math.sqrt(law.log_covariance[k][k]), "")
+            lines.append(f"{words + ', times':32}{before:>20}{now:>20}")
+        one = law.misfit
+        verdict = "well" if one.error_scale == 1.0 else (
+            "the law does not have the shape of your profiles: their errors are taken "
+            f"{plain(one.error_scale, 2)} times as large"
+        )  # fmt: skip
+        text = f"chi² = {plain(one.chi2, 2)} of {one.values} values"
         lines.append(f"{one.kind:32}{text:30}{verdict}")
     peak_to_valley, balls = 2e6 * found.design.sonotrode.amplitude, found.design.shot.count
     as_designed = f"as designed ({peak_to_valley:g} µm peak to valley, {balls} balls)"

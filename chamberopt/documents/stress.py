@@ -37,7 +37,7 @@ def part_text(found: StressRecord) -> str:
 
 def band_text(figure: Estimate, band: float) -> str:
     """Return between which values the law leaves a figure, e.g. "×/÷ 1.5: −300 to −680"."""
-    factor = f"×/÷ {plain(band)}"
+    factor = f"×/÷ {plain(band, 3)}"
     if figure.in_words:
         return factor
     ends = sorted((figure.value / band, figure.value * band))

@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 # Standard deviations of measurements that come without any, see docs/peening.md.
 ARC_PERCENT, COVERAGE_POINTS, DENT_PERCENT = 3.0, 3.0, 1.5
 DROP_PERCENT, IMPACTS_PERCENT = 1.5, 5.0
+SD_OF_METHOD = {"x-ray": 30.0, "hole drilling": 50.0}  # MPa
+LEAST_DEPTHS = 3
 MAX_ARC_MM = 3.0
 MAX_FALL = 3.0  # standard deviations by which an arc may be below an earlier arc by chance
 # Diameters of single dents on the shipped plate scatter by SPREAD of their mean. The logarithms of
@@ -175,6 +177,38 @@ class MeasuredAmplitude(FileTable):
     sd: float | None = quantity(1e-3, 100, "µm", "of the measured one; absent: 3 %", None)
 
 
+class MeasuredProfile(Peened):
+    """Residual stress by depth in a peened coupon, which is the part of its design."""
+
+    method: Literal["x-ray", "hole drilling"] = Field(description="how it was measured")
+    time_s: float | None = quantity(0.01, 1e6, "s", "peening time, if not the design's", None)
+    depth_um: Several[float] = list_field("a list of depths in µm", "at least three, ascending")
+    stress_MPa: Several[float] = list_field(  # noqa: N815
+        "a list of stresses in MPa", "one for each depth; compression is negative"
+    )
+    sd_MPa: float | None = quantity(  # noqa: N815
+        0.1, 1000, "MPa", "standard deviation of one; absent: 30 by X-rays, 50 by drilling", None
+    )
+
+    def _problems(self) -> Iterator[Problem]:
+        yield from super()._problems()
+        if len(self.stress_MPa) != len(self.depth_um):
+            text = f"has {len(self.stress_MPa)} stresses for {len(self.depth_um)} depths"
+            yield Problem("stress_MPa", f"{text}; give one for each")
+        ascends = all(above < below for above, below in pairwise(self.depth_um))
+        if len(self.depth_um) < LEAST_DEPTHS or not ascends or self.depth_um[0] < 0.0:
+            text = f"given {list(self.depth_um)}; allowed: {LEAST_DEPTHS} or more, ascending from 0"
+            yield Problem("depth_um", text)
+        if self.stress_MPa and min(self.stress_MPa) >= 0.0:
+            text = "has no compression; compressive stresses are negative: give them so"
+            yield Problem("stress_MPa", text)
+
+    @property
+    def sd(self) -> float:
+        """Standard deviation of one stress [MPa]."""
+        return self.sd_MPa or SD_OF_METHOD[self.method]
+
+
 class PriorTable(FileTable):
     """What is known of a parameter before measuring: its usual value and standard deviation."""
 
@@ -197,20 +231,22 @@ class Priors(FileTable):
 class Measured(FileTable):
     """All measurements of one machine."""
 
-    RENAMED = {"drops": "drop", "strips": "strip", "coupons": "coupon"}  # noqa: RUF012
+    RENAMED = {"drops": "drop", "strips": "strip", "coupons": "coupon", "profiles": "profile"}  # noqa: RUF012
 
     design: File = Field(description="where they were peened, and for which predictions are made")
     strip: Several[MeasuredStrip] = list_field("tables, [[strip]]", "arc heights", ())
     coupon: Several[MeasuredCoupon] = list_field("tables, [[coupon]]", "coverage and dents", ())
     drop: Several[MeasuredDrop] = list_field("tables, [[drop]]", "bounces of a ball", ())
     impacts: Several[MeasuredImpacts] = list_field("tables, [[impacts]]", "impact rates", ())
+    profile: Several[MeasuredProfile] = list_field("tables, [[profile]]", "residual stress", ())
     amplitude: MeasuredAmplitude | None = Field(default=None, description="of the sonotrode")
     prior: Priors = Field(default_factory=Priors, description="instead of the usual priors")
 
     def _problems(self) -> Iterator[Problem]:
         if not (self.strip or self.coupon or self.drop or self.impacts or self.amplitude):
             text = "holds no measurement; give [[strip]], [[coupon]], [[drop]], [[impacts]] or"
-            yield Problem("", f"{text} [amplitude]")
+            beside = " beside [[profile]], which tells the metal alone" if self.profile else ""
+            yield Problem("", f"{text} [amplitude]{beside}")
         for number, one in enumerate(self.strip):
             if one.size != self.strip[0].size:
                 text = (
@@ -244,6 +280,15 @@ def load_measured(path: Path) -> tuple[Measured, dict[str, Design]]:
     friction = any(one.effects.friction is not None for one in designs.values())
     without = {"mu": ("" if friction else "no design here has effects.friction")}
     without |= dict.fromkeys(OF_STRIPS, "" if found.strip else "no [[strip]] is given")
+    silent = [
+        Problem(
+            f"profile.{number}", "the design of its coupon has no [stress]; add the table to it"
+        )
+        for number, one in enumerate(found.profile)
+        if designs[one.design or found.design].stress is None
+    ]
+    if silent:
+        raise InputError(format_problems(silent, path, source))
     idle = [
         Problem(f"prior.{name}", f"given, but {reason}, so it is not looked for; leave it out")
         for name, reason in without.items()
@@ -264,7 +309,7 @@ def load_measured(path: Path) -> tuple[Measured, dict[str, Design]]:
 def _designs(found: Measured) -> Iterator[tuple[str, str]]:
     """Yield each field of the file that names a design: the field's name and the design's path."""
     yield "design", found.design
-    for kind in ("strip", "coupon", "drop", "impacts"):
+    for kind in ("strip", "coupon", "drop", "impacts", "profile"):
         for number, entry in enumerate(getattr(found, kind)):
             if entry.design is not None:
                 yield f"{kind}.{number}.design", entry.design

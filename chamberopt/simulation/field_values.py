@@ -39,6 +39,7 @@ from chamberopt.coverage.stress_profile import (
     SURFACE,
     dented_by_size,
     depth_of_compression,
+    law_factors,
     layer_histograms,
     level_layers,
     share_by_level,
@@ -366,7 +367,7 @@ class PartField:
             widest: dent diameter at the upper end of the levels [m].
         """
         share, model = share_by_level(by_size, self._scale), stress_model(self._design)
-        depth = depth_of_compression(share.sum(axis=1), widest)
+        depth = depth_of_compression(share.sum(axis=1), widest, law_factors(self._design))
         found = {"compression_depth_um": 1e6 * np.asarray(depth)}
         if model is not None and widest > 0.0:
             layers = level_layers(model, widest, dented_by_size([self._in_sector], widest, model))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,6 +11,7 @@ from chamberopt.design.load import save_design
 from chamberopt.documents.calibration import calibration_lines, calibration_notes
 from chamberopt.peening.calibrate import calibrate, prepare
 from chamberopt.peening.next_measurement import predict
+from chamberopt.peening.profile_fit import calibrate_law
 from chamberopt.pictures.charts.calibration import calibration_picture
 from chamberopt.results.command_records import calibration_record, write_record
 
@@ -54,6 +56,10 @@ def calibrate_machine(
         teller.compile(one.design, one.chamber, None)
     with teller.step("simulations") as progress:
         found = calibrate(measured, designs, prepared, executor, progress)
+    if measured.profile:
+        with teller.step("profiles of residual stress"):
+            table = calibrate_law(measured, designs, found.table, executor)
+            found = replace(found, table=table)
     with teller.step("writing and drawing"):
         lines = save_calibration(folder, found)
     return found, lines
