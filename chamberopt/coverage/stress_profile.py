@@ -366,15 +366,19 @@ def band_of_profile(
     return corners.min(axis=0), corners.max(axis=0)
 
 
-def why_not_known(found: dict[str, Estimate], seen: LayerHistograms, model: StressModel) -> str:
+def why_not_known(
+    found: dict[str, Estimate], reachable: float, widest: float, model: StressModel
+) -> str:
     """Return why the stress of a surface is not told, in a few words; "" if it is told.
 
     Args:
         found: metrics of the surface, with mean_coverage and the depth of compression.
+        reachable: share of the surface that a ball can touch, of which the stress is.
+        widest: diameter of the widest dent [m].
     """
-    if found["mean_coverage"].value < FULL_COVERAGE:
-        return f"coverage below {FULL_COVERAGE:.0%}".replace("%", " %")
-    if seen.found.highest > WIDEST_DENT * min(model.balls):
+    if found["mean_coverage"].value < FULL_COVERAGE * reachable:
+        return f"coverage below {100.0 * FULL_COVERAGE:g} %"
+    if widest > WIDEST_DENT * max(model.balls):
         return "dents too wide for the law"
     if model.plate and 1e6 * model.plate.thickness < THINNEST * found[DEPTH].value:
         return "plate too thin for the law"
@@ -404,7 +408,7 @@ def stress_estimates(
     if seen.layers is None:
         nothing = Estimate(0.0, math.inf, (0.0,) * len(batches))
         layer |= dict.fromkeys(OF_STRESS, nothing)
-    if why := why_not_known(found | layer, seen, model):
+    if why := why_not_known(found | layer, field.reach.share, seen.found.highest, model):
         layer |= {name: layer[name].not_known(why) for name in OF_STRESS}
     return layer
 

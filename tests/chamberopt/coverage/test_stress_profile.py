@@ -32,6 +32,7 @@ from chamberopt.coverage.stress_profile import (
     stress_model,
     stress_notes,
     surface_profile,
+    why_not_known,
 )
 from chamberopt.design.load import Design
 from tests.helpers.synthetic import dents_at, plane_chamber, plate_design, triangles_at
@@ -171,6 +172,9 @@ def test_what_the_law_does_not_tell_is_said_in_words() -> None:
     assert wide[PEAK].in_words == "dents too wide for the law"
     thin = stress_estimates(plane_field(), batches_of(1, 40.0), asked(thickness_mm=0.5), full)
     assert thin[PEAK_DEPTH].in_words == "plate too thin for the law"
+    half = {"mean_coverage": few[DEPTH].times(0.5 / few[DEPTH].value)}
+    assert why_not_known(half | few, 0.5, SIZE, model_of()) == ""
+    assert why_not_known(half | few, 0.6, SIZE, model_of()) == "coverage below 98 %"
     hidden = plate_design().changed({"materials.part": PART})
     assert set(stress_estimates(plane_field(), batches_of(1, 40.0), hidden, full)) == {DEPTH}
 
