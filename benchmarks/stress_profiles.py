@@ -5,7 +5,7 @@
 A row a profile: surface, largest value and its depth, and depth of compression, of the model over
 measured. Below them the mean and the root mean square of the logarithm of these ratios, and the
 factor within which 95 % would lie, by Student's t for so few rows. The bands of
-chamberopt/coverage/stress_profile.py are these factors, rounded up. It takes a second.
+chamberopt/coverage/stress_knowledge.py are these factors, rounded up. It takes a second.
 
 Two profiles were read, as an abstract tells them, with dents that were measured. Five are by heart,
 numbers, speeds and strengths, and are themselves good to 20 % at most; where no speed is known, it
@@ -29,13 +29,14 @@ import numpy as np
 from benchmarks.table import print_table
 from chamberopt.common.estimate import student_quantile
 from chamberopt.coverage.dents import dent_diameter
+from chamberopt.coverage.stress_knowledge import BANDS, DEPTH, PEAK, PEAK_DEPTH, SURFACE
 from chamberopt.coverage.stress_law import (
     OF_DENT,
     PeenedMetal,
     eigenstrain_under_dents,
     residual_stress,
 )
-from chamberopt.coverage.stress_profile import BANDS, DEPTH, PEAK, PEAK_DEPTH, SURFACE, lowest
+from chamberopt.coverage.stress_profile import lowest
 from chamberopt.design.almen_strip import STRIP_C0, STRIP_HB, STRIP_STEEL
 from chamberopt.design.materials import BRINELL_TO_PASCAL, PartMaterial, alloy
 from chamberopt.design.materials.catalogue import Elastic, yield_speed

@@ -25,7 +25,7 @@ ORDER = {
     "part_mesh",
     "chamberopt/design": (
         "shape_surface+table_base materials shapes effects+part+process+shot+sonotrode "
-        "almen_strip+calibration+fixture+flexure+ranges+tolerances+zones stress design load"
+        "almen_strip+calibration+fixture+flexure+ranges+tolerances+zones design+intensity load"
     ),
     "chamberopt/chamber": (
         "replica_seed bores_and_deflectors thin_part part fixture+reach+largest_ball build "
@@ -33,13 +33,14 @@ ORDER = {
         "flexure+scene analytic checks propose"
     ),
     "chamberopt/coverage": "dents part_impacts+metrics field coverage_from_impacts "
-    "percentile coverage_intervals strength strength_intervals stress_law stress_profile",
+    "percentile coverage_intervals strength strength_intervals stress_law stress_model "
+    "stress_knowledge stress_profile",
     "chamberopt/simulation": "resting_balls trapped_balls settling effort replicas evaluation "
     "estimates evaluate time_curve field_values variations advice effect_pilot+budget_pilot "
     "error_law numerical_parameters+timed_replicas convergence recommendation",
     "chamberopt/peening": "strip+calibration_errors kirk_fit+strip_holder responses "
-    "tolerance_result range_result tolerances+ranges measured probes virtual_strip posterior "
-    "setups profile_fit calibrate next_measurement",
+    "tolerance_result range_result tolerances+ranges+intensity_pilot measured probes virtual_strip "
+    "posterior setups profile_fit calibrate next_measurement",
     "chamberopt/search": "study+optimiser trial_log study_folder "
     "sensitivity+observe+candidate judge ask_and_tell run_study pareto+run_sweep",
     "chamberopt/results": (

@@ -16,7 +16,7 @@ from benchmarks.gas import sample_gas
 from benchmarks.scenes import DIAMETER
 from benchmarks.structures.mesh_obstacles import build_shell
 from chamberopt.common.estimate import Estimate
-from chamberopt.coverage.stress_profile import BANDS
+from chamberopt.coverage.stress_knowledge import BANDS
 from chamberopt.design.load import load_design
 from sim_core.loop.spatial_blocks import MIN_BALLS
 from tests.helpers.scenes.cavities import box_around

@@ -17,7 +17,7 @@ import numpy as np
 
 from chamberopt.common import toml_errors
 from chamberopt.common.errors import InputError
-from chamberopt.design.stress import NO_STRESS
+from chamberopt.design.flexure import NO_STRESS
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber

@@ -46,8 +46,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from chamberopt.design.flexure import PlateKind
 from chamberopt.design.materials.catalogue import Elastic
-from chamberopt.design.stress import PlateKind
 
 OF_DENT = 1.25  # depth of compression over the diameter of the dent
 AT_SURFACE = 0.75  # w at z = 0

@@ -15,90 +15,41 @@ Each spot keeps the layer of its widest dent, as a strip keeps its strongest den
 profile is a mean over the surface, as a measurement by X-rays is over its spot. The stress follows
 from e by the balance of forces in the part. Balls of several sizes have a mean e_j by dented area.
 
-Two kinds of error are kept apart. The interval of a figure holds the scatter of the replicas. The
-band is a factor on it by which the law may be wrong, the same for all designs of one metal and shot
-(BANDS), so that the ratios of such designs are free of it.
+Intervals hold the scatter of the replicas, and not what is not known of the law
+(stress_knowledge.py).
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from chamberopt.common.estimate import CONFIDENCE, Estimate, estimate, jackknife, normal_quantile
-from chamberopt.coverage.dents import dent_diameter
-from chamberopt.coverage.metrics import FULL_COVERAGE
+from chamberopt.common.estimate import Estimate, estimate, jackknife
 from chamberopt.coverage.strength import LEVELS, area_of_dent, ball_diameter, dent_rates, levels
 from chamberopt.coverage.strength_intervals import MIN_BATCHES, StrengthHistograms, level_histograms
+from chamberopt.coverage.stress_knowledge import DEPTH, OF_STRESS, why_not_known
 from chamberopt.coverage.stress_law import (
     AS_IS,
     OF_DENT,
     LawFactors,
-    PeenedMetal,
-    Plate,
     eigenstrain_under_dents,
     residual_stress,
 )
-from chamberopt.design.flexure import plate_metals
+from chamberopt.coverage.stress_model import law_factors, stress_model
 
 if TYPE_CHECKING:
     from chamberopt.coverage.field.target_field import TargetField
     from chamberopt.coverage.part_impacts import Hits
-    from chamberopt.design.calibration import LawCalibration
+    from chamberopt.coverage.stress_model import StressModel
     from chamberopt.design.load import Design
-    from chamberopt.design.materials import PartMaterial
 
-DEPTH, SURFACE, PEAK, PEAK_DEPTH = (
-    "compression_depth_um", "surface_stress_MPa", "peak_stress_MPa", "peak_stress_depth_um",
-)  # fmt: skip
-OF_STRESS = SURFACE, PEAK, PEAK_DEPTH
-# Factors within which 95 % of measured values lie, as far as seven published profiles tell: rms of
-# the logarithm by Student's t, rounded up (benchmarks/stress_profiles.py).
-BANDS = {DEPTH: 1.6, SURFACE: 1.9, PEAK: 1.6, PEAK_DEPTH: 4.0}
-OF_LAW = DEPTH, PEAK, SURFACE  # figures that the factors of a calibration move, in their order
-# Standard deviation of a factor's logarithm that a measured profile does not take away, from one
-# shot, intensity and laboratory to another: 20 %, by judgement.
-CARRIED = math.log(1.2) / 1.96
-PEAK_STRESS = 0.5, 0.7  # peak compressive stress over tensile strength, at almost any intensity
-WIDEST_DENT = 0.4  # over the ball's diameter, up to which the law was compared with anything
-THINNEST = 3.0  # thickness of a plate over the depth of compression
 POINTS = 129  # depths of a profile
 FASTEST = 1000.0  # m/s
 SPEEDS = 2001
 EVERY = slice(None)
-
-
-@dataclass(frozen=True)
-class StressModel:
-    """What a design tells of the stress that a dent leaves.
-
-    Attributes:
-        metal: strength and elasticity of the part.
-        material: restitution and hardness of the part, which set the size of dents.
-        balls: diameters of the balls [m].
-        density: of the balls [kg/m³].
-        plate: thickness of the part; None for a thick part.
-    """
-
-    metal: PeenedMetal
-    material: PartMaterial
-    balls: tuple[float, ...]
-    density: float
-    plate: Plate | None = None
-    factors: LawFactors = AS_IS
-
-    def speeds(self, dent: np.ndarray, ball: float) -> np.ndarray:
-        """Return the normal speeds [m/s] at which a ball leaves these dents on a thick part, (k,).
-
-        Dents smaller than the smallest have the speed at which the part yields.
-        """
-        speed = np.geomspace(self.material.yield_speed, FASTEST, SPEEDS)
-        dents = dent_diameter(speed, ball, self.density, self.material)
-        return np.asarray(np.interp(dent, np.maximum.accumulate(dents), speed))
 
 
 class LevelLayers(NamedTuple):
@@ -124,47 +75,6 @@ class SurfaceProfile(NamedTuple):
     stress_MPa: np.ndarray  # noqa: N815
     half_width_MPa: np.ndarray  # noqa: N815
     eigenstrain: np.ndarray
-
-
-def stress_model(design: Design) -> StressModel | None:
-    """Return the model of a design's residual stress; None if the design does not ask for it."""
-    asked, metals = design.stress, plate_metals(design)
-    if asked is None or metals is None:
-        return None
-    part = design.simulated.materials.part
-    assert part.yield_MPa is not None
-    assert part.tensile_MPa is not None
-    metal = PeenedMetal(
-        metals.part, 1e6 * part.yield_MPa, 1e6 * part.tensile_MPa, metals.contact_modulus
-    )
-    height = asked.thickness_mm
-    plate = None if height is None else Plate(1e-3 * height, asked.peened)
-    factors = law_factors(design)
-    balls = tuple(diameter for diameter, _ in design.shot.sizes)
-    return StressModel(metal, part, balls, design.shot.density, plate, factors)
-
-
-def stress_bands(design: Design) -> dict[str, float]:
-    """Return the factor by which the law may be wrong in each figure of the compressed layer."""
-    if design.materials.part.hardens_strongly:
-        return {}
-    known, measured = dict(BANDS), _law_of(design)
-    if measured is not None:
-        for name, row, k in zip(OF_LAW, measured.log_covariance, range(len(OF_LAW)), strict=True):
-            sd = math.hypot(math.sqrt(row[k]), CARRIED)
-            known[name] = math.exp(normal_quantile(CONFIDENCE) * sd)
-    return known if design.stress else {DEPTH: known[DEPTH]}
-
-
-def law_factors(design: Design) -> LawFactors:
-    """Return the factors on the law by measured profiles of the design's metal; 1 without any."""
-    measured = _law_of(design)
-    return AS_IS if measured is None else LawFactors(*map(math.exp, measured.log_mean))
-
-
-def _law_of(design: Design) -> LawCalibration | None:
-    calibration = design.calibration
-    return None if calibration is None else calibration.law_of(design.materials.part)
 
 
 def level_layers(model: StressModel, highest: float, sizes: np.ndarray) -> LevelLayers:
@@ -344,47 +254,6 @@ def surface_profile(seen: LayerHistograms, peening_time: float) -> SurfaceProfil
     )
 
 
-def band_of_profile(
-    depth: np.ndarray, stress: np.ndarray, bands: Mapping[str, float]
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return the lowest and the highest stress at each depth by the bands of the law, (n,) each.
-
-    The law may be wrong by a factor on all depths, and by one on the stress that goes from that of
-    the surface to that of the largest stress. The ends are those of the four corners, at the
-    nearest depths that they have.
-
-    Args:
-        depth: from 0 on, (n,), in any unit, as the stress (n,).
-        bands: the factors by the name of their figure.
-    """
-    at = float(depth[stress.argmin()])
-    inside = np.minimum(depth / at, 1.0) if at > 0.0 else np.ones(len(depth))
-    size = bands[SURFACE] + (bands[PEAK] - bands[SURFACE]) * inside
-    wider = (bands[DEPTH], 1.0 / bands[DEPTH], 1.0)
-    moved = [np.interp(depth / one, depth, stress) for one in wider]
-    corners = np.array([x * one for one in moved for x in (size, 1.0 / size)])
-    return corners.min(axis=0), corners.max(axis=0)
-
-
-def why_not_known(
-    found: dict[str, Estimate], reachable: float, widest: float, model: StressModel
-) -> str:
-    """Return why the stress of a surface is not told, in a few words; "" if it is told.
-
-    Args:
-        found: metrics of the surface, with mean_coverage and the depth of compression.
-        reachable: share of the surface that a ball can touch, of which the stress is.
-        widest: diameter of the widest dent [m].
-    """
-    if found["mean_coverage"].value < FULL_COVERAGE * reachable:
-        return f"coverage below {100.0 * FULL_COVERAGE:g} %"
-    if widest > WIDEST_DENT * max(model.balls):
-        return "dents too wide for the law"
-    if model.plate and 1e6 * model.plate.thickness < THINNEST * found[DEPTH].value:
-        return "plate too thin for the law"
-    return ""
-
-
 def stress_estimates(
     field: TargetField,
     batches: Sequence[Sequence[Hits]],
@@ -411,28 +280,3 @@ def stress_estimates(
     if why := why_not_known(found | layer, field.reach.share, seen.found.highest, model):
         layer |= {name: layer[name].not_known(why) for name in OF_STRESS}
     return layer
-
-
-def stress_notes(design: Design) -> tuple[str, ...]:
-    """Return notes on the stress under the surface: how well its law is known, its likely peak, and
-    a warning if the depth of compression cannot be estimated for this metal.
-    """
-    notes, metal = [], design.materials.part
-    if bands := stress_bands(design):
-        known = ", ".join(f"{name} by a factor of {band:.3g}" for name, band in bands.items())
-        notes.append(
-            f"beyond its interval, the law may be wrong in {known}, more or less, in all designs "
-            "with this metal and shot alike: their ratios are better known"
-        )
-    if metal.tensile_MPa is not None and design.stress is None:
-        low, high = (share * metal.tensile_MPa for share in PEAK_STRESS)
-        notes.append(
-            f"the largest compressive stress is usually {PEAK_STRESS[0]:g} to {PEAK_STRESS[1]:g} "
-            f"of the tensile strength, {low:.0f} to {high:.0f} MPa, almost whatever the intensity"
-        )
-    if metal.hardens_strongly:
-        notes.append(
-            "materials.part: tensile_MPa and yield_MPa are those of a metal that hardens strongly, "
-            "whose depth of compression cannot be estimated from the size of its dents"
-        )
-    return tuple(notes)

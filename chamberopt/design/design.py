@@ -27,7 +27,7 @@ from chamberopt.design.calibration import (
 )
 from chamberopt.design.effects import Effects
 from chamberopt.design.fixture import Holder, Mask, fixture_problems
-from chamberopt.design.flexure import flexure_problems
+from chamberopt.design.flexure import StressTable, flexure_problems, stress_problems
 from chamberopt.design.materials import Materials, with_friction, with_numbers
 from chamberopt.design.part import PartTable
 from chamberopt.design.process import Process
@@ -38,7 +38,6 @@ from chamberopt.design.shapes.custom import RecordedShape, load_custom_shape
 from chamberopt.design.shapes.imported import IMPORTED, Imported
 from chamberopt.design.shot import ShotTable
 from chamberopt.design.sonotrode import FurtherSonotrode, Sonotrode
-from chamberopt.design.stress import StressTable, stress_problems
 from chamberopt.design.table_base import MAX_NAMES, STRICT, FileTable
 from chamberopt.design.tolerances import FORM as TOLERANCE_FORM
 from chamberopt.design.tolerances import Tolerance, tolerance_problems
@@ -49,6 +48,7 @@ MAX_SONOTRODES = 50
 SHAPE = "chamber.shape"
 NOT_VARIED = (
     "calibration.", "zones.", "ranges.", "part.tessellation.", "holder.at.", "mask.at.", "stress.",
+    "process.intensity_mmA.", "process.coverage_percent",
 )  # fmt: skip
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from chamberopt.chamber.build import TARGET
-from chamberopt.coverage.stress_profile import DEPTH, OF_STRESS
+from chamberopt.coverage.stress_knowledge import DEPTH, OF_STRESS
 from chamberopt.documents.document import Beside, Block, Chart, Section, Sentence, Table
 from chamberopt.documents.wording import metric_label, plain
 from chamberopt.pictures.charts.stress import stress_figure

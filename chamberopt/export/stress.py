@@ -22,8 +22,8 @@ import numpy as np
 from chamberopt.chamber.build import TARGET
 from chamberopt.common.errors import InputError
 from chamberopt.common.files import csv_text, write_text
+from chamberopt.coverage.stress_knowledge import band_of_profile
 from chamberopt.coverage.stress_law import integrals
-from chamberopt.coverage.stress_profile import band_of_profile
 from chamberopt.design.flexure import plate_metals
 from chamberopt.results.load import load_result
 

@@ -21,15 +21,10 @@ from chamberopt.chamber.scene import chamber_mesh
 from chamberopt.common.errors import InputError
 from chamberopt.coverage.coverage_from_impacts import in_batches
 from chamberopt.coverage.metrics import FULL_COVERAGE
+from chamberopt.coverage.stress_knowledge import BANDS, OF_LAW
 from chamberopt.coverage.stress_law import LawFactors
-from chamberopt.coverage.stress_profile import (
-    BANDS,
-    OF_LAW,
-    dented_by_size,
-    layer_histograms,
-    level_layers,
-    stress_model,
-)
+from chamberopt.coverage.stress_model import stress_model
+from chamberopt.coverage.stress_profile import dented_by_size, layer_histograms, level_layers
 from chamberopt.design.calibration import LAW, LawCalibration, Parameter, law_metal
 from chamberopt.peening.measured import Measured, MeasuredProfile, with_amplitude
 from chamberopt.peening.posterior import Data, Figures, Prior, explaining_posterior

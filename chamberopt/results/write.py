@@ -14,7 +14,7 @@ from chamberopt.common.files import RESULT, make_folder, write_text
 from chamberopt.common.versions import versions
 from chamberopt.coverage.metrics import exposed_target
 from chamberopt.coverage.part_impacts import HITS_FILE, save_hits, sort_hits_by_triangle
-from chamberopt.coverage.stress_profile import stress_bands
+from chamberopt.coverage.stress_knowledge import stress_bands
 from chamberopt.design.load import Design, save_design, with_paths_from
 from chamberopt.peening.range_result import Spreads
 from chamberopt.results.arrays_file import ResultArrays, save_result_arrays

@@ -35,15 +35,14 @@ from chamberopt.coverage.strength import (
     saturated_strength,
     strip_dents,
 )
+from chamberopt.coverage.stress_knowledge import SURFACE
+from chamberopt.coverage.stress_model import law_factors, stress_model
 from chamberopt.coverage.stress_profile import (
-    SURFACE,
     dented_by_size,
     depth_of_compression,
-    law_factors,
     layer_histograms,
     level_layers,
     share_by_level,
-    stress_model,
     surface_profile,
 )
 from chamberopt.design.calibration import calibrated_strip

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from chamberopt.coverage.stress_profile import band_of_profile
+from chamberopt.coverage.stress_knowledge import band_of_profile
 from chamberopt.pictures.charts.colours import BLUE, DARK_GREY, GREEN, ORANGE
 from chamberopt.pictures.charts.coverage import NARROW
 from chamberopt.pictures.charts.figure_style import SMALL, literal, new_figure, style_axes

@@ -16,7 +16,7 @@ import numpy as np
 from chamberopt.common.errors import InputError
 from chamberopt.common.estimate import Estimate
 from chamberopt.coverage.metrics import parse_objective
-from chamberopt.coverage.stress_profile import stress_bands
+from chamberopt.coverage.stress_knowledge import stress_bands
 from chamberopt.design.shapes.base import is_custom
 from chamberopt.results.compare.difference import Difference, confidence_of_each, difference
 from chamberopt.results.load import Result, load_result

@@ -8,38 +8,48 @@ import pytest
 
 from chamberopt.chamber.scene import chamber_mesh
 from chamberopt.common.errors import InputError
+from chamberopt.common.estimate import Estimate
 from chamberopt.coverage.field.target_field import TargetField, WindowSetting, find_target_field
 from chamberopt.coverage.part_impacts import Hits
 from chamberopt.coverage.strength import LEVELS
 from chamberopt.coverage.strength_intervals import StrengthHistograms
-from chamberopt.coverage.stress_law import OF_DENT, eigenstrain_under_dents, residual_stress
-from chamberopt.coverage.stress_profile import (
+from chamberopt.coverage.stress_knowledge import (
     BANDS,
     DEPTH,
     OF_STRESS,
     PEAK,
     PEAK_DEPTH,
     SURFACE,
+    arc_by_law,
+    stress_bands,
+    stress_notes,
+    why_not_known,
+)
+from chamberopt.coverage.stress_law import OF_DENT, eigenstrain_under_dents, residual_stress
+from chamberopt.coverage.stress_model import StressModel, stress_model
+from chamberopt.coverage.stress_profile import (
     LayerHistograms,
-    StressModel,
     dented_by_size,
     layer_estimates,
     layer_histograms,
     level_layers,
     lowest,
-    stress_bands,
     stress_estimates,
-    stress_model,
-    stress_notes,
     surface_profile,
-    why_not_known,
 )
 from chamberopt.design.load import Design
-from tests.helpers.synthetic import dents_at, plane_chamber, plate_design, triangles_at
+from tests.helpers.synthetic import (
+    dents_at,
+    machine_values,
+    plane_chamber,
+    plate_design,
+    triangles_at,
+)
 
 PLANE = plane_chamber()
 PART = {"alloy": "7075-T6"}
 SIZE = 0.2e-3
+STRENGTH = Estimate(30.0, 1.0)
 GLASS_ON = {"C0": 0.9, "v0_m_s": 0.3}
 
 
@@ -226,18 +236,43 @@ def test_a_stress_that_cannot_be_estimated_is_refused(
         DESIGN.changed(changes)
 
 
+@pytest.mark.parametrize(
+    ("ball_mm", "strength_um", "arc_mm"),
+    [(3.0, 20.3, 0.290), (3.0, 31.8, 0.349), (3.0, 48.3, 0.406), (1.5, 16.0, 0.204)],
+)
+def test_a_strip_bends_as_a_whole_simulation_has_it(
+    ball_mm: float, strength_um: float, arc_mm: float
+) -> None:
+    """Arcs of a simulated chamber's dents, all sizes of them, by another program: 10 % above."""
+    design = DESIGN.changed({"shot.diameter_mm": ball_mm})
+    assert 1e3 * arc_by_law(design, 1e-6 * strength_um) == pytest.approx(arc_mm, rel=0.1)
+
+
+def test_strips_that_disagree_with_the_law_are_told() -> None:
+    """K is 10 mm of arc for 1 mm of strength by the law."""
+    values = {**machine_values(K=0.03, beta=0.1)}
+
+    def notes(k: float) -> tuple[str, ...]:
+        machine = {**values, "log_mean": (np.log(k), 0.0)}
+        return stress_notes(DESIGN.changed({"calibration": machine}), STRENGTH)
+
+    assert len(notes(10.0)) == len(notes(15.0)) == 1
+    for k in (4.0, 25.0):
+        assert "bends an A strip by 0.32 mm, and the calibration has" in notes(k)[0]
+
+
 def test_a_metal_that_hardens_strongly_gets_no_depth() -> None:
     """Tensile over yield strength of 316L is 2, of a quenched steel 1.1."""
     plain = plate_design()
-    assert len(stress_notes(plain)) == 1
-    assert "compression_depth_um by a factor of 1.6" in stress_notes(plain)[0]
+    assert len(stress_notes(plain, STRENGTH)) == 1
+    assert "compression_depth_um by a factor of 1.6" in stress_notes(plain, STRENGTH)[0]
     assert not plain.materials.part.hardens_strongly
     hard = plain.changed({"materials.part.tensile_MPa": 1000.0})
     both = hard.changed({"materials.part.yield_MPa": 900.0})
-    assert stress_notes(hard) == stress_notes(both)
-    assert "500 to 700 MPa" in stress_notes(hard)[1]
+    assert stress_notes(hard, STRENGTH) == stress_notes(both, STRENGTH)
+    assert "500 to 700 MPa" in stress_notes(hard, STRENGTH)[1]
     soft = hard.changed({"materials.part.yield_MPa": 290.0})
     assert soft.materials.part.hardens_strongly
-    assert "cannot be estimated" in stress_notes(soft)[1]
-    assert "surface_stress_MPa by a factor of 1.9" in stress_notes(DESIGN)[0]
-    assert len(stress_notes(DESIGN)) == 1
+    assert "cannot be estimated" in stress_notes(soft, STRENGTH)[1]
+    assert "surface_stress_MPa by a factor of 1.9" in stress_notes(DESIGN, STRENGTH)[0]
+    assert len(stress_notes(DESIGN, STRENGTH)) == 1

@@ -17,6 +17,7 @@ from chamberopt.documents.report import report
 from chamberopt.documents.stress import band_text, part_text
 from chamberopt.export.stress import write_shell_layers, write_stress_table
 from chamberopt.printers.report_page import write_report
+from chamberopt.results.arrays_file import load_result_arrays
 from chamberopt.results.load import load_result
 from chamberopt.workflows.save_run import save_simulation
 from tests.helpers.synthetic import plate_design, poisson_evaluation
@@ -87,6 +88,18 @@ def test_the_table_has_the_profile_of_each_surface(folder: Path, tmp_path: Path)
         assert low <= middle * (1 - 1e-5 * np.sign(middle))
         assert middle <= high + 1e-3
         assert float(row["stress_pm_MPa"]) < 0.1 * (high - low)
+
+
+def test_the_map_is_that_of_the_figure(folder: Path) -> None:
+    result = load_result(folder)
+    elements = load_result_arrays(result).elements
+    inside = (elements["target"] > 0) & ~np.isnan(elements["surface_stress_MPa"])
+    area = elements["reachable_area_mm2"][inside]
+    mean = elements["surface_stress_MPa"][inside] @ area / area.sum()
+    assert mean == pytest.approx(result.metrics["surface_stress_MPa"].value, rel=0.03)
+    zone = result.metrics["middle.surface_stress_MPa"]
+    assert zone.value == pytest.approx(mean, rel=0.05)
+    assert zone.half_width < 0.1 * abs(mean)
 
 
 @pytest.mark.parametrize("peened", ["one_side", "both_sides"])

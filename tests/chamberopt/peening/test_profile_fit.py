@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from chamberopt.common.errors import InputError
+from chamberopt.coverage.stress_knowledge import BANDS, DEPTH, OF_LAW, PEAK_DEPTH, stress_bands
 from chamberopt.coverage.stress_law import (
     AS_IS,
     OF_DENT,
@@ -15,14 +16,7 @@ from chamberopt.coverage.stress_law import (
     eigenstrain_under_dents,
     residual_stress,
 )
-from chamberopt.coverage.stress_profile import (
-    BANDS,
-    DEPTH,
-    OF_LAW,
-    PEAK_DEPTH,
-    law_factors,
-    stress_bands,
-)
+from chamberopt.coverage.stress_model import law_factors
 from chamberopt.design.calibration import Calibration, LawCalibration, Misfit, law_metal
 from chamberopt.design.load import Design
 from chamberopt.design.materials import alloy, ball

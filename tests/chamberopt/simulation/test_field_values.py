@@ -88,8 +88,8 @@ def test_values_of_an_even_rain_of_equal_dents(field: PartField) -> None:
 
 def test_there_is_all_that_can_be_drawn(field: PartField) -> None:
     elements = field.element_values()
-    # Of designs with zones, of calibrated ones, and of parts with rounds.
-    of_others = {"zone", "almen_intensity_mmA", "moved_um"}
+    # Of designs with zones, of calibrated ones, of parts with rounds, and with [stress].
+    of_others = {"zone", "almen_intensity_mmA", "moved_um", "surface_stress_MPa"}
     assert {one.column for one in QUANTITIES.values()} - of_others <= set(elements)
     assert {column.shape for column in elements.values()} == {(len(PLANE.part.triangles),)}
 

@@ -16,7 +16,7 @@ from chamberopt.chamber.build import build_chamber
 from chamberopt.common.errors import InputError
 from chamberopt.common.estimate import Estimate, estimate
 from chamberopt.coverage.metrics import NEVER, find_metric
-from chamberopt.coverage.stress_profile import BANDS
+from chamberopt.coverage.stress_knowledge import BANDS
 from chamberopt.design.load import load_design
 from chamberopt.documents.comparison import comparison_lines
 from chamberopt.printers import terminal
