@@ -6,14 +6,13 @@
 each row is then measured with both in turns. "cold" starts with an empty cache of compiled code,
 "warm" with that of the run before it. CPU seconds are those of all processes of a command. Figures
 are medians of three rounds, one for what takes minutes. Rows go to benchmarks/results/speed.csv
-with the name of the machine. It takes ten minutes, on Linux; growth is in growth.py, the yardsticks
-(embree, the paper's method) are in events.py.
+with the name of the machine. It takes a quarter of an hour, on Linux; growth is in growth.py, the
+yardsticks (embree, the paper's method) are in events.py.
 """
 
 import argparse
 import json
 import os
-import resource
 import statistics
 import subprocess
 import sys
@@ -48,6 +47,31 @@ confirm_replicas = 8
 [search_accuracy]
 simulated_time_s = 1.0
 """
+CALIBRATION = """
+program = "0"
+parameters = ["amplitude", "C0", "v0", "mu"]
+log_mean = [0.0, 0.0, 0.0, 0.0]
+log_covariance = [[0.0025, 0, 0, 0], [0, 0.0001, 0, 0], [0, 0, 0.01, 0], [0, 0, 0, 0.04]]
+amplitude_um = [20, 60]
+ball_diameter_mm = [1.5, 1.5]
+ball_density_kg_m3 = 7800
+"""
+EIGHT_CONFIRMED = """
+design = "gear.toml"
+[vary]
+"chamber.height_mm" = [28, 60]
+"chamber.sonotrode_distance_mm" = [10, 30]
+[optimizer]
+algorithm = "sobol"
+evaluations = 9
+first_replicas = 0
+confirm = 7
+confirm_replicas = 8
+confirm_rounds = 1
+[search_accuracy]
+simulated_time_s = 0.3
+replicas = 4
+"""
 SCENES = (
     "cylinder-200-1k",
     "cylinder-200-10k",
@@ -73,13 +97,15 @@ class Version(NamedTuple):
     def spent(
         self, words: list[str], cache: str | Path, cores: set[int] | None = None
     ) -> dict[str, float]:
-        """Seconds of a command, by the clock and of CPU. Raises RuntimeError if it fails.
+        """Seconds of a command, by the clock and of CPU, and its memory.
+
+        Raises RuntimeError if it fails.
 
         Args:
             cores: that the command may use; None for all.
         """
         setting = self.environment(cache)
-        before, begin = _children(), time.perf_counter()
+        begin = time.perf_counter()
         pinned = ["taskset", "-c", ",".join(map(str, sorted(cores)))] if cores else []
         going = subprocess.Popen([*pinned, self.python, *words], cwd=self.root, env=setting,
                                  stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)  # fmt: skip
@@ -87,12 +113,15 @@ class Version(NamedTuple):
         going.stdout.read(1)
         first = time.perf_counter() - begin
         going.stdout.read()
-        if going.wait():
+        _, status, used = os.wait4(going.pid, 0)
+        going.returncode = os.waitstatus_to_exitcode(status)
+        if status:
             raise RuntimeError(f"{words} ended with {going.returncode}")
         return {
             "first_s": first,
             "all_s": time.perf_counter() - begin,
-            "cpu_s": _children() - before,
+            "cpu_s": used.ru_utime + used.ru_stime,
+            "peak_gb": 1024e-9 * used.ru_maxrss,  # of the largest process
         }
 
     def printed(self, words: list[str]) -> Any:
@@ -101,11 +130,6 @@ class Version(NamedTuple):
                               env=self.environment("cache"), text=True,
                               stdout=subprocess.PIPE, check=True)  # fmt: skip
         return json.loads(done.stdout)
-
-
-def _children() -> float:
-    used = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return used.ru_utime + used.ru_stime
 
 
 def compiling(version: Version, turn: int) -> Iterator[tuple[str, float]]:
@@ -130,10 +154,43 @@ def checking(version: Version, turn: int) -> Iterator[tuple[str, float]]:
 
 
 def quickstart(version: Version, turn: int) -> Iterator[tuple[str, float]]:
-    """The first command of the README."""
-    out = str(version.folder / f"quickstart{turn}")
-    words = ["-m", "chamberopt", "run", "studies/quickstart.toml", "--out", out]
-    yield "README's first command, cold, s", version.spent(words, f"quick{turn}")["all_s"]
+    """The first command of the README, and once more with all compiled."""
+    for state in ("cold", "warm"):
+        out = str(version.folder / f"quickstart{turn}-{state}")
+        words = ["-m", "chamberopt", "run", "studies/quickstart.toml", "--out", out]
+        spent = version.spent(words, f"quick{turn}")
+        yield f"README's first command, {state}, s", spent["all_s"]
+        yield f"README's first command, {state}, CPU s", spent["cpu_s"]
+    yield "README's first command, peak memory, GB", spent["peak_gb"]
+
+
+def recommending(version: Version, turn: int) -> Iterator[tuple[str, float]]:
+    """`chamberopt accuracy` with a budget of 80 CPU seconds."""
+    for name in ("plate", "gear"):
+        out = str(version.folder / f"accuracy{turn}-{name}")
+        words = ["accuracy", f"designs/{name}.toml", "--budget-s", "80", "--out", out]
+        spent = version.spent(["-m", "chamberopt", *words], "cache")
+        yield f"accuracy of the {name} for 80 CPU s, CPU s", spent["cpu_s"]
+        yield f"accuracy of the {name} for 80 CPU s, peak memory, GB", spent["peak_gb"]
+
+
+def remembering(version: Version, turn: int) -> Iterator[tuple[str, float]]:
+    """A study that confirms eight gears whose machine was calibrated."""
+    folder = version.folder / f"calibrated{turn}"
+    folder.mkdir()
+    gear = (version.root / "designs" / "gear.toml").read_text(encoding="utf-8")
+    gear = gear.replace('"parts/', f'"{version.root}/designs/parts/')
+    texts = {
+        "machine": CALIBRATION,
+        "gear": f'calibration = "machine.toml"\n{gear}',
+        "study": EIGHT_CONFIRMED,
+    }
+    for name, text in texts.items():
+        (folder / f"{name}.toml").write_text(text, encoding="utf-8")
+    study, out = str(folder / "study.toml"), str(folder / "out")
+    spent = version.spent(["-m", "chamberopt", "run", study, "--no-ranges", "--out", out], "cache")
+    yield "a study of 8 calibrated gears, peak memory, GB", spent["peak_gb"]
+    yield "a study of 8 calibrated gears, CPU s", spent["cpu_s"]
 
 
 def colliding(version: Version, turn: int) -> Iterator[tuple[str, float]]:
@@ -187,6 +244,8 @@ ROWS: dict[str, tuple[Callable[[Version, int], Iterator[tuple[str, float]]], int
     "layer": (layering, 1),
     "evaluation": (evaluating, ROUNDS),
     "study": (studying, 1),
+    "accuracy": (recommending, 1),
+    "memory": (remembering, 1),
     "quickstart": (quickstart, 1),
 }
 

@@ -131,7 +131,7 @@ def simulate_ends(
         return None
     count = replicas or replicas_at_ends(whole.replicas, len(groups))
     first = [Replica({}, None, NOT_TRAPPED, hits) for hits in whole.hits[:count]]
-    plan = ReplicaPlan(count, whole.stream, whole.objective_name)
+    plan = ReplicaPlan(count, whole.stream, whole.objective_name, wide_windows=False)
     cavity = analytic_cavity(design, chamber) if whole.analytic else None
     of_all = RunsProgress(progress, 2 * len(groups), ended=-1)  # the design itself takes none
     # The chamber is the same at all ends, so that one target serves them all.

@@ -7,9 +7,9 @@ import time
 from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Executor, Future, ThreadPoolExecutor, wait
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -32,7 +32,7 @@ from chamberopt.search.study_folder import STUDY, StudyFolder
 from chamberopt.search.trial_log import Trial
 from chamberopt.simulation.evaluate import ReplicaPlan, evaluate, prepare_target
 from chamberopt.simulation.evaluation import Evaluation
-from chamberopt.simulation.replicas import ReplicaSet
+from chamberopt.simulation.replicas import Replica, ReplicaSet
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
@@ -295,12 +295,11 @@ def save_inputs(study: Study, folder: Path) -> None:
     write_text(folder / STUDY, tomlkit.dumps({"design": "design.toml", **values}))
 
 
-@dataclass
-class _Simulated:
-    """The chamber and the replicas of a candidate, kept in case more replicas are wanted."""
+class _Simulated(NamedTuple):
+    """The chamber, the replicas and the target of a candidate, in case more replicas are wanted."""
 
     chamber: Chamber
-    known: ReplicaSet = field(default_factory=ReplicaSet)
+    known: ReplicaSet
 
 
 class ChamberSimulator:
@@ -312,16 +311,19 @@ class ChamberSimulator:
 
     def __init__(self, study: Study, executor: Executor, target: np.ndarray | None) -> None:
         self._study, self._executor, self._target = study, executor, target
-        self._confirmed: dict[str, _Simulated] = {}
+        # Replicas of confirmed candidates. Chambers and targets, which take ten times as much
+        # memory, are built again if a later round asks for more replicas.
+        self._confirmed: dict[str, list[Replica]] = {}
         self._meant: set[tuple[str, str]] | None = None  # tight gaps of the study's own design
-        self._searched = threading.local()  # each thread's last candidate of the search
+        self._last = threading.local()  # each thread's last candidate
 
     def __call__(self, design: Design, stream: str, replicas: int | None) -> Evaluation:
         began = time.perf_counter()
         one = self._candidate(design, stream)
         seconds = time.perf_counter() - began
-        plan = ReplicaPlan(replicas, stream, self._study.objective.goals[0])
-        run = evaluate_calibrated if stream == "confirm" else evaluate
+        is_shown = stream == "confirm"  # all figures of a result, which the search needs not
+        plan = ReplicaPlan(replicas, stream, self._study.objective.goals[0], is_shown)
+        run = evaluate_calibrated if is_shown else evaluate
         evaluation = run(design, one.chamber, self._executor, plan=plan, known=one.known)
         return replace(evaluation, timings={"chamber": seconds, **evaluation.timings})
 
@@ -350,11 +352,11 @@ class ChamberSimulator:
     def _candidate(self, design: Design, stream: str) -> _Simulated:
         from chamberopt.chamber.build import build_chamber
 
-        key = design.model_dump_json()
-        known = self._confirmed if stream == "confirm" else vars(self._searched)
-        if key not in known:
-            if stream != "confirm":
-                known.clear()
-            known[key] = _Simulated(build_chamber(design, self._target))
-        found: _Simulated = known[key]
+        key, last = f"{stream} {design.model_dump_json()}", vars(self._last)
+        if key not in last:
+            last.clear()
+            chamber = build_chamber(design, self._target)
+            replicas = self._confirmed.setdefault(key, []) if stream == "confirm" else []
+            last[key] = _Simulated(chamber, ReplicaSet(replicas))
+        found: _Simulated = last[key]
         return found

@@ -77,11 +77,12 @@ class SeenDents:
     gauge: list[Prints]
     wide: list[Prints]
     in_sector: list[Hits]
+    has_wide: bool = True  # whether dents are counted in the larger windows at all
 
     @classmethod
-    def none(cls, field: TargetField) -> SeenDents:
+    def none(cls, field: TargetField, has_wide: bool = True) -> SeenDents:
         """Return the dents of a surface before the first replica: none."""
-        return cls(field, [], [], [])
+        return cls(field, [], [], [], has_wide)
 
     def add(self, hits: Sequence[Hits]) -> None:
         """Add the dents of new replicas.
@@ -94,7 +95,8 @@ class SeenDents:
             dents = locate_dents(self.field, in_sector)
             self.in_sector.append(in_sector)
             self.gauge.append(kept_footprints(self.field, self.field.gauge, dents))
-            self.wide.append(kept_footprints(self.field, self.field.wide, dents))
+            if self.has_wide:
+                self.wide.append(kept_footprints(self.field, self.field.wide, dents))
 
     @property
     def crease_share(self) -> float:
@@ -120,12 +122,11 @@ def estimate_metrics(
     """
     found, resolution = raw_estimates(seen, design)
     found |= _ratios(in_batches(hits), chamber, design)
-    of_wide, resolution_of_wide = window_estimates(seen.field, seen.field.wide, seen.wide, design)
-    return Estimates(
-        _all_resolved({name: found[name] for name in METRICS if name in found}, resolution),
-        _all_resolved(of_wide, resolution_of_wide),
-        resolution,
-    )
+    metrics = _all_resolved({name: found[name] for name in METRICS if name in found}, resolution)
+    if not seen.has_wide:
+        return Estimates(metrics, {}, resolution)
+    of_wide = window_estimates(seen.field, seen.field.wide, seen.wide, design)
+    return Estimates(metrics, _all_resolved(*of_wide), resolution)
 
 
 def estimate_zones(

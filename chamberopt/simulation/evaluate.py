@@ -70,6 +70,8 @@ class ReplicaPlan:
     stream: str = "search"  # stream of seeds, "search" or "confirm"
     # The objective, whose interval decides when a wanted accuracy is reached.
     objective_name: str = "uniform_coverage"
+    # Whether coverage is also measured in windows of twice the radius. No search takes these.
+    wide_windows: bool = True
 
 
 def evaluate(
@@ -127,7 +129,11 @@ class _Run:
         def see() -> tuple[SeenDents, dict[str, SeenDents]]:
             target = self.known.target or prepare_target(design, chamber, mesh)
             self.known.target = target  # for more replicas of the candidate
-            return SeenDents.none(target), see_zones(design, chamber, mesh)
+            zones = zone_fields(design, chamber, mesh)
+            has_wide = self.plan.wide_windows
+            return SeenDents.none(target, has_wide), {
+                name: SeenDents.none(one, has_wide=False) for name, one in zones.items()
+            }
 
         # The dents of a replica are looked at while others are simulated, so that no worker waits.
         beside = ThreadPoolExecutor(1)
@@ -236,15 +242,13 @@ def prepare_target(design: Design, chamber: Chamber, mesh: TriangleMesh) -> Targ
     return find_target_field(chamber, mesh, window_setting(design, chamber))
 
 
-def see_zones(design: Design, chamber: Chamber, mesh: TriangleMesh) -> dict[str, SeenDents]:
-    """Return an empty record for the dents on each zone of a chamber's part, by name of the zone.
+def zone_fields(design: Design, chamber: Chamber, mesh: TriangleMesh) -> dict[str, TargetField]:
+    """Return each zone of a chamber's part with windows in which its coverage is measured, by name.
 
     Raises InputError if no triangle of a zone bounds the cavity, or the windows are too small.
     """
     surfaces = {name: chamber.on_zone(name) for name in chamber.part.zones}
-    return {
-        name: SeenDents.none(prepare_target(design, one, mesh)) for name, one in surfaces.items()
-    }
+    return {name: prepare_target(design, one, mesh) for name, one in surfaces.items()}
 
 
 def window_setting(design: Design, chamber: Chamber) -> WindowSetting:

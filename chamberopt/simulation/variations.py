@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from chamberopt.chamber.analytic import analytic_cavity
@@ -79,7 +79,7 @@ class Variations:
         """
         self.progress.ended += not replicas
         nominal, known = self.nominal, ReplicaSet(list(replicas), target)
-        plan = ReplicaPlan(nominal.replicas, nominal.stream, nominal.objective_name)
+        plan = replace(self.plan or ReplicaPlan(), count=nominal.replicas)
         cavity = analytic_cavity(design, chamber) if self.cavity and chamber else self.cavity
         how = self.executor, self.progress, plan, cavity, known
         return evaluate(design, chamber or self.chamber, *how)

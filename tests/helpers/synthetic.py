@@ -25,7 +25,7 @@ from chamberopt.simulation.estimates import (
     resolution_notes,
     weighted_sum,
 )
-from chamberopt.simulation.evaluate import prepare_target, see_zones
+from chamberopt.simulation.evaluate import prepare_target, zone_fields
 from chamberopt.simulation.evaluation import Evaluation
 from sim_core import closest_points
 
@@ -205,7 +205,8 @@ def evaluation_of(design: Design, chamber: Chamber, hits: Sequence[Hits]) -> Eva
     seen = SeenDents.none(prepare_target(design, chamber, chamber_mesh(chamber)))
     seen.add(hits)
     found = estimate_metrics(seen, hits, chamber, design)
-    zones = see_zones(design, chamber, chamber_mesh(chamber))
+    fields = zone_fields(design, chamber, chamber_mesh(chamber))
+    zones = {name: SeenDents.none(one) for name, one in fields.items()}
     for one in zones.values():
         one.add(hits)
     of_zones, zone_notes = estimate_zones(zones, hits, chamber, design)

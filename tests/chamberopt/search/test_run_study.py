@@ -3,11 +3,12 @@
 import json
 from dataclasses import replace
 from pathlib import Path
+from weakref import ref
 
 import numpy as np
 import pytest
 
-from chamberopt.chamber.build import build_chamber
+from chamberopt.chamber.build import Chamber, build_chamber
 from chamberopt.chamber.scene import require_ball_count
 from chamberopt.common.errors import InputError
 from chamberopt.common.executor import SerialExecutor, local_executor
@@ -17,7 +18,7 @@ from chamberopt.coverage.metrics import metric_names
 from chamberopt.design.load import load_design
 from chamberopt.results.load import load_result
 from chamberopt.search.judge import FAILURE_PENALTY
-from chamberopt.search.run_study import fixed_target, tolerance_notes
+from chamberopt.search.run_study import ChamberSimulator, fixed_target, tolerance_notes
 from chamberopt.search.study import Limits, Study, load_study
 from chamberopt.search.trial_log import read_trials, trials_as_csv
 from chamberopt.workflows.save_run import save_study
@@ -417,3 +418,25 @@ def test_a_cost_of_tolerances_is_only_said_where_a_model_knows_it() -> None:
     assert "--tolerances" in only
     assert "it is 0.02 below the value" in tolerance_notes(0.02)[0]
     assert "it is 0.02 above the value" in tolerance_notes(-0.02)[0]
+
+
+def test_a_second_round_adds_replicas_to_those_of_a_chamber_that_is_gone(monkeypatch) -> None:
+    """Chambers of confirmed candidates would fill the memory; their replicas are small."""
+    built = []
+
+    def build(*args) -> Chamber:
+        built.append(ref(chamber := build_chamber(*args)))
+        return chamber
+
+    monkeypatch.setattr("chamberopt.chamber.build.build_chamber", build)
+    short = {"process__accuracy__simulated_time_s": 0.02, "process__accuracy__points": 1000}
+    design = plate_design(**short)
+    other = design.changed({"chamber.height_mm": design.value("chamber.height_mm") + 1})
+    question = Study(design=design, vary={"chamber.height_mm": (19.0, 60.0)})
+    simulator, anew = (ChamberSimulator(question, SerialExecutor(), None) for _ in range(2))
+    simulator(design, "confirm", 2)
+    simulator(other, "confirm", 2)
+    assert [one() is None for one in built] == [True, False]
+    again, once = simulator(design, "confirm", 4), anew(design, "confirm", 4)
+    assert len(built) == 4
+    assert replace(again, timings={}, hits=()) == replace(once, timings={}, hits=())

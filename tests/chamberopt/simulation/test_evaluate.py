@@ -76,6 +76,17 @@ def test_random_dents_on_a_plane_cover_what_avrami_says() -> None:
     assert set(found.metrics_of_wide) == of_windows
 
 
+def test_without_wide_windows_all_other_figures_are_the_same() -> None:
+    hits = poisson_replicas(np.random.default_rng(7), 3, 20.0)
+    field, found = prepare_target(DESIGN, PLANE, chamber_mesh(PLANE)), []
+    for has_wide in (True, False):
+        seen = SeenDents.none(field, has_wide)
+        seen.add(hits)
+        found.append(estimate_metrics(seen, hits, PLANE, DESIGN))
+    assert found[1] == found[0]._replace(metrics_of_wide={})
+    assert found[0].metrics_of_wide
+
+
 def test_a_note_says_how_high_coverage_can_go_with_some_of_the_target_out_of_reach() -> None:
     """r of the area covered to 1 and the rest bare: mean r, standard deviation sqrt(r (1 - r))."""
     covered = np.repeat([1.0, 0.0], [80, 20])
