@@ -203,7 +203,14 @@ def test_a_plate_closes_the_chamber_and_the_room_above_is_left_out() -> None:
         assert chamber.volume == pytest.approx(
             shape_volume(design) * distance / design.chamber.height, rel=1e-9
         )
-        assert any("cuts off a closed room" in note for note in chamber.notes)
+        # What is left out is all from the plate's upper side to the ceiling.
+        top, ceiling = chamber.part.vertices[:, 2].max(), design.chamber.height
+        volume = shape_volume(design) * (ceiling - top) / ceiling
+        text = (
+            f"cuts off a closed room of {1e6 * volume:.3g} cm³ between z = {1e3 * top:.4g} and "
+            f"{1e3 * ceiling:.4g} mm"
+        )
+        assert any(text in note for note in chamber.notes)
         assert any("chamber.height_mm has no effect" in note for note in chamber.notes)
     assert chamber.exposed_area.sum() == pytest.approx(first.volume / distance, rel=1e-9)
     assert first.volume == pytest.approx(second.volume, rel=1e-9)

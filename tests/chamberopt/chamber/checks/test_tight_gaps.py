@@ -1,5 +1,6 @@
 """Gaps beside the walls of a chamber that a search refuses before it simulates."""
 
+import re
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
@@ -27,6 +28,29 @@ def test_a_gap_that_balls_do_not_pass_is_found(gap_mm: float, found: bool) -> No
     texts = [one.text for one in tight_gaps(chamber, (2e-3,))]
     assert bool(texts) is found
     assert all("a ball of 2 mm jams or does not get in" in text for text in texts)
+
+
+@pytest.mark.parametrize("left_mm", [1.2, 1.8])
+def test_each_gap_is_told_with_its_own_width(left_mm: float) -> None:
+    """A part of 20 mm has 3 mm in all beside it, of which so much to the left, and room around.
+
+    At its ends a gap is wider than between the faces: there a ball touches an edge.
+    """
+    box = trimesh.creation.box((0.02, 0.02, 0.02))
+    chamber = chamber_round(box, gap=0.02)
+    vertices = chamber.vertices.copy()
+    walls = np.arange(len(vertices)) >= len(box.vertices)
+    left = vertices[:, 0] < 0.0
+    vertices[walls & left, 0] = -1e-3 * (10.0 + left_mm)
+    vertices[walls & ~left, 0] = 1e-3 * (13.0 - left_mm)
+    gaps = list(tight_gaps(replace(chamber, vertices=vertices), (2e-3,)))
+    assert {one.sides for one in gaps} == {("the part's side", "the wall")}
+    widths = {}
+    for one in gaps:
+        x, low, high = map(float, re.findall(r"\(([-\d.]+),.*is ([\d.]+) to ([\d.]+)", one.text)[0])
+        widths[x < 0.0] = low, high
+    for is_left, wide in ((True, left_mm), (False, 3.0 - left_mm)):
+        assert widths[is_left] == (pytest.approx(wide, abs=0.01), pytest.approx(wide, rel=0.2))
 
 
 def test_a_search_refuses_such_a_candidate_in_words_without_a_simulation() -> None:

@@ -6,7 +6,7 @@ import trimesh
 
 from chamberopt.chamber.reach import TOLERATED_OVERLAP
 from chamberopt.coverage.field.surface_points import ball_fits, spread_points, spread_within
-from chamberopt.geometry.triangles import areas
+from chamberopt.geometry.triangles import areas, unit_normals
 from sim_core import TriangleMesh
 
 R = 1.5e-3  # m, of the ball
@@ -120,3 +120,18 @@ def test_places_that_are_not_on_the_surface_of_the_cavity_never_fit() -> None:
         [0.004, 0.004, 0.004], [0.036, 0.036, 0.016], (500, 3)
     )
     assert not ball_fits(room, inside, np.tile([0.0, 0.0, 1.0], (500, 1)), R).any()
+
+
+def test_whether_a_ball_fits_does_not_depend_on_the_order_of_triangles() -> None:
+    """In a box of twelve triangles a ball fits at the middle of each, whichever of them is first.
+
+    A place off the surface is nowhere near, and a ball larger than the room fits nowhere.
+    """
+    room = prism([(0.0, 0.0), (8 * R, 0.0), (8 * R, 8 * R), (0.0, 8 * R)], 8 * R)
+    for first in range(len(room.triangles)):
+        order = np.roll(np.arange(len(room.triangles)), first)
+        mesh = TriangleMesh(room.vertices, room.triangles[order], room.tags)
+        middle, into = mesh.corners.mean(axis=1), -unit_normals(mesh.corners)
+        assert ball_fits(mesh, middle, into, R).all()
+        assert not ball_fits(mesh, middle + 0.1 * R * into, into, R).any()
+        assert not ball_fits(mesh, middle, into, 4.1 * R).any()

@@ -7,6 +7,7 @@ import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ import pytest
 from chamberopt.chamber.part import posed_part
 from chamberopt.common.errors import InputError
 from chamberopt.export.frame import frame_of
+from chamberopt.geometry.meshes import step_tessellation
 from chamberopt.geometry.meshes.native_reader import LEAST_SECONDS
 from chamberopt.geometry.meshes.part_mesh import PartMesh, read_part
 from chamberopt.geometry.meshes.step import READER, StepFace, _decoded, _face_names, read_solids
@@ -185,6 +187,33 @@ def test_planes_hold_as_many_triangles_as_their_side_asks_for(tmp_path: Path) ->
         read_part(path, how=Tessellation(side=1e-3 * side))
     count = float(str(told.value).split("about ")[1].split(" million")[0])
     assert count == pytest.approx(expected / side**2, rel=0.01)  # in millions
+
+
+@pytest.mark.parametrize("backwards", [False, True])
+def test_all_edges_of_a_long_chain_of_grids_get_the_rows_of_the_finest(
+    monkeypatch: pytest.MonkeyPatch, backwards: bool
+) -> None:
+    """40 faces in a row, each of which shares an edge with the next; only the last wants 7 rows.
+
+    Across the row each face has edges of its own, with as many rows as it wants itself.
+    """
+    count = 40
+
+    def grid(_model: object, face: int, _side: object) -> list[tuple[int, int, int]]:
+        own = 1000 + 2 * face
+        return [(face, face + 1, 7 if face == count else 2), (own, own + 1, face)]
+
+    rows: dict[int, int] = {}
+    mesh = SimpleNamespace(
+        setTransfiniteCurve=rows.__setitem__, setTransfiniteSurface=lambda *_: None
+    )
+    model = SimpleNamespace(getType=lambda *_: "Cylinder", mesh=mesh)
+    monkeypatch.setattr(step_tessellation, "_find_grid", grid)
+    faces = list(range(1, count + 1))
+    step_tessellation.lay_grids(model, faces[::-1] if backwards else faces, lambda _: 1.0)  # type: ignore[arg-type]
+    # Gmsh counts points, which are one more than rows.
+    assert {rows[edge] for edge in range(1, count + 2)} == {7 + 1}
+    assert all(rows[1000 + 2 * k] == rows[1001 + 2 * k] == k + 1 for k in faces)
 
 
 @pytest.mark.parametrize(
