@@ -12,6 +12,7 @@ seeds (calibration_errors.py). The slopes by K and beta come from the formula of
 
 from __future__ import annotations
 
+import math
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
@@ -25,7 +26,14 @@ from chamberopt.common.number_text import plain
 from chamberopt.design.almen_strip import OVER_A, USED_FOR
 from chamberopt.design.calibration import TIME_ERROR, calibrated_strip
 from chamberopt.peening.calibration_errors import moved_designs, slope
-from chamberopt.peening.kirk_fit import MULTIPLES, KirkFit, heights, kirk_fits, strip_saturation
+from chamberopt.peening.kirk_fit import (
+    MULTIPLES,
+    KirkFit,
+    StripSaturation,
+    heights,
+    kirk_fits,
+    strip_saturation,
+)
 from chamberopt.peening.probes import impacts_of
 from chamberopt.peening.strip import (
     ENOUGH_DENTS,
@@ -37,6 +45,7 @@ from chamberopt.peening.strip import (
     surface_cells,
 )
 from chamberopt.peening.strip_holder import HOLDER_FILE, strip_design
+from chamberopt.simulation.effort import Effort
 from chamberopt.simulation.replicas import Replica, ReplicaSetting, simulate_replicas
 from chamberopt.simulation.resting_balls import resting_notes
 from chamberopt.simulation.trapped_balls import trapped_notes
@@ -175,17 +184,16 @@ def peen_strip(
     mesh = chamber_mesh(chamber)
     moves = moved_designs(design)
     of_all = RunsProgress(progress, 1 + len(moves))
-    replicas = simulate_replicas(ReplicaSetting(design, chamber, mesh), executor, of_all)
-    dents = impacts_of(design, replicas).strip_dents(setting.cells)
-    first = strip_saturation(dents)
-    if first.time.value <= 0.0:
-        raise _without_dents(design, replicas)
+    replicas, dents, first, note = _simulated(
+        ReplicaSetting(design, chamber, mesh), setting.cells, executor, of_all
+    )
     at, drawn_at = (np.multiply(one, first.time.value) for one in (MULTIPLES, DRAWN))
     found = [*first, *heights(dents, [*at, *drawn_at])]
     slopes: list[dict[Parameter, float]] = [{} for _ in found]
     for name, step, moved in moves:
         of_all.ended += 1
-        again = simulate_replicas(ReplicaSetting(moved, chamber, mesh), executor, of_all)
+        setting_of_moved, as_many = ReplicaSetting(moved, chamber, mesh), range(len(replicas))
+        again = simulate_replicas(setting_of_moved, executor, of_all, as_many)
         other_dents = impacts_of(moved, again).strip_dents(setting.cells)
         others = [*strip_saturation(other_dents), *heights(other_dents, [*at, *drawn_at])]
         for of_one, one, other in zip(slopes, found, others, strict=True):
@@ -208,11 +216,42 @@ def peen_strip(
             *((why_not, ONLY_RATIOS) if why_not else _calibrated_notes(setting, intensity.value)),
             *setting.notes,
             FITS,
+            *((note,) if note else ()),
             *_few_dents(dents),
             *resting_notes([one.resting for one in replicas if one.resting], len(replicas)),
             *trapped_notes([one.trapped for one in replicas], design),
         ),
     )
+
+
+def _simulated(
+    setting: ReplicaSetting, cells: Cells, executor: Executor, progress: Progress
+) -> tuple[list[Replica], StripDents, StripSaturation, str]:
+    """Simulate the replicas that a strip takes.
+
+    With process.accuracy.objective_half_width there are as many as give the arc height at the
+    saturation time that half-width, as a share of it, by their scatter.
+
+    Args:
+        cells: pieces of the strip in which dents are counted.
+    Returns:
+        The replicas, their dents, arc height and time of saturation, and a note on how many
+        replicas there are, "" if the design gives their number.
+    """
+    effort, replicas = Effort.of(setting.design.process.accuracy), list[Replica]()
+    step = effort.begin
+    while True:
+        more = range(len(replicas), step.replicas)
+        replicas += simulate_replicas(setting, executor, progress, more)
+        dents = impacts_of(setting.design, replicas).strip_dents(cells)
+        found = strip_saturation(dents)
+        if found.time.value <= 0.0:
+            raise _without_dents(setting.design, replicas)
+        height = found.strength.times(1.0 / found.strength.value)
+        step = effort.after(len(replicas), height, math.inf, step)
+        if step.stopped_by:
+            note = f"arc height at saturation, as a share of it: {step.note}" if step.note else ""
+            return replicas, dents, found, note
 
 
 def _require_bare(chamber: Chamber) -> None:

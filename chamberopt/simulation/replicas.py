@@ -65,17 +65,24 @@ class ReplicaSet:
 
 
 def simulate_replicas(
-    setting: ReplicaSetting, executor: Executor, progress: Progress | None = None
+    setting: ReplicaSetting,
+    executor: Executor,
+    progress: Progress | None = None,
+    numbers: range | None = None,
 ) -> list[Replica]:
-    """Simulate as many replicas as the design asks for, and return them in a fixed order."""
+    """Simulate replicas of a design, and return them in a fixed order.
+
+    Args:
+        numbers: numbers of the replicas; by default the first, as many as the design asks for.
+    """
     found: list[Replica] = []
     process, shared = setting.design.process, share(executor, setting)
-    count = process.accuracy.replicas
-    how = process.seed, executor, "search", range(count), count
+    wanted = range(process.accuracy.replicas) if numbers is None else numbers
+    how = process.seed, executor, "search", wanted, len(wanted)
     for replica in run_in_order(simulate_replica, shared, *how):
         found.append(replica)
         if progress:
-            progress(len(found), count, None)
+            progress(wanted.start + len(found), wanted.stop, None)
     return found
 
 

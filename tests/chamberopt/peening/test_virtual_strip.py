@@ -133,6 +133,40 @@ def test_what_a_simulation_must_show_of_a_calibration_is_in_the_interval(tmp_pat
     assert found.time.half_width == pytest.approx(Z * of_time * found.time.value, rel=0.02)
 
 
+def test_as_many_replicas_as_the_asked_accuracy_of_the_intensity_takes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Replicas differ by their speed: five times the accuracy takes far more of them."""
+    simulated: list[int] = []
+
+    def scattered(*given: Any) -> list[Replica]:
+        simulated.extend(given[3])
+        speed = 3.0 + 0.15 * np.random.default_rng(8).normal(size=1000)
+        hits = [hits_at(middles(DISC, HITS), speed[number]) for number in given[3]]
+        return [Replica({}, None, NOT_TRAPPED, one) for one in hits]
+
+    monkeypatch.setattr(virtual_strip, "simulate_replicas", scattered)
+    counts = []
+    for asked, most in ((0.1, 400), (0.02, 400), (0.0001, 20)):
+        simulated.clear()
+        accuracy = {"objective_half_width": asked, "max_replicas": most}
+        design = SHORT.changed({f"process.accuracy.{k}": one for k, one in accuracy.items()})
+        folder = tmp_path / str(asked)
+        folder.mkdir()
+        setting = strip_in_lid(design, "A", DISC, folder)
+        found = peen_strip(setting, build_chamber(setting.design), SerialExecutor())
+        assert simulated == list(range(len(simulated)))  # each once, in order
+        counts.append(len(simulated))
+        reached = found.intensity.half_width <= asked * found.intensity.value
+        assert reached == (most == 400)
+        words = "was reached after" if reached else "was not reached"
+        (note,) = (one for one in found.notes if "arc height at saturation" in one)
+        assert f"the wanted accuracy of ± {asked:.3g} {words}" in note
+    assert counts[0] < 20
+    assert counts[1] > 2 * counts[0]
+    assert counts[2] == 20
+
+
 def test_a_shot_that_leaves_no_dent_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
