@@ -82,6 +82,7 @@ def evaluation(design: Any, chamber: Any, impacts: int) -> Any:
         objective=weighted_sum(OBJECTIVES["uniform_coverage"], found.metrics),
         metrics=found.metrics,
         metrics_of_wide=found.metrics_of_wide,
+        gauge_mm2=design.process.accuracy.gauge_mm2,
         resolution=found.resolution,
         reachable=seen.field.reachable,
         crease_share=seen.crease_share,
