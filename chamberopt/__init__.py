@@ -8,11 +8,15 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from chamberopt.api import (
         Design,
+        Result,
         Search,
         Study,
         calibrate,
         compare,
+        fields,
+        impacts,
         load_design,
+        load_result,
         load_study,
         measure_accuracy,
         optimise,
@@ -20,15 +24,20 @@ if TYPE_CHECKING:
         show,
         simulate,
         sweep,
+        trials,
     )
 
 __all__ = [
     "Design",
+    "Result",
     "Search",
     "Study",
     "calibrate",
     "compare",
+    "fields",
+    "impacts",
     "load_design",
+    "load_result",
     "load_study",
     "measure_accuracy",
     "optimise",
@@ -36,6 +45,7 @@ __all__ = [
     "show",
     "simulate",
     "sweep",
+    "trials",
 ]
 
 

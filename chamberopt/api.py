@@ -26,26 +26,33 @@ from typing import TYPE_CHECKING
 from chamberopt.common.errors import InputError
 from chamberopt.design.design import Design
 from chamberopt.design.load import load_design
+from chamberopt.results.load import Result, load_result
 from chamberopt.search.ask_and_tell import Search
 from chamberopt.search.study import Study, load_study
 
 if TYPE_CHECKING:
+    from pandas import DataFrame
+
     from chamberopt.common.progress import Progress
     from chamberopt.design.calibration import Calibration
+    from chamberopt.export.formats import FrameName
     from chamberopt.peening.virtual_strip import VirtualStrip
     from chamberopt.results.compare.comparison import Comparison
-    from chamberopt.results.load import Result
     from chamberopt.search.run_sweep import SweepResult
     from chamberopt.simulation.convergence import ConvergenceStudy
     from chamberopt.workflows.strip import StripPlace
 
 __all__ = [
     "Design",
+    "Result",
     "Search",
     "Study",
     "calibrate",
     "compare",
+    "fields",
+    "impacts",
     "load_design",
+    "load_result",
     "load_study",
     "measure_accuracy",
     "optimise",
@@ -53,6 +60,7 @@ __all__ = [
     "show",
     "simulate",
     "sweep",
+    "trials",
 ]
 
 
@@ -85,7 +93,6 @@ def simulate(
     from chamberopt.common.executor import local_executor
     from chamberopt.common.files import claim_folder
     from chamberopt.peening.tolerances import plan_tolerances
-    from chamberopt.results.load import load_result
     from chamberopt.workflows.simulate import SimulationSettings, Teller, simulate_design
 
     _require("design", design, Design, "load_design")
@@ -120,7 +127,6 @@ def optimise(
             meets the constraints.
     """
     from chamberopt.common.executor import local_executor
-    from chamberopt.results.load import load_result
     from chamberopt.search.study_folder import open_study_folder
     from chamberopt.workflows.optimise import optimise_study
     from chamberopt.workflows.simulate import Teller
@@ -290,13 +296,83 @@ def show(result: Result, screenshot: str | Path | None = None) -> None:
     Args:
         screenshot: image file to write instead of opening a window.
     """
-    from chamberopt.results.load import Result
     from chamberopt.viewer.opened_result import result_info
     from chamberopt.viewer.view_state import ViewState
     from chamberopt.viewer.window import inspect
 
-    _require("result", result, Result, "simulate")
+    _require("result", result, Result, "load_result")
     inspect([result_info(result)], ViewState(), screenshot)
+
+
+def impacts(
+    result: Result,
+    *,
+    frame: FrameName = "part",
+    replicas: int | None = None,
+    workers: int | None = None,
+    progress: Progress | None = None,
+) -> DataFrame:
+    """Return every impact on the part of a result, a row for each, in a pandas DataFrame.
+
+    A result stores no impacts: it is simulated again, and must be the same to the last bit. An
+    impact takes about 100 bytes. The columns are those of docs/export.md.
+
+    Args:
+        frame: coordinates: "part", as in the part's file and in its unit, or "chamber", in mm.
+        replicas: number of replicas, beginning with the first, which are then not compared with the
+            result; None for all.
+        workers: number of threads, by default one per core.
+        progress: called as progress(done, total, None) after each replica.
+    Raises:
+        InputError: the simulation is not the result's, or pandas is missing (extra "notebook").
+    """
+    from chamberopt.common.executor import local_executor
+    from chamberopt.export.data_frames import impacts_frame, require_pandas
+    from chamberopt.results.rebuild import rebuild_chamber
+    from chamberopt.workflows.simulate import Teller
+
+    _require("result", result, Result, "load_result")
+    require_pandas("impacts")
+    rebuilt, teller = rebuild_chamber(result), Teller(progress)
+    with local_executor(workers) as executor:
+        teller.compile(result.design, rebuilt.chamber, rebuilt.cavity)
+        with teller.step("impacts, replicas", replicas or result.record.replicas) as shown:
+            return impacts_frame(
+                result, rebuilt, executor, frame=frame, replicas=replicas, progress=shown
+            )
+
+
+def fields(result: Result, *, frame: FrameName = "part") -> DataFrame:
+    """Return the values on each triangle of a result's part, such as coverage, in a DataFrame.
+
+    Its rows are the triangles of part.vtp, its columns the centre of each triangle and the values
+    of docs/export.md. Units and meanings are in `fields(result).attrs["columns"]`.
+
+    Args:
+        frame: coordinates: "part", as in the part's file and in its unit, or "chamber", in mm.
+    Raises:
+        InputError: a file of the result was changed, or pandas is missing (extra "notebook").
+    """
+    from chamberopt.export.data_frames import fields_frame
+
+    _require("result", result, Result, "load_result")
+    return fields_frame(result, frame)
+
+
+def trials(study: Result | SweepResult | str | Path) -> DataFrame:
+    """Return the evaluations of a study or sweep, a row for each, in a pandas DataFrame.
+
+    NAME_pm is the 95 % half-width of NAME. Figures without a number, such as a time that words like
+    "never" stand for, are NaN.
+
+    Args:
+        study: a study's result, a sweep, or the folder of either, which need not be finished.
+    Raises:
+        InputError: there are no evaluations, or pandas is missing (extra "notebook").
+    """
+    from chamberopt.export.data_frames import trials_frame
+
+    return trials_frame(Path(study) if isinstance(study, str | Path) else study.folder)
 
 
 def _require(name: str, given: object, kind: type, source: str) -> None:

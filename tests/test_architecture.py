@@ -58,6 +58,7 @@ ONE_IMPORTER: dict[str, str | tuple[str, ...]] = {
     "manifold3d": "geometry/solids.py",
     "nlopt": "search/optimiser/nlopt_search.py",
     "pyvista": "results/vtp_files.py",
+    "pandas": ("export/data_frames.py", "api.py"),  # api.py for its types alone
     "vtk": ("pictures/", "viewer/"),
     "starlette": "page/",
     "uvicorn": "page/server.py",

@@ -170,14 +170,52 @@ METADATA_ENDING = ".json"  # the description of FILE.csv is in FILE.csv.json
 WriteRows = Callable[[Sequence[np.ndarray]], None]
 
 
+class ImpactTable(NamedTuple):
+    """The table of the impacts of a result, computed piece by piece.
+
+    It has one row for each impact, replica after replica, in order of time.
+
+    Args:
+        columns: the columns in order.
+        metadata: description of the table, as JSON values.
+        pieces: the values of each column for some rows, piece after piece. The replicas are
+            simulated as the pieces are taken.
+    """
+
+    columns: tuple[Column, ...]
+    metadata: dict[str, object]
+    pieces: Iterator[list[np.ndarray]]
+
+
+def impact_table(
+    result: Result, rebuilt: RebuiltChamber, executor: Executor, *,
+    frame: FrameName = "part", replicas: int | None = None, progress: Progress | None = None,
+) -> ImpactTable:  # fmt: skip
+    """Return the table of the impacts of a result, which is simulated again.
+
+    Raises:
+        InputError: the number of replicas is not one of the result's. After the last piece, if the
+            new replicas differ from the replicas of the result.
+    """
+    design, chamber = result.design, rebuilt.chamber
+    axes = frame_of(frame, chamber.part)
+    columns = columns_of(axes)
+    metadata = _metadata(result, rebuilt, axes, columns, replica_count(result, replicas))
+    pieces = (
+        [column.values(rows).astype(column.dtype) for column in columns]
+        for impacts in simulate_impacts(result, rebuilt, executor, replicas, progress)
+        for rows in impact_rows(impacts, chamber, design, axes)
+    )
+    return ImpactTable(columns, metadata, pieces)
+
+
 def write_impacts(
     files: Sequence[Path], result: Result, rebuilt: RebuiltChamber, executor: Executor, *,
     frame: FrameName = "part", replicas: int | None = None, progress: Progress | None = None,
 ) -> int:  # fmt: skip
     """Simulate a result again, and write its impacts into files in the formats of their endings.
 
-    The table has one row for each impact, replica after replica, in order of time. `columns_of`
-    lists its columns. Files appear complete or not at all.
+    Files appear complete or not at all.
 
     Returns:
         The number of impacts.
@@ -185,19 +223,16 @@ def write_impacts(
     Raises:
         InputError: the new replicas differ from the replicas of the result, or pyarrow is missing.
     """
-    design, chamber = result.design, rebuilt.chamber
-    axes = frame_of(frame, chamber.part)
-    columns = columns_of(axes)
-    metadata = _metadata(result, rebuilt, axes, columns, replica_count(result, replicas))
+    columns, metadata, pieces = impact_table(
+        result, rebuilt, executor, frame=frame, replicas=replicas, progress=progress
+    )
     written = 0
     with ExitStack() as stack:
         writers = [stack.enter_context(_open_table(file, columns, metadata)) for file in files]
-        for impacts in simulate_impacts(result, rebuilt, executor, replicas, progress):
-            for rows in impact_rows(impacts, chamber, design, axes):
-                values = [column.values(rows).astype(column.dtype) for column in columns]
-                for write_rows in writers:
-                    write_rows(values)
-            written += len(impacts.log)
+        for values in pieces:
+            for write_rows in writers:
+                write_rows(values)
+            written += len(values[0])
     return written
 
 

@@ -188,25 +188,30 @@ def read_seconds(folder: Path) -> dict[int, float]:
 
 
 def trials_as_csv(trials: Iterable[Trial], seconds: Mapping[int, float]) -> str:
-    """Return trials as CSV text, with a column for each parameter and metric.
+    """Return trials as CSV text, with the rows of `trial_rows`."""
+    return csv_text(trial_rows(trials, seconds))
 
-    NAME_pm is the half-width of NAME, empty where words such as "never" stand in the place of the
+
+def trial_rows(trials: Iterable[Trial], seconds: Mapping[int, float]) -> list[dict[str, object]]:
+    """Return a row for each trial, with a column for each parameter and metric.
+
+    NAME_pm is the half-width of NAME, None where words such as "never" stand in the place of the
     number. A failed evaluation has no metrics.
 
     Args:
         seconds: wall-clock time [s] of each evaluation, by its number.
     """
-    lines = []
+    rows = []
     for one in trials:
         number = one.number + 1  # as pictures count
-        line: dict[str, object] = {"number": number, "stage": one.stage, **one.parameters}
-        line["objective"], line["half_width"] = _cells(one.objective)
-        line |= {"score": one.score, "feasible": one.feasible, "reason": one.reason}
-        line["seconds"] = seconds.get(one.number)
+        row: dict[str, object] = {"number": number, "stage": one.stage, **one.parameters}
+        row["objective"], row["half_width"] = _cells(one.objective)
+        row |= {"score": one.score, "feasible": one.feasible, "reason": one.reason}
+        row["seconds"] = seconds.get(one.number)
         for name, metric in one.metrics.items():
-            line[name], line[f"{name}_pm"] = _cells(metric)
-        lines.append(line)
-    return csv_text(lines)
+            row[name], row[f"{name}_pm"] = _cells(metric)
+        rows.append(row)
+    return rows
 
 
 def _cells(figure: Estimate | None) -> tuple[object, object]:

@@ -18,9 +18,11 @@ import pytest
 import trimesh
 from lxml import etree
 
+import chamberopt as toolkit
 from chamberopt.chamber.analytic import analytic_cavity
 from chamberopt.chamber.build import build_chamber
 from chamberopt.cli import main
+from chamberopt.common.errors import InputError
 from chamberopt.common.executor import SerialExecutor, local_executor
 from chamberopt.coverage.part_impacts import load_hits
 from chamberopt.design.load import Design
@@ -489,3 +491,47 @@ def test_an_unfinished_study_and_a_sweep(study: Path, chamberopt: Said, tmp_path
             chamberopt("export", folder, "--to", "study-csv", "--out", f"{folder.name}.csv")[0] == 0
         )
         assert len(Path(f"{folder.name}.csv").read_text(encoding="utf-8").splitlines()) > 5
+
+
+def test_from_python_the_frames_hold_what_the_files_hold(
+    simulated: Path, study: Path, tmp_path: Path
+) -> None:
+    pandas = pytest.importorskip("pandas")
+    result = toolkit.load_result(simulated)
+    hits = toolkit.impacts(result, workers=1)
+    for name, column in table_of(simulated, tmp_path / "i.parquet").items():
+        assert hits[name].dtype == column.dtype
+        np.testing.assert_array_equal(hits[name], column)
+    assert hits.attrs["length_unit"] == "in"
+    one = toolkit.impacts(result, frame="chamber", replicas=1, workers=1)
+    np.testing.assert_array_equal(one["time_s"], hits["time_s"][hits["replica"] == 0])
+    assert not one.attrs["same_as_result"]
+
+    surface = pyvista().read(simulated / "part.vtp")
+    values = toolkit.fields(result, frame="chamber")
+    for name in ("coverage", "impacts", "target", "exposed_area_mm2"):
+        np.testing.assert_array_equal(values[name], surface[name])
+    centres = surface.cell_centers().points
+    np.testing.assert_allclose(values[["x_mm", "y_mm", "z_mm"]], centres, atol=1e-9)
+    assert values.attrs["columns"]["mean_normal_speed"].endswith("m/s")
+    in_part = toolkit.fields(result)[["x_in", "y_in", "z_in"]].to_numpy()
+    part = trimesh.load_mesh(load_result(simulated).design.part.mesh_path, process=False)
+    np.testing.assert_allclose(in_part, part.triangles_center, atol=1e-9)
+
+    for given in (study, str(study), toolkit.load_result(study)):
+        found = toolkit.trials(given)
+        assert found["number"].tolist() == list(range(1, len(found) + 1))
+        written = pandas.read_csv(study / "history.csv", na_values=["never", "not resolved"])
+        pandas.testing.assert_frame_equal(
+            found[list(written)].drop(columns="reason"), written.drop(columns="reason"),
+            check_dtype=False,
+        )  # fmt: skip
+        assert found["time_to_98_s"].dtype == float
+
+
+def test_without_pandas(simulated: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    result = toolkit.load_result(simulated)
+    for call in (toolkit.impacts, toolkit.fields, lambda one: toolkit.trials(one.folder)):
+        with pytest.raises(InputError, match=r"pandas is not installed: .*chamberopt\[notebook\]"):
+            call(result)
