@@ -25,6 +25,7 @@ if TYPE_CHECKING:
         simulate,
         sweep,
         trials,
+        with_part,
     )
 
 __all__ = [
@@ -46,6 +47,7 @@ __all__ = [
     "simulate",
     "sweep",
     "trials",
+    "with_part",
 ]
 
 

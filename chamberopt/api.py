@@ -32,6 +32,8 @@ from chamberopt.search.study import Study, load_study
 
 if TYPE_CHECKING:
     from pandas import DataFrame
+    from pyvista import PolyData
+    from trimesh import Trimesh
 
     from chamberopt.common.progress import Progress
     from chamberopt.design.calibration import Calibration
@@ -61,6 +63,7 @@ __all__ = [
     "simulate",
     "sweep",
     "trials",
+    "with_part",
 ]
 
 
@@ -302,6 +305,25 @@ def show(result: Result, screenshot: str | Path | None = None) -> None:
 
     _require("result", result, Result, "load_result")
     inspect([result_info(result)], ViewState(), screenshot)
+
+
+def with_part(design: Design, mesh: Trimesh | PolyData, file: str | Path, *, unit: str) -> Design:
+    """Return a copy of a design with a mesh of trimesh or PyVista as its part.
+
+    The mesh is written to `file`, so that the design can be saved and its results name their part.
+    The design keeps its pose and its target, whose names of surfaces a PLY file does not have.
+
+    Args:
+        file: a .ply file, new or with the same mesh.
+        unit: unit of the mesh's numbers: um, mm, cm, m or in.
+    Raises:
+        InputError: the mesh is empty, open or crosses itself, another file is there, or the design
+            cannot have the part.
+    """
+    from chamberopt.workflows.part_file import write_part
+
+    _require("design", design, Design, "load_design")
+    return design.changed({"part.mesh": write_part(mesh, file, unit), "part.unit": unit})
 
 
 def impacts(

@@ -57,8 +57,8 @@ ONE_IMPORTER: dict[str, str | tuple[str, ...]] = {
     "sklearn": "search/optimiser/gaussian_process.py",
     "manifold3d": "geometry/solids.py",
     "nlopt": "search/optimiser/nlopt_search.py",
-    "pyvista": "results/vtp_files.py",
-    "pandas": ("export/data_frames.py", "api.py"),  # api.py for its types alone
+    "pyvista": ("results/vtp_files.py", "api.py"),  # api.py for types alone
+    "pandas": ("export/data_frames.py", "api.py"),  # api.py for types alone
     "vtk": ("pictures/", "viewer/"),
     "starlette": "page/",
     "uvicorn": "page/server.py",

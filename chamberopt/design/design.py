@@ -368,8 +368,11 @@ def _replaced(old: Any, name: str, steps: Sequence[str], value: Any) -> Any:
 def _of_the_same_kind(old: Any, value: Any) -> Any:
     """Return a new number in the type of the old value, int or float; other values as they are.
 
-    A number that is not whole becomes a float. Numbers of numpy are accepted too.
+    A number that is not whole becomes a float. Numbers of numpy are accepted too, and a Path in the
+    place of a text.
     """
+    if isinstance(value, Path):
+        return str(value)
     is_number = isinstance(value, Real) and not isinstance(value, bool)
     if not is_number:
         return value

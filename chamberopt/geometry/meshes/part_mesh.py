@@ -138,7 +138,17 @@ def read_triangles(
         InputError: for a file that is missing, empty, truncated or not finite, and for a size that
             no part has.
     """
-    content = _read_content(path)
+    return triangles_in(path, _read_content(path), unit, how)
+
+
+def triangles_in(
+    path: Path, content: bytes, unit: str = "guess", how: Tessellation | None = None
+) -> TriangleSoup:
+    """Read the triangles in the content of a mesh file, as `read_triangles` does.
+
+    Args:
+        path: path of the file, for messages. The file need not be there yet.
+    """
     raw = read_raw_mesh(path, content, how)
     corners = raw.corners
     if not len(corners):

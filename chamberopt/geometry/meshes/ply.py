@@ -1,4 +1,4 @@
-"""Read PLY files, text and binary, with trimesh. Colours become groups of triangles."""
+"""Read PLY files, text and binary, with trimesh, and write them. Colours become groups."""
 
 from __future__ import annotations
 
@@ -37,6 +37,27 @@ def read_ply(path: Path, content: bytes) -> RawMesh:
         if colour[0] >= 0 and len(distinct) <= MAX_COLOURS
     }
     return RawMesh(corners, groups)
+
+
+def ply_content(vertices: np.ndarray, triangles: np.ndarray, unit: str) -> bytes:
+    """Return the content of a binary PLY file with the surface's coordinates to the last bit.
+
+    Args:
+        vertices: positions in the unit of the file, shape (n, 3).
+        triangles: shape (m, 3).
+        unit: unit of the positions, which a comment of the file states.
+    """
+    header = (
+        "ply\nformat binary_little_endian 1.0\n"
+        f"comment unit = {unit}\n"
+        f"element vertex {len(vertices)}\n"
+        "property double x\nproperty double y\nproperty double z\n"
+        f"element face {len(triangles)}\n"
+        "property list uchar int vertex_indices\nend_header\n"
+    )
+    faces = np.zeros(len(triangles), dtype=[("count", "u1"), ("corners", "<i4", 3)])
+    faces["count"], faces["corners"] = 3, triangles
+    return header.encode() + np.asarray(vertices, dtype="<f8").tobytes() + faces.tobytes()
 
 
 def _require_all_lines(path: Path, content: bytes) -> None:
