@@ -24,6 +24,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from chamberopt.common.errors import InputError
+from chamberopt.common.notebook import html_of
 from chamberopt.design.design import Design
 from chamberopt.design.load import load_design
 from chamberopt.results.load import Result, load_result
@@ -395,6 +396,30 @@ def trials(study: Result | SweepResult | str | Path) -> DataFrame:
     from chamberopt.export.data_frames import trials_frame
 
     return trials_frame(Path(study) if isinstance(study, str | Path) else study.folder)
+
+
+# How a notebook shows what this module returns. It is told here, above all that it takes.
+
+
+@html_of.register
+def _design_html(design: Design) -> str:
+    from chamberopt.printers.notebook import design_html
+
+    return design_html(design)
+
+
+@html_of.register
+def _study_html(study: Study) -> str:
+    from chamberopt.printers.notebook import study_html
+
+    return study_html(study)
+
+
+@html_of.register
+def _result_html(result: Result) -> str:
+    from chamberopt.printers.notebook import result_html
+
+    return result_html(result)
 
 
 def _require(name: str, given: object, kind: type, source: str) -> None:

@@ -17,6 +17,7 @@ from pydantic import BaseModel, Field, ValidationError, ValidationInfo
 
 from chamberopt.common import toml_errors
 from chamberopt.common.errors import InputError
+from chamberopt.common.notebook import ShownInNotebook
 from chamberopt.common.toml_errors import CrossCheckError, Problem, text_choices
 from chamberopt.common.toml_fields import Several, from_file, list_field
 from chamberopt.design.calibration import (
@@ -52,7 +53,7 @@ NOT_VARIED = (
 )  # fmt: skip
 
 
-class Design(FileTable):
+class Design(FileTable, ShownInNotebook):
     """One complete design: part, chamber, sonotrode, shot, materials, effects, process."""
 
     part: PartTable

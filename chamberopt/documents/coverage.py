@@ -108,6 +108,11 @@ def tiles(shown: Sequence[Figure]) -> Tiles:
     )
 
 
+def figures_table(shown: Sequence[Figure]) -> Table:
+    """Return a table of figures with their intervals, and of start and change if there is one."""
+    return _table(shown) if shown[0].start is None else _compared(shown)
+
+
 def coverage_section(
     shown: Sequence[Figure], of: Mapping[str, Result], scenes: Mapping[str, PartScene]
 ) -> Section:
@@ -123,10 +128,7 @@ def coverage_section(
     """
     *_, result = of.values()
     has_start = len(of) > 1
-    content: list[Block] = [
-        _compared(shown) if has_start else _table(shown),
-        *_windows(result.record.field),
-    ]
+    content: list[Block] = [figures_table(shown), *_windows(result.record.field)]
     charts: list[Block] = []
     drawn = {
         name: (scene.coverage, scene.area)

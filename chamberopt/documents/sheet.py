@@ -334,7 +334,7 @@ def _chamber(result: Result, openings: Sequence[Opening]) -> Iterator[Row]:
     rows = []
     for key, value in table.items():
         if value not in (0, 0.0, []):
-            name, text = _key_row(key, value)
+            name, text = key_row(key, value)
             rows.append((name, _limited(result, f"chamber.{key}", text)))
     yield from _first(rows, "numbers", MOST_KEYS)
     for what, several in counted.items():
@@ -384,7 +384,7 @@ def _fixtures(result: Result, openings: Sequence[Opening]) -> Iterator[Row]:
         yield name, f"{text}, on {plain(one.covered_mm2, 3)} mm² of the part{where}"
 
 
-def _key_row(key: str, value: Any) -> Row:
+def key_row(key: str, value: Any) -> Row:
     """Return the name and the text of a chamber's value, with the unit in the text.
 
     In `key`, the unit is the end of the name, e.g. "height_mm".
@@ -409,7 +409,7 @@ def _sonotrode(result: Result, face_mm: tuple[float, ...]) -> Iterator[Row]:
     if design.sonotrode.blocks is not None:
         yield "made of", f"{design.sonotrode.blocks.in_words}, driven alike: simulated as one face"
     yield "frequency", f"{plain(design.sonotrode.frequency_khz)} kHz"
-    yield "amplitude", _amplitude(design.sonotrode)
+    yield "amplitude", amplitude_text(design.sonotrode)
     yield "peak speed of the face", f"{plain(design.sonotrode.peak_speed, 3)} m/s"
     if design.sonotrode.amplitude_profile is not None:
         yield "amplitude over the face", design.sonotrode.amplitude_profile.in_words
@@ -420,11 +420,11 @@ def _sonotrode(result: Result, face_mm: tuple[float, ...]) -> Iterator[Row]:
     for one in design.sonotrodes:
         place = ", ".join(map(plain, one.at_mm))
         name = f"further, Ø {plain(one.diameter_mm)} mm"
-        others.append((name, f"at ({place}) mm: {_amplitude(one)}"))
+        others.append((name, f"at ({place}) mm: {amplitude_text(one)}"))
     yield from _first(others, "sonotrodes")
 
 
-def _amplitude(face: VibratingFace) -> str:
+def amplitude_text(face: VibratingFace) -> str:
     one = face.zero_to_peak_um
     return f"{plain(one)} µm zero-to-peak = {plain(2.0 * one)} µm peak to valley"
 

@@ -16,6 +16,7 @@ from chamberopt.common.errors import InputError
 from chamberopt.common.estimate import Estimate
 from chamberopt.common.files import INPUTS, RESULT, open_plain, require_plain_folder
 from chamberopt.common.limits import MAX_RESULT_BYTES, parse_json, read_limited
+from chamberopt.common.notebook import ShownInNotebook
 from chamberopt.common.number_text import estimate_text, plain
 from chamberopt.coverage.metrics import find_metric
 from chamberopt.design.design import validate
@@ -46,7 +47,7 @@ RESTORE = "restore the folder from where it came, or simulate again"
 
 
 @dataclass(frozen=True)
-class Result:
+class Result(ShownInNotebook):
     """A results folder that has been read.
 
     design: the simulated design. For a study it is the best design.

@@ -8,6 +8,7 @@ from pydantic import BeforeValidator, Field, ValidationInfo, model_validator
 
 from chamberopt.common import toml_errors
 from chamberopt.common.errors import InputError
+from chamberopt.common.notebook import ShownInNotebook
 from chamberopt.common.toml_errors import CrossCheckError, Problem
 from chamberopt.common.toml_fields import Several, from_file, list_field, quantity
 from chamberopt.coverage.metrics import (
@@ -183,7 +184,7 @@ class Optimizer(FileTable):
             yield Problem("phases", text)
 
 
-class Study(FileTable):
+class Study(FileTable, ShownInNotebook):
     """A study: a design, its varied parameters, objective and constraints, and the budget.
 
     `vary` maps the dotted name of a parameter to the values it may have, in the units of the file.
