@@ -76,7 +76,7 @@ def simulate(
     tolerances: bool = False,
     ranges: bool = True,
     workers: int | None = None,
-    progress: Progress | None = None,
+    progress: Progress | bool = True,
 ) -> Result:
     """Simulate one design, write the result to a folder, and return it as read from there.
 
@@ -88,8 +88,9 @@ def simulate(
         ranges: also simulate how far the figures may be off because friction etc. are not
             calibrated, in as many replicas again. The figures are in result.record.ranges.
         workers: number of threads, by default one per core. It does not change the result.
-        progress: called as progress(done, total, None) after each replica. It counts those of the
-            ranges anew.
+        progress: True to show bars in a terminal or notebook, False for nothing, or a function,
+            called as progress(done, total, None) after each replica. It counts those of the ranges
+            anew.
     Raises:
         InputError: the chamber cannot be built, has no room for the shot or is not analytic.
         sim_core.SimulationError: a simulation had to stop.
@@ -97,14 +98,14 @@ def simulate(
     from chamberopt.common.executor import local_executor
     from chamberopt.common.files import claim_folder
     from chamberopt.peening.tolerances import plan_tolerances
-    from chamberopt.workflows.simulate import SimulationSettings, Teller, simulate_design
+    from chamberopt.workflows.simulate import SimulationSettings, simulate_design, teller_of
 
     _require("design", design, Design, "load_design")
     if tolerances:
         plan_tolerances(design)
     with claim_folder(out) as folder, local_executor(workers) as executor:
         settings = SimulationSettings(analytic, tolerances, ranges)
-        done = simulate_design(design, folder, executor, Teller(progress), settings)
+        done = simulate_design(design, folder, executor, teller_of(progress), settings)
     _warn([*map(str, done.advice), *done.remarks])
     return load_result(out)
 
@@ -115,7 +116,7 @@ def optimise(
     *,
     ranges: bool = True,
     workers: int | None = None,
-    progress: Progress | None = None,
+    progress: Progress | bool = True,
 ) -> Result:
     """Run a study, write it to a folder, and return the confirmed result of its best design.
 
@@ -125,7 +126,8 @@ def optimise(
         ranges: also simulate whether the best design stays best where friction etc. are not
             calibrated.
         workers: number of threads, by default one per core. It does not change the result.
-        progress: called as progress(done, total, best) after each evaluation.
+        progress: True for bars, False for nothing, or a function, called as
+            progress(done, total, best) after each evaluation.
     Raises:
         InputError: the folder is another study's, the start cannot be simulated, or no candidate
             meets the constraints.
@@ -133,12 +135,12 @@ def optimise(
     from chamberopt.common.executor import local_executor
     from chamberopt.search.study_folder import open_study_folder
     from chamberopt.workflows.optimise import optimise_study
-    from chamberopt.workflows.simulate import Teller
+    from chamberopt.workflows.simulate import teller_of
 
     _require("study", study, Study, "load_study")
     with open_study_folder(study, out) as folder, local_executor(workers) as executor:
         if not folder.finished:
-            done = optimise_study(folder, executor, Teller(progress), with_ranges=ranges)
+            done = optimise_study(folder, executor, teller_of(progress), with_ranges=ranges)
             _warn([*map(str, done.advice), *done.remarks])
     return load_result(out)
 
@@ -151,7 +153,7 @@ def sweep(
     sobol: int | None = None,
     seed: int | None = None,
     workers: int | None = None,
-    progress: Progress | None = None,
+    progress: Progress | bool = True,
 ) -> SweepResult:
     """Simulate candidates on a grid or spread evenly over a study's [vary]; save them in a folder.
 
@@ -166,7 +168,8 @@ def sweep(
         sobol: number of candidates, at Sobol points.
         seed: seed of the Sobol points, by default the study's optimizer.seed.
         workers: number of processes, by default one per core. It does not change the result.
-        progress: called as progress(done, total, best) after each candidate.
+        progress: True for bars, False for nothing, or a function, called as
+            progress(done, total, best) after each candidate.
     Raises:
         InputError: the candidates cannot be planned, the folder is another study's, or no
             candidate can be simulated.
@@ -174,14 +177,14 @@ def sweep(
     from chamberopt.search.run_sweep import plan_sweep
     from chamberopt.search.study_folder import open_study_folder
     from chamberopt.workflows.optimise import read_sweep, sweep_study
-    from chamberopt.workflows.simulate import Teller
+    from chamberopt.workflows.simulate import teller_of
 
     _require("study", study, Study, "load_study")
     plan = plan_sweep(study, grid, sobol, seed)
     with open_study_folder(study, out, plan.as_json()) as folder:
         if folder.finished:
             return read_sweep(folder, plan)
-        done = sweep_study(folder, plan, Teller(progress), workers)
+        done = sweep_study(folder, plan, teller_of(progress), workers)
     _warn([*map(str, done.advice), *done.remarks])
     return done.result
 
@@ -192,6 +195,7 @@ def compare(
     *,
     treatment_time_s: float | None = None,
     workers: int | None = None,
+    progress: Progress | bool = True,
 ) -> Comparison:
     """Compare designs and results with the first of them, and write the comparison into a folder.
 
@@ -201,17 +205,23 @@ def compare(
         treatment_time_s: peening time of all candidates; results of another time are simulated
             again.
         workers: number of threads, by default one per core; it does not change the result.
+        progress: True for bars, False for nothing, or a function, called as
+            progress(done, total, None) in each step that counts.
     Raises:
         InputError: a candidate cannot be read, or not be compared with the first.
     """
     from chamberopt.common.executor import local_executor
     from chamberopt.common.files import claim_folder
     from chamberopt.workflows.comparison_folder import compare_candidates
-    from chamberopt.workflows.simulate import Teller
+    from chamberopt.workflows.simulate import teller_of
 
     with claim_folder(out) as folder:
         found, remarks = compare_candidates(
-            candidates, folder, partial(local_executor, workers), Teller(), treatment_time_s
+            candidates,
+            folder,
+            partial(local_executor, workers),
+            teller_of(progress),
+            treatment_time_s,
         )
     _warn(remarks)
     return found
@@ -223,7 +233,7 @@ def peen_strip(
     place: StripPlace | None = None,
     *,
     workers: int | None = None,
-    progress: Progress | None = None,
+    progress: Progress | bool = True,
 ) -> VirtualStrip:
     """Peen a virtual Almen strip in place of the part, and save it in a folder.
 
@@ -231,31 +241,40 @@ def peen_strip(
         out: new or empty folder.
         place: type, size and place of the strip. None for an A strip of full size in the lid.
         workers: number of threads, by default one per core; it does not change the result.
-        progress: called as progress(done, total, None) after each replica.
+        progress: True for bars, False for nothing, or a function, called as
+            progress(done, total, None) after each replica.
     Raises:
         InputError: the strip does not fit, or the design lacks the zone.
     """
     from chamberopt.common.executor import local_executor
     from chamberopt.common.files import claim_folder
-    from chamberopt.workflows.simulate import Teller
+    from chamberopt.workflows.simulate import teller_of
     from chamberopt.workflows.strip import StripPlace, peen_strip_in
 
     _require("design", design, Design, "load_design")
     with claim_folder(out) as folder, local_executor(workers) as executor:
         peened, advice = peen_strip_in(
-            design, place or StripPlace(), folder, executor, Teller(progress)
+            design, place or StripPlace(), folder, executor, teller_of(progress)
         )
     _warn(map(str, advice))
     return peened
 
 
-def calibrate(measured: str | Path, out: str | Path, *, workers: int | None = None) -> Calibration:
+def calibrate(
+    measured: str | Path,
+    out: str | Path,
+    *,
+    workers: int | None = None,
+    progress: Progress | bool = True,
+) -> Calibration:
     """Calibrate the model to the measurements in a file, and save the machine in a folder.
 
     Args:
         measured: file of measurements (.toml), see docs/peening.md.
         out: new or empty folder. It receives machine.toml, which designs name as their calibration.
         workers: number of threads, by default one per core; it does not change the result.
+        progress: True for bars, False for nothing, or a function, called as
+            progress(done, total, None) in each step that counts.
     Raises:
         InputError: the measurements, or a design that they name, cannot be used.
     """
@@ -263,22 +282,24 @@ def calibrate(measured: str | Path, out: str | Path, *, workers: int | None = No
     from chamberopt.common.files import claim_folder
     from chamberopt.peening.measured import load_measured
     from chamberopt.workflows.calibrate import calibrate_machine
-    from chamberopt.workflows.simulate import Teller
+    from chamberopt.workflows.simulate import teller_of
 
     loaded, designs = load_measured(Path(measured))
     with claim_folder(out) as folder, local_executor(workers) as executor:
-        found, _ = calibrate_machine(loaded, designs, folder, executor, Teller())
+        found, _ = calibrate_machine(loaded, designs, folder, executor, teller_of(progress))
     return found.table
 
 
 def measure_accuracy(
-    design: Design, out: str | Path, *, budget_s: float = 300.0
+    design: Design, out: str | Path, *, budget_s: float = 300.0, progress: Progress | bool = True
 ) -> ConvergenceStudy:
     """Measure how the error of a design's coverage etc. depends on numerical settings and CPU time.
 
     Args:
         out: new or empty folder.
         budget_s: CPU seconds to spend on simulations.
+        progress: True for bars, False for nothing, or a function, called as
+            progress(done, total, None) in each step that counts.
     Raises:
         InputError: the budget is not positive, or the design cannot be simulated.
     """
@@ -286,12 +307,12 @@ def measure_accuracy(
     from chamberopt.common.files import claim_folder
     from chamberopt.simulation.convergence import require_budget
     from chamberopt.workflows.accuracy import measure_accuracy as measure
-    from chamberopt.workflows.simulate import Teller
+    from chamberopt.workflows.simulate import teller_of
 
     _require("design", design, Design, "load_design")
     require_budget(budget_s)
     with claim_folder(out) as folder, local_executor() as executor:
-        return measure(design, budget_s, folder, executor, Teller())
+        return measure(design, budget_s, folder, executor, teller_of(progress))
 
 
 def show(result: Result, screenshot: str | Path | None = None) -> None:
@@ -333,7 +354,7 @@ def impacts(
     frame: FrameName = "part",
     replicas: int | None = None,
     workers: int | None = None,
-    progress: Progress | None = None,
+    progress: Progress | bool = True,
 ) -> DataFrame:
     """Return every impact on the part of a result, a row for each, in a pandas DataFrame.
 
@@ -345,18 +366,19 @@ def impacts(
         replicas: number of replicas, beginning with the first, which are then not compared with the
             result; None for all.
         workers: number of threads, by default one per core.
-        progress: called as progress(done, total, None) after each replica.
+        progress: True for bars, False for nothing, or a function, called as
+            progress(done, total, None) after each replica.
     Raises:
         InputError: the simulation is not the result's, or pandas is missing (extra "notebook").
     """
     from chamberopt.common.executor import local_executor
     from chamberopt.export.data_frames import impacts_frame, require_pandas
     from chamberopt.results.rebuild import rebuild_chamber
-    from chamberopt.workflows.simulate import Teller
+    from chamberopt.workflows.simulate import teller_of
 
     _require("result", result, Result, "load_result")
     require_pandas("impacts")
-    rebuilt, teller = rebuild_chamber(result), Teller(progress)
+    rebuilt, teller = rebuild_chamber(result), teller_of(progress)
     with local_executor(workers) as executor:
         teller.compile(result.design, rebuilt.chamber, rebuilt.cavity)
         with teller.step("impacts, replicas", replicas or result.record.replicas) as shown:

@@ -29,26 +29,9 @@ def compile_with_message(
     Raises:
         InputError: the shot does not fit, or the part cannot turn. It is raised early.
     """
-    import sim_core
-    from chamberopt.chamber.flexure import flexure_of_surfaces
-    from chamberopt.chamber.part import turning_axis
-    from chamberopt.chamber.replica_seed import replica_seed
-    from chamberopt.chamber.scene import build_scene, chamber_mesh
-    from chamberopt.common.progress import step
+    from chamberopt.workflows.compile import compile_for
 
-    room, seed = cavity or chamber_mesh(chamber), replica_seed(design.process.seed, 0)
-    with step("placing the shot"):
-        flexure = flexure_of_surfaces(design, chamber, room)
-        scene = build_scene(design, room, seed, turning_axis(design, chamber.part), flexure)
-    is_cylinder = cavity is not None and cavity.radius is not None
-    variant = scene.physics, design.shot.count, design.shot.mix is None, is_cylinder
-    if sim_core.is_compiled(*variant):
-        return
-    print_remarks(["compiling the simulator (once per set of effects) ..."])
-    with step("compiling, functions") as progress:
-        sim_core.compile_simulator(*variant, lambda done, total: progress(done, total, None))
-    if not sim_core.is_compiled(*variant):
-        print_remarks(["compiled code cannot be kept: set NUMBA_CACHE_DIR to a folder of your own"])
+    compile_for(design, chamber, cavity, lambda text: print_remarks([text]))
 
 
 def advise_effects(design: Design, chamber: Chamber) -> list[dict[str, object]]:

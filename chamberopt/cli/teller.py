@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from chamberopt.cli.console import print_remarks, print_warnings
 from chamberopt.cli.prepare import compile_with_message
 from chamberopt.common.progress import step
-from chamberopt.workflows.simulate import Teller
+from chamberopt.workflows.simulate import StepTeller
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -20,11 +20,8 @@ if TYPE_CHECKING:
     from sim_core import AnalyticCavity
 
 
-class TerminalTeller(Teller):
+class TerminalTeller(StepTeller):
     """Show on stderr the steps, compilation and warnings that a workflow reports."""
-
-    def step(self, what: str, total: int | None = None) -> AbstractContextManager[Progress]:
-        return step(what, total)
 
     def compile(self, design: Design, chamber: Chamber, cavity: AnalyticCavity | None) -> None:
         compile_with_message(design, chamber, cavity)

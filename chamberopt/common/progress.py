@@ -12,6 +12,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
+from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any, TextIO
 
 if TYPE_CHECKING:
@@ -44,7 +45,8 @@ def step(
     `total` is the number of items to do, if it is known at the beginning.
 
     On a terminal the step has a line on stderr (or `stream`) from its beginning to its end, below
-    the line of the step in whose `with` block it runs. To a log or a pipe, a long step writes a
+    the line of the step in whose `with` block it runs. In a Jupyter notebook the line is below the
+    cell. To a log or a pipe, a long step writes a
     plain line now and then.
     """
     stream = stream or sys.stderr
@@ -56,7 +58,7 @@ def step(
         finally:
             print(json.dumps({"step": what, "ended": True}), file=stream, flush=True)
         return
-    if not _displays and not stream.isatty():
+    if not _displays and not stream.isatty() and not _is_notebook():
         yield _log_lines(what, stream)
         return
     with _display(stream) as display:
@@ -68,6 +70,18 @@ def step(
         finally:
             display.refresh()
             display.remove_task(row)
+
+
+def _is_notebook() -> bool:
+    """Return True in a Jupyter notebook that can show a display which changes.
+
+    rich draws it with ipywidgets. Without them, only lines of a log can be shown.
+    """
+    if "IPython" not in sys.modules or find_spec("ipywidgets") is None:
+        return False
+    from rich.console import Console
+
+    return Console().is_jupyter
 
 
 def _update(display: Display, row: Any, done: int, total: int, best: float | None) -> None:

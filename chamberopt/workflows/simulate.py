@@ -1,7 +1,7 @@
 """Simulate a design into a folder. Python users and the command line share this workflow.
 
-The workflow reports its steps to an object, a Teller. The class of this module is silent. The
-command line has a subclass that prints.
+The workflow reports its steps to an object, a Teller. One class of this module is silent, the other
+shows progress. The command line has a subclass that prints.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 from chamberopt.chamber.analytic import analytic_cavity
 from chamberopt.chamber.build import build_chamber
+from chamberopt.common.progress import step
 from chamberopt.coverage.field.memory import PROCESS, evaluation_bytes, how_many_fit
 from chamberopt.design.ranges import variants
 from chamberopt.peening.calibration_errors import evaluate_calibrated
@@ -21,6 +22,7 @@ from chamberopt.peening.tolerances import simulate_tolerances
 from chamberopt.simulation.effect_pilot import with_effects_resolved
 from chamberopt.simulation.effort import Effort
 from chamberopt.simulation.evaluate import ReplicaPlan
+from chamberopt.workflows.compile import compile_for
 from chamberopt.workflows.ranges import EndError, simulate_ranges
 from chamberopt.workflows.save_run import save_simulation
 
@@ -40,7 +42,7 @@ class Teller:
     """The object to which a workflow reports its steps.
 
     This class reports nothing but the progress of counted steps, to the function that it was given.
-    The command line has a subclass that prints.
+    StepTeller shows all steps. The command line has a subclass of it that prints.
     """
 
     def __init__(self, progress: Progress | None = None) -> None:
@@ -76,6 +78,28 @@ class Teller:
 
     def tell(self, text: str) -> None:
         """Tell the user a sentence. This class ignores it."""
+
+
+class StepTeller(Teller):
+    """Show the steps of a workflow in the terminal or notebook, each with its progress."""
+
+    def step(self, what: str, total: int | None = None) -> AbstractContextManager[Progress]:
+        return step(what, total)
+
+    def compile(self, design: Design, chamber: Chamber, cavity: AnalyticCavity | None) -> None:
+        compile_for(design, chamber, cavity, self.tell)
+
+
+def teller_of(progress: Progress | bool) -> Teller:
+    """Return the Teller for the argument `progress` of the functions that Python users call.
+
+    Args:
+        progress: True to show all steps, False for none, or the function to call with the progress
+            of counted steps.
+    """
+    if progress is True:
+        return StepTeller()
+    return Teller(progress or None)
 
 
 def _uncounted(done: int, total: int, best: float | None) -> None:

@@ -1,6 +1,10 @@
 """From Python: the names are there, and what is no design, study or result is named."""
 
+import builtins
+import io
+import sys
 from pathlib import Path
+from types import ModuleType
 
 import pytest
 
@@ -29,6 +33,53 @@ def test_what_is_none_is_named_with_its_maker(name, call, tmp_path: Path) -> Non
     with pytest.raises(InputError, match=rf"^{name}: given .*chamberopt\.load_{name}"):
         call(tmp_path / "out")
     assert not (tmp_path / "out").exists()
+
+
+class Terminal(io.StringIO):
+    """A stream that says it is a terminal."""
+
+    def isatty(self) -> bool:
+        return True
+
+
+def test_progress_is_shown_unless_it_is_not_wanted(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Bars by default, nothing, or calls of a function: the figures are the same."""
+    monkeypatch.setattr("chamberopt.workflows.save_run.draw_coverage", lambda *_: None)
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setenv("COLUMNS", "120")
+    brief = {"replicas": 3, "simulated_time_s": 0.05, "warmup_time_s": 0.01}
+    design = plate_design(**{f"process__accuracy__{name}": value for name, value in brief.items()})
+    calls: list[tuple[object, ...]] = []
+    shown, found = {}, set()
+    for name, progress in (
+        ("bars", True), ("none", False), ("called", lambda *now: calls.append(now)),
+    ):  # fmt: skip
+        terminal = Terminal()
+        monkeypatch.setattr(sys, "stderr", terminal)
+        out = tmp_path / name
+        result = chamberopt.simulate(design, out, ranges=False, workers=1, progress=progress)
+        shown[name] = terminal.getvalue()
+        found.add(result.objective.value)
+    assert "building the chamber" in shown["bars"]
+    assert "3/3" in shown["bars"]
+    assert (shown["none"], shown["called"]) == ("", "")
+    assert calls[-1] == (3, 3, None)
+    assert len(found) == 1
+
+
+def test_in_a_notebook_progress_is_drawn_as_in_a_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As Jupyter's kernel is recognised: its stderr is no terminal."""
+    from chamberopt.common import progress
+
+    assert not progress._is_notebook()
+    shell = type("ZMQInteractiveShell", (), {})()
+    monkeypatch.setattr(builtins, "get_ipython", lambda: shell, raising=False)
+    monkeypatch.setitem(sys.modules, "IPython", ModuleType("IPython"))
+    for spec, drawn in ((object(), True), (None, False)):  # without ipywidgets: lines of a log
+        monkeypatch.setattr(progress, "find_spec", lambda _, spec=spec: spec)
+        assert progress._is_notebook() is drawn
 
 
 def test_designs_are_compared_and_a_strip_is_peened(
