@@ -1,4 +1,4 @@
-"""The Python of the README and of docs/science.md runs as printed, and named files exist.
+"""The Python of the README and of two pages of docs/ runs as printed, and named files exist.
 
 The README's gear has fewer and larger balls and replicas here, so that it takes seconds.
 """
@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import chamberopt
 from chamberopt.pictures.subprocess_drawing import missing_opengl
 
 ROOT = Path(__file__).parents[1]
@@ -57,6 +58,21 @@ def test_the_page_for_science_prints_what_it_shows(tmp_path: Path) -> None:
     assert re.sub(NUMBER, "", printed).split() == re.sub(NUMBER, "", shown).split()
     seen, expected = (np.array(re.findall(NUMBER, text), float) for text in (printed, shown))
     np.testing.assert_allclose(seen, expected, rtol=0.1, atol=0.02)
+
+
+def test_the_page_on_python_runs_as_one_program(tmp_path: Path) -> None:
+    pytest.importorskip("pandas")
+    for name in ("designs", "studies"):
+        (tmp_path / name).symlink_to(ROOT / name)
+    page = (ROOT / "docs/python.md").read_text(encoding="utf-8")
+    printed = run("".join(re.findall(BLOCK.format("python"), page, re.DOTALL)), tmp_path)
+    for expected in ("±", "mean_normal_speed", "m/s", "replica", "ring.ply"):
+        assert expected in printed
+
+
+def test_the_page_on_python_has_every_name() -> None:
+    page = (ROOT / "docs/python.md").read_text(encoding="utf-8")
+    assert [name for name in chamberopt.__all__ if f"`{name}`" not in page] == []
 
 
 def test_files_named_in_the_readme_exist() -> None:
