@@ -25,6 +25,7 @@ if TYPE_CHECKING:
         simulate,
         sweep,
         trials,
+        view,
         with_part,
     )
 
@@ -47,6 +48,7 @@ __all__ = [
     "simulate",
     "sweep",
     "trials",
+    "view",
     "with_part",
 ]
 

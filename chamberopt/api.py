@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from chamberopt.design.calibration import Calibration
     from chamberopt.export.formats import FrameName
     from chamberopt.peening.virtual_strip import VirtualStrip
+    from chamberopt.printers.notebook import PartsView
     from chamberopt.results.compare.comparison import Comparison
     from chamberopt.search.run_sweep import SweepResult
     from chamberopt.simulation.convergence import ConvergenceStudy
@@ -64,6 +65,7 @@ __all__ = [
     "simulate",
     "sweep",
     "trials",
+    "view",
     "with_part",
 ]
 
@@ -327,6 +329,21 @@ def show(result: Result, screenshot: str | Path | None = None) -> None:
 
     _require("result", result, Result, "load_result")
     inspect([result_info(result)], ViewState(), screenshot)
+
+
+def view(*results: Result) -> PartsView:
+    """Return the parts of results in 3D, side by side, to be shown at the end of a notebook's cell.
+
+    The view is that of a report: it turns, is coloured by each quantity, and is cut and measured.
+    The notebook then holds the part, some MB. Raises InputError for a part that is too large.
+    """
+    from chamberopt.printers.notebook import PartsView
+
+    if not results:
+        raise InputError("view: given no result; give one or more, as chamberopt.load_result reads")
+    for result in results:
+        _require("result", result, Result, "load_result")
+    return PartsView(results)
 
 
 def with_part(design: Design, mesh: Trimesh | PolyData, file: str | Path, *, unit: str) -> Design:

@@ -1,12 +1,15 @@
 """Show a design, a study or a result in a notebook: an overview beside a picture.
 
-The HTML holds its picture, fetches nothing and runs no script. printers.html escapes all text.
+The HTML holds its picture, fetches nothing and runs no script. printers.html escapes all text. Only
+the 3D view of results needs a script, which a frame keeps from the notebook.
 """
 
 from __future__ import annotations
 
 import base64
 from collections.abc import Sequence
+from dataclasses import dataclass
+from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,6 +22,7 @@ from chamberopt.pictures.coverage import draw_coverage
 from chamberopt.pictures.part import draw_part
 from chamberopt.pictures.part3d import PartScene
 from chamberopt.printers import html
+from chamberopt.printers.report_page import part_page
 from chamberopt.results.load import summary
 
 if TYPE_CHECKING:
@@ -46,6 +50,24 @@ def study_html(study: Study) -> str:
 def result_html(result: Result) -> str:
     """Return the overview of a result as HTML, with the coverage drawn on its part."""
     return _shown(result_overview(result), *_coverage(result))
+
+
+@dataclass(frozen=True)
+class PartsView:
+    """The parts of results in 3D, side by side, for the end of a notebook's cell.
+
+    It is the view of the report and of the page in the browser, in a frame of its own: its script
+    reaches nothing of the notebook, and fetches nothing.
+    """
+
+    results: Sequence[Result]
+    height: int = 760  # of the frame, in pixels
+
+    def _repr_html_(self) -> str:
+        page, _ = part_page(self.results)
+        style = f"width:100%;height:{self.height}px;border:0"
+        inside = escape(page, quote=True)
+        return f'<iframe sandbox="allow-scripts" style="{style}" srcdoc="{inside}"></iframe>'
 
 
 def _built(design: Design) -> tuple[Chamber | None, str]:

@@ -89,14 +89,24 @@ def write_part_page(results: Sequence[Path], path: Path) -> list[str]:
             holds anything but a page of this program.
     """
     with claim_file(require_free_page(path)):
-        loaded = [load_result(one) for one in results]
-        names, scenes = _scenes(loaded)
-        summaries = [f"{name}: {summary(one)}" for name, one in zip(names, loaded, strict=True)]
-        title = ", ".join(names)
-        parts = Section("Part in its chamber", [Items(summaries), PartView(scenes)])
-        content = html.section(parts, viewer)
-        write_page(path, title, f"<header><h1>{html.text(title)}</h1></header>{content}", scenes)
-    return [remark for scene in scenes for remark in scene.remarks]
+        page, remarks = part_page([load_result(one) for one in results])
+        write_text(path, page)
+    return remarks
+
+
+def part_page(loaded: Sequence[Result]) -> tuple[str, list[str]]:
+    """Return the text of a page with the parts of results in 3D, side by side, and remarks.
+
+    Raises:
+        InputError: a part is too large for a page.
+    """
+    names, scenes = _scenes(loaded)
+    summaries = [f"{name}: {summary(one)}" for name, one in zip(names, loaded, strict=True)]
+    title = ", ".join(names)
+    parts = Section("Part in its chamber", [Items(summaries), PartView(scenes)])
+    content = html.section(parts, viewer)
+    page = page_text(title, f"<header><h1>{html.text(title)}</h1></header>{content}", scenes)
+    return page, [remark for scene in scenes for remark in scene.remarks]
 
 
 def parts_content(results: Sequence[Path]) -> tuple[str, dict[str, object]]:
@@ -203,7 +213,12 @@ def viewer(scenes: Sequence[PartScene]) -> str:
 
 
 def write_page(path: Path, title: str, body: str, scenes: Sequence[PartScene]) -> None:
-    """Write an HTML page from the HTML of its body, whole or not at all.
+    """Write an HTML page, as `page_text` returns it, whole or not at all."""
+    write_text(path, page_text(title, body, scenes))
+
+
+def page_text(title: str, body: str, scenes: Sequence[PartScene]) -> str:
+    """Return the text of an HTML page from the HTML of its body.
 
     Args:
         scenes: parts in 3D that the body shows.
@@ -212,7 +227,7 @@ def write_page(path: Path, title: str, body: str, scenes: Sequence[PartScene]) -
     if drawn := [scene.data for scene in scenes if scene.data]:
         data = html.embedded_json(_content(drawn), "parts")
     scripts = "</script><script>".join(map(_asset, SCRIPTS))
-    page = (
+    return (
         '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
         f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">'
         f'{GENERATOR} {html.text(version("chamberopt"))}">'
@@ -221,7 +236,6 @@ def write_page(path: Path, title: str, body: str, scenes: Sequence[PartScene]) -
         f"<body><main>{body}</main>\n{data}\n"
         f"<script>{scripts}</script></body></html>\n"
     )
-    write_text(path, page)
 
 
 def _content(drawn: Sequence[dict[str, object]]) -> dict[str, object]:

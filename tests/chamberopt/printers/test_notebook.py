@@ -4,6 +4,7 @@ Names of files may hold markup. Pictures are not drawn here, but their bytes mus
 """
 
 import base64
+import html
 import re
 import shutil
 import subprocess
@@ -16,6 +17,7 @@ import pytest
 
 import chamberopt.api
 from chamberopt.chamber.build import build_chamber
+from chamberopt.common.errors import InputError
 from chamberopt.common.notebook import html_of
 from chamberopt.documents.wording import metric_label
 from chamberopt.printers import notebook
@@ -143,6 +145,26 @@ def test_a_result_gives_its_figures_with_intervals(
     (folder / "coverage.png").write_text("<script>", encoding="utf-8")
     assert shown(result).sources
     assert len(pictures) == 2
+
+
+def test_the_view_in_3d_is_kept_in_its_frame(
+    hostile: Path, tmp_path: Path, pictures: list[str]
+) -> None:
+    folder = tmp_path / (HOSTILE.replace("/", "") if sys.platform != "win32" else "a result")
+    design = plate_design().changed({"part.mesh": hostile})
+    chamber = build_chamber(design)
+    save_simulation(folder, design, chamber, poisson_evaluation(design, chamber))
+    frame = chamberopt.view(chamberopt.load_result(folder))._repr_html_()
+    found = Tags(frame)
+    assert found.names == {"iframe"}
+    assert 'sandbox="allow-scripts" ' in frame  # not allow-same-origin
+    page = html.unescape(frame.partition('srcdoc="')[2].rpartition('"')[0])
+    assert page.startswith("<!DOCTYPE html>")
+    assert "default-src 'none'" in page
+    assert "<script>alert(1)" not in page
+    assert "&lt;script&gt;alert(1)" in page
+    with pytest.raises(InputError, match="view: given no result"):
+        chamberopt.view()
 
 
 def test_objects_nobody_told_of_are_shown_as_text() -> None:

@@ -162,3 +162,27 @@ def test_a_narrow_window_needs_no_scrolling_sideways(
     assert np.abs(narrow.pixels("#part-0") - first).max() > 0.2
     assert np.abs(narrow.pixels("#part-1") - second).max() > 0.2
     assert narrow.errors == []
+
+
+def test_a_notebook_shows_the_same_view_in_a_frame(
+    browser: Any, study: Path, tmp_path: Path
+) -> None:
+    """Jupyter inserts what `_repr_html_` returns into its own page."""
+    from chamberopt.api import load_result, view
+
+    cell = tmp_path / "cell.html"
+    frame = view(load_result(study / "start"), load_result(study))._repr_html_()
+    cell.write_text(f"<body><div>{frame}</div></body>", encoding="utf-8")
+    errors, requests = [], []
+    page = browser.new_page(viewport={"width": 1280, "height": 900})
+    page.on("pageerror", lambda error: errors.append(str(error)))
+    page.on("request", lambda request: requests.append(request.url))
+    page.goto(cell.as_uri())
+    inside = page.frame_locator("iframe")
+    expect(inside.locator(DRAWN)).to_be_visible(timeout=WAIT)
+    expect(inside.locator(".part canvas")).to_have_count(2)
+    picture = imread(io.BytesIO(page.locator("iframe").screenshot()), format="png")[..., :3]
+    assert len(np.unique(np.round(picture.reshape(-1, 3), 1), axis=0)) > 20
+    assert [one for one in requests if not one.startswith(("file:", "about:"))] == []
+    assert errors == []
+    page.close()
