@@ -87,7 +87,7 @@ def clamped_outside(made: Proposal, floor: Floor, shop: Shop | None) -> Proposal
     tables = _with_table(
         made.tables, "sonotrode", "holder", {"kind": "bore", "clearance_mm": most_mm}
     )
-    text = "the part's own end, clamped outside in a split wall; play, or a soft lip that seals it"
+    text = "the part's own end, clamped outside; wider play takes a soft lip in a split wall"
     reasons = {**made.reasons, "holder.kind": text}
     return checked(tables, reasons, floor, made.known, made.mesh, shop)
 
