@@ -186,12 +186,16 @@ def propose_ranges(
         ball_mass: mass of one ball [kg].
     """
     distance, height = round(1e3 * sizes.distance), round(1e3 * sizes.height)
-    near = max(round(0.4 * distance), math.ceil(2.0 * ball_mm))
+    # Where the part is held outside, the ceiling stays near the place at which it goes out.
+    least, most_mm = (
+        (0.75, height + round(0.25 * distance)) if sizes.through_ceiling else (0.4, LARGEST_MM)
+    )
+    near = max(round(least * distance), math.ceil(2.0 * ball_mm))
     # The ceiling stays above the part even when the part is highest, so that no ball is caught.
     under = math.floor(height - 1e3 * sizes.top - 2.0 * ball_mm)
     far = max(distance, min(round(1.25 * distance), under))
     low = math.ceil(far + 1e3 * sizes.top + 2.0 * ball_mm)
-    high = min(round(1.5 * height), LARGEST_MM)
+    high = min(round(1.5 * height), most_mm)
     digit = _second_digit(mass_g)
     least, most = (digit * round(share * mass_g / digit) for share in (LIGHTER, HEAVIER))
     mass = (least, min(most, _heaviest_g(ball_mass)), digit)
