@@ -43,7 +43,14 @@ def code_of(notebook: Path) -> str:
     return "\n".join(parts)
 
 
-@pytest.mark.parametrize("notebook", NOTEBOOKS, ids=lambda path: path.stem)
+QUICK = "first_chamber"  # the others take as long again
+CASES = [
+    pytest.param(one, marks=() if one.stem == QUICK else pytest.mark.long, id=one.stem)
+    for one in NOTEBOOKS
+]
+
+
+@pytest.mark.parametrize("notebook", CASES)
 def test_the_notebook_runs_as_it_stands(notebook: Path, tmp_path: Path) -> None:
     code = code_of(notebook)
     if ".impacts(" in code or ".fields(" in code:

@@ -1,5 +1,6 @@
 """Bores that take an arbor, and parts that turn about one: bodies whose bores are known."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,7 @@ from chamberopt.chamber.propose.proposed_arbor import (
     turning_pose,
 )
 from chamberopt.chamber.propose.proposed_holder import holder_choices
+from chamberopt.chamber.propose.proposed_target import Surface
 from chamberopt.geometry.meshes.part_mesh import PartMesh
 from chamberopt.geometry.meshes.raw_mesh import number_by_position
 from chamberopt.geometry.triangles import rotation_matrix
@@ -111,6 +113,23 @@ def test_a_ring_of_alike_teeth_turns_about_its_bore() -> None:
     assert first.keys["both_sides"]
 
 
+def test_a_ring_is_proposed_to_turn_on_an_arbor(tmp_path: Path) -> None:
+    """Its outside is a target alike all round; at rest balls would lie on its upper face."""
+    trimesh.creation.annulus(10.0, 30.0, 12.0, sections=24).export(tmp_path / "ring.stl")
+
+    def outside(known: Sequence[Surface]) -> list[str]:
+        return [max(known, key=lambda one: np.hypot(*one.keys["faces"][0]["at_mm"][:2])).name]
+
+    made = propose(tmp_path / "ring.stl", Wanted("mm"), outside)
+    turn, holder = made.design.effects.part_turn, made.design.holder
+    assert turn is not None
+    assert holder is not None
+    assert (holder.kind, holder.both_sides) == ("arbor", True)
+    assert abs(holder.axis[2]) < 1e-6
+    assert not made.warnings
+
+
+@pytest.mark.long
 def test_a_disc_on_whose_web_balls_would_lie_turns_on_an_arbor(tmp_path: Path) -> None:
     part = MORE_PARTS["turbine_disc"].write(tmp_path)
     made = propose(part, Wanted("m"), lambda _: [])

@@ -147,7 +147,7 @@ def test_a_jaw_holds_an_end_of_any_form_beside_the_target() -> None:
 
 def test_a_leaf_is_held_by_an_end_left_out_of_its_target(tmp_path: Path) -> None:
     """Broad sides reach both ends: a block on the edge of the upper one alone holds no leaf."""
-    trimesh.creation.box((170, 5, 36)).subdivide_to_size(6.0).export(tmp_path / "leaf.stl")
+    trimesh.creation.box((170, 5, 36)).subdivide_to_size(20.0).export(tmp_path / "leaf.stl")
     made = propose(tmp_path / "leaf.stl", Wanted("mm"), lambda _: [])
     assert made.design.holder is not None
     assert made.design.holder.grip_mm is not None
