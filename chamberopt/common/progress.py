@@ -46,8 +46,7 @@ def step(
 
     On a terminal the step has a line on stderr (or `stream`) from its beginning to its end, below
     the line of the step in whose `with` block it runs. In a Jupyter notebook the line is below the
-    cell. To a log or a pipe, a long step writes a
-    plain line now and then.
+    cell. To a log or a pipe, a long step writes a plain line now and then.
     """
     stream = stream or sys.stderr
     if _json_lines:

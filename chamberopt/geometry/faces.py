@@ -59,6 +59,21 @@ class Faces:
         middle = np.average(middles, axis=0, weights=self._weight[own] + 1e-30)
         return np.asarray(middles[np.linalg.norm(middles - middle, axis=1).argmin()])
 
+    def place_mm(self, face: int) -> list[float]:
+        """Return the point of `place` in mm, to the micrometre, as design files have it."""
+        return [round(1e3 * float(x), 3) + 0.0 for x in self.place(face)]
+
+    def free_of(self, marked: np.ndarray) -> np.ndarray:
+        """Return which faces (count,) have none of the marked triangles (m,)."""
+        return np.asarray(np.bincount(self.of_triangle, marked) == 0.0)
+
+    @cached_property
+    def area_vectors(self) -> np.ndarray:
+        """Sum of the outward area vectors of each face [m²], (count, 3)."""
+        vectors = self._normal * self._weight[:, None]
+        sums = [np.bincount(self.of_triangle, one, self.count) for one in vectors.T]
+        return np.stack(sums, axis=1)
+
     def alike(self, face: int) -> np.ndarray:
         """Return marks (count,) of the faces that are congruent with the face of number `face`.
 

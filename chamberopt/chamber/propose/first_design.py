@@ -184,23 +184,21 @@ def _proposed(
         """
         best: tuple[Proposal, Floor] | None = None
         refused: InputError | None = None
+        common, pose, why_so, form = tables, turns, pose_reason, wanted
+        if turning is not None:
+            pose, turn = turning_pose(turning, mesh)
+            common = {**tables, "effects": {**tables["effects"], "part_turn": turn}}
+            why_so = "on its axis, about which it turns, so that all of it passes the shot"
+            form = replace(wanted, shape=wanted.shape or "box")
         for number, wider in enumerate(WIDER):
             progress(number, len(WIDER), None)
             try:
-                own, pose_why, placed, form = dict(tables), pose_reason, turns, wanted
-                if turning is not None:
-                    placed, turn = turning_pose(turning, mesh)
-                    own["effects"] = {**own["effects"], "part_turn": turn}
-                    pose_why = (
-                        "on its axis, about which it turns, so that all of it passes the shot"
-                    )
-                    form = replace(wanted, shape=wanted.shape or "box")
-                placed, floor = _place(mesh, target, placed, diameter, form, wider, is_local)
-                pose = {"rotate_deg": list(placed)}
+                placed, floor = _place(mesh, target, pose, diameter, form, wider, is_local)
+                part = {**tables["part"], "rotate_deg": list(placed)}
                 if any(floor.offset_mm):
-                    pose["offset_mm"] = list(floor.offset_mm)
-                own |= {"part": {**tables["part"], **pose}, **_floor_tables(floor)}
-                words = {"part.rotate_deg": f"{pose_in_words(mesh, known, placed)}: {pose_why}"}
+                    part["offset_mm"] = list(floor.offset_mm)
+                own = {**common, "part": part, **_floor_tables(floor)}
+                words = {"part.rotate_deg": f"{pose_in_words(mesh, known, placed)}: {why_so}"}
                 why = {**reasons, **words, **_floor_reasons(floor, is_local)}
                 made = checked(own, why, floor, known, mesh, wanted.shop)
             except UnreadableError:

@@ -11,7 +11,14 @@ import numpy as np
 
 from chamberopt.chamber.build import build_chamber
 from chamberopt.chamber.checks.place_names import one_of
-from chamberopt.chamber.propose.proposal import Proposal, Tables, checked, faults, touched_share
+from chamberopt.chamber.propose.proposal import (
+    Proposal,
+    Tables,
+    checked,
+    faults,
+    touched,
+    touched_share,
+)
 from chamberopt.chamber.propose.proposed_arbor import Bore
 from chamberopt.chamber.propose.proposed_end import HeldEnd
 from chamberopt.chamber.propose.proposed_floor import Floor
@@ -19,7 +26,6 @@ from chamberopt.chamber.propose.proposed_holder import end_holder, holder_choice
 from chamberopt.chamber.propose.proposed_mask import are_holes, pads, to_be_masked, to_be_plugged
 from chamberopt.chamber.propose.proposed_target import LONG, Target
 from chamberopt.chamber.propose.shop import Shop
-from chamberopt.chamber.reach import reached_part_share
 from chamberopt.common.errors import InputError, UnreadableError
 from chamberopt.common.progress import Progress
 from chamberopt.design.fixture import USUAL_SHELL_MM, WIDEST_GAP, Holder
@@ -44,9 +50,6 @@ def held(
 ) -> Proposal:
     """Return a proposal with the first holder that does no harm, or without one and the reason.
 
-    A holder does harm if no chamber can be built with it somewhere in the ranges of the study, if
-    balls jam beside it, or if it keeps the balls from some of the target.
-
     Args:
         free: the proposal without a holder.
         end: an end that is left out of the target to hold the part by, if there is one.
@@ -63,20 +66,10 @@ def held(
         tables = _with_table(free.tables, "sonotrode", "holder", one.keys)
         height = "sonotrode to ceiling; what holds the part goes on to the wall"
         reasons = {**free.reasons, "holder.kind": one.reason, "chamber.height_mm": height}
-        try:
-            made = _checked_at_extremes(tables, reasons, floor, free, shop)
-        except UnreadableError:
-            raise
-        except InputError as error:
-            why = why or str(error)
-            continue
-        if touched_share(free) - touched_share(made) > HIDDEN:
-            why = why or "a holder would keep the balls from some of the target"
-        elif faults(made) > faults(free):
-            new = [text for text in made.warnings if text not in free.warnings]
-            why = why or f"a {one.keys['kind']} would bring a warning: {(new or made.warnings)[0]}"
-        else:
+        made, harm = _harmless(tables, reasons, floor, free, shop, one.keys["kind"])
+        if made is not None:
             return made
+        why = why or harm
     text = f"sonotrode to ceiling; NOTHING HOLDS THE PART: {why}"
     return replace(free, reasons={**free.reasons, "chamber.height_mm": text})
 
@@ -108,8 +101,8 @@ def is_firm(holder: Holder) -> bool:
 def padded(made: Proposal, floor: Floor, target: Target, shop: Shop | None) -> Proposal:
     """Return a proposal with a pad on the level top of a part on which balls would come to rest.
 
-    The pad goes up to the ceiling, against which it clamps the part, so that a holder which stands
-    on a face is left out. Where a pad would do harm, the proposal stays as it is.
+    The pad goes up to the ceiling. The part is screwed to it, so that a holder which stands on a
+    face is left out. Where a pad would do harm, the proposal stays as it is.
     """
     rests = any("come to rest on the part" in text for text in made.warnings)
     if "mask" in made.tables or not rests:
@@ -121,22 +114,14 @@ def padded(made: Proposal, floor: Floor, target: Target, shop: Shop | None) -> P
         choices.reverse()
     for at in pads(made.mesh, target.triangles, turns, diameter):
         for tables in choices:
-            after = "holder" if "holder" in tables else "sonotrode"
-            own = _with_table(tables, after, "mask", {"axis": [0.0, 0.0, 1.0], "at": at})
+            own = _with_mask(tables, {"axis": [0.0, 0.0, 1.0], "at": at})
             text = "a pad on the level top, up to the ceiling: no ball lies there; screw it on"
             height = "sonotrode to ceiling; a pad on the part's top goes on to it"
             reasons = {**made.reasons, "mask.axis": text, "chamber.height_mm": height}
             if "holder" not in own:
                 reasons.pop("holder.kind", None)
-            try:
-                other = _checked_at_extremes(own, reasons, floor, made, shop)
-            except UnreadableError:
-                raise
-            except InputError:
-                continue
-            hidden = touched_share(made) - touched_share(other)
-            is_held = not other.chamber.pieces_in_air
-            if is_held and hidden <= HIDDEN and faults(other) < faults(made):
+            other, _ = _harmless(own, reasons, floor, made, shop)
+            if other and not other.chamber.pieces_in_air and faults(other) < faults(made):
                 return other
     return made
 
@@ -144,14 +129,13 @@ def padded(made: Proposal, floor: Floor, target: Target, shop: Shop | None) -> P
 def masked(bare: Proposal, floor: Floor, bores: Sequence[Bore], shop: Shop | None) -> Proposal:
     """Return a proposal with a mask on what must not be peened, where that does no harm.
 
-    Holes are plugged, also those that a wall cuts and through which balls would leave. Harm is that
-    of a holder. Where a mask would do some, the surfaces stay bare and are named.
+    Holes are plugged, also those that a wall cuts and through which balls would leave. Where a mask
+    would do harm, the surfaces stay bare and are named.
     """
     names = to_be_masked(bare.design, bare.chamber, bare.known)
     holes = to_be_plugged(bare.design, bare.chamber, bores, names)
     if not (names or holes) or bare.design.effects.part_turn is not None:
         return bare
-    after = "holder" if "holder" in bare.tables else "sonotrode"
     if holes and are_holes(bare.mesh, bare.known, names, holes):
         sizes = ", ".join(f"{2e3 * one.radius:.3g}" for one in holes)
         text = f"in holes of {sizes} mm, not to be peened, or open to the outside"
@@ -160,15 +144,7 @@ def masked(bare: Proposal, floor: Floor, bores: Sequence[Bore], shop: Shop | Non
         text = f"a cap on {', '.join(names)}: not to be peened, by the name"
         keys = {"thickness_mm": USUAL_SHELL_MM, "at": {"surface": names}}
     reasons = {**bare.reasons, f"mask.{next(iter(keys))}": text}
-    tables = _with_table(bare.tables, after, "mask", keys)
-    try:
-        made = _checked_at_extremes(tables, reasons, floor, bare, shop)
-    except UnreadableError:
-        raise
-    except InputError:
-        return bare
-    hidden = touched_share(bare) - touched_share(made)
-    return bare if hidden > HIDDEN or faults(made) > faults(bare) else made
+    return _harmless(_with_mask(bare.tables, keys), reasons, floor, bare, shop)[0] or bare
 
 
 def only_touched(made: Proposal, floor: Floor, shop: Shop | None) -> Proposal:
@@ -182,8 +158,7 @@ def only_touched(made: Proposal, floor: Floor, shop: Shop | None) -> Proposal:
         return made
     target = {**made.tables["part.target"], "reachable": True}
     part = made.chamber.part
-    touched = reached_part_share(made.reach, made.chamber.source, len(part.triangles))
-    left = np.where(part.target, (1.0 - touched) * part.area, 0.0)
+    left = np.where(part.target, (1.0 - touched(made)) * part.area, 0.0)
     place = one_of(part.vertices[part.triangles].mean(axis=1), left)
     text = f"leaves out the {hidden:.1%} that no ball touches here, such as at {place}"
     reasons = {**made.reasons, "part.target.reachable": text}
@@ -191,19 +166,43 @@ def only_touched(made: Proposal, floor: Floor, shop: Shop | None) -> Proposal:
     return checked(tables, reasons, floor, made.known, made.mesh, shop)
 
 
-def _checked_at_extremes(
-    tables: Tables, reasons: dict[str, str], floor: Floor, made: Proposal, shop: Shop | None
-) -> Proposal:
-    """Return a proposal with these tables in the place of one's own.
+def _harmless(
+    tables: Tables,
+    reasons: dict[str, str],
+    floor: Floor,
+    before: Proposal,
+    shop: Shop | None,
+    kind: str = "mask",
+) -> tuple[Proposal | None, str]:
+    """Return a proposal with these tables in the place of one's own, or None and the harm they do.
 
-    Raises InputError if a chamber cannot be built with them somewhere in the ranges of the study.
+    Harm is done if no chamber can be built with them somewhere in the ranges of the study, if they
+    bring a warning, or if they keep the balls from some of the target.
+
+    Args:
+        kind: what the tables add, for the words.
     """
-    other = checked(tables, reasons, floor, made.known, made.mesh, shop)
+    try:
+        made = checked(tables, reasons, floor, before.known, before.mesh, shop)
+        _build_at_extremes(made)
+    except UnreadableError:
+        raise
+    except InputError as error:
+        return None, str(error)
+    if touched_share(before) - touched_share(made) > HIDDEN:
+        return None, "a holder would keep the balls from some of the target"
+    if faults(made) > faults(before):
+        new = [text for text in made.warnings if text not in before.warnings]
+        return None, f"a {kind} would bring a warning: {(new or made.warnings)[0]}"
+    return made, ""
+
+
+def _build_at_extremes(made: Proposal) -> None:
+    """Raise InputError if a chamber cannot be built somewhere in the ranges of the study."""
     # Where the part no longer goes out, a study leaves a candidate out: no reason against a mask.
-    free = {"holder": None} if other.design.holder and other.design.holder.kind == "bore" else {}
-    for extreme in _extremes(other.bounds):
-        build_chamber(other.design.changed({**extreme, **free}))
-    return other
+    free = {"holder": None} if made.design.holder and made.design.holder.kind == "bore" else {}
+    for extreme in _extremes(made.bounds):
+        build_chamber(made.design.changed({**extreme, **free}))
 
 
 def _with_table(tables: Tables, after: str, name: str, values: dict[str, Any]) -> Tables:
@@ -212,6 +211,11 @@ def _with_table(tables: Tables, after: str, name: str, values: dict[str, Any]) -
     for key, one in tables.items():
         added |= {key: one, name: values} if key == after else {key: one}
     return added
+
+
+def _with_mask(tables: Tables, values: dict[str, Any]) -> Tables:
+    after = "holder" if "holder" in tables else "sonotrode"
+    return _with_table(tables, after, "mask", values)
 
 
 def _extremes(bounds: dict[str, dict[str, Any]]) -> list[dict[str, Any]]:

@@ -7,10 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from chamberopt.chamber.part import chosen_triangles
-from chamberopt.chamber.propose.proposal import Proposal
+from chamberopt.chamber.propose.proposal import Proposal, touched_share
 from chamberopt.chamber.propose.proposed_mask import is_met
 from chamberopt.chamber.propose.proposed_target import SELDOM
-from chamberopt.chamber.reach import reached_part_share
 from chamberopt.geometry.triangles import area_vectors, areas, rotation_matrix, unit_vectors
 
 AWAY_DEG = 105.0  # angle to the way down from which on a face is turned away from the sonotrode
@@ -50,9 +49,7 @@ def find_left_out(proposal: Proposal) -> list[LeftOut]:
         direction = [round(float(x), 4) + 0.0 for x in down]
         keys: dict[str, object] = {"direction": direction, "angle_deg": [0.0, AWAY_DEG]}
         found.append(LeftOut(keys, f"the {share:.0%} that face away from the sonotrode ({named})"))
-    posed = chamber.part
-    touched = reached_part_share(proposal.reach, chamber.source, len(posed.triangles))
-    hidden = 1.0 - touched[posed.target] @ posed.area[posed.target] / posed.area[posed.target].sum()
+    hidden = 1.0 - touched_share(proposal)
     if hidden > LEAST and not part.target.reachable:
         found.append(LeftOut({"reachable": True}, f"the {hidden:.0%} that no ball touches here"))
     seldom = [one for one in proposal.known if SELDOM.search(one.name)]

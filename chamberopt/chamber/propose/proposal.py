@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from chamberopt.chamber.build import Chamber, build_chamber
 from chamberopt.chamber.checks.check import shot_reach, warnings
 from chamberopt.chamber.checks.jams import JamGap, gaps_in_reach, jam_gaps
@@ -141,10 +143,14 @@ def faults(made: Proposal) -> tuple[int, int]:
     return len(made.jams), len(made.warnings)
 
 
+def touched(made: Proposal) -> np.ndarray:
+    """Return the share of each triangle of the part that the balls can touch, (m,)."""
+    return reached_part_share(made.reach, made.chamber.source, len(made.chamber.part.triangles))
+
+
 def touched_share(made: Proposal) -> float:
     """Return the share of the target's area that the balls can touch."""
-    part = made.chamber.part
-    share = reached_part_share(made.reach, made.chamber.source, len(part.triangles))
+    part, share = made.chamber.part, touched(made)
     return float(share[part.target] @ part.area[part.target] / part.area[part.target].sum())
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -59,23 +60,21 @@ def find_bores(mesh: PartMesh, target: np.ndarray) -> list[Bore]:
     """
     faces = Faces(mesh.vertices, mesh.triangles, CREASE_DEG)
     vectors = area_vectors(mesh.vertices, mesh.triangles)
-    sums = np.stack([np.bincount(faces.of_triangle, one) for one in vectors.T], axis=1)
-    closed = np.linalg.norm(sums, axis=1) < OPEN * faces.area
-    free = np.bincount(faces.of_triangle, target) == 0.0
+    closed = np.linalg.norm(faces.area_vectors, axis=1) < OPEN * faces.area
     found = []
-    for face in map(int, np.flatnonzero(closed & free)):
+    for face in map(int, np.flatnonzero(closed & faces.free_of(target))):
         own = faces.of_triangle == face
         spread, axes = np.linalg.eigh(vectors[own].T @ unit_vectors(vectors[own]))
         along = np.abs(vectors[own] @ axes[:, 0]).sum() / faces.area[face]
         if along > 0.5 * ACROSS or spread[1] < 0.5 * spread[2]:
             continue
-        bore = _bore(mesh, own, axes[:, 0], faces.place(face))
+        bore = _bore(mesh, own, axes[:, 0], faces.place_mm(face))
         if bore is not None:
             found.append(bore)
     return sorted(found, key=lambda one: -one.radius)
 
 
-def _bore(mesh: PartMesh, own: np.ndarray, axis: np.ndarray, place: np.ndarray) -> Bore | None:
+def _bore(mesh: PartMesh, own: np.ndarray, axis: np.ndarray, at_mm: list[float]) -> Bore | None:
     """Return the bore with these triangles as its wall; None if it is none, or not free."""
     axis = np.round(axis * np.sign(axis[np.abs(axis).argmax()]), 6)
     frame = frame_along(axis / np.linalg.norm(axis))
@@ -89,8 +88,7 @@ def _bore(mesh: PartMesh, own: np.ndarray, axis: np.ndarray, place: np.ndarray) 
     if inner < ROUND * outer or away.min(initial=math.inf) < FREE * inner or outer < THINNEST / 2:
         return None
     height = float(corners[own][..., 2].mean())
-    at_mm = tuple(round(1e3 * float(x), 3) + 0.0 for x in place)
-    return Bore(own, at_mm, np.r_[middle, height] @ frame, frame[2], outer)
+    return Bore(own, tuple(at_mm), np.r_[middle, height] @ frame, frame[2], outer)
 
 
 def arbor_through(
@@ -128,7 +126,7 @@ def arbor_through(
     return keys, text
 
 
-def turning_bore(bores: list[Bore], mesh: PartMesh, target: np.ndarray) -> Bore | None:
+def turning_bore(bores: Sequence[Bore], mesh: PartMesh, target: np.ndarray) -> Bore | None:
     """Return the bore about whose axis a part turns, so that all of its target passes the shot.
 
     It is None unless the target is a ring at the outside of a short part, alike all round, such as

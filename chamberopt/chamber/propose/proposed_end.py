@@ -21,7 +21,7 @@ NEARLY_ALL = 0.95  # share of the part's area from which on its target is all of
 END, LONG_END = 0.15, 0.25  # length of the end over the part's, the latter if no end is straight
 TIP, STRAIGHT = 0.25, 0.8  # of an end: near its tip, and width there over that where it begins
 ALIKE = 0.05  # difference of that from which on it decides which end is held
-UPRIGHT = 0.999  # cosine from which on an axis of the part's file is upright
+UPRIGHT = 0.999  # cosine from which on an axis of the part's file is one of the chamber's
 SLIMMER = 0.8  # area of the lower end over the upper one's, below which the part is turned over
 MARGIN_MM = 1.0  # of boxes round the part
 
@@ -73,18 +73,28 @@ def held_end(mesh: PartMesh, target: Target, turns: Turns, of_any: bool = False)
     if slimmer if abs(upper - lower) < ALIKE else lower > upper:
         up = -up
         turns = turns_down(-np.sign(up[axis]) * np.eye(3)[axis])
-    box = 1e3 * np.array([mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)])
-    box += MARGIN_MM * np.array([[-1.0], [1.0]])
-    is_top = int(up[axis] > 0.0)
-    cut = box[is_top, axis] - (2 * is_top - 1) * (MARGIN_MM + 1e3 * share * length)
-    rest, end = box.copy(), box.copy()
-    rest[is_top, axis] = end[1 - is_top, axis] = cut
+    is_top, own = bool(up[axis] > 0.0), mesh.vertices[:, axis]
+    cut = 1e3 * float(own.max() - share * length if is_top else own.min() + share * length)
     middle = 1e3 * mesh.vertices[mesh.triangles].mean(axis=1)[:, axis]
     of_end = middle > cut if is_top else middle < cut
-    keys = {**target.keys, "box_mm": np.round(rest, 3).tolist()}
+    keys = {**target.keys, "box_mm": box_beyond(mesh, axis, not is_top, cut)}
     reason = f"{target.reason}; but for an end, {share:.0%} of its length, to hold it by"
     left = Target(keys, target.triangles & ~of_end, reason)
-    return HeldEnd(left, turns, {"box_mm": np.round(end, 3).tolist()}, of_end)
+    return HeldEnd(left, turns, {"box_mm": box_beyond(mesh, axis, is_top, cut)}, of_end)
+
+
+def box_beyond(mesh: PartMesh, axis: int, is_top: bool, cut: float) -> list[list[float]]:
+    """Return the box [mm], as designs have it, round what of a part lies beyond a cut.
+
+    Args:
+        axis: axis of the part's file across which the cut goes.
+        is_top: whether what has larger coordinates lies beyond it.
+        cut: its coordinate [mm].
+    """
+    box = 1e3 * np.array([mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)])
+    box += MARGIN_MM * np.array([[-1.0], [1.0]])
+    box[1 - int(is_top), axis] = cut
+    return [[float(x) for x in corner] for corner in np.round(box, 3)]
 
 
 def _width(mesh: PartMesh, places: np.ndarray, at: float, axis: int) -> float:

@@ -22,6 +22,7 @@ import numpy as np
 
 from chamberopt.chamber.fixture import OF_FACE
 from chamberopt.chamber.propose.proposed_arbor import Bore, arbor_through
+from chamberopt.chamber.propose.proposed_end import UPRIGHT, box_beyond
 from chamberopt.common.number_text import plain
 from chamberopt.geometry.faces import Faces
 from chamberopt.geometry.meshes.part_mesh import PartMesh
@@ -54,8 +55,6 @@ SEAT, EDGE = 0.05, 0.3
 LONG_FACE, FILLED = 1.6, 0.9
 OPPOSITE = 0.5  # cosine from which on a face is opposite to the target
 ALONG = 0.02  # largest mean cosine between the walls of a bore and its axis
-UPRIGHT = 0.999  # cosine from which on an axis of the part's file is one of the chamber's
-MARGIN_MM = 1.0  # of boxes round the part
 
 
 class HolderChoice(NamedTuple):
@@ -110,7 +109,8 @@ def holder_choices(
         ball: diameter of a ball [m].
         bores: bores of the part that may take an arbor, the best first.
     """
-    posed = mesh.vertices @ rotation_matrix(turns).T
+    turn = rotation_matrix(turns)
+    posed = mesh.vertices @ turn.T
     away = -area_vectors(posed, mesh.triangles)[target].sum(axis=0)
     width = float(np.sort(np.ptp(posed, axis=0))[1])
     found: list[tuple[tuple[float, ...], HolderChoice]] = []
@@ -126,12 +126,12 @@ def holder_choices(
     for bore in bores:
         if made := arbor_through(bore, mesh, target, turns, ball):
             offer(HolderChoice(*made), thick=2.0 * bore.radius)
-    on_faces = list(_on_flat_faces(mesh, target, posed, ball, bores))
+    on_faces = list(_on_flat_faces(mesh, target, turn, ball, bores))
     closed = [one.axis for one in on_faces if one.choice.is_round_an_end]
     for axis in np.array([[0, 0, 1], [1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0]], dtype=float):
         if any(axis @ other > UPRIGHT for other in closed):
             continue
-        if (jaw := _jaw(mesh, target, turns, axis, CLEAR * ball)) is not None:
+        if (jaw := _jaw(mesh, target, turn, axis, CLEAR * ball)) is not None:
             opposite = axis @ away > OPPOSITE * np.linalg.norm(away)
             offer(jaw, float(not opposite), 1.0, thick=0.0)
     for one in on_faces:
@@ -152,21 +152,20 @@ class _OnFace(NamedTuple):
 
 
 def _on_flat_faces(
-    mesh: PartMesh, target: np.ndarray, posed: np.ndarray, ball: float, bores: Sequence[Bore]
+    mesh: PartMesh, target: np.ndarray, turn: np.ndarray, ball: float, bores: Sequence[Bore]
 ) -> Iterator[_OnFace]:
     """Yield holders on the flat faces of a part that look up or aside.
 
     Args:
         target, ball, bores: those of holder_choices.
-        posed: the part's vertices in its pose [m], (n, 3).
+        turn: rotation of the part into its pose, (3, 3).
     """
+    posed = mesh.vertices @ turn.T
     faces = Faces(mesh.vertices, mesh.triangles, FLAT_DEG)
-    vectors = area_vectors(posed, mesh.triangles)
-    sums = np.stack([np.bincount(faces.of_triangle, one) for one in vectors.T], axis=1)
+    sums = faces.area_vectors @ turn.T
     # A face that bends has a sum of area vectors that is shorter than its area.
     flat = np.linalg.norm(sums, axis=1) > math.cos(math.radians(FLAT_DEG)) * faces.area
-    free = np.bincount(faces.of_triangle, target) == 0.0
-    usable = np.flatnonzero(flat & free & (sums[:, 2] > LEVEL * faces.area))
+    usable = np.flatnonzero(flat & faces.free_of(target) & (sums[:, 2] > LEVEL * faces.area))
     width = float(np.sort(np.ptp(posed, axis=0))[1])
     for face in usable[np.argsort(-faces.area[usable], kind="stable")][:MOST_FACES]:
         normal = np.round(sums[face] / np.linalg.norm(sums[face]), 4) + 0.0
@@ -178,8 +177,8 @@ def _on_flat_faces(
         if hull is None:
             continue
         seen = _Seen(corners, own, target, hull, CLEAR * ball, "up" if up else "aside")
-        place = [round(1e3 * float(x), 3) + 0.0 for x in faces.place(face)]
-        at: dict[str, Any] = {"at": {"faces": [{"at_mm": place, "crease_deg": FLAT_DEG}]}}
+        place = {"at_mm": faces.place_mm(face), "crease_deg": FLAT_DEG}
+        at: dict[str, Any] = {"at": {"faces": [place]}}
         at |= {} if up else {"axis": axis.tolist()}
         on_face = _rod(seen, float(faces.area[face]))
         holes = _holes(seen, axis, posed, mesh.triangles, bores)
@@ -240,22 +239,18 @@ def _in_words(bolts: Sequence[_Hole]) -> str:
 
 
 def _jaw(
-    mesh: PartMesh,
-    target: np.ndarray,
-    turns: tuple[float, float, float],
-    axis: np.ndarray,
-    clear: float,
+    mesh: PartMesh, target: np.ndarray, turn: np.ndarray, axis: np.ndarray, clear: float
 ) -> HolderChoice | None:
     """Return a jaw round the end of a part that points along an axis; None if the target is there.
 
     The end is chosen by a box, so that it may have any form. The axis must be one of the file's.
 
     Args:
-        target, turns: those of holder_choices.
+        target: that of holder_choices.
+        turn: rotation of the part into its pose, (3, 3).
         axis: unit vector in the chamber's frame, (3,).
         clear: least distance from the target [m].
     """
-    turn = rotation_matrix(turns)
     of_file = turn.T @ axis
     k = int(np.abs(of_file).argmax())
     if abs(of_file[k]) < UPRIGHT:
@@ -264,19 +259,14 @@ def _jaw(
     heights = corners[..., 2]
     top = float(heights.max())
     cut = max(float(heights[target].max()) + clear, top - LONGEST * float(np.ptp(heights)))
-    end = heights.mean(axis=1) > cut
-    hull = convex_hull(corners[end].reshape(-1, 3)[:, :2]) if end.any() else None
-    if hull is None:
-        return None
     up = bool(axis[2] > UP)
-    made = _around_end(_Seen(corners, end, target, hull, clear, "up" if up else "aside"))
+    end, where = heights.mean(axis=1) > cut, "up" if up else "aside"
+    made = _of_end(corners, end, target, clear, where) if end.any() else None
     if made is None:
         return None
-    box = 1e3 * np.array([mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)])
-    box += MARGIN_MM * np.array([[-1.0], [1.0]])
-    box[int(of_file[k] < 0.0), k] = 1e3 * cut * np.sign(of_file[k])
-    at: dict[str, Any] = {"at": {"box_mm": np.round(box, 3).tolist()}}
-    return made._replace(keys={**made.keys, **at, **({} if up else {"axis": axis.tolist()})})
+    box = box_beyond(mesh, k, of_file[k] > 0.0, 1e3 * cut * np.sign(of_file[k]))
+    keys = {**made.keys, "at": {"box_mm": box}, **({} if up else {"axis": axis.tolist()})}
+    return made._replace(keys=keys)
 
 
 def end_holder(
@@ -292,11 +282,25 @@ def end_holder(
         target, turns, ball: those of holder_choices.
         end: marks the triangles of the end, (m,).
     """
-    corners = (mesh.vertices @ rotation_matrix(turns).T)[mesh.triangles]
-    hull = convex_hull(corners[end].reshape(-1, 3)[:, :2])
-    if hull is None or not target.any():
+    if not target.any():
         return None
-    return _around_end(_Seen(corners, end, target, hull, CLEAR * ball, "up"))
+    corners = (mesh.vertices @ rotation_matrix(turns).T)[mesh.triangles]
+    return _of_end(corners, end, target, CLEAR * ball, "up")
+
+
+def _of_end(
+    corners: np.ndarray, end: np.ndarray, target: np.ndarray, clear: float, where: str
+) -> HolderChoice | None:
+    """Return the collar or block round an end of any form; None if there is no room for one.
+
+    Args:
+        corners, target, clear, where: those of _Seen.
+        end: marks the triangles of the end, (m,).
+    """
+    hull = convex_hull(corners[end].reshape(-1, 3)[:, :2])
+    if hull is None:
+        return None
+    return _around_end(_Seen(corners, end, target, hull, clear, where))
 
 
 def _around_end(seen: _Seen) -> HolderChoice | None:

@@ -17,7 +17,7 @@ from chamberopt.design.design import Design
 from chamberopt.design.part import Selection
 from chamberopt.geometry.faces import Faces
 from chamberopt.geometry.meshes.part_mesh import PartMesh
-from chamberopt.geometry.triangles import area_vectors, areas, rotation_matrix
+from chamberopt.geometry.triangles import areas, rotation_matrix
 
 FLAT_DEG = 1.0  # largest angle in a flat face
 STRAIGHT_UP = 0.9998  # cosine from which on a face is level: balls lie on it
@@ -83,12 +83,9 @@ def pads(mesh: PartMesh, target: np.ndarray, turns: Turns, ball: float) -> list[
         ball: diameter of a ball [m].
     """
     faces = Faces(mesh.vertices, mesh.triangles, FLAT_DEG)
-    posed = mesh.vertices @ rotation_matrix(turns).T
-    up = np.bincount(faces.of_triangle, area_vectors(posed, mesh.triangles)[:, 2])
-    free = np.bincount(faces.of_triangle, target) == 0.0
-    level = free & (up > STRAIGHT_UP * faces.area) & (faces.area > ball * ball)
+    up = faces.area_vectors @ rotation_matrix(turns)[2]
+    level = faces.free_of(target) & (up > STRAIGHT_UP * faces.area) & (faces.area > ball * ball)
     found = np.flatnonzero(level)
     found = found[np.argsort(-faces.area[found], kind="stable")][:MOST_PADS]
-    places = [[round(1e3 * float(x), 3) + 0.0 for x in faces.place(int(one))] for one in found]
-    keys = [{"at_mm": place, "crease_deg": FLAT_DEG} for place in places]
+    keys = [{"at_mm": faces.place_mm(int(one)), "crease_deg": FLAT_DEG} for one in found]
     return [{"faces": one} for one in (keys, keys[:1])[: len(keys)] if one]

@@ -269,8 +269,7 @@ def _faces(mesh: PartMesh) -> list[Surface]:
     taken = {name.lower() for name in mesh.groups}  # a name of the file goes first
     free = (name for number in count(1) if (name := f"face {number}") not in taken)
     for (area, face, same), name in zip(found[:MAX_KINDS], free, strict=False):
-        place = [_decimals(1e3 * x) for x in faces.place(face)]
-        key: dict[str, object] = {"at_mm": place, "crease_deg": CREASE_DEG}
+        key: dict[str, object] = {"at_mm": faces.place_mm(face), "crease_deg": CREASE_DEG}
         several = int(same.sum())
         if several > 1:
             key["alike"] = True
@@ -336,7 +335,3 @@ def _joined(chosen: Sequence[Surface], reason: str) -> Target:
 
 def _mm2(area: float) -> str:
     return f"{plain(1e6 * area, 3)} mm²"
-
-
-def _decimals(value: float) -> float:
-    return round(float(value), 3) + 0.0

@@ -124,14 +124,20 @@ def test_a_study_says_what_varies(hostile: Path, pictures: list[str]) -> None:
     assert len(found.sources) == 1
 
 
-def test_a_result_gives_its_figures_with_intervals(
-    hostile: Path, tmp_path: Path, pictures: list[str]
-) -> None:
+def saved_result(hostile: Path, tmp_path: Path) -> chamberopt.Result:
+    """A result of a part with a hostile name, in a folder with one."""
     folder = tmp_path / (HOSTILE.replace("/", "") if sys.platform != "win32" else "a result")
     design = plate_design().changed({"part.mesh": hostile})
     chamber = build_chamber(design)
     save_simulation(folder, design, chamber, poisson_evaluation(design, chamber))
-    result = chamberopt.load_result(folder)
+    return chamberopt.load_result(folder)
+
+
+def test_a_result_gives_its_figures_with_intervals(
+    hostile: Path, tmp_path: Path, pictures: list[str]
+) -> None:
+    result = saved_result(hostile, tmp_path)
+    folder = result.folder
     found = shown(result)
     assert f"Result: {folder.name}" in found.words
     mean = metric_label("mean_coverage").number(result.metrics["mean_coverage"])
@@ -150,11 +156,7 @@ def test_a_result_gives_its_figures_with_intervals(
 def test_the_view_in_3d_is_kept_in_its_frame(
     hostile: Path, tmp_path: Path, pictures: list[str]
 ) -> None:
-    folder = tmp_path / (HOSTILE.replace("/", "") if sys.platform != "win32" else "a result")
-    design = plate_design().changed({"part.mesh": hostile})
-    chamber = build_chamber(design)
-    save_simulation(folder, design, chamber, poisson_evaluation(design, chamber))
-    frame = chamberopt.view(chamberopt.load_result(folder))._repr_html_()
+    frame = chamberopt.view(saved_result(hostile, tmp_path))._repr_html_()
     found = Tags(frame)
     assert found.names == {"iframe"}
     assert 'sandbox="allow-scripts" ' in frame  # not allow-same-origin

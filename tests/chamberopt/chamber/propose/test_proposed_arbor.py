@@ -9,7 +9,7 @@ import trimesh
 from manifold3d import Manifold, OpType
 
 from chamberopt.chamber.propose.first_design import propose
-from chamberopt.chamber.propose.proposal import Wanted
+from chamberopt.chamber.propose.proposal import Proposal, Wanted
 from chamberopt.chamber.propose.proposed_arbor import (
     arbor_through,
     find_bores,
@@ -113,6 +113,15 @@ def test_a_ring_of_alike_teeth_turns_about_its_bore() -> None:
     assert first.keys["both_sides"]
 
 
+def turns_on_an_arbor(made: Proposal) -> None:
+    turn, holder = made.design.effects.part_turn, made.design.holder
+    assert turn is not None
+    assert holder is not None
+    assert (holder.kind, holder.both_sides) == ("arbor", True)
+    assert abs(holder.axis[2]) < 1e-6
+    assert not made.warnings
+
+
 def test_a_ring_is_proposed_to_turn_on_an_arbor(tmp_path: Path) -> None:
     """Its outside is a target alike all round; at rest balls would lie on its upper face."""
     trimesh.creation.annulus(10.0, 30.0, 12.0, sections=24).export(tmp_path / "ring.stl")
@@ -120,24 +129,13 @@ def test_a_ring_is_proposed_to_turn_on_an_arbor(tmp_path: Path) -> None:
     def outside(known: Sequence[Surface]) -> list[str]:
         return [max(known, key=lambda one: np.hypot(*one.keys["faces"][0]["at_mm"][:2])).name]
 
-    made = propose(tmp_path / "ring.stl", Wanted("mm"), outside)
-    turn, holder = made.design.effects.part_turn, made.design.holder
-    assert turn is not None
-    assert holder is not None
-    assert (holder.kind, holder.both_sides) == ("arbor", True)
-    assert abs(holder.axis[2]) < 1e-6
-    assert not made.warnings
+    turns_on_an_arbor(propose(tmp_path / "ring.stl", Wanted("mm"), outside))
 
 
 @pytest.mark.long
 def test_a_disc_on_whose_web_balls_would_lie_turns_on_an_arbor(tmp_path: Path) -> None:
     part = MORE_PARTS["turbine_disc"].write(tmp_path)
     made = propose(part, Wanted("m"), lambda _: [])
-    turn, holder = made.design.effects.part_turn, made.design.holder
-    assert turn is not None
-    assert holder is not None
-    assert (holder.kind, holder.both_sides) == ("arbor", True)
-    assert abs(holder.axis[2]) < 1e-6
-    assert not made.warnings
+    turns_on_an_arbor(made)
     assert made.design.sonotrode.blocks is not None
     assert made.design.sonotrode.blocks.count == 2  # lying it takes four
