@@ -12,6 +12,7 @@ if TYPE_CHECKING:
 
     from chamberopt.chamber.build import Chamber
     from chamberopt.chamber.propose.proposal import Proposal, Wanted
+    from chamberopt.chamber.propose.proposed_budget import Measured
     from chamberopt.chamber.propose.proposed_intensity import IntensityPilot
     from chamberopt.common.progress import Progress
     from chamberopt.design.intensity import WantedIntensity
@@ -68,12 +69,12 @@ def advise_effects(design: Design, chamber: Chamber) -> list[dict[str, object]]:
 
 
 def with_intensity(
-    made: Proposal, wanted: Wanted, intensity: WantedIntensity, again: Callable[[float], Proposal]
+    made: Proposal, wanted: Wanted, intensity: WantedIntensity, again: Callable[[Wanted], Proposal]
 ) -> Proposal:
     """Return a proposal with balls and an amplitude for a wanted Almen intensity, by pilot runs.
 
     Args:
-        again: proposes the design with balls of another diameter [mm].
+        again: proposes the design for other wishes.
     Raises:
         InputError: no pilot tells the intensity.
     """
@@ -92,12 +93,11 @@ def with_intensity(
         return propose_intensity(made, wanted, intensity, again, simulate)
 
 
-def with_pilot(made: Proposal) -> Proposal:
-    """Return a proposal whose treatment time and budget follow from a short simulation.
+def measured(made: Proposal, is_told: bool = True) -> Measured | None:
+    """Simulate a proposal briefly, and return what its budget follows from.
 
-    Where that cannot run, the proposal stays as it is, and a warning gives the reason.
+    It is None where that cannot be done. A warning then gives the reason, unless is_told is false.
     """
-    from chamberopt.chamber.propose.proposed_budget import Asked, propose_budget, with_budget
     from chamberopt.common.errors import InputError
     from chamberopt.common.executor import local_executor
     from chamberopt.common.progress import step
@@ -107,9 +107,18 @@ def with_pilot(made: Proposal) -> Proposal:
     try:
         compile_with_message(made.design, made.chamber)
         with local_executor() as executor, step("pilot run (--no-pilot leaves it out)") as progress:
-            found = measure_budget(made.design, made.chamber, executor, progress)
+            return measure_budget(made.design, made.chamber, executor, progress)
     except (InputError, SimulationError) as error:
-        print_remarks([f"warning: no pilot, treatment and simulated time are starts: {error}"])
+        text = f"warning: no pilot, treatment and simulated time are starts: {error}"
+        print_remarks([text] if is_told else [])
+        return None
+
+
+def with_measured_budget(made: Proposal, found: Measured | None) -> Proposal:
+    """Return a proposal whose treatment time and budget follow from a pilot, if one could run."""
+    from chamberopt.chamber.propose.proposed_budget import Asked, propose_budget, with_budget
+
+    if found is None:
         return made
     is_limited = not made.design.why_no_intensity
     asked = Asked(made.design.process.coverage_percent, made.strength_dents, is_limited)

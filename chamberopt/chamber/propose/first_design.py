@@ -5,6 +5,7 @@ Every number comes from a rule of thumb, with its reason beside it. A study then
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
@@ -18,13 +19,16 @@ from chamberopt.chamber.propose.held_proposal import (
     clamped_outside,
     hangs_by_a_face,
     held,
+    is_firm,
     masked,
     only_touched,
     padded,
 )
 from chamberopt.chamber.propose.pose import (
     Turns,
+    end_to_wall,
     hanging_pose,
+    pose_by_size,
     pose_in_words,
     propose_pose,
     square_to_walls,
@@ -64,6 +68,7 @@ from chamberopt.geometry.meshes.surface_error import format_box
 from chamberopt.geometry.meshes.units import GUESSED
 from chamberopt.geometry.triangles import rotation_matrix
 
+AT_WALL = 2.0  # ball diameters from the target to the wall through which its end goes out
 WIDER = (1.0, 1.4, 2.0)  # factors on the room round the part that are tried
 AMPLITUDE_UM = 40.0  # zero-to-peak; the nearest that the sonotrode can set is taken
 USUAL_PART, WALL, SONOTRODE = "42CrMo4", "100Cr6", "Ti-6Al-4V"  # of the catalogue
@@ -93,10 +98,18 @@ def propose(
     asked = choose(known)
     target = propose_target(mesh, known, asked)
     _require_near_origin(path, target)
-    turns, pose_reason = propose_pose(mesh.vertices, mesh.triangles, target.triangles)
+    shape = mesh.vertices, mesh.triangles, target.triangles
+    turns, pose_reason = propose_pose(*shape)
+    if wanted.pose is not None:
+        turns, pose_reason = (
+            pose_by_size(*shape, wanted.pose),
+            f"{wanted.pose.replace('-', ' ')}, as asked",
+        )
+    if wanted.pose in ("lying", "on-edge"):
+        return _lying(path, wanted, mesh, known, target, turns, pose_reason, bool(asked))
     end = None if asked else held_end(mesh, target, turns)
     made = _proposed(path, wanted, mesh, known, target, turns, pose_reason, end)
-    if asked or end is not None or not hangs_by_a_face(made):
+    if asked or wanted.pose or end is not None or not hangs_by_a_face(made):
         return made
     end = held_end(mesh, target, made.design.part.rotate_deg, of_any=True)
     if end is not None:
@@ -104,6 +117,34 @@ def propose(
             other = _proposed(path, wanted, mesh, known, target, turns, ON_END, end)
             if "holder" in other.tables and faults(other) <= faults(made):
                 return other
+    return made
+
+
+def _lying(
+    path: Path,
+    wanted: Wanted,
+    mesh: PartMesh,
+    known: Sequence[Surface],
+    target: Target,
+    turns: Turns,
+    reason: str,
+    keeps_target: bool,
+) -> Proposal:
+    """Return a proposal for a part that lies, held at its side.
+
+    Where it is not held firmly otherwise, an end is left out of its target, if that may be changed.
+
+    Args:
+        turns, reason: the pose [degrees], and why.
+    """
+    upright = pose_by_size(mesh.vertices, mesh.triangles, target.triangles, "standing")
+    for of_any in (False, True):
+        end = None if keeps_target else held_end(mesh, target, upright, of_any)
+        lying = None if end is None else end._replace(turns=turns)
+        made = _proposed(path, wanted, mesh, known, target, turns, reason, lying)
+        holder = made.design.holder
+        if end is not None or keeps_target or (holder is not None and is_firm(holder)):
+            break
     return made
 
 
@@ -154,7 +195,7 @@ def _proposed(
     with step("choosing the balls"):
         diameter, ball_reason = _ball_diameter(tables, wanted, shop)
     tables["shot"]["diameter_mm"] = round(1e3 * diameter, 4)
-    if end is None and (hanging := _hanging(mesh, target, turns, diameter, wanted)):
+    if not (end or wanted.pose) and (hanging := _hanging(mesh, target, turns, diameter, wanted)):
         turns, pose_reason = hanging, ON_END
     reasons = {
         "part.unit": ("GUESSED: " if any(GUESSED in note for note in mesh.notes) else "")
@@ -174,6 +215,8 @@ def _proposed(
     }
 
     bores = find_bores(mesh, target.triangles)
+    # Balls would lie on what holds an end at the side: it goes out through the wall instead.
+    goes_out = end is not None and wanted.pose in ("lying", "on-edge")
 
     def built(is_local: bool, turning: Bore | None = None) -> tuple[Proposal, Floor]:
         """Return the proposal with the least room that is free of gaps, else of fewest faults.
@@ -193,13 +236,14 @@ def _proposed(
         for number, wider in enumerate(WIDER):
             progress(number, len(WIDER), None)
             try:
-                placed, floor = _place(mesh, target, pose, diameter, form, wider, is_local)
+                out = end.axis if goes_out and end is not None else None
+                placed, floor = _place(mesh, target, pose, diameter, form, wider, is_local, out)
                 part = {**tables["part"], "rotate_deg": list(placed)}
                 if any(floor.offset_mm):
                     part["offset_mm"] = list(floor.offset_mm)
                 own = {**common, "part": part, **_floor_tables(floor)}
                 words = {"part.rotate_deg": f"{pose_in_words(mesh, known, placed)}: {why_so}"}
-                why = {**reasons, **words, **_floor_reasons(floor, is_local)}
+                why = {**reasons, **words, **_floor_reasons(floor, is_local, goes_out)}
                 made = checked(own, why, floor, known, mesh, wanted.shop)
             except UnreadableError:
                 raise
@@ -216,8 +260,8 @@ def _proposed(
         return best
 
     with step("building and checking the chamber") as progress:
-        made, floor = built(is_local=False)
-        if not floor.is_one_sonotrode or is_capped(made):
+        made, floor = built(is_local=goes_out)
+        if not goes_out and (not floor.is_one_sonotrode or is_capped(made)):
             with suppress(InputError):
                 local = built(is_local=True)
                 fits = local[1].is_one_sonotrode and not is_capped(local[0])
@@ -225,7 +269,8 @@ def _proposed(
                     made, floor = local
     if made.chamber.pieces_in_air:
         with step("choosing what holds the part") as progress:
-            made = held(made, floor, target, end, bores, wanted.shop, progress)
+            above = None if goes_out else end
+            made = held(made, floor, target, above, bores, wanted.shop, progress)
     else:
         made = clamped_outside(made, floor, wanted.shop)
     turning = turning_bore(bores, mesh, target.triangles)
@@ -322,6 +367,7 @@ def _place(
     wanted: Wanted,
     wider: float,
     is_local: bool = False,
+    out: np.ndarray | None = None,
 ) -> tuple[Turns, Floor]:
     """Return the turns of a part [degrees] and the sizes of a chamber round it on a sonotrode.
 
@@ -333,10 +379,14 @@ def _place(
         ball: diameter of the balls [m].
         wider: factor on the room round the part.
         is_local: true for a chamber round the target, whose walls the part goes out through.
+        out: axis of the part's file (3,) along which an end goes out through a wall, near which the
+            target ends.
     Raises:
         InputError: the shop has no sonotrode for it, or no chamber so large.
     """
     square, found = square_to_walls(mesh.vertices, turns), []
+    if out is not None:
+        square = end_to_wall(turns, out)
     suits = shape_for(np.ptp(mesh.vertices @ rotation_matrix(square).T, axis=0))
     refused: InputError | None = None
     usual = ["box"] if is_local else ["cylinder", suits]
@@ -347,6 +397,10 @@ def _place(
         on_target = posed[np.unique(mesh.triangles[target.triangles])]
         top, around = float(on_target[:, 2].max()), on_target if is_local else None
         sizes, shop = propose_sizes(posed, top, ball, shape, wider, around), wanted.shop
+        beyond = sizes.gap if out is None else AT_WALL * ball  # of the target, along x
+        if out is not None:
+            length = float(sizes.plan["length_mm"]) - math.floor(1e3 * (sizes.gap - beyond))
+            sizes = replace(sizes, plan={**sizes.plan, "length_mm": length})
         try:
             floor = floor_on_sonotrode(sizes, _round(posed), shop or usual_shop(), shop is None)
             if shop is not None:
@@ -356,6 +410,9 @@ def _place(
                 floor = floor._replace(sizes=room)
             if is_local:
                 x, y = 1e3 * (middle_in_plan(posed) - middle_in_plan(on_target))
+                if out is not None:
+                    free = 1e-3 * float(floor.sizes.plan["length_mm"]) - np.ptp(on_target[:, 0])
+                    x += 1e3 * (0.5 * free - beyond)
                 floor = floor._replace(offset_mm=(round(float(x), 1), round(float(y), 1)))
         except InputError as error:
             refused = refused or error
@@ -411,11 +468,12 @@ def _floor_tables(floor: Floor) -> Tables:
     }
 
 
-def _floor_reasons(floor: Floor, is_local: bool) -> dict[str, str]:
+def _floor_reasons(floor: Floor, is_local: bool, goes_out: bool) -> dict[str, str]:
     sizes, one = floor.sizes, floor.face.sonotrode
     first = next(key for key in sizes.plan if key.endswith("_mm"))
     where = "; the part goes out through it" if sizes.through_ceiling else ""
     beside = "target, and the part goes out through the walls" if is_local else "part"
+    placed = "the target ends near the wall" if goes_out else "the target in the middle"
     key, _ = one.amplitude_nearest(AMPLITUDE_UM)
     kind = (
         "ZERO-TO-PEAK, half of" if key == "amplitude_um" else "PEAK-TO-VALLEY, twice zero-to-peak"
@@ -426,7 +484,7 @@ def _floor_reasons(floor: Floor, is_local: bool) -> dict[str, str]:
         "chamber.height_mm": f"sonotrode to ceiling{where}",
         "chamber.sonotrode_distance_mm": "mean sonotrode face to the part's lowest point",
         **({"sonotrode.frequency_khz": one.note} if one.note else {}),
-        **({"part.offset_mm": "the target in the middle"} if any(floor.offset_mm) else {}),
+        **({"part.offset_mm": placed} if any(floor.offset_mm) else {}),
         **({"sonotrode.blocks": BLOCKS} if floor.blocks is not None else {}),
         f"sonotrode.{key}": f"{kind}; one that the sonotrode can set",
     }

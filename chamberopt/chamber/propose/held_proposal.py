@@ -115,7 +115,8 @@ def padded(made: Proposal, floor: Floor, target: Target, shop: Shop | None) -> P
     for at in pads(made.mesh, target.triangles, turns, diameter):
         for tables in choices:
             own = _with_mask(tables, {"axis": [0.0, 0.0, 1.0], "at": at})
-            text = "a pad on the level top, up to the ceiling: no ball lies there; screw it on"
+            text = "a pad on the level top, up to the ceiling: no ball lies there"
+            text += "" if "holder" in own else "; screw it on"
             height = "sonotrode to ceiling; a pad on the part's top goes on to it"
             reasons = {**made.reasons, "mask.axis": text, "chamber.height_mm": height}
             if "holder" not in own:

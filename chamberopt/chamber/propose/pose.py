@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from itertools import product
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     from chamberopt.geometry.meshes.part_mesh import PartMesh
 
 Turns = tuple[float, float, float]
+Pose = Literal["standing", "lying", "on-edge"]
+"""Which of a part's sizes is upright: its longest one, its shortest one, or that between."""
 
 # Advantages in the mean minus standard deviation of the exposure, over poses of any angle: of the
 # pose as drawn, of turns by multiples of 90 and of 45 degrees, and of turns by steps of 15 and 5.
@@ -32,6 +34,7 @@ AS_DRAWN, ALONG_AXIS, DIAGONAL = 0.10, 0.08, 0.05
 OF_STEP = {15.0: 0.02, 5.0: 0.01}
 # What a long part may lose by hanging, where no sonotrode is large enough for it lying.
 HANGING = 0.15
+SIDED = 0.01  # mean cosine over a target from which on it looks to one side
 LOW = 0.05  # advantage of a target at the part's lower end over a target at its upper end
 FLAT = 0.999  # length of the mean unit normal of a target that counts as flat
 LEVEL_DEG = 0.5  # a flat face is level if it is tilted by less
@@ -94,6 +97,21 @@ def hanging_pose(
     return turns_down(down) if _evenness(weight, normal, down) >= lying - HANGING else None
 
 
+def pose_by_size(
+    vertices: np.ndarray, triangles: np.ndarray, target: np.ndarray, pose: Pose
+) -> Turns:
+    """Return turns with which a part stands, lies or stands on edge, its target more down than up.
+
+    Args:
+        vertices, triangles, target: as of propose_pose.
+    """
+    size = ("lying", "on-edge", "standing").index(pose)
+    axis = int(np.argsort(np.ptp(vertices, axis=0), kind="stable")[size])
+    weight, normal = _weighted_normals(vertices, triangles, target)
+    sign = 1.0 if float(weight @ normal[:, axis]) > SIDED else -1.0
+    return turns_down(sign * np.eye(3)[axis])
+
+
 def _weighted_normals(
     vertices: np.ndarray, triangles: np.ndarray, target: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -140,6 +158,16 @@ def square_to_walls(vertices: np.ndarray, turns: Turns) -> Turns:
     else:
         angle = round(float(-np.degrees(np.arctan2(y, x)) % 180.0), 1)
     return turns[0], turns[1], angle - 180.0 if angle > 90.0 else angle
+
+
+def end_to_wall(turns: Turns, axis: np.ndarray) -> Turns:
+    """Return turns [degrees] with a further turn about z that makes an axis point along x.
+
+    Args:
+        axis: unit vector of the part's file, which is level in the pose, (3,).
+    """
+    x, y, _ = rotation_matrix((turns[0], turns[1], 0.0)) @ axis
+    return turns[0], turns[1], round(float(-np.degrees(np.arctan2(y, x))), 4) + 0.0
 
 
 def pose_in_words(mesh: PartMesh, known: Sequence[Surface], turns: Turns) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -13,6 +13,7 @@ import numpy as np
 from chamberopt.chamber.build import Chamber, build_chamber
 from chamberopt.chamber.checks.check import shot_reach, warnings
 from chamberopt.chamber.checks.jams import JamGap, gaps_in_reach, jam_gaps
+from chamberopt.chamber.propose.pose import Pose
 from chamberopt.chamber.propose.proposed_balls import MOST_BALLS, charge_of
 from chamberopt.chamber.propose.proposed_floor import Floor
 from chamberopt.chamber.propose.proposed_target import Sizes, Surface
@@ -51,6 +52,7 @@ class Wanted:
     alloy: str = ""
     shot: str = ""  # material of the balls
     ball_mm: float | None = None
+    pose: Pose | None = None
     shop: Shop | None = None  # what the shop has; usual sizes if it is not known
     calibration: Path | None = None  # file of the machine's calibration
     coverage: float | None = None  # [%], 200 is twice the time to 98 %
@@ -133,6 +135,20 @@ def checked(
     )
 
 
+def with_charge(made: Proposal, factor: float) -> Proposal:
+    """Return a proposal whose balls have a multiple of its mass, at most what is supported."""
+    ball_mass = made.design.shot.ball_mass
+    mass_g = float(f"{min(factor * made.tables['shot']['mass_g'], _heaviest_g(ball_mass)):.2g}")
+    design = made.design.changed({"shot.mass_g": mass_g})
+    return replace(
+        made,
+        design=design,
+        tables={**made.tables, "shot": {**made.tables["shot"], "mass_g": mass_g}},
+        bounds={**made.bounds, "shot.mass_g": _masses(mass_g, ball_mass)._asdict()},
+        warnings=tuple(warnings(design, made.chamber, made.reach)),
+    )
+
+
 def is_capped(made: Proposal) -> bool:
     """Return whether a chamber holds fewer balls than it should, as more take too long."""
     return made.reasons["shot.mass_g"].startswith(CAPPED)
@@ -202,14 +218,22 @@ def propose_ranges(
     far = max(distance, min(round(1.25 * distance), under))
     low = math.ceil(far + 1e3 * sizes.top + 2.0 * ball_mm)
     high = min(round(1.5 * height), most_mm)
-    digit = _second_digit(mass_g)
-    least, most = (digit * round(share * mass_g / digit) for share in (LIGHTER, HEAVIER))
-    mass = (least, min(most, _heaviest_g(ball_mass)), digit)
     return {
         "chamber.height_mm": _lengths(min(low, height), high),
         "chamber.sonotrode_distance_mm": _lengths(min(near, distance), far),
-        "shot.mass_g": Range(*(float(f"{one:.6g}") for one in mass)),
+        "shot.mass_g": _masses(mass_g, ball_mass),
     }
+
+
+def _masses(mass_g: float, ball_mass: float) -> Range:
+    """Return the range of the mass of all balls [g] round that of the first design.
+
+    Args:
+        ball_mass: mass of one ball [kg].
+    """
+    digit = _second_digit(mass_g)
+    least, most = (digit * round(share * mass_g / digit) for share in (LIGHTER, HEAVIER))
+    return Range(*(float(f"{x:.6g}") for x in (least, min(most, _heaviest_g(ball_mass)), digit)))
 
 
 def _lengths(low: float, high: float) -> Range:

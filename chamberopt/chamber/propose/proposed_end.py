@@ -27,10 +27,14 @@ MARGIN_MM = 1.0  # of boxes round the part
 
 
 class HeldEnd(NamedTuple):
-    """An end of a part that is left out of its target, and the pose in which it points up."""
+    """An end of a part that is left out of its target, and a pose in which the part is held by it.
+
+    The end points up in the pose that is proposed with it.
+    """
 
     target: Target  # the rest
     turns: Turns
+    axis: np.ndarray  # unit vector of the part's file along which the end points, (3,)
     at: dict[str, Any]  # keys that choose the end
     triangles: np.ndarray  # marks those of the end, (m,)
 
@@ -80,7 +84,8 @@ def held_end(mesh: PartMesh, target: Target, turns: Turns, of_any: bool = False)
     keys = {**target.keys, "box_mm": box_beyond(mesh, axis, not is_top, cut)}
     reason = f"{target.reason}; but for an end, {share:.0%} of its length, to hold it by"
     left = Target(keys, target.triangles & ~of_end, reason)
-    return HeldEnd(left, turns, {"box_mm": box_beyond(mesh, axis, is_top, cut)}, of_end)
+    points = np.eye(3)[axis] * (1.0 if is_top else -1.0)
+    return HeldEnd(left, turns, points, {"box_mm": box_beyond(mesh, axis, is_top, cut)}, of_end)
 
 
 def box_beyond(mesh: PartMesh, axis: int, is_top: bool, cut: float) -> list[list[float]]:

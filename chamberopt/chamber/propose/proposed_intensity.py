@@ -126,14 +126,14 @@ def propose_intensity(
     made: Proposal,
     wanted: Wanted,
     intensity: WantedIntensity,
-    again: Callable[[float], Proposal],
+    again: Callable[[Wanted], Proposal],
     simulate: Callable[[Proposal], IntensityPilot | None],
 ) -> Proposal:
     """Return a proposal with balls and an amplitude for a wanted intensity, and the reasons.
 
     Args:
         made: the proposal by geometry alone.
-        again: proposes the design with other balls, by their diameter [mm].
+        again: proposes the design for other wishes.
         simulate: runs a pilot of a proposal; None if its intensity is not resolved.
     Raises:
         InputError: no pilot resolved the strength.
@@ -148,7 +148,8 @@ def propose_intensity(
     chosen, pilots = setting_of(made), 0
     while chosen not in found:
         try:
-            one = by_ball.get(chosen.ball_mm) or again(chosen.ball_mm)
+            one = by_ball.get(chosen.ball_mm)
+            one = one or again(replace(wanted, ball_mm=chosen.ball_mm))
         except InputError:  # no chamber with these balls
             settings = [one for one in settings if one.ball_mm != chosen.ball_mm]
             chosen = choose(intensity, settings, _values(found))

@@ -33,6 +33,7 @@ def new(
     material: str = "",
     shot: str = "",
     ball_mm: float | None = None,
+    pose: Literal["standing", "lying", "on-edge"] | None = None,
     shop: Path | None = None,
     intensity: str | None = None,
     coverage: float | None = None,
@@ -60,6 +61,10 @@ def new(
     ball_mm
         Diameter of a ball; by default the largest in stock that suits the target's fillets and
         slots, and jams in no gap.
+    pose
+        How the part is held: by its longest size upright, its shortest one, or that between. By
+        default its target is evenly exposed; where a long part then takes long, the others are
+        tried by pilot runs.
     shop
         A file of the sonotrodes, balls and sizes of chambers that your shop has; nothing else is
         proposed. `chamberopt shop --example` prints one. By default usual sizes.
@@ -83,10 +88,11 @@ def new(
     from chamberopt.chamber.propose.first_design import propose
     from chamberopt.chamber.propose.left_out import find_left_out
     from chamberopt.chamber.propose.proposal import Wanted
+    from chamberopt.chamber.propose.quicker import Way, propose_quicker
     from chamberopt.chamber.propose.shop import load_shop
     from chamberopt.chamber.propose.text import design_text, study_texts
     from chamberopt.cli.commands.check import draw_target
-    from chamberopt.cli.prepare import with_intensity, with_pilot
+    from chamberopt.cli.prepare import measured, with_intensity, with_measured_budget
     from chamberopt.common.errors import InputError
     from chamberopt.common.files import claim_folder, whole_or_nothing, write_text
     from chamberopt.common.progress import step
@@ -112,7 +118,9 @@ def new(
         raise InputError("--target: pick asks, and nobody answers here; give names or faces")
 
     of_shop = None if shop is None else load_shop(shop)
-    wanted = Wanted(unit or STATED, shape, material, shot, ball_mm, of_shop, calibration, coverage)
+    wanted = Wanted(
+        unit or STATED, shape, material, shot, ball_mm, pose, of_shop, calibration, coverage
+    )
 
     chosen: Sequence[str] = target
 
@@ -131,19 +139,26 @@ def new(
             raise
         wanted = replace(wanted, unit=_asked_unit(part, error.sizes))
         made = propose(part, wanted, choose)
-    if asked:
 
-        def again(ball_mm: float) -> Proposal:
-            return propose(part, replace(wanted, ball_mm=ball_mm), lambda _: chosen)
+    def again(other: Wanted) -> Proposal:
+        return propose(part, other, lambda _: chosen)
 
-        made = with_intensity(made, wanted, asked, again)
-    left_out = find_left_out(made)
     pyvista()  # before the folder is claimed: Ctrl-C during an import would leave the folder behind
     with claim_folder(out) as folder, whole_or_nothing(folder):
-        with step("drawing"):  # before the pilot, so that it can be looked at meanwhile
+        with step("drawing"):  # before the pilots, so that it can be looked at meanwhile
             draw_target(made.chamber, made.reach, folder / "design.png")
         if pilot:
-            made = with_pilot(made)
+            drawn = made.chamber
+            way = Way(made, wanted, measured(made))
+            made, wanted, found = propose_quicker(way, again, lambda one: measured(one, False))
+            if asked:
+                made = with_intensity(made, wanted, asked, again)
+                found = measured(made)
+            made = with_measured_budget(made, found)
+            if made.chamber is not drawn:
+                with step("drawing"):
+                    draw_target(made.chamber, made.reach, folder / "design.png")
+        left_out = find_left_out(made)
         write_text(folder / "design.toml", design_text(made, folder, left_out))
         studies = study_texts(made, "design.toml")
         for name, text in studies.items():

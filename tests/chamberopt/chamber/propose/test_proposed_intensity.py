@@ -127,8 +127,8 @@ def test_machines_of_other_laws_are_found_by_pilots(
     )
     bare = propose(plate, wanted, lambda _: [])
 
-    def again(ball_mm: float) -> Proposal:
-        return propose(plate, replace(wanted, ball_mm=ball_mm), lambda _: [])
+    def again(other: Wanted) -> Proposal:
+        return propose(plate, other, lambda _: [])
 
     made = propose_intensity(bare, wanted, intensity, again, law.simulate)
     assert 1 <= law.pilots <= MOST_PILOTS

@@ -1,0 +1,150 @@
+"""Poses and charges that are tried by pilots where a treatment takes long."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from chamberopt.chamber.propose.first_design import propose
+from chamberopt.chamber.propose.pose import Pose, end_to_wall, pose_by_size
+from chamberopt.chamber.propose.proposal import Proposal, Wanted, with_charge
+from chamberopt.chamber.propose.proposed_budget import Measured
+from chamberopt.chamber.propose.quicker import Way, propose_quicker
+from chamberopt.geometry.triangles import rotation_matrix
+
+LEAF = (160.0, 30.0, 6.0)  # mm: length, width and thickness of a bar with a broad side to peen
+
+
+def measured(seconds: float, places: bool = True) -> Measured:
+    """What a pilot says of a design whose target is covered after some time [s]."""
+    return Measured(1e5, 1e4, seconds, places, 0.1 * seconds, True, 0.01, 5e-3, 6.4, 0.8 * seconds)
+
+
+@pytest.fixture(scope="module")
+def leaf(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A bar that stands in its file."""
+    path = tmp_path_factory.mktemp("leaf") / "leaf.stl"
+    box = trimesh.creation.box((LEAF[2], LEAF[1], LEAF[0]))
+    box.subdivide_to_size(8.0).export(path)  # so that a box of the design can cut its end off
+    return path
+
+
+@pytest.fixture(scope="module")
+def poses(leaf: Path) -> dict[Pose | None, Proposal]:
+    """The proposals for the bar by the pose that is asked for."""
+    asked: list[Pose | None] = [None, "lying", "on-edge"]
+    return {one: propose(leaf, Wanted("mm", pose=one), lambda _: []) for one in asked}
+
+
+def pilots(times: dict[Pose | None, float]) -> Callable[[Proposal], Measured]:
+    """Return a pilot of the bar, whose time [s] follows from its pose."""
+    by_height: dict[float, Pose | None] = {LEAF[0]: None, LEAF[2]: "lying", LEAF[1]: "on-edge"}
+
+    def measure(made: Proposal) -> Measured:
+        height = round(1e3 * float(np.ptp(made.chamber.part.vertices[:, 2])), 3)
+        return measured(times[by_height[height]])
+
+    return measure
+
+
+@pytest.mark.parametrize("pose", ["standing", "lying", "on-edge"])
+def test_a_pose_by_size_has_that_size_upright_however_the_file_is_turned(pose: Pose) -> None:
+    upright = {"standing": LEAF[0], "on-edge": LEAF[1], "lying": LEAF[2]}[pose]
+    for order in ([0, 1, 2], [2, 0, 1], [1, 2, 0]):
+        bar = trimesh.creation.box(np.array(LEAF)[order])
+        target = np.ones(len(bar.faces), dtype=bool)
+        turns = pose_by_size(bar.vertices, bar.faces, target, pose)
+        posed = bar.vertices @ rotation_matrix(turns).T
+        assert np.ptp(posed[:, 2]) == pytest.approx(upright)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_target_on_one_side_lies_on_it(sign: float) -> None:
+    bar = trimesh.creation.box(LEAF)
+    target = bar.face_normals[:, 2] * sign > 0.5
+    turns = pose_by_size(bar.vertices, bar.faces, target, "lying")
+    down = bar.face_normals[target] @ rotation_matrix(turns).T
+    np.testing.assert_allclose(down, [[0.0, 0.0, -1.0]] * 2, atol=1e-9)
+
+
+@pytest.mark.parametrize("axis", [[1.0, 0, 0], [-1.0, 0, 0], [0, 1.0, 0], [0, -1.0, 0]])
+def test_an_end_is_turned_to_the_wall_along_x(axis: list[float]) -> None:
+    turns = end_to_wall((0.0, 0.0, 33.0), np.array(axis))
+    np.testing.assert_allclose(rotation_matrix(turns) @ axis, [1.0, 0.0, 0.0], atol=1e-6)
+
+
+def test_a_long_bar_is_held_in_each_pose(poses: dict[Pose | None, Proposal]) -> None:
+    for pose, made in poses.items():
+        assert made.chamber.pieces_in_air == 0, pose
+        assert not made.jams
+    # What holds it at the side is the end that goes out through a wall: no ball lies on jaws.
+    for pose in ("lying", "on-edge"):
+        assert poses[pose].tables["holder"]["kind"] == "bore"
+        part = poses[pose].chamber.part.vertices[:, 0]
+        half = 5e-4 * poses[pose].tables["chamber"]["length_mm"]
+        assert part.max() > half
+        assert part.min() > -half
+
+
+def test_a_quick_design_is_not_tried_in_other_ways(poses: dict[Pose | None, Proposal]) -> None:
+    def again(_: Wanted) -> Proposal:
+        raise AssertionError
+
+    first = Way(poses[None], Wanted("mm"), measured(500.0))
+    assert propose_quicker(first, again, lambda _: measured(1.0)) is first
+    unknown = first._replace(found=None)
+    assert propose_quicker(unknown, again, lambda _: measured(1.0)) is unknown
+
+
+def test_the_quicker_pose_is_taken_and_all_times_are_told(
+    poses: dict[Pose | None, Proposal],
+) -> None:
+    first = Way(poses[None], Wanted("mm"), measured(2024.0))
+    measure = pilots({None: 2024.0, "lying": 900.0, "on-edge": 512.0})
+    best = propose_quicker(first, lambda one: poses[one.pose], measure)
+    assert best.wanted.pose == "on-edge"
+    assert best.found == measured(512.0)
+    told = best.made.reasons["part.rotate_deg"]
+    for text in ("standing: 98 % after about 2000 s", "on edge on", "98 % after about 510 s"):
+        assert text in told
+
+
+def test_more_sonotrodes_must_save_more_time(poses: dict[Pose | None, Proposal]) -> None:
+    blocks = poses["on-edge"].design.sonotrode.blocks
+    assert blocks is not None
+    assert blocks.count > 1
+    for share, taken in ((0.7, None), (0.5, "on-edge")):
+        first = Way(poses[None], Wanted("mm"), measured(1000.0))
+        measure = pilots({None: 1000.0, "lying": 2000.0, "on-edge": share * 1000.0})
+        best = propose_quicker(first, lambda one: poses[one.pose], measure)
+        assert best.wanted.pose == taken
+
+
+@pytest.mark.parametrize("share", [0.7, 0.9])
+def test_a_whole_layer_is_taken_where_it_is_quicker(
+    poses: dict[Pose | None, Proposal], share: float
+) -> None:
+    first = Way(poses[None], Wanted("mm", pose="standing"), measured(1000.0))
+    best = propose_quicker(first, lambda _: poses[None], lambda _: measured(1000.0 * share))
+    count = first.made.design.shot.count
+    if share == 0.9:
+        assert best is first
+        return
+    assert best.made.design.shot.count == pytest.approx(2 * count, rel=0.1)
+    assert "a whole layer of balls" in best.made.reasons["shot.mass_g"]
+    assert (
+        "98 % after about 700 s, with half a layer 98 % after about 1000 s"
+        in (best.made.reasons["shot.mass_g"])
+    )
+
+
+def test_a_doubled_charge_moves_its_range_too(poses: dict[Pose | None, Proposal]) -> None:
+    made = poses[None]
+    heavy = with_charge(made, 2.0)
+    assert heavy.design.shot.mass == pytest.approx(2.0 * made.design.shot.mass, rel=0.05)
+    for end in ("low", "high"):
+        before, after = made.bounds["shot.mass_g"][end], heavy.bounds["shot.mass_g"][end]
+        assert after == pytest.approx(2.0 * before, rel=0.1)
+    assert heavy.bounds["chamber.height_mm"] == made.bounds["chamber.height_mm"]
