@@ -8,6 +8,12 @@ Notation
 Strips that were measured give K and its error (calibration.py). Until then K is the usual value,
 which is known to a factor: ln K has the standard deviation USUAL_K_LOG_SD. The 95 % interval of I
 is then I exp(± 1.96 sd), with sd² the sum of the squares of that and of the relative error of S.
+
+Where no specification is at hand, ranges that are usual for a metal and a thickness are those of
+SAE AMS-S-13165, table VI (once MIL-S-13165C, cancelled, still quoted), for metallic and ceramic
+shot. They were read in a copy at yumpu.com/en/document/view/13851658, page 20, whose text has strong
+steel and titanium in one column. The table has no nickel alloys, and none for less than 0.09 in:
+customer and shop agree on an intensity there.
 """
 
 from __future__ import annotations
@@ -22,6 +28,7 @@ from chamberopt.common.errors import InputError
 from chamberopt.common.estimate import Estimate
 from chamberopt.common.number_text import plain, with_interval
 from chamberopt.design.almen_strip import OVER_A, USUAL_K, USUAL_K_LOG_SD, StripType
+from chamberopt.design.materials import Alloy
 
 if TYPE_CHECKING:
     from chamberopt.design.calibration import Calibration
@@ -39,6 +46,14 @@ FORM = (
     "a range such as 0.15-0.20A, a value with its tolerance such as 0.20+-0.02A, or a value such "
     "as 0.15A (to 30 % or 0.076 mm above it, by SAE AMS 2430); in mm of an A, N or C strip"
 )
+INCH_MM = 25.4
+THIN_MM, THICK_MM = 0.090 * INCH_MM, 0.375 * INCH_MM
+STRONG_MPa = 1379.0  # tensile strength of steel: 200,000 psi
+TABLE = "table VI of SAE AMS-S-13165"
+# From THIN_MM to THICK_MM, and above it [in on A strips].
+_STEEL = (0.008, 0.012), (0.012, 0.016)
+_STRONG = (0.006, 0.010), (0.006, 0.010)  # strong steel, and titanium
+_ALUMINIUM = (0.006, 0.010), (0.010, 0.014)
 _NUMBER = r"(\d+\.?\d*|\.\d+)"
 _GIVEN = re.compile(
     rf"\s*{_NUMBER}\s*(?:(-|–|to|\+-|\+/-|±)\s*{_NUMBER})?\s*(?:mm)?\s*([NAC])\s*", re.IGNORECASE
@@ -218,3 +233,27 @@ class Comparison:
             if where == OUTSIDE:
                 words = f"{NOT_DECIDED}: the value is {where}, the interval not wholly"
         return cls(standing, words, predicted.in_words)
+
+
+def usual_intensity(alloy: Alloy, thickness: float) -> WantedIntensity | None:
+    """Return the usual range for an alloy of some thickness [m]; None if the table has none."""
+    ranges = {"titanium": _STRONG, "aluminium": _ALUMINIUM, "steel": _STEEL}.get(alloy.metal)
+    if ranges is None or 1e3 * thickness < THIN_MM:
+        return None
+    what = alloy.metal
+    if alloy.metal == "steel" and (alloy.tensile_MPa or 0.0) >= STRONG_MPa:
+        ranges, what = _STRONG, f"steel from {STRONG_MPa:.0f} MPa on"
+    is_thick = 1e3 * thickness > THICK_MM
+    low, high = (round(INCH_MM * one, 2) for one in ranges[is_thick])
+    edge = f"above {THICK_MM:.3g} mm" if is_thick else f"of {plain(1e3 * thickness, 2)} mm"
+    return WantedIntensity(low, high, f"usual for {what} {edge} by {TABLE}")
+
+
+def why_none(alloy: Alloy, thickness: float) -> str:
+    """Return in words why there is no usual range for an alloy of some thickness [m]."""
+    if math.isfinite(thickness) and 1e3 * thickness < THIN_MM:
+        return (
+            f"the target is {plain(1e3 * thickness, 2)} mm thick or less, where {TABLE} has no "
+            f"range (below {THIN_MM:.2g} mm): agree on one with your customer"
+        )
+    return f"{TABLE} has no range for {alloy.metal}: take that of your drawing"

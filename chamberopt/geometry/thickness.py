@@ -64,6 +64,22 @@ def measure_depth(
     return _smoothed(samples._replace(thickness=depth), length)
 
 
+def depth_below(
+    vertices: np.ndarray, triangles: np.ndarray, chosen: np.ndarray, share: float, reach: float
+) -> float:
+    """Return the depth of material [m] than which a share of the chosen area has less.
+
+    It is infinite from `reach` [m] on. The depth is smoothed over a fifth of that.
+
+    Args:
+        vertices, triangles: those of measure_depth.
+        chosen: marks the chosen triangles, (m,).
+    """
+    samples = measure_depth(vertices, triangles, 0.2 * reach, reach)
+    depths = np.sort(samples.thickness[chosen[samples.triangle]])
+    return float(depths[int(share * len(depths))]) if len(depths) else float(np.inf)
+
+
 def only_plates(samples: Samples) -> Samples:
     """Return the points with an infinite thickness where the part is no plate."""
     return samples._replace(thickness=np.where(_in_plate(samples), samples.thickness, np.inf))

@@ -21,6 +21,7 @@ from chamberopt.common.errors import InputError
 from chamberopt.common.executor import share
 from chamberopt.common.progress import Progress
 from chamberopt.coverage.metrics import NEVER, exposed_target
+from chamberopt.design.intensity import PredictedIntensity
 from chamberopt.design.ranges import variants
 from chamberopt.simulation.evaluate import ReplicaPlan, evaluate, require_figures
 from chamberopt.simulation.evaluation import Evaluation
@@ -114,7 +115,7 @@ def measure_budget(
     ]
     recorded = {"simulated_time_s": time - warmup, "warmup_time_s": warmup}
     slow = slow.changed({f"process.accuracy.{key}": one for key, one in recorded.items()})
-    found = _seen(slow, chamber, executor, replicas)
+    wide = found = _seen(slow, chamber, executor, replicas)
     narrow = slow.process.accuracy.gauge_mm2 * FEW / max(found.resolution.dents, 1.0)
     if narrow < slow.process.accuracy.gauge_mm2:
         narrower = slow.changed({"process.accuracy.gauge_mm2": max(1.0, narrow)})
@@ -140,6 +141,7 @@ def measure_budget(
         mean_time=mean_time,
         warmup=warmup,
         settled=settled,
+        intensity=PredictedIntensity.of(wide.metrics, design.calibration),
     )
 
 

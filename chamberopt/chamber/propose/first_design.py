@@ -68,6 +68,7 @@ from chamberopt.geometry.meshes.surface_error import format_box
 from chamberopt.geometry.meshes.units import GUESSED
 from chamberopt.geometry.triangles import rotation_matrix
 
+REACHES = 0.95  # of a part's length, from which on a target reaches both of its ends
 AT_WALL = 2.0  # ball diameters from the target to the wall through which its end goes out
 WIDER = (1.0, 1.4, 2.0)  # factors on the room round the part that are tried
 AMPLITUDE_UM = 40.0  # zero-to-peak; the nearest that the sonotrode can set is taken
@@ -132,18 +133,22 @@ def _lying(
 ) -> Proposal:
     """Return a proposal for a part that lies, held at its side.
 
-    Where it is not held firmly otherwise, an end is left out of its target, if that may be changed.
+    Where it is not held firmly otherwise, an end is left out of a target that reaches both ends, if
+    it may be changed.
 
     Args:
         turns, reason: the pose [degrees], and why.
     """
     upright = pose_by_size(mesh.vertices, mesh.triangles, target.triangles, "standing")
+    along = mesh.vertices @ rotation_matrix(upright)[2]
+    whole = np.ptp(along[mesh.triangles[target.triangles]]) > REACHES * np.ptp(along)
     for of_any in (False, True):
         end = None if keeps_target else held_end(mesh, target, upright, of_any)
         lying = None if end is None else end._replace(turns=turns)
         made = _proposed(path, wanted, mesh, known, target, turns, reason, lying)
         holder = made.design.holder
-        if end is not None or keeps_target or (holder is not None and is_firm(holder)):
+        is_held = holder is not None and is_firm(holder)
+        if end is not None or keeps_target or not whole or is_held:
             break
     return made
 

@@ -166,8 +166,8 @@ def end_to_wall(turns: Turns, axis: np.ndarray) -> Turns:
     Args:
         axis: unit vector of the part's file, which is level in the pose, (3,).
     """
-    x, y, _ = rotation_matrix((turns[0], turns[1], 0.0)) @ axis
-    return turns[0], turns[1], round(float(-np.degrees(np.arctan2(y, x))), 4) + 0.0
+    x, y, _ = np.round(rotation_matrix((turns[0], turns[1], 0.0)) @ axis, 9) + 0.0
+    return turns[0], turns[1], round(float(np.degrees(np.arctan2(-y + 0.0, x))), 4) + 0.0
 
 
 def pose_in_words(mesh: PartMesh, known: Sequence[Surface], turns: Turns) -> str:

@@ -12,6 +12,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from chamberopt.chamber.propose.proposal import REPLICAS, Proposal, touched_share
+from chamberopt.design.intensity import PredictedIntensity
 
 DENTS, MARGIN = 25.0, 1.3  # needed in a window; over what is needed, as a pilot is short
 COVERED = 0.95  # share of the target's area whose time to 98 % counts
@@ -55,6 +56,8 @@ class Measured(NamedTuple):
         mean_time: after which the target is 98 % covered on average [s].
         warmup: after which the shot no longer slowed down [s].
         settled: this is known; otherwise it is half of the pilot.
+        intensity: Almen intensity in wide windows, a little more than in single places where these
+            differ; None if it is not known.
     """
 
     dent_rate: float
@@ -69,6 +72,7 @@ class Measured(NamedTuple):
     mean_time: float
     warmup: float = 0.0
     settled: bool = True
+    intensity: PredictedIntensity | None = None
 
 
 class Budget(NamedTuple):

@@ -26,12 +26,21 @@ from chamberopt.chamber.propose.proposed_balls import fit_sizes, serving_sizes, 
 from chamberopt.chamber.propose.shop import ShopSonotrode, usual_shop
 from chamberopt.common.errors import InputError
 from chamberopt.common.number_text import plain
-from chamberopt.design.intensity import Comparison, PredictedIntensity, WantedIntensity
+from chamberopt.design.intensity import (
+    Comparison,
+    PredictedIntensity,
+    WantedIntensity,
+    usual_intensity,
+    why_none,
+)
+from chamberopt.design.materials import alloy
+from chamberopt.geometry.thickness import depth_below
 
 BALL_POWER, AMPLITUDE_POWER = 1.0, 0.9
 MOST_PILOTS = 5
 # Settings in the middle half of the range, by logarithms, count as equally good.
 MIDDLE = 0.5
+DEEPEST, THIN_SHARE = 10e-3, 0.05  # m that is measured under a target; share that may be thin
 MOST_LISTED = 3  # other settings in a reason
 
 
@@ -176,6 +185,49 @@ def propose_intensity(
     others = _other(intensity, [x for x in settings if x != chosen], found)
     told = _with_amplitude(one, chosen), intensity, found[chosen].predicted
     return _told(*told, others, reason)
+
+
+def usual_for(made: Proposal) -> WantedIntensity:
+    """Return the Almen intensity that is usual for the alloy and thickness of a proposal's target.
+
+    Raises InputError if none is.
+    """
+    metal, middle = alloy(made.tables["materials"]["part"]), _depth(made, 0.5)
+    found = usual_intensity(metal, middle)
+    if found is None:
+        raise InputError(f"--intensity: given usual, but {why_none(metal, middle)}")
+    return found
+
+
+def with_expected_intensity(made: Proposal, predicted: PredictedIntensity | None) -> Proposal:
+    """Return a proposal that tells its expected intensity beside the usual one.
+
+    Args:
+        predicted: by a pilot; None if it is not known.
+    """
+    if predicted is None:
+        return made
+    metal, middle, thin = (
+        alloy(made.tables["materials"]["part"]),
+        _depth(made, 0.5),
+        _depth(made, THIN_SHARE),
+    )
+    factor = "" if predicted.factor == 1.0 else f" x/÷ {plain(predicted.factor, 2)}"
+    expected = f"expected: {plain(predicted.value, 2)} mmA{factor}"
+    usual = usual_intensity(metal, middle)
+    beside = why_none(metal, middle)
+    if usual is not None:
+        beside = f"{usual.low:g}-{usual.high:g}A are {usual.text}: --intensity usual"
+        if usual_intensity(metal, thin) is None:
+            beside += f"; THIN PLACES: of {THIN_SHARE:.0%} {why_none(metal, thin)}, or mask them"
+    reason = f"{made.reasons['shot.diameter_mm']}; {expected}; {beside}"
+    return replace(made, reasons={**made.reasons, "shot.diameter_mm": reason})
+
+
+def _depth(made: Proposal, share: float) -> float:
+    """Return the depth of material [m] than which a share of a proposal's target has less."""
+    part = made.chamber.part
+    return depth_below(part.vertices, part.triangles, part.target, share, DEEPEST)
 
 
 def _with_prediction(

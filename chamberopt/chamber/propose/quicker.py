@@ -1,9 +1,9 @@
 """Find a quicker way to peen a part whose treatment takes long, by pilot simulations.
 
-A long part that stands on one sonotrode is dented slowly at its upper end, as few balls get there.
-Lying or on edge over several sonotrodes it may take a fifth of the time. A whole layer of balls
-dents faster than half a layer in a roomy chamber, and slower where the balls are in each other's
-way. So both are tried, and what is proposed was simulated itself.
+A part that stands on one sonotrode is dented slowly at its upper end, as few balls get there. Lying
+or on edge, over several sonotrodes if it is long, it may take a fifth of the time. A whole layer of
+balls dents faster than half a layer in a roomy chamber, and slower where the balls are in each
+other's way. So both are tried, and what is proposed was simulated itself.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from chamberopt.chamber.propose.pose import Pose
 from chamberopt.chamber.propose.proposal import Proposal, Wanted, faults, with_charge
 from chamberopt.chamber.propose.proposed_balls import MOST_BALLS
 from chamberopt.chamber.propose.proposed_budget import Measured
-from chamberopt.chamber.propose.proposed_target import LONG
 from chamberopt.common.errors import InputError
+from chamberopt.geometry.triangles import rotation_matrix
 
 SLOW = 600.0  # s until 98 % of the target are dented, from which on other ways are tried
 # Time over that of the way before, below which a way is taken: with more sonotrodes, or with as
@@ -27,6 +27,7 @@ SLOW = 600.0  # s until 98 % of the target are dented, from which on other ways 
 DEARER, QUICKER = 0.6, 0.8
 POSES: tuple[Pose, ...] = ("lying", "on-edge")
 LAYER = 2.0  # over half a layer
+SAME = 0.999  # cosine between the directions that point up, from which on a pose is no other one
 
 
 class Way(NamedTuple):
@@ -47,12 +48,14 @@ def propose_quicker(
         measure: simulates a proposal briefly; None if that cannot be done.
     """
     best, tried = first, []
-    if _is_slow(first) and first.wanted.pose is None and _stands(first.made):
+    if _is_slow(first) and first.wanted.pose is None and not _turns(first.made):
         for pose in POSES:
             wanted = replace(first.wanted, pose=pose)
             try:
                 made = again(wanted)
             except InputError:
+                continue
+            if float(_up(made) @ _up(first.made)) > SAME:
                 continue
             harm = _harm(made, first.made)
             one = Way(made, wanted, None if harm else measure(made))
@@ -77,10 +80,13 @@ def _is_slow(way: Way) -> bool:
     return way.found is not None and way.found.time_to_98 > SLOW
 
 
-def _stands(made: Proposal) -> bool:
-    """Return whether a part is long and its long side is upright."""
-    sides = np.ptp(made.chamber.part.vertices, axis=0)
-    return bool(sides[2] > LONG * sides[:2].max()) and "part_turn" not in made.tables["effects"]
+def _turns(made: Proposal) -> bool:
+    return made.design.effects.part_turn is not None
+
+
+def _up(made: Proposal) -> np.ndarray:
+    """Return the direction of the part's file that points up in a proposal, (3,)."""
+    return np.asarray(rotation_matrix(made.design.part.rotate_deg)[2])
 
 
 def _harm(made: Proposal, first: Proposal) -> str:
@@ -116,7 +122,7 @@ def _with_pose_told(best: Way, first: Way, tried: list[tuple[Way, str]]) -> Way:
     """Return the best way with the times of all poses in the reason for its pose."""
     texts = []
     for one, harm in [(first, ""), *tried]:
-        name = (one.wanted.pose or "standing").replace("-", " ")
+        name = (one.wanted.pose or "evenly exposed").replace("-", " ")
         what = harm or _after(one.found)
         count = _sonotrodes(one.made)
         texts.append(f"{name}{f' on {count} sonotrodes' if count > 1 else ''}: {what}")

@@ -2,6 +2,7 @@
 
 from chamberopt.design.materials.catalogue import (
     BRINELL_TO_PASCAL,
+    Alloy,
     alloy,
     alloys,
     ball,
@@ -31,6 +32,7 @@ __all__ = [
     "DEFAULT_C0",
     "NONE",
     "USUAL",
+    "Alloy",
     "Materials",
     "PartMaterial",
     "RestitutionTable",

@@ -10,13 +10,24 @@ from chamberopt.common.estimate import Estimate
 from chamberopt.design.almen_strip import USUAL_K, USUAL_K_LOG_SD
 from chamberopt.design.calibration import Calibration
 from chamberopt.design.intensity import (
+    INCH_MM,
     INSIDE,
     NOT_DECIDED,
     OUTSIDE,
+    THICK_MM,
+    THIN_MM,
     Comparison,
     PredictedIntensity,
+    STRONG_MPa,
     WantedIntensity,
+    usual_intensity,
+    why_none,
 )
+from chamberopt.design.materials import Alloy, alloy
+
+STEEL = alloy("42CrMo4").model_copy(update={"tensile_MPa": 1100.0})
+STRONG = STEEL.model_copy(update={"tensile_MPa": STRONG_MPa})
+TITANIUM, ALUMINIUM = alloy("Ti-6Al-4V"), alloy("7075-T6")
 
 
 def calibration(**changed: object) -> Calibration:
@@ -159,3 +170,38 @@ def test_an_estimate_far_off_is_outside_though_no_strip_was_measured() -> None:
     """0.0135 mmA, at 95 % at most 0.079, is certainly below 0.15 mmA."""
     found = Comparison.of((0.15, 0.20), {"strength_um": Estimate(1.0, 0.05)}, None)
     assert found.standing == OUTSIDE
+
+
+@pytest.mark.parametrize(
+    ("metal", "medium", "thick"),
+    [
+        (STEEL, (0.008, 0.012), (0.012, 0.016)),
+        (STRONG, (0.006, 0.010), (0.006, 0.010)),
+        (TITANIUM, (0.006, 0.010), (0.006, 0.010)),
+        (ALUMINIUM, (0.006, 0.010), (0.010, 0.014)),
+    ],
+)
+def test_the_ranges_are_those_of_the_table_in_inches(
+    metal: Alloy, medium: tuple[float, float], thick: tuple[float, float]
+) -> None:
+    for mm, inches in ((THIN_MM, medium), (THICK_MM, medium), (1.01 * THICK_MM, thick)):
+        found = usual_intensity(metal, 1e-3 * mm)
+        assert found is not None
+        assert (found.low, found.high) == pytest.approx(
+            [INCH_MM * one for one in inches], abs=0.005
+        )
+    assert usual_intensity(metal, math.inf) is not None
+
+
+def test_a_range_of_the_table_reads_as_if_it_were_given() -> None:
+    found = usual_intensity(TITANIUM, 5e-3)
+    assert found is not None
+    again = WantedIntensity.parse(f"{found.low:g}-{found.high:g}A")
+    assert (again.low, again.high) == (found.low, found.high) == (0.15, 0.25)
+
+
+def test_thin_targets_and_other_metals_have_none_and_say_why() -> None:
+    assert usual_intensity(TITANIUM, 0.99e-3 * THIN_MM) is None
+    assert "0.64 mm thick or less" in why_none(TITANIUM, 0.64e-3)
+    assert usual_intensity(alloy("IN718"), 5e-3) is None
+    assert "no range for nickel" in why_none(alloy("IN718"), 5e-3)

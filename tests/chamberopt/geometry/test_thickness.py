@@ -7,6 +7,7 @@ from manifold3d import CrossSection
 
 from chamberopt.geometry.thickness import (
     border_distance,
+    depth_below,
     measure_depth,
     only_plates,
     thickness_of_triangles,
@@ -111,3 +112,15 @@ def test_borders_are_as_far_as_the_edges() -> None:
     near = plate & (edge < 4e-3)
     # borders are known at sample points, half a ball apart and now and then more
     assert (np.abs(found[near] - edge[near]) < 1.5e-3).mean() > 0.97
+
+
+@pytest.mark.parametrize("share", [0.1, 0.9])
+def test_the_depth_below_a_share_of_a_step(share: float) -> None:
+    """A step of 2 and 6 mm, half of whose top is thin: its thinner tenth has 2 mm, its rest 6."""
+    mm = [(0.0, 0.0), (60.0, 0.0), (60.0, 6.0), (30.0, 6.0), (30.0, 2.0), (0.0, 2.0)]
+    step = split(prism(mm, 40.0), 2)
+    vertices, triangles = np.asarray(step.vertices), np.asarray(step.faces)
+    top = step.face_normals[:, 1] > 0.9
+    found = 1e3 * depth_below(vertices, triangles, top, share, 10e-3)
+    assert found == pytest.approx(2.0 if share < 0.5 else 6.0, rel=0.02)
+    assert depth_below(vertices, triangles, top, 0.9, 5e-3) == np.inf

@@ -22,6 +22,8 @@ from chamberopt.chamber.propose.proposed_intensity import (
     propose_intensity,
     setting_of,
     settings_of,
+    usual_for,
+    with_expected_intensity,
 )
 from chamberopt.chamber.propose.shop import Shop, load_shop
 from chamberopt.chamber.propose.text import design_text, study_texts
@@ -266,3 +268,24 @@ def test_a_wanted_intensity_that_is_no_range_is_named() -> None:
 
 def test_a_setting_has_its_units() -> None:
     assert Setting(1.5, 27.5).in_words == "1.5 mm at 27.5 µm"
+
+
+def test_without_a_wish_the_expected_intensity_stands_beside_the_usual_one(
+    plate: Path, shop: Shop
+) -> None:
+    """A plate of 8 mm of titanium, 0.006 to 0.010 in; of nickel there is no usual range."""
+    made = propose(plate, Wanted("mm", shop=shop, alloy="Ti-6Al-4V"), lambda _: [])
+    assert with_expected_intensity(made, None) is made
+    predicted = PredictedIntensity(0.31, 0.05, 1.9, 2.5)
+    told = with_expected_intensity(made, predicted).reasons["shot.diameter_mm"]
+    assert "; expected: 0.31 mmA x/÷ 2.5; 0.15-0.25A are usual for titanium of 8 mm" in told
+    assert "THIN" not in told
+    wanted = usual_for(made)
+    assert (wanted.low, wanted.high) == (0.15, 0.25)
+    nickel = propose(plate, Wanted("mm", shop=shop, alloy="IN718"), lambda _: [])
+    assert (
+        "no range for nickel"
+        in with_expected_intensity(nickel, predicted).reasons["shot.diameter_mm"]
+    )
+    with pytest.raises(InputError, match=r"--intensity: given usual, but .*nickel"):
+        usual_for(nickel)
