@@ -11,7 +11,7 @@ is then I exp(± 1.96 sd), with sd² the sum of the squares of that and of the r
 
 Where no specification is at hand, ranges that are usual for a metal and a thickness are those of
 SAE AMS-S-13165, table VI (once MIL-S-13165C, cancelled, still quoted), for metallic and ceramic
-shot. They were read in a copy at yumpu.com/en/document/view/13851658, page 20, whose text has strong
+shot. They were read in a copy (yumpu.com/en/document/view/13851658, page 20) whose text has strong
 steel and titanium in one column. The table has no nickel alloys, and none for less than 0.09 in:
 customer and shop agree on an intensity there.
 """
