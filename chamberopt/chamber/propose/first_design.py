@@ -76,6 +76,13 @@ USUAL_PART, WALL, SONOTRODE = "42CrMo4", "100Cr6", "Ti-6Al-4V"  # of the catalog
 # Materials of balls, and least hardness of steel balls over the part's. A part as hard as they are
 # is hardly dented: in pilots of a gear of 650 HB tungsten carbide left 9 times the dents.
 STEEL, HARD, HARDER = "steel", "tungsten_carbide", 1.25
+# By metal of the part. Of aluminium: SAE AMS-S-13165, note 5 to table VI (design/intensity.py).
+IRON = {
+    "aluminium": "IT LEAVES IRON on aluminium: decontaminate (note 5 to table VI of SAE "
+    "AMS-S-13165), or ceramic balls, such as --shot zirconia",
+    "titanium": "IT LEAVES IRON on titanium: decontaminate, or ceramic balls, such as --shot "
+    "zirconia, above all on implants (by heart)",
+}
 TREATMENT_S, HALF_WIDTH, MOST_REPLICAS = 300.0, 0.03, 24
 BLOCKS = "LARGER THAN ONE SONOTRODE: several side by side, driven alike"
 START = "a start, NOT MEASURED by a pilot"
@@ -291,7 +298,7 @@ def _proposed(
 
 
 def _shot(name: str, part: str, shop: Shop) -> tuple[str, str]:
-    """Return the material of the balls, and why they are not of steel, or an empty text.
+    """Return the material of the balls, and why they are not of steel or what steel leaves behind.
 
     Raises InputError if a wanted material is unknown, or its hardness and so its restitution is
     not known.
@@ -306,7 +313,8 @@ def _shot(name: str, part: str, shop: Shop) -> tuple[str, str]:
         raise InputError(f"--shot: given {name!r}; {text}; give one of {known}")
     hardness = alloy(part).hardness_HB
     if name or (ball(STEEL).hardness_HB or 0.0) >= HARDER * hardness or not _has(shop, HARD):
-        return ball(name or STEEL).name, ""
+        found = ball(name or STEEL).name
+        return found, IRON.get(alloy(part).metal, "") if found == STEEL else ""
     return HARD, f"harder than the part, of {hardness:g} HB, which steel balls hardly dent"
 
 
