@@ -205,15 +205,12 @@ def with_expected_intensity(made: Proposal, predicted: PredictedIntensity | None
     Args:
         predicted: by a pilot; None if it is not known.
     """
-    if predicted is None:
-        return made
-    metal, middle, thin = (
-        alloy(made.tables["materials"]["part"]),
-        _depth(made, 0.5),
-        _depth(made, THIN_SHARE),
-    )
-    factor = "" if predicted.factor == 1.0 else f" x/÷ {plain(predicted.factor, 2)}"
-    expected = f"expected: {plain(predicted.value, 2)} mmA{factor}"
+    metal = alloy(made.tables["materials"]["part"])
+    middle, thin = _depth(made, 0.5), _depth(made, THIN_SHARE)
+    expected = "its Almen intensity is not resolved by the pilot"
+    if predicted is not None:
+        factor = "" if predicted.factor == 1.0 else f" x/÷ {plain(predicted.factor, 2)}"
+        expected = f"expected: {plain(predicted.value, 2)} mmA{factor}"
     usual = usual_intensity(metal, middle)
     beside = why_none(metal, middle)
     if usual is not None:

@@ -63,7 +63,8 @@ def propose_quicker(
             if not harm and _is_quicker(one, best):
                 best = one
         best = _with_pose_told(best, first, tried)
-    if _is_slow(best) and 2 * best.made.design.shot.count <= MOST_BALLS:
+    is_known = best.found is not None and best.found.places  # else a heavier one takes longer still
+    if is_known and _is_slow(best) and 2 * best.made.design.shot.count <= MOST_BALLS:
         made = with_charge(best.made, LAYER)
         found = measure(made)
         if _is_quicker(Way(made, best.wanted, found), best):
