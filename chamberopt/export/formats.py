@@ -25,6 +25,7 @@ class ExportFormat:
             It returns remarks or None. Its module is imported when it is needed. None for impacts,
             which are simulated again, once for all formats of impacts.
         arguments: further arguments of the writer.
+        takes_mesh: True if its last argument is the user's own mesh.
     """
 
     file: str
@@ -32,12 +33,18 @@ class ExportFormat:
     endings: tuple[str, ...] = ()
     writer: str | None = None
     arguments: tuple[str, ...] = ()
+    takes_mesh: bool = False
 
-    def write(self, folder: Path, file: Path) -> list[str]:
-        """Write a result in this format to a file and return remarks for the user."""
+    def write(self, folder: Path, file: Path, mesh: Path | None = None) -> list[str]:
+        """Write a result in this format to a file and return remarks for the user.
+
+        Args:
+            mesh: the user's own mesh, for a format that takes one.
+        """
         module, function = str(self.writer).split(".")
         write = getattr(import_module(f"chamberopt.export.{module}"), function)
-        return write(folder, file, *self.arguments) or []
+        own = (mesh,) if self.takes_mesh else ()
+        return write(folder, file, *self.arguments, *own) or []
 
 
 STUDY = "study-csv"  # the only format for a study without a result, and for a sweep
@@ -109,6 +116,13 @@ FORMATS = {
         "the same as layers of composite shells, for CalculiX and Abaqus",
         (".inp", ".inc"),
         "stress.write_shell_layers",
+    ),
+    "stress-solid": ExportFormat(
+        "stress_solid.inp",
+        "the same as initial stress in your own solids, for CalculiX; takes --mesh",
+        (".inp", ".inc"),
+        "stress_solid.write_solid_stress",
+        takes_mesh=True,
     ),
     "tolerances-csv": ExportFormat(
         "tolerances.csv",

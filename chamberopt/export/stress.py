@@ -3,7 +3,7 @@
 A composite shell has a material for each layer, whose thermal expansion is the mean eigenstrain of
 the layer: heated by 1 K, the shell bends and stretches as the peened plate does. A flat shell has
 no stress along its normal, so that one expansion in all directions is right. On a solid with a
-curved skin it is wrong by up to a third, which is why there is no such deck here.
+curved skin it is wrong by up to a third: solids have initial stress (stress_solid.py).
 
 Source: Abaqus Keywords Reference Guide and CalculiX CrunchiX user's manual, *SHELL SECTION with
 COMPOSITE: a line for each layer, from the face at the negative side of the normal on, of its

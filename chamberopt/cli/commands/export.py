@@ -36,6 +36,7 @@ def export(
     /,
     *,
     to: To = None,
+    mesh: Path | None = None,
     frame: FrameName | None = None,
     replicas: int | None = None,
     workers: Workers = None,
@@ -51,6 +52,8 @@ def export(
     ----------
     result
         Results folder.
+    mesh
+        Your own deck of the part for stress-solid: Abaqus or CalculiX, with elements C3D4 or C3D10.
     frame
         Coordinates of impacts: "part" (default), as in the part's file and in its unit; or
         "chamber", in mm.
@@ -68,6 +71,11 @@ def export(
         if given is not None and not from_impacts:
             text = "applies only to impact exports; remove it or add --to impacts-parquet"
             raise InputError(f"--{name}: {text}")
+    take_mesh = [name for name, one in formats.items() if one.takes_mesh]
+    if mesh is None and take_mesh:
+        raise InputError(f"--to {take_mesh[0]}: takes --mesh DECK, your own deck of the part")
+    if mesh is not None and not take_mesh:
+        raise InputError("--mesh: applies only to stress-solid; remove it or add --to stress-solid")
     loaded = None if set(formats) == {export_formats.STUDY} else load_result(result)
     folder = loaded.folder if loaded else result
     counts: dict[str, int] = {}
@@ -76,7 +84,7 @@ def export(
         for name, one in formats.items():
             if one.writer is not None:
                 with step(name):
-                    remarks += one.write(folder, files[name])
+                    remarks += one.write(folder, files[name], mesh)
         print_remarks(dict.fromkeys(remarks))  # several formats may have the same remark
         # Impacts come last, because simulating them takes long. Other errors are reported before.
         if loaded and from_impacts:

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter, defaultdict
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -88,12 +88,24 @@ def read_abaqus(path: Path, content: bytes) -> RawMesh:
 
     Raises InputError, which names the line, for a keyword that is not supported or is damaged.
     """
-    scopes, instances, notes = _read_scopes(path, content.decode("utf-8", errors="replace"))
+    return extract_surface(read_elements(path, content))
+
+
+def read_elements(path: Path, content: bytes, only: Sequence[str] = ()) -> ElementMesh:
+    """Read the elements of an Abaqus input file, with the nodes and sets of all its instances.
+
+    Args:
+        only: types of elements with a surface that the file may have, e.g. "C3D4"; none for all
+            that are known.
+    Raises:
+        InputError: for a keyword that is not supported or is damaged, with its line.
+    """
+    scopes, instances, notes = _read_scopes(path, content.decode("utf-8", errors="replace"), only)
     try:
         placed = [scopes[instance.part] for instance in instances.values()]
         count = sum(len(scope.nodes) + len(scope.elements) for scope in placed)
         require_few(path, count, "nodes and elements in all instances")
-        return extract_surface(_assemble(scopes, instances, notes))
+        return _assemble(scopes, instances, notes)
     except KeyError as error:
         why = f"names {error.args[0]}, which is not there"
         raise InputError(f"{path}: {why}; export the whole model") from None
@@ -123,11 +135,14 @@ def _keywords(text: str) -> list[tuple[str, Options, list[str], int]]:
 
 
 def _read_scopes(
-    path: Path, text: str
+    path: Path, text: str, only: Sequence[str]
 ) -> tuple[dict[str, _Scope], dict[str, _Instance], list[str]]:
     """Return the parts and the instances of a file by upper-case name, and notes for the user.
 
     Nodes, elements and sets outside of all parts are under the name "".
+
+    Args:
+        only: types of elements that the file may have, as in `read_elements`.
     """
     scopes, instances, left_out = {"": _Scope()}, {}, Counter[str]()
     current = ""
@@ -147,7 +162,7 @@ def _read_scopes(
             elif keyword == "NODE":
                 _add_nodes(scope, options, data)
             elif keyword == "ELEMENT":
-                _add_elements(scope, options, data, left_out)
+                _add_elements(scope, options, data, left_out, only)
             elif keyword in ("ELSET", "NSET"):
                 sets = scope.element_sets if keyword == "ELSET" else scope.node_sets
                 sets[options[keyword]] |= _members(options, data, sets)
@@ -177,11 +192,15 @@ def _add_nodes(scope: _Scope, options: Options, data: list[str]) -> None:
             scope.node_sets[options["NSET"]][_one("", number)] = None
 
 
-def _add_elements(scope: _Scope, options: Options, data: list[str], left_out: Counter[str]) -> None:
+def _add_elements(
+    scope: _Scope, options: Options, data: list[str], left_out: Counter[str], only: Sequence[str]
+) -> None:
     name = options["TYPE"].upper()
     if WITHOUT_SURFACE.match(name):
         left_out[name] += len(data)
         return
+    if only and name not in only:
+        raise ValueError(f"type={name} is not supported here; use {' or '.join(only)}")
     if found := SHELL.match(name):
         kind = SHELL_KIND[int(found[1])]
     elif found := SOLID.match(name):

@@ -342,6 +342,8 @@ def test_several_formats_into_a_new_folder(simulated: Path, chamberopt: Said) ->
         (["--to", "chamber-stl", "--out", "full"], "full: already holds files"),
         (["--to", "study-csv"], "history.jsonl: is not there; give a study's results folder"),
         (["--to", "chamber-stl", "--frame", "room"], "--frame"),
+        (["--to", "stress-solid"], "--to stress-solid: takes --mesh DECK, your own deck"),
+        (["--to", "stress-csv", "--mesh", "deck.inp"], "--mesh: applies only to stress-solid"),
     ],
 )
 def test_wrong_calls_are_one_message(
