@@ -20,8 +20,10 @@ from chamberopt.coverage.stress_model import StressModel, measured_law
 from chamberopt.design.almen_strip import STRIP_STEEL, STRIP_TENSILE, STRIP_YIELD, STRIPS
 from chamberopt.design.calibration import calibrated_strip
 from chamberopt.design.flexure import plate_metals
+from chamberopt.geometry.triangles import border_edges, sharp_sides, sides_of
 
 if TYPE_CHECKING:
+    from chamberopt.chamber.part import Part
     from chamberopt.design.load import Design
 
 DEPTH, SURFACE, PEAK, PEAK_DEPTH = (
@@ -41,6 +43,8 @@ AT_SATURATION = 0.9  # share of the strength and arc of equal dents that a satur
 ARC_AGREES = 0.6, 1.6  # arc height by the law over the calibrated intensity, as far as it is usual
 THINNEST = 3.0  # thickness of a plate over the depth of compression
 POINTS = 129  # depths in a strip
+EDGE = 2.0  # distance from a sharp edge over the depth of compression, below which nothing is told
+FEW = 0.005  # share of a surface that is worth no note
 
 
 def stress_bands(design: Design) -> dict[str, float]:
@@ -127,6 +131,34 @@ def _arc_note(design: Design, strength: Estimate) -> tuple[str, ...]:
     return (
         f"the law of residual stress bends an A strip by {1e3 * arc:.2g} mm, and the calibration "
         f"has {intensity:.2g}: they disagree, so trust the stress less, or measure a [[profile]]",
+    )
+
+
+def edge_notes(design: Design, part: Part, found: Mapping[str, Estimate]) -> tuple[str, ...]:
+    """Return a note on the share of target and zones that is near a sharp edge of the part.
+
+    It is that of strips along the edges, which overlap at corners, so that it is a little large.
+
+    Args:
+        found: figures of the target and of zones.
+    """
+    if design.stress is None or len(border_edges(part.triangles)):
+        return ()
+    sides = sharp_sides(part.vertices, part.triangles).ravel()
+    ends = part.vertices[sides_of(part.triangles)[sides]]
+    length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    shares = []
+    for name, inside in {"": part.target, **part.zones}.items():
+        depth = 1e-6 * found[f"{name}.{DEPTH}" if name else DEPTH].value
+        share = EDGE * depth * float(length[inside[sides // 3]].sum() / part.area[inside].sum())
+        if share > FEW:
+            of = f"zone {name}" if name else "the target"
+            shares.append(f"{100.0 * min(share, 1.0):.2g} % of {of}")
+    if not shares:
+        return ()
+    return (
+        f"{' and '.join(shares)} are within {EDGE:g} depths of compression of a sharp edge, where "
+        "the residual stress is another: it is told for a flat surface",
     )
 
 

@@ -88,14 +88,19 @@ def swept(
 
 
 def sharp_edges(vertices: np.ndarray, triangles: np.ndarray, degrees: float = 30.0) -> np.ndarray:
-    """Return both end vertices (k, 2) of the edges at which a closed surface turns sharply.
+    """Return both end vertices (k, 2) of the edges at which a closed surface turns sharply."""
+    return np.asarray(sides_of(triangles)[sharp_sides(vertices, triangles, degrees)[:, 0]])
+
+
+def sharp_sides(vertices: np.ndarray, triangles: np.ndarray, degrees: float = 30.0) -> np.ndarray:
+    """Return the numbers of the two sides (k, 2) at edges where a closed surface turns sharply.
 
     Sharply means by more than an angle in `degrees`.
     """
     normals, pairs = unit_vectors(area_vectors(vertices, triangles)), side_pairs(triangles)
     one, two = normals[pairs.T // 3]
     is_sharp = np.einsum("ij,ij->i", one, two) < np.cos(np.radians(degrees))
-    return np.asarray(sides_of(triangles)[pairs[is_sharp, 0]])
+    return np.asarray(pairs[is_sharp])
 
 
 def find_shells(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -28,7 +28,7 @@ from chamberopt.peening.range_result import RangeResult, RivalAtEnds
 from chamberopt.peening.tolerance_result import ToleranceResult
 from chamberopt.search.study.parameters import bound_at
 
-FORMAT = 8
+FORMAT = 9
 ROUNDING = 1e-9
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
 Count = Annotated[int, Field(ge=0)]

@@ -25,7 +25,7 @@ from chamberopt.coverage.field.target_field import (
     require_wide_gauge,
 )
 from chamberopt.coverage.metrics import require_metrics, require_target, unit_of_objective
-from chamberopt.coverage.stress_knowledge import stress_notes
+from chamberopt.coverage.stress_knowledge import edge_notes, stress_notes
 from chamberopt.simulation.effort import Effort
 from chamberopt.simulation.estimates import (
     SeenDents,
@@ -210,6 +210,7 @@ class _Run:
                 *strength_notes(found.metrics, found.resolution),
                 *zone_notes,
                 *stress_notes(design, metrics["strength_um"]),
+                *edge_notes(design, self.chamber.part, metrics),
                 *resting_notes([one.resting for one in replicas if one.resting], done),
                 *trapped_notes([one.trapped for one in replicas], design),
                 *settling_notes(excess, design),

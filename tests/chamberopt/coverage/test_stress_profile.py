@@ -1,10 +1,12 @@
 """Figures of the compressed layer over surfaces of which they are known."""
 
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
 import numpy as np
 import pytest
+import trimesh
 
 from chamberopt.chamber.scene import chamber_mesh
 from chamberopt.common.errors import InputError
@@ -21,6 +23,7 @@ from chamberopt.coverage.stress_knowledge import (
     PEAK_DEPTH,
     SURFACE,
     arc_by_law,
+    edge_notes,
     stress_bands,
     stress_notes,
     why_not_known,
@@ -39,6 +42,7 @@ from chamberopt.coverage.stress_profile import (
 )
 from chamberopt.design.load import Design
 from tests.helpers.synthetic import (
+    chamber_round,
     dents_at,
     machine_values,
     plane_chamber,
@@ -259,6 +263,22 @@ def test_strips_that_disagree_with_the_law_are_told() -> None:
     assert len(notes(10.0)) == len(notes(15.0)) == 1
     for k in (4.0, 25.0):
         assert "bends an A strip by 0.32 mm, and the calibration has" in notes(k)[0]
+
+
+def test_the_strip_along_sharp_edges_is_told() -> None:
+    """A face of 20 mm x 20 mm has four strips of .5 mm; a ball has no edges."""
+    depth = {
+        "compression_depth_um": Estimate(250.0, 1.0),
+        "low.compression_depth_um": Estimate(0.0, 1.0),
+    }
+    slab = trimesh.creation.box((0.02, 0.02, 2e-3)).subdivide()
+    top = slab.triangles_center[:, 2] > 0.9e-3
+    part = chamber_round(slab, top).part
+    (note,) = edge_notes(DESIGN, replace(part, zones={"low": ~top}), depth)
+    assert note.startswith("10 % of the target are within 2 depths of compression of a sharp edge")
+    assert edge_notes(plate_design(), part, depth) == ()
+    ball = trimesh.creation.icosphere(3, 0.01)
+    assert edge_notes(DESIGN, chamber_round(ball).part, depth) == ()
 
 
 def test_a_metal_that_hardens_strongly_gets_no_depth() -> None:
