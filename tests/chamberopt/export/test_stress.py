@@ -12,7 +12,8 @@ import pytest
 
 from chamberopt.chamber.build import build_chamber
 from chamberopt.common.errors import InputError
-from chamberopt.coverage.stress_law import bending, integrals
+from chamberopt.coverage.stress_law import arc_height, bending, integrals
+from chamberopt.design.almen_strip import STRIPS
 from chamberopt.documents.report import report
 from chamberopt.documents.stress import band_text, part_text
 from chamberopt.export.stress import write_shell_layers, write_stress_table
@@ -128,50 +129,80 @@ def test_the_layers_of_a_shell_are_read_back(peened: str, folder: Path, tmp_path
 
 
 @pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX is not installed")
-def test_calculix_bends_the_strip_as_the_closed_form(folder: Path, tmp_path: Path) -> None:
+def test_calculix_bends_the_plate_as_the_closed_form(folder: Path, tmp_path: Path) -> None:
     """A free plate of 120 x 120 mm: w = k r² / 2 about its middle, far from the edges."""
-    write_shell_layers(folder, tmp_path / "shells.inp")
+    across = np.linspace(-60.0, 60.0, 9)
+    found = sag(folder, tmp_path, (across, across), [(30, 0), (-30, 0), (0, 30), (0, -30)])
+    assert found == pytest.approx(bending(*layer_of(folder), HEIGHT) * 30.0**2 / 2.0, rel=1e-3)
+
+
+@pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX is not installed")
+def test_calculix_bends_an_almen_strip_as_the_arc_height(tmp_path: Path) -> None:
+    """A strip of 76.2 x 18.9 x 1.295 mm on the four balls of the gauge."""
+    thickness = 1e3 * STRIPS["A"].thickness
+    folder = saved(tmp_path / "strip", stress={"thickness_mm": thickness}, zones=[ZONE])
+    x = np.array([0.0, 4.0, 8.0, 12.0, 15.875, 22.0, 30.0, 38.1])
+    y = np.array([0.0, 4.0, 7.94, 9.45])
+    both = [np.r_[-one[:0:-1], one] for one in (x, y)]
+    balls = [(i * 15.875, j * 7.94) for i in (-1, 1) for j in (-1, 1)]
+    found = sag(folder, tmp_path, (both[0], both[1]), balls)
+    depth, strain = layer_of(folder)
+    assert found == pytest.approx(
+        1e3 * arc_height(1e-3 * depth, strain, 1e-3 * thickness), rel=5e-3
+    )
+
+
+def layer_of(folder: Path) -> tuple[np.ndarray, np.ndarray]:
+    """Depths [mm] and eigenstrain below the target of a result."""
     record = load_result(folder).record.stress
     assert record is not None
     profile = record.profiles["the target"]
-    depth, strain = 1e-3 * np.array(profile.depth_um), np.array(profile.eigenstrain)
-    curvature = float(bending(depth, strain, HEIGHT))
-    text = (tmp_path / "shells.inp").read_text().partition("*MATERIAL, NAME=PEENED_MIDDLE")[0]
-    (tmp_path / "layers.inp").write_text(text)
-    (tmp_path / "plate.inp").write_text(free_plate(sides=8, length=120.0))
-    subprocess.run(["ccx", "plate"], cwd=tmp_path, check=True, capture_output=True, timeout=100)
-    rows = [line.split() for line in (tmp_path / "plate.dat").read_text().splitlines()]
+    return 1e-3 * np.array(profile.depth_um), np.array(profile.eigenstrain)
+
+
+def sag(
+    folder: Path, place: Path, lines: tuple[np.ndarray, np.ndarray], at: list[tuple[float, float]]
+) -> float:
+    """By how much the middle of a free plate stands out over the mean of places [mm], by CalculiX.
+
+    Args:
+        lines: where the corners of its shells are along x and y [mm].
+    """
+    write_shell_layers(folder, place / "shells.inp")
+    text = (place / "shells.inp").read_text().partition("*MATERIAL, NAME=PEENED_MIDDLE")[0]
+    (place / "layers.inp").write_text(text)
+    deck, points = free_plate(*lines)
+    (place / "plate.inp").write_text(deck)
+    subprocess.run(["ccx", "plate"], cwd=place, check=True, capture_output=True, timeout=100)
+    rows = [line.split() for line in (place / "plate.dat").read_text().splitlines()]
     moved = {int(row[0]): float(row[3]) for row in rows if len(row) == 4 and row[0].isdigit()}
-    middle = 17 * 8 + 9
-    beside = [moved[middle + step] for step in (-4, 4, -4 * 17, 4 * 17)]  # 30 mm from it
-    # the peened face gets longer, so that it is on the outer side of the bend
-    assert np.mean(beside) - moved[middle] == pytest.approx(-curvature * 30.0**2 / 2.0, rel=1e-3)
+    middle, *beside = (
+        moved[min(points, key=lambda node: np.hypot(*np.subtract(points[node], one)))]
+        for one in [(0.0, 0.0), *at]
+    )
+    return middle - float(np.mean(beside))
 
 
-def free_plate(sides: int, length: float) -> str:
-    """The deck of a flat plate in shells of 8 nodes, with the layers included."""
-    many = 2 * sides + 1
-    numbers = np.arange(1, many**2 + 1).reshape(many, many)  # rows along y
-    at = np.linspace(0.0, length, many)
+def free_plate(x: np.ndarray, y: np.ndarray) -> tuple[str, dict[int, tuple[float, float]]]:
+    """The deck of a flat plate in shells of 8 nodes with the layers included, and its nodes."""
+    along, across = (np.sort(np.r_[one, 0.5 * (one[1:] + one[:-1])]) for one in (x, y))
+    number = np.arange(1, len(along) * len(across) + 1).reshape(len(across), len(along))
     corners = [(0, 0), (0, 2), (2, 2), (2, 0), (0, 1), (1, 2), (2, 1), (1, 0)]
-    elements = [(j, i) for j in range(0, many - 1, 2) for i in range(0, many - 1, 2)]
-    nodes = [[(numbers[j + b, i + a]) for b, a in corners] for j, i in elements]
-    used = sorted({one for element in nodes for one in element})
-    place = {numbers[j, i]: (at[i], at[j]) for j in range(many) for i in range(many)}
-    lines = ["*NODE, NSET=NALL", *(f"{k}, {place[k][0]:g}, {place[k][1]:g}, 0." for k in used)]
+    first = [(j, i) for j in range(0, len(across) - 1, 2) for i in range(0, len(along) - 1, 2)]
+    elements = [[int(number[j + b, i + a]) for b, a in corners] for j, i in first]
+    used = {one for element in elements for one in element}
+    points = {
+        int(number[j, i]): (along[i], across[j])
+        for j in range(len(across)) for i in range(len(along)) if number[j, i] in used
+    }  # fmt: skip
+    lines = ["*NODE, NSET=NALL", *(f"{k}, {u:g}, {v:g}, 0." for k, (u, v) in points.items())]
     lines.append("*ELEMENT, TYPE=S8R, ELSET=PEENED_TARGET")
-    lines += [", ".join(map(str, (k, *one))) for k, one in enumerate(nodes, start=1)]
+    lines += [", ".join(map(str, (k, *one))) for k, one in enumerate(elements, start=1)]
     lines += ["*INCLUDE, INPUT=layers.inp", "*INITIAL CONDITIONS, TYPE=TEMPERATURE", "NALL, 0."]
-    lines += [
-        "*STEP",
-        "*STATIC",
-        "*BOUNDARY",
-        "1, 1, 3",
-        f"{many}, 2, 3",
-        f"{numbers[-1, 0]}, 3, 3",
-    ]
-    lines += ["*TEMPERATURE", "NALL, 1.", "*NODE PRINT, NSET=NALL", "U", "*END STEP"]
-    return "\n".join(lines) + "\n"
+    lines += ["*STEP", "*STATIC", "*BOUNDARY", "1, 1, 3", f"{len(along)}, 2, 3"]
+    lines += [f"{number[-1, 0]}, 3, 3", "*TEMPERATURE", "NALL, 1."]
+    lines += ["*NODE PRINT, NSET=NALL", "U", "*END STEP"]
+    return "\n".join(lines) + "\n", points
 
 
 def test_the_report_says_how_wide_the_law_is(folder: Path, tmp_path: Path) -> None:
