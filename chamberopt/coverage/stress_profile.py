@@ -47,8 +47,6 @@ if TYPE_CHECKING:
     from chamberopt.design.load import Design
 
 POINTS = 129  # depths of a profile
-FASTEST = 1000.0  # m/s
-SPEEDS = 2001
 EVERY = slice(None)
 
 

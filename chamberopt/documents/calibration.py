@@ -14,6 +14,7 @@ from chamberopt.peening.measured import falls
 from chamberopt.peening.profile_fit import law_prior
 
 if TYPE_CHECKING:
+    from chamberopt.design.calibration import Misfit
     from chamberopt.peening.calibrate import Calibrated
     from chamberopt.peening.next_measurement import Prediction
 
@@ -46,26 +47,21 @@ def calibration_lines(found: Calibrated, predictions: Sequence[Prediction]) -> l
         lines.append(f"{words:32}{before:>20}{now:>20}")
     lines += ["", "how well the model explains what was measured"]
     for one in table.misfits:
-        verdict = "well" if one.error_scale == 1.0 else (
-            f"the model does not explain your {one.kind}: their errors are taken "
-            f"{plain(one.error_scale, 2)} times as large, so that all intervals are wider; look at "
-            "the picture, check the measurements and what the design assumes"
-        )  # fmt: skip
-        text = f"chi² = {plain(one.chi2, 2)} of {one.values} value{'s' * (one.values > 1)}"
-        lines.append(f"{one.kind:32}{text:30}{verdict}")
+        lines.append(
+            _misfit_line(
+                one,
+                f"the model does not explain your {one.kind}",
+                ", so that all intervals are "
+                "wider; look at the picture, check the measurements and what the design assumes",
+            )
+        )
     for law in table.stress:
         lines += ["", f"the law of residual stress for {law.metal}"]
         for k, words in enumerate(("depths", "largest stress", "stress at the surface")):
             before = _value(0.0, float(law_prior().sd[k]), "")
             now = _value(law.log_mean[k], math.sqrt(law.log_covariance[k][k]), "")
             lines.append(f"{words + ', times':32}{before:>20}{now:>20}")
-        one = law.misfit
-        verdict = "well" if one.error_scale == 1.0 else (
-            "the law does not have the shape of your profiles: their errors are taken "
-            f"{plain(one.error_scale, 2)} times as large"
-        )  # fmt: skip
-        text = f"chi² = {plain(one.chi2, 2)} of {one.values} values"
-        lines.append(f"{one.kind:32}{text:30}{verdict}")
+        lines.append(_misfit_line(law.misfit, "the law does not have the shape of your profiles"))
     peak_to_valley, balls = 2e6 * found.design.sonotrode.amplitude, found.design.shot.count
     as_designed = f"as designed ({peak_to_valley:g} µm peak to valley, {balls} balls)"
     lines += ["", f"{as_designed}: standard deviations"]
@@ -75,6 +71,14 @@ def calibration_lines(found: Calibrated, predictions: Sequence[Prediction]) -> l
             spread += f"; with {figure.next_name}: {_percent(figure.next_sd)}"
         lines.append(f"{figure.words:32}{spread}")
     return [*lines, *(f"note: {text}" for text in calibration_notes(found))]
+
+
+def _misfit_line(one: Misfit, else_why: str, then: str = "") -> str:
+    """Return a line with chi² of a kind of measurement, and a verdict."""
+    text = f"chi² = {plain(one.chi2, 2)} of {one.values} value{'s' * (one.values > 1)}"
+    scale = f"their errors are taken {plain(one.error_scale, 2)} times as large"
+    verdict = "well" if one.error_scale == 1.0 else f"{else_why}: {scale}{then}"
+    return f"{one.kind:32}{text:30}{verdict}"
 
 
 def calibration_notes(found: Calibrated) -> list[str]:

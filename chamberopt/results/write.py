@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import json
-import math
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from chamberopt.chamber.checks.fillets import facets_are_left
 from chamberopt.common.estimate import finite_or_none
@@ -259,12 +260,7 @@ def _about_stress(design: Design, candidate: CandidateResult) -> StressRecord:
     """Return the record of the residual stress that a design asks for."""
     assert design.stress is not None
     profiles = {
-        name: ProfileRecord(
-            depth_um=one.depth_um.tolist(),
-            stress_MPa=one.stress_MPa.tolist(),
-            half_width_MPa=[x for x in one.half_width_MPa.tolist() if math.isfinite(x)],
-            eigenstrain=one.eigenstrain.tolist(),
-        )
+        name: ProfileRecord(**{key: x[np.isfinite(x)].tolist() for key, x in one._asdict().items()})
         for name, one in candidate.stress.items()
     }
     return StressRecord(

@@ -46,7 +46,7 @@ from chamberopt.coverage.stress_profile import (
     surface_profile,
 )
 from chamberopt.design.calibration import calibrated_strip
-from chamberopt.simulation.evaluate import prepare_target
+from chamberopt.simulation.evaluate import prepare_target, zone_fields
 from chamberopt.simulation.evaluation import require_triangles
 from chamberopt.simulation.time_curve import coverage_against_time
 from sim_core import TriangleMesh, closest_points
@@ -188,12 +188,10 @@ class PartField:
         Args:
             metrics: those of the evaluation.
         """
-        model, process, zones = stress_model(self._design), self._design.process, {}
+        model, process, profiles = stress_model(self._design), self._design.process, {}
         if model is None:
             return {}
-        for name in self._chamber.part.zones:
-            zones[name] = prepare_target(self._design, self._chamber.on_zone(name), self._mesh)
-        profiles = {}
+        zones = zone_fields(self._design, self._chamber, self._mesh)
         for name, surface in {TARGET: self.target, **zones}.items():
             figure = SURFACE if name == TARGET else f"{name}.{SURFACE}"
             if metrics[figure].in_words:

@@ -200,7 +200,9 @@ def _add_elements(
         left_out[name] += len(data)
         return
     if only and name not in only:
-        raise ValueError(f"type={name} is not supported here; use {' or '.join(only)}")
+        raise ValueError(
+            f"type={name} is not supported here; leave it out, and use {' or '.join(only)}"
+        )
     if found := SHELL.match(name):
         kind = SHELL_KIND[int(found[1])]
     elif found := SOLID.match(name):

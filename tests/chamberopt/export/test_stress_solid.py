@@ -242,7 +242,10 @@ Change = Callable[[str], str]
         (lambda _: "", "has no solids"),
         (lambda _: "*NODE\n1, 0, 0, 0\n", "has no solids"),
         (lambda _: "\0\1\2 no deck", "has no solids"),
-        (lambda text: text.replace("C3D4", "DC3D4"), "type=DC3D4 is not supported here; use C3D4"),
+        (
+            lambda text: text.replace("C3D4", "DC3D4"),
+            "type=DC3D4 is not supported here; leave it out, and use C3D4",
+        ),
         (lambda text: text.replace("C3D4", "C3D10M"), "type=C3D10M is not supported here"),
         (lambda text: text.replace("C3D4", "S4"), "type=S4 is not supported here"),
         (lambda text: text.replace("1, -20,", "1, nan,", 1), "has nodes that are no numbers"),
@@ -294,10 +297,12 @@ def test_elements_that_are_too_coarse_are_refused(plate: Path, tmp_path: Path) -
     for order, thickness in ((4, 1.2), (10, 1.7)):
         mesh = plate_mesh(thickness * layer)
         mesh = with_middles(mesh) if order == 10 else mesh
-        with pytest.raises(InputError, match="too coarse; make them half as thick as the layer"):
+        with pytest.raises(
+            InputError, match=f"{thickness} times as thick as the layer, which is 0.14 mm "
+        ):
             exported(plate, tmp_path, deck_of(mesh))
     remarks = exported(plate, tmp_path, deck_of(with_middles(plate_mesh(layer))))
-    assert remarks[1].endswith("is coarse; make them half as thick as the layer")
+    assert remarks[1].endswith("but the stress in the layer takes half of it")
 
 
 def test_the_command_takes_a_deck(
