@@ -51,7 +51,8 @@ TYPES = "C3D4", "C3D10"
 # Unit of stress that goes with a unit of length by custom, and its pascals.
 STRESS_UNITS = {"mm": ("MPa", 1e6), "m": ("Pa", 1.0), "in": ("psi", 6894.757293168)}
 SAME_SIZE = 1.2  # ratio of two lengths of one part; units differ by 2.5 and more
-ELASTIC = re.compile(rb"^\*ELASTIC\b[^\n]*\n\s*(\d+\.?\d*(?:E[+-]?\d+)?)", re.I | re.M)
+NUMBER = rb"((?:\d+\.?\d*|\.\d+)(?:[ED][+-]?\d+)?)"
+ELASTIC = re.compile(rb"^\*ELASTIC\b[^\n]*\n\s*" + NUMBER, re.I | re.M)
 SAME_METAL = 0.15  # relative difference of Young's moduli that a metal may have in two sources
 PEENED = 1  # tag of triangles with a stress that is told
 ON_SKIN = 0.2  # distance over the depth of compression up to which a mesh lies on the part
@@ -219,7 +220,7 @@ def _unit_of(deck: Path, mesh: ElementMesh, size: np.ndarray) -> str:
 
 def _require_metal(deck: Path, content: bytes, modulus: float, unit: str) -> None:
     """Raise InputError if the deck has materials, and none with Young's modulus of the part."""
-    found = [float(one[1]) for one in ELASTIC.finditer(content)]
+    found = [float(one.upper().replace(b"D", b"E")) for one in ELASTIC.findall(content)]
     if found and all(abs(one / modulus - 1.0) > SAME_METAL for one in found):
         raise InputError(
             f"{deck}: *ELASTIC has {found[0]:g}, and the part's metal {modulus:.3g} {unit}; stress "

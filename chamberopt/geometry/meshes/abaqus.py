@@ -40,6 +40,7 @@ SOLID_KIND = {
     4: "tetra", 10: "tetra", 5: "pyramid", 13: "pyramid", 6: "wedge", 15: "wedge",
     8: "hexahedron", 20: "hexahedron",
 }  # fmt: skip
+MAX_LABEL = 999_999_999  # the largest number of an element that Abaqus takes
 Options = dict[str, str]
 # instance that a set names ("" for any), and element or node numbers in it
 Member = tuple[str, range]
@@ -219,6 +220,8 @@ def _add_elements(
         )
     for at in range(0, len(flat), count + 1):
         number, *nodes = flat[at : at + count + 1]
+        if not 0 < number <= MAX_LABEL:
+            raise ValueError(f"element {number}: allowed are numbers from 1 to {MAX_LABEL}")
         scope.elements[number] = kind, nodes[: CORNERS[kind] + len(EDGES[kind])]
         if "ELSET" in options:
             scope.element_sets[options["ELSET"]][_one("", number)] = None

@@ -260,6 +260,8 @@ Change = Callable[[str], str]
             ),
             "has parts and instances; write the model out flat",
         ),
+        (lambda text: text.replace("1001, ", "9" * 30 + ", ", 1), "allowed are numbers from 1 to"),
+        (lambda text: text + "*ELASTIC\r\n .2D12, .33\r\n", r"\*ELASTIC has 2e\+11, and"),
         (lambda text: text + "*ELASTIC\n71.7, .33\n", r"\*ELASTIC has 71.7, and the part's metal"),
     ],
 )
