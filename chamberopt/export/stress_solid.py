@@ -62,6 +62,7 @@ ALONG = 0.95  # cosine to the normal up to which a point is below the surface, a
 # bends by the right curvature to 1 % up to FINE, and to 6 % up to COARSEST. There the stress in the
 # layer is off by 14 % of the largest in C3D4 (the first number) and by 6 % in C3D10, rms.
 FINE, COARSEST = 0.6, (1.0, 1.5)
+FARTHEST = 4.0  # distance over the depth of compression up to which a thickness is measured
 FEW = 0.05  # share of the peened surface whose elements are not asked
 
 
@@ -131,7 +132,7 @@ def write_solid_stress(folder: Path, file: Path, deck: Path) -> list[str]:
     columns = stress[:, [0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]] + 0.0  # no -0
     rows = zip(element[inside].tolist(), point[inside].tolist(), columns.tolist(), strict=True)
     lines = [
-        f"** Residual stress by chamberopt in elements of {deck.name}, in {name}, for CalculiX.",
+        f"** Residual stress by chamberopt in elements of {deck.name!r}, in {name}, for CalculiX.",
         "** Include it after the mesh and before the first step, which has no loads and only holds",
         "** the body in place: what the solver prints then is the stress. It is an estimate.",
         "*INITIAL CONDITIONS, TYPE=STRESS",
@@ -188,8 +189,7 @@ def read_solids(deck: Path, content: bytes) -> ElementMesh:
         )
     if mesh.instance or not mesh.own:
         raise InputError(f"{deck}: has parts and instances; write the model out flat")
-    used = np.concatenate([block.nodes.ravel() for block in mesh.blocks])
-    if not np.isfinite(mesh.points[used]).all():
+    if not np.isfinite(mesh.points).all():
         raise InputError(f"{deck}: has nodes that are no numbers; export it again")
     points = sum(len(block.nodes) * len(AT_POINTS[block.nodes.shape[1]]) for block in mesh.blocks)
     require_few(deck, points, "integration points")
@@ -256,11 +256,9 @@ def require_skin(deck: Path, mesh: ElementMesh, peened: PeenedSkin) -> list[str]
         )
     order, corners = np.argsort(mesh.numbers), [block.nodes[:, :4] for block in mesh.blocks]
     row = order[np.searchsorted(mesh.numbers, skin.numbering.elements, sorter=order)]
-    below = centre[:, None] - mesh.points[np.concatenate(corners)[row]]
-    height = np.einsum("tci,ti->tc", below, normal).max(axis=1)
-    first_order = np.concatenate(
-        [np.full(len(one.nodes), one.nodes.shape[1] == 4) for one in mesh.blocks]
-    )[row][on].any()
+    below = closest_points(peened.mesh, mesh.points, FARTHEST * peened.deepest).distance
+    height = below[np.concatenate(corners)[row]].max(axis=1)
+    first_order = any(block.nodes.shape[1] == 4 for block in mesh.blocks)
     order = np.argsort(ratio := height / depth)
     thickest = ratio[order][np.searchsorted(np.cumsum(area[order]), (1.0 - FEW) * area.sum())]
     text = (
