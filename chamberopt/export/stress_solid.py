@@ -162,8 +162,9 @@ def peened_skin(result: Result, found: StressRecord, arrays: ResultArrays) -> Pe
         raise InputError(f"{result.folder}: no triangle of its part has a residual stress")
     try:
         mesh = TriangleMesh(part.vertices, part.triangles, tags)
-    except SceneError as error:
-        raise InputError(f"{result.folder}: its part is not a closed body: {error}") from None
+    except SceneError:
+        text = "its part is no closed body, as one that is drawn with its chamber"
+        raise InputError(f"{result.folder}: {text}; simulate it as a file of its own") from None
     keys = [DEPTH if name == TARGET else f"{name}.{DEPTH}" for name in names]
     depth = np.array([1e-6 * result.metrics[key].value for key in keys])
     curves = [(1e-6 * np.array(one.depth_um), np.array(one.eigenstrain))

@@ -17,6 +17,7 @@ from chamberopt.common.errors import InputError
 from chamberopt.common.estimate import Estimate
 from chamberopt.coverage.metrics import parse_objective
 from chamberopt.coverage.stress_knowledge import stress_bands
+from chamberopt.coverage.stress_model import measured_law
 from chamberopt.design.shapes.base import is_custom
 from chamberopt.results.compare.difference import Difference, confidence_of_each, difference
 from chamberopt.results.load import Result, load_result
@@ -245,11 +246,12 @@ def _of_two_metals(found: Difference, errors: Sequence[float]) -> Difference:
 
 
 def _metal(design: Design) -> tuple[object, ...]:
-    """Return the part material and the density and sizes of the balls, to be compared.
+    """Return the part material, the balls and the factors of measured profiles, to be compared.
 
-    Such results share the errors of the law of the compressed layer, as a factor on both.
+    Results alike in them share the errors of the law of the compressed layer, as a factor on both.
     """
-    return design.materials.part, design.shot.density, set(design.shot.diameters)
+    balls = design.shot.density, set(design.shot.diameters)
+    return design.materials.part, *balls, measured_law(design)
 
 
 def labels(paths: Sequence[Path]) -> tuple[str, ...]:

@@ -17,6 +17,7 @@ from chamberopt.common.errors import InputError
 from chamberopt.common.estimate import Estimate, estimate
 from chamberopt.coverage.metrics import NEVER, find_metric
 from chamberopt.coverage.stress_knowledge import BANDS
+from chamberopt.design.calibration import Calibration, LawCalibration, Misfit, law_metal
 from chamberopt.design.load import load_design
 from chamberopt.documents.comparison import comparison_lines
 from chamberopt.printers import terminal
@@ -87,6 +88,24 @@ def test_the_error_of_the_depth_is_not_common_to_two_metals(tmp_path: Path) -> N
         apart.half_width
         > 0.999 * np.sqrt(2.0) * OF_LAW * both.metrics["compression_depth_um"][0].value
     )
+
+
+def test_the_error_of_the_law_stays_where_one_result_has_a_measured_profile(tmp_path: Path) -> None:
+    """The depth of the second is .8 of the first by the factor alone; the band has 1.6 for it."""
+    law = LawCalibration(
+        metal=law_metal(PLATE.materials.part),
+        log_mean=(np.log(0.8), 0.0, 0.0),
+        log_covariance=tuple(map(tuple, (1e-4 * np.eye(3)).tolist())),
+        misfit=Misfit(kind="stress profiles", chi2=10.0, values=12),
+    )
+    machine = Calibration(**machine_values(amplitude=1e-3), stress=(law,)).model_dump()
+    factors = PLATE.changed({"calibration": machine})
+    both = compare([left(tmp_path / "a", 10), left(tmp_path / "b", 10, design=factors)])
+    (apart,) = both.differences["compression_depth_um"]
+    first, second = both.metrics["compression_depth_um"]
+    assert second.value == pytest.approx(0.8 * first.value, rel=1e-3)
+    assert apart.half_width > OF_LAW * first.value
+    assert not apart.real
 
 
 def test_what_differs_is_named_and_measured(tmp_path: Path) -> None:
