@@ -14,8 +14,10 @@ from chamberopt.cli import main
 from chamberopt.common.errors import InputError
 from chamberopt.coverage.stress_law import bending, integrals
 from chamberopt.design.flexure import plate_metals
-from chamberopt.export.stress_solid import write_solid_stress
+from chamberopt.export.stress import require_stress
+from chamberopt.export.stress_solid import eigenstrain_at, peened_skin, write_solid_stress
 from chamberopt.geometry.meshes.elements import EDGES
+from chamberopt.results.arrays_file import load_result_arrays
 from chamberopt.results.load import content_sha256, load_result
 from tests.chamberopt.export.test_stress import saved
 from tests.helpers.solid_decks import Tets, balanced, deck_of, hollow_ball, slab, with_middles
@@ -216,21 +218,45 @@ def test_a_hollow_ball_has_the_stress_of_the_closed_form(tmp_path: Path) -> None
     assert around[core].mean() == pytest.approx(exact[core].mean(), rel=0.03)
 
 
-def test_the_smallest_surface_counts_where_they_overlap(plate: Path, tmp_path: Path) -> None:
-    """The corner's profile is not told: nothing is written there, though the target has one."""
+@pytest.fixture
+def without_corner(plate: Path, tmp_path: Path) -> Path:
+    """The plate, but its corner's profile is not told."""
     other = Path(shutil.copytree(plate, tmp_path / "other"))
     data = json.loads((other / "result.json").read_text())
     del data["stress"]["profiles"]["corner"]
     data["sha256"] = content_sha256(data)
     (other / "result.json").write_text(json.dumps(data))
+    return other
+
+
+def test_the_smallest_surface_counts_where_they_overlap(
+    plate: Path, without_corner: Path, tmp_path: Path
+) -> None:
+    """Nothing is written at the corner, though the target has a profile there."""
     mesh = plate_mesh(0.07, sides=16)
     rows = []
-    for folder in (plate, other):
+    for folder in (plate, without_corner):
         exported(folder, tmp_path, deck_of(mesh))
         rows.append(read_initial(tmp_path / "stress.inp"))
     x, y = (mesh[0][mesh[1][rows[1][:, 0].astype(int) - 1001]].mean(axis=1)).T[:2]
     assert not ((x > 10) & (y > 10)).any()
     assert len(rows[1]) / len(rows[0]) == pytest.approx(15 / 16, rel=0.01)
+
+
+def test_the_layer_ends_at_an_edge_and_below_a_border(without_corner: Path) -> None:
+    """At a depth of .1 mm: nearer to the bare side of the plate, and beside the bare corner."""
+    result = load_result(without_corner)
+    skin = peened_skin(result, require_stress(result), load_result_arrays(result))
+    depth, strain, _ = profile_of(without_corner)
+    low, of_file = 0.1 - HEIGHT / 2, skin.part.file
+    assert of_file is not None
+    at = np.array([[-19.98, 0, low], [9.9, 15, low], [10.01, 15, low], [10.06, 15, low]])
+    found, normal = eigenstrain_at(1e-3 * at @ of_file.rotation.T + of_file.shift, skin)
+    e = np.interp(0.1, depth, strain)
+    assert found == pytest.approx([e, e, e, 0.0], rel=0.02)
+    down = [0.0, 0.0, -1.0]
+    expected = np.array([down, down, down, [0.0, 0.0, 0.0]])
+    assert normal @ of_file.rotation == pytest.approx(expected, abs=1e-6)
 
 
 Change = Callable[[str], str]
