@@ -272,7 +272,9 @@ def require_skin(deck: Path, mesh: ElementMesh, peened: PeenedSkin) -> list[str]
     if first_order:
         remarks.append("C3D4 are too stiff in bending: take C3D10 for the distortion of the part")
     if thickest > FINE:
-        remarks.append(f"{text}: forces are right, but the stress in the layer takes half of it")
+        remarks.append(
+            f"{text}: forces are right; for the stress there, make them half as thick as the layer"
+        )
     return remarks
 
 

@@ -330,7 +330,7 @@ def test_elements_that_are_too_coarse_are_refused(plate: Path, tmp_path: Path) -
         ):
             exported(plate, tmp_path, deck_of(mesh))
     remarks = exported(plate, tmp_path, deck_of(with_middles(plate_mesh(layer))))
-    assert remarks[1].endswith("but the stress in the layer takes half of it")
+    assert remarks[1].endswith("for the stress there, make them half as thick as the layer")
 
 
 def test_the_command_takes_a_deck(
