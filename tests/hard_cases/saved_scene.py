@@ -49,6 +49,7 @@ def load_scene(path: Path) -> Scene:
             **{
                 RENAMED.get(name, name): _effect(kinds[RENAMED.get(name, name)], numbers)
                 for name, numbers in effects.items()
+                if name != "surface" or numbers is not None  # no value of it, once saved
             }
         )
         mesh = TriangleMesh(file["vertices"], file["triangles"], file["tags"])

@@ -14,7 +14,7 @@ import pytest
 
 from sim_core import Balls, Gravity, Physics, Restitution, Scene, TriangleMesh, Vibration, simulate
 from sim_core.effects.gravity import STANDARD as G
-from tests.helpers.scenes.cavities import CEILING, FLOOR, box
+from tests.helpers.scenes.cavities import CEILING, ELASTIC, FLOOR, box
 from tests.helpers.scenes.gas import SURE, jackknife
 
 DIAMETER = 3e-3
@@ -41,8 +41,8 @@ def power(c0: float, v0: float, elastic_below: float = 0.0) -> Law:
 
 
 # Each law as the simulator takes it, and as the marching does, on (ceiling, floor).
-LAWS: dict[str, tuple[Restitution | None, tuple[Law, Law]]] = {
-    "elastic": (None, (constant(1.0),) * 2),
+LAWS: dict[str, tuple[Restitution, tuple[Law, Law]]] = {
+    "elastic": (ELASTIC, (constant(1.0),) * 2),
     "constant": (
         Restitution(((0.6, 1e3),) * 3, (1.0, 1.0), elastic_below=0.05),
         (constant(0.6, 0.05),) * 2,

@@ -54,6 +54,8 @@ def test_balls_of_several_sizes_and_densities_have_their_own_energy() -> None:
     diameters, densities = np.array([2e-3, 3e-3]), np.array([7800.0, 2500.0])
     places, speeds = np.array([[0.02, 0.05, 0.1], [0.08, 0.05, 0.2]]), np.array([1.0, -3.0])
     balls = Balls(places, np.outer(speeds, [0.0, 0.6, 0.8]), diameters, densities)
-    seen = energies(simulate(Scene(ROOM, balls, Physics(PULL), 1e-3), frames=[0.0]).frames, balls)
+    # with the log, the same machine code as in test_ball_sizes
+    scene = Scene(ROOM, balls, Physics(PULL), 1e-3, record_collisions=True)
+    seen = energies(simulate(scene, frames=[0.0]).frames, balls)
     mass = densities * np.pi / 6.0 * diameters**3
     assert seen.translational[0] == pytest.approx(0.5 * mass @ speeds**2, rel=1e-14)
