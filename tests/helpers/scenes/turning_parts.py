@@ -17,6 +17,7 @@ from sim_core.scene.invariants import clearance, contained
 from tests.helpers.scenes.cavities import CEILING, box_around
 
 PART = CEILING  # the tag that box_around gives its body
+FAR = 1e-3  # m; how much more than this a ball is away from a part is not measured
 
 
 def bar(length: float = 0.02, width: float = 0.004, height: float = 0.01) -> trimesh.Trimesh:
@@ -149,9 +150,10 @@ class Rotor:
         time: float,
         delay: np.ndarray,
     ) -> np.ndarray:
-        """Distance (n,) [m] between ball and part after delays (n,) [s]."""
+        """Distance (n,) [m] between ball and part after delays (n,) [s], capped at FAR."""
         points = flight(position, velocity, gravity, delay)
-        return clearance(self.own, self.seen(points, time + delay), 0.2) - self.radius
+        frame = self.seen(points, time + delay)
+        return clearance(self.own, frame, self.radius + FAR) - self.radius
 
 
 def flight(
