@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from sim_core import Balls, Gravity, Scene, Vibration, can_rest, pack_balls, simulate
+from sim_core import Balls, Gravity, Roughness, Scene, Vibration, can_rest, pack_balls, simulate
 from sim_core.effects.contact_mode import ASLEEP
 from sim_core.loop.contact_neighbours import MAX_JAM_GAP
 from sim_core.loop.simulate import Simulation
 from tests.hard_cases.force_balance import force_lacking
-from tests.helpers.scenes.cavities import FLOOR, box, cylinder
+from tests.helpers.scenes.cavities import FLOOR, SMOOTH, box, cylinder
 from tests.helpers.scenes.contact_mode import (
     CAPTURE,
     DIAMETER,
@@ -38,7 +38,9 @@ def test_on_the_sonotrode_nothing_rests() -> None:
     assert can_rest(room, Gravity())
     assert not can_rest(room, Gravity(), FLOOR)
     assert not can_rest(room, None)
-    with_rest = simulate(Scene(room, balls, physics(0.8, 0.0, shaking), 2.0))
+    # smooth balls and faces, with the machine code of the gear's chamber
+    effects = physics(0.8, 0.0, shaking)._replace(friction=SMOOTH, roughness=Roughness((0.0,) * 3))
+    with_rest = simulate(Scene(room, balls, effects, 2.0))
     assert len(with_rest.resting) == 0
     assert np.sqrt((with_rest.balls.velocities**2).sum(axis=1).mean()) > 0.3
     assert with_rest.collisions.total < 1_000_000
