@@ -5,6 +5,7 @@ Imports point one way, and each heavy library has one importer.
 
 import ast
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -99,8 +100,13 @@ def sources(package: str) -> list[Path]:
     return sorted((ROOT / package).rglob("*.py"))
 
 
-def imports(path: Path) -> Iterator[tuple[str, tuple[str, ...], int]]:
+@cache
+def imports(path: Path) -> tuple[tuple[str, tuple[str, ...], int], ...]:
     """(module, names taken from it, line) of every import statement anywhere in the file."""
+    return tuple(_imports(path))
+
+
+def _imports(path: Path) -> Iterator[tuple[str, tuple[str, ...], int]]:
     tree = ast.parse(path.read_text(encoding="utf-8"), filename=str(path))
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):
