@@ -164,7 +164,7 @@ def test_evaluate_gives_the_same_numbers_on_any_number_of_workers() -> None:
     design = plate_design(
         process__accuracy__simulated_time_s=0.02, process__accuracy__warmup_time_s=0.02,
         process__accuracy__replicas=4,
-    ).changed({"effects.friction": "none"})  # fmt: skip
+    ).changed({"effects.friction": "none", "effects.roughness": "none"})  # fmt: skip
     chamber = build_chamber(design)
     seen: list[tuple[int, int, float | None]] = []
     serial = evaluate(design, chamber, SerialExecutor(), lambda *args: seen.append(args))
