@@ -7,7 +7,7 @@ import re
 import tomllib
 from collections.abc import Iterable
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 from pathlib import Path
 from typing import Literal, TypeVar
 
@@ -202,6 +202,7 @@ def _found(name: str, among: tuple[Solid, ...], kind: str) -> Solid:
     return found
 
 
+@lru_cache(maxsize=1024)  # all names of the catalogue, and some of users
 def _plain(name: str) -> str:
     return re.sub(r"[\W_]", "", name).casefold()
 
