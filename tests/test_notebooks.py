@@ -5,6 +5,7 @@ The last expression of a cell is shown as a notebook shows it.
 """
 
 import ast
+import inspect
 import json
 import os
 import shutil
@@ -13,6 +14,8 @@ import sys
 from pathlib import Path
 
 import pytest
+
+import chamberopt
 
 ROOT = Path(__file__).parents[1]
 NOTEBOOKS = sorted((ROOT / "docs" / "notebooks").glob("*.ipynb"))
@@ -43,14 +46,25 @@ def code_of(notebook: Path) -> str:
     return "\n".join(parts)
 
 
-QUICK = "first_chamber"  # the others take as long again
-CASES = [
-    pytest.param(one, marks=() if one.stem == QUICK else pytest.mark.long, id=one.stem)
-    for one in NOTEBOOKS
-]
+CASES = pytest.mark.parametrize("notebook", NOTEBOOKS, ids=[one.stem for one in NOTEBOOKS])
 
 
-@pytest.mark.parametrize("notebook", CASES)
+@CASES
+def test_the_notebook_calls_what_there_is(notebook: Path) -> None:
+    """In a moment, beside the programs of README and docs/python.md, which run."""
+    called = 0
+    for node in ast.walk(ast.parse(code_of(notebook))):
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
+            if ast.unparse(node.func.value) != "chamberopt":
+                continue
+            given = {str(one.arg): None for one in node.keywords}
+            inspect.signature(getattr(chamberopt, node.func.attr)).bind(*node.args, **given)
+            called += 1
+    assert called > 1
+
+
+@pytest.mark.long  # half a minute each
+@CASES
 def test_the_notebook_runs_as_it_stands(notebook: Path, tmp_path: Path) -> None:
     code = code_of(notebook)
     if ".impacts(" in code or ".fields(" in code:
