@@ -21,7 +21,7 @@ from chamberopt.printers.report_page import write_part_page, write_report
 from chamberopt.results.arrays_file import load_result_arrays, read_result_arrays
 from chamberopt.results.load import load_result
 from tests.helpers.results.digests import replace_result
-from tests.helpers.results.report_folders import simulated, studied
+from tests.helpers.results.report_folders import simulated, studied_once
 
 NASTY = "a <img src=x onerror=alert(1)> & b"
 
@@ -39,8 +39,8 @@ def simulation(tmp_path_factory: pytest.TempPathFactory, no_pictures: None) -> P
 
 
 @pytest.fixture(scope="module")
-def study(tmp_path_factory: pytest.TempPathFactory, no_pictures: None) -> Path:
-    return studied(tmp_path_factory.mktemp("report") / "study")
+def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return studied_once(tmp_path_factory)
 
 
 class Page(HTMLParser):

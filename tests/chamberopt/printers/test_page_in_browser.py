@@ -11,7 +11,7 @@ from matplotlib.image import imread
 
 from chamberopt.printers.report_page import write_part_page, write_report
 from tests.helpers.results.browser import WAIT, chromium, expect, needs_chromium
-from tests.helpers.results.report_folders import studied
+from tests.helpers.results.report_folders import studied_once
 
 pytestmark = needs_chromium
 DRAWN = "body[data-drawn=yes]"
@@ -19,9 +19,7 @@ DRAWN = "body[data-drawn=yes]"
 
 @pytest.fixture(scope="module")
 def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("chamberopt.workflows.save_run.draw_coverage", lambda *_: None)
-        return studied(tmp_path_factory.mktemp("report") / "study")
+    return studied_once(tmp_path_factory)
 
 
 @pytest.fixture(scope="module")

@@ -1,6 +1,13 @@
 """Results folders for reports: a simulation and a study of the plate with random dents."""
 
+import os
+import shutil
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+
+import pytest
 
 from chamberopt.chamber.build import Chamber, build_chamber
 from chamberopt.common.errors import InputError
@@ -47,3 +54,34 @@ def studied(folder: Path, evaluations: int = 8) -> Path:
 
     save_study(folder, run_in_folder(question, folder, SerialExecutor(), simulator=simulator))
     return folder
+
+
+def studied_once(factory: pytest.TempPathFactory) -> Path:
+    """A copy of the folder of a study without the picture of its coverage.
+
+    The study is made once for all workers: the first makes it while the others wait.
+    """
+    own = factory.getbasetemp()
+    is_shared = "PYTEST_XDIST_WORKER" in os.environ and sys.platform != "win32"
+    common = own.parent if is_shared else own
+    made = common / "studied" / "study"
+    with one_at_a_time(common / "studied.lock"):
+        if not made.exists():
+            with pytest.MonkeyPatch.context() as patch:
+                patch.setattr("chamberopt.workflows.save_run.draw_coverage", lambda *_: None)
+                studied(common / "begun" / "study")
+            (common / "begun").rename(made.parent)
+    return Path(shutil.copytree(made, factory.mktemp("report") / "study"))
+
+
+@contextmanager
+def one_at_a_time(lock: Path) -> Iterator[None]:
+    """Wait until no other process is within such a block."""
+    if sys.platform == "win32":  # it has no such locks, and each process its own folder
+        yield
+        return
+    import fcntl
+
+    with lock.open("w") as file:
+        fcntl.flock(file, fcntl.LOCK_EX)
+        yield
