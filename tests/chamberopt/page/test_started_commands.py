@@ -63,7 +63,8 @@ def served_with_a_running(command: str, folder: Path, is_awaited: bool = True) -
 
 @pytest.mark.parametrize(
     ("name", "command"),
-    [("SIGTERM", "simulate"), ("SIGHUP", "simulate"), ("SIGKILL", "simulate"), ("SIGINT", "run"),
+    [("SIGTERM", "simulate"), ("SIGKILL", "simulate"), ("SIGINT", "run"),
+     pytest.param("SIGHUP", "simulate", marks=pytest.mark.long),
      pytest.param("SIGKILL", "sweep", marks=pytest.mark.long)],
 )  # fmt: skip
 def test_nothing_outlives_the_server(name: str, command: str, tmp_path: Path) -> None:
