@@ -123,11 +123,11 @@ def print_result(
         show([*content, f"results in {folder}"])
 
 
-def print_finished(folder: Path, what: str, lines: Sequence[str], as_json: bool) -> None:
+def print_finished(folder: Path, what: str, content: Sequence[Table | str], as_json: bool) -> None:
     """Print the stored result of a study or sweep that had finished before this command."""
     again = "to run it again, give another folder (--out)"
     print_remarks([f"{folder}: this {what} is finished, nothing was run; {again}"])
-    print_result(lines, folder, as_json)
+    print_result(content, folder, as_json)
 
 
 def table_lines(table: Mapping[str, Any], prefix: str = "") -> list[str]:

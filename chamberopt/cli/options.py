@@ -33,6 +33,8 @@ app = App(
 Json = Annotated[
     bool, Parameter(name="--json", negative="", help="Print JSON on stdout instead of text.")
 ]
+_VERBOSE = "Also print every figure by its name in files, and all notes."
+Verbose = Annotated[bool, Parameter(name=("--verbose", "-v"), negative="", help=_VERBOSE)]
 _WORKERS = "Number of workers on this machine, by default one per core. Does not change results."
 Workers = Annotated[int | None, Parameter(name="--workers", help=_WORKERS)]
 _CLUSTER = "Dask scheduler to use: tcp://HOST:PORT, or its scheduler file. Does not change results."

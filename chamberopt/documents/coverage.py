@@ -31,6 +31,15 @@ if TYPE_CHECKING:
     from chamberopt.results.load import Result
     from chamberopt.results.records import CoverageAtTime, FieldRecord
 
+# The figures that a terminal shows besides the objective.
+MAIN = (
+    "mean_coverage",
+    "p05_coverage",
+    "time_to_98_s",
+    "almen_intensity",
+    "strength_um",
+    "mean_normal_speed_m_s",
+)
 SHOWN_AS_TILES = ("mean_coverage", "p05_coverage", "time_to_98_s")  # besides the objective
 
 
@@ -91,6 +100,16 @@ def change(after: Estimate, before: Estimate, result: Result, start: Result) -> 
     same_seeds = result.seeds == start.seeds
     found = (paired_difference if same_seeds else independent_difference)(after, before)
     return found if after.has_number and before.has_number else found.not_known("not known")
+
+
+def main_figures(shown: Sequence[Figure]) -> list[Figure]:
+    """Return the objective and the main metrics, with the Almen intensity if it is known.
+
+    Where it is not, the peening strength takes its place.
+    """
+    names = {one.name for one in shown}
+    chosen = [name for name in MAIN if name != "strength_um" or "almen_intensity" not in names]
+    return [shown[0], *(one for one in shown[1:] if one.name in chosen)]
 
 
 def tiles(shown: Sequence[Figure]) -> Tiles:
@@ -159,7 +178,7 @@ def coverage_section(
 
 def _table(shown: Sequence[Figure]) -> Table:
     rows = [(one.label.with_unit, one.label.number(one.result)) for one in shown]
-    return _with_ranges(Table("± 95 % intervals", ("", "with 95 % interval"), rows), shown)
+    return _with_ranges(Table("± 95 % intervals", ("", "± 95 %"), rows), shown)
 
 
 def _with_ranges(table: Table, shown: Sequence[Figure]) -> Table:
@@ -168,7 +187,7 @@ def _with_ranges(table: Table, shown: Sequence[Figure]) -> Table:
         return table
     ranges = {one.label.with_unit: one.range_text for one in shown}
     rows = [(*row, ranges[row[0]]) for row in table.rows]
-    return Table(table.caption, (*table.head, "range, not calibrated"), rows)
+    return Table(table.caption, (*table.head, "range"), rows)
 
 
 def _compared(shown: Sequence[Figure]) -> Table:

@@ -110,6 +110,8 @@ class Fold:
     printed: bool = False
 
 
+# Subjects of the sentences that qualify an answer, what changes the process most first.
+About: TypeAlias = Literal["process", "zone", "best", "start", "other", "calibration", "ranges"]
 Block: TypeAlias = Sentence | Items | Table | Chart | Tiles | TextFile | PartView | Beside | Fold
 
 
@@ -130,7 +132,7 @@ class AnswerLine:
     warns: True if the sentence is a warning, e.g. that a limit is not certainly met.
     """
 
-    about: Literal["zone", "best", "start", "other", "calibration", "ranges", "process"]
+    about: About
     text: str
     warns: bool
 

@@ -185,9 +185,7 @@ def _text(label: Label, figure: RangedFigure) -> str:
         )
         return low if low == high else f"{low} to {high}"
     if not figure.is_resolved:
-        return (
-            f"changes below the noise, ± {number_text.plain(abs(label.factor) * figure.noise, 1)}"
-        )
+        return f"within noise, ± {number_text.plain(abs(label.factor) * figure.noise, 1)}"
     ends = sorted(label.factor * one.value for one in (figure.low, figure.high))
     return number_text.range_text(ends[0], ends[1])
 

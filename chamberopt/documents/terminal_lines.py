@@ -1,68 +1,110 @@
-"""Lines for a terminal about a simulation, a study or a sweep, a line for each figure."""
+"""Text for a terminal at the end of a simulation, a study or a sweep: a sentence and a table.
+
+The table has the main figures in words. With --verbose, all figures follow by the names that files
+have for them, and all notes.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import chain, zip_longest
+from pathlib import Path
+from typing import TYPE_CHECKING, get_args
 
-from chamberopt.common.number_text import counted, estimate_text, plain
-from chamberopt.documents.ranges import at_ends_text, range_lines, range_texts
-from chamberopt.documents.wanted import wanted_lines
-from chamberopt.search.study.constraints import judge_zones
+from chamberopt.common.number_text import counted, estimate_text
+from chamberopt.common.number_text import plain as ascii_number
+from chamberopt.documents.answer import answer, answer_lines
+from chamberopt.documents.coverage import Figure, figures, figures_table, main_figures
+from chamberopt.documents.document import About, Table
+from chamberopt.documents.ranges import range_lines, range_texts
+from chamberopt.documents.study import influence_sentences, influences, tried_sentence
+from chamberopt.documents.tolerances import tolerance_lines, tolerance_sentences
+from chamberopt.documents.wording import metric_label, objective_label, plain
+from chamberopt.results.load import load_result, load_start, load_trials
 
 if TYPE_CHECKING:
     from chamberopt.common.estimate import Estimate
     from chamberopt.design.load import Design
-    from chamberopt.peening.range_result import RangeResult, StudyRanges
-    from chamberopt.search.run_study import StudyResult
+    from chamberopt.results.load import Result
     from chamberopt.search.run_sweep import SweepResult
-    from chamberopt.simulation.evaluation import Evaluation
+
+MOST_NOTES = 3  # shown without --verbose
+RANK: tuple[str, ...] = get_args(About)  # of the sentences: what the process is asked for first
 
 
-def estimate_line(name: str, estimate: Estimate) -> str:
-    """Return a line with the name of a metric or objective, its estimate and interval."""
-    return f"{name:34}{estimate_text(estimate)}"
+def result_end(folder: Path, verbose: bool) -> list[Table | str]:
+    """Return the end of the command that made a result: its answer, main figures and notes.
 
+    A study's table has its parameters too, of the start and of the best design, and a sentence says
+    what became of all candidates.
 
-def evaluation_lines(evaluation: Evaluation, ranges: RangeResult | None = None) -> list[str]:
-    """Return a line for the objective and each metric, with their 95 % intervals.
-
-    Behind the interval stands the range of what is not calibrated, if it is given. The last line
-    gives the area of the windows, the discs in which coverage is measured.
+    Raises:
+        InputError: the folder has no usable result of a simulation or study.
     """
-    rows = {evaluation.objective_name: evaluation.objective, **evaluation.metrics}
-    beside = range_texts(ranges)
-    lines = [
-        f"{estimate_line(name, one):56}{beside.get(name, '')}".rstrip()
-        for name, one in rows.items()
+    result = load_result(folder)
+    start, study, record = load_start(result), result.study, result.record
+    all_figures = figures(result, start)
+    lines = sorted(answer_lines(result), key=lambda one: (one.warns, RANK.index(one.about)))
+    said = [f"warning: {one.text}" if one.warns else one.text for one in lines]
+    notes, content = [one.said for one in record.effects or ()], [answer(result, start), ""]
+    if study and start:
+        parameters = {
+            name: [plain(value, 6), plain(study.best.parameters[name], 6)]
+            for name, value in study.start.parameters.items()
+        }
+        table = _table(("start", "best"), parameters, all_figures)
+        said.append(f"Candidates: {tried_sentence(load_trials(folder))}")
+        if study.front:
+            names = " and ".join(objective_label(name).text for name in study.front[0].objectives)
+            said.append(f"The Pareto front of {names}: pareto.csv, pareto.png.")
+    else:
+        table = figures_table(main_figures(all_figures))
+    if record.tolerances:
+        said += tolerance_sentences(record.tolerances)
+        notes = [*record.tolerances.notes, *notes]
+    of_study = study.notes if study else []
+    both = chain.from_iterable(zip_longest(of_study, result.notes))  # the first of each matter most
+    told = list(note_lines([*filter(None, both), *notes], verbose))
+    more = list(_all_figures(result, start)) if verbose else []
+    return [*content, table, "", *said, *told, *more]
+
+
+def sweep_end(result: SweepResult, notes: Iterable[str], verbose: bool) -> list[Table | str]:
+    """Return the end of a sweep: a sentence, its best candidate and what became of all."""
+    study, best, count = result.study, result.best, len(result.trials)
+    effort = replicas_text(study.at_search_accuracy(study.design))
+    tried = f"{count} candidates in {result.seconds:.0f} s, {effort} each: "
+    last = [tried + tried_sentence(result.trials), *note_lines(notes, verbose)]
+    if best is None or best.objective is None:
+        return [f"None of {count} candidates meets the constraints.", *last]
+    name = study.objective.goals[0]
+    label, found = objective_label(name), {name: best.objective, **best.metrics}
+    shown = [Figure(name, label, best.objective)]
+    shown += [
+        Figure(one, metric_label(one), value)
+        for one, value in best.metrics.items()
+        if metric_label(one).text != label.text
     ]
-    found = evaluation.resolution
-    return [
-        *lines,
-        f"{'gauge_mm2':34}{plain(evaluation.gauge_mm2)}: area of the windows; the median window "
-        f"has {counted(found.dents, 'dent')}",
-    ]
+    parameters = {name: [plain(value, 5)] for name, value in best.parameters.items()}
+    sentence = (
+        f"The best of {count} candidates, number {best.number + 1}, has this {label.text}: "
+        f"{label.format(best.objective)} (95 % interval)."
+    )
+    table = _table(("best",), parameters, shown)
+    more = ["", *map(_line, found, found.values())] if verbose else []
+    return [sentence, "", table, "", *last, *more]
 
 
-def zone_limit_lines(design: Design, evaluation: Evaluation) -> list[str]:
-    """Return a line for each limit of each zone that says whether it is met."""
-    return [
-        f"zone {zone}: {row['key']} {row['limit']:g}: {row['standing']} "
-        f"({row['metric']} {estimate_text(evaluation.metrics[row['metric']])})"
-        for zone, rows in judge_zones(design, evaluation.metrics).items()
-        for row in rows
-    ]
+def note_lines(notes: Iterable[str], verbose: bool = True) -> Iterator[str]:
+    """Yield a line for each note. Unless `verbose`, the first three, and how many there are more.
 
-
-def process_lines(design: Design, evaluation: Evaluation) -> list[str]:
-    """Return a line on the wanted intensity and on the wanted coverage, if there are any."""
-    lines = wanted_lines(design, evaluation.metrics)
-    return [f"warning: {one.text}" if one.warns else one.text for one in lines]
-
-
-def note_lines(notes: Iterable[str]) -> list[str]:
-    """Return a line for each note, with the word "note" before it."""
-    return [f"note: {note}" for note in notes]
+    The notes begin with the most important.
+    """
+    every = [f"note: {note}" for note in notes]
+    shown = every if verbose else every[:MOST_NOTES]
+    yield from shown
+    if left := len(every) - len(shown):
+        yield f"and {counted(left, 'more note')}: --verbose, or in the report"
 
 
 def replicas_text(design: Design) -> str:
@@ -73,52 +115,40 @@ def replicas_text(design: Design) -> str:
     return f"{accuracy.replicas} replicas of {design.process.recorded_time:g} s"
 
 
-def study_lines(result: StudyResult, ranges: StudyRanges | None = None) -> list[str]:
-    """Return lines on a study: start and best design with parameters and figures, gain, effort.
-
-    Args:
-        ranges: ranges of what is not calibrated; None if they were not simulated.
-    """
-    study, start, best = result.study, result.start, result.best
-    lines = [f"{'parameter':34}{'start':>12}{'best':>12}"]
-    for name in study.vary:
-        values = (f"{plain(one.parameters[name], 6):>12}" for one in (start, best))
-        lines.append(f"{name:34}{''.join(values)}")
-    of_both = (ranges.start, ranges.best) if ranges else (None, None)
-    for title, one, found in zip(("start", "best"), (start, best), of_both, strict=True):
-        limits = process_lines(one.design, one.evaluation)
-        limits += zone_limit_lines(one.design, one.evaluation)
-        lines += ["", title, *evaluation_lines(one.evaluation, found), *range_lines(found), *limits]
-    verdict = "better than the start" if result.improved else "within the noise of the start"
-    if result.gain.in_words:
-        verdict = "the objective of the start or of the best design is not known"
-    lines += ["", f"{estimate_line('gain', result.gain)}: {verdict}"]
-    lines += [at_ends_text(one) for one in ranges.rivals] if ranges else []
-    if result.sensitivity:
-        lines += ["", *result.sensitivity.sentences(), ""]
-    if study.objective.pareto:
-        names = " and ".join(study.objective.pareto)
-        lines += [f"the Pareto front of {names}: pareto.csv, pareto.png", ""]
-    counts = dict.fromkeys(one.evaluation.replicas for one in (start, best))
-    replicas, seconds = " and ".join(map(str, counts)), study.design.process.recorded_time
-    effort = replicas_text(study.at_search_accuracy(study.design))
-    if result.ended_early:
-        effort += f"; {study.first_look} where more would have told nothing"
-    return [
-        *lines,
-        f"± 95 % intervals; start and best: {replicas} replicas of {seconds:g} s with seeds of "
-        f"their own; candidates of the search in history.csv: {effort}",
+def _table(
+    head: Sequence[str], parameters: Mapping[str, Sequence[str]], shown: Sequence[Figure]
+) -> Table:
+    """Return a table of parameters and main figures, with a column for each design of `head`."""
+    rows = [(name, *values) for name, values in parameters.items()]
+    rows += [
+        (one.label.with_unit, *map(one.label.number, filter(None, (one.start, one.result))))
+        for one in main_figures(shown)
     ]
+    return Table("", ("", *head), rows)
 
 
-def sweep_lines(result: SweepResult) -> list[str]:
-    """Return lines with a sweep's number of candidates and run time, and its best candidate."""
-    study, best = result.study, result.best
-    effort = replicas_text(study.at_search_accuracy(study.design))
-    lines = [f"{len(result.trials)} candidates in {result.seconds:.0f} s, {effort} each"]
-    if best is not None and best.objective is not None:
-        lines += ["", f"best, number {best.number + 1}"]
-        lines += [f"{name:34}{plain(value, 5):>12}" for name, value in best.parameters.items()]
-        estimates = {study.objective.goals[0]: best.objective, **best.metrics}
-        lines += [estimate_line(name, estimate) for name, estimate in estimates.items()]
-    return lines
+def _all_figures(result: Result, start: Result | None) -> Iterator[str]:
+    """Yield lines with all figures of a result by their names in files, and of its start."""
+    if result.study:
+        label = objective_label(result.objective_name)
+        yield from ("", *influence_sentences(result.study, influences(result.study, label), label))
+    for title, one in (("start", start), ("best", result)):
+        if one is None:
+            continue
+        yield from ("", title) if start else ("",)
+        beside = range_texts(one.record.ranges)
+        for name, value in {one.objective_name: one.objective, **one.metrics}.items():
+            yield f"{_line(name, value):56}{beside.get(name, '')}".rstrip()
+        field = one.record.field
+        yield (
+            f"{'gauge_mm2':34}{ascii_number(field.gauge_mm2)}: area of the windows; the median "
+            f"window has {counted(field.dents_in_median_window, 'dent')}"
+        )
+        yield from range_lines(one.record.ranges)
+    if result.record.tolerances:
+        yield from ("", *tolerance_lines(result.record.tolerances))
+
+
+def _line(name: str, estimate: Estimate) -> str:
+    """Return a line with the name of a metric or objective, its estimate and interval."""
+    return f"{name:34}{estimate_text(estimate)}"

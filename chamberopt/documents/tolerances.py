@@ -15,7 +15,6 @@ from chamberopt.common.estimate import Estimate
 from chamberopt.common.number_text import estimate_text
 from chamberopt.common.number_text import plain as ascii_number
 from chamberopt.documents.document import Block, Chart, Items, Section, Sentence, Table
-from chamberopt.documents.terminal_lines import note_lines
 from chamberopt.documents.wording import Label, metric_label, plain
 from chamberopt.pictures.charts.tolerances import TornadoBar, TornadoPanel, tornado_figure
 
@@ -128,6 +127,14 @@ def sheet_rows(found: ToleranceResult) -> Iterator[tuple[str, str]]:
         yield label.with_unit, "; ".join(texts)
 
 
+def tolerance_sentences(found: ToleranceResult) -> Iterator[str]:
+    """Yield sentences on the main figures over all tolerances, and on the worst corner."""
+    yield from (f"Over the tolerances, {name}: {text}." for name, text in sheet_rows(found))
+    if found.corner:
+        place = ", ".join(f"{name} = {plain(value)}" for name, value in found.corner.items())
+        yield f"Worst corner, for the {metric_label(found.worst_for).text}: {place}."
+
+
 def table_rows(result: Result) -> Iterator[dict[str, object]]:
     """Yield the rows of the CSV table: one row per pair of a figure and a number with a tolerance.
 
@@ -154,8 +161,8 @@ def table_rows(result: Result) -> Iterator[dict[str, object]]:
 def tolerance_lines(found: ToleranceResult) -> list[str]:
     """Return lines for a terminal about the tolerances of a design.
 
-    The lines give the figures over all tolerances, in the worst corner, and the effect of each
-    tolerance.
+    The lines give all figures over all tolerances and in the worst corner, and the effect of each
+    tolerance, by their names in files.
     """
     shown = {name: column.terminal for name, column in _columns(found).items() if column.terminal}
     rows = [["over the tolerances", *shown.values()]]
@@ -163,9 +170,6 @@ def tolerance_lines(found: ToleranceResult) -> list[str]:
         known = map(figure.intervals.get, shown)
         rows.append([name, *(estimate_text(one) if one else "" for one in known)])
     lines = [f"{name:34}{''.join(f'{one:19} ' for one in ends)}".rstrip() for name, *ends in rows]
-    if found.corner:
-        place = ", ".join(f"{name} = {ascii_number(value)}" for name, value in found.corner.items())
-        lines.append(f"worst corner, for {found.worst_for}: {place}")
     lines.append("")
     for name, figure in found.figures.items():
         lines.append(f"{name}: change at the low and at the high end of")
@@ -182,4 +186,4 @@ def tolerance_lines(found: ToleranceResult) -> list[str]:
                 small.append(number)
         lines += [f"    not resolved: {', '.join(small)}"] if small else []
         lines += [f"    does not depend on: {', '.join(none)}"] if none else []
-    return [*lines, *note_lines(found.notes)]
+    return lines

@@ -230,7 +230,7 @@ def _write_candidate(folder: Path, candidate: CandidateResult, **more: Any) -> C
             facets_left=facets_are_left(chamber.part),
             **_about_fixtures(chamber),
         ),
-        notes=[*chamber.notes, *evaluation.notes],
+        notes=[*evaluation.notes, *chamber.notes],
         design=_design_values(design, folder),
         part_sha256=chamber.part.sha256,
         part_unit=chamber.part.unit,

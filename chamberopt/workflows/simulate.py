@@ -184,7 +184,7 @@ def simulate_design(
         try:
             ranges = simulate_ranges(design, chamber, evaluation, executor, teller)
         except EndError as error:
-            evaluation = replace(evaluation, notes=(*evaluation.notes, str(error)))
+            evaluation = replace(evaluation, notes=(str(error), *evaluation.notes))
     spreads = Spreads(found, ranges)
     with teller.step("writing and drawing"):
         saved = save_simulation(folder, design, chamber, evaluation, advice, warnings, spreads)

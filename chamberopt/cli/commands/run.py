@@ -13,6 +13,7 @@ from chamberopt.cli.options import (
     Json,
     Resumable,
     TreatmentTime,
+    Verbose,
     Workers,
     app,
     as_options,
@@ -32,6 +33,7 @@ def run(
     ranges: bool = True,
     workers: Workers = None,
     cluster: Cluster = None,
+    verbose: Verbose = False,
     json: Json = False,
     out: Resumable = None,
 ) -> None:
@@ -54,8 +56,7 @@ def run(
     with Interrupt() as interrupt:
         from chamberopt.cli.teller import SearchTeller
         from chamberopt.common.executor import open_executor
-        from chamberopt.documents.answer import answer_in
-        from chamberopt.documents.terminal_lines import note_lines, study_lines
+        from chamberopt.documents.terminal_lines import result_end
         from chamberopt.search.study import load_study
         from chamberopt.search.study_folder import open_study_folder
         from chamberopt.workflows.optimise import optimise_study
@@ -67,23 +68,14 @@ def run(
         claim = partial(open_study_folder, loaded)
         with console.claimed_folder(out, study.stem, claim) as folder:
             if folder.finished:
-                console.print_finished(folder.path, "study", [answer_in(folder.path)], json)
+                console.print_finished(folder.path, "study", result_end(folder.path, verbose), json)
                 return
             command = resume_command(study, folder.path, options=as_options(values))
             with resume_note(folder, command), open_executor(workers, cluster) as executor:
                 teller = SearchTeller(interrupt, f"to resume: {command}")
                 done = optimise_study(folder, executor, teller, lambda: interrupt.requested, ranges)
-            result = done.result
             console.print_remarks(done.remarks)
-            notes = [
-                *map(str, done.advice),
-                *result.warnings,
-                *result.notes,
-                *done.chamber.notes,
-                *result.best.evaluation.notes,
-            ]
-            lines = [*study_lines(result, done.ranges), *note_lines(notes)]
-            console.print_result([*lines, "", answer_in(folder.path)], folder.path, json)
+            console.print_result(result_end(folder.path, verbose), folder.path, json)
             if not json:
                 show, best = quoted("report", folder.path), folder.path / "best.toml"
                 console.show([f"to see it: {show}; the design: {best}"])

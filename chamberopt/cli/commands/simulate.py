@@ -11,6 +11,7 @@ from chamberopt.cli.options import (
     Json,
     Out,
     TreatmentTime,
+    Verbose,
     Workers,
     app,
     given_values,
@@ -29,6 +30,7 @@ def simulate(
     ranges: bool = True,
     workers: Workers = None,
     cluster: Cluster = None,
+    verbose: Verbose = False,
     json: Json = False,
     out: Out = None,
 ) -> None:
@@ -50,17 +52,8 @@ def simulate(
     from chamberopt.cli.teller import TerminalTeller
     from chamberopt.common.executor import open_executor
     from chamberopt.design.load import load_design
-    from chamberopt.documents.answer import answer
-    from chamberopt.documents.ranges import range_lines
-    from chamberopt.documents.terminal_lines import (
-        evaluation_lines,
-        note_lines,
-        process_lines,
-        zone_limit_lines,
-    )
-    from chamberopt.documents.tolerances import tolerance_lines
+    from chamberopt.documents.terminal_lines import result_end
     from chamberopt.peening.tolerances import plan_tolerances
-    from chamberopt.results.load import Result
     from chamberopt.workflows.simulate import SimulationSettings, simulate_design
 
     candidate = load_design(design)
@@ -77,13 +70,4 @@ def simulate(
         settings = SimulationSettings(analytic, tolerances, ranges)
         done = simulate_design(candidate, folder, executor, TerminalTeller(), settings)
     console.print_remarks(done.remarks)
-    notes = note_lines([*map(str, done.advice), *done.chamber.notes, *done.evaluation.notes])
-    limits = process_lines(done.design, done.evaluation)
-    limits += zone_limit_lines(done.design, done.evaluation)
-    found = done.spreads
-    lines = [*evaluation_lines(done.evaluation, found.ranges), *range_lines(found.ranges)]
-    lines += [*limits, *notes]
-    said = answer(Result(folder, done.design, done.record), None)
-    if found.tolerances:
-        lines += ["", *tolerance_lines(found.tolerances)]
-    console.print_result([*lines, "", said], folder, json)
+    console.print_result(result_end(folder, verbose), folder, json)

@@ -12,6 +12,7 @@ from chamberopt.cli.options import (
     Json,
     Resumable,
     TreatmentTime,
+    Verbose,
     Workers,
     app,
     as_options,
@@ -32,6 +33,7 @@ def sweep(
     time: TreatmentTime = None,
     workers: Workers = None,
     cluster: Cluster = None,
+    verbose: Verbose = False,
     json: Json = False,
     out: Resumable = None,
 ) -> None:
@@ -53,7 +55,7 @@ def sweep(
         Seed of the Sobol points, by default the study's optimizer.seed.
     """
     from chamberopt.cli.teller import TerminalTeller
-    from chamberopt.documents.terminal_lines import note_lines, sweep_lines
+    from chamberopt.documents.terminal_lines import sweep_end
     from chamberopt.results.write import best_row_note
     from chamberopt.search.run_sweep import plan_sweep
     from chamberopt.search.study import load_study
@@ -80,4 +82,4 @@ def sweep(
     if failed:
         notes.append(f"{len(failed)} candidates failed, the first because: {failed[0].reason}")
     notes.append(best_row_note(done.result))
-    console.print_result([*sweep_lines(done.result), *note_lines(notes)], folder.path, json)
+    console.print_result(sweep_end(done.result, notes, verbose), folder.path, json)
