@@ -74,7 +74,7 @@ def sweep_end(result: SweepResult, notes: Iterable[str], verbose: bool) -> list[
     study, best, count = result.study, result.best, len(result.trials)
     effort = replicas_text(study.at_search_accuracy(study.design))
     tried = f"{count} candidates in {result.seconds:.0f} s, {effort} each: "
-    last = [tried + tried_sentence(result.trials), *note_lines(notes, verbose)]
+    last = [tried + tried_sentence(result.trials), *note_lines(notes)]
     if best is None or best.objective is None:
         return [f"None of {count} candidates meets the constraints.", *last]
     name = study.objective.goals[0]

@@ -79,19 +79,20 @@ class StudyResult:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Sentences on how tolerances changed the search, on best values at their bounds, and on
-        what is not left to gain.
+        """Sentences on what is not left to gain, on best values at their bounds, and on how
+        tolerances changed the search: the most important first.
         """
         lost = self.best.lost_to_tolerances
         which = "mean" if self.study.objective.over_tolerances == "mean" else "worst value"
-        sentences = tolerance_notes(lost, which) if self.study.design.tolerances else []
+        sentences = [*self._nothing_left]
         numbers = {name: one for name, one in self.study.vary.items() if not one.texts}
         for name, varied in numbers.items():
             value = self.best.parameters[name]
             if side := bound_at(value, varied.bounds):
                 place = f"{name} = {value:g} lies on its {side} bound"
                 sentences.append(f"{place}: a better design may lie beyond; widen [vary]")
-        return *sentences, *self._nothing_left
+        more = tolerance_notes(lost, which) if self.study.design.tolerances else []
+        return *sentences, *more
 
     @property
     def _nothing_left(self) -> tuple[str, ...]:

@@ -16,7 +16,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from chamberopt.common.estimate import Estimate
-from chamberopt.common.number_text import plain
 from chamberopt.design.design import SHAPE
 from chamberopt.search.optimiser.gaussian_process import GaussianProcess, one_thread
 from chamberopt.search.optimiser.search_model import SearchModel
@@ -26,7 +25,6 @@ NORMAL_95 = 1.96  # standard deviations of a 95 % interval
 SLICE_POINTS = 41
 SAMPLE_EXPONENT = 9  # main effects are means over 2^9 points of the other parameters
 RANGE_POINTS = 201
-FEW = "too few candidates near the best"
 
 
 @dataclass(frozen=True)
@@ -57,20 +55,6 @@ class Sensitivity:
     noise: float  # loss that counts as none
     expected: Estimate  # the model's score of the best design
     together: float  # share of the designs within all flat ranges that lose no more than the noise
-
-    def sentences(self) -> list[str]:
-        """Return sentences on how far parameters may change without loss, alone and together."""
-        loss = f"without losing more than the noise, {self.noise:.2g} (95 % sure)"
-        ranges = []
-        for one in self.slices:
-            if not one.texts and one.flat[0] == one.flat[-1]:
-                ranges.append(f"how far {one.name} may go without loss is not known: {FEW}")
-                continue
-            first, last = plain(one.flat[0], 5), plain(one.flat[-1], 5)
-            may = " or ".join(map(str, one.flat)) if one.texts else f"go from {first} to {last}"
-            ranges.append(f"{one.name} may {'be ' if one.texts else ''}{may} {loss}")
-        share = f"{self.together:.0%}"
-        return [*ranges, f"of all designs within these ranges {share} lose no more than that"]
 
 
 def analyse_sensitivity(

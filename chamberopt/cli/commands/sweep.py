@@ -77,9 +77,8 @@ def sweep(
         with resume_note(folder, command):
             done = sweep_study(folder, plan, TerminalTeller(), workers, cluster)
     console.print_remarks(done.remarks)
-    notes = [*map(str, done.advice)]
+    notes = [best_row_note(done.result), *map(str, done.advice)]
     failed = [trial for trial in done.result.trials if trial.objective is None]
     if failed:
         notes.append(f"{len(failed)} candidates failed, the first because: {failed[0].reason}")
-    notes.append(best_row_note(done.result))
     console.print_result(sweep_end(done.result, notes, verbose), folder.path, json)

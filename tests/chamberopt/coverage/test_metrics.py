@@ -76,7 +76,7 @@ def test_a_metric_of_a_zone_is_found_by_its_name() -> None:
     assert find_metric("p05_coverage") is of_target
     assert of_zone is not None
     assert (of_zone.lowest, of_zone.highest, of_zone.unit) == (0.0, 1.0, "")
-    assert of_zone.summary == "coverage that 95 % of zone root's area exceeds"
+    assert of_zone.summary == "coverage that 95 % of the area exceeds, zone root"
     assert of_zone.of_places
     assert not of_zone.required
     for wrong in ("shiny", "root.shiny", "root.shot_count", "a b.p05_coverage", ".p05_coverage"):

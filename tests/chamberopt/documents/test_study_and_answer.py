@@ -155,7 +155,7 @@ def test_constraints_that_are_not_certainly_met_are_in_the_answer() -> None:
         "Zone tip: no limits; mean coverage 90.0 ± 2.0 %.",
         "The start: constraints not met: shot_count 50 > max 30.",
         "The best chamber found: constraints not known: shot_count 33 may be > max 30.",
-        "Another chamber, whose time until 95 % of the target's area is 98 % covered is 100 ± 20 "
+        "Another chamber, whose time until 95 % of the area is 98 % covered is 100 ± 20 "
         "s: constraints not known: faster.",
         "Calibration: the model explains your dent diameters only with errors 2 times as "
         "large, as intervals have them: look at the picture of the calibration.",

@@ -47,18 +47,18 @@ def test_a_number_alone_has_four_digits_that_count(value: float, text: str) -> N
 
 def test_an_objective_that_is_a_metric_has_its_label() -> None:
     assert objective_label("minus_time_to_98_s") == Label(
-        "time until 95 % of the target's area is 98 % covered", "s", -1.0
+        "time until 95 % of the area is 98 % covered", "s", -1.0
     )
     assert objective_label("p05_coverage").unit == "%"
     assert (
         objective_label("uniform_coverage").meaning == "mean minus standard deviation of coverage"
     )
     seconds = objective_label("-0.001 root.time_to_98_s")
-    assert seconds.text == "time until 95 % of zone root's area is 98 % covered"
+    assert seconds.text == "time until 95 % of the area is 98 % covered, zone root"
     assert (seconds.unit, seconds.factor) == ("s", -1000.0)
     assert objective_label("1 uniform_coverage + -0.001 time_to_98_s").in_full == (
         "weighted sum (mean coverage of the target − standard deviation of coverage over the "
-        "target − 0.001 × time until 95 % of the target's area is 98 % covered [s])"
+        "target − 0.001 × time until 95 % of the area is 98 % covered [s])"
     )
     assert objective_label("of a later version").text == "of a later version"
 

@@ -1,6 +1,7 @@
 """Ranges of what is not calibrated in a results folder: they read back, and all texts say them."""
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,10 +16,11 @@ from chamberopt.design.ranges import unknowns
 from chamberopt.documents.ranges import range_texts
 from chamberopt.documents.report import report
 from chamberopt.documents.sheet import AsBuilt, cautions, process_sheet
-from chamberopt.documents.terminal_lines import evaluation_lines, study_lines
+from chamberopt.documents.terminal_lines import result_end
 from chamberopt.documents.wording import metric_label
 from chamberopt.peening.range_result import Spreads
 from chamberopt.peening.ranges import EndRuns, find_ranges
+from chamberopt.printers import terminal
 from chamberopt.results.load import load_result
 from chamberopt.search.study import Study
 from chamberopt.simulation.evaluation import Evaluation
@@ -59,9 +61,19 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         recorded = load_result(folder).record.ranges
         assert recorded is not None
         assert recorded == found
-        line = next(one for one in evaluation_lines(whole, found) if one.startswith("mean_cov"))
-        assert line.endswith(f" {range_texts(found)['mean_coverage']}")
     return folder
+
+
+def test_the_terminal_says_the_range_beside_the_interval(folder: Path) -> None:
+    """In words, and with --verbose by the names of code too."""
+    found = load_result(folder).record.ranges
+    short, long = (terminal.text(result_end(folder, way)) for way in (False, True))
+    assert "mean_coverage " not in short
+    text = range_texts(found)["mean_coverage"]
+    (line,) = [one for one in long.splitlines() if one.startswith("mean_coverage ")]
+    assert line.endswith(f" {text}")
+    (row,) = [one for one in short.splitlines() if one.startswith("mean coverage of the target")]
+    assert re.search(r"\d ± \d.* \d.* to \d", row)
 
 
 def test_the_report_says_the_range_beside_the_interval(folder: Path) -> None:
@@ -75,7 +87,7 @@ def test_the_report_says_the_range_beside_the_interval(folder: Path) -> None:
         "(chamberopt calibrate)."
     )
     sections = {one.title: one for one in document.sections}
-    assert sections["Coverage"].content[0].head[-1] == "range, not calibrated"
+    assert sections["Coverage"].content[0].head[-1] == "range"
     figures, ends = sections["What is not calibrated"].content[1:3]
     assert ends.head == ("", "v0, low", "v0, high")
     row = dict((one[0], one) for one in figures.rows)["mean exposure, in times to 98 % coverage"]
@@ -186,7 +198,7 @@ def test_a_study_says_whether_its_best_stays_best(
     assert load_result(tmp_path / "start").record.ranges == found.start
     sentence = "The best design stays better than the start at both ends of v0."
     assert sentence in [one.text for one in report(read).answer_lines]
-    assert sentence in study_lines(result, found)
+    assert sentence in result_end(tmp_path, verbose=False)
 
 
 def test_an_end_that_cannot_be_simulated_is_told(
@@ -205,4 +217,4 @@ def test_an_end_that_cannot_be_simulated_is_told(
     )
     result = chamberopt.simulate(DESIGN, tmp_path / "out", workers=1)
     assert result.record.ranges is None
-    assert result.notes[-1].startswith("what is not calibrated was not simulated")
+    assert result.notes[0].startswith("what is not calibrated was not simulated")

@@ -63,7 +63,7 @@ def test_the_report_has_a_section_and_a_chart(folder: Path, tmp_path: Path) -> N
     (section,) = (one for one in report(load_result(folder)).sections if one.title == "Tolerances")
     _, ranges, figures, *_ = section.content
     assert [row[0] for row in ranges.rows] == ["sonotrode.amplitude_um", "shot.mass_g"]
-    assert figures.rows[0][0] == "coverage that 95 % of the target's area exceeds [%]"
+    assert figures.rows[0][0] == "coverage that 95 % of the area exceeds [%]"
     page = write_report(folder, tmp_path / "page.html")[0].read_text(encoding="utf-8")
     for text in ("<h2>Tolerances</h2>", 'id="tolerances"', "27 to 30 whole balls"):
         assert text in page

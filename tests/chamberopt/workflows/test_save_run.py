@@ -59,7 +59,7 @@ def test_zones_read_back_and_are_shown_from_the_folder_alone(tmp_path: Path) -> 
     document = report(load_result(moved))
     tables = {one.title: one.content for one in document.sections}
     judged = tables["Zones"][0].rows[0]
-    assert judged[2].startswith("coverage that 95 % of the zone's area exceeds: ")
+    assert judged[2].startswith("coverage that 95 % of the area exceeds: ")
     (line,) = document.answer_lines
     assert line.text.startswith("Zone left: coverage_min = 0.999 is not met (")
     assert line.warns
