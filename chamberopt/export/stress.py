@@ -1,9 +1,12 @@
 """Write the residual stress of a result for another solver: a table, and layers of shells.
 
 A composite shell has a material for each layer, whose thermal expansion is the mean eigenstrain of
-the layer: heated by 1 K, the shell bends and stretches as the peened plate does. A flat shell has
-no stress along its normal, so that one expansion in all directions is right. On a solid with a
-curved skin it is wrong by up to a third: solids have initial stress (stress_solid.py).
+the layer: heated by 1 K, the shell bends and stretches as the peened plate does. A shell has no
+stress along its normal, so that one expansion in all directions is right. CalculiX makes solids of
+shells, whose layers hinder each other's expansion along the normal: nu / (1 - nu) times the stress
+s along it stands in those along the surface too. Bending is right, as the sum of s over the
+thickness is 0. On a solid with a curved skin such an expansion is wrong by up to a third: solids
+have initial stress (stress_solid.py).
 
 Source: Abaqus Keywords Reference Guide and CalculiX CrunchiX user's manual, *SHELL SECTION with
 COMPOSITE: a line for each layer, from the face at the negative side of the normal on, of its
@@ -83,14 +86,18 @@ def write_shell_layers(folder: Path, file: Path) -> list[str]:
         )
     if len({name.upper() for name in found.profiles}) < len(found.profiles):
         raise InputError("zones: names that differ only in case are one name in a deck; change one")
+    poisson = metals.part.poisson
     lines = [
         "** Residual stress by chamberopt, as layers of composite shells. Units: mm, N, MPa, K.",
         "** Take an element set of each section from your own mesh, with normals out of the peened",
-        "** face. Initial temperature 0; a step without loads at 1 K, with *TEMPERATURE, balances.",
-        "** The stress that the solver then prints is the answer. It is an estimate, see the CSV.",
+        "** face; in CalculiX of S8R or S6, and with *EL FILE, as *EL PRINT fails on many layers.",
+        "** Initial temperature 0; a step without loads at 1 K, with *TEMPERATURE, balances.",
+        "** What Abaqus then prints as stress is the answer. CalculiX makes solids of shells: from",
+        "** the stresses along the surface take away that along the normal times",
+        f"** nu / (1 - nu) = {poisson / (1.0 - poisson):.4g}. It is an estimate, see the CSV.",
     ]
     for name, profile in found.profiles.items():
-        lines += _section(name, profile, found, (metals.part.modulus / 1e6, metals.part.poisson))
+        lines += _section(name, profile, found, (metals.part.modulus / 1e6, poisson))
     write_text(file, "".join(f"{line}\n" for line in lines))
     return ["heat the shells by 1 K in a step without loads: expansions are eigenstrains"]
 

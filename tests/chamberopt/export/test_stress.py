@@ -14,6 +14,7 @@ from chamberopt.chamber.build import build_chamber
 from chamberopt.common.errors import InputError
 from chamberopt.coverage.stress_law import arc_height, bending, integrals
 from chamberopt.design.almen_strip import STRIPS
+from chamberopt.design.flexure import plate_metals
 from chamberopt.documents.report import report
 from chamberopt.documents.stress import band_text, part_text
 from chamberopt.export.stress import write_shell_layers, write_stress_table
@@ -152,6 +153,52 @@ def test_calculix_bends_an_almen_strip_as_the_arc_height(tmp_path: Path) -> None
     )
 
 
+@pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX is not installed")
+def test_calculix_prints_the_stress_once_that_along_the_normal_is_taken_away(
+    folder: Path, tmp_path: Path
+) -> None:
+    """In the middle of a free plate, at the borders of its layers, by depth."""
+    across = np.linspace(-30.0, 30.0, 7)
+    sag(folder, tmp_path, (across, across), [(30, 0)])
+    metals = plate_metals(load_result(folder).design)
+    assert metals is not None
+    ratio = metals.part.poisson / (1.0 - metals.part.poisson)
+    assert f"nu / (1 - nu) = {ratio:.4g}." in (tmp_path / "shells.inp").read_text()
+    at, stress = stress_of_middle(tmp_path / "plate.frd")
+    depth = 0.5 * HEIGHT - at
+    found = stress[:, 0] - ratio * stress[:, 2]
+    record = load_result(folder).record.stress
+    assert record is not None
+    profile = record.profiles["the target"]
+    told = np.interp(depth, 1e-3 * np.array(profile.depth_um), profile.stress_MPa)
+    inside = (depth > 1e-3) & (depth < 1e-3 * profile.depth_um[-1])
+    assert inside.sum() >= 10
+    largest = np.abs(profile.stress_MPa).max()
+    np.testing.assert_allclose(found[inside], told[inside], atol=0.02 * largest)
+    plain = np.abs(stress[inside, 0] - told[inside]).max()
+    assert plain > 0.3 * largest  # what is printed is not the stress by itself
+
+
+def stress_of_middle(file: Path) -> tuple[np.ndarray, np.ndarray]:
+    """Heights (n,) [mm] in the middle of a plate, and the mean stress xx, yy, zz there (n, 3)."""
+    places: dict[int, list[float]] = {}
+    stress: dict[int, list[float]] = {}
+    into: dict[int, list[float]] | None = None
+    for line in file.read_text().splitlines():
+        if line.startswith("    2C"):
+            into = places
+        elif line.startswith(" -4  STRESS"):
+            into = stress
+        elif line.startswith((" -3", " -4")):
+            into = None
+        elif line.startswith(" -1") and into is not None:
+            into[int(line[3:13])] = [float(line[k : k + 12]) for k in range(13, len(line) - 11, 12)]
+    middle = [one for one, at in places.items() if np.hypot(*at[:2]) < 1e-6 and one in stress]
+    heights, which = np.unique([round(places[one][2], 6) for one in middle], return_inverse=True)
+    values = np.array([stress[one][:3] for one in middle])
+    return heights, np.array([values[which == k].mean(axis=0) for k in range(len(heights))])
+
+
 def layer_of(folder: Path) -> tuple[np.ndarray, np.ndarray]:
     """Depths [mm] and eigenstrain below the target of a result."""
     record = load_result(folder).record.stress
@@ -201,7 +248,7 @@ def free_plate(x: np.ndarray, y: np.ndarray) -> tuple[str, dict[int, tuple[float
     lines += ["*INCLUDE, INPUT=layers.inp", "*INITIAL CONDITIONS, TYPE=TEMPERATURE", "NALL, 0."]
     lines += ["*STEP", "*STATIC", "*BOUNDARY", "1, 1, 3", f"{len(along)}, 2, 3"]
     lines += [f"{number[-1, 0]}, 3, 3", "*TEMPERATURE", "NALL, 1."]
-    lines += ["*NODE PRINT, NSET=NALL", "U", "*END STEP"]
+    lines += ["*NODE PRINT, NSET=NALL", "U", "*EL FILE", "S", "*END STEP"]
     return "\n".join(lines) + "\n", points
 
 
