@@ -43,6 +43,7 @@ from sim_core import SceneError, TriangleMesh, closest_points
 
 if TYPE_CHECKING:
     from chamberopt.chamber.part import Part
+    from chamberopt.design.materials.catalogue import Elastic
     from chamberopt.results.arrays_file import ResultArrays
     from chamberopt.results.load import Result
     from chamberopt.results.records import StressRecord
@@ -52,8 +53,11 @@ TYPES = "C3D4", "C3D10"
 STRESS_UNITS = {"mm": ("MPa", 1e6), "m": ("Pa", 1.0), "in": ("psi", 6894.757293168)}
 SAME_SIZE = 1.2  # ratio of two lengths of one part; units differ by 2.5 and more
 NUMBER = rb"((?:\d+\.?\d*|\.\d+)(?:[ED][+-]?\d+)?)"
-ELASTIC = re.compile(rb"^\*ELASTIC\b[^\n]*\n\s*" + NUMBER, re.I | re.M)
-SAME_METAL = 0.15  # relative difference of Young's moduli that a metal may have in two sources
+ELASTIC = re.compile(rb"^\*ELASTIC\b[^\n]*\n([^*\n]*)", re.I | re.M)
+ROW = re.compile(rb"\s*" + NUMBER + rb"\s*,\s*" + NUMBER + rb"\s*(?:,|$)", re.I)
+# Differences that a metal may have in two sources: of Young's moduli, relative, and of Poisson's
+# ratios, which at ± 0.03 change the stress by 5 %.
+SAME_METAL, SAME_RATIO = 0.15, 0.03
 PEENED = 1  # tag of triangles with a stress that is told
 ON_SKIN = 0.2  # distance over the depth of compression up to which a mesh lies on the part
 COVERED = 0.95  # least share of the peened surface on which the mesh lies
@@ -118,7 +122,7 @@ def write_solid_stress(folder: Path, file: Path, deck: Path) -> list[str]:
     mesh = read_solids(deck, content)
     unit = _unit_of(deck, mesh, of_file.simulated.size)
     name, pascals = STRESS_UNITS[unit]
-    _require_metal(deck, content, metals.part.modulus / pascals, name)
+    _require_metal(deck, content, metals.part, pascals, name)
     in_file = mesh.points * METRES_PER[unit]
     mesh = replace(mesh, points=in_file @ of_file.rotation.T + of_file.shift)
     remarks = require_skin(deck, mesh, skin)
@@ -219,13 +223,26 @@ def _unit_of(deck: Path, mesh: ElementMesh, size: np.ndarray) -> str:
     )
 
 
-def _require_metal(deck: Path, content: bytes, modulus: float, unit: str) -> None:
-    """Raise InputError if the deck has materials, and none with Young's modulus of the part."""
-    found = [float(one.upper().replace(b"D", b"E")) for one in ELASTIC.findall(content)]
-    if found and all(abs(one / modulus - 1.0) > SAME_METAL for one in found):
+def _require_metal(deck: Path, content: bytes, metal: Elastic, pascals: float, unit: str) -> None:
+    """Raise InputError if the deck has elastic constants, and not once those of the part's metal.
+
+    Args:
+        pascals: of the deck's unit of stress [Pa].
+    """
+    given = ELASTIC.findall(content)
+    rows = [[float(x.upper().replace(b"D", b"E")) for x in found.groups()]
+            for one in given if (found := ROW.match(one))]  # fmt: skip
+    modulus = metal.modulus / pascals
+
+    def is_alike(row: list[float]) -> bool:
+        return abs(row[0] / modulus - 1.0) < SAME_METAL and abs(row[1] - metal.poisson) < SAME_RATIO
+
+    if given and not any(map(is_alike, rows)):
+        has = f"{rows[0][0]:g}, {rows[0][1]:g}" if rows else repr(given[0].decode(errors="replace"))
         raise InputError(
-            f"{deck}: *ELASTIC has {found[0]:g}, and the part's metal {modulus:.3g} {unit}; stress "
-            "is written in the unit that goes with that of lengths: change the deck's, or the metal"
+            f"{deck}: *ELASTIC has {has}, and the part's metal {modulus:.3g} {unit} and "
+            f"{metal.poisson:g}; stress is written in the unit that goes with that of lengths: "
+            "change the deck's, or the metal"
         )
 
 

@@ -177,6 +177,10 @@ class MeasuredAmplitude(FileTable):
     sd: float | None = quantity(1e-3, 100, "µm", "of the measured one; absent: 3 %", None)
 
 
+# Of a measured profile: the depth at which it ends [µm], and the size of stress [MPa].
+LEAST_DEEP_UM, MOST_DEEP_UM, MOST_MPa = 10.0, 5000.0, 4000.0
+
+
 class MeasuredProfile(Peened):
     """Residual stress by depth in a peened coupon, which is the part of its design."""
 
@@ -199,8 +203,17 @@ class MeasuredProfile(Peened):
         if len(self.depth_um) < LEAST_DEPTHS or not ascends or self.depth_um[0] < 0.0:
             text = f"given {list(self.depth_um)}; allowed: {LEAST_DEPTHS} or more, ascending from 0"
             yield Problem("depth_um", text)
-        if self.stress_MPa and min(self.stress_MPa) >= 0.0:
-            text = "has no compression; compressive stresses are negative: give them so"
+        if self.depth_um and not LEAST_DEEP_UM < self.depth_um[-1] < MOST_DEEP_UM:
+            text = (
+                f"ends at {self.depth_um[-1]:g}; allowed: {LEAST_DEEP_UM:g} to {MOST_DEEP_UM:g} µm"
+            )
+            yield Problem("depth_um", f"{text}; is it in µm?")
+        largest = max(self.stress_MPa, key=abs, default=-1.0)
+        if abs(largest) > MOST_MPa:
+            text = f"has {largest:g}; allowed: up to {MOST_MPa:g} MPa in size; is it in MPa?"
+            yield Problem("stress_MPa", text)
+        elif largest >= 0.0:
+            text = "is mostly tension; compressive stresses are negative: give them so"
             yield Problem("stress_MPa", text)
 
     @property

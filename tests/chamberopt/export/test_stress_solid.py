@@ -287,8 +287,10 @@ Change = Callable[[str], str]
             "has parts and instances; write the model out flat",
         ),
         (lambda text: text.replace("1001, ", "9" * 30 + ", ", 1), "allowed are numbers from 1 to"),
-        (lambda text: text + "*ELASTIC\r\n .2D12, .33\r\n", r"\*ELASTIC has 2e\+11, and"),
-        (lambda text: text + "*ELASTIC\n71.7, .33\n", r"\*ELASTIC has 71.7, and the part's metal"),
+        (lambda text: text + "*ELASTIC\r\n .2D12, .33\r\n", r"\*ELASTIC has 2e\+11, 0.33, and"),
+        (lambda text: text + "*ELASTIC\n71700, .2\n", r"\*ELASTIC has 71700, 0.2, and"),
+        (lambda text: text + "*ELASTIC\nsoft, .33\n", r"\*ELASTIC has 'soft, .33', and"),
+        (lambda text: text + "*ELASTIC\n71.7, .33\n", r"has 71.7, 0.33, and the part's metal"),
     ],
 )
 def test_a_deck_that_cannot_be_used_is_refused(
