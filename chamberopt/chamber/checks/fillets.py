@@ -216,7 +216,7 @@ def _slots(reach: Reach, chamber: Chamber, chosen: np.ndarray, largest: float) -
     where = one_of(points[facing], area[facing])
     return [
         f"shot of {1e3 * largest:g} mm is larger than a quarter of the target's narrowest slot, "
-        f"about {1e3 * width:.2g} mm wide, e.g. at {where}: few balls get to its bottom, and "
+        f"about {1e3 * width:.3g} mm wide, e.g. at {where}: few balls get to its bottom, and "
         "slowly; use smaller balls, or give it a zone of its own (docs/peening.md)"
     ]
 

@@ -46,7 +46,9 @@ def mm2(area: float) -> str:
 def one_of(points: np.ndarray, weights: np.ndarray) -> str:
     """Return as text the point, among points (n, 3) [m], that is closest to their weighted mean.
 
-    The mean itself may lie far from all points, as the middle of a ring does.
+    The mean itself may lie far from all points, as the middle of a ring does. Points without weight
+    do not count.
     """
     middle = np.average(points, axis=0, weights=weights)
+    points = points[weights > 0.0]
     return around(points[[np.linalg.norm(points - middle, axis=1).argmin()]])

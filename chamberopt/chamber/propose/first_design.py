@@ -75,13 +75,14 @@ AMPLITUDE_UM = 40.0  # zero-to-peak; the nearest that the sonotrode can set is t
 USUAL_PART, WALL, SONOTRODE = "42CrMo4", "100Cr6", "Ti-6Al-4V"  # of the catalogue
 # Materials of balls, and least hardness of steel balls over the part's. A part as hard as they are
 # is hardly dented: in pilots of a gear of 650 HB tungsten carbide left 9 times the dents.
+CERAMIC, IMPLANT = "zirconia", "ELI"
 STEEL, HARD, HARDER = "steel", "tungsten_carbide", 1.25
 # By metal of the part. Of aluminium: SAE AMS-S-13165, note 5 to table VI (design/intensity.py).
 IRON = {
     "aluminium": "IT LEAVES IRON on aluminium: decontaminate (note 5 to table VI of SAE "
     "AMS-S-13165), or ceramic balls, such as --shot zirconia",
     "titanium": "IT LEAVES IRON on titanium: decontaminate, or ceramic balls, such as --shot "
-    "zirconia, above all on implants (by heart)",
+    "zirconia (by heart)",
 }
 TREATMENT_S, HALF_WIDTH, MOST_REPLICAS = 300.0, 0.03, 24
 BLOCKS = "LARGER THAN ONE SONOTRODE: several side by side, driven alike"
@@ -312,6 +313,8 @@ def _shot(name: str, part: str, shop: Shop) -> tuple[str, str]:
         text = "the hardness of these balls is not known, and their restitution follows from it"
         raise InputError(f"--shot: given {name!r}; {text}; give one of {known}")
     hardness = alloy(part).hardness_HB
+    if not name and IMPLANT in part.split() and _has(shop, CERAMIC):
+        return CERAMIC, "steel leaves iron on an alloy of implants"
     if name or (ball(STEEL).hardness_HB or 0.0) >= HARDER * hardness or not _has(shop, HARD):
         found = ball(name or STEEL).name
         return found, IRON.get(alloy(part).metal, "") if found == STEEL else ""

@@ -9,7 +9,7 @@ import numpy as np
 from chamberopt.chamber.part import chosen_triangles
 from chamberopt.chamber.propose.proposal import Proposal, touched_share
 from chamberopt.chamber.propose.proposed_mask import is_met
-from chamberopt.chamber.propose.proposed_target import SELDOM
+from chamberopt.chamber.propose.proposed_target import RUNNING, SELDOM
 from chamberopt.geometry.triangles import area_vectors, areas, rotation_matrix, unit_vectors
 
 AWAY_DEG = 105.0  # angle to the way down from which on a face is turned away from the sonotrode
@@ -52,7 +52,8 @@ def find_left_out(proposal: Proposal) -> list[LeftOut]:
     hidden = 1.0 - touched_share(proposal)
     if hidden > LEAST and not part.target.reachable:
         found.append(LeftOut({"reachable": True}, f"the {hidden:.0%} that no ball touches here"))
-    seldom = [one for one in proposal.known if SELDOM.search(one.name)]
+    others = [one for one in proposal.known if not np.any(one.triangles & target)]
+    seldom = [one for one in others if SELDOM.search(one.name) or RUNNING.search(one.name)]
     if names := [one.name for one in seldom if is_met(proposal.design, chamber, one)]:
         text = f"NOT MASKED: the shot also meets {', '.join(names)}, seldom peened; give a [mask]"
         found.append(LeftOut({}, f"{text} (docs/chambers.md)"))

@@ -82,7 +82,10 @@ def held_end(mesh: PartMesh, target: Target, turns: Turns, of_any: bool = False)
     middle = 1e3 * mesh.vertices[mesh.triangles].mean(axis=1)[:, axis]
     of_end = middle > cut if is_top else middle < cut
     keys = {**target.keys, "box_mm": box_beyond(mesh, axis, not is_top, cut)}
-    reason = f"{target.reason}; but for an end, {share:.0%} of its length, to hold it by"
+    reason = (
+        f"{target.reason}; but for an end, {share:.0%} of its length, to hold it by: turn the part "
+        "end for end for it, or leave it bare"
+    )
     left = Target(keys, target.triangles & ~of_end, reason)
     points = np.eye(3)[axis] * (1.0 if is_top else -1.0)
     return HeldEnd(left, turns, points, {"box_mm": box_beyond(mesh, axis, is_top, cut)}, of_end)

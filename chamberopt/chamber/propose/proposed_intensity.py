@@ -26,7 +26,9 @@ from chamberopt.chamber.propose.proposed_balls import fit_sizes, serving_sizes, 
 from chamberopt.chamber.propose.shop import ShopSonotrode, usual_shop
 from chamberopt.common.errors import InputError
 from chamberopt.common.number_text import plain
+from chamberopt.design.almen_strip import OVER_A
 from chamberopt.design.intensity import (
+    THIN_MM,
     Comparison,
     PredictedIntensity,
     WantedIntensity,
@@ -40,6 +42,7 @@ BALL_POWER, AMPLITUDE_POWER = 1.0, 0.9
 MOST_PILOTS = 5
 # Settings in the middle half of the range, by logarithms, count as equally good.
 MIDDLE = 0.5
+ON_N = 0.1016  # mmA: 0.004 in, below which N strips are taken (SAE J443)
 DEEPEST, THIN_SHARE = 10e-3, 0.05  # m that is measured under a target; share that may be thin
 MOST_LISTED = 3  # other settings in a reason
 
@@ -205,20 +208,57 @@ def with_expected_intensity(made: Proposal, predicted: PredictedIntensity | None
     Args:
         predicted: by a pilot; None if it is not known.
     """
-    metal = alloy(made.tables["materials"]["part"])
-    middle, thin = _depth(made, 0.5), _depth(made, THIN_SHARE)
+    metal, middle = alloy(made.tables["materials"]["part"]), _depth(made, 0.5)
     expected = "its Almen intensity is not resolved by the pilot"
     if predicted is not None:
-        factor = "" if predicted.factor == 1.0 else f" x/÷ {plain(predicted.factor, 2)}"
-        expected = f"expected: {plain(predicted.value, 2)} mmA{factor}"
+        expected = f"expected: {_with_strip(predicted)}"
     usual = usual_intensity(metal, middle)
     beside = why_none(metal, middle)
     if usual is not None:
         beside = f"{usual.low:g}-{usual.high:g}A are {usual.text}: --intensity usual"
-        if usual_intensity(metal, thin) is None:
-            beside += f"; THIN PLACES: of {THIN_SHARE:.0%} {why_none(metal, thin)}, or mask them"
     reason = f"{made.reasons['shot.diameter_mm']}; {expected}; {beside}"
     return replace(made, reasons={**made.reasons, "shot.diameter_mm": reason})
+
+
+def with_thin_places(made: Proposal) -> Proposal:
+    """Return a proposal that names places of its target for which no intensity is usual."""
+    thin = _depth(made, THIN_SHARE)
+    if 1e3 * thin >= THIN_MM:
+        return made
+    text = (
+        f"THIN PLACES: {THIN_SHARE:.0%} of the target has {plain(1e3 * thin, 2)} mm of metal or "
+        "less under it: smaller balls or less amplitude there, or a mask on its edges"
+    )
+    reason = f"{made.reasons['shot.diameter_mm']}; {text}"
+    return replace(made, reasons={**made.reasons, "shot.diameter_mm": reason})
+
+
+def is_off(made: Proposal, predicted: PredictedIntensity | None) -> bool:
+    """Return whether the expected intensity lies outside of the usual range, if there is one."""
+    usual = usual_intensity(alloy(made.tables["materials"]["part"]), _depth(made, 0.5))
+    return usual is not None and predicted is not None and usual.off(predicted.value) != 0.0
+
+
+def as_no_wish(made: Proposal) -> Proposal:
+    """Return a proposal for an intensity that nobody asked for, without that wish in its design."""
+    reasons = dict(made.reasons)
+    key = f"sonotrode.{_amplitudes(made.sonotrode)[0]}"
+    reasons[key] += f": {reasons.pop('process.intensity_mmA')} (--intensity none keeps the largest)"
+    process = {k: one for k, one in made.tables["process"].items() if k != "intensity_mmA"}
+    return replace(
+        made,
+        tables={**made.tables, "process": process},
+        reasons=reasons,
+        design=made.design.changed({"process.intensity_mmA": None}),
+        strength_dents=0.0,
+    )
+
+
+def _with_strip(predicted: PredictedIntensity) -> str:
+    """Return an intensity in words, also on the N strip where it is measured on one."""
+    factor = "" if predicted.factor == 1.0 else f" x/÷ {plain(predicted.factor, 2)}"
+    of_n = f" ({plain(OVER_A['N'] * predicted.value, 2)} mm on N strips)"
+    return f"{plain(predicted.value, 2)} mmA{factor}{of_n if predicted.value < ON_N else ''}"
 
 
 def _depth(made: Proposal, share: float) -> float:

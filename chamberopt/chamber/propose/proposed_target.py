@@ -136,6 +136,8 @@ SELDOM = re.compile(
     r"fixture|seat|tip|leg|thread)s?(?![a-z])",
     re.I,
 )
+# Names of what runs in bearings: where they are no target, its size and finish must stay.
+RUNNING = re.compile(r"(?<![a-z])(?:pin|journal|race|bearing|zapfen)s?(?![a-z])", re.I)
 AS_LARGE = 0.9  # of the largest face's area: the target takes a face as large, e.g. a blade's back
 PATTERN = 6  # number of alike faces that make a repeated feature, such as teeth
 COLOUR, VIVID = re.compile(r"#([0-9a-f]{2})([0-9a-f]{2})([0-9a-f]{2})$", re.I), 100

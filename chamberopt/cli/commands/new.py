@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from chamberopt.chamber.propose.proposal import Proposal
     from chamberopt.chamber.propose.proposed_target import Surface
 
-PICK, USUAL = "pick", "usual"
+PICK, USUAL, NONE = "pick", "usual", "none"
 MAX_LISTED = 12
 
 
@@ -71,7 +71,8 @@ def new(
     intensity
         The Almen intensity that is wanted, in mm: a range such as 0.15-0.20A (A, N or C strips), or
         0.20+-0.02A; or usual, for the alloy and the thickness of the target. Balls that suit the
-        target and an amplitude of the sonotrode are chosen for it by pilot runs.
+        target and an amplitude of the sonotrode are chosen for it by pilot runs. By default the
+        usual one is aimed at if the alloy is given; none leaves it out.
     coverage
         The coverage that is wanted, in per cent: 100 is the time to 98 %, 200 twice that time.
     calibration
@@ -88,7 +89,13 @@ def new(
     from chamberopt.chamber.propose.first_design import propose
     from chamberopt.chamber.propose.left_out import find_left_out
     from chamberopt.chamber.propose.proposal import Wanted
-    from chamberopt.chamber.propose.proposed_intensity import usual_for, with_expected_intensity
+    from chamberopt.chamber.propose.proposed_intensity import (
+        as_no_wish,
+        is_off,
+        usual_for,
+        with_expected_intensity,
+        with_thin_places,
+    )
     from chamberopt.chamber.propose.quicker import Way, propose_quicker
     from chamberopt.chamber.propose.shop import load_shop
     from chamberopt.chamber.propose.text import design_text, study_texts
@@ -113,10 +120,10 @@ def new(
     if coverage is not None and not low <= coverage <= high:
         raise InputError(f"--coverage: given {coverage:g}; allowed: from {low:g} to {high:g} %")
     is_usual = intensity == USUAL
-    asked = None if intensity is None or is_usual else WantedIntensity.parse(intensity)
+    asked = None if intensity in (None, USUAL, NONE) else WantedIntensity.parse(intensity)
     if is_usual and not material:
         raise InputError("--intensity: usual follows from the alloy; give --material")
-    if intensity is not None and not pilot:
+    if intensity not in (None, NONE) and not pilot:
         raise InputError("--intensity: it takes pilot runs; leave out --no-pilot")
     if PICK in target and not sys.stdin.isatty():
         raise InputError("--target: pick asks, and nobody answers here; give names or faces")
@@ -155,13 +162,17 @@ def new(
             drawn = made.chamber
             way = Way(made, wanted, measured(made))
             made, wanted, found = propose_quicker(way, again, lambda one: measured(one, False))
-            if is_usual:
+            # A stated alloy has a usual intensity, which a proposal should not miss.
+            seeks = material and intensity is None and found and is_off(made, found.intensity)
+            if is_usual or seeks:
                 asked = usual_for(made)
             if asked:
                 made = with_intensity(made, wanted, asked, again)
                 found = measured(made)
+                made = as_no_wish(made) if seeks else made
             elif found is not None:
                 made = with_expected_intensity(made, found.intensity)
+            made = with_thin_places(made)
             made = with_measured_budget(made, found)
             if made.chamber is not drawn:
                 with step("drawing"):
