@@ -180,7 +180,13 @@ METRICS = {
             lacking=_why_no_intensity,
         ),
         Metric("saturation_time_s", "s", "saturation time of a strip", 0.0, of_places=True),
-        Metric("compression_depth_um", "µm", "estimated depth of compression", 0.0, of_places=True),
+        Metric(
+            "compression_depth_um",
+            "µm",
+            "estimated depth of compression in a thick part",
+            0.0,
+            of_places=True,
+        ),
         Metric(
             "surface_stress_MPa",
             "MPa",

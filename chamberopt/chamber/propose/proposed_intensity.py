@@ -243,7 +243,9 @@ def as_no_wish(made: Proposal) -> Proposal:
     """Return a proposal for an intensity that nobody asked for, without that wish in its design."""
     reasons = dict(made.reasons)
     key = f"sonotrode.{_amplitudes(made.sonotrode)[0]}"
-    reasons[key] += f": {reasons.pop('process.intensity_mmA')} (--intensity none keeps the largest)"
+    low, high = made.tables["process"]["intensity_mmA"]
+    why = reasons.pop("process.intensity_mmA")
+    reasons[key] += f" {low:g}-{high:g}A, {why} (--intensity none keeps the largest amplitude)"
     process = {k: one for k, one in made.tables["process"].items() if k != "intensity_mmA"}
     return replace(
         made,

@@ -17,13 +17,16 @@ from chamberopt.chamber.propose.proposed_intensity import (
     MOST_PILOTS,
     IntensityPilot,
     Setting,
+    as_no_wish,
     choose,
     expected_intensity,
+    is_off,
     propose_intensity,
     setting_of,
     settings_of,
     usual_for,
     with_expected_intensity,
+    with_thin_places,
 )
 from chamberopt.chamber.propose.shop import Shop, load_shop
 from chamberopt.chamber.propose.text import design_text, study_texts
@@ -289,3 +292,39 @@ def test_without_a_wish_the_expected_intensity_stands_beside_the_usual_one(
     )
     with pytest.raises(InputError, match=r"--intensity: given usual, but .*nickel"):
         usual_for(nickel)
+
+
+def test_a_usual_intensity_is_aimed_at_and_is_no_wish(plate: Path, shop: Shop) -> None:
+    """A machine whose largest amplitude gives 0.36 mmA, where 0.15 to 0.25 are usual."""
+    wanted, law = Wanted("mm", shop=shop, alloy="Ti-6Al-4V"), Machine(0.36 / 3.0 / 40.0**0.9)
+    made = propose(plate, wanted, lambda _: [])
+    pilot = law.simulate(made)
+    assert pilot is not None
+    assert is_off(made, pilot.predicted)
+    assert not is_off(made, PredictedIntensity(0.2, 0.03, 1.2, 2.5))
+    assert not is_off(made, None)
+    aimed = propose_intensity(
+        made, wanted, usual_for(made), lambda one: propose(plate, one, lambda _: []), law.simulate
+    )
+    free = as_no_wish(aimed)
+    assert free.design.process.intensity_mmA is None
+    assert "intensity_mmA" not in free.tables["process"]
+    assert setting_of(free) == setting_of(aimed) != setting_of(made)
+    told = free.reasons["sonotrode.amplitude_pv_um"]
+    assert "chosen for the intensity 0.15-0.25A, usual for titanium of 8 mm" in told
+
+
+def test_a_weak_intensity_stands_on_n_strips_too(plate: Path, shop: Shop) -> None:
+    made = propose(plate, Wanted("mm", shop=shop), lambda _: [])
+    told = with_expected_intensity(made, PredictedIntensity(0.06, 0.01, 0.36, 2.5))
+    assert "0.06 mmA x/÷ 2.5 (0.18 mm on N strips)" in told.reasons["shot.diameter_mm"]
+
+
+@pytest.mark.parametrize("metal", ["IN718", "Ti-6Al-4V"])
+def test_thin_places_are_told_of_every_metal(tmp_path: Path, shop: Shop, metal: str) -> None:
+    for thick, is_thin in ((1.5, True), (3.0, False)):
+        path = tmp_path / f"{thick}.stl"
+        trimesh.creation.box((40, 40, thick)).export(path)
+        made = with_thin_places(propose(path, Wanted("mm", shop=shop, alloy=metal), lambda _: []))
+        told = made.reasons["shot.diameter_mm"]
+        assert ("THIN PLACES: 5% of the target has 1.5 mm of metal or less" in told) is is_thin

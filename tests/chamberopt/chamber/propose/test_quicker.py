@@ -14,7 +14,7 @@ from chamberopt.chamber.propose.proposed_budget import Measured
 from chamberopt.chamber.propose.quicker import Way, propose_quicker
 from chamberopt.geometry.triangles import rotation_matrix
 
-LEAF = (160.0, 30.0, 6.0)  # mm: length, width and thickness of a bar with a broad side to peen
+LEAF = (130.0, 26.0, 6.0)  # mm: length, width and thickness of a bar with a broad side to peen
 
 
 def measured(seconds: float, places: bool = True) -> Measured:
@@ -27,7 +27,7 @@ def leaf(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A bar that stands in its file."""
     path = tmp_path_factory.mktemp("leaf") / "leaf.stl"
     box = trimesh.creation.box((LEAF[2], LEAF[1], LEAF[0]))
-    box.subdivide_to_size(8.0).export(path)  # so that a box of the design can cut its end off
+    box.subdivide_to_size(12.0).export(path)  # so that a box of the design can cut its end off
     return path
 
 
@@ -35,7 +35,7 @@ def leaf(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def poses(leaf: Path) -> dict[Pose | None, Proposal]:
     """The proposals for the bar by the pose that is asked for."""
     asked: list[Pose | None] = [None, "lying", "on-edge"]
-    return {one: propose(leaf, Wanted("mm", pose=one), lambda _: []) for one in asked}
+    return {one: propose(leaf, Wanted("mm", ball_mm=3.0, pose=one), lambda _: []) for one in asked}
 
 
 def pilots(times: dict[Pose | None, float]) -> Callable[[Proposal], Measured]:

@@ -14,12 +14,10 @@ from tests.hunt.command import Server, fault, fingerprint
 
 HERE = "tests.chamberopt.common.files"
 COMMANDS = (
-    "new box.stl --unit mm --no-pilot --out out",
     "check design.toml --out out",
     "check study.toml --out out",
     "simulate design.toml --workers 1",
     SIMULATE.replace("result", "out"),
-    "run study.toml --workers 1 --out begun",
     "run study.toml --workers 1 --out study",
     "report given",
     "report study",
@@ -37,6 +35,8 @@ COMMANDS = (
     "save",
 )
 SLOW = (
+    "run study.toml --workers 1 --out begun",
+    "new box.stl --unit mm --no-pilot --out out",
     "run study.toml --workers 1",
     "sweep study.toml --grid 2 --workers 1",
     "compare given design.toml --workers 1",
