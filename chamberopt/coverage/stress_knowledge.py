@@ -162,16 +162,18 @@ def edge_notes(design: Design, part: Part, found: Mapping[str, Estimate]) -> tup
     )
 
 
-def stress_notes(design: Design, strength: Estimate) -> tuple[str, ...]:
+def stress_notes(design: Design, metrics: Mapping[str, Estimate]) -> tuple[str, ...]:
     """Return notes on the stress under the surface: how well its law is known, its likely peak, and
     a warning if the depth of compression cannot be estimated for this metal.
 
     Args:
-        strength: peening strength of the target [µm].
+        metrics: of the target. Only figures of which a number is told are named.
     """
-    notes, metal = [*_arc_note(design, strength)], design.materials.part
-    if bands := stress_bands(design):
-        known = ", ".join(f"{name} by a factor of {band:.3g}" for name, band in bands.items())
+    notes, metal = [*_arc_note(design, metrics["strength_um"])], design.materials.part
+    told = {name: band for name, band in stress_bands(design).items()
+            if name in metrics and not metrics[name].in_words}  # fmt: skip
+    if told:
+        known = ", ".join(f"{name} by a factor of {band:.3g}" for name, band in told.items())
         notes.append(
             f"beyond its interval, the law may be wrong in {known}, more or less, in all designs "
             "with this metal and shot alike: their ratios are better known"

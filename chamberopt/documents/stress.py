@@ -44,6 +44,21 @@ def band_text(figure: Estimate, band: float) -> str:
     return f"{factor}: {plain(ends[0], 2)} to {plain(ends[1], 2)}"
 
 
+def stress_sentence(result: Result) -> str:
+    """Return the stress under the target in one sentence, with what its law is good for.
+
+    It is empty if the design asks for none, or none is told.
+    """
+    found = result.record.stress
+    if found is None or TARGET not in found.profiles:
+        return ""
+    texts = []
+    for name in OF_STRESS[:2]:
+        label, one = metric_label(name), result.metrics[name]
+        texts.append(f"{label.text} {label.format(one)}, {band_text(one, found.bands[name])}")
+    return f"Residual stress {part_text(found)}, by a law that may be off: {'; '.join(texts)}."
+
+
 def stress_section(result: Result, start: Result | None) -> Section | None:
     """Return the report's section on residual stress; None if the design does not ask for it.
 

@@ -17,6 +17,7 @@ from chamberopt.documents.answer import answer, answer_lines
 from chamberopt.documents.coverage import Figure, figures, figures_table, main_figures
 from chamberopt.documents.document import About, Table
 from chamberopt.documents.ranges import range_lines, range_texts
+from chamberopt.documents.stress import stress_sentence
 from chamberopt.documents.study import influence_sentences, influences, tried_sentence
 from chamberopt.documents.tolerances import tolerance_lines, tolerance_sentences
 from chamberopt.documents.wording import metric_label, objective_label, plain
@@ -59,6 +60,7 @@ def result_end(folder: Path, verbose: bool) -> list[Table | str]:
             said.append(f"The Pareto front of {names}: pareto.csv, pareto.png.")
     else:
         table = figures_table(main_figures(all_figures))
+    said += filter(None, [stress_sentence(result)])
     if record.tolerances:
         said += tolerance_sentences(record.tolerances)
         notes = [*record.tolerances.notes, *notes]

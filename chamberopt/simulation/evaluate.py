@@ -211,7 +211,7 @@ class _Run:
                 *friction_notes(design),
                 *amplitude_notes(design),
                 *edge_notes(design, self.chamber.part, metrics),
-                *stress_notes(design, metrics["strength_um"]),
+                *stress_notes(design, metrics),
                 *((cavity_note(self.cavity),) if self.cavity else ()),
                 *_symmetry_note(field.alike),
             ),

@@ -16,7 +16,8 @@ from chamberopt.coverage.stress_law import arc_height, bending, integrals
 from chamberopt.design.almen_strip import STRIPS
 from chamberopt.design.flexure import plate_metals
 from chamberopt.documents.report import report
-from chamberopt.documents.stress import band_text, part_text
+from chamberopt.documents.stress import band_text, part_text, stress_sentence
+from chamberopt.documents.terminal_lines import result_end
 from chamberopt.export.stress import write_shell_layers, write_stress_table
 from chamberopt.printers.report_page import write_report
 from chamberopt.results.arrays_file import load_result_arrays
@@ -265,6 +266,14 @@ def test_the_report_says_how_wide_the_law_is(folder: Path, tmp_path: Path) -> No
     assert part_text(record.model_copy(update={"thickness_mm": None})) == "in a thick part"
     known = result.metrics["surface_stress_MPa"]
     assert band_text(known.not_known("coverage below 98 %"), 1.9) == "×/÷ 1.9"
+
+
+def test_the_end_of_a_simulation_says_the_stress_and_how_wide_its_law_is(folder: Path) -> None:
+    said = stress_sentence(load_result(folder))
+    assert said.startswith(f"Residual stress in a plate of {HEIGHT:g} mm, peened on one side")
+    assert "×/÷ 1.9" in said
+    assert "×/÷ 1.6" in said
+    assert said in result_end(folder, verbose=False)
 
 
 def test_what_cannot_be_handed_on_is_said(folder: Path, tmp_path: Path) -> None:
