@@ -113,6 +113,8 @@ def _up_mm(length: float) -> float:
 CREASE_DEG = 30.0
 WHOLE_PART = 0.99  # share of the area from which a named surface counts as the whole part
 RUNNERS_UP = 2  # that a reason names
+MOST_SINGLE = 4  # faces alike that are listed one by one
+SINGLE = re.compile(r"(face \d+)\.(\d+)", re.I)
 MAX_KINDS = 40  # kinds of faces that are listed, the largest areas first
 FOR = "(?:peen|target|(?:ge)?strahl|grenaill)"
 MEANT = re.compile(FOR, re.I)  # names that say that a surface is to be peened
@@ -158,6 +160,7 @@ class Surface:
     triangles: np.ndarray  # (m,) bool
     text: str  # description in a few words
     colour: str = ""  # colour of just these triangles in the file
+    alone: str = ""  # names of each of its faces, and where they look, if they are few
 
 
 @dataclass(frozen=True)
@@ -277,8 +280,33 @@ def _faces(mesh: PartMesh) -> list[Surface]:
             key["alike"] = True
         marked = same[faces.of_triangle]
         text = f"{several} faces alike, {_mm2(area)} in all" if several > 1 else _mm2(area)
-        listed.append(Surface(name, {"faces": [key]}, marked, text))
+        singles = np.flatnonzero(same) if 1 < several <= MOST_SINGLE else ()
+        alone = ", ".join(
+            f"{name}.{k} looks {_way(faces.normal(int(one)))}"
+            for k, one in enumerate(singles, start=1)
+        )
+        listed.append(Surface(name, {"faces": [key]}, marked, text, alone=alone))
     return listed
+
+
+def _single(mesh: PartMesh, of: Surface, number: int) -> Surface | None:
+    """Return one of several faces that are alike, by its number from 1; None if there is none."""
+    faces = Faces(mesh.vertices, mesh.triangles, CREASE_DEG)
+    own = np.unique(faces.of_triangle[of.triangles])
+    if not 1 <= number <= len(own):
+        return None
+    face = int(own[number - 1])
+    key: dict[str, object] = {"at_mm": faces.place_mm(face), "crease_deg": CREASE_DEG}
+    marked = faces.of_triangle == face
+    return Surface(f"{of.name}.{number}", {"faces": [key]}, marked, _mm2(float(faces.area[face])))
+
+
+def _way(normal: np.ndarray) -> str:
+    """Return in words which axis of the part's file a normal (3,) is nearest to."""
+    if not normal.any():
+        return "all round"
+    axis = int(np.abs(normal).argmax())
+    return f"to {'-' if normal[axis] < 0.0 else '+'}{'xyz'[axis]}"
 
 
 def _named(mesh: PartMesh, name: str, marked: np.ndarray) -> Surface:
@@ -310,6 +338,10 @@ def _find(mesh: PartMesh, known: Sequence[Surface], name: str) -> Surface:
     if name.lower() == "all":
         whole = np.ones(len(mesh.triangles), dtype=bool)
         return Surface("all", WHOLE, whole, "the whole surface")
+    if (found := SINGLE.fullmatch(name)) is not None:
+        of = [one for one in known if one.name.lower() == found[1].lower() and "faces" in one.keys]
+        if of and (single := _single(mesh, of[0], int(found[2]))) is not None:
+            return single
     if FACE.fullmatch(name):
         faces = [one.name for one in known if "faces" in one.keys]
         text = f"the part has {faces[0]} to {faces[-1]}"

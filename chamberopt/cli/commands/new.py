@@ -49,8 +49,9 @@ def new(
     part
         The part's file: STEP, STL, OBJ, PLY, 3MF, Nastran, Abaqus, Gmsh or VTK.
     target
-        What is to be peened: a name of the file, "face N" as the command lists them, or all; may
-        be given several times. pick lists the surfaces and asks. By default the likeliest.
+        What is to be peened: a name of the file, "face N" as the command lists them, "face N.1" for
+        the first alone of several alike, or all; may be given several times. pick lists the
+        surfaces and asks. By default the likeliest.
     shape
         Form of the chamber; by default a cylinder, or a box for a long part.
     material
@@ -260,6 +261,7 @@ def _listed(known: Sequence[Surface], most: int) -> list[str]:
     lines = []
     for one in known[:most]:
         place = f", one at {one.keys['faces'][0]['at_mm']} mm" if "faces" in one.keys else ""
-        lines.append(f"  {one_line(one.name)}: {one.text}{place}")
+        alone = f"; {one.alone}" if one.alone else ""
+        lines.append(f"  {one_line(one.name)}: {one.text}{place}{alone}")
     more = [f"  and {len(known) - most} more (--target pick)"] if len(known) > most else []
     return ["surfaces to choose from (--target):", *lines, *more]

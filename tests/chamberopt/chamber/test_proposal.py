@@ -18,10 +18,11 @@ from chamberopt.chamber.propose.proposal import Wanted, propose_charge, propose_
 from chamberopt.chamber.propose.proposed_target import Sizes, Surface, propose_target, surfaces
 from chamberopt.chamber.propose.shop import StockBalls, usual_shop
 from chamberopt.chamber.propose.text import design_text
+from chamberopt.common.errors import InputError
 from chamberopt.design.part import Target
 from chamberopt.geometry.meshes.part_mesh import PartMesh, read_part
 from chamberopt.geometry.meshes.raw_mesh import number_by_position
-from chamberopt.geometry.triangles import areas
+from chamberopt.geometry.triangles import area_vectors, areas
 from chamberopt.search.study.parameters import Varied
 from tests.helpers.four_parts import FOUR_PARTS
 
@@ -233,3 +234,22 @@ def test_names_cannot_write_into_the_design(tmp_path: Path) -> None:
     assert tomllib.loads(text) == written
     choices = [line for line in text.splitlines() if line.startswith("# surface = ")]
     assert tomllib.loads(choices[0].removeprefix("# ")) == {"surface": [bad]}
+
+
+def test_one_of_several_faces_alike_is_a_target_of_its_own(tmp_path: Path) -> None:
+    """The broad sides of a plate: one looks up, the other down."""
+    trimesh.creation.box((40, 30, 5)).export(tmp_path / "plate.stl")
+    mesh = read_part(tmp_path / "plate.stl", "mm")
+    known = surfaces(mesh)
+    broad = next(one for one in known if one.name == "face 1")
+    assert "face 1.1 looks to " in broad.alone
+    singles = [propose_target(mesh, known, [f"face 1.{k}"]) for k in (1, 2)]
+    assert not (singles[0].triangles & singles[1].triangles).any()
+    np.testing.assert_array_equal(singles[0].triangles | singles[1].triangles, broad.triangles)
+    for one, way in zip(singles, broad.alone.split(", "), strict=True):
+        normals = area_vectors(mesh.vertices, mesh.triangles)[one.triangles]
+        assert way.endswith("+z" if normals[0, 2] > 0.0 else "-z")
+        assert "alike" not in one.keys["faces"][0]
+    for name in ("face 1.3", "face 1.0", "face 99.1"):
+        with pytest.raises(InputError, match="--target"):
+            propose_target(mesh, known, [name])
