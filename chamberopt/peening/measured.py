@@ -266,6 +266,11 @@ class Measured(FileTable):
                     f"a {one.size} beside a {self.strip[0].size}: an arc height belongs to one size"
                 )
                 yield Problem(f"strip.{number}", f"{text}; calibrate each size on its own")
+        numbers = [(found.design, found.depth_um, found.stress_MPa) for found in self.profile]
+        for number, same in enumerate(numbers):
+            if same in numbers[:number]:
+                text = "has the numbers of one above it, and each counts as a measurement"
+                yield Problem(f"profile.{number}", f"{text}; leave one out")
 
 
 Entry = MeasuredStrip | MeasuredCoupon | MeasuredDrop | MeasuredImpacts

@@ -137,6 +137,11 @@ def test_wrong_factors_are_refused() -> None:
         ("depth_um = [0, 50, 90]\nstress_MPa = [190, 270, -40]", "mostly tension"),
         ("depth_um = [0, 50, 90]\nstress_MPa = [-270e6, -3e8, 0]", "is it in MPa"),
         ("depth_um = [0, 0.05, 0.09]\nstress_MPa = [-200, -300, 0]", "is it in µm"),
+        (
+            "depth_um = [0, 50, 90]\nstress_MPa = [-1, -2, 1]\n"
+            '[[profile]]\nmethod = "x-ray"\ndepth_um = [0, 50, 90]\nstress_MPa = [-1, -2, 1]',
+            "profile.1: has the numbers of one above it",
+        ),
         ("depth_um = [0, 50, 9e5]\nstress_MPa = [-200, -300, 0]", "ends at 900000"),
         ("depth_um = [0, 50, 90]\nstress_MPa = [-1, -2, 1]", r"coupon has no \[stress\]; add"),
     ],
