@@ -197,7 +197,10 @@ def _over_the_face(sizes: Sizes, shop: Shop, face: Face) -> Floor:
         more = min(plan[key] - float(sizes.plan[key]) for key in plan)
         wider = replace(sizes, plan={**sizes.plan, **plan}, gap=sizes.gap + 5e-4 * more)
         return Floor(wider, face, f"the face of {face.in_words}, the wall round it {clear}")
-    return Floor(sizes, face, f"on {face.in_words}: the wall ends over its face, {clear}")
+    where = "ends over its face"
+    if any(float(sizes.plan.get(key, 0.0)) >= side for key, side in plan.items()):
+        where = "goes round it on two sides and ends over its face on the others"
+    return Floor(sizes, face, f"on {face.in_words}: the wall {where}, {clear}")
 
 
 def _along(sizes: Sizes, face: Face) -> tuple[float, float]:
