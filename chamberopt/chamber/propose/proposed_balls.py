@@ -162,7 +162,8 @@ def propose_ball(fits: Sequence[SizeFit]) -> tuple[float, str]:
         text = f"NO SIZE SERVES ALL (fillets of 2, slots of 4 diameters); of the target: {shares}"
     larger = [one for one in fits if one.diameter > best.diameter and one.count <= MANY]
     if best.count > MANY and larger:
-        text += f"; MANY BALLS: {_mm(larger[0])} would serve {larger[0].served:.0%}"
+        text += f"; MANY BALLS, some {best.count:,} under the whole part: "
+        text += f"{_mm(larger[0])} would serve {larger[0].served:.0%}"
     if best.jam:
         text += f"; IT JAMS in gaps of {1e3 * best.jam:.4g} mm, as every size does"
     elif jammed := [one for one in fits if one.jam]:
