@@ -27,7 +27,7 @@ DRAW: dict[str, Callable[[random.Random, Path, Path], list[str]]] = {
     "many": toml_files.write_many_keys,
     "step": meshes.write_damaged_step,
 }
-FEW = {"toml": 20, "mesh": 10, "arguments": 8, "results": 3, "formulas": 2, "many": 4, "step": 2}
+FEW = {"toml": 12, "mesh": 10, "arguments": 8, "results": 2, "formulas": 2, "many": 4, "step": 2}
 # Seeds whose commands end within seconds, for the program that a user starts.
 STARTED = {"toml": (0, 1, 2), "mesh": (1, 4, 10), "arguments": (1, 4, 7), "results": (3, 6, 8),
            "formulas": (0,), "many": (0, 1), "step": (0,)}  # fmt: skip

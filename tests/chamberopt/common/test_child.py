@@ -76,7 +76,14 @@ def test_a_child_over_its_limit_of_time_is_late(seconds: float, cpu_s: float | N
 
 
 @posix
-@pytest.mark.parametrize("name", ["SIGKILL", "SIGTERM", "SIGHUP", "SIGINT"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "SIGKILL",
+        "SIGINT",
+        *(pytest.param(x, marks=pytest.mark.long) for x in ("SIGTERM", "SIGHUP")),
+    ],
+)
 def test_children_end_with_their_parent_and_leave_no_file(name: str, tmp_path: Path) -> None:
     parent = subprocess.Popen(
         [sys.executable, "-c", "from tests.helpers.worker_jobs import be_parent; be_parent()"],

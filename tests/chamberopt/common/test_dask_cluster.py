@@ -267,7 +267,7 @@ def test_a_worker_with_edited_sources_is_refused(dask: Dask, tmp_path: Path) -> 
         other.end()
 
 
-@pytest.mark.parametrize("command", ["simulate", "sweep"])
+@pytest.mark.parametrize("command", ["simulate", pytest.param("sweep", marks=pytest.mark.long)])
 def test_a_scheduler_that_dies_is_one_message(command: str, tmp_path: Path) -> None:
     own = Dask(tmp_path, [])
     save_design(plate_design(process__accuracy__replicas=400), tmp_path / "plate.toml")

@@ -63,7 +63,8 @@ def served_with_a_running(command: str, folder: Path, is_awaited: bool = True) -
 
 @pytest.mark.parametrize(
     ("name", "command"),
-    [("SIGTERM", "simulate"), ("SIGKILL", "simulate"), ("SIGINT", "run"),
+    [("SIGKILL", "simulate"), ("SIGINT", "run"),
+     pytest.param("SIGTERM", "simulate", marks=pytest.mark.long),
      pytest.param("SIGHUP", "simulate", marks=pytest.mark.long),
      pytest.param("SIGKILL", "sweep", marks=pytest.mark.long)],
 )  # fmt: skip

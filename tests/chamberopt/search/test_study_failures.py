@@ -110,8 +110,11 @@ class TestFullDisk:
         assert history(folder) == expected
 
 
-@pytest.mark.parametrize("error", [ZeroDivisionError, MemoryError, KeyboardInterrupt])
-@pytest.mark.parametrize("at", [5, 17])
+@pytest.mark.parametrize(
+    "error",
+    [ZeroDivisionError, pytest.param(MemoryError, marks=pytest.mark.long), KeyboardInterrupt],
+)
+@pytest.mark.parametrize("at", [pytest.param(5, marks=pytest.mark.long), 17])
 def test_a_fault_of_ours_stops_the_study_not_the_candidate(
     error: type[BaseException], at: int, tmp_path: Path, whole: Path
 ) -> None:

@@ -16,7 +16,6 @@ HERE = "tests.chamberopt.common.files"
 COMMANDS = (
     "check design.toml --out out",
     "check study.toml --out out",
-    "simulate design.toml --workers 1",
     SIMULATE.replace("result", "out"),
     "run study.toml --workers 1 --out study",
     "report given",
@@ -35,6 +34,7 @@ COMMANDS = (
     "save",
 )
 SLOW = (
+    "simulate design.toml --workers 1",
     "run study.toml --workers 1 --out begun",
     "new box.stl --unit mm --no-pilot --out out",
     "run study.toml --workers 1",
