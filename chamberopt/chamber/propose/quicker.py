@@ -121,9 +121,13 @@ def _after(found: Measured | None) -> str:
 
 def _with_pose_told(best: Way, first: Way, tried: list[tuple[Way, str]]) -> Way:
     """Return the best way with the times of all poses in the reason for its pose."""
+
+    def named(one: Way) -> str:
+        return (one.wanted.pose or "evenly exposed").replace("-", " ")
+
     texts = []
     for one, harm in [(first, ""), *tried]:
-        name = (one.wanted.pose or "evenly exposed").replace("-", " ")
+        name = named(one)
         what = harm or _after(one.found)
         count = _sonotrodes(one.made)
         texts.append(f"{name}{f' on {count} sonotrodes' if count > 1 else ''}: {what}")
@@ -132,6 +136,6 @@ def _with_pose_told(best: Way, first: Way, tried: list[tuple[Way, str]]) -> Way:
     pose = best.made.reasons["part.rotate_deg"].rpartition(": ")[0]
     if best is first:
         pose = first.made.reasons["part.rotate_deg"]
-    reason = f"{pose}; poses tried by pilots: {'; '.join(texts)}"
+    reason = f"{pose}; poses tried by pilots: {'; '.join(texts)}; TAKEN: {named(best)}"
     reasons = {**best.made.reasons, "part.rotate_deg": reason}
     return best._replace(made=replace(best.made, reasons=reasons))

@@ -163,12 +163,15 @@ def new(
             drawn = made.chamber
             way = Way(made, wanted, measured(made))
             made, wanted, found = propose_quicker(way, again, lambda one: measured(one, False))
+            why_so = {"part.rotate_deg": made.reasons["part.rotate_deg"]}
             # A stated alloy has a usual intensity, which a proposal should not miss.
             seeks = material and intensity is None and found and is_off(made, found.intensity)
             if is_usual or seeks:
                 asked = usual_for(made)
             if asked:
                 made = with_intensity(made, wanted, asked, again)
+                if wanted.pose != pose:  # by pilots, and not as asked
+                    made = replace(made, reasons={**made.reasons, **why_so})
                 found = measured(made)
                 made = as_no_wish(made) if seeks else made
             elif found is not None:
