@@ -25,6 +25,7 @@ from chamberopt.chamber.propose.held_proposal import (
     padded,
 )
 from chamberopt.chamber.propose.pose import (
+    AT_SIDE,
     Turns,
     end_to_wall,
     hanging_pose,
@@ -73,9 +74,9 @@ AT_WALL = 2.0  # ball diameters from the target to the wall through which its en
 WIDER = (1.0, 1.4, 2.0)  # factors on the room round the part that are tried
 AMPLITUDE_UM = 40.0  # zero-to-peak; the nearest that the sonotrode can set is taken
 USUAL_PART, WALL, SONOTRODE = "42CrMo4", "100Cr6", "Ti-6Al-4V"  # of the catalogue
+CERAMIC, IMPLANT = "zirconia", "ELI"  # balls for an alloy of implants, by a word of its name
 # Materials of balls, and least hardness of steel balls over the part's. A part as hard as they are
 # is hardly dented: in pilots of a gear of 650 HB tungsten carbide left 9 times the dents.
-CERAMIC, IMPLANT = "zirconia", "ELI"
 STEEL, HARD, HARDER = "steel", "tungsten_carbide", 1.25
 # By metal of the part. Of aluminium: SAE AMS-S-13165, note 5 to table VI (design/intensity.py).
 IRON = {
@@ -108,13 +109,12 @@ def propose(
     target = propose_target(mesh, known, asked)
     _require_near_origin(path, target)
     shape = mesh.vertices, mesh.triangles, target.triangles
-    turns, pose_reason = propose_pose(*shape)
-    if wanted.pose is not None:
-        turns, pose_reason = (
-            pose_by_size(*shape, wanted.pose),
-            f"{wanted.pose.replace('-', ' ')}, as asked",
-        )
-    if wanted.pose in ("lying", "on-edge"):
+    if wanted.pose is None:
+        turns, pose_reason = propose_pose(*shape)
+    else:
+        turns = pose_by_size(*shape, wanted.pose)
+        pose_reason = f"{wanted.pose.replace('-', ' ')}, as asked"
+    if wanted.pose in AT_SIDE:
         return _lying(path, wanted, mesh, known, target, turns, pose_reason, bool(asked))
     end = None if asked else held_end(mesh, target, turns)
     made = _proposed(path, wanted, mesh, known, target, turns, pose_reason, end)
@@ -154,9 +154,7 @@ def _lying(
         end = None if keeps_target else held_end(mesh, target, upright, of_any)
         lying = None if end is None else end._replace(turns=turns)
         made = _proposed(path, wanted, mesh, known, target, turns, reason, lying)
-        holder = made.design.holder
-        is_held = holder is not None and is_firm(holder)
-        if end is not None or keeps_target or not whole or is_held:
+        if end is not None or keeps_target or not whole or is_firm(made):
             break
     return made
 
@@ -229,7 +227,8 @@ def _proposed(
 
     bores = find_bores(mesh, target.triangles)
     # Balls would lie on what holds an end at the side: it goes out through the wall instead.
-    goes_out = end is not None and wanted.pose in ("lying", "on-edge")
+    out = end.axis if end is not None and wanted.pose in AT_SIDE else None
+    goes_out = out is not None
 
     def built(is_local: bool, turning: Bore | None = None) -> tuple[Proposal, Floor]:
         """Return the proposal with the least room that is free of gaps, else of fewest faults.
@@ -249,7 +248,6 @@ def _proposed(
         for number, wider in enumerate(WIDER):
             progress(number, len(WIDER), None)
             try:
-                out = end.axis if goes_out and end is not None else None
                 placed, floor = _place(mesh, target, pose, diameter, form, wider, is_local, out)
                 part = {**tables["part"], "rotate_deg": list(placed)}
                 if any(floor.offset_mm):

@@ -16,6 +16,7 @@ from chamberopt.chamber.propose.proposal import (
     Tables,
     checked,
     faults,
+    new_warning,
     touched,
     touched_share,
 )
@@ -28,7 +29,7 @@ from chamberopt.chamber.propose.proposed_target import LONG, Target
 from chamberopt.chamber.propose.shop import Shop
 from chamberopt.common.errors import InputError, UnreadableError
 from chamberopt.common.progress import Progress
-from chamberopt.design.fixture import USUAL_SHELL_MM, WIDEST_GAP, Holder
+from chamberopt.design.fixture import USUAL_SHELL_MM, WIDEST_GAP
 
 MOST_HOLDERS = 6  # that are tried
 HIDDEN = 0.005  # share of the target that a holder may keep from the balls
@@ -87,15 +88,16 @@ def clamped_outside(made: Proposal, floor: Floor, shop: Shop | None) -> Proposal
 
 def hangs_by_a_face(made: Proposal) -> bool:
     """Return whether a long part hangs by nothing but a holder that stands on one of its faces."""
-    if made.design.holder is not None and is_firm(made.design.holder):
+    if is_firm(made):
         return False
     sides = np.ptp(made.chamber.part.vertices, axis=0)
     return bool(sides[2] > LONG * sides[:2].max())
 
 
-def is_firm(holder: Holder) -> bool:
-    """Return whether a holder holds a part by itself, as one that stands on a face does not."""
-    return holder.kind in ("arbor", "bore") or holder.grip_mm is not None
+def is_firm(made: Proposal) -> bool:
+    """Return whether a holder holds the part by itself, as one that stands on a face does not."""
+    holder = made.design.holder
+    return holder is not None and (holder.kind in ("arbor", "bore") or holder.grip_mm is not None)
 
 
 def padded(made: Proposal, floor: Floor, target: Target, shop: Shop | None) -> Proposal:
@@ -110,7 +112,7 @@ def padded(made: Proposal, floor: Floor, target: Target, shop: Shop | None) -> P
     diameter, turns = made.design.shot.diameter, made.design.part.rotate_deg
     bare = {name: one for name, one in made.tables.items() if name != "holder"}
     choices = [made.tables] if hangs_by_a_face(made) else [bare, made.tables]
-    if made.design.holder is not None and is_firm(made.design.holder):
+    if is_firm(made):
         choices.reverse()
     for at in pads(made.mesh, target.triangles, turns, diameter):
         for tables in choices:
@@ -193,8 +195,7 @@ def _harmless(
     if touched_share(before) - touched_share(made) > HIDDEN:
         return None, "a holder would keep the balls from some of the target"
     if faults(made) > faults(before):
-        new = [text for text in made.warnings if text not in before.warnings]
-        return None, f"a {kind} would bring a warning: {(new or made.warnings)[0]}"
+        return None, f"a {kind} would bring a warning: {new_warning(made, before)}"
     return made, ""
 
 

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 Turns = tuple[float, float, float]
 Pose = Literal["standing", "lying", "on-edge"]
 """Which of a part's sizes is upright: its longest one, its shortest one, or that between."""
+AT_SIDE: tuple[Pose, ...] = ("lying", "on-edge")  # in which a part is held at its side
 
 # Advantages in the mean minus standard deviation of the exposure, over poses of any angle: of the
 # pose as drawn, of turns by multiples of 90 and of 45 degrees, and of turns by steps of 15 and 5.

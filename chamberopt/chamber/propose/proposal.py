@@ -159,6 +159,12 @@ def faults(made: Proposal) -> tuple[int, int]:
     return len(made.jams), len(made.warnings)
 
 
+def new_warning(made: Proposal, before: Proposal) -> str:
+    """Return the first warning of a proposal that another one has not, or else its first."""
+    new = [text for text in made.warnings if text not in before.warnings]
+    return (new or made.warnings)[0]
+
+
 def touched(made: Proposal) -> np.ndarray:
     """Return the share of each triangle of the part that the balls can touch, (m,)."""
     return reached_part_share(made.reach, made.chamber.source, len(made.chamber.part.triangles))

@@ -14,8 +14,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from chamberopt.chamber.propose.pose import Pose
-from chamberopt.chamber.propose.proposal import Proposal, Wanted, faults, with_charge
+from chamberopt.chamber.propose.pose import AT_SIDE
+from chamberopt.chamber.propose.proposal import Proposal, Wanted, faults, new_warning, with_charge
 from chamberopt.chamber.propose.proposed_balls import MOST_BALLS
 from chamberopt.chamber.propose.proposed_budget import LONG, Measured
 from chamberopt.common.errors import InputError
@@ -25,7 +25,6 @@ SLOW = 600.0  # s until 98 % of the target are dented, from which on other ways 
 # Time over that of the way before, below which a way is taken: with more sonotrodes, or with as
 # many, and where that time is LONG. Pilots know a time to 10 to 20 %.
 DEARER, QUICKER = 0.6, 0.8
-POSES: tuple[Pose, ...] = ("lying", "on-edge")
 LAYER = 2.0  # over half a layer
 SAME = 0.999  # cosine between the directions that point up, from which on a pose is no other one
 
@@ -49,7 +48,7 @@ def propose_quicker(
     """
     best, tried = first, []
     if _is_slow(first) and first.wanted.pose is None and not _turns(first.made):
-        for pose in POSES:
+        for pose in AT_SIDE:
             wanted = replace(first.wanted, pose=pose)
             try:
                 made = again(wanted)
@@ -95,8 +94,7 @@ def _harm(made: Proposal, first: Proposal) -> str:
     if made.chamber.pieces_in_air and not first.chamber.pieces_in_air:
         return "nothing would hold it"
     if faults(made) > faults(first):
-        new = [text for text in made.warnings if text not in first.warnings]
-        return (new or made.warnings)[0].split(",")[0]
+        return new_warning(made, first).split(",")[0]
     return ""
 
 
