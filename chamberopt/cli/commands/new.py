@@ -169,7 +169,13 @@ def new(
             if is_usual or seeks:
                 asked = usual_for(made)
             if asked:
-                made = with_intensity(made, wanted, asked, again)
+                try:
+                    made = with_intensity(made, wanted, asked, again)
+                except InputError:  # which is no reason to stop if nobody asked
+                    if not seeks:
+                        raise
+                    asked = None
+            if asked:
                 if wanted.pose != pose:  # by pilots, and not as asked
                     made = replace(made, reasons={**made.reasons, **why_so})
                 found = measured(made)

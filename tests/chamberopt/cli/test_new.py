@@ -16,6 +16,7 @@ from chamberopt.chamber.propose.proposed_budget import Measured
 from chamberopt.chamber.propose.proposed_target import propose_target, surfaces
 from chamberopt.cli import main
 from chamberopt.common.errors import InputError
+from chamberopt.design.intensity import PredictedIntensity
 from chamberopt.design.load import load_design
 from chamberopt.geometry.meshes.part_mesh import PartMesh, read_part
 from chamberopt.geometry.triangles import rotation_matrix
@@ -267,6 +268,26 @@ def test_a_pilot_that_cannot_run_leaves_the_starts_and_says_so(
     assert "--time 180s" in Path("piloted/most_even.toml").read_text(encoding="utf-8")
     searched = study.search_accuracy
     assert searched["replicas"] * searched["simulated_time_s"] == 500.0
+
+
+def test_a_usual_intensity_that_no_pilot_tells_is_no_reason_to_stop(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Nobody asked for it. Where it is asked for, it is one message."""
+    off = PredictedIntensity(0.9, 0.1, 5.0, 2.5)
+    found = Measured(1e5, 1e4, 250.0, True, 60.0, True, 0.01, 5e-3, 6.4, 200.0, intensity=off)
+    monkeypatch.chdir(tmp_path)
+    trimesh.creation.box((20, 20, 30)).export("box.stl")
+    monkeypatch.setattr("chamberopt.cli.prepare.compile_with_message", lambda *_: None)
+    monkeypatch.setattr("chamberopt.simulation.budget_pilot.measure_budget", lambda *_: found)
+    monkeypatch.setattr("chamberopt.peening.intensity_pilot.predict_intensity", lambda *_: None)
+    monkeypatch.setattr("chamberopt.cli.commands.check.draw_target", lambda *_: None)
+    words = ["new", "box.stl", "--unit", "mm", "--material", "Ti-6Al-4V"]
+    assert main(words) == 0
+    assert "expected: 0.9 mmA x/÷ 2.5; 0.15-0.25A are usual for titanium" in capfd.readouterr().out
+    assert main([*words, "--intensity", "usual", "--out", "asked"]) == 2
+    assert "--intensity: the shot hardly dents a strip" in capfd.readouterr().err
+    assert not Path("asked").exists()
 
 
 @pytest.mark.long
