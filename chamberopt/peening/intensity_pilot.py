@@ -20,6 +20,7 @@ from chamberopt.common.progress import Progress
 from chamberopt.coverage.strength_intervals import MAX_STEP
 from chamberopt.design.intensity import PredictedIntensity
 from chamberopt.peening.calibration_errors import evaluate_calibrated
+from chamberopt.simulation.budget_pilot import rough_intensity
 from chamberopt.simulation.evaluate import ReplicaPlan, evaluate
 from chamberopt.simulation.replicas import ReplicaSet
 
@@ -42,7 +43,9 @@ FIGURES = "strength_um", "almen_intensity"
 def predict_intensity(
     design: Design, chamber: Chamber, executor: Executor, progress: Progress | None = None
 ) -> IntensityPilot | None:
-    """Simulate a design briefly, and return its Almen intensity; None if it is not resolved.
+    """Simulate a design briefly, and return its Almen intensity; None if hardly a dent fell.
+
+    Where single places are not resolved it is a rough one.
 
     Raises:
         InputError: the shot does not fit, or the target has no figures.
@@ -64,7 +67,8 @@ def predict_intensity(
             break
         time *= GROWTH
     if not _is_known(wide, math.inf):
-        return None
+        rough = rough_intensity(short, chamber, executor, list(known.replicas))
+        return None if rough is None else IntensityPilot(rough, 0.0)
     found, dents = wide, _dents_needed(wide)
     narrow = short.process.accuracy.gauge_mm2 * dents / wide.resolution.dents
     if narrow < short.process.accuracy.gauge_mm2:

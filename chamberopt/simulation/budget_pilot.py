@@ -21,7 +21,7 @@ from chamberopt.common.errors import InputError
 from chamberopt.common.executor import share
 from chamberopt.common.progress import Progress
 from chamberopt.coverage.metrics import NEVER, exposed_target
-from chamberopt.design.intensity import PredictedIntensity
+from chamberopt.design.intensity import PredictedIntensity, Z
 from chamberopt.design.ranges import variants
 from chamberopt.simulation.evaluate import ReplicaPlan, evaluate, require_figures
 from chamberopt.simulation.evaluation import Evaluation
@@ -47,6 +47,9 @@ FEW = 40.0  # dents in the median of the narrowest windows; 25 are needed (propo
 # Of all replicas: a run that would have more is not begun, unless it is the first. The second is
 # for a shot that still slows down.
 COLLISIONS, UNSETTLED = 2e6, 8e6
+# Share of the target in windows that tell an intensity roughly, and the error of its logarithm: of
+# connecting_rod, turbine_disc and vane it was 1.22, 1.0 and 1.33 times that of single places.
+ROUGH, ROUGH_LOG_SD = 0.2, 0.3
 
 
 class _TimedReplica(NamedTuple):
@@ -141,8 +144,28 @@ def measure_budget(
         mean_time=mean_time,
         warmup=warmup,
         settled=settled,
-        intensity=PredictedIntensity.of(wide.metrics, design.calibration),
+        intensity=PredictedIntensity.of(wide.metrics, design.calibration)
+        or rough_intensity(slow, chamber, executor, replicas),
     )
+
+
+def rough_intensity(
+    design: Design, chamber: Chamber, executor: Executor, replicas: list[Replica]
+) -> PredictedIntensity | None:
+    """Return the Almen intensity in windows of a fifth of the target, which takes few dents.
+
+    It is None if there are hardly any, or if strips were measured: their intensity is not told
+    roughly.
+    """
+    if design.calibration is not None:
+        return None
+    gauge = ROUGH * 1e6 * float(chamber.part.area[chamber.part.target].sum())
+    wide = design.changed({"process.accuracy.gauge_mm2": max(1.0, gauge)})
+    strength = _seen(wide, chamber, executor, replicas).metrics["strength_um"]
+    if not strength.bias < ROUGH_LOG_SD * strength.value:
+        return None
+    error = Z * ROUGH_LOG_SD * strength.value
+    return PredictedIntensity.estimated(replace(strength, half_width=error, in_words=""))
 
 
 def _seen(

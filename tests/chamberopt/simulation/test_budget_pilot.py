@@ -4,8 +4,10 @@ import pytest
 
 from chamberopt.chamber.build import build_chamber
 from chamberopt.common.executor import local_executor
-from chamberopt.simulation.budget_pilot import at_slow_end, measure_budget
-from chamberopt.simulation.evaluate import evaluate
+from chamberopt.design.intensity import PredictedIntensity
+from chamberopt.simulation.budget_pilot import at_slow_end, measure_budget, rough_intensity
+from chamberopt.simulation.evaluate import ReplicaPlan, evaluate
+from chamberopt.simulation.replicas import ReplicaSet
 from tests.helpers.synthetic import plate_design
 
 PLATE = plate_design()
@@ -38,3 +40,21 @@ def test_a_pilot_foretells_a_longer_run() -> None:
         full.simulated_time + full.replicas * design.process.accuracy.warmup_time
     )
     assert pilot.collision_rate == pytest.approx(per_second, rel=0.1)
+
+
+def test_a_rough_intensity_takes_few_dents() -> None:
+    """Places are not resolved by a tenth of a second; the strength of wide windows is near."""
+    design = PLATE.changed(
+        {"process.accuracy.simulated_time_s": 0.1, "process.accuracy.objective_half_width": None}
+    )
+    chamber, known, plan = build_chamber(design), ReplicaSet(), ReplicaPlan(count=4)
+    with local_executor() as executor:
+        short = evaluate(design, chamber, executor, plan=plan, known=known)
+        rough = rough_intensity(design, chamber, executor, list(known.replicas))
+        longer = design.changed({"process.accuracy.simulated_time_s": 4.0})
+        full = PredictedIntensity.of(evaluate(longer, chamber, executor, plan=plan).metrics, None)
+    assert PredictedIntensity.of(short.metrics, None) is None
+    assert rough is not None
+    assert full is not None
+    assert rough.value == pytest.approx(full.value, rel=0.4)
+    assert rough.factor > full.factor
