@@ -182,7 +182,7 @@ class PredictedIntensity:
             plain(one, 2) for one in (self.value, self.low, self.high, self.factor)
         )
         return (
-            f"{value} mmA, x/÷ {factor} (one standard deviation; at 95 % {low} to {high} mmA): "
+            f"{value} mmA, x/÷ {factor} (one standard deviation, at 95 % {low} to {high} mmA): "
             f"{UNTIL}"
         )
 

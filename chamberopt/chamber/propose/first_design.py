@@ -80,14 +80,14 @@ CERAMIC, IMPLANT = "zirconia", "ELI"  # balls for an alloy of implants, by a wor
 STEEL, HARD, HARDER = "steel", "tungsten_carbide", 1.25
 # By metal of the part. Of aluminium: SAE AMS-S-13165, note 5 to table VI (design/intensity.py).
 IRON = {
-    "aluminium": "IT LEAVES IRON on aluminium: decontaminate (note 5 to table VI of SAE "
+    "aluminium": "STEEL LEAVES IRON on aluminium: decontaminate (note 5 to table VI of SAE "
     "AMS-S-13165), or ceramic balls, such as --shot zirconia",
-    "titanium": "IT LEAVES IRON on titanium: decontaminate, or ceramic balls, such as --shot "
+    "titanium": "STEEL LEAVES IRON on titanium: decontaminate, or ceramic balls, such as --shot "
     "zirconia (by heart)",
 }
 TREATMENT_S, HALF_WIDTH, MOST_REPLICAS = 300.0, 0.03, 24
 BLOCKS = "LARGER THAN ONE SONOTRODE: several side by side, driven alike"
-START = "a start, NOT MEASURED by a pilot"
+START = "NOT MEASURED by a pilot, a start"
 ON_END = "on end, as no sonotrode is large enough for it lying"
 
 
@@ -209,19 +209,19 @@ def _proposed(
     if not (end or wanted.pose) and (hanging := _hanging(mesh, target, turns, diameter, wanted)):
         turns, pose_reason = hanging, ON_END
     reasons = {
-        "part.unit": ("GUESSED: " if any(GUESSED in note for note in mesh.notes) else "")
+        "part.unit": ("UNIT GUESSED: " if any(GUESSED in note for note in mesh.notes) else "")
         + f"the part measures {format_box(mesh.size)}",
         "part.target": target.reason,
         "shot.diameter_mm": ball_reason,
         **({"shot.material": shot_reason} if shot_reason else {}),
         "materials.part": "C0 and v0 are computed: to be calibrated"
         if wanted.alloy
-        else "NOT KNOWN, a guess: chamberopt materials lists alloys",
+        else "ALLOY NOT KNOWN, a guess: chamberopt materials lists alloys",
         "materials.wall": "hardened, as soft walls slow the balls; give yours",
         "effects.friction": "mu of these balls on these metals, dry: chamberopt materials",
         "effects.roughness": "rms slope of faces that shot has dented",
         "process.treatment_time_s": f"{START}: the report has coverage over time",
-        "process.accuracy.simulated_time_s": f"{START}: results say what is resolved",
+        "process.accuracy.simulated_time_s": "a start: results say what is resolved",
         "process.accuracy.objective_half_width": "until it is so sure; of a time: this share",
     }
 

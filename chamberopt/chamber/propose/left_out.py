@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from chamberopt.chamber.build import Chamber
 from chamberopt.chamber.part import chosen_triangles
 from chamberopt.chamber.propose.proposal import Proposal, touched_share
 from chamberopt.chamber.propose.proposed_mask import is_met
-from chamberopt.chamber.propose.proposed_target import RUNNING, SELDOM
+from chamberopt.chamber.propose.proposed_target import RUNNING, Surface
+from chamberopt.common.number_text import plain
 from chamberopt.geometry.triangles import area_vectors, areas, rotation_matrix, unit_vectors
 
 AWAY_DEG = 105.0  # angle to the way down from which on a face is turned away from the sonotrode
 LEAST = 0.02  # share of the target's area below which nothing is offered
 NEARLY_ALL, MOST_NAMED = 0.9, 3
+MOST_LOOKED_AT = 20  # surfaces, the largest
 
 
 @dataclass(frozen=True)
@@ -53,8 +57,28 @@ def find_left_out(proposal: Proposal) -> list[LeftOut]:
     if hidden > LEAST and not part.target.reachable:
         found.append(LeftOut({"reachable": True}, f"the {hidden:.0%} that no ball touches here"))
     others = [one for one in proposal.known if not np.any(one.triangles & target)]
-    seldom = [one for one in others if SELDOM.search(one.name) or RUNNING.search(one.name)]
-    if names := [one.name for one in seldom if is_met(proposal.design, chamber, one)]:
-        text = f"NOT MASKED: the shot also meets {', '.join(names)}, seldom peened; give a [mask]"
-        found.append(LeftOut({}, f"{text} (docs/chambers.md)"))
+    found += _met_beside(proposal, chamber, others[:MOST_LOOKED_AT])
     return found
+
+
+def _met_beside(
+    proposal: Proposal, chamber: Chamber, others: Sequence[Surface]
+) -> Iterator[LeftOut]:
+    """Yield what the shot meets of the part beside its target, the largest surfaces by name."""
+    named = [one for one in others if "surface" in one.keys] or others
+    met = [one for one in named if is_met(proposal.design, chamber, one)]
+    if not met:
+        return
+    met.sort(key=lambda one: not RUNNING.search(one.name))
+    area = areas(proposal.mesh.vertices, proposal.mesh.triangles)
+    names = [
+        f"{one.name} ({plain(1e6 * float(area[one.triangles].sum()), 3)} mm²)"
+        for one in met[:MOST_NAMED]
+    ]
+    more = f" and {len(met) - MOST_NAMED} more" if len(met) > MOST_NAMED else ""
+    runs = "runs or fits by its name, and " if RUNNING.search(met[0].name) else ""
+    yield LeftOut(
+        {},
+        f"NOT MASKED: the shot also meets {', '.join(names)}{more}; {runs}what has to keep its "
+        "size and finish takes a [mask] (docs/chambers.md)",
+    )

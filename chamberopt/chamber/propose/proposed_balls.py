@@ -165,7 +165,7 @@ def propose_ball(fits: Sequence[SizeFit]) -> tuple[float, str]:
         text += f"; MANY BALLS, some {best.count:,} under the whole part: "
         text += f"{_mm(larger[0])} would serve {larger[0].served:.0%}"
     if best.jam:
-        text += f"; IT JAMS in gaps of {1e3 * best.jam:.4g} mm, as every size does"
+        text += f"; BALLS JAM in gaps of {1e3 * best.jam:.4g} mm, as every size does"
     elif jammed := [one for one in fits if one.jam]:
         text += f"; {', '.join(map(_mm, jammed[:MOST_LISTED]))} would jam in gaps of the part"
     return best.diameter, text

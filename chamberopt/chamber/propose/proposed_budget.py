@@ -115,7 +115,7 @@ def propose_budget(found: Measured, asked: Asked | None = None) -> Budget:
     expected = (
         f"about {_plain(dents * gauge, 2)} dents in a window by a pilot; {needed:.0f} would do"
     )
-    few = f": TOO FEW within {MINUTES:g} minutes on two cores; give more"
+    few = f"; TOO FEW DENTS within {MINUTES:g} minutes on two cores; give more"
     wider = f"WIDER than the usual 1 mm²: enough dents within {MINUTES:g} minutes on two cores"
     reasons = {
         "process.treatment_time_s": _said_of_treatment(found, treatment, coverage_percent),
@@ -193,9 +193,9 @@ def _said_of_long(found: Measured) -> str:
     if uneven > UNEVEN:
         return (
             f"the least covered places take {_plain(uneven, 2)} times as long as the target on "
-            "average; half of the time in a second pose, turned over or round, may do"
+            "average: half of the time in a second pose, turned over or round, may do"
         )
-    return "few balls get to the target, or slowly; a larger sonotrode, harder balls or the study"
+    return "few balls get to the target, or slowly: a larger sonotrode, harder balls or the study"
 
 
 def _plain(value: float, digits: int) -> str:

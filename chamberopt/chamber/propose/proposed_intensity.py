@@ -44,6 +44,7 @@ MOST_PILOTS = 5
 MIDDLE = 0.5
 ON_N = 0.1016  # mmA: 0.004 in, below which N strips are taken (SAE J443)
 DEEPEST, THIN_SHARE = 10e-3, 0.05  # m that is measured under a target; share that may be thin
+INTENSITY = "process.intensity_mmA"  # whose reason stands in a design without a wish too
 MOST_LISTED = 3  # other settings in a reason
 
 
@@ -209,15 +210,14 @@ def with_expected_intensity(made: Proposal, predicted: PredictedIntensity | None
         predicted: by a pilot; None if it is not known.
     """
     metal, middle = alloy(made.tables["materials"]["part"]), _depth(made, 0.5)
-    expected = "its Almen intensity is not resolved by the pilot"
+    expected = "not known: the pilot left hardly a dent"
     if predicted is not None:
         expected = f"expected: {_with_strip(predicted)}"
     usual = usual_intensity(metal, middle)
     beside = why_none(metal, middle)
     if usual is not None:
         beside = f"{usual.low:g}-{usual.high:g}A are {usual.text}: --intensity usual"
-    reason = f"{made.reasons['shot.diameter_mm']}; {expected}; {beside}"
-    return replace(made, reasons={**made.reasons, "shot.diameter_mm": reason})
+    return replace(made, reasons={**made.reasons, INTENSITY: f"{expected}; {beside}"})
 
 
 def with_thin_places(made: Proposal) -> Proposal:
@@ -242,10 +242,7 @@ def is_off(made: Proposal, predicted: PredictedIntensity | None) -> bool:
 def as_no_wish(made: Proposal) -> Proposal:
     """Return a proposal for an intensity that nobody asked for, without that wish in its design."""
     reasons = dict(made.reasons)
-    key = f"sonotrode.{_amplitudes(made.sonotrode)[0]}"
-    low, high = made.tables["process"]["intensity_mmA"]
-    why = reasons.pop("process.intensity_mmA")
-    reasons[key] += f" {low:g}-{high:g}A, {why} (--intensity none keeps the largest amplitude)"
+    reasons[INTENSITY] += "; --intensity none keeps the largest amplitude"
     process = {k: one for k, one in made.tables["process"].items() if k != "intensity_mmA"}
     return replace(
         made,
@@ -274,8 +271,9 @@ def _with_prediction(
 ) -> Proposal:
     """Return a proposal with its wanted intensity, and in the reason the predicted one."""
     found = Comparison.with_prediction((wanted.low, wanted.high), predicted)
-    text = f"{wanted.text}; predicted {found.predicted}; {found.in_words}{more}"
-    reasons = {**made.reasons, "process.intensity_mmA": text}
+    text = f"predicted {found.predicted}; for {wanted.low:g}-{wanted.high:g}A, {wanted.text}"
+    text += f"; {found.in_words}{more}"
+    reasons = {**made.reasons, INTENSITY: text}
     ends = {"intensity_mmA": [wanted.low, wanted.high]}
     tables = {**made.tables, "process": {**made.tables["process"], **ends}}
     design = made.design.changed({"process.intensity_mmA": (wanted.low, wanted.high)})
@@ -298,7 +296,7 @@ def _told(
     key = _amplitudes(made.sonotrode)[0]
     off, more = wanted.off(predicted.value), others
     if off:
-        more = f"; NO BALLS AND AMPLITUDE THAT THERE ARE GIVE IT: {_needed(made, off)}"
+        more = f"; NO BALLS AND AMPLITUDE GIVE THIS INTENSITY: {_needed(made, off)}"
     reasons = dict(made.reasons)
     reasons[f"sonotrode.{key}"] += ", chosen for the intensity"
     ball = "chosen for the intensity"

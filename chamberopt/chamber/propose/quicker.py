@@ -128,12 +128,12 @@ def _with_pose_told(best: Way, first: Way, tried: list[tuple[Way, str]]) -> Way:
         name = named(one)
         what = harm or _after(one.found)
         count = _sonotrodes(one.made)
-        texts.append(f"{name}{f' on {count} sonotrodes' if count > 1 else ''}: {what}")
+        on, taken = f" on {count} sonotrodes" if count > 1 else "", " (taken)" * (one is best)
+        texts.append(f"{name}{on} {what}{taken}")
     if len(texts) == 1:
         return best
-    pose = best.made.reasons["part.rotate_deg"].rpartition(": ")[0]
-    if best is first:
-        pose = first.made.reasons["part.rotate_deg"]
-    reason = f"{pose}; poses tried by pilots: {'; '.join(texts)}; TAKEN: {named(best)}"
+    pose, _, why = best.made.reasons["part.rotate_deg"].rpartition(": ")
+    tried_ones = f"poses tried by pilots: {', '.join(texts)}"
+    reason = f"{pose}: {why}; {tried_ones}" if best is first else f"{pose}: {tried_ones}"
     reasons = {**best.made.reasons, "part.rotate_deg": reason}
     return best._replace(made=replace(best.made, reasons=reasons))

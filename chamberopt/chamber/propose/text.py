@@ -11,6 +11,7 @@ import tomlkit
 
 from chamberopt.chamber.propose.left_out import LeftOut
 from chamberopt.chamber.propose.proposal import Proposal
+from chamberopt.chamber.propose.proposed_intensity import INTENSITY
 from chamberopt.chamber.propose.proposed_target import Surface
 from chamberopt.common.errors import one_line
 from chamberopt.design.almen_strip import USUAL_K, USUAL_K_LOG_SD
@@ -61,6 +62,8 @@ def design_text(proposal: Proposal, folder: Path, left_out: Sequence[LeftOut] = 
         lines += ["", title] if table else [""]  # "" is the file's top, above all tables
         quoted = {f'"{key}"' if "." in key else key: one for key, one in values.items()}
         lines += _values(quoted, table, proposal.reasons)
+        if table == "process" and "intensity_mmA" not in values and INTENSITY in proposal.reasons:
+            lines.append(f"# Almen intensity: {proposal.reasons[INTENSITY]}")
         if table == "part.target":
             lines += _left_out(left_out)
             lines += _choices(proposal.known)

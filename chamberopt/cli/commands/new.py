@@ -11,16 +11,14 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from cyclopts import Parameter
 
 from chamberopt.cli.console import print_remarks, show
-from chamberopt.cli.options import Out, app
+from chamberopt.cli.options import Out, Verbose, app
 from chamberopt.common.errors import one_line
 
 if TYPE_CHECKING:
-    from chamberopt.chamber.propose.left_out import LeftOut
     from chamberopt.chamber.propose.proposal import Proposal
     from chamberopt.chamber.propose.proposed_target import Surface
 
 PICK, USUAL, NONE = "pick", "usual", "none"
-MAX_LISTED = 12
 
 
 @app.command
@@ -41,6 +39,7 @@ def new(
     unit: Literal["um", "mm", "cm", "m", "in", "guess"] | None = None,
     pilot: bool = True,
     out: Out = None,
+    verbose: Verbose = False,
 ) -> None:
     """Propose a first design and study for a part, each number with its reason, and a picture.
 
@@ -109,6 +108,7 @@ def new(
     from chamberopt.design.intensity import WantedIntensity
     from chamberopt.design.process import Process
     from chamberopt.design.shot import ShotSize
+    from chamberopt.documents.proposal import proposal_end
     from chamberopt.geometry.meshes.units import STATED, UnknownUnitError
     from chamberopt.results.vtp_files import pyvista
 
@@ -192,7 +192,7 @@ def new(
         studies = study_texts(made, "design.toml")
         for name, text in studies.items():
             write_text(folder / name, text)
-    show(_summary(made, left_out))
+    show(proposal_end(made, left_out, verbose))
     print_remarks(f"note: {one_line(text)}" for text in made.mesh.notes)
     print_remarks(f"warning: {text}" for text in made.warnings)
     show(
@@ -238,8 +238,9 @@ def _asked_unit(part: Path, sizes: Mapping[str, str]) -> str:
 def _picked(known: Sequence[Surface]) -> Sequence[str]:
     """Ask the user which of the part's surfaces are to be peened, and return their names."""
     from chamberopt.common.errors import InputError
+    from chamberopt.documents.proposal import surface_lines
 
-    show(_listed(known, len(known)))
+    show(surface_lines(known, len(known)))
     try:
         answer = input("to be peened, separated by commas: ").strip()
     except EOFError:
@@ -247,30 +248,3 @@ def _picked(known: Sequence[Surface]) -> Sequence[str]:
     if any(one.name == answer for one in known):  # a single name with commas
         return [answer]
     return [name.strip() for name in answer.split(",") if name.strip()]
-
-
-def _summary(made: Proposal, left_out: Sequence[LeftOut]) -> list[str]:
-    """Return lines with each proposed value and its reason, and other possible targets."""
-    lines = [f"{'part.target':38}{one_line(made.reasons['part.target'])}"]
-    for one in left_out:
-        keys = " and ".join(f"part.target.{key}" for key in one.keys)
-        leave = f": {keys} in the design leave it out" if keys else ""
-        lines.append(f"{'':38}{one_line(one.text)}{leave}")
-    for table, values in made.tables.items():
-        for key, value in values.items():
-            reason = made.reasons.get(f"{table}.{key}")
-            if reason:
-                text = f"{value:g}" if isinstance(value, float) else value
-                lines.append(f"{table + '.' + key:38}{text}: {reason}")
-    return [*lines, *_listed(made.known, MAX_LISTED)]
-
-
-def _listed(known: Sequence[Surface], most: int) -> list[str]:
-    """Return lines with at most `most` surfaces of the part to choose a target from."""
-    lines = []
-    for one in known[:most]:
-        place = f", one at {one.keys['faces'][0]['at_mm']} mm" if "faces" in one.keys else ""
-        alone = f"; {one.alone}" if one.alone else ""
-        lines.append(f"  {one_line(one.name)}: {one.text}{place}{alone}")
-    more = [f"  and {len(known) - most} more (--target pick)"] if len(known) > most else []
-    return ["surfaces to choose from (--target):", *lines, *more]

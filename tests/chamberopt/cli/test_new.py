@@ -201,14 +201,16 @@ def test_a_guess_is_said_and_no_folder_is_held_while_the_design_is_made(
     monkeypatch.setattr("chamberopt.cli.commands.check.draw_target", lambda *_: None)
     assert main(["new", "box.stl", "--unit", "guess", "--out", "out", "--no-pilot"]) == 0
     said = capfd.readouterr()
-    assert "mm: GUESSED: the part measures 20 x 20 x 30 mm" in said.out
+    assert "1. UNIT GUESSED: the part measures 20 x 20 x 30 mm." in said.out
     assert "unit guessed as 'mm' (by its size)" in said.err
     assert "give --unit if that is wrong" in said.err
     assert not held
     made = sorted(one.name for one in Path("out").iterdir())
     assert made == ["design.toml", "study.toml"]
     assert load_study("out/study.toml").objective.name == "uniform_coverage"
-    assert "# GUESSED: the part measures" in Path("out/design.toml").read_text(encoding="utf-8")
+    assert "# UNIT GUESSED: the part measures" in Path("out/design.toml").read_text(
+        encoding="utf-8"
+    )
     assert "a pad on the level top, up to the ceiling: no ball lies there" in said.out
     design = load_design("out/design.toml")
     assert design.mask is not None
@@ -253,7 +255,7 @@ def test_a_pilot_that_cannot_run_leaves_the_starts_and_says_so(
     monkeypatch.setattr("chamberopt.cli.commands.check.draw_target", lambda *_: None)
     assert main(["new", "box.stl", "--unit", "mm"]) == 0
     assert "warning: no pilot, treatment and simulated time are starts" in capfd.readouterr().err
-    assert "a start, NOT MEASURED by a pilot" in Path("box/design.toml").read_text("utf-8")
+    assert "NOT MEASURED by a pilot, a start" in Path("box/design.toml").read_text("utf-8")
 
     measured = Measured(1e5, 1e4, 250.0, True, 60.0, True, 0.01, 5e-3, 6.4, 200.0)
     monkeypatch.setattr("chamberopt.simulation.budget_pilot.measure_budget", lambda *_: measured)
@@ -284,7 +286,9 @@ def test_a_usual_intensity_that_no_pilot_tells_is_no_reason_to_stop(
     monkeypatch.setattr("chamberopt.cli.commands.check.draw_target", lambda *_: None)
     words = ["new", "box.stl", "--unit", "mm", "--material", "Ti-6Al-4V"]
     assert main(words) == 0
-    assert "expected: 0.9 mmA x/÷ 2.5; 0.15-0.25A are usual for titanium" in capfd.readouterr().out
+    said = capfd.readouterr().out
+    assert "intensity    expected: 0.9 mmA x/÷ 2.5\n" in said
+    assert "0.15-0.25A are usual for titanium" in said
     assert main([*words, "--intensity", "usual", "--out", "asked"]) == 2
     assert "--intensity: the shot hardly dents a strip" in capfd.readouterr().err
     assert not Path("asked").exists()

@@ -73,7 +73,7 @@ def test_what_serves_the_most_is_proposed_where_no_size_serves_all() -> None:
     assert "1 mm 90%, 2 mm 89%, 3 mm 70%" in reason
     jams = [SizeFit(1e-3, 1.0, 1.0, True, 0.0, 100), SizeFit(2e-3, 1.0, 1.0, True, 1.988e-3, 100)]
     assert propose_ball(jams)[0] == 1e-3
-    assert "IT JAMS in gaps of 1.988 mm" in propose_ball(jams[1:])[1]
+    assert "BALLS JAM in gaps of 1.988 mm" in propose_ball(jams[1:])[1]
 
 
 def test_fewer_balls_are_proposed_where_they_serve_nearly_as_much() -> None:

@@ -14,6 +14,7 @@ from chamberopt.chamber.propose.proposed_balls import SizeFit, serving_sizes
 from chamberopt.chamber.propose.proposed_budget import Asked, Measured, propose_budget
 from chamberopt.chamber.propose.proposed_intensity import (
     AMPLITUDE_POWER,
+    INTENSITY,
     MOST_PILOTS,
     IntensityPilot,
     Setting,
@@ -191,7 +192,7 @@ def test_a_calibration_is_named_in_the_design_and_limits_the_study(
 
     made = propose_intensity(bare, wanted, intensity, lambda _: bare, simulate)
     text = made.reasons["process.intensity_mmA"]
-    assert "predicted 0.200 ± 0.010 mmA; inside with the whole interval" in text
+    assert "predicted 0.200 ± 0.010 mmA; for 0.17-0.23A, asked: 0.17-0.23A; inside with" in text
     folder = tmp_path / "proposed"
     folder.mkdir()
     (folder / "design.toml").write_text(design_text(made, folder))
@@ -278,18 +279,15 @@ def test_without_a_wish_the_expected_intensity_stands_beside_the_usual_one(
 ) -> None:
     """A plate of 8 mm of titanium, 0.006 to 0.010 in; of nickel there is no usual range."""
     made = propose(plate, Wanted("mm", shop=shop, alloy="Ti-6Al-4V"), lambda _: [])
-    assert "not resolved" in with_expected_intensity(made, None).reasons["shot.diameter_mm"]
+    assert "not known" in with_expected_intensity(made, None).reasons[INTENSITY]
     predicted = PredictedIntensity(0.31, 0.05, 1.9, 2.5)
-    told = with_expected_intensity(made, predicted).reasons["shot.diameter_mm"]
-    assert "; expected: 0.31 mmA x/÷ 2.5; 0.15-0.25A are usual for titanium of 8 mm" in told
+    told = with_expected_intensity(made, predicted).reasons[INTENSITY]
+    assert "expected: 0.31 mmA x/÷ 2.5; 0.15-0.25A are usual for titanium of 8 mm" in told
     assert "THIN" not in told
     wanted = usual_for(made)
     assert (wanted.low, wanted.high) == (0.15, 0.25)
     nickel = propose(plate, Wanted("mm", shop=shop, alloy="IN718"), lambda _: [])
-    assert (
-        "no range for nickel"
-        in with_expected_intensity(nickel, predicted).reasons["shot.diameter_mm"]
-    )
+    assert "no range for nickel" in with_expected_intensity(nickel, predicted).reasons[INTENSITY]
     with pytest.raises(InputError, match=r"--intensity: given usual, but .*nickel"):
         usual_for(nickel)
 
@@ -310,14 +308,17 @@ def test_a_usual_intensity_is_aimed_at_and_is_no_wish(plate: Path, shop: Shop) -
     assert free.design.process.intensity_mmA is None
     assert "intensity_mmA" not in free.tables["process"]
     assert setting_of(free) == setting_of(aimed) != setting_of(made)
-    told = free.reasons["sonotrode.amplitude_pv_um"]
-    assert "chosen for the intensity 0.15-0.25A, usual for titanium of 8 mm" in told
+    assert "chosen for the intensity" in free.reasons["sonotrode.amplitude_pv_um"]
+    told = free.reasons[INTENSITY]
+    assert told.startswith("predicted 0.")
+    assert "for 0.15-0.25A, usual for titanium of 8 mm" in told
+    assert f"# Almen intensity: {told}" in design_text(free, Path())
 
 
 def test_a_weak_intensity_stands_on_n_strips_too(plate: Path, shop: Shop) -> None:
     made = propose(plate, Wanted("mm", shop=shop), lambda _: [])
     told = with_expected_intensity(made, PredictedIntensity(0.06, 0.01, 0.36, 2.5))
-    assert "0.06 mmA x/÷ 2.5 (0.18 mm on N strips)" in told.reasons["shot.diameter_mm"]
+    assert "0.06 mmA x/÷ 2.5 (0.18 mm on N strips)" in told.reasons[INTENSITY]
 
 
 @pytest.mark.parametrize("metal", ["IN718", "Ti-6Al-4V"])

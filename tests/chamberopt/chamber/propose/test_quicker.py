@@ -107,7 +107,7 @@ def test_the_quicker_pose_is_taken_and_all_times_are_told(
     assert best.wanted.pose == "on-edge"
     assert best.found == measured(512.0)
     told = best.made.reasons["part.rotate_deg"]
-    for text in ("evenly exposed: 98 % after about 2000 s", "on edge on", "98 % after about 510 s"):
+    for text in ("evenly exposed 98 % after about 2000 s", "on edge on", "98 % after about 510 s"):
         assert text in told
 
 

@@ -1,0 +1,67 @@
+"""The end of `new` on a terminal."""
+
+import pytest
+import trimesh
+
+from chamberopt.chamber.propose.first_design import propose
+from chamberopt.chamber.propose.left_out import LeftOut
+from chamberopt.chamber.propose.proposal import Proposal, Wanted
+from chamberopt.documents.proposal import WIDTH, clauses, proposal_end, time_in_words
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Proposal:
+    path = tmp_path_factory.mktemp("part") / "box.stl"
+    trimesh.creation.box((20, 20, 30)).export(path)
+    return propose(path, Wanted("mm"), lambda _: [])
+
+
+def test_all_that_is_to_be_settled_is_one_list(made: Proposal) -> None:
+    """What reasons say in capitals, and what the shot meets beside the target."""
+    left_out = [LeftOut({}, "NOT MASKED: the shot also meets PIN")]
+    text = "\n".join(proposal_end(made, left_out, verbose=False))
+    told, _, settle = text.partition("\nTo be settled before it is built:\n")
+    assert "ALLOY NOT KNOWN" in settle
+    assert "NOT MEASURED" in settle
+    assert "NOT MASKED" in settle
+    assert not any(mark in told for mark in ("ALLOY NOT", "NOT MEASURED", "NOT MASKED"))
+    assert told.startswith("Peen face 1 (")
+    assert max(map(len, text.splitlines())) <= WIDTH
+
+
+def test_verbose_has_every_reason_and_every_surface(made: Proposal) -> None:
+    short, text = (
+        " ".join(" ".join(proposal_end(made, [], verbose=one)).split()) for one in (False, True)
+    )
+    for name in ("shot.diameter_mm", "chamber.length_mm", "process.accuracy.simulated_time_s"):
+        for clause in clauses(made.reasons.get(name, ""))[0]:
+            assert clause in text
+    assert made.reasons["process.accuracy.simulated_time_s"] not in short
+    for one in made.known:
+        assert f"{one.name}: {one.text}" in text
+
+
+@pytest.mark.parametrize(
+    ("reason", "why", "settle"),
+    [
+        ("", [], []),
+        ("half a layer", ["half a layer"], []),
+        ("serves all; BALLS JAM in gaps; 2 mm", ["serves all", "2 mm"], ["BALLS JAM in gaps"]),
+        ("ZERO-TO-PEAK, half", ["ZERO-TO-PEAK, half"], []),
+        ("SAE AMS 2430 says", ["SAE AMS 2430 says"], []),
+        ("LONG: turn it", [], ["LONG: turn it"]),
+    ],
+)
+def test_clauses_in_capitals_are_to_be_settled(
+    reason: str, why: list[str], settle: list[str]
+) -> None:
+    assert clauses(reason) == (why, settle)
+
+
+def test_a_time_has_the_unit_of_a_timer() -> None:
+    assert [time_in_words(one) for one in (45, 600, 5400, 14400)] == [
+        "45 s",
+        "10 min",
+        "90 min",
+        "4 h",
+    ]
