@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from chamberopt.design.shape_surface import TAG_PART, is_sonotrode
+from chamberopt.design.shape_surface import is_sonotrode
 from chamberopt.pictures.actors import add_chamber
 from chamberopt.pictures.camera import (
     cells_of,
@@ -80,7 +80,7 @@ def part_panels(
     eye, near = views
     points = np.concatenate([part.points, chamber.points])
     view = render_view(add_both, eye, points, SIZE, BORDER_OF_CHAMBER)
-    dimensions = chamber_dimensions(chamber, eye)
+    dimensions = chamber_dimensions(chamber, eye, float(part.bounds[4]))
     return [
         Panel(view, "in the chamber", dimensions, points),
         *near_panels(add, target, part, near),
@@ -103,14 +103,15 @@ def near_panels(
     ]
 
 
-def chamber_dimensions(chamber: Surface, eye: np.ndarray) -> list[Dimension]:
+def chamber_dimensions(chamber: Surface, eye: np.ndarray, lowest: float) -> list[Dimension]:
     """Return the dimensions to write at a chamber.
 
     They are the chamber's size, and the distance from the sonotrode to the part's lowest point.
 
     Args:
-        chamber: surface of the cavity; cell data "tag" tells walls, sonotrodes and part apart.
+        chamber: surface of the cavity.
         eye: direction to the eye.
+        lowest: height of the part's lowest point [mm], which may be outside the cavity.
     """
     frame = view_frame(eye)
     low, high = np.reshape(chamber.bounds, (3, 2)).T
@@ -138,14 +139,10 @@ def chamber_dimensions(chamber: Surface, eye: np.ndarray) -> list[Dimension]:
     across = feet @ frame[0]
     foot = feet[across.argmin() if left else across.argmax()]
     found.append(_upright(foot, low[2], high[2], 1))
-    part = np.asarray(chamber["tag"]) == TAG_PART
-    if part.any():
-        own = points[np.unique(np.asarray(chamber.regular_faces)[part])]
-        lowest = float(own[:, 2].min())
-        if low[2] < lowest < high[2] - 1e-6 * size[2]:
-            found.append(_upright(foot, low[2], lowest, 0))
-        else:
-            found[-1] = found[-1]._replace(row=0)
+    if low[2] < lowest < high[2] - 1e-6 * size[2]:
+        found.append(_upright(foot, low[2], lowest, 0))
+    else:
+        found[-1] = found[-1]._replace(row=0)
     return found
 
 

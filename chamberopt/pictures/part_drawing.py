@@ -277,8 +277,7 @@ def _draw_section(
         low, high = view.place([[view.low[0], 0.0], [view.high[0], 0.0]])[:, 0]
         text = _with_limits(plain(wide), wide, limits, side)
         dimension(axes, (low, y - FACE), (high, y - FACE), 8.5, text)
-    own = chamber.vertices[np.unique(chamber.triangles[chamber.tags == TAG_PART]), 2]
-    lowest = 1e3 * float(own.min())
+    lowest = 1e3 * float(chamber.part.vertices[:, 2].min())
     left, low_at = view.place([view.low[0], lowest]) - np.array([view.outside[0], 0.0])
     right = view.place(view.high)[0] + view.outside[0]
     text = _with_limits(plain(lowest), lowest, limits, "sonotrode_distance_mm")

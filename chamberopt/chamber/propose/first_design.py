@@ -5,7 +5,6 @@ Every number comes from a rule of thumb, with its reason beside it. A study then
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
@@ -23,6 +22,7 @@ from chamberopt.chamber.propose.held_proposal import (
     masked,
     only_touched,
     padded,
+    rests,
 )
 from chamberopt.chamber.propose.pose import (
     AT_SIDE,
@@ -47,7 +47,7 @@ from chamberopt.chamber.propose.proposal import (
 )
 from chamberopt.chamber.propose.proposed_arbor import Bore, find_bores, turning_bore, turning_pose
 from chamberopt.chamber.propose.proposed_balls import fit_sizes, propose_ball, sizes_to_try
-from chamberopt.chamber.propose.proposed_end import HeldEnd, held_end
+from chamberopt.chamber.propose.proposed_end import HeldEnd, bare_end, held_end, local_room
 from chamberopt.chamber.propose.proposed_floor import Floor, floor_on_sonotrode, require_room
 from chamberopt.chamber.propose.proposed_target import (
     Surface,
@@ -87,6 +87,8 @@ IRON = {
 }
 TREATMENT_S, HALF_WIDTH, MOST_REPLICAS = 300.0, 0.03, 24
 BLOCKS = "LARGER THAN ONE SONOTRODE: several side by side, driven alike"
+CUT_OUT = "plates, cut out round it, 0.2 to 0.7 mm clear"
+OWN_WALL, OWN_LID = "the part itself is the wall", f"the part itself is the lid: {CUT_OUT}"
 START = "NOT MEASURED by a pilot, a start"
 ON_END = "on end, as no sonotrode is large enough for it lying"
 
@@ -148,6 +150,12 @@ def _lying(
         turns, reason: the pose [degrees], and why.
     """
     upright = pose_by_size(mesh.vertices, mesh.triangles, target.triangles, "standing")
+    if (end := bare_end(mesh, target, upright)) is not None:
+        with suppress(InputError):
+            lying = end._replace(turns=turns)
+            made = _proposed(path, wanted, mesh, known, target, turns, reason, lying)
+            if is_firm(made) and not rests(made):
+                return made
     along = mesh.vertices @ rotation_matrix(upright)[2]
     whole = np.ptp(along[mesh.triangles[target.triangles]]) > REACHES * np.ptp(along)
     for of_any in (False, True):
@@ -411,10 +419,11 @@ def _place(
         on_target = posed[np.unique(mesh.triangles[target.triangles])]
         top, around = float(on_target[:, 2].max()), on_target if is_local else None
         sizes, shop = propose_sizes(posed, top, ball, shape, wider, around), wanted.shop
-        beyond = sizes.gap if out is None else AT_WALL * ball  # of the target, along x
-        if out is not None:
-            length = float(sizes.plan["length_mm"]) - math.floor(1e3 * (sizes.gap - beyond))
-            sizes = replace(sizes, plan={**sizes.plan, "length_mm": length})
+        room = None
+        if is_local and shape == "box":
+            at_wall = None if out is None else AT_WALL * ball
+            room = local_room(posed, mesh.triangles, target.triangles, sizes, at_wall)
+            sizes = room.sizes
         try:
             floor = floor_on_sonotrode(sizes, _round(posed), shop or usual_shop(), shop is None)
             if shop is not None:
@@ -423,11 +432,9 @@ def _place(
                     room = replace(room, through_ceiling=False, top=highest)
                 floor = floor._replace(sizes=room)
             if is_local:
-                x, y = 1e3 * (middle_in_plan(posed) - middle_in_plan(on_target))
-                if out is not None:
-                    free = 1e-3 * float(floor.sizes.plan["length_mm"]) - np.ptp(on_target[:, 0])
-                    x += 1e3 * (0.5 * free - beyond)
-                floor = floor._replace(offset_mm=(round(float(x), 1), round(float(y), 1)))
+                middle = middle_in_plan(on_target) if room is None else room.middle(floor.sizes)
+                x, y = np.round(1e3 * (middle_in_plan(posed) - middle), 2) + 0.0
+                floor = floor._replace(offset_mm=(float(x), float(y)))
         except InputError as error:
             refused = refused or error
             continue
@@ -487,6 +494,9 @@ def _floor_reasons(floor: Floor, is_local: bool, goes_out: bool) -> dict[str, st
     first = next(key for key in sizes.plan if key.endswith("_mm"))
     where = "; the part goes out through it" if sizes.through_ceiling else ""
     beside = "target, and the part goes out through the walls" if is_local else "part"
+    where += "; " + OWN_LID if "z" in sizes.closed else ""
+    if sides := [one for one in sizes.closed if one != "z"]:
+        beside += f"; {OWN_WALL} at {' and '.join(sides)}: {CUT_OUT}"
     placed = "the target ends near the wall" if goes_out else "the target in the middle"
     key, _ = one.amplitude_nearest(AMPLITUDE_UM)
     kind = (

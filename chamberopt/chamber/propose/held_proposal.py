@@ -100,32 +100,28 @@ def is_firm(made: Proposal) -> bool:
     return holder is not None and (holder.kind in ("arbor", "bore") or holder.grip_mm is not None)
 
 
+def rests(made: Proposal) -> bool:
+    """Return whether balls would come to rest on the part."""
+    return any("come to rest on the part" in text for text in made.warnings)
+
+
 def padded(made: Proposal, floor: Floor, target: Target, shop: Shop | None) -> Proposal:
     """Return a proposal with a pad on the level top of a part on which balls would come to rest.
 
-    The pad goes up to the ceiling. The part is screwed to it, so that a holder which stands on a
-    face is left out. Where a pad would do harm, the proposal stays as it is.
+    The pad goes up to the ceiling. It holds nothing: a part without a holder gets none. Where a pad
+    would do harm, the proposal stays as it is.
     """
-    rests = any("come to rest on the part" in text for text in made.warnings)
-    if "mask" in made.tables or not rests:
+    if "mask" in made.tables or "holder" not in made.tables or not rests(made):
         return made
     diameter, turns = made.design.shot.diameter, made.design.part.rotate_deg
-    bare = {name: one for name, one in made.tables.items() if name != "holder"}
-    choices = [made.tables] if hangs_by_a_face(made) else [bare, made.tables]
-    if is_firm(made):
-        choices.reverse()
     for at in pads(made.mesh, target.triangles, turns, diameter):
-        for tables in choices:
-            own = _with_mask(tables, {"axis": [0.0, 0.0, 1.0], "at": at})
-            text = "a pad on the level top, up to the ceiling: no ball lies there"
-            text += "" if "holder" in own else "; screw it on"
-            height = "sonotrode to ceiling; a pad on the part's top goes on to it"
-            reasons = {**made.reasons, "mask.axis": text, "chamber.height_mm": height}
-            if "holder" not in own:
-                reasons.pop("holder.kind", None)
-            other, _ = _harmless(own, reasons, floor, made, shop)
-            if other and not other.chamber.pieces_in_air and faults(other) < faults(made):
-                return other
+        tables = _with_mask(made.tables, {"axis": [0.0, 0.0, 1.0], "at": at})
+        text = "a pad on the level top, up to the ceiling: no ball lies there"
+        height = "sonotrode to ceiling; a pad on the part's top goes on to it"
+        reasons = {**made.reasons, "mask.axis": text, "chamber.height_mm": height}
+        other, _ = _harmless(tables, reasons, floor, made, shop)
+        if other and not other.chamber.pieces_in_air and faults(other) < faults(made):
+            return other
     return made
 
 

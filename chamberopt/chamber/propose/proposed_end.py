@@ -1,21 +1,34 @@
-"""Leave an end of a part out of its target, to hold it there, where all of it would be peened.
+"""Find the end by which a part is held outside its chamber, and the faces that close the chamber.
 
 A part without names and without sharp edges, such as a scan or an implant, has one face. Its target
-is all of it, and no fixture could hold it. The broad sides of a leaf spring reach both of its ends.
+is all of it, and no fixture could hold it: an end of it is left out. The broad sides of a leaf
+spring reach both of its ends. The root of a blade is such an end already.
+
+A flat face of the part that ends the target is a wall of the chamber: a platform, a base plate, the
+webs of a crank. The wall that is built goes round that face, a little behind it.
+
+                 |  | wall, behind the face
+      target     |__|
+    =============|  root, clamped outside
+                 |__|
+                 |  |
 """
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
+from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from chamberopt.chamber.propose.pose import Turns, turns_down
-from chamberopt.chamber.propose.proposed_target import Target
+from chamberopt.chamber.propose.proposed_target import Sizes, Target
 from chamberopt.design.shapes.outlines import area_inside
 from chamberopt.geometry.meshes.part_mesh import PartMesh
 from chamberopt.geometry.outline import convex_hull
-from chamberopt.geometry.triangles import areas, rotation_matrix, sides_of
+from chamberopt.geometry.triangles import area_vectors, areas, rotation_matrix, sides_of
 
 NEARLY_ALL = 0.95  # share of the part's area from which on its target is all of it
 END, LONG_END = 0.15, 0.25  # length of the end over the part's, the latter if no end is straight
@@ -24,6 +37,16 @@ ALIKE = 0.05  # difference of that from which on it decides which end is held
 UPRIGHT = 0.999  # cosine from which on an axis of the part's file is one of the chamber's
 SLIMMER = 0.8  # area of the lower end over the upper one's, below which the part is turned over
 MARGIN_MM = 1.0  # of boxes round the part
+# Of an end that is clamped outside: length over its width, or [m], the shorter one, and what of it
+# may stand in the chamber [m]. It is straight as far as it is wider than STRAIGHT of its width;
+# jaws have the form of a root, which is wider than ROOT of it.
+CLAMPED, LONG_ENOUGH, INSIDE, ROOT = 0.75, 10e-3, 6e-3, 0.5
+# Of a face that closes a chamber: cosine, share of the rectangle round the target, and how far it
+# may lie before the target's end [m]. The wall is that far behind it [m].
+FACING, CLOSES, BEFORE, BEHIND = 0.999, 0.5, 1e-5, 0.2e-3
+# What of the part stands outside such walls may come nearer to the sonotrode: share of the distance
+# that is left. It may stand into the chamber by [m].
+NEAREST, INTO = 0.25, 0.5e-3
 
 
 class HeldEnd(NamedTuple):
@@ -89,6 +112,139 @@ def held_end(mesh: PartMesh, target: Target, turns: Turns, of_any: bool = False)
     left = Target(keys, target.triangles & ~of_end, reason)
     points = np.eye(3)[axis] * (1.0 if is_top else -1.0)
     return HeldEnd(left, turns, points, {"box_mm": box_beyond(mesh, axis, is_top, cut)}, of_end)
+
+
+def bare_end(mesh: PartMesh, target: Target, turns: Turns) -> HeldEnd | None:
+    """Return the longer end of a part that its target does not reach, if a clamp holds it outside.
+
+    Args:
+        turns: a pose in which the axis of the part's file along which the ends point is upright.
+    """
+    up = rotation_matrix(turns)[2]
+    axis = int(np.abs(up).argmax())
+    own = mesh.vertices[:, axis]
+    on_target = own[np.unique(mesh.triangles[target.triangles])]
+    is_top = own.max() - on_target.max() > on_target.min() - own.min()
+    way = 1.0 if is_top else -1.0
+    cut = float((way * on_target).max()) + INSIDE
+    if abs(up[axis]) < UPRIGHT or not can_be_clamped(mesh, way * np.eye(3)[axis], cut, ROOT):
+        return None
+    of_end = (way * own[mesh.triangles]).min(axis=1) > cut
+    return HeldEnd(target, turns, way * np.eye(3)[axis], {}, of_end)
+
+
+def can_be_clamped(
+    mesh: PartMesh, axis: np.ndarray, cut: float, straight: float = STRAIGHT
+) -> bool:
+    """Return whether what of a part lies beyond a cut is long and straight enough for a clamp.
+
+    Args:
+        axis: unit vector along which the end points, (3,), an axis of the file.
+        cut: place of the cut along it [m].
+        straight: least width where the clamp ends, over that at the cut.
+    """
+    places, of_file = mesh.vertices @ axis, int(np.abs(axis).argmax())
+    beyond = float(places.max()) - cut
+    if beyond <= 0.0:
+        return False
+    width = _width(mesh, places, cut, of_file)
+    needed = min(CLAMPED * width, LONG_ENOUGH)
+    return needed < beyond and _width(mesh, places, cut + needed, of_file) > straight * width > 0.0
+
+
+def closing_faces(
+    posed: np.ndarray, triangles: np.ndarray, target: np.ndarray, beyond: float
+) -> np.ndarray:
+    """Return where flat faces of a part end its target along -x and -y, and x, y and z, (2, 3) [m].
+
+    They are a platform, a base plate or the webs of a crank, which close a chamber round the target
+    there. It is nan where there is none, and below.
+
+    Args:
+        posed: vertices of the part in its pose [m], (n, 3).
+        triangles: its triangles, (m, 3).
+        target: marks the triangles of the target, (m,).
+        beyond: how far from the target such a face may be [m].
+    """
+    vectors, corners = area_vectors(posed, triangles), posed[triangles]
+    area, found = np.linalg.norm(vectors, axis=1), np.full((2, 3), np.nan)
+    sides = np.ptp(corners[target].reshape(-1, 3), axis=0)
+    for k, way in [*product(range(2), (-1.0, 1.0)), (2, 1.0)]:
+        places = way * corners[..., k]
+        end = float(places[target].max())
+        inward = ~target & (way * vectors[:, k] < -FACING * area)
+        inward &= (places.min(axis=1) > end - BEFORE) & (places.max(axis=1) < end + beyond)
+        if not inward.any():
+            continue
+        place = float(places[inward].min())
+        level = inward & (places.max(axis=1) < place + BEFORE)
+        if area[level].sum() > CLOSES * np.delete(sides, k).prod():
+            found[int(way > 0.0), k] = way * place
+    return found
+
+
+class LocalRoom(NamedTuple):
+    """A box round a target, out of which the part goes through the walls."""
+
+    sizes: Sizes
+    walls: np.ndarray  # places of its walls along -x and -y, and along x and y, in the pose [m]
+    kept: np.ndarray  # marks those that stay there if the box becomes longer or shorter, (2, 2)
+
+    def middle(self, sizes: Sizes) -> np.ndarray:
+        """Return the middle in plan (2,) [m] of the box if it gets other sizes."""
+        lengths = 1e-3 * np.array([sizes.plan["length_mm"], sizes.plan["width_mm"]], dtype=float)
+        longer = 0.5 * (lengths - np.ptp(self.walls, axis=0))
+        return self.walls.mean(axis=0) + (self.kept[0] * 1.0 - self.kept[1]) * longer
+
+
+def local_room(
+    posed: np.ndarray,
+    triangles: np.ndarray,
+    target: np.ndarray,
+    sizes: Sizes,
+    at_wall: float | None,
+) -> LocalRoom:
+    """Return the box round a target that ends where faces of the part are its walls.
+
+    Args:
+        posed, triangles, target: as of closing_faces.
+        sizes: those of a box with the usual room beside and above the target.
+        at_wall: distance from the target of the wall through which an end goes out along x [m].
+    """
+    on_target = posed[np.unique(triangles[target])]
+    faces = closing_faces(posed, triangles, target, sizes.gap) + BEHIND * np.array([[-1.0], [1.0]])
+    walls = np.array([on_target.min(axis=0) - sizes.gap, on_target.max(axis=0) + sizes.gap])
+    if at_wall is not None:
+        walls[1, 0] += at_wall - sizes.gap
+    closes = np.isfinite(faces)
+    walls, kept = np.where(closes, faces, walls)[:, :2], closes[:, :2].copy()
+    kept[1, 0] |= at_wall is not None
+    plan = {
+        key: _up_half_mm(high - low) if stays else sizes.plan[key]
+        for key, low, high, stays in zip(
+            ("length_mm", "width_mm"), *walls, kept.any(axis=0), strict=True
+        )
+    }
+    names = np.array([["-x", "-y", "-z"], ["x", "y", "z"]])
+    within = (np.abs(posed[:, :2] - walls.mean(axis=0)) < 0.5 * np.ptp(walls, axis=0) - INTO).all(1)
+    lower = min(float(posed[within, 2].min(initial=math.inf)), (1.0 - NEAREST) * sizes.distance)
+    sizes = replace(
+        sizes,
+        plan=plan,
+        closed=tuple(map(str, names[closes])),
+        distance=1e-3 * math.ceil(1e3 * (sizes.distance - lower) - 1e-6),
+        height=1e-3 * math.ceil(1e3 * (sizes.height - lower) - 1e-6),
+    )
+    if closes[1, 2]:
+        height = 1e-3 * _up_half_mm(sizes.distance + faces[1, 2])
+        lid = {"height": height, "through_ceiling": True, "top": float(faces[1, 2] - BEHIND)}
+        sizes = replace(sizes, **lid)
+    return LocalRoom(sizes, walls, kept)
+
+
+def _up_half_mm(length: float) -> float:
+    """Return a length given in m in half millimetres, rounded up."""
+    return 0.5 * math.ceil(2e3 * length - 1e-6)
 
 
 def box_beyond(mesh: PartMesh, axis: int, is_top: bool, cut: float) -> list[list[float]]:

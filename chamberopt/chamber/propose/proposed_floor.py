@@ -84,7 +84,8 @@ def floor_on_sonotrode(sizes: Sizes, round_part: float, shop: Shop, may_exceed: 
     if held := [one for move, one in moves if move <= HELD]:
         return _over_the_face(sizes, shop, min(held, key=lambda one: one.area_mm2))
     move, face = min(moves, key=lambda one: one[0])
-    tighter = 0.0 if sizes.shape == "conformal" else (1.0 - TIGHTER) * sizes.gap
+    is_given = sizes.shape == "conformal" or sizes.is_fixed
+    tighter = 0.0 if is_given else (1.0 - TIGHTER) * sizes.gap
     if move <= tighter:
         return _over_the_face(_tight(sizes, move, face), shop, face)
     far = min(
@@ -93,7 +94,7 @@ def floor_on_sonotrode(sizes: Sizes, round_part: float, shop: Shop, may_exceed: 
     far = 1e-3 * math.ceil(1e3 * far - 1e-6)
     angle = math.degrees(math.atan(move / far))
     rise = (sizes.height + far - sizes.distance) * move / far
-    if sizes.shape != "conformal" and angle <= STEEPEST + 0.5 and rise <= WIDEST:
+    if not is_given and angle <= STEEPEST + 0.5 and rise <= WIDEST:
         height = sizes.height + far - sizes.distance
         return _leaning(replace(sizes, distance=far, height=height), move, angle, face)
     floors = [(one.area_mm2, _move(sizes, round_part, one), one) for one in shop.floors_of_blocks()]
@@ -193,7 +194,11 @@ def _over_the_face(sizes: Sizes, shop: Shop, face: Face) -> Floor:
         plan = {"diameter_mm": face.sides_mm[0]}
     is_disc = face.sonotrode.size_mm is None
     alike = (sizes.shape, is_disc) in (("cylinder", True), ("box", False))
-    if alike and all(plan[key] <= WHOLE * float(sizes.plan[key]) for key in plan):
+    if (
+        alike
+        and not sizes.is_fixed
+        and all(plan[key] <= WHOLE * float(sizes.plan[key]) for key in plan)
+    ):
         more = min(plan[key] - float(sizes.plan[key]) for key in plan)
         wider = replace(sizes, plan={**sizes.plan, **plan}, gap=sizes.gap + 5e-4 * more)
         return Floor(wider, face, f"the face of {face.in_words}, the wall round it {clear}")

@@ -42,6 +42,12 @@ class Sizes:
     gap: float  # part to side wall [m]
     through_ceiling: bool  # true if the part goes out through the ceiling
     top: float  # height over the part's lowest point that must be below the ceiling [m]
+    closed: tuple[str, ...] = ()  # sides at which a face of the part is the wall, such as "-x"
+
+    @property
+    def is_fixed(self) -> bool:
+        """Whether faces of the part are walls on two opposite sides, so that its plan is fixed."""
+        return any({axis, f"-{axis}"} <= {*self.closed} for axis in "xy")
 
     def lengths_mm(self) -> dict[str, float]:
         """Return the lengths of these sizes by their keys of [chamber]."""
