@@ -47,7 +47,13 @@ from chamberopt.chamber.propose.proposal import (
 )
 from chamberopt.chamber.propose.proposed_arbor import Bore, find_bores, turning_bore, turning_pose
 from chamberopt.chamber.propose.proposed_balls import fit_sizes, propose_ball, sizes_to_try
-from chamberopt.chamber.propose.proposed_end import HeldEnd, bare_end, held_end, local_room
+from chamberopt.chamber.propose.proposed_end import (
+    HeldEnd,
+    bare_end,
+    can_be_clamped,
+    held_end,
+    local_room,
+)
 from chamberopt.chamber.propose.proposed_floor import Floor, floor_on_sonotrode, require_room
 from chamberopt.chamber.propose.proposed_target import (
     Surface,
@@ -419,6 +425,13 @@ def _place(
         on_target = posed[np.unique(mesh.triangles[target.triangles])]
         top, around = float(on_target[:, 2].max()), on_target if is_local else None
         sizes, shop = propose_sizes(posed, top, ball, shape, wider, around), wanted.shop
+        out_at = sizes.height - sizes.distance
+        if (
+            sizes.through_ceiling
+            and not is_local
+            and not can_be_clamped(posed, mesh.triangles, 2, out_at)
+        ):  # a higher ceiling takes in the whole part
+            sizes = propose_sizes(posed, float(posed[:, 2].max()), ball, shape, wider)
         room = None
         if is_local and shape == "box":
             at_wall = None if out is None else AT_WALL * ball

@@ -83,7 +83,8 @@ def held_end(mesh: PartMesh, target: Target, turns: Turns, of_any: bool = False)
         """Width of an end near its tip over that where it begins, from 0 to 1."""
         tip = float((way * places).max())
         near, far = (
-            _width(mesh, way * places, tip - part * share * length, axis) for part in (TIP, 1.0)
+            _width(mesh.vertices, mesh.triangles, way * places, tip - part * share * length, axis)
+            for part in (TIP, 1.0)
         )
         return min(near / far, 1.0) if far > 0.0 else 0.0
 
@@ -127,29 +128,32 @@ def bare_end(mesh: PartMesh, target: Target, turns: Turns) -> HeldEnd | None:
     is_top = own.max() - on_target.max() > on_target.min() - own.min()
     way = 1.0 if is_top else -1.0
     cut = float((way * on_target).max()) + INSIDE
-    if abs(up[axis]) < UPRIGHT or not can_be_clamped(mesh, way * np.eye(3)[axis], cut, ROOT):
+    if abs(up[axis]) < UPRIGHT or not can_be_clamped(
+        way * mesh.vertices, mesh.triangles, axis, cut, ROOT
+    ):
         return None
     of_end = (way * own[mesh.triangles]).min(axis=1) > cut
     return HeldEnd(target, turns, way * np.eye(3)[axis], {}, of_end)
 
 
 def can_be_clamped(
-    mesh: PartMesh, axis: np.ndarray, cut: float, straight: float = STRAIGHT
+    vertices: np.ndarray, triangles: np.ndarray, axis: int, cut: float, straight: float = STRAIGHT
 ) -> bool:
     """Return whether what of a part lies beyond a cut is long and straight enough for a clamp.
 
     Args:
-        axis: unit vector along which the end points, (3,), an axis of the file.
+        vertices, triangles: those of the part, (n, 3) [m] and (m, 3).
+        axis: the axis along which the end points.
         cut: place of the cut along it [m].
         straight: least width where the clamp ends, over that at the cut.
     """
-    places, of_file = mesh.vertices @ axis, int(np.abs(axis).argmax())
-    beyond = float(places.max()) - cut
-    if beyond <= 0.0:
+    places = vertices[:, axis]
+    if places.max() <= cut:
         return False
-    width = _width(mesh, places, cut, of_file)
+    width = _width(vertices, triangles, places, cut, axis)
     needed = min(CLAMPED * width, LONG_ENOUGH)
-    return needed < beyond and _width(mesh, places, cut + needed, of_file) > straight * width > 0.0
+    end = _width(vertices, triangles, places, cut + needed, axis)
+    return bool(places.max() > cut + needed and end > straight * width > 0.0)
 
 
 def closing_faces(
@@ -261,16 +265,19 @@ def box_beyond(mesh: PartMesh, axis: int, is_top: bool, cut: float) -> list[list
     return [[float(x) for x in corner] for corner in np.round(box, 3)]
 
 
-def _width(mesh: PartMesh, places: np.ndarray, at: float, axis: int) -> float:
-    """Return the width [m] of the section of a part in a plane across an axis of its file.
+def _width(
+    vertices: np.ndarray, triangles: np.ndarray, places: np.ndarray, at: float, axis: int
+) -> float:
+    """Return the width [m] of the section of a part in a plane across an axis.
 
     Args:
+        vertices, triangles: those of the part, (n, 3) [m] and (m, 3).
         places: place of each vertex along the axis [m], (n,).
         at: place of the plane [m].
     """
-    one, two = sides_of(mesh.triangles).T
+    one, two = sides_of(triangles).T
     cut = (places[one] < at) & (places[two] >= at)
     one, two = one[cut], two[cut]
     share = ((at - places[one]) / (places[two] - places[one]))[:, None]
-    points = mesh.vertices[one] + share * (mesh.vertices[two] - mesh.vertices[one])
+    points = vertices[one] + share * (vertices[two] - vertices[one])
     return float(np.ptp(np.delete(points, axis, axis=1), axis=0).min()) if len(points) else 0.0

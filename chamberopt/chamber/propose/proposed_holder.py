@@ -46,7 +46,11 @@ CLEAR = 2.0  # ball diameters between a holder and the target, so that balls get
 # its width; most length over the part's.
 WIDER, SHORTEST, LONGEST = 2.0, 0.25, 0.4
 # An end narrows if its outer TIP, a share of the grip, is slimmer than STRAIGHT of the whole grip.
-TIP, STRAIGHT = 0.25, 0.8
+TIP, STRAIGHT = 0.1, 0.8
+POTTED = (
+    "IT NARROWS TO ITS TIP: cast it into the block with polyurethane or an alloy that melts at "
+    "70 °C, or give jaws its form"
+)
 WALL = 2e-3  # m: of a collar or block round an end
 THINNEST, SLIM = 2e-3, 0.15  # of a rod: m, and over the part's width: slim ones come last
 # Over the radius of a face: least seat of a rod round a hole in it, and least edge beside a target.
@@ -332,7 +336,7 @@ def _around_end(seen: _Seen) -> HolderChoice | None:
     beyond = plain(1e3 * (level - grip - target_top), 2)
     text = f"round the end that points {seen.where}, which is not peened; the target begins"
     if (tip < STRAIGHT * needed).any():
-        beyond += " mm beyond it; IT NARROWS TO ITS TIP: jaws of its form, or potted"
+        beyond += f" mm beyond it; {POTTED}"
     else:
         beyond += " mm beyond it"
     keys = {"kind": "collar" if is_round else "plate", **size, "grip_mm": round(1e3 * grip, 1)}

@@ -1,0 +1,132 @@
+"""Ends that a clamp holds outside, and faces of a part that close its chamber."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from manifold3d import Manifold
+
+from chamberopt.chamber.propose.first_design import propose
+from chamberopt.chamber.propose.proposal import Wanted
+from chamberopt.chamber.propose.proposed_end import (
+    bare_end,
+    can_be_clamped,
+    closing_faces,
+    local_room,
+)
+from chamberopt.chamber.propose.proposed_target import Target, propose_sizes
+from tests.chamberopt.chamber.propose.test_proposed_arbor import drum, part_of
+
+UPRIGHT = (0.0, 0.0, 0.0)
+WEB = 6.0  # thickness [mm]
+
+
+def crank(apart: float, web: float = 60.0) -> Manifold:
+    """Two square webs [mm] with a pin of 16 mm across between them, along z, about its middle."""
+    plate = Manifold.cube((web, web, WEB)).translate([-0.5 * web, -0.5 * web, 0.5 * apart])
+    return (
+        drum(8, apart + 0.1).translate([0, 0, -0.5 * apart - 0.05])
+        + plate
+        + plate.mirror((0, 0, 1))
+    )
+
+
+@pytest.mark.parametrize("apart", [12.0, 20.0])
+def test_webs_close_a_chamber_where_the_target_ends(apart: float) -> None:
+    mesh, body = part_of(crank(apart))
+    radius = np.linalg.norm(body.triangles_center[:, :2], axis=1)
+    pin = (radius < 8.01) & (np.abs(body.face_normals[:, 2]) < 0.1)
+    found = closing_faces(mesh.vertices, mesh.triangles, pin, 2e-3)
+    assert 1e3 * found[1, 2] == pytest.approx(0.5 * apart)
+    assert np.isnan(found[:, :2]).all()
+    lying = mesh.vertices[:, [0, 2, 1]] * [1, -1, 1]  # the pin along y
+    found = closing_faces(lying, mesh.triangles, pin, 2e-3)
+    assert 1e3 * found[:, 1] == pytest.approx([-0.5 * apart, 0.5 * apart])
+    assert np.isnan(found[:, [0, 2]]).all()
+    sizes = propose_sizes(lying, 8e-3, 1e-3, "box", 1.0, lying[np.unique(mesh.triangles[pin])])
+    room = local_room(lying, mesh.triangles, pin, sizes, None)
+    assert room.sizes.closed == ("-y", "y")
+    assert room.sizes.is_fixed
+    assert apart + 0.4 <= room.sizes.plan["width_mm"] < apart + 0.9
+    assert 1e3 * room.middle(room.sizes) == pytest.approx([0.0, 0.0], abs=1e-6)
+    # The webs reach 22 mm below the pin: they may come nearer to the sonotrode than it.
+    assert room.sizes.distance < sizes.distance
+    assert room.sizes.height - room.sizes.distance == pytest.approx(sizes.height - sizes.distance)
+
+
+def test_small_or_far_faces_close_no_chamber() -> None:
+    for web, far in ((60.0, 0.0), (17.0, 0.0), (60.0, 5.0)):
+        mesh, body = part_of(crank(20.0, web))
+        body = trimesh.Trimesh(1e3 * mesh.vertices, mesh.triangles, process=False)
+        pin = np.linalg.norm(body.triangles_center[:, :2], axis=1) < 8.01
+        pin &= np.abs(body.face_normals[:, 2]) < 0.1
+        raised = mesh.vertices.copy()  # webs away from the pin's end, which is the target's
+        moved = np.unique(mesh.triangles[~pin])
+        raised[moved, 2] += 1e-3 * far * np.sign(raised[moved, 2])
+        shared = np.unique(mesh.triangles[pin])
+        raised[shared] = mesh.vertices[shared]
+        is_wall = np.isfinite(closing_faces(raised, mesh.triangles, pin, 2e-3)[1, 2])
+        assert is_wall == (web == 60.0 and far == 0.0)
+
+
+def test_a_wall_at_a_face_stays_there_as_the_floor_grows() -> None:
+    """A blade on a platform of 30 x 30 mm, which is its wall along x."""
+    blade = Manifold.cube((40, 3, 20)).translate([-40, -1.5, -10])
+    mesh, body = part_of(blade + Manifold.cube((15, 30, 30)).translate([0, -15, -15]))
+    target = body.triangles_center[:, 0] < 0.0
+    around = mesh.vertices[np.unique(mesh.triangles[target])]
+    sizes = propose_sizes(mesh.vertices, 10e-3, 1e-3, "box", 1.0, around)
+    room = local_room(mesh.vertices, mesh.triangles, target, sizes, 2e-3)
+    assert room.sizes.closed == ("x",)
+    assert not room.sizes.is_fixed
+    for longer in (0.0, 7.0, -3.0):
+        plan = {**room.sizes.plan, "length_mm": room.sizes.plan["length_mm"] + longer}
+        other = propose_sizes(mesh.vertices, 10e-3, 1e-3, "box")
+        middle = room.middle(type(other)("box", plan, 0.0, 0.0, 0.0, False, 0.0))
+        assert 1e3 * middle[0] + 0.5 * plan["length_mm"] == pytest.approx(0.2)
+        assert middle[1] == pytest.approx(0.0, abs=1e-9)
+
+
+def test_a_straight_end_is_clamped_and_a_dome_is_not() -> None:
+    """A rod of 12 mm whose end is flat, or a half ball: 9 mm of it must be straight."""
+    for length, dome, holds in ((9.5, 0, True), (8.5, 0, False), (9.5, 6, False), (16, 6, True)):
+        body = drum(6, 30 + length - dome)
+        if dome:
+            body += Manifold.sphere(6, circular_segments=64).translate([0, 0, 30 + length - dome])
+        mesh, _ = part_of(body)
+        assert can_be_clamped(mesh.vertices, mesh.triangles, 2, 30e-3) == holds
+
+
+@pytest.mark.parametrize(("long", "holds"), [(10.0, False), (17.0, True)])
+def test_a_root_beside_the_target_is_an_end_to_hold(long: float, holds: bool) -> None:
+    root = Manifold.cube((40, 20, long)).translate([-20, -10, -long])
+    mesh, body = part_of(root + Manifold.cube((36, 3, 60)).translate([-18, -1.5, 0]))
+    target = body.triangles_center[:, 2] > 0.0
+    end = bare_end(mesh, Target({}, target, ""), UPRIGHT)
+    assert (end is not None) == holds
+    if end is not None:
+        assert end.axis.tolist() == [0.0, 0.0, -1.0]
+        assert (end.target.triangles == target).all()
+        assert not (end.triangles & target).any()
+
+
+def test_a_blade_on_edge_goes_out_by_its_root(tmp_path: Path) -> None:
+    """Its platform is the wall: no level top stays in the chamber, and one sonotrode does."""
+    root = Manifold.cube((40, 20, 17)).translate([-20, -10, -17])
+    _, body = part_of(root + drum(18, 60).scale([1, 0.1, 1]))
+    lines = [f"v {x} {y} {z}" for x, y, z in body.vertices]
+    for name, of_name in (("ROOT", False), ("BLADE", True)):
+        rows = body.faces[(body.triangles_center[:, 2] > 0.0) == of_name] + 1
+        lines += [f"g {name}", *(f"f {a} {b} {c}" for a, b, c in rows)]
+    part = tmp_path / "blade.obj"
+    part.write_text("\n".join(lines) + "\n")
+    made = propose(part, Wanted("mm", pose="on-edge"), lambda _: [])
+    assert made.design.holder is not None
+    assert made.design.holder.kind == "bore"
+    assert made.design.mask is None
+    assert not made.chamber.pieces_in_air
+    assert not any("rest on the part" in text for text in made.warnings)
+    inside = made.chamber.exposed_area > 0.0
+    assert inside[made.chamber.part.target].all()
+    assert "the part itself is the wall" in made.reasons["chamber.length_mm"]
