@@ -67,6 +67,9 @@ def held(
         tables = _with_table(free.tables, "sonotrode", "holder", one.keys)
         height = "sonotrode to ceiling; what holds the part goes on to the wall"
         reasons = {**free.reasons, "holder.kind": one.reason, "chamber.height_mm": height}
+        if one.pins:
+            tables = _with_mask(tables, {"plugs": True, "at": {"faces": list(one.pins)}})
+            reasons["mask.plugs"] = "the pins that hold it fill these holes, flush with their rims"
         made, harm = _harmless(tables, reasons, floor, free, shop, one.keys["kind"])
         if made is not None:
             return made
@@ -133,7 +136,7 @@ def masked(bare: Proposal, floor: Floor, bores: Sequence[Bore], shop: Shop | Non
     """
     names = to_be_masked(bare.design, bare.chamber, bare.known)
     holes = to_be_plugged(bare.design, bare.chamber, bores, names)
-    if not (names or holes) or bare.design.effects.part_turn is not None:
+    if "mask" in bare.tables or not (names or holes) or bare.design.effects.part_turn is not None:
         return bare
     if holes and are_holes(bare.mesh, bare.known, names, holes):
         sizes = ", ".join(f"{2e3 * one.radius:.3g}" for one in holes)

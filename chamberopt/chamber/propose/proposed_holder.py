@@ -47,6 +47,7 @@ CLEAR = 2.0  # ball diameters between a holder and the target, so that balls get
 WIDER, SHORTEST, LONGEST = 2.0, 0.25, 0.4
 # An end narrows if its outer TIP, a share of the grip, is slimmer than STRAIGHT of the whole grip.
 TIP, STRAIGHT = 0.1, 0.8
+PINS = "expanding pins, drawn from behind, in its"
 POTTED = (
     "IT NARROWS TO ITS TIP: cast it into the block with polyurethane or an alloy that melts at "
     "70 °C, or give jaws its form"
@@ -66,6 +67,7 @@ class HolderChoice(NamedTuple):
 
     keys: dict[str, Any]
     reason: str
+    pins: tuple[dict[str, Any], ...] = ()  # entries of `faces`: walls of holes that pins fill
 
     @property
     def is_round_an_end(self) -> bool:
@@ -194,7 +196,9 @@ def _on_flat_faces(
         for made in (_around_end(seen), on_face):
             if made is not None:
                 bolts = [] if made.is_round_an_end else _bolts(seen, made, holes)
-                choice = HolderChoice({**made.keys, **at}, f"{made.reason}{_in_words(bolts)}")
+                reason = f"{made.reason}{_in_words(bolts)}"
+                pins = tuple(one.wall for one in bolts if one.is_in_target)
+                choice = HolderChoice({**made.keys, **at}, reason, pins)
                 yield _OnFace(choice, axis, float(round(1e3 * seen.level)))
 
 
@@ -203,6 +207,8 @@ class _Hole(NamedTuple):
 
     middle: np.ndarray  # (2,) [m]
     radius: float  # [m]
+    wall: dict[str, Any]  # as an entry of `faces`
+    is_in_target: bool  # whether it opens in the target too, on which no head may lie
 
 
 def _holes(
@@ -220,7 +226,8 @@ def _holes(
         across = np.abs(walls @ axis).sum() < ALONG * np.linalg.norm(walls, axis=1).sum()
         corners = seen.corners[bore.triangles].reshape(-1, 3)
         if across and corners[:, 2].max() > seen.level - HIGHER:
-            found.append(_Hole(*fitted_circle(corners[:, :2])))
+            rim = np.isin(triangles[seen.target], triangles[bore.triangles]).any()
+            found.append(_Hole(*fitted_circle(corners[:, :2]), bore.wall, bool(rim)))
     return found
 
 
@@ -235,11 +242,16 @@ def _bolts(seen: _Seen, holder: HolderChoice, holes: Sequence[_Hole]) -> list[_H
 
 
 def _in_words(bolts: Sequence[_Hole]) -> str:
-    """Return words for bolts that hold a rod or block; empty if there are none."""
-    if not bolts:
-        return ""
-    sizes = ", ".join(plain(2e3 * one.radius, 3) for one in bolts)
-    return f"; bolts through its hole{'s' if len(bolts) > 1 else ''} of {sizes} mm hold it"
+    """Return words for bolts or pins that hold a rod or block; empty if there are none."""
+    words = ""
+    for is_in_target, what in ((False, "bolts through its"), (True, PINS)):
+        sizes = [plain(2e3 * one.radius, 3) for one in bolts if one.is_in_target == is_in_target]
+        if sizes:
+            words += (
+                f"; {what} hole{'s' if len(sizes) > 1 else ''} of {', '.join(sizes)} mm hold it"
+            )
+            words += ", flush with the target: no heads lie on it" if is_in_target else ""
+    return words
 
 
 def _jaw(

@@ -44,6 +44,29 @@ def ring(outer: float, inner: float, height: float) -> Manifold:
     return drum(outer, height) - drum(inner, 3 * height).translate([0, 0, -height])
 
 
+@pytest.mark.parametrize("reaches", [False, True])
+def test_no_head_of_a_bolt_lies_on_the_target(reaches: bool) -> None:
+    """Of a plate with two holes that open in its lower face, which is the target or half of it."""
+    plate = Manifold.cube((100, 40, 8)).translate([-50, -20, 0])
+    plate += Manifold.cube((50, 40, 1)).translate([0, -20, -1])  # half of it is thicker
+    for x in (-20, 20):
+        plate -= drum(5, 30).translate([x, 0, -10])
+    mesh, body = part_of(plate)
+    target = body.face_normals[:, 2] < -0.5
+    target &= reaches | (body.triangles_center[:, 2] > -0.5)
+    holes = find_bores(mesh, target)
+    assert len(holes) == 2
+    for one in holder_choices(mesh, target, (0.0, 0.0, 0.0), BALL, holes):
+        if "hole" in one.reason:
+            break
+    assert one.keys["kind"] == "plate"
+    in_target = [hole.wall for hole in holes if reaches or hole.point[0] < 0.0]
+    assert [*one.pins] == in_target
+    assert ("bolts through its hole of 10 mm hold it" in one.reason) != reaches
+    count = "holes of 10, 10" if reaches else "hole of 10"
+    assert f"expanding pins, drawn from behind, in its {count} mm hold it, flush" in one.reason
+
+
 def test_bores_are_round_free_and_go_through() -> None:
     """Of a plate: a hole of 8 mm counts; a blind, a square, a thin and a blocked one do not."""
     plate = Manifold.cube((120, 40, 10))
