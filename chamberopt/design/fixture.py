@@ -12,11 +12,13 @@ from chamberopt.common.toml_fields import Direction, Pair, list_field, quantity
 from chamberopt.design.part import Selection
 from chamberopt.design.table_base import SI, FileTable
 
-# Sink of a ball into a gap, over its radius, up to which the chamber is closed there. It is what
-# chamberopt.chamber.reach tolerates of an overlap. A ball of diameter d over a gap of width w sinks
-# by (d - sqrt(d² - w²)) / 2, so w is at most d sqrt(1 - (1 - SINK)²).
-SINK = 0.01
-WIDEST_GAP = math.sqrt(1.0 - (1.0 - SINK) ** 2)  # over the ball's diameter
+# Gaps over the diameter d of the smallest balls up to which the chamber counts as closed there. A
+# ball lies on the edges of a gap of width w at asin(w / d) from the gap's middle, and sinks into it
+# by (d - sqrt(d² - w²)) / 2. At half a ball these are 30 degrees, where it is thrown out and cannot
+# wedge, and 0.067 d. In a tight gap it sinks by SINK of its radius, which reach.py tolerates of an
+# overlap. Nobody need work closer than LEAST_GAP_MM.
+SINK, LEAST_GAP_MM = 0.01, 0.1
+TIGHT_GAP, WIDEST_GAP = math.sqrt(1.0 - (1.0 - SINK) ** 2), 0.5
 USUAL_SHELL_MM = 1.0
 
 # The keys that each kind of holder may have beside `axis`.
@@ -164,7 +166,6 @@ def fixture_problems(
         yield Problem(
             "holder.clearance_mm",
             f"given {holder.clearance_mm:g}; allowed: at most {math.floor(1e3 * most) / 1e3:g} for "
-            f"balls of {balls_mm:g} mm, which sink by up to a hundredth of their radius into twice "
-            "that, the play on one side; in a wider gap they may wedge: close it, or use larger "
-            "balls",
+            f"balls of {balls_mm:g} mm, as the play on one side is twice that: in a gap above half "
+            "a ball they may wedge; close it, or use larger balls",
         )

@@ -14,7 +14,7 @@ from chamberopt.common.estimate import Estimate
 from chamberopt.common.number_text import estimate_text, percent
 from chamberopt.coverage.coverage_intervals import NOT_RESOLVED
 from chamberopt.design.calibration import why_no_intensity
-from chamberopt.design.fixture import WIDEST_GAP
+from chamberopt.design.fixture import LEAST_GAP_MM, TIGHT_GAP, WIDEST_GAP
 from chamberopt.design.intensity import PredictedIntensity
 from chamberopt.design.materials import alloys, find
 from chamberopt.design.tolerances import tolerance_box
@@ -342,7 +342,7 @@ def _chamber(result: Result, openings: Sequence[Opening]) -> Iterator[Row]:
             yield what, f"{len(several)}: see the report"
     yield from _fixtures(result, openings)
     ball = 1e3 * min(result.design.shot.diameters)
-    widest = f"{plain(math.floor(100.0 * WIDEST_GAP * ball) / 100.0)} mm"
+    widest = f"{plain(max(math.floor(100.0 * TIGHT_GAP * ball) / 100.0, LEAST_GAP_MM))} mm"
     yield "gaps", f"of joints and openings, and round the sonotrode: at most {widest}, or sealed"
     if volume := result.record.chamber.volume_mm3:
         yield "free volume", f"{plain(1e-3 * volume)} cm³"
@@ -408,6 +408,8 @@ def _sonotrode(result: Result, face_mm: tuple[float, ...]) -> Iterator[Row]:
     yield "face in the chamber", _face(face_mm)
     if design.sonotrode.blocks is not None:
         yield "made of", f"{design.sonotrode.blocks.in_words}, driven alike: simulated as one face"
+        gap = plain(1e3 * WIDEST_GAP * min(design.shot.diameters), 3)
+        yield "gaps between the blocks", f"below {gap} mm, half a ball"
     yield "frequency", f"{plain(design.sonotrode.frequency_khz)} kHz"
     yield "amplitude", amplitude_text(design.sonotrode)
     yield "peak speed of the face", f"{plain(design.sonotrode.peak_speed, 3)} m/s"

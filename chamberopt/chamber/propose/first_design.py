@@ -66,9 +66,11 @@ from chamberopt.chamber.propose.proposed_target import (
 )
 from chamberopt.chamber.propose.shop import Shop, usual_shop
 from chamberopt.common.errors import InputError, UnreadableError
+from chamberopt.common.number_text import plain
 from chamberopt.common.progress import step
 from chamberopt.common.toml_fields import MAX_COORDINATE_MM
 from chamberopt.design.design import Design, validate
+from chamberopt.design.fixture import WIDEST_GAP
 from chamberopt.design.materials import CATALOGUE, USUAL, alloy, ball, balls
 from chamberopt.geometry.meshes.part_mesh import PartMesh, read_part
 from chamberopt.geometry.meshes.surface_error import format_box
@@ -92,7 +94,7 @@ IRON = {
     "zirconia (by heart)",
 }
 TREATMENT_S, HALF_WIDTH, MOST_REPLICAS = 300.0, 0.03, 24
-BLOCKS = "LARGER THAN ONE SONOTRODE: several side by side, driven alike"
+BLOCKS = "LARGER THAN ONE SONOTRODE: several side by side, driven alike; gaps between them below"
 CUT_OUT = "plates, cut out round it, 0.2 to 0.7 mm clear"
 OWN_WALL, OWN_LID = "the part itself is the wall", f"the part itself is the lid: {CUT_OUT}"
 START = "NOT MEASURED by a pilot, a start"
@@ -222,8 +224,10 @@ def _proposed(
     tables["shot"]["diameter_mm"] = round(1e3 * diameter, 4)
     if not (end or wanted.pose) and (hanging := _hanging(mesh, target, turns, diameter, wanted)):
         turns, pose_reason = hanging, ON_END
+    half_ball = f"{plain(1e3 * WIDEST_GAP * diameter, 3)} mm, half a ball"
     reasons = {
-        "part.unit": ("UNIT GUESSED: " if any(GUESSED in note for note in mesh.notes) else "")
+        "sonotrode.blocks": f"{BLOCKS} {half_ball}",
+        "part.unit": ("GUESSED: " if any(GUESSED in note for note in mesh.notes) else "")
         + f"the part measures {format_box(mesh.size)}",
         "part.target": target.reason,
         "shot.diameter_mm": ball_reason,
@@ -522,6 +526,5 @@ def _floor_reasons(floor: Floor, is_local: bool, goes_out: bool) -> dict[str, st
         "chamber.sonotrode_distance_mm": "mean sonotrode face to the part's lowest point",
         **({"sonotrode.frequency_khz": one.note} if one.note else {}),
         **({"part.offset_mm": placed} if any(floor.offset_mm) else {}),
-        **({"sonotrode.blocks": BLOCKS} if floor.blocks is not None else {}),
         f"sonotrode.{key}": f"{kind}; one that the sonotrode can set",
     }

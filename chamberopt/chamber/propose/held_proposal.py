@@ -31,6 +31,7 @@ from chamberopt.common.errors import InputError, UnreadableError
 from chamberopt.common.progress import Progress
 from chamberopt.design.fixture import USUAL_SHELL_MM, WIDEST_GAP
 
+MILLED_MM = 0.2  # between a part and a wall that is milled or printed round it
 MOST_HOLDERS = 6  # that are tried
 HIDDEN = 0.005  # share of the target that a holder may keep from the balls
 LEAST_LEFT, MOST_LEFT = 0.005, 0.15  # share of the target that is left out if no ball touches it
@@ -80,11 +81,10 @@ def held(
 
 def clamped_outside(made: Proposal, floor: Floor, shop: Shop | None) -> Proposal:
     """Return a proposal whose part, which goes out of the chamber, is held where it does."""
-    most_mm = math.floor(50.0 * WIDEST_GAP * 1e3 * made.design.shot.diameter) / 100.0
-    tables = _with_table(
-        made.tables, "sonotrode", "holder", {"kind": "bore", "clearance_mm": most_mm}
-    )
-    text = "the part's own end, clamped outside; wider play takes a soft lip in a split wall"
+    most_mm = math.floor(1e4 * WIDEST_GAP * made.design.shot.diameter) / 20.0
+    keys = {"kind": "bore", "clearance_mm": min(MILLED_MM, most_mm)}
+    tables = _with_table(made.tables, "sonotrode", "holder", keys)
+    text = "the part's own end, clamped outside; the wall, cut out round it, is split there"
     reasons = {**made.reasons, "holder.kind": text}
     return checked(tables, reasons, floor, made.known, made.mesh, shop)
 

@@ -17,6 +17,7 @@ Notation
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -187,8 +188,17 @@ def _tight(sizes: Sizes, move: float, face: Face) -> Sizes:
 
 
 def _over_the_face(sizes: Sizes, shop: Shop, face: Face) -> Floor:
-    """Return a floor that is the whole face, if the face is little larger, else a part of it."""
+    """Return a floor that is the whole face, if the face is little larger, else a part of it.
+
+    A wall that goes round the face stands beside it by the clearance, which is not simulated.
+    """
     clear = f"{shop.clearance_mm:g} mm clear"
+
+    def room(sides: Iterable[float]) -> str:
+        """Return in words how wide the room must be where its wall goes round the face."""
+        wide = " x ".join(f"{one + 2.0 * shop.clearance_mm:g}" for one in sides)
+        return f"{clear}: make it {wide} mm wide"
+
     plan = dict(zip(("length_mm", "width_mm"), _along(sizes, face), strict=True))
     if sizes.shape == "cylinder":
         plan = {"diameter_mm": face.sides_mm[0]}
@@ -201,11 +211,12 @@ def _over_the_face(sizes: Sizes, shop: Shop, face: Face) -> Floor:
     ):
         more = min(plan[key] - float(sizes.plan[key]) for key in plan)
         wider = replace(sizes, plan={**sizes.plan, **plan}, gap=sizes.gap + 5e-4 * more)
-        return Floor(wider, face, f"the face of {face.in_words}, the wall round it {clear}")
-    where = "ends over its face"
-    if any(float(sizes.plan.get(key, 0.0)) >= side for key, side in plan.items()):
-        where = "goes round it on two sides and ends over its face on the others"
-    return Floor(sizes, face, f"on {face.in_words}: the wall {where}, {clear}")
+        text = f"the face of {face.in_words}, the wall round it {room(plan.values())}"
+        return Floor(wider, face, text)
+    where = f"ends over its face, {clear}"
+    if sides := [one for key, one in plan.items() if float(sizes.plan.get(key, 0.0)) >= one]:
+        where = f"goes round it on two sides, {room(sides)} there, and ends over its face elsewhere"
+    return Floor(sizes, face, f"on {face.in_words}: the wall {where}")
 
 
 def _along(sizes: Sizes, face: Face) -> tuple[float, float]:

@@ -16,7 +16,7 @@ from chamberopt.chamber.part import turning_axis
 from chamberopt.chamber.scene import chamber_mesh, require_turnable
 from chamberopt.common.errors import InputError
 from chamberopt.design.design import Design, validate
-from chamberopt.design.fixture import WIDEST_GAP
+from chamberopt.design.fixture import TIGHT_GAP, WIDEST_GAP
 from chamberopt.design.load import load_design
 from chamberopt.design.shapes import TAG_PART, TAG_WALL
 from chamberopt.geometry.triangles import area_vectors, areas
@@ -261,8 +261,8 @@ def test_a_rod_may_come_from_a_side_wall(parts: Path, facing: tuple[float, ...])
          r"holder\.thickness_mm: given 300, but the wall is"),
         ("box", {"holder": {"kind": "rod", "at": {}}}, r"at: given without a key: this is"),
         ("box", {"holder": {"kind": "rod", "axis": (0.0, 0.0, 0.0)}}, r"axis: given \[0, 0, 0\]"),
-        ("shaft", {"holder": {"kind": "bore", "clearance_mm": 0.2}},
-         r"clearance_mm: given 0\.2; allowed: at most 0\.105 for balls of 1\.5 mm"),
+        ("shaft", {"holder": {"kind": "bore", "clearance_mm": 0.4}},
+         r"clearance_mm: given 0\.4; allowed: at most 0\.375 for balls of 1\.5 mm"),
         ("box", {"mask": {}}, r"mask\.at: missing"),
         ("box", {"mask": {"at": {"surface": ("all",)}}},
          r"mask\.at: the mask covers all of the target"),
@@ -318,10 +318,13 @@ def translate(x: float, y: float, z: float) -> np.ndarray:
     return trimesh.transformations.translation_matrix((x, y, z))
 
 
-def test_the_clearance_of_a_bore_is_one_that_balls_hardly_sink_into() -> None:
-    """A ball over a gap sinks by a hundredth of its radius where the gap is as wide as stated."""
-    radius, half = 1.0, WIDEST_GAP
-    assert radius - np.sqrt(radius**2 - half**2) == pytest.approx(0.01 * radius)
+def test_balls_hardly_sink_into_a_tight_gap_and_wedge_in_no_allowed_one() -> None:
+    """On the edges of a gap a ball is 0.01 of its radius deep, or at 30 degrees from its middle."""
+    radius = 0.5
+    for gap, depth in ((TIGHT_GAP, 0.01 * radius), (WIDEST_GAP, 0.067)):
+        sunk = radius - np.sqrt(radius**2 - 0.25 * gap**2)
+        assert sunk == pytest.approx(depth, abs=5e-5)
+    assert np.degrees(np.arcsin(WIDEST_GAP)) == pytest.approx(30.0)
 
 
 def test_a_round_holder_on_the_axis_turns_with_the_part(parts: Path) -> None:

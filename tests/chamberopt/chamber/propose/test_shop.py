@@ -1,6 +1,7 @@
 """What a shop has: its file, and the sonotrode on which a proposed chamber stands."""
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -58,6 +59,30 @@ def test_a_floor_lies_within_the_face_of_a_sonotrode(
     assert found.lean == 0.0
     assert found.sizes.plan == size
     assert "clear" in found.reason
+
+
+@pytest.mark.parametrize("clear", [0.2, 0.5])
+def test_a_wall_round_a_face_is_wider_by_its_clearance(clear: float) -> None:
+    own = shop(DISC, BLOCK, clearance_mm=clear)
+    wide = 60.0 + 2.0 * clear
+    found = floor({"diameter_mm": 52.0}, "cylinder", own)
+    assert f"the wall round it {clear:g} mm clear: make it {wide:g} mm wide" in found.reason
+    found = floor({"length_mm": 110.0, "width_mm": 30.0}, "box", own)
+    assert found.reason.endswith(f"the wall ends over its face, {clear:g} mm clear")
+    found = floor({"length_mm": 60.0, "width_mm": 50.0}, "box", own)
+    assert f"on two sides, {clear:g} mm clear: make it {50.0 + 2.0 * clear:g} mm" in found.reason
+
+
+def test_faces_of_the_part_that_are_walls_fix_the_floor() -> None:
+    """No wall between them moves in or out, or leans, for the sake of a sonotrode."""
+    plan: dict[str, float | str] = {"length_mm": 118.0, "width_mm": 49.0}
+    free = Sizes("box", plan, 0.015, 0.05, 0.01, False, 0.03)
+    for closed, width in (((), 50.0), (("y",), 50.0), (("-y", "y"), 49.0)):
+        found = floor_on_sonotrode(replace(free, closed=closed), 0.02, shop(BLOCK), False)
+        assert found.sizes.plan["width_mm"] == width
+    wide = replace(free, plan={"length_mm": 118.0, "width_mm": 52.0}, closed=("-y", "y"))
+    with pytest.raises(InputError, match="larger than the largest face"):
+        floor_on_sonotrode(wide, 0.02, shop(BLOCK), False)
 
 
 def test_a_room_is_no_wider_than_the_largest_chamber() -> None:
