@@ -95,7 +95,7 @@ IRON = {
 }
 TREATMENT_S, HALF_WIDTH, MOST_REPLICAS = 300.0, 0.03, 24
 BLOCKS = "LARGER THAN ONE SONOTRODE: several side by side, driven alike; gaps between them below"
-CUT_OUT = "plates, cut out round it, 0.2 to 0.7 mm clear"
+CUT_OUT = "plates, cut out round it"
 OWN_WALL, OWN_LID = "the part itself is the wall", f"the part itself is the lid: {CUT_OUT}"
 START = "NOT MEASURED by a pilot, a start"
 ON_END = "on end, as no sonotrode is large enough for it lying"
@@ -158,10 +158,10 @@ def _lying(
         turns, reason: the pose [degrees], and why.
     """
     upright = pose_by_size(mesh.vertices, mesh.triangles, target.triangles, "standing")
-    if (end := bare_end(mesh, target, upright)) is not None:
+    if (bare := bare_end(mesh, target, upright)) is not None:
         with suppress(InputError):
-            lying = end._replace(turns=turns)
-            made = _proposed(path, wanted, mesh, known, target, turns, reason, lying)
+            root = bare._replace(turns=turns)
+            made = _proposed(path, wanted, mesh, known, target, turns, reason, root)
             if is_firm(made) and not rests(made):
                 return made
     along = mesh.vertices @ rotation_matrix(upright)[2]
@@ -436,11 +436,11 @@ def _place(
             and not can_be_clamped(posed, mesh.triangles, 2, out_at)
         ):  # a higher ceiling takes in the whole part
             sizes = propose_sizes(posed, float(posed[:, 2].max()), ball, shape, wider)
-        room = None
+        local = None
         if is_local and shape == "box":
             at_wall = None if out is None else AT_WALL * ball
-            room = local_room(posed, mesh.triangles, target.triangles, sizes, at_wall)
-            sizes = room.sizes
+            local = local_room(posed, mesh.triangles, target.triangles, sizes, at_wall)
+            sizes = local.sizes
         try:
             floor = floor_on_sonotrode(sizes, _round(posed), shop or usual_shop(), shop is None)
             if shop is not None:
@@ -449,7 +449,7 @@ def _place(
                     room = replace(room, through_ceiling=False, top=highest)
                 floor = floor._replace(sizes=room)
             if is_local:
-                middle = middle_in_plan(on_target) if room is None else room.middle(floor.sizes)
+                middle = middle_in_plan(on_target) if local is None else local.middle(floor.sizes)
                 x, y = np.round(1e3 * (middle_in_plan(posed) - middle), 2) + 0.0
                 floor = floor._replace(offset_mm=(float(x), float(y)))
         except InputError as error:

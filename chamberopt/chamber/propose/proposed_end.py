@@ -198,7 +198,8 @@ class LocalRoom(NamedTuple):
         """Return the middle in plan (2,) [m] of the box if it gets other sizes."""
         lengths = 1e-3 * np.array([sizes.plan["length_mm"], sizes.plan["width_mm"]], dtype=float)
         longer = 0.5 * (lengths - np.ptp(self.walls, axis=0))
-        return self.walls.mean(axis=0) + (self.kept[0] * 1.0 - self.kept[1]) * longer
+        shift = self.kept[0] * 1.0 - self.kept[1]
+        return np.asarray(self.walls.mean(axis=0) + shift * longer)
 
 
 def local_room(
@@ -221,17 +222,17 @@ def local_room(
     if at_wall is not None:
         walls[1, 0] += at_wall - sizes.gap
     closes = np.isfinite(faces)
-    walls, kept = np.where(closes, faces, walls)[:, :2], closes[:, :2].copy()
+    walls, kept = np.where(closes, faces, walls)[:, :2], np.array(closes[:, :2])
     kept[1, 0] |= at_wall is not None
-    plan = {
-        key: _up_half_mm(high - low) if stays else sizes.plan[key]
-        for key, low, high, stays in zip(
-            ("length_mm", "width_mm"), *walls, kept.any(axis=0), strict=True
-        )
-    }
+    plan = dict(sizes.plan)
+    for k, key in enumerate(("length_mm", "width_mm")):
+        if kept[:, k].any():
+            plan[key] = _up_half_mm(walls[1, k] - walls[0, k])
+    corners = posed[triangles]
+    low, high = corners.min(axis=1), corners.max(axis=1)
+    inside = ((high[:, :2] > walls[0] + INTO) & (low[:, :2] < walls[1] - INTO)).all(axis=1)
+    lower = min(float(low[inside, 2].min()), (1.0 - NEAREST) * sizes.distance)
     names = np.array([["-x", "-y", "-z"], ["x", "y", "z"]])
-    within = (np.abs(posed[:, :2] - walls.mean(axis=0)) < 0.5 * np.ptp(walls, axis=0) - INTO).all(1)
-    lower = min(float(posed[within, 2].min(initial=math.inf)), (1.0 - NEAREST) * sizes.distance)
     sizes = replace(
         sizes,
         plan=plan,
@@ -241,8 +242,8 @@ def local_room(
     )
     if closes[1, 2]:
         height = 1e-3 * _up_half_mm(sizes.distance + faces[1, 2])
-        lid = {"height": height, "through_ceiling": True, "top": float(faces[1, 2] - BEHIND)}
-        sizes = replace(sizes, **lid)
+        top = float(faces[1, 2] - BEHIND)
+        sizes = replace(sizes, height=height, through_ceiling=True, top=top)
     return LocalRoom(sizes, walls, kept)
 
 

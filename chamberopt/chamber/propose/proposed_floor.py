@@ -262,4 +262,7 @@ def require_room(sizes: Sizes, shop: Shop) -> Sizes:
             given = " x ".join(f"{one:.4g}" for one in (*wide, height))
             text = f"the chamber would measure {given} mm, more than largest_chamber_mm"
             raise InputError(f"--shop: {text}; peen the part a strip at a time, or in another pose")
-    return replace(sizes, height=1e-3 * height)
+    closed = sizes.closed  # a higher lid is no face of the part any more
+    if 1e-3 * height > sizes.height + HELD:
+        closed = tuple(one for one in closed if one != "z")
+    return replace(sizes, height=1e-3 * height, closed=closed)

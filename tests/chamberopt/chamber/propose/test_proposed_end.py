@@ -40,11 +40,11 @@ def test_webs_close_a_chamber_where_the_target_ends(apart: float) -> None:
     found = closing_faces(mesh.vertices, mesh.triangles, pin, 2e-3)
     assert 1e3 * found[1, 2] == pytest.approx(0.5 * apart)
     assert np.isnan(found[:, :2]).all()
-    lying = mesh.vertices[:, [0, 2, 1]] * [1, -1, 1]  # the pin along y
+    lying = mesh.vertices[:, [0, 2, 1]] * [1, -1, 1] + [0, 0, 30e-3]  # the pin along y
     found = closing_faces(lying, mesh.triangles, pin, 2e-3)
     assert 1e3 * found[:, 1] == pytest.approx([-0.5 * apart, 0.5 * apart])
     assert np.isnan(found[:, [0, 2]]).all()
-    sizes = propose_sizes(lying, 8e-3, 1e-3, "box", 1.0, lying[np.unique(mesh.triangles[pin])])
+    sizes = propose_sizes(lying, 38e-3, 1e-3, "box", 1.0, lying[np.unique(mesh.triangles[pin])])
     room = local_room(lying, mesh.triangles, pin, sizes, None)
     assert room.sizes.closed == ("-y", "y")
     assert room.sizes.is_fixed
