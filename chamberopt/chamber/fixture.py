@@ -306,9 +306,10 @@ def _arbor(
     solids = [_prism(frame, outline, bottom, end)]
     if holder.diameter_mm is not None and holder.thickness_mm is not None:
         flange, thick = _circle(middle, 1e-3 * holder.diameter_mm), 1e-3 * holder.thickness_mm
-        solids.append(_prism(frame, flange, high - SINK, min(high + thick, end)))
+        sink = SINK + 1e-3 * (holder.grip_mm or 0.0)
+        solids.append(_prism(frame, flange, high - sink, min(high + thick, end)))
         if holder.both_sides:
-            solids.append(_prism(frame, flange, max(low - thick, bottom), low + SINK))
+            solids.append(_prism(frame, flange, max(low - thick, bottom), low + sink))
     place = tuple(map(float, np.array([*middle, start]) @ frame))
     return _Made(solids, clamped, holder.kind, (2.0 * radius,), wall - start, place)
 

@@ -26,7 +26,7 @@ HOLDER_KEYS = {
     "rod": ("at", "diameter_mm"),
     "collar": ("at", "diameter_mm", "grip_mm"),
     "plate": ("at", "size_mm", "grip_mm", "thickness_mm", "diameter_mm"),
-    "arbor": ("at", "both_sides", "diameter_mm", "thickness_mm"),
+    "arbor": ("at", "both_sides", "diameter_mm", "thickness_mm", "grip_mm"),
     "bore": ("clearance_mm",),
 }
 
@@ -68,8 +68,8 @@ class Holder(FileTable):
     )
     grip_mm: float | None = quantity(
         0.01, 2000, "mm",
-        "length of the part that it encloses; absent: a collar encloses its faces, a plate nothing",
-        None,
+        "length of the part that it encloses; absent: a collar encloses its faces, a plate nothing;"
+        " of an arbor: how far its flanges reach over the part, as cups", None,
     )  # fmt: skip
     thickness_mm: float | None = quantity(
         0.1, 2000, "mm",
@@ -98,6 +98,8 @@ class Holder(FileTable):
         if self.kind == "arbor" and (self.diameter_mm is None) != (self.thickness_mm is None):
             lone = "diameter_mm" if self.thickness_mm is None else "thickness_mm"
             yield Problem(lone, "given alone: the flanges of an arbor need both; give both or none")
+        if self.kind == "arbor" and self.grip_mm and self.diameter_mm is None:
+            yield Problem("grip_mm", "given without flanges, of which it is; give diameter_mm too")
         if self.kind == "arbor" and self.at is None:
             yield Problem("at", "missing: an arbor needs to know its hole; choose the hole's walls")
 

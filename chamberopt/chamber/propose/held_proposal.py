@@ -194,7 +194,7 @@ def _harmless(
     if touched_share(before) - touched_share(made) > HIDDEN:
         return None, "a holder would keep the balls from some of the target"
     if faults(made) > faults(before):
-        return None, f"a {kind} would bring a warning: {new_warning(made, before)}"
+        return None, f"the {kind} would bring a warning: {new_warning(made, before)}"
     return made, ""
 
 

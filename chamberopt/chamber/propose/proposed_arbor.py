@@ -20,7 +20,13 @@ from chamberopt.geometry.outline import (
     frame_along,
     radii,
 )
-from chamberopt.geometry.triangles import area_vectors, areas, rotation_matrix, unit_vectors
+from chamberopt.geometry.triangles import (
+    area_vectors,
+    areas,
+    rotation_matrix,
+    sides_of,
+    unit_vectors,
+)
 
 # A keyway may interrupt the wall of a bore: largest sum of its area vectors over its area, and
 # least radius in its outline over that round it. FREE is that of the way through.
@@ -28,6 +34,7 @@ OPEN, ROUND, FREE = 0.2, 0.9, 0.95
 THINNEST = 4e-3  # m: of a bore whose arbor holds a part
 # Of flanges: diameter over the bore's, least of it, and thickness over the bore's diameter and [m].
 FLANGE, LEAST_FLANGE, THICK, THINNEST_FLANGE = 1.6, 1.2, 0.1, 2e-3
+BESIDE = 2.0  # ball diameters between cups and the target, so that balls get there
 UPRIGHT, LEVEL = 0.999, 0.02  # cosines with the vertical of an axis that is upright, and level
 # A part turns about a bore's axis if its target looks the same all round: largest difference of the
 # spread of its normals over their mean, their mean along any way, and the middle's distance from
@@ -92,16 +99,23 @@ def _bore(mesh: PartMesh, own: np.ndarray, axis: np.ndarray, at_mm: list[float])
 
 
 def arbor_through(
-    bore: Bore, mesh: PartMesh, target: np.ndarray, turns: Turns, ball: float
+    bore: Bore,
+    mesh: PartMesh,
+    target: np.ndarray,
+    turns: Turns,
+    ball: float,
+    with_cups: bool = False,
 ) -> tuple[dict[str, Any], str] | None:
     """Return the keys of [holder] of an arbor through a bore, and the reason for it.
 
     An upright one goes out through the ceiling, a level one through both side walls. The result is
-    None for another axis, or if the arbor would hide some of the target.
+    None for another axis, if the arbor would hide some of the target, or if cups are wanted and the
+    part is not hollow beside its hub.
 
     Args:
         target: marks the triangles to be peened, (m,).
         ball: diameter of a ball [m], which must get past the arbor to the target.
+        with_cups: whether its flanges are cups, which mask all but what is near the target.
     """
     axis = rotation_matrix(turns) @ bore.axis
     frame = frame_along(bore.axis)
@@ -118,12 +132,50 @@ def arbor_through(
         where = "through both side walls"
     else:
         return None
+    text = f"through the bore of {2e3 * bore.radius:.4g} mm, which is not peened, and {where}"
+    if with_cups:
+        cup = math.floor(4e3 * (away - BESIDE * ball)) / 2.0
+        depth = _depth_of_seat(bore, mesh, 5e-4 * cup, 0.5 * ball)
+        if depth < 0.5 * ball:
+            return None
+        keys |= {"diameter_mm": cup, "thickness_mm": 1e3 * THINNEST_FLANGE}
+        keys["grip_mm"] = round(1e3 * depth, 2)
+        return keys, f"{text}; cups, which close on the part round hub and holes, mask these"
     flange = math.floor(2e3 * 2.0 * min(FLANGE * bore.radius, away - ball)) / 2.0
     if 1e-3 * flange > 2.0 * LEAST_FLANGE * bore.radius:
         thick = max(THINNEST_FLANGE, 2.0 * THICK * bore.radius)
         keys |= {"diameter_mm": flange, "thickness_mm": math.ceil(2e3 * thick - 1e-6) / 2.0}
-    text = f"through the bore of {2e3 * bore.radius:.4g} mm, which is not peened, and {where}"
     return keys, text
+
+
+def _depth_of_seat(bore: Bore, mesh: PartMesh, radius: float, even: float) -> float:
+    """Return how far inside the ends of a bore the part's faces are at a radius about it [m].
+
+    It is the same at both ends, the smaller one; -inf where the faces are not even all round.
+
+    Args:
+        radius: of the seat [m], which is wider than the bore.
+        even: largest difference of heights along the seat [m].
+    """
+    frame = frame_along(bore.axis)
+    places = (mesh.vertices - bore.point) @ frame.T
+    one, two = places[sides_of(mesh.triangles)].swapaxes(0, 1)
+    near, far = (np.linalg.norm(end[:, :2], axis=1) for end in (one, two))
+    cut = (near < radius) & (far >= radius)
+    if radius <= bore.radius or not cut.any():
+        return -math.inf
+    share = (radius - near[cut]) / (far[cut] - near[cut])
+    heights = one[cut, 2] + share * (two[cut, 2] - one[cut, 2])
+    wall = places[mesh.triangles[bore.triangles]][..., 2]
+    middle = 0.5 * float(wall.min() + wall.max())
+    depths = []
+    for way in (-1.0, 1.0):
+        seat = way * (heights - middle)
+        seat = seat[seat > 0.0]
+        if not seat.size or np.ptp(seat) > even:
+            return -math.inf
+        depths.append(0.5 * float(np.ptp(wall)) - float(seat.max()))
+    return min(depths)
 
 
 def turning_bore(bores: Sequence[Bore], mesh: PartMesh, target: np.ndarray) -> Bore | None:

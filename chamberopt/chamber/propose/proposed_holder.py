@@ -130,8 +130,9 @@ def holder_choices(
         found.append(((slim, place, *order, -thick), one))
 
     for bore in bores:
-        if made := arbor_through(bore, mesh, target, turns, ball):
-            offer(HolderChoice(*made), thick=2.0 * bore.radius)
+        for with_cups in (True, False):
+            if made := arbor_through(bore, mesh, target, turns, ball, with_cups):
+                offer(HolderChoice(*made), thick=2.0 * bore.radius)
     on_faces = list(_on_flat_faces(mesh, target, turn, ball, bores))
     closed = [one.axis for one in on_faces if one.choice.is_round_an_end]
     for axis in np.array([[0, 0, 1], [1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0]], dtype=float):
