@@ -95,6 +95,7 @@ IRON = {
 }
 TREATMENT_S, HALF_WIDTH, MOST_REPLICAS = 300.0, 0.03, 24
 BLOCKS = "LARGER THAN ONE SONOTRODE: several side by side, driven alike; gaps between them below"
+BETWEEN = "a plate that fits between the faces of the part, like the two walls beside them"
 CUT_OUT = "plates, cut out round it"
 OWN_WALL, OWN_LID = "the part itself is the wall", f"the part itself is the lid: {CUT_OUT}"
 START = "NOT MEASURED by a pilot, a start"
@@ -510,6 +511,7 @@ def _floor_reasons(floor: Floor, is_local: bool, goes_out: bool) -> dict[str, st
     sizes, one = floor.sizes, floor.face.sonotrode
     first = next(key for key in sizes.plan if key.endswith("_mm"))
     where = "; the part goes out through it" if sizes.through_ceiling else ""
+    where = f"; {BETWEEN}" if sizes.is_fixed else where
     beside = "target, and the part goes out through the walls" if is_local else "part"
     where += "; " + OWN_LID if "z" in sizes.closed else ""
     if sides := [one for one in sizes.closed if one != "z"]:

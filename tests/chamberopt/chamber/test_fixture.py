@@ -357,7 +357,8 @@ def around(diameter: float) -> float:
         ((90, 0, 0), (0, -1, 0), True, ROOM[1] - BOX[2], 2),
     ],
 )
-@pytest.mark.parametrize("given", [{}, FLANGES])
+# The rims of cups go into the part here, whose ends are flat.
+@pytest.mark.parametrize("given", [{}, FLANGES, {**FLANGES, "grip_mm": 1.5}])
 def test_an_arbor_fills_its_hole_and_goes_out(
     parts: Path,
     turns: tuple[float, ...],

@@ -133,6 +133,29 @@ def test_flanges_are_cups_that_close_on_a_web_beside_its_hub(hub: float) -> None
     assert arbor_through(bore, leaning, rim, (90, 0, 0), BALL, with_cups=True) is None
 
 
+def test_cups_leave_nothing_of_a_hub_to_the_shot(tmp_path: Path) -> None:
+    disc = ring(40, 10, 12) + ring(18, 10, 24).translate([0, 0, -6])
+    _, body = part_of(disc)
+    radius = np.hypot(*body.triangles_center[:, :2].T)
+    rim = (radius > 39.0) & (np.abs(body.face_normals[:, 2]) < 0.5)
+    hub = (radius < 18.1) & (radius > 10.1)
+    lines = [f"v {x} {y} {z}" for x, y, z in body.vertices]
+    for name, rows in (("PEENED", rim), ("HUB", hub), ("WEB", ~rim & ~hub)):
+        lines += [f"g {name}", *(f"f {a} {b} {c}" for a, b, c in body.faces[rows] + 1)]
+    part = tmp_path / "disc.obj"
+    part.write_text("\n".join(lines) + "\n")
+    made = propose(part, Wanted("mm"), lambda _: [])
+    turns_on_an_arbor(made)
+    assert made.design.holder is not None
+    assert made.design.holder.grip_mm == pytest.approx(6.0)
+    rows = np.zeros(len(made.chamber.part.triangles), dtype=bool)
+    for one in made.known:
+        if one.name == "HUB":
+            rows |= one.triangles
+    assert rows.any()
+    assert made.chamber.exposed_area[rows].sum() < 1e-3 * made.chamber.part.area[rows].sum()
+
+
 def test_a_ring_of_alike_teeth_turns_about_its_bore() -> None:
     """A toothed disc turns; with half of its teeth as target, or none outside, it does not."""
     teeth = [
