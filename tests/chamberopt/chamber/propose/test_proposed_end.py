@@ -17,6 +17,7 @@ from chamberopt.chamber.propose.proposed_end import (
 )
 from chamberopt.chamber.propose.proposed_target import Target, propose_sizes
 from tests.chamberopt.chamber.propose.test_proposed_arbor import drum, part_of
+from tests.helpers.eight_parts import EIGHT_PARTS
 
 UPRIGHT = (0.0, 0.0, 0.0)
 WEB = 6.0  # thickness [mm]
@@ -130,3 +131,15 @@ def test_a_blade_on_edge_goes_out_by_its_root(tmp_path: Path) -> None:
     inside = made.chamber.exposed_area > 0.0
     assert inside[made.chamber.part.target].all()
     assert "the part itself is the wall" in made.reasons["chamber.length_mm"]
+
+
+def test_a_crank_pin_gets_a_chamber_between_its_webs(tmp_path: Path) -> None:
+    """The webs are 36 mm apart, from fillet to fillet."""
+    made = propose(EIGHT_PARTS["crank_pin"].write(tmp_path), Wanted(), lambda _: [])
+    lengths = [made.tables["chamber"][key] for key in ("length_mm", "width_mm")]
+    assert 36.4 <= min(lengths) < 36.9
+    assert "the part itself is the wall" in made.reasons["chamber.length_mm"]
+    assert "a plate that fits between the faces" in made.reasons["chamber.height_mm"]
+    assert made.design.holder is not None
+    assert (made.design.holder.kind, made.design.holder.clearance_mm) == ("bore", 0.2)
+    assert not made.jams
