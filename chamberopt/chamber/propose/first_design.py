@@ -228,7 +228,7 @@ def _proposed(
     half_ball = f"{plain(1e3 * WIDEST_GAP * diameter, 3)} mm, half a ball"
     reasons = {
         "sonotrode.blocks": f"{BLOCKS} {half_ball}",
-        "part.unit": ("GUESSED: " if any(GUESSED in note for note in mesh.notes) else "")
+        "part.unit": ("UNIT GUESSED: " if any(GUESSED in note for note in mesh.notes) else "")
         + f"the part measures {format_box(mesh.size)}",
         "part.target": target.reason,
         "shot.diameter_mm": ball_reason,
