@@ -14,6 +14,7 @@ from typing import Annotated, Any, Literal, TypeVar, cast
 
 import pydantic
 from pydantic import BaseModel, Field, ValidationError, ValidationInfo
+from pydantic.fields import FieldInfo
 
 from chamberopt.common import toml_errors
 from chamberopt.common.errors import InputError
@@ -31,7 +32,7 @@ from chamberopt.design.fixture import Holder, Mask, fixture_problems
 from chamberopt.design.flexure import StressTable, flexure_problems, stress_problems
 from chamberopt.design.materials import Materials, with_friction, with_numbers
 from chamberopt.design.part import PartTable
-from chamberopt.design.process import Process
+from chamberopt.design.process import MAX_STEPS, Process, Step, step_problems, values_in_step
 from chamberopt.design.ranges import Ranges
 from chamberopt.design.shapes import SHAPES, ChamberTable
 from chamberopt.design.shapes.base import is_custom
@@ -77,6 +78,11 @@ class Design(FileTable, ShownInNotebook):
     mask: Mask | None = Field(default=None, description="what keeps the shot from faces")
     effects: Effects = Field(default_factory=Effects)
     process: Process
+    steps: Annotated[Several[Step], Field(max_length=MAX_STEPS)] = list_field(
+        f"a list of 2 to {MAX_STEPS} tables, [[steps]]",
+        "poses, charges or chambers in which the part is peened one after another",
+        (),
+    )
     calibration: CalibrationField = None
     tolerances: dict[str, Tolerance] | None = Field(
         default=None,
@@ -99,9 +105,13 @@ class Design(FileTable, ShownInNotebook):
         handler: pydantic.ModelWrapValidatorHandler["Design"],
         info: ValidationInfo,
     ) -> "Design":
-        """Validate with the subclass whose chamber table has the keys of the design's shape."""
+        """Validate with the subclass whose chamber table has the keys of the design's shape.
+
+        The design of each step is checked like any other.
+        """
         if cls is not Design or not isinstance(data, Mapping):
-            return handler(data)
+            found = handler(data)
+            return found if found is data else _with_checked_steps(found, info.context)
         return design_class(data, info.context).model_validate(data, context=info.context)
 
     def __reduce__(self) -> tuple[object, ...]:
@@ -113,6 +123,34 @@ class Design(FileTable, ShownInNotebook):
         """Return the design to simulate, with its calibration's values in place of its own."""
         found: Design = with_measured_values(self)
         return found
+
+    @property
+    def in_steps(self) -> "dict[str, Design]":
+        """The design of each step by its name, with its share of the peening and simulated time.
+
+        A design without steps is returned by the name "".
+        """
+        if not self.steps:
+            return {"": self}
+        values = self.model_dump()
+        return {
+            step.name: validate(
+                Design, values_in_step(values, self.steps, k), recorded=self.is_recorded
+            )
+            for k, step in enumerate(self.steps)
+        }
+
+    def require_one_step(self, what: str) -> None:
+        """Raise InputError if the design has steps, for a command that cannot take them.
+
+        Args:
+            what: what cannot be done with several steps, as the subject of a sentence.
+        """
+        if self.steps:
+            raise InputError(
+                f"steps: {what} is not supported for a design with [[steps]]; give a design of the "
+                "step that you mean, without [[steps]]"
+            )
 
     @property
     def is_recorded(self) -> bool:
@@ -164,6 +202,7 @@ class Design(FileTable, ShownInNotebook):
         if self.tolerances:
             yield from tolerance_problems(self, dict(toml_errors.numeric_fields(self)))
         yield from zone_problems(self.zones, self.calibration)
+        yield from step_problems(self.steps)
         yield from calibration_problems(self)
         yield from flexure_problems(self)
         yield from stress_problems(self)
@@ -228,12 +267,25 @@ class Design(FileTable, ShownInNotebook):
 
     def numbers(self) -> tuple[str, ...]:
         """Return the dotted names, such as shot.mass_g, of all continuous numbers that may vary."""
-        fields = toml_errors.numeric_fields(self)
         return tuple(
             name
-            for name, field in fields
+            for name, field in self._numeric_fields()
             if field.annotation is not int and not name.startswith(NOT_VARIED)
         )
+
+    def _numeric_fields(self) -> Iterator[tuple[str, FieldInfo]]:
+        """Yield the dotted name and the field of every number, also of those that steps change."""
+        yield from toml_errors.numeric_fields(self)
+        for k, one in enumerate(self.in_steps.values() if self.steps else ()):
+            changed = {
+                f"{table}.{key}"
+                for table, change in self.steps[k].changes.items()
+                if isinstance(change, dict)
+                for key in change
+            }
+            for name, field in toml_errors.numeric_fields(one):
+                if ".".join(name.split(".")[:2]) in changed:
+                    yield f"steps.{k}.{name}", field
 
     def whole_numbers(self) -> tuple[str, ...]:
         """Return the dotted names of all whole numbers of the chamber, such as its sides."""
@@ -291,13 +343,16 @@ class Design(FileTable, ShownInNotebook):
 
         Raises InputError if there is no such number, or it is not set in this design.
         """
-        known = [known for known, _ in toml_errors.numeric_fields(self)]
+        known = [known for known, _ in self._numeric_fields()]
         if name not in known:
             hint = toml_errors.did_you_mean(name, known)
             raise InputError(f"{name}: not a number of a design; {hint}")
         value: Any = self
         for step in name.split("."):
-            value = value[int(step)] if isinstance(value, tuple) else getattr(value, step)
+            if isinstance(value, dict):
+                value = value[step]
+            else:
+                value = value[int(step)] if isinstance(value, tuple) else getattr(value, step)
             if value is None:
                 raise InputError(f"{name}: not set in this design; give it a value there first")
         return cast(float, value)
@@ -328,6 +383,27 @@ class Design(FileTable, ShownInNotebook):
         for name, value in values.items():
             data = _replaced(data, name, name.split("."), value)
         return validate(Design, data, recorded=self.is_recorded)
+
+
+def _with_checked_steps(design: Design, context: Mapping[str, object] | None) -> Design:
+    """Return a design with the checked values of its steps, and with absolute paths in them.
+
+    Raises CrossCheckError, which names every problem of the design of a step.
+    """
+    if not design.steps:
+        return design
+    values, checked = design.model_dump(), []
+    problems: list[Problem] = []
+    for k, step in enumerate(design.steps):
+        own = values_in_step(values, design.steps, k)
+        try:
+            checked.append(step.with_values(Design.model_validate(own, context=context).model_dump()))
+        except ValidationError as error:
+            found = toml_errors.explain_validation_error(error, design_class(own, context))
+            problems += (Problem(f"steps.{k}.{one.field}", one.text) for one in found)
+    if problems:
+        raise CrossCheckError(problems)
+    return design.model_copy(update={"steps": tuple(checked)})
 
 
 def _unpickled(data: dict[str, object], recorded: bool, sha256: str) -> Design:

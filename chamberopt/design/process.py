@@ -1,7 +1,11 @@
-"""Peening time of a design, and the accuracy of its simulation."""
+"""Peening time of a design, the steps in which it is peened, and accuracy of its simulation.
 
-from collections.abc import Iterator
-from typing import ClassVar
+Without steps a part stays in one pose, with one charge of balls. In steps it is peened in several,
+one after another: each step has its share of the time, and changes some keys of the design.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field
 
@@ -10,6 +14,12 @@ from chamberopt.common.toml_fields import Pair, list_field, quantity
 from chamberopt.design.table_base import SI, FileTable
 
 MIN_POINTS, MAX_POINTS = 1_000, 1_000_000  # limits on the number of coverage windows
+MAX_STEPS = 10
+NONE = "none"  # in the place of a holder or mask that a step does not have
+NAME = "a name in quotes of at most 40 letters, digits and _, no digit first"
+OF_POSE = "rotate_deg", "offset_mm"
+# Keys of which a table has only one, so that a step's key takes the place of the design's other.
+EITHER_OR = (("diameter_mm", "mix"), ("amplitude_um", "amplitude_pv_um"))
 
 
 class Accuracy(FileTable):
@@ -87,3 +97,126 @@ class Process(FileTable):
         return self.accuracy.simulated_time
 
     treatment_time = SI("treatment_time_s", 1.0, "Peening time [s] of the predicted coverage")
+
+
+def _changes(what: str) -> Any:
+    return Field(default=None, description=what, json_schema_extra={"form": "a table"})
+
+
+Changes = dict[str, Any] | None
+
+
+class Step(FileTable):
+    """One of several steps in which a part is peened, and the keys of the design that it changes.
+
+    The first step is the design as its tables have it, and changes nothing.
+    """
+
+    name: Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$", max_length=40)] = Field(
+        description="e.g. turned: its figures are steps.turned.mean_coverage ...",
+        json_schema_extra={"form": NAME},
+    )
+    time_share: float = quantity(
+        1e-3, 1e6, "", "its part of process.treatment_time_s, over the sum of all steps' parts", 1.0
+    )
+    part: Changes = _changes("the pose of the part in this step")
+    chamber: Changes = _changes("keys of the chamber that differ in this step")
+    sonotrode: Changes = _changes("keys of the sonotrode that differ in this step")
+    sonotrodes: tuple[dict[str, Any], ...] | None = Field(
+        default=None,
+        strict=False,
+        description="the further sonotrodes of this step, in place of the design's",
+        json_schema_extra={"form": "a list of tables"},
+    )
+    shot: Changes = _changes("keys of the shot that differ in this step")
+    holder: dict[str, Any] | Literal["none"] | None = _changes(
+        'the whole holder of this step, in place of the design\'s; "none": no holder'
+    )
+    mask: dict[str, Any] | Literal["none"] | None = _changes(
+        'the whole mask of this step, in place of the design\'s; "none": no mask'
+    )
+
+    REMOVED: ClassVar[dict[str, str]] = dict.fromkeys(
+        ("materials", "zones", "effects", "calibration", "tolerances", "ranges", "stress"),
+        "is the same in all steps, as one part is peened on one machine",
+    ) | {"process": "is of all steps together: give each step its time_share of the time"}
+
+    def _problems(self) -> Iterator[Problem]:
+        for key in self.part or {}:
+            if key not in OF_POSE:
+                text = f"is the same in all steps; a step may change {' and '.join(OF_POSE)}"
+                yield Problem(f"part.{key}", text)
+        for key in ("material", "density_kg_m3"):
+            if key in (self.shot or {}):
+                text = "balls of another metal are not supported in a step; leave it out"
+                yield Problem(f"shot.{key}", text)
+
+    @property
+    def changes(self) -> dict[str, Any]:
+        """What the step changes in the design, by the name of the table."""
+        tables = ((name, getattr(self, name)) for name in type(self).model_fields)
+        return {
+            name: one for name, one in tables if one is not None and name not in ("name", "time_share")
+        }
+
+    def with_values(self, design: Mapping[str, Any]) -> "Step":
+        """Return the step with the values that a checked design has in their place.
+
+        Args:
+            design: values of the design that this step makes, by table.
+        """
+        found: dict[str, Any] = {}
+        for name, change in self.changes.items():
+            table = design[name]
+            if isinstance(change, dict):
+                found[name] = {key: table[key] for key in change}
+            else:
+                found[name] = change if change == NONE else table
+        return self.model_copy(update=found)
+
+
+def step_problems(steps: Sequence[Step]) -> Iterator[Problem]:
+    """Yield a problem if there is one step only, it changes the design, or names are alike."""
+    if len(steps) == 1:
+        yield Problem("steps", "given one step; give two or more, or leave it out")
+    names = [step.name for step in steps]
+    for k, step in enumerate(steps):
+        if step.name in names[:k]:
+            text = f"given {step.name!r}, as steps.{names.index(step.name)} has; names must differ"
+            yield Problem(f"steps.{k}.name", text)
+    for name in steps[0].changes if steps else ():
+        text = f"the first step is the design itself: write this in [{name}], and leave it out here"
+        yield Problem(f"steps.0.{name}", text)
+
+
+def values_in_step(design: Mapping[str, Any], steps: Sequence[Step], number: int) -> dict[str, Any]:
+    """Return the values of the design that is peened in one of the steps alone.
+
+    Times are in proportion: of the peening time and of the simulated time, each step has its share.
+    So the dents of all steps together are those of a short piece of the whole treatment.
+
+    Args:
+        design: values of the design with all steps.
+        number: position of the step.
+    """
+    step, share = steps[number], steps[number].time_share / sum(one.time_share for one in steps)
+    found = {**design, "steps": (), "tolerances": None}
+    for name, change in step.changes.items():
+        found[name] = None if change == NONE else change
+        if name not in ("holder", "mask", "sonotrodes"):
+            found[name] = {**_not_replaced(design[name], change), **change}
+    accuracy = design["process"]["accuracy"]
+    found["process"] = {
+        **design["process"],
+        "treatment_time_s": share * design["process"]["treatment_time_s"],
+        "accuracy": {**accuracy, "simulated_time_s": share * accuracy["simulated_time_s"]},
+    }
+    return found
+
+
+def _not_replaced(table: Mapping[str, Any], change: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the keys of a table in whose place a change has none."""
+    replaced = {key for pair in EITHER_OR for key in pair if not set(pair).isdisjoint(change)}
+    if change.get("shape", table.get("shape")) != table.get("shape"):
+        replaced |= set(table) - {"shape"}  # each shape has keys of its own
+    return {key: one for key, one in table.items() if key not in replaced}
