@@ -84,6 +84,9 @@ class Chamber:
     fitting: np.ndarray | None = None
     shape_sha256: str = ""  # of the Python file that a user's own shape was run from
     fixtures: dict[str, Fixture] = field(default_factory=dict)  # "holder" and "mask", if any
+    # The chambers of all steps of a design with steps. The chamber then is that of the first step,
+    # but for the area that is exposed in any of them.
+    steps: tuple[Chamber, ...] = ()
 
     @property
     def height(self) -> float:
@@ -130,6 +133,9 @@ class Chamber:
 def build_chamber(design: Design, target: np.ndarray | None = None) -> Chamber:
     """Build and return the chamber of a design.
 
+    With steps it is the chamber of the first step, which holds those of all steps. Its exposed area
+    is, on each triangle, that of the step that exposes most of it.
+
     Args:
         target: part triangles to cover, (m,) bool, in place of the design's own choice. A study
             keeps the target of its start.
@@ -138,6 +144,41 @@ def build_chamber(design: Design, target: np.ndarray | None = None) -> Chamber:
             sonotrode, no target triangle faces the shot, there is no room over the sonotrode, or
             the holder or the mask is out of place.
     """
+    if not design.steps:
+        chamber = _build_one(design, target)
+    else:
+        names = list(design.in_steps)
+        steps = [_build_step(name, one, target) for name, one in design.in_steps.items()]
+        in_any = np.any([one.part.target for one in steps], axis=0)  # some may reach less of it
+        steps = [replace(one, part=replace(one.part, target=in_any)) for one in steps]
+        of_all = set.intersection(*(set(one.notes) for one in steps))
+        notes = (
+            note if note in of_all else f"step {name}: {note}"
+            for name, one in zip(names, steps, strict=True)
+            for note in one.notes
+        )
+        chamber = replace(
+            steps[0],
+            exposed_area=np.max([one.exposed_area for one in steps], axis=0),
+            notes=tuple(dict.fromkeys(notes)),
+            steps=tuple(steps),
+        )
+    _refuse_hidden_zones(chamber.part, chamber.exposed_area)
+    return replace(chamber, notes=(*chamber.notes, *_hidden_notes(chamber)))
+
+
+def _build_step(name: str, design: Design, target: np.ndarray | None) -> Chamber:
+    """Build the chamber of one step. Raise InputError, which names the step, if that fails."""
+    try:
+        return _build_one(design, target)
+    except SurfaceError as error:
+        raise SurfaceError(f"step {name}: {error}", error.corners, error.edges) from None
+    except InputError as error:
+        raise InputError(f"step {name}: {error}") from None
+
+
+def _build_one(design: Design, target: np.ndarray | None) -> Chamber:
+    """Build the chamber of a design without steps, with no notes on what is outside it."""
     part, notes = posed_part(design)
     deflectors = read_deflectors(design)
     part = part if target is None else replace(part, target=target)
@@ -194,14 +235,13 @@ def build_chamber(design: Design, target: np.ndarray | None = None) -> Chamber:
         text = f"part.target: none of its {int(part.target.sum())} triangles bounds the cavity, so "
         turn = "" if is_drawn else "check part.rotate_deg (which side faces the sonotrode); "
         raise _misplaced(part, shape, f"{text}no shot reaches it; {turn}{_where_to_look(is_drawn)}")
-    _refuse_hidden_zones(part, exposed)
     notes += [*room_notes, *_notes_on_rounding(room, traced, bodies)]
     volume = float(tetrahedron_volumes(room.vertices, room.triangles).sum())
     surface = room.vertices, room.triangles, traced.tags, traced.source
     origin = tuple(notes), traced.fitting, design.chamber.sha256
     chamber = Chamber(*surface, volume, part, exposed, *origin, fixtures)
     _refuse_idle_bore(design, chamber)
-    return replace(chamber, notes=(*notes, *_holding_notes(chamber), *_hidden_notes(chamber)))
+    return replace(chamber, notes=(*notes, *_holding_notes(chamber)))
 
 
 def _misplaced(part: Part, shape: ShapeSurface, text: str) -> SurfaceError:

@@ -19,3 +19,15 @@ def replica_seed(seed: int, replica: int, stream: str = "search") -> int:
         raise ValueError(f"stream {stream!r}: one of {', '.join(STREAMS)}")
     digest = hashlib.sha256(f"chamberopt/{stream}/{seed}/{replica}".encode()).digest()
     return int.from_bytes(digest[:16], "big")
+
+
+def step_seed(seed: int, step: int) -> int:
+    """Return the random seed, 128 bits, of one step of a replica with this seed.
+
+    The first step, number 0, has the seed of the replica.
+    """
+    if not step:
+        return seed
+    return int.from_bytes(
+        hashlib.sha256(f"chamberopt/step/{seed}/{step}".encode()).digest()[:16], "big"
+    )

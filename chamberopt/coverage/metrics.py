@@ -2,8 +2,8 @@
 
 A new metric is an entry of `METRICS`, and a new objective is an entry of `OBJECTIVES`. Study files,
 tables, reports and result folders take names, units and ranges from `find_metric`. The metrics of
-`METRICS` are over the target, and "ZONE.mean_coverage" is the same metric over a zone of the
-design. A design may lack some metrics: `metric_problem` gives the reason.
+`METRICS` are over the target, "ZONE.mean_coverage" is the same metric over a zone of the design,
+and "steps.STEP.mean_coverage" is the same metric after one of its steps alone. A design may lack some metrics: `metric_problem` gives the reason.
 """
 
 from __future__ import annotations
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 FULL_COVERAGE = 0.98  # SAE J2277: coverage that counts as complete
 NEVER = 1e6  # s: eleven days of peening stand for never
 P05 = 0.05  # share of the target's area that may be covered less than p05_coverage
+STEPS = "steps"
 P95 = 0.95  # share of the target's area that may be covered less than p95_coverage
 
 
@@ -238,16 +239,31 @@ METRICS = {
 }
 
 
+# What a strip tells, which is peened in one step.
+OF_STRIP = frozenset(
+    name
+    for name in METRICS
+    if name.startswith(("strength_", "almen_", "intensity_", "saturation_"))
+)
+
+
 def find_metric(name: str) -> Metric | None:
-    """Return the metric with a name such as "mean_coverage" or "ZONE.mean_coverage", or None."""
-    zone, _, of_target = name.rpartition(".")
+    """Return the metric with a name such as "mean_coverage", "ZONE.mean_coverage" or
+    "steps.STEP.mean_coverage", or None.
+    """
+    surface, _, of_target = name.rpartition(".")
     metric = METRICS.get(of_target)
-    if metric is None or not zone:
+    if metric is None or not surface:
         return METRICS.get(name)
-    if not (zone.isidentifier() and metric.of_zones):
+    step = surface.removeprefix(f"{STEPS}.")
+    if not (step.isidentifier() and metric.of_zones):
         return None
-    of_target, of_zone = metric.summary, metric.summary.replace("the target", f"zone {zone}")
-    summary = of_zone if of_zone != of_target else f"{of_target}, zone {zone}"
+    of_target = metric.summary
+    if step != surface:
+        summary = f"{of_target}, step {step} alone"
+    else:
+        of_zone = of_target.replace("the target", f"zone {surface}")
+        summary = of_zone if of_zone != of_target else f"{of_target}, zone {surface}"
     return replace(metric, name=name, summary=summary, required=False)
 
 
@@ -268,6 +284,12 @@ def metric_problem(design: Design, name: str) -> str:
             return ""
         return f"not a metric; {toml_errors.did_you_mean(name, METRICS)}"
     zone, zones = name.rpartition(".")[0], [one.name for one in design.zones]
+    if zone.startswith(f"{STEPS}."):
+        steps = [one.name for one in design.steps or ()]
+        if (step := zone.removeprefix(f"{STEPS}.")) not in steps:
+            hint = toml_errors.did_you_mean(step, steps) if steps else "add it as [[steps]]"
+            return f"the design has no step {step!r}; {hint}"
+        return metric.lacking(design) if metric.lacking else ""
     if zone and zone not in zones:
         hint = toml_errors.did_you_mean(zone, zones) if zones else "add it as [[zones]]"
         return f"the design has no zone {zone!r}; {hint}"
@@ -277,7 +299,11 @@ def metric_problem(design: Design, name: str) -> str:
 def metric_names(design: Design) -> tuple[str, ...]:
     """Return the names of all metrics of a design. The metrics of its zones come last."""
     of_target = tuple(name for name in METRICS if not metric_problem(design, name))
-    of_zones = (f"{zone.name}.{name}" for zone in design.zones for name in of_target)
+    surfaces = (
+        *(zone.name for zone in design.zones),
+        *(f"{STEPS}.{step.name}" for step in design.steps or ()),
+    )
+    of_zones = (f"{one}.{name}" for one in surfaces for name in of_target)
     return (*of_target, *(name for name in of_zones if find_metric(name)))
 
 

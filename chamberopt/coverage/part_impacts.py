@@ -6,7 +6,7 @@ An impact takes 32 bytes in this form, and about 100 bytes in the simulator's lo
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,10 +16,11 @@ from chamberopt.common.errors import InputError
 from chamberopt.common.limits import MAX_NUMBER
 from chamberopt.common.npz_files import UNREADABLE, read_arrays, save_arrays
 from chamberopt.coverage.dents import ball_diameters, dent_diameters, impact_angle_deg
-from chamberopt.geometry.triangles import closest_on_each
+from chamberopt.geometry.triangles import closest_on_each, interpolate
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
+    from chamberopt.chamber.part import Part
     from chamberopt.design.load import Design
     from sim_core import ImpactLog
 
@@ -104,6 +105,20 @@ def hits_on_part(impacts: ImpactLog, chamber: Chamber, design: Design) -> Hits:
     )
 
 
+def join_hits(hits: Sequence[Hits]) -> Hits:
+    """Return impacts together, one after another."""
+    return Hits(
+        *(np.concatenate([getattr(one, column.name) for one in hits]) for column in fields(Hits))
+    )
+
+
+def in_pose_of(hits: Hits, part: Part, other: Part) -> Hits:
+    """Return impacts on a part at their places on the same part in another pose."""
+    corners, there = (one.vertices[one.triangles[hits.triangle]] for one in (part, other))
+    place = interpolate(there, corners, hits.place.astype(float))
+    return replace(hits, place=place.astype(np.float32))
+
+
 def sort_hits_by_triangle(hits: Sequence[Hits], triangles: int) -> HitsByTriangle:
     """Return the impacts of several replicas together, in the order of the part triangles that they
     hit.
@@ -111,9 +126,7 @@ def sort_hits_by_triangle(hits: Sequence[Hits], triangles: int) -> HitsByTriangl
     Args:
         triangles: number of triangles of the part.
     """
-    together = Hits(
-        *(np.concatenate([getattr(one, column.name) for one in hits]) for column in fields(Hits))
-    )
+    together = join_hits(hits)
     first = np.concatenate([[0], np.cumsum(np.bincount(together.triangle, minlength=triangles))])
     return HitsByTriangle(first, together.select(np.argsort(together.triangle, kind="stable")))
 

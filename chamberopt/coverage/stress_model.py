@@ -64,7 +64,8 @@ def stress_model(design: Design) -> StressModel | None:
     height = asked.thickness_mm
     plate = None if height is None else Plate(1e-3 * height, asked.peened)
     factors = law_factors(design)
-    balls = tuple(diameter for diameter, _ in design.shot.sizes)
+    steps = design.in_steps.values()
+    balls = tuple(dict.fromkeys(ball for one in steps for ball, _ in one.shot.sizes))
     return StressModel(metal, part, balls, design.shot.density, plate, factors)
 
 

@@ -78,10 +78,10 @@ class Design(FileTable, ShownInNotebook):
     mask: Mask | None = Field(default=None, description="what keeps the shot from faces")
     effects: Effects = Field(default_factory=Effects)
     process: Process
-    steps: Annotated[Several[Step], Field(max_length=MAX_STEPS)] = list_field(
+    steps: Annotated[Several[Step], Field(max_length=MAX_STEPS)] | None = list_field(
         f"a list of 2 to {MAX_STEPS} tables, [[steps]]",
         "poses, charges or chambers in which the part is peened one after another",
-        (),
+        None,
     )
     calibration: CalibrationField = None
     tolerances: dict[str, Tolerance] | None = Field(
@@ -139,6 +139,15 @@ class Design(FileTable, ShownInNotebook):
             )
             for k, step in enumerate(self.steps)
         }
+
+    @property
+    def has_like_steps(self) -> bool:
+        """True if all steps throw balls of the same sizes with the same sonotrodes."""
+        like = {
+            (tuple(size for size, _ in one.shot.sizes), one.sonotrode, one.sonotrodes)
+            for one in self.in_steps.values()
+        }
+        return len(like) == 1
 
     def require_one_step(self, what: str) -> None:
         """Raise InputError if the design has steps, for a command that cannot take them.
@@ -202,7 +211,7 @@ class Design(FileTable, ShownInNotebook):
         if self.tolerances:
             yield from tolerance_problems(self, dict(toml_errors.numeric_fields(self)))
         yield from zone_problems(self.zones, self.calibration)
-        yield from step_problems(self.steps)
+        yield from step_problems(self.steps or ())
         yield from calibration_problems(self)
         yield from flexure_problems(self)
         yield from stress_problems(self)
@@ -276,10 +285,12 @@ class Design(FileTable, ShownInNotebook):
     def _numeric_fields(self) -> Iterator[tuple[str, FieldInfo]]:
         """Yield the dotted name and the field of every number, also of those that steps change."""
         yield from toml_errors.numeric_fields(self)
-        for k, one in enumerate(self.in_steps.values() if self.steps else ()):
+        for k, (step, one) in enumerate(
+            zip(self.steps or (), self.in_steps.values(), strict=False)
+        ):
             changed = {
                 f"{table}.{key}"
-                for table, change in self.steps[k].changes.items()
+                for table, change in step.changes.items()
                 if isinstance(change, dict)
                 for key in change
             }
@@ -397,7 +408,9 @@ def _with_checked_steps(design: Design, context: Mapping[str, object] | None) ->
     for k, step in enumerate(design.steps):
         own = values_in_step(values, design.steps, k)
         try:
-            checked.append(step.with_values(Design.model_validate(own, context=context).model_dump()))
+            checked.append(
+                step.with_values(Design.model_validate(own, context=context).model_dump())
+            )
         except ValidationError as error:
             found = toml_errors.explain_validation_error(error, design_class(own, context))
             problems += (Problem(f"steps.{k}.{one.field}", one.text) for one in found)

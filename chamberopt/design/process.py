@@ -156,7 +156,9 @@ class Step(FileTable):
         """What the step changes in the design, by the name of the table."""
         tables = ((name, getattr(self, name)) for name in type(self).model_fields)
         return {
-            name: one for name, one in tables if one is not None and name not in ("name", "time_share")
+            name: one
+            for name, one in tables
+            if one is not None and name not in ("name", "time_share")
         }
 
     def with_values(self, design: Mapping[str, Any]) -> "Step":
@@ -177,7 +179,7 @@ class Step(FileTable):
 
 def step_problems(steps: Sequence[Step]) -> Iterator[Problem]:
     """Yield a problem if there is one step only, it changes the design, or names are alike."""
-    if len(steps) == 1:
+    if len(steps) == 1:  # an empty list in a file is as none
         yield Problem("steps", "given one step; give two or more, or leave it out")
     names = [step.name for step in steps]
     for k, step in enumerate(steps):
@@ -200,7 +202,7 @@ def values_in_step(design: Mapping[str, Any], steps: Sequence[Step], number: int
         number: position of the step.
     """
     step, share = steps[number], steps[number].time_share / sum(one.time_share for one in steps)
-    found = {**design, "steps": (), "tolerances": None}
+    found = {**design, "steps": None, "tolerances": None}
     for name, change in step.changes.items():
         found[name] = None if change == NONE else change
         if name not in ("holder", "mask", "sonotrodes"):

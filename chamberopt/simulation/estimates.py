@@ -42,6 +42,7 @@ from chamberopt.coverage.field.surface_points import CERTAIN, RULE_OF_THREE, Rea
 from chamberopt.coverage.field.target_field import Gauge, TargetField
 from chamberopt.coverage.metrics import (
     METRICS,
+    OF_STRIP,
     P05,
     ObjectiveFunction,
     exposed_target,
@@ -61,6 +62,7 @@ if TYPE_CHECKING:
     from chamberopt.design.load import Design
 
 
+OF_EACH_STEP = "of each step"
 SHARES = frozenset({"mean_coverage", "std_coverage", "p05_coverage", "p95_coverage"})
 
 
@@ -153,6 +155,17 @@ def estimate_zones(
                 "lower process.accuracy.gauge_mm2, and simulate longer, to see differences in it"
             )
     return metrics, tuple(notes)
+
+
+def told_of_each_step(metrics: Mapping[str, Estimate]) -> dict[str, Estimate]:
+    """Return metrics without those of intensity, for steps whose balls or amplitudes differ.
+
+    A strip is peened in one step, so that no strip has the intensity of such steps together.
+    """
+    return {
+        name: one.not_known(OF_EACH_STEP) if name.rpartition(".")[2] in OF_STRIP else one
+        for name, one in metrics.items()
+    }
 
 
 def raw_estimates(seen: SeenDents, design: Design) -> tuple[dict[str, Estimate], Resolution]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from concurrent.futures import Executor, ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -24,7 +24,14 @@ from chamberopt.coverage.field.target_field import (
     require_touchable_zones,
     require_wide_gauge,
 )
-from chamberopt.coverage.metrics import require_metrics, require_target, unit_of_objective
+from chamberopt.coverage.field.surface_points import StepRoom
+from chamberopt.coverage.metrics import (
+    STEPS,
+    find_metric,
+    require_metrics,
+    require_target,
+    unit_of_objective,
+)
 from chamberopt.coverage.stress_knowledge import edge_notes, stress_notes
 from chamberopt.simulation.effort import Effort
 from chamberopt.simulation.estimates import (
@@ -36,6 +43,7 @@ from chamberopt.simulation.estimates import (
     reach_notes,
     resolution_notes,
     strength_notes,
+    told_of_each_step,
 )
 from chamberopt.simulation.evaluation import Evaluation
 from chamberopt.simulation.replicas import (
@@ -49,7 +57,11 @@ from chamberopt.simulation.settling import first_half_excess, settling_notes
 from chamberopt.simulation.trapped_balls import trapped_notes, trapped_shares
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from chamberopt.chamber.build import Chamber
+    from chamberopt.common.estimate import Estimate
+    from chamberopt.coverage.field.surface_points import Rooms
     from chamberopt.coverage.part_impacts import Hits
     from chamberopt.design.load import Design
     from sim_core import AnalyticCavity, TriangleMesh
@@ -105,6 +117,14 @@ def evaluate(
             return found
 
 
+class SeenSurfaces(NamedTuple):
+    """The dents of all replicas: on the target, on each zone, and on the target in each step."""
+
+    target: SeenDents
+    zones: dict[str, SeenDents]
+    steps: list[SeenDents]
+
+
 @dataclass
 class _Run:
     """The simulation of one candidate design, to which replicas can be added."""
@@ -125,33 +145,71 @@ class _Run:
         self.step = self.effort.begin  # how many replicas the next look takes
         self.timings = {"simulate": 0.0, "coverage": 0.0}
         require_figures(design, chamber, mesh)
+        own = design.in_steps.items()
+        self.steps = [(*one, room) for one, room in zip(own, chamber.steps, strict=False)]
 
-        def see() -> tuple[SeenDents, dict[str, SeenDents]]:
+        def see() -> SeenSurfaces:
             target = self.known.target or prepare_target(design, chamber, mesh)
             self.known.target = target  # for more replicas of the candidate
             zones = zone_fields(design, chamber, mesh)
-            has_wide = self.plan.wide_windows
-            return SeenDents.none(target, has_wide), {
-                name: SeenDents.none(one, has_wide=False) for name, one in zones.items()
-            }
+            steps = [prepare_target(one, room, room.mesh) for _, one, room in self.steps]
+            return SeenSurfaces(
+                SeenDents.none(target, self.plan.wide_windows),
+                {name: SeenDents.none(one, has_wide=False) for name, one in zones.items()},
+                [SeenDents.none(one, has_wide=False) for one in steps],
+            )
 
         # The dents of a replica are looked at while others are simulated, so that no worker waits.
         beside = ThreadPoolExecutor(1)
         self.seen = beside.submit(see)
         beside.shutdown(wait=False)
 
-    def look(self) -> tuple[list[Hits], SeenDents, dict[str, SeenDents]]:
+    def look(self) -> tuple[list[Hits], SeenSurfaces]:
         """Locate the dents of new replicas in the windows in which dents are counted.
 
         Returns:
-            The impacts of each replica, the dents of all replicas on the target, and their dents on
-            each zone by its name.
+            The impacts of each replica, and the dents of all replicas.
         """
         hits = [replica.hits for replica in self.known.replicas]
-        target, zones = self.seen.result()
-        for one in (target, *zones.values()):
+        seen = self.seen.result()
+        for one in (seen.target, *seen.zones.values()):
             one.add(hits)
-        return hits, target, zones
+        for k, one in enumerate(seen.steps):
+            one.add(self.hits_in_step(k))
+        return hits, seen
+
+    def hits_in_step(self, step: int) -> list[Hits]:
+        """Return the impacts of each replica in one of the steps, in the pose of this step."""
+        return [replica.steps[step].hits for replica in self.known.replicas]
+
+    def estimate_steps(self, seen: Sequence[SeenDents]) -> dict[str, Estimate]:
+        """Return the metrics of the target in each step alone, by names as steps.NAME.strength_um.
+
+        Args:
+            seen: the dents on the target in each step.
+        """
+        metrics: dict[str, Estimate] = {}
+        for k, (name, design, chamber) in enumerate(self.steps):
+            found = estimate_metrics(seen[k], self.hits_in_step(k), chamber, design).metrics
+            of_step = {f"{STEPS}.{name}.{figure}": one for figure, one in found.items()}
+            metrics |= {figure: one for figure, one in of_step.items() if find_metric(figure)}
+        return metrics
+
+    def ball_notes(self) -> tuple[dict[str, float], tuple[str, ...]]:
+        """Return shares of trapped balls, and notes on balls that are trapped or at rest.
+
+        With steps, the shares are those of the step in which most balls are held in gaps.
+        """
+        replicas, found, notes = self.known.replicas, [], []
+        for k, (name, design) in enumerate(self.design.in_steps.items()):
+            own = [one.steps[k] if one.steps else one for one in replicas]
+            found.append(trapped_shares([one.trapped for one in own]))
+            said = (
+                *trapped_notes([one.trapped for one in own], design),
+                *resting_notes([one.resting for one in own if one.resting], len(own)),
+            )
+            notes += [f"step {name}: {note}" if name else note for note in said]
+        return max(found, key=lambda shares: shares.get("rattling_impacts", 0.0)), tuple(notes)
 
     def look_after_more(self, progress: Progress | None) -> Evaluation:
         """Add the replicas of the next step, and return the evaluation of all replicas.
@@ -168,10 +226,15 @@ class _Run:
                 progress(len(replicas), count, None)
             self.look()
         simulated = time.perf_counter()
-        hits, target, zones = self.look()
+        hits, seen = self.look()
+        target = seen.target
         found = estimate_metrics(target, hits, self.chamber, design)
-        of_zones, zone_notes = estimate_zones(zones, hits, self.chamber, design)
+        of_zones, zone_notes = estimate_zones(seen.zones, hits, self.chamber, design)
         metrics = found.metrics | of_zones
+        if not design.has_like_steps:
+            metrics = told_of_each_step(metrics)
+        metrics |= self.estimate_steps(seen.steps)
+        trapped, ball_notes = self.ball_notes()
         objective = objective_estimate(plan.objective_name, metrics, design)
         self.timings["simulate"] += simulated - began
         self.timings["coverage"] += time.perf_counter() - simulated
@@ -200,8 +263,7 @@ class _Run:
             },
             notes=(  # the most important first
                 *settling_notes(excess, design),
-                *trapped_notes([one.trapped for one in replicas], design),
-                *resting_notes([one.resting for one in replicas if one.resting], done),
+                *ball_notes,
                 *((self.step.note,) if self.step.note else ()),
                 *resolution_notes(found.resolution),
                 *strength_notes(found.metrics, found.resolution),
@@ -215,11 +277,15 @@ class _Run:
                 *((cavity_note(self.cavity),) if self.cavity else ()),
                 *_symmetry_note(field.alike),
             ),
-            zones={name: one.field.reachable for name, one in zones.items()},
+            zones={name: one.field.reachable for name, one in seen.zones.items()},
+            steps={
+                name: one.field.reachable
+                for (name, _, _), one in zip(self.steps, seen.steps, strict=True)
+            },
             stream=plan.stream,
             stopped_by=self.step.stopped_by or "replicas",
             analytic=self.cavity is not None,
-            trapped=trapped_shares([one.trapped for one in replicas]),
+            trapped=trapped,
             first_half_excess=None if excess is None else excess.value,
         )
 
@@ -232,7 +298,7 @@ def require_figures(design: Design, chamber: Chamber, mesh: TriangleMesh) -> Non
     """
     window = window_setting(design, chamber)
     require_narrow_gauge(chamber, window)
-    require_touchable_zones(chamber, mesh, 0.5 * window.ball)
+    require_touchable_zones(chamber, rooms_of(design, chamber, mesh), 0.5 * window.ball)
 
 
 def prepare_target(design: Design, chamber: Chamber, mesh: TriangleMesh) -> TargetField:
@@ -240,7 +306,24 @@ def prepare_target(design: Design, chamber: Chamber, mesh: TriangleMesh) -> Targ
 
     Raises InputError if no triangle of the target bounds the cavity, or windows are too small.
     """
-    return find_target_field(chamber, mesh, window_setting(design, chamber))
+    return find_target_field(
+        chamber, rooms_of(design, chamber, mesh), window_setting(design, chamber)
+    )
+
+
+def rooms_of(design: Design, chamber: Chamber, mesh: TriangleMesh) -> Rooms:
+    """Return the surface of a chamber; for a design with steps, the rooms of the balls in all."""
+    if not chamber.steps:
+        return mesh
+    rooms, first = [], chamber.part.file
+    for one, own in zip(design.in_steps.values(), chamber.steps, strict=True):
+        pose = own.part.file
+        assert first is not None
+        assert pose is not None
+        turn = pose.rotation @ first.rotation.T
+        shift = pose.shift - turn @ first.shift
+        rooms.append(StepRoom(own.mesh, 0.5 * min(one.shot.diameters), turn, shift))
+    return tuple(rooms)
 
 
 def zone_fields(design: Design, chamber: Chamber, mesh: TriangleMesh) -> dict[str, TargetField]:
@@ -262,26 +345,31 @@ def window_setting(design: Design, chamber: Chamber) -> WindowSetting:
         InputError: no triangle of the target bounds the cavity, or the windows are too small.
     """
     require_target(chamber)
-    design = design.simulated
+    steps = [one.simulated for one in design.in_steps.values()]
+    accuracy = design.process.accuracy
+    setting = WindowSetting(
+        gauge=accuracy.gauge,
+        points=accuracy.points,
+        ball=min(min(one.shot.diameters) for one in steps),
+        largest_dent=max(map(_largest_dent, steps)),
+        symmetric=design.effects.part_turn is None
+        and not design.steps
+        and not design.sonotrodes
+        and design.sonotrode.is_centred,
+    )
+    require_wide_gauge(chamber, setting)
+    return setting
+
+
+def _largest_dent(design: Design) -> float:
+    """Return the diameter of the largest dent [m] for which windows are prepared."""
     material, shot = design.materials.part, design.shot
     faces = (design.sonotrode, *design.sonotrodes)
     fastest = max(one.peak_speed * one.largest_share for one in faces) * MAX_SPEED
     fastest = max(fastest, 2.0 * material.yield_speed)
     # With a table of restitution a slower impact may leave a wider dent than the fastest.
     speeds = np.linspace(0.0, fastest, SPEEDS)
-    dents = dent_diameter(speeds, max(shot.diameters), shot.density, material)
-    accuracy = design.process.accuracy
-    setting = WindowSetting(
-        gauge=accuracy.gauge,
-        points=accuracy.points,
-        ball=min(shot.diameters),
-        largest_dent=float(dents.max()),
-        symmetric=design.effects.part_turn is None
-        and not design.sonotrodes
-        and design.sonotrode.is_centred,
-    )
-    require_wide_gauge(chamber, setting)
-    return setting
+    return float(dent_diameter(speeds, max(shot.diameters), shot.density, material).max())
 
 
 def _symmetry_note(alike: int) -> tuple[str, ...]:

@@ -46,6 +46,8 @@ class Evaluation:
     alike: int = 1
     # Share of each zone that a ball can touch, by its name.
     zones: dict[str, float] = field(default_factory=dict)
+    # Share of the target that a ball can touch in each step, by its name; of no steps without.
+    steps: dict[str, float] = field(default_factory=dict)
     # Shares of hopping and of rattling balls, by the names in trapped_balls.py. Empty if they are
     # not known.
     trapped: dict[str, float] = field(default_factory=dict)

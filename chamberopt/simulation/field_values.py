@@ -46,7 +46,7 @@ from chamberopt.coverage.stress_profile import (
     surface_profile,
 )
 from chamberopt.design.calibration import calibrated_strip
-from chamberopt.simulation.evaluate import prepare_target, zone_fields
+from chamberopt.simulation.evaluate import prepare_target, rooms_of, zone_fields
 from chamberopt.simulation.evaluation import require_triangles
 from chamberopt.simulation.time_curve import coverage_against_time
 from sim_core import TriangleMesh, closest_points
@@ -98,7 +98,8 @@ class PartField:
         self._design, self._chamber = design, chamber
         self._mesh = chamber_mesh(chamber)
         self.target = prepare_target(design, chamber, self._mesh)
-        self.field = with_whole_part(self.target, chamber, self._mesh)
+        self._rooms = rooms_of(design, chamber, self._mesh)
+        self.field = with_whole_part(self.target, chamber, self._rooms)
         self._hits = evaluation.hits
         self._in_sector = [self.field.in_sector(hits) for hits in self._hits]
         self._located = [locate_dents(self.field, hits) for hits in self._in_sector]
@@ -109,7 +110,7 @@ class PartField:
     def reachable(self, places: Places) -> np.ndarray:
         """Return for each point of the surface whether the smallest ball fits there, (p,) bool."""
         return ball_fits(
-            self._mesh, places.place, places.normal, 0.5 * min(self._design.shot.diameters)
+            self._rooms, places.place, places.normal, 0.5 * min(self._design.shot.diameters)
         )
 
     def coverage(self, places: Places) -> np.ndarray:

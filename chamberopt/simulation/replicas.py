@@ -13,14 +13,14 @@ import numpy as np
 from chamberopt.chamber.analytic import impacts_on_chamber
 from chamberopt.chamber.flexure import flexure_of_surfaces
 from chamberopt.chamber.part import turning_axis
-from chamberopt.chamber.replica_seed import replica_seed
+from chamberopt.chamber.replica_seed import replica_seed, step_seed
 from chamberopt.chamber.scene import build_scene
 from chamberopt.common.errors import WorkerLostError
 from chamberopt.common.executor import share
-from chamberopt.coverage.part_impacts import Hits, hits_on_part
+from chamberopt.coverage.part_impacts import Hits, hits_on_part, in_pose_of, join_hits
 from chamberopt.simulation.resting_balls import RestingBalls, find_resting_balls
 from chamberopt.simulation.settling import dented_halves
-from chamberopt.simulation.trapped_balls import TrappedBalls, find_trapped_balls
+from chamberopt.simulation.trapped_balls import NOT_TRAPPED, TrappedBalls, find_trapped_balls
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
@@ -51,6 +51,9 @@ class Replica:
     hits: Hits
     # What was dented on the target in its two halves, as of `dented_halves`; None if not known.
     halves: tuple[float, float] | None = None
+    # Of each step of a design with steps, with hits in the step's own pose. Those of the replica
+    # then are of all steps together, in the pose of the first.
+    steps: tuple[Replica, ...] = ()
 
 
 @dataclass
@@ -132,8 +135,43 @@ def _result(number: int, future: Future[T]) -> T:
 
 
 def simulate_replica(setting: ReplicaSetting, seed: int) -> Replica:
-    """Simulate one replica with this seed, and return its balls and its impacts on the part."""
-    return replica_of(setting, simulate_seed(*setting, seed))
+    """Simulate one replica with this seed, and return its balls and its impacts on the part.
+
+    With steps, each step is simulated from a start of its own, for its share of the time.
+    """
+    design, chamber, _ = setting
+    if not chamber.steps:
+        return replica_of(setting, simulate_seed(*setting, seed))
+    own = zip(design.in_steps.values(), chamber.steps, strict=True)
+    return _joined(
+        [
+            simulate_replica(ReplicaSetting(one, room, room.mesh), step_seed(seed, k))
+            for k, (one, room) in enumerate(own)
+        ],
+        chamber,
+    )
+
+
+def _joined(steps: Sequence[Replica], chamber: Chamber) -> Replica:
+    """Return the replicas of all steps as one, with impacts in the part's pose in the first.
+
+    Balls that are at rest or trapped are told of each step.
+    """
+    halves = [one.halves for one in steps if one.halves is not None]
+    hits = [
+        in_pose_of(one.hits, room.part, chamber.part)
+        for one, room in zip(steps, chamber.steps, strict=True)
+    ]
+    return Replica(
+        collisions={
+            kind: sum(one.collisions[kind] for one in steps) for kind in steps[0].collisions
+        },
+        resting=None,
+        trapped=NOT_TRAPPED,
+        hits=join_hits(hits),
+        halves=(sum(one for one, _ in halves), sum(two for _, two in halves)) if halves else None,
+        steps=tuple(steps),
+    )
 
 
 def replica_of(setting: ReplicaSetting, result: SimulationResult) -> Replica:

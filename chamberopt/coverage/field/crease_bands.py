@@ -10,9 +10,9 @@ from chamberopt.coverage.field.surface_points import ball_fits
 from chamberopt.geometry.triangles import count_up
 
 if TYPE_CHECKING:
+    from chamberopt.coverage.field.surface_points import Rooms
     from chamberopt.coverage.field.smooth_faces import Creases, Places
     from chamberopt.coverage.field.windows import Windows
-    from sim_core import TriangleMesh
 
 # Length of a window along a crease, in radii of a window. A dent takes a larger share of a line
 # than of an area, so windows along creases are longer to hold as many dents.
@@ -30,9 +30,7 @@ class CreasePieces(NamedTuple):
     length: np.ndarray
 
 
-def crease_pieces(
-    creases: Creases, mesh: TriangleMesh, ball_radius: float, radius: float
-) -> CreasePieces:
+def crease_pieces(creases: Creases, mesh: Rooms, ball_radius: float, radius: float) -> CreasePieces:
     """Divide creases into short pieces, and return the pieces that a ball can touch.
 
     Args:

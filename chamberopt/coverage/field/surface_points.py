@@ -16,6 +16,9 @@ from chamberopt.geometry.triangles import count_up, unit_normals
 if TYPE_CHECKING:
     from sim_core import TriangleMesh
 
+    Rooms = TriangleMesh | tuple["StepRoom", ...]
+    """The surface of the room of the balls; for a design with steps, the rooms of all of them."""
+
 PLASTIC_NUMBER = 1.32471795724474602596  # real root of x³ = x + 1
 SPARSE = 10
 ON_SURFACE = 1e-3  # ball radii from the surface within which a place counts as on it
@@ -123,19 +126,39 @@ def morton(places: np.ndarray) -> np.ndarray:
     return code
 
 
-def ball_fits(
-    mesh: TriangleMesh, place: np.ndarray, normal: np.ndarray, radius: float
-) -> np.ndarray:
+class StepRoom(NamedTuple):
+    """The cavity round a part in one of several steps, and the way there from the first step.
+
+    Attributes:
+        mesh: the surface of the cavity.
+        ball: radius of the smallest ball [m].
+        turn, shift: rotation (3, 3), then shift (3,) [m], of the part from its pose in the first.
+    """
+
+    mesh: TriangleMesh
+    ball: float
+    turn: np.ndarray
+    shift: np.ndarray
+
+
+def ball_fits(mesh: Rooms, place: np.ndarray, normal: np.ndarray, radius: float) -> np.ndarray:
     """Return for each point on the surface of the cavity whether a ball can touch it, (p,) bool.
 
     Args:
-        mesh: the surface of the cavity.
+        mesh: the surface of the cavity; or the cavities of several steps, each with its balls, of
+            which a ball must touch the point in one.
         place: the points [m], shape (p, 3). No ball fits at a point off the surface.
         normal: unit vectors into the cavity at the points, shape (p, 3).
-        radius: radius of the ball [m].
+        radius: radius of the ball [m]. Each of several steps has its own.
     """
     from sim_core import closest_points
 
+    if isinstance(mesh, tuple):
+        fits = np.zeros(len(place), dtype=bool)
+        for room in mesh:
+            at, out = place[~fits] @ room.turn.T + room.shift, normal[~fits] @ room.turn.T
+            fits[~fits] = ball_fits(room.mesh, at, out, room.ball)
+        return fits
     found = closest_points(mesh, place + radius * normal, radius * (1.0 + 1e-6))
     fits = (found.triangle >= 0) & (found.distance >= radius * (1.0 - TOLERATED_OVERLAP))
     # Another spot of the surface may be nearer, also to a place outside the cavity.

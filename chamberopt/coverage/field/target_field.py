@@ -34,12 +34,12 @@ from chamberopt.coverage.field.symmetry import TOLERANCE, Symmetry, find_symmetr
 from chamberopt.geometry.triangles import areas, unit_normals
 
 if TYPE_CHECKING:
+    from chamberopt.coverage.field.surface_points import Rooms
     from chamberopt.chamber.build import Chamber
     from chamberopt.coverage.field.smooth_faces import Places
     from chamberopt.coverage.field.window_areas import SurfacePieces
     from chamberopt.coverage.field.windows import Windows
     from chamberopt.coverage.part_impacts import Hits
-    from sim_core import TriangleMesh
 
 OF_WIDE = 0.125  # number of windows of twice the radius, which overlap more, over all windows
 # Area of all windows together [m²], or over the target's area, whichever is more. A few windows
@@ -272,7 +272,7 @@ def require_narrow_gauge(chamber: Chamber, setting: WindowSetting) -> None:
         )
 
 
-def require_touchable_zones(chamber: Chamber, mesh: TriangleMesh, ball: float) -> None:
+def require_touchable_zones(chamber: Chamber, mesh: Rooms, ball: float) -> None:
     """Raise InputError for a zone of the part that no ball with the radius `ball` [m] can touch.
 
     The test takes POINTS_OF_ZONE points of each zone. A zone of which a ball touches less than a
@@ -290,11 +290,11 @@ def require_touchable_zones(chamber: Chamber, mesh: TriangleMesh, ball: float) -
             )
 
 
-def find_target_field(chamber: Chamber, mesh: TriangleMesh, setting: WindowSetting) -> TargetField:
+def find_target_field(chamber: Chamber, mesh: Rooms, setting: WindowSetting) -> TargetField:
     """Return a chamber's target with all that is needed to measure coverage in windows on it.
 
     Args:
-        mesh: surface of the chamber.
+        mesh: surface of the chamber, or the rooms of all steps.
     """
     from chamberopt.coverage.field.window_areas import surface_pieces
 
@@ -305,7 +305,8 @@ def find_target_field(chamber: Chamber, mesh: TriangleMesh, setting: WindowSetti
     radius, corners = float(np.sqrt(gauge / np.pi)), part.vertices[part.triangles]
     ball = 0.5 * setting.ball
     touched, fits = _touched(chamber, mesh, area, face, setting)
-    symmetry = find_symmetry(chamber, mesh) if setting.symmetric else None
+    one_room = None if isinstance(mesh, tuple) or not setting.symmetric else mesh
+    symmetry = None if one_room is None else find_symmetry(chamber, one_room)
     longest = _longest_side(setting, float(area.sum()), MAX_PIECES)
     wanted = _near_windows(symmetry, part.target, corners, radius)
     surface = surface_pieces(part.corners_with_normals[wanted], face[wanted], mesh, ball, longest)
@@ -325,7 +326,7 @@ def find_target_field(chamber: Chamber, mesh: TriangleMesh, setting: WindowSetti
     )
 
 
-def with_whole_part(field: TargetField, chamber: Chamber, mesh: TriangleMesh) -> TargetField:
+def with_whole_part(field: TargetField, chamber: Chamber, mesh: Rooms) -> TargetField:
     """Return the field extended from the target to the rest of the part in the chamber, for
     pictures.
     """
@@ -370,7 +371,7 @@ def _longest_side(setting: WindowSetting, area: float, most: float) -> float:
 
 
 def _touched(
-    chamber: Chamber, mesh: TriangleMesh, area: np.ndarray, face: np.ndarray, setting: WindowSetting
+    chamber: Chamber, mesh: Rooms, area: np.ndarray, face: np.ndarray, setting: WindowSetting
 ) -> tuple[Places, np.ndarray]:
     """Return the points that a ball can touch, and marks of them among all points that were tried.
 

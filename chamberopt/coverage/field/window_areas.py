@@ -30,7 +30,7 @@ from chamberopt.geometry.triangles import unit_normals, unit_vectors
 from sim_core import jit
 
 if TYPE_CHECKING:
-    from sim_core import TriangleMesh
+    from chamberopt.coverage.field.surface_points import Rooms
 
 FINEST = 0.5  # share of the longest side, for pieces at the border of the touchable surface
 NEAR_CORNERS = 0.1  # share of the way from corner to middle where a piece is tested for a border
@@ -57,7 +57,7 @@ class SurfacePieces(NamedTuple):
 
 
 def surface_pieces(
-    corners: np.ndarray, face: np.ndarray, mesh: TriangleMesh, ball_radius: float, longest: float
+    corners: np.ndarray, face: np.ndarray, mesh: Rooms, ball_radius: float, longest: float
 ) -> SurfacePieces:
     """Divide triangles into pieces, and find the touchable share of each piece.
 
@@ -133,7 +133,7 @@ def _halved_until(
     )
 
 
-def _touched_share(places: np.ndarray, mesh: TriangleMesh, ball_radius: float) -> np.ndarray:
+def _touched_share(places: np.ndarray, mesh: Rooms, ball_radius: float) -> np.ndarray:
     """Return for each of n triangles the share of its k points that a ball can touch, (n,).
 
     Args:
