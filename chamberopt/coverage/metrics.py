@@ -3,7 +3,8 @@
 A new metric is an entry of `METRICS`, and a new objective is an entry of `OBJECTIVES`. Study files,
 tables, reports and result folders take names, units and ranges from `find_metric`. The metrics of
 `METRICS` are over the target, "ZONE.mean_coverage" is the same metric over a zone of the design,
-and "steps.STEP.mean_coverage" is the same metric after one of its steps alone. A design may lack some metrics: `metric_problem` gives the reason.
+and "steps.STEP.mean_coverage" is the same metric after one of its steps alone. A design may lack
+some metrics: `metric_problem` gives the reason.
 """
 
 from __future__ import annotations

@@ -337,8 +337,9 @@ def _usable(design: Design) -> Design:
     """Return the design without its calibration.
 
     Raises InputError if the design leaves the choice of its physical effects to a pilot run
-    ("auto"). A calibration needs the same effects in all simulations.
+    ("auto"), or has steps. A calibration needs the same effects in all simulations.
     """
+    design.require_one_step("a calibration")
     if design.effects.auto:
         text = 'effects: given "auto"; a calibration needs effects that stay: name them, as '
         raise InputError(f"{text}`chamberopt check --pilot` advises")

@@ -78,7 +78,11 @@ class RebuiltReplica:
 
 
 def rebuild_chamber(result: Result) -> RebuiltChamber:
-    """Return the chamber of a result as it was simulated. Raise InputError if its file changed."""
+    """Return the chamber of a result as it was simulated.
+
+    Raises InputError if its file changed, or the design has steps, each with its own chamber.
+    """
+    result.design.require_one_step("simulating a result again")
     chamber = load_chamber(result)
     return RebuiltChamber(
         chamber, analytic_cavity(result.design, chamber) if result.record.analytic else None

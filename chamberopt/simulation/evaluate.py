@@ -16,6 +16,7 @@ from chamberopt.chamber.scene import chamber_mesh
 from chamberopt.common.executor import share
 from chamberopt.common.progress import Progress
 from chamberopt.coverage.dents import dent_diameter
+from chamberopt.coverage.field.surface_points import StepRoom
 from chamberopt.coverage.field.target_field import (
     TargetField,
     WindowSetting,
@@ -24,7 +25,6 @@ from chamberopt.coverage.field.target_field import (
     require_touchable_zones,
     require_wide_gauge,
 )
-from chamberopt.coverage.field.surface_points import StepRoom
 from chamberopt.coverage.metrics import (
     STEPS,
     find_metric,

@@ -143,7 +143,7 @@ def simulate_replica(setting: ReplicaSetting, seed: int) -> Replica:
     if not chamber.steps:
         return replica_of(setting, simulate_seed(*setting, seed))
     own = zip(design.in_steps.values(), chamber.steps, strict=True)
-    return _joined(
+    return join_steps(
         [
             simulate_replica(ReplicaSetting(one, room, room.mesh), step_seed(seed, k))
             for k, (one, room) in enumerate(own)
@@ -152,7 +152,7 @@ def simulate_replica(setting: ReplicaSetting, seed: int) -> Replica:
     )
 
 
-def _joined(steps: Sequence[Replica], chamber: Chamber) -> Replica:
+def join_steps(steps: Sequence[Replica], chamber: Chamber) -> Replica:
     """Return the replicas of all steps as one, with impacts in the part's pose in the first.
 
     Balls that are at rest or trapped are told of each step.

@@ -38,11 +38,15 @@ if TYPE_CHECKING:
 def measure_accuracy(
     design: Design, budget_s: float, folder: Path, executor: Executor, teller: Teller
 ) -> ConvergenceStudy:
-    """Run a convergence study of about `budget_s` CPU seconds, and save it in an empty folder."""
+    """Run a convergence study of about `budget_s` CPU seconds, and save it in an empty folder.
+
+    Raises InputError for a design with steps.
+    """
 
     def compile_it(one: Design, chamber: Chamber) -> None:
         teller.compile(one, chamber, None)
 
+    design.require_one_step("a convergence study")
     teller.tell(describe_cost(budget_s))
     study = run_convergence_study(design, budget_s, executor, compile_it, teller.tell)
     with teller.step("writing and drawing"):

@@ -82,6 +82,8 @@ def read_candidates(
         if one.design.part.target.reachable:
             own = target if one.result is None else _target(one.result)
         if one.missing:
+            if one.result:
+                one.design.require_one_step("simulating a result again for another time")
             chamber = load_chamber(one.result) if one.result else build_chamber(one.design, own)
             own = chamber.part.target if one.design.part.target.reachable else None
         if own is not None:

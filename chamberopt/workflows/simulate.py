@@ -162,6 +162,8 @@ def simulate_design(
             too much memory.
     """
     warnings = None
+    if settings.analytic:
+        design.require_one_step("an exact cavity in place of the mesh")
     if chamber is None:
         with teller.step("building the chamber"):
             chamber = build_chamber(design)

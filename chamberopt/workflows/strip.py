@@ -48,6 +48,7 @@ def peen_strip_in(
     Returns:
         The peened strip, and the reasons for physical effects that the design left to the program.
     """
+    design.require_one_step("a virtual strip")
     with whole_or_nothing(folder):
         with teller.step("building the chamber"):
             if place.at == LID:

@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from chamberopt.chamber.build import NOTED_HIDDEN, hidden_share, selection_of
+from chamberopt.chamber.build import NOTED_HIDDEN, TARGET, hidden_share, selection_of
 from chamberopt.chamber.checks.calibration import calibration_warnings
 from chamberopt.chamber.checks.fillets import facet_warnings, fillet_warnings, touched_by_curvature
 from chamberopt.chamber.checks.gaps import (
+    MIN_MISSED_SHARE,
     find_ledges,
     gap_warnings,
     pocket_warnings,
@@ -58,6 +59,8 @@ def describe(design: Design, chamber: Chamber, reach: Reach | None = None) -> di
         InputError: there are too many balls, or the part cannot turn.
         sim_core.SceneError: the cavity is not closed; the message says where.
     """
+    if chamber.steps:
+        return _describe_steps(design, chamber)
     require_ball_count(design)
     reach = shot_reach(design, chamber) if reach is None else reach
     axis = turning_axis(design, chamber.part)
@@ -85,6 +88,37 @@ def describe(design: Design, chamber: Chamber, reach: Reach | None = None) -> di
         },
         "notes": notes(design, chamber),
         "warnings": warnings(design, chamber, reach),
+    }
+
+
+def _describe_steps(design: Design, chamber: Chamber) -> dict[str, Any]:
+    """Return facts and warnings about a design with steps, first those of its first step."""
+    steps = [*zip(design.in_steps.items(), chamber.steps, strict=True)]
+    found = {name: describe(one, room) for (name, one), room in steps}
+    first, told = found[steps[0][0][0]], {}
+    for (name, one), room in steps:
+        facts = found[name]
+        told[name] = {
+            "treatment_time_s": _rounded(one.process.treatment_time),
+            "recorded_s": _rounded(one.process.recorded_time),
+            "lowest_point_mm": facts["part"]["lowest_point_mm"],
+            "target_exposed_area_mm2": facts["target"]["exposed_area_mm2"],
+            "target_reachable_share": facts["reach"]["target_reachable_share"],
+            "free_volume_cm3": _rounded(room.volume * 1e6),
+            "balls": facts["shot"]["balls"],
+        }
+    accuracy, own = design.process.accuracy, len(found) * design.process.accuracy.warmup_time
+    replicas = first["replicas"] | {
+        "recorded_s": _rounded(design.process.recorded_time),
+        "simulated_s_in_all": _rounded(accuracy.replicas * (design.process.recorded_time + own)),
+    }
+    return {
+        **first,
+        **with_clearance(first_facts(design, chamber), chamber.mesh),
+        "replicas": replicas,
+        "steps": told,
+        "notes": notes(design, chamber),
+        "warnings": warnings(design, chamber),
     }
 
 
@@ -199,22 +233,58 @@ def warnings(design: Design, chamber: Chamber, reach: Reach | None = None) -> li
     Args:
         reach: the points of the surface that the shot reaches, if they are already known.
     """
+    if chamber.steps:
+        return _step_warnings(design, chamber)
     reach = shot_reach(design, chamber) if reach is None else reach
     texts = first_warnings(design, chamber, reach.mesh)
     for name, surface in _to_be_peened(design, chamber).items():
         texts += surface_warnings(reach, surface, name, design.part.target.reachable)
-    texts += facet_warnings(chamber.part, reach.diameter, _reached_share(reach, chamber.on_target))
+    return texts + _wall_warnings(design, chamber, reach)
+
+
+def _wall_warnings(design: Design, chamber: Chamber, reach: Reach) -> list[str]:
+    """Return warnings about facets, pockets, gaps and fillets, from where the shot reaches."""
+    texts = facet_warnings(chamber.part, reach.diameter, _reached_share(reach, chamber.on_target))
     texts += pocket_warnings(reach, chamber)
     turns = design.effects.part_turn is not None
     texts += gap_warnings(reach, chamber, design.shot.diameters, turns)
     return texts + fillet_warnings(reach, chamber, max(design.shot.diameters))
 
 
-def first_warnings(design: Design, chamber: Chamber, mesh: TriangleMesh) -> list[str]:
+def _step_warnings(design: Design, chamber: Chamber) -> list[str]:
+    """Return the warnings of each step, and one on what no ball can touch in any of them."""
+    texts, part = [], chamber.part
+    shares, balls = np.zeros(len(part.triangles)), set()
+    for (name, one), room in zip(design.in_steps.items(), chamber.steps, strict=True):
+        reach = shot_reach(one, room)
+        own = reached_part_share(reach, room.source, len(part.triangles))
+        shares = np.maximum(shares, own * room.exposed_area)
+        balls.add(f"{1e3 * reach.diameter:g}")
+        found = [*first_warnings(one, room, reach.mesh, False), *_wall_warnings(one, room, reach)]
+        texts += [f"step {name}: {text}" for text in found]
+    spared = {one.name for one in design.zones if one.is_spared}
+    wanted = {TARGET: part.target}
+    wanted |= {f"zone {name}": one for name, one in part.zones.items() if name not in spared}
+    for name, rows in wanted.items():
+        left, whole = float((part.area - shares)[rows].sum()), float(part.area[rows].sum())
+        if left > MIN_MISSED_SHARE * whole and not design.part.target.reachable:
+            texts.append(
+                f"{left / whole:.1%} of {name} ({mm2(left)}) cannot be touched by a ball of "
+                f"{' or '.join(sorted(balls))} mm in any step, however long it is peened: add a "
+                f"step in another pose, or narrow {selection_of(name)}"
+            )
+    return texts
+
+
+def first_warnings(
+    design: Design, chamber: Chamber, mesh: TriangleMesh, of_surfaces: bool = True
+) -> list[str]:
     """Return the warnings that do not depend on where the shot reaches the surface.
 
     Args:
         mesh: surface of the chamber.
+        of_surfaces: whether a target that is partly outside the chamber is warned of. One of
+            several steps need not have all of it inside.
     """
     shot, texts = design.shot, []
     filled = shot.volume / chamber.volume
@@ -228,7 +298,7 @@ def first_warnings(design: Design, chamber: Chamber, mesh: TriangleMesh) -> list
             f"shot.mass_g = {shot.mass_g:g} is rounded to {shot.count} whole ball(s) of "
             f"{shot.ball_mass * 1e6:.3g} mg: the charge differs by more than 5 %"
         )
-    for name, surface in _to_be_peened(design, chamber).items():
+    for name, surface in _to_be_peened(design, chamber).items() if of_surfaces else ():
         if (hidden := hidden_share(surface)) > MAX_HIDDEN_SHARE:
             texts.append(
                 f"{hidden:.0%} of the area of {name} is outside the chamber and counts as not "

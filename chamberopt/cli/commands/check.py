@@ -115,14 +115,22 @@ def draw_target(
 ) -> None:
     """Draw the part with its target, and mark triangles of the target that are out of reach.
 
+    With steps, the part stands as in the first, and what is marked is out of reach in all of them.
+
     Where the part is thin, further views show how soft it is.
     """
+    from chamberopt.chamber.checks.check import shot_reach
     from chamberopt.chamber.flexure import softness_of_part
     from chamberopt.chamber.reach import reached_part_share
     from chamberopt.pictures.part import draw_part
 
-    part = chamber.part
-    missed = part.target & (reached_part_share(reach, chamber.source, len(part.triangles)) <= 0.5)
+    part, missed = chamber.part, chamber.part.target
+    rooms = [(reach, chamber)]
+    if design is not None and chamber.steps:
+        steps = zip(design.in_steps.values(), chamber.steps, strict=True)
+        rooms = [(shot_reach(one, room), room) for one, room in steps]
+    for found, room in rooms:
+        missed = missed & (reached_part_share(found, room.source, len(part.triangles)) <= 0.5)
     corners = part.vertices[part.triangles]
     softness = None if design is None else softness_of_part(design, part)
     more = {"missed": missed, "softness": softness}

@@ -10,8 +10,8 @@ from chamberopt.coverage.field.surface_points import ball_fits
 from chamberopt.geometry.triangles import count_up
 
 if TYPE_CHECKING:
-    from chamberopt.coverage.field.surface_points import Rooms
     from chamberopt.coverage.field.smooth_faces import Creases, Places
+    from chamberopt.coverage.field.surface_points import Rooms
     from chamberopt.coverage.field.windows import Windows
 
 # Length of a window along a crease, in radii of a window. A dent takes a larger share of a line

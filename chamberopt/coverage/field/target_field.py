@@ -34,9 +34,9 @@ from chamberopt.coverage.field.symmetry import TOLERANCE, Symmetry, find_symmetr
 from chamberopt.geometry.triangles import areas, unit_normals
 
 if TYPE_CHECKING:
-    from chamberopt.coverage.field.surface_points import Rooms
     from chamberopt.chamber.build import Chamber
     from chamberopt.coverage.field.smooth_faces import Places
+    from chamberopt.coverage.field.surface_points import Rooms
     from chamberopt.coverage.field.window_areas import SurfacePieces
     from chamberopt.coverage.field.windows import Windows
     from chamberopt.coverage.part_impacts import Hits
