@@ -66,7 +66,7 @@ class Figure:
 def figures(result: Result, start: Result | None) -> list[Figure]:
     """Return the figures of a result: its objective, then its metrics.
 
-    Metrics of zones are left out, and so is a metric that is the objective itself.
+    Metrics of zones and of single steps are left out, and so is a metric that is the objective.
     """
     label = objective_label(result.objective_name)
     before = None if start is None else start.objective

@@ -111,7 +111,9 @@ class Fold:
 
 
 # Subjects of the sentences that qualify an answer, what changes the process most first.
-About: TypeAlias = Literal["process", "zone", "best", "start", "other", "calibration", "ranges"]
+About: TypeAlias = Literal[
+    "process", "step", "zone", "best", "start", "other", "calibration", "ranges"
+]
 Block: TypeAlias = Sentence | Items | Table | Chart | Tiles | TextFile | PartView | Beside | Fold
 
 

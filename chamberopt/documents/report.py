@@ -25,6 +25,7 @@ from chamberopt.documents.document import (
     values,
 )
 from chamberopt.documents.ranges import groups_text, range_section
+from chamberopt.documents.steps import steps_section
 from chamberopt.documents.stress import stress_section
 from chamberopt.documents.study import (
     front_section,
@@ -105,6 +106,7 @@ def report(result: Result) -> Document:
         search_section(result, trials) if study else None,
         influence_section(study, label) if study else None,
         coverage_section(shown, of, scenes),
+        steps_section(result),
         zones_section(result),
         stress_section(result, start),
         range_section(result),

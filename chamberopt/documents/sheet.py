@@ -23,6 +23,7 @@ from chamberopt.documents.coverage import figures
 from chamberopt.documents.document import Block, Document, Section, Sentence, Table
 from chamberopt.documents.ranges import groups_text, slow_end_is_late, time_at_slow_end
 from chamberopt.documents.report import limits_of_intervals, notes_of
+from chamberopt.documents.steps import turned
 from chamberopt.documents.study import exposed_target
 from chamberopt.documents.tolerances import sheet_rows
 from chamberopt.documents.wanted import wanted_lines, wanted_rows
@@ -259,6 +260,7 @@ def setting_tables(result: Result, built: AsBuilt) -> list[Table]:
         ("Chamber", _chamber(result, built.openings)),
         ("Sonotrode", _sonotrode(result, built.face_mm)),
         ("Shot", _shot(result)),
+        ("Steps", _steps(result)),
         ("Made with", _identity(result)),
         ("Peening, and what to expect", _expected(result)),
     ])  # fmt: skip
@@ -287,12 +289,7 @@ def _part(result: Result) -> Iterator[Row]:
     if result.design.chamber.shape == "imported":
         yield "pose", "as drawn with its chamber"
     else:
-        turns = [
-            f"{plain(angle)}° about {axis}"
-            for axis, angle in zip("xyz", part.rotate_deg, strict=True)
-            if angle
-        ]
-        yield "turned", ", then ".join(turns) or "as in its file"
+        yield "turned", turned(part.rotate_deg) or "as in its file"
         x, y = part.offset_mm
         yield "offset from the axis", f"x {plain(x)} mm, y {plain(y)} mm" if x or y else "none"
         text = f"{plain(result.design.chamber.sonotrode_distance_mm)} mm"
@@ -447,6 +444,13 @@ def _shot(result: Result) -> Iterator[Row]:
 def _weighed_g(result: Result) -> float:
     """Return the mass of the simulated balls together [g]. Their number is whole."""
     return 1e3 * result.design.shot.ball_mass * result.design.shot.count
+
+
+def _steps(result: Result) -> Iterator[Row]:
+    """Yield a row for each step; the drawing and the other tables are of the first."""
+    if result.design.steps:
+        yield "", "Drawing and tables are of the first step; the others differ from it:"
+    yield from (("", one.text) for one in answer_lines(result) if one.about == "step")
 
 
 def _expected(result: Result) -> Iterator[Row]:

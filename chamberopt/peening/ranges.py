@@ -130,7 +130,9 @@ def simulate_ends(
     if not groups:
         return None
     count = replicas or replicas_at_ends(whole.replicas, len(groups))
-    first = [Replica({}, None, NOT_TRAPPED, hits) for hits in whole.hits[:count]]
+    # What was hit in which step is not kept, so that a design with steps is simulated again.
+    kept = () if design.steps else whole.hits[:count]
+    first = [Replica({}, None, NOT_TRAPPED, hits) for hits in kept]
     plan = ReplicaPlan(count, whole.stream, whole.objective_name, wide_windows=False)
     cavity = analytic_cavity(design, chamber) if whole.analytic else None
     of_all = RunsProgress(progress, 2 * len(groups), ended=-1)  # the design itself takes none

@@ -418,6 +418,8 @@ class CandidateRecord(ResultRecord):
     objective: Objective
     metrics: dict[str, WholeEstimate]
     zones: list[ZoneRecord] = Field(default_factory=list)
+    # Share of the target that a ball can touch in each step, by its name; None without steps.
+    steps: dict[str, Share] | None = None
     field: FieldRecord
     coverage_against_time: list[CoverageAtTime]
     seed: Annotated[int, Field(ge=0, le=2**63 - 1)]

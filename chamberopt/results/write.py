@@ -201,6 +201,8 @@ def _write_candidate(folder: Path, candidate: CandidateResult, **more: Any) -> C
     target = exposed_target(chamber)
     if design.zones:
         more["zones"] = _about_zones(design, chamber, evaluation)
+    if evaluation.steps:
+        more["steps"] = evaluation.steps
     if design.stress:
         more["stress"] = _about_stress(design, candidate)
     if chamber.shape_sha256:
