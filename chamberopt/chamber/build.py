@@ -65,6 +65,7 @@ MAX_ROTATION = 1e-3
 MIN_ROOM = 1e-13  # [m³], a fifth of the smallest ball: less is rounding, and worth no note
 NOTED_HIDDEN = 1e-3  # share of a surface outside the cavity from which on it is told
 TARGET = "the target"
+OF_FIRST = "pictures and files show part and chamber as in the first"
 
 
 @dataclass(frozen=True)
@@ -160,7 +161,7 @@ def build_chamber(design: Design, target: np.ndarray | None = None) -> Chamber:
         chamber = replace(
             steps[0],
             exposed_area=np.max([one.exposed_area for one in steps], axis=0),
-            notes=tuple(dict.fromkeys(notes)),
+            notes=(*dict.fromkeys(notes), f"peened in steps, {', '.join(names)}: {OF_FIRST}"),
             steps=tuple(steps),
         )
     _refuse_hidden_zones(chamber.part, chamber.exposed_area)

@@ -458,7 +458,8 @@ def _expected(result: Result) -> Iterator[Row]:
 
     Without a calibration, a row says why there is no intensity in mmA.
     """
-    time = f"{plain(result.design.process.treatment_time)} s"
+    of_all = ", all steps together" if result.design.steps else ""
+    time = f"{plain(result.design.process.treatment_time)} s{of_all}"
     yield "peening time", _limited(result, "process.treatment_time_s", time)
     yield from wanted_rows(result)
     calibration = result.design.calibration

@@ -232,10 +232,10 @@ def _table(value: dict[str, object]) -> object:
 # Fields of the page: each number and choice of a design with unit, bounds and description.
 
 # Tables without fields: their numbers are measured, or chosen by clicks on the part, or mesh the
-# part, which would become another part.
+# part, which would become another part, or are of a step, as the page shows the first one.
 NOT_SHOWN = (
     "calibration.", "part.target.", "zones.", "tolerances.", "ranges.", "part.tessellation.",
-    "holder.at.", "mask.at.",
+    "holder.at.", "mask.at.", "steps.",
 )  # fmt: skip
 
 
