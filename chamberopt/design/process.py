@@ -11,6 +11,8 @@ from pydantic import Field
 
 from chamberopt.common.toml_errors import Problem
 from chamberopt.common.toml_fields import Pair, list_field, quantity
+from chamberopt.design.shapes.base import is_custom
+from chamberopt.design.shapes.imported import IMPORTED
 from chamberopt.design.table_base import SI, FileTable
 
 MIN_POINTS, MAX_POINTS = 1_000, 1_000_000  # limits on the number of coverage windows
@@ -146,6 +148,10 @@ class Step(FileTable):
             if key not in OF_POSE:
                 text = f"is the same in all steps; a step may change {' and '.join(OF_POSE)}"
                 yield Problem(f"part.{key}", text)
+        for key, value in (self.chamber or {}).items():
+            if key == "mesh" or (key == "shape" and (is_custom(value) or value == IMPORTED)):
+                text = "a chamber that a file describes is not supported in a step; leave it out"
+                yield Problem(f"chamber.{key}", text)
         for key in ("material", "density_kg_m3"):
             if key in (self.shot or {}):
                 text = "balls of another metal are not supported in a step; leave it out"

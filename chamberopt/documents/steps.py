@@ -49,8 +49,10 @@ def changes_in_words(step: Step) -> str:
 
 def step_lines(result: Result) -> list[AnswerLine]:
     """Return a sentence on each step: its time, what it changes, and what it does alone."""
-    lines = []
-    steps = zip(result.design.steps or (), result.design.in_steps.values(), strict=False)
+    lines: list[AnswerLine] = []
+    if not result.design.steps:
+        return lines
+    steps = zip(result.design.steps, result.design.in_steps.values(), strict=True)
     for number, (step, one) in enumerate(steps, start=1):
         figures = [
             f"{label.text} {label.format(found)}"

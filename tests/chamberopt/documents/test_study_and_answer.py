@@ -136,7 +136,7 @@ def test_constraints_that_are_not_certainly_met_are_in_the_answer() -> None:
     )
     process = SimpleNamespace(intensity_mmA=None, coverage_percent=None)
     calibration = SimpleNamespace(misfits=[misfit], not_mmA="")
-    design = SimpleNamespace(calibration=calibration, process=process)
+    design = SimpleNamespace(calibration=calibration, process=process, steps=None)
     result: Any = SimpleNamespace(
         study=study,
         record=SimpleNamespace(zones=zones, ranges=None),
