@@ -154,9 +154,16 @@ def _figures(found: Evaluation) -> dict[str, Estimate]:
     return found.metrics | {WIDE + name: one for name, one in found.metrics_of_wide.items()}
 
 
-def _with_other_dents(replicas: list[Replica], factor: float) -> list[Replica]:
-    """Return copies of the replicas, with the part's dents wider by a factor."""
-    return [replace(one, hits=replace(one.hits, dent=one.hits.dent * factor)) for one in replicas]
+def _with_other_dents(replicas: Sequence[Replica], factor: float) -> list[Replica]:
+    """Return copies of the replicas and of their steps, with the part's dents wider by a factor."""
+    return [
+        replace(
+            one,
+            hits=replace(one.hits, dent=one.hits.dent * factor),
+            steps=tuple(_with_other_dents(one.steps, factor)),
+        )
+        for one in replicas
+    ]
 
 
 def _factors(name: str, one: Estimate) -> dict[Parameter, float]:

@@ -35,7 +35,7 @@ def evaluation_bytes(design: Design, chamber: Chamber, replicas: int) -> float:
     the process itself.
     """
     accuracy, target = design.process.accuracy, chamber.part.target
-    fields = 1 + len(design.zones)
+    fields = 1 + len(design.zones) + len(design.steps or ())
     of_points = OF_POINT * (fields - 1) + OF_POINT_AT_WORK
     of_points += OF_POINT_IN_BATCH * min(replicas, BATCHES)
     windows = float(chamber.part.area[target].sum()) / accuracy.gauge

@@ -7,12 +7,14 @@ import pytest
 
 from chamberopt.chamber.build import Chamber, build_chamber
 from chamberopt.common.errors import InputError
-from chamberopt.common.estimate import Estimate
+from chamberopt.common.estimate import FIRST_OF_CALIBRATION, Estimate
 from chamberopt.common.executor import SerialExecutor
 from chamberopt.coverage.field.surface_points import ball_fits, spread_points
 from chamberopt.coverage.metrics import metric_names
 from chamberopt.coverage.part_impacts import in_pose_of
+from chamberopt.design.calibration import PARAMETERS
 from chamberopt.design.load import Design, load_design
+from chamberopt.peening.calibration_errors import evaluate_calibrated
 from chamberopt.simulation.estimates import OF_EACH_STEP
 from chamberopt.simulation.evaluate import ReplicaPlan, evaluate, rooms_of
 from chamberopt.simulation.evaluation import Evaluation
@@ -24,7 +26,7 @@ from chamberopt.simulation.replicas import (
     simulate_replica,
 )
 from chamberopt.simulation.trapped_balls import NOT_TRAPPED
-from tests.helpers.synthetic import DESIGNS, no_hits, random_dents
+from tests.helpers.synthetic import DESIGNS, machine_values, no_hits, random_dents
 
 REPLICAS, DENT = 6, 1e-8  # area of a dent of random_dents [m²]
 COUNTS = {"walls": 0, "balls": 0, "sonotrode": 0, "total": 0}
@@ -128,6 +130,20 @@ def test_a_step_that_hits_nothing_changes_nothing() -> None:
         scale = 2.0 if name == "time_to_98_s" else 1.0  # the idle step takes its time too
         assert one.value == pytest.approx(scale * other.value, rel=0.02)
     assert found.metrics["steps.idle.mean_coverage"].value == 0.0
+
+
+def test_errors_of_a_calibration_are_in_the_figures_of_each_step() -> None:
+    """By Avrami's law d C / d ln x = (1 - C) x, and x goes with the hardness to the power -1/2."""
+    design = plate({"name": "again"}, **{"part.target": LOWER["target"]})
+    design = design.changed({"calibration": machine_values(hardness=0.1)})
+    chamber = build_chamber(design)
+    known = ReplicaSet(random_replicas(design, chamber, (0.5, 1.0)))
+    plan = ReplicaPlan(count=REPLICAS)
+    found = evaluate_calibrated(design, chamber, SerialExecutor(), plan=plan, known=known).metrics
+    for name, x in (("", 1.5), ("steps.first_side.", 0.5), ("steps.again.", 1.0)):
+        errors = found[f"{name}mean_coverage"].shared[FIRST_OF_CALIBRATION:]
+        error = errors[PARAMETERS.index("hardness")]
+        assert abs(error) == pytest.approx(0.1 * 0.5 * x * np.exp(-x), rel=0.15)
 
 
 @cache
