@@ -31,6 +31,7 @@ from chamberopt.coverage.field.surface_points import CERTAIN, Reach, sampling_er
 from chamberopt.coverage.metrics import FULL_COVERAGE, NEVER, P05, P95
 
 SPLITS = 6  # of the replicas into halves
+SIDE = 1.645  # standard deviations from the mean beyond which 5 % of a normal quantity lie
 NOT_ONE = 3.0  # expected number of dents at which no dent falls with a probability of 5 %
 NEARLY_FULL = 0.9  # coverage above which times come from a shorter treatment
 SHORTEST = 1e-6  # shortest treatment, over the whole treatment
@@ -68,11 +69,14 @@ class DentSums(NamedTuple):
         replicas: number of replicas in each batch, shape (g,).
         share: sums of the dents' shares of each window, by batch, shape (g, p).
         number: dents of all batches in each window, shape (p,).
+        has_levels: whether the windows may have separate levels of density, as sides of a part have
+            that are peened in different steps.
     """
 
     replicas: np.ndarray
     share: np.ndarray
     number: np.ndarray
+    has_levels: bool = False
 
     @property
     def weight(self) -> float:
@@ -200,6 +204,10 @@ def _quantile_of_reached(
         found.half_width + max(abs(step), least),
         math.hypot(furthest, step, shared_half_width(shared)),
     )
+    if sums.has_levels:
+        level = all_of_them.level(SIDE if quantile.level < 0.5 else -SIDE)
+        of_level = float(quantile.of_density(level * time_ratio))
+        known_to = max(known_to, abs(of_level - value) + found.half_width)
     bias = known_to - found.half_width if math.isfinite(known_to) else math.inf
     return replace(found, half_width=known_to, bias=bias)
 
@@ -258,6 +266,14 @@ class DensityRoots(NamedTuple):
     middle: float
     over_target: float
     counting: float
+
+    def level(self, deviations: float) -> float:
+        """Return the density that lies so many standard deviations of counting from the quantile.
+
+        Windows of one level of density scatter round it by counting alone. So SIDE deviations bring
+        the 5th or 95th percentile of such windows back to their level.
+        """
+        return max(0.0, self.at_share + deviations * math.sqrt(self.counting)) ** 2
 
     def density(self, more: float = 0.0) -> float:
         """Return the dent density that the given share of the windows do not exceed, corrected for

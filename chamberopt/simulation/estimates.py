@@ -212,7 +212,7 @@ def window_estimates(
     process = design.process
     time_ratio = process.treatment_time / process.recorded_time
     batches = batches_of(prints)
-    sums = sum_dents(batches, len(gauge.area))
+    sums = sum_dents(batches, len(gauge.area))._replace(has_levels=bool(design.steps))
     found = coverage_estimates(batches, sums, field.reach, time_ratio)
     found["time_to_98_s"] = time_to_98(
         found["p05_coverage"], sums, field.reach, time_ratio, process.treatment_time

@@ -39,6 +39,7 @@ from tests.helpers.synthetic import (
 @dataclass(frozen=True)
 class _Replica:
     hits: Hits
+    steps: tuple[()] = ()
 
 
 SDS = {"amplitude": 0.05, "C0": 0.01, "v0": 0.1, "K": 0.2, "beta": 0.1}

@@ -84,6 +84,8 @@ def test_each_side_of_a_turned_plate_has_what_its_own_step_threw() -> None:
     assert_holds(found.metrics["lower.mean_coverage"], lower)
     assert_holds(found.metrics["upper.mean_coverage"], upper)
     assert_holds(found.metrics["mean_coverage"], 0.5 * (lower + upper))
+    assert_holds(found.metrics["p05_coverage"], lower)  # where half of the target is of each level
+    assert_holds(found.metrics["p95_coverage"], upper)
     assert_holds(found.metrics["steps.first_side.mean_coverage"], 0.5 * lower)
     assert_holds(found.metrics["steps.turned.mean_coverage"], 0.5 * upper)
     assert found.reachable > 0.999
