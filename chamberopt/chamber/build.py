@@ -12,7 +12,7 @@ Frame: metres, z up, mean sonotrode face at z = 0, chamber axis at x = y = 0.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -152,20 +152,30 @@ def build_chamber(design: Design, target: np.ndarray | None = None) -> Chamber:
         steps = [_build_step(name, one, target) for name, one in design.in_steps.items()]
         in_any = np.any([one.part.target for one in steps], axis=0)  # some may reach less of it
         steps = [replace(one, part=replace(one.part, target=in_any)) for one in steps]
-        of_all = set.intersection(*(set(one.notes) for one in steps))
-        notes = (
-            note if note in of_all else f"step {name}: {note}"
-            for name, one in zip(names, steps, strict=True)
-            for note in one.notes
-        )
+        notes = told_of_steps(dict(zip(names, (one.notes for one in steps), strict=True)))
         chamber = replace(
             steps[0],
             exposed_area=np.max([one.exposed_area for one in steps], axis=0),
-            notes=(*dict.fromkeys(notes), f"peened in steps, {', '.join(names)}: {OF_FIRST}"),
+            notes=(*notes, f"peened in steps, {', '.join(names)}: {OF_FIRST}"),
             steps=tuple(steps),
         )
     _refuse_hidden_zones(chamber.part, chamber.exposed_area)
     return replace(chamber, notes=(*chamber.notes, *_hidden_notes(chamber)))
+
+
+def told_of_steps(texts: Mapping[str, Sequence[str]]) -> list[str]:
+    """Return texts on each step, which begin with its name unless they hold for all steps.
+
+    Args:
+        texts: by name of the step.
+    """
+    of_all = set.intersection(*(set(own) for own in texts.values()))
+    said = (
+        text if text in of_all else f"step {name}: {text}"
+        for name, own in texts.items()
+        for text in own
+    )
+    return list(dict.fromkeys(said))
 
 
 def _build_step(name: str, design: Design, target: np.ndarray | None) -> Chamber:

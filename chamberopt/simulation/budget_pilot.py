@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from chamberopt.chamber.propose.proposed_budget import WIDEST, Measured
+from chamberopt.chamber.replica_seed import step_seed
 from chamberopt.chamber.scene import chamber_mesh
 from chamberopt.common.errors import InputError
 from chamberopt.common.executor import share
@@ -29,6 +30,7 @@ from chamberopt.simulation.replicas import (
     Replica,
     ReplicaSet,
     ReplicaSetting,
+    join_steps,
     replica_of,
     run_in_order,
     simulate_seed,
@@ -60,9 +62,29 @@ class _TimedReplica(NamedTuple):
 
 
 def _timed_replica(setting: ReplicaSetting, seed: int) -> _TimedReplica:
-    """Simulate one replica with this seed."""
+    """Simulate one replica with this seed. In each step time goes from 0 to that of all steps."""
+    design, chamber, _ = setting
+    if chamber.steps:
+        timed, times = [], []
+        for k, (one, room) in enumerate(zip(design.in_steps.values(), chamber.steps, strict=True)):
+            own = ReplicaSetting(one, room, room.mesh)
+            timed.append(_timed_replica(own, step_seed(seed, k)))
+            times.append(timed[k].time * design.process.recorded_time / one.process.recorded_time)
+        joined = join_steps([one.replica for one in timed], chamber)
+        return _TimedReplica(joined, np.concatenate(times))
     result = simulate_seed(*setting, seed)
     return _TimedReplica(replica_of(setting, result), times_on_part(setting.chamber, result))
+
+
+def _after(warmup: float, timed: _TimedReplica) -> Replica:
+    """Return a replica with its impacts after a time [s]."""
+    one, late = timed.replica, timed.time > warmup
+    of_steps = np.split(late, np.cumsum([len(step.hits) for step in one.steps])[:-1])
+    steps = (
+        replace(step, hits=step.hits.select(rows))
+        for step, rows in zip(one.steps, of_steps, strict=False)
+    )
+    return replace(one, hits=one.hits.select(late), halves=None, steps=tuple(steps))
 
 
 def at_slow_end(design: Design) -> tuple[Design, bool]:
@@ -112,10 +134,7 @@ def measure_budget(
         if (settled and hits >= DENTS / WIDEST) or GROWTH * collisions > most:
             break
         time *= GROWTH
-    replicas = [
-        replace(one.replica, hits=one.replica.hits.select(one.time > warmup), halves=None)
-        for one in timed
-    ]
+    replicas = [_after(warmup, one) for one in timed]
     recorded = {"simulated_time_s": time - warmup, "warmup_time_s": warmup}
     slow = slow.changed({f"process.accuracy.{key}": one for key, one in recorded.items()})
     wide = found = _seen(slow, chamber, executor, replicas)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from chamberopt.chamber.build import NOTED_HIDDEN, TARGET, hidden_share, selection_of
+from chamberopt.chamber.build import NOTED_HIDDEN, TARGET, hidden_share, selection_of, told_of_steps
 from chamberopt.chamber.checks.calibration import calibration_warnings
 from chamberopt.chamber.checks.fillets import facet_warnings, fillet_warnings, touched_by_curvature
 from chamberopt.chamber.checks.gaps import (
@@ -253,15 +253,16 @@ def _wall_warnings(design: Design, chamber: Chamber, reach: Reach) -> list[str]:
 
 def _step_warnings(design: Design, chamber: Chamber) -> list[str]:
     """Return the warnings of each step, and one on what no ball can touch in any of them."""
-    texts, part = [], chamber.part
+    part, found = chamber.part, {}
     shares, balls = np.zeros(len(part.triangles)), set()
     for (name, one), room in zip(design.in_steps.items(), chamber.steps, strict=True):
         reach = shot_reach(one, room)
         own = reached_part_share(reach, room.source, len(part.triangles))
         shares = np.maximum(shares, own * room.exposed_area)
         balls.add(f"{1e3 * reach.diameter:g}")
-        found = [*first_warnings(one, room, reach.mesh, False), *_wall_warnings(one, room, reach)]
-        texts += [f"step {name}: {text}" for text in found]
+        walls = _wall_warnings(one, room, reach)
+        found[name] = [*first_warnings(one, room, reach.mesh, False), *walls]
+    texts = told_of_steps(found)
     spared = {one.name for one in design.zones if one.is_spared}
     wanted = {TARGET: part.target}
     wanted |= {f"zone {name}": one for name, one in part.zones.items() if name not in spared}

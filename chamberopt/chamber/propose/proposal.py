@@ -166,8 +166,17 @@ def new_warning(made: Proposal, before: Proposal) -> str:
 
 
 def touched(made: Proposal) -> np.ndarray:
-    """Return the share of each triangle of the part that the balls can touch, (m,)."""
-    return reached_part_share(made.reach, made.chamber.source, len(made.chamber.part.triangles))
+    """Return the share of each triangle of the part that the balls can touch, (m,).
+
+    With steps it is that of the step in which they touch most of it.
+    """
+    rooms = [(made.reach, made.chamber)]
+    if made.chamber.steps:
+        steps = zip(made.design.in_steps.values(), made.chamber.steps, strict=True)
+        rooms = [(shot_reach(one, room), room) for one, room in steps]
+    count = len(made.chamber.part.triangles)
+    each = [reached_part_share(reach, room.source, count) for reach, room in rooms]
+    return np.asarray(np.max(each, axis=0))
 
 
 def touched_share(made: Proposal) -> float:

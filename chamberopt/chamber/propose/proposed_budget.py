@@ -193,7 +193,7 @@ def _said_of_long(found: Measured) -> str:
     if uneven > UNEVEN:
         return (
             f"the least covered places take {_plain(uneven, 2)} times as long as the target on "
-            "average: half of the time in a second pose, turned over or round, may do"
+            "average: [[steps]] in further poses, turned over or round, may do"
         )
     return "few balls get to the target, or slowly: a larger sonotrode, harder balls or the study"
 

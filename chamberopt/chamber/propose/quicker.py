@@ -3,7 +3,8 @@
 A part that stands on one sonotrode is dented slowly at its upper end, as few balls get there. Lying
 or on edge, over several sonotrodes if it is long, it may take a fifth of the time. A whole layer of
 balls dents faster than half a layer in a roomy chamber, and slower where the balls are in each
-other's way. So both are tried, and what is proposed was simulated itself.
+other's way. A part that lies gets few balls on its upper side, until it is turned over. So all of
+these are tried, and what is proposed was simulated itself.
 """
 
 from __future__ import annotations
@@ -14,10 +15,20 @@ from typing import NamedTuple
 
 import numpy as np
 
+from chamberopt.chamber.build import build_chamber
+from chamberopt.chamber.checks.check import shot_reach, warnings
+from chamberopt.chamber.checks.jams import gaps_in_reach, jam_gaps
 from chamberopt.chamber.propose.pose import AT_SIDE
-from chamberopt.chamber.propose.proposal import Proposal, Wanted, faults, new_warning, with_charge
+from chamberopt.chamber.propose.proposal import (
+    Proposal,
+    Wanted,
+    faults,
+    new_warning,
+    touched_share,
+    with_charge,
+)
 from chamberopt.chamber.propose.proposed_balls import MOST_BALLS
-from chamberopt.chamber.propose.proposed_budget import LONG, Measured
+from chamberopt.chamber.propose.proposed_budget import COVERED, LONG, UNEVEN, Measured
 from chamberopt.common.errors import InputError
 from chamberopt.geometry.triangles import rotation_matrix
 
@@ -74,6 +85,66 @@ def propose_quicker(
             made = replace(made, reasons={**made.reasons, "shot.mass_g": reason})
             best = Way(made, best.wanted, found)
     return best
+
+
+def propose_second_pose(
+    made: Proposal, found: Measured | None, measure: Callable[[Proposal], Measured | None]
+) -> tuple[Proposal, Measured | None]:
+    """Return a proposal with a second step, turned over, and its pilot, where that is worth it.
+
+    It is tried where single places rule a slow treatment, or where balls cannot touch enough of the
+    target in one pose. What holds the part must hold it in both poses.
+
+    Args:
+        found: what a pilot measured of the proposal; None if nothing.
+        measure: simulates a proposal briefly; None if that cannot be done.
+    """
+    if found is None or _turns(made):
+        return made, found
+    is_hidden = not found.places and touched_share(made) < COVERED
+    if not is_hidden and found.time_to_98 < max(SLOW, UNEVEN * found.mean_time):
+        return made, found
+    try:
+        two = _turned_over(made)
+    except InputError:  # what holds the part in the first pose does not in the second
+        return made, found
+    in_air = any(one.pieces_in_air for one in two.chamber.steps) and not made.chamber.pieces_in_air
+    if in_air or faults(two) > faults(made):
+        return made, found
+    after = measure(two)
+    if after is None or not after.places:
+        return made, found
+    enough = after.time_to_98 <= QUICKER * found.time_to_98 or is_hidden
+    if not enough or touched_share(two) < COVERED:
+        return made, found
+    before = f"{touched_share(made):.0%} of the target is in reach" if is_hidden else _after(found)
+    reason = f"turned over after half of the time: by pilots {_after(after)}, in one pose {before}"
+    return replace(two, reasons={**two.reasons, ".steps": reason}), after
+
+
+def _turned_over(made: Proposal) -> Proposal:
+    """Return a proposal with a second step in which the part is turned over.
+
+    Raises InputError if the chamber cannot be built round the part in this pose.
+    """
+    x, y, z = made.design.part.rotate_deg
+    # Half a turn about the chamber's x after turns about x, y and z is one before them, with the
+    # turns about y and z the other way.
+    turned = [(x + 180.0) % 360.0, -y + 0.0, -z + 0.0]
+    steps = [{"name": "first"}, {"name": "turned_over", "part": {"rotate_deg": turned}}]
+    design = made.design.changed({"steps": steps})
+    chamber = build_chamber(design)
+    (_, other), room = list(design.in_steps.values()), chamber.steps[1]
+    diameter = other.shot.diameter
+    jams = jam_gaps(room, diameter, gaps_in_reach(shot_reach(other, room)))
+    return replace(
+        made,
+        design=design,
+        tables={"": {}, **made.tables} | {"": {**made.tables.get("", {}), "steps": steps}},
+        chamber=chamber,
+        jams=max(made.jams, tuple(jams), key=len),
+        warnings=tuple(warnings(design, chamber)),
+    )
 
 
 def _is_slow(way: Way) -> bool:

@@ -96,7 +96,7 @@ def new(
         with_expected_intensity,
         with_thin_places,
     )
-    from chamberopt.chamber.propose.quicker import Way, propose_quicker
+    from chamberopt.chamber.propose.quicker import Way, propose_quicker, propose_second_pose
     from chamberopt.chamber.propose.shop import load_shop
     from chamberopt.chamber.propose.text import design_text, study_texts
     from chamberopt.cli.commands.check import draw_target
@@ -182,6 +182,7 @@ def new(
                 made = as_no_wish(made) if seeks else made
             elif found is not None:
                 made = with_expected_intensity(made, found.intensity)
+            made, found = propose_second_pose(made, found, lambda one: measured(one, False))
             made = with_thin_places(made)
             made = with_measured_budget(made, found)
             if made.chamber is not drawn:

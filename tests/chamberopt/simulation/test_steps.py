@@ -15,6 +15,7 @@ from chamberopt.coverage.part_impacts import in_pose_of
 from chamberopt.design.calibration import PARAMETERS
 from chamberopt.design.load import Design, load_design
 from chamberopt.peening.calibration_errors import evaluate_calibrated
+from chamberopt.simulation.budget_pilot import measure_budget
 from chamberopt.simulation.estimates import OF_EACH_STEP
 from chamberopt.simulation.evaluate import ReplicaPlan, evaluate, rooms_of
 from chamberopt.simulation.evaluation import Evaluation
@@ -186,6 +187,17 @@ def test_a_ball_touches_what_it_touches_in_any_step() -> None:
     np.testing.assert_array_equal(found, np.any(each, axis=0))
     assert found.sum() == sum(one.sum() for one in each) > 600  # each step has its own side
     assert chamber.exposed_area[part.target].sum() == pytest.approx(part.area[part.target].sum())
+
+
+def test_a_pilot_of_two_sides_takes_twice_the_time_of_one() -> None:
+    two, one = plate(TURNED), plate(**{"part.target": LOWER["target"]})
+    found, alone = (
+        measure_budget(design, build_chamber(design), SerialExecutor()) for design in (two, one)
+    )
+    assert found.places
+    assert alone.places
+    assert found.time_to_98 == pytest.approx(2.0 * alone.time_to_98, rel=0.3)
+    assert found.mean_time == pytest.approx(2.0 * alone.mean_time, rel=0.1)
 
 
 def test_what_a_step_cannot_be_is_refused_with_its_name() -> None:

@@ -11,7 +11,9 @@ from chamberopt.chamber.propose.first_design import propose
 from chamberopt.chamber.propose.pose import Pose, end_to_wall, pose_by_size
 from chamberopt.chamber.propose.proposal import Proposal, Wanted, with_charge
 from chamberopt.chamber.propose.proposed_budget import Measured
-from chamberopt.chamber.propose.quicker import Way, propose_quicker
+from chamberopt.chamber.propose.quicker import Way, propose_quicker, propose_second_pose
+from chamberopt.chamber.propose.text import design_text
+from chamberopt.design.load import load_design
 from chamberopt.geometry.triangles import rotation_matrix
 
 LEAF = (130.0, 26.0, 6.0)  # mm: length, width and thickness of a bar with a broad side to peen
@@ -148,3 +150,46 @@ def test_a_doubled_charge_moves_its_range_too(poses: dict[Pose | None, Proposal]
         before, after = made.bounds["shot.mass_g"][end], heavy.bounds["shot.mass_g"][end]
         assert after == pytest.approx(2.0 * before, rel=0.1)
     assert heavy.bounds["chamber.height_mm"] == made.bounds["chamber.height_mm"]
+
+
+def uneven(seconds: float) -> Measured:
+    """What a pilot says of a target on which single places take three times as long."""
+    return measured(seconds)._replace(mean_time=seconds / 3.0)
+
+
+def test_a_part_that_lies_is_turned_over_where_that_is_quicker(
+    poses: dict[Pose | None, Proposal], tmp_path: Path
+) -> None:
+    lying = poses["lying"]
+    made, found = propose_second_pose(lying, uneven(900.0), lambda _: measured(400.0))
+    assert found == measured(400.0)
+    first, other = made.design.in_steps.values()
+    up, down = (rotation_matrix(one.part.rotate_deg)[2] for one in (first, other))
+    np.testing.assert_allclose(up, -down, atol=1e-12)
+    ends = [rotation_matrix(one.part.rotate_deg)[0] for one in (first, other)]
+    np.testing.assert_allclose(*ends, atol=1e-12)  # the end in the wall stays in it
+    assert [one.pieces_in_air for one in made.chamber.steps] == [0, 0]
+    assert (
+        "by pilots 98 % after about 400 s, in one pose 98 % after about 900 s"
+        in (made.reasons[".steps"])
+    )
+    (tmp_path / "design.toml").write_text(design_text(made, tmp_path), "utf-8")
+    assert load_design(tmp_path / "design.toml").in_steps.keys() == {"first", "turned_over"}
+
+
+@pytest.mark.parametrize(
+    ("pose", "first", "second"),
+    [
+        ("lying", 500.0, 100.0),  # quick enough
+        ("lying", 900.0, 800.0),  # not worth it
+        ("on-edge", 900.0, 100.0),  # its mask goes up to the wall, from one side alone
+        (None, 900.0, 100.0),  # jaws hold its upper end
+    ],
+)
+def test_a_part_stays_in_one_pose_where_another_is_no_gain_or_not_held(
+    poses: dict[Pose | None, Proposal], pose: Pose | None, first: float, second: float
+) -> None:
+    made = poses[pose]
+    found = uneven(first)
+    assert propose_second_pose(made, found, lambda _: measured(second)) == (made, found)
+    assert propose_second_pose(made, None, lambda _: measured(second)) == (made, None)
