@@ -153,4 +153,4 @@ def _all_figures(result: Result, start: Result | None) -> Iterator[str]:
 
 def _line(name: str, estimate: Estimate) -> str:
     """Return a line with the name of a metric or objective, its estimate and interval."""
-    return f"{name:34}{estimate_text(estimate)}"
+    return f"{name:33} {estimate_text(estimate)}"
