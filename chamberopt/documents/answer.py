@@ -12,10 +12,9 @@ from chamberopt.coverage.metrics import OBJECTIVES
 from chamberopt.documents.coverage import change
 from chamberopt.documents.document import AnswerLine
 from chamberopt.documents.ranges import range_answer
-from chamberopt.documents.steps import step_lines
 from chamberopt.documents.wanted import wanted_lines
 from chamberopt.documents.wording import Label, metric_label, objective_label, plain
-from chamberopt.documents.zones import zone_lines
+from chamberopt.documents.zones import step_lines, zone_lines
 from chamberopt.results.load import load_result, load_start
 from chamberopt.search.study.constraints import MET
 

@@ -141,6 +141,8 @@ def _rows(made: Proposal) -> Iterator[_Row]:
     yield _Row("balls", balls, ("shot.diameter_mm", "shot.mass_g", "shot.material"))
     time = time_in_words(design.process.treatment_time)
     yield _Row("time", time, ("process.treatment_time_s", "process.coverage_percent"))
+    if ".steps" in made.reasons:
+        yield _Row("steps", made.reasons[".steps"].partition(": ")[0], (".steps",))
     if "process.intensity_mmA" in made.reasons:
         value = clauses(made.reasons["process.intensity_mmA"])[0][0]
         yield _Row("intensity", value, ("process.intensity_mmA",))

@@ -25,7 +25,6 @@ from chamberopt.documents.document import (
     values,
 )
 from chamberopt.documents.ranges import groups_text, range_section
-from chamberopt.documents.steps import steps_section
 from chamberopt.documents.stress import stress_section
 from chamberopt.documents.study import (
     front_section,
@@ -35,7 +34,7 @@ from chamberopt.documents.study import (
 )
 from chamberopt.documents.tolerances import tolerance_section
 from chamberopt.documents.wording import metric_label, objective_label, plain
-from chamberopt.documents.zones import zones_section
+from chamberopt.documents.zones import steps_section, zones_section
 from chamberopt.pictures.part3d import part_scene
 from chamberopt.results.load import START, load_start, load_trials
 from chamberopt.simulation.advice import unit_of_change

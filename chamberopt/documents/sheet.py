@@ -23,11 +23,11 @@ from chamberopt.documents.coverage import figures
 from chamberopt.documents.document import Block, Document, Section, Sentence, Table
 from chamberopt.documents.ranges import groups_text, slow_end_is_late, time_at_slow_end
 from chamberopt.documents.report import limits_of_intervals, notes_of
-from chamberopt.documents.steps import turned
 from chamberopt.documents.study import exposed_target
 from chamberopt.documents.tolerances import sheet_rows
 from chamberopt.documents.wanted import wanted_lines, wanted_rows
 from chamberopt.documents.wording import metric_label, plain
+from chamberopt.documents.zones import turned
 from chamberopt.results.load import load_start
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ from chamberopt.design.load import Design, load_design
 from chamberopt.documents.answer import answer_lines
 from chamberopt.documents.document import Table
 from chamberopt.documents.sheet import AsBuilt, process_sheet
-from chamberopt.documents.steps import changes_in_words, steps_section
+from chamberopt.documents.zones import changes_in_words, steps_section
 from chamberopt.results.arrays_file import load_chamber
 from chamberopt.results.load import Result, load_result
 from chamberopt.results.rebuild import rebuild_chamber
