@@ -135,7 +135,9 @@ def _rows(made: Proposal) -> Iterator[_Row]:
             )
             kind = own.get(table, {}).get("kind", "pad" if "axis" in own.get(table, {}) else "")
             keys = tuple(f"{one}.{key}" for one, values in own.items() for key in values)
-            yield _Row(name, ", ".join(filter(None, (str(kind), sizes))), keys)
+            value = ", ".join(filter(None, (str(kind), sizes)))
+            whys = [why for key in keys for why in clauses(made.reasons.get(key, ""))[0]]
+            yield _Row(name, value or next(iter(whys), "see the design"), keys)
     count = f"{design.shot.count:,} of {tables['shot']['diameter_mm']:g} mm"
     balls = f"{count}, {tables['shot']['material']}, {tables['shot']['mass_g']:g} g in all"
     yield _Row("balls", balls, ("shot.diameter_mm", "shot.mass_g", "shot.material"))
