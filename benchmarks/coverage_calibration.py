@@ -1,11 +1,11 @@
 """Do the 95 % intervals of the coverage's figures hold, and from how many dents on?
 
     python benchmarks/coverage_calibration.py [--case NAME ...] [--replicas N] [--group N]
-        [--csv FILE]
+        [--groups N] [--csv FILE]
 
 For each case a pool of replicas is simulated once. Groups of eight, or N, are drawn from it
-at random, 200 a row, and their figures are compared with those of the whole pool, which is many
-times as large.
+at random, 200 a row by default, and their figures are compared with those of the whole pool, which
+is many times as large.
 Rows are for groups with all and with half of the time of each replica. A row gives the
 share of the intervals that held, the bias, the ratio of the median half-width to 1.96 standard
 deviations of the figure, and in how many groups the figure was resolved. Rows are printed also for
@@ -27,6 +27,7 @@ from chamberopt.chamber.replica_seed import replica_seed
 from chamberopt.chamber.scene import chamber_mesh
 from chamberopt.common.executor import core_count
 from chamberopt.coverage.coverage_from_impacts import find_footprints
+from chamberopt.coverage.metrics import OBJECTIVES
 from chamberopt.coverage.part_impacts import Hits, hits_on_part
 from chamberopt.design.design import Design
 from chamberopt.design.load import load_design
@@ -81,7 +82,9 @@ def until(hits: Hits, rows: np.ndarray) -> Hits:
     return replace(hits, **{name: column[rows] for name, column in vars(hits).items()})
 
 
-def rows_of(name: str, case: Case, replicas: int, group: int) -> Iterator[dict[str, Any]]:
+def rows_of(
+    name: str, case: Case, replicas: int, group: int, count: int
+) -> Iterator[dict[str, Any]]:
     """Calibration of all figures of a case, a row each for each part of the time."""
     whole, chamber, pool = simulate_pool(case, replicas)
     field = evaluation.prepare_target(whole, chamber, chamber_mesh(chamber))
@@ -99,7 +102,7 @@ def rows_of(name: str, case: Case, replicas: int, group: int) -> Iterator[dict[s
             truth = {key: one.value for key, one in of_pool.items()}
         groups = [
             figures(field, [[kind[i] for i in some] for kind in seen], design)
-            for some in drawn(rng, replicas, group)
+            for some in drawn(rng, replicas, group, count)
         ]
         for key, true in truth.items():
             found = [figures_of[key] for figures_of, _, _ in groups]
@@ -123,14 +126,14 @@ def rows_of(name: str, case: Case, replicas: int, group: int) -> Iterator[dict[s
             }
 
 
-def drawn(rng: np.random.Generator, replicas: int, group: int) -> Iterator[np.ndarray]:
+def drawn(rng: np.random.Generator, replicas: int, group: int, groups: int) -> Iterator[np.ndarray]:
     """Groups of replicas; no replica is in two groups until all have been in one."""
     count = 0
     while True:
         for some in rng.permutation(replicas)[: replicas // group * group].reshape(-1, group):
             yield some
             count += 1
-            if count == GROUPS:
+            if count == groups:
                 return
 
 
@@ -141,9 +144,7 @@ def figures(field: Any, seen: list[Any], design: Design) -> tuple[dict[str, Any]
     known = {
         key for key, one in raw.items() if not estimates.as_resolved(key, one, resolution).in_words
     }
-    raw["uniform_coverage"] = estimates.weighted_sum(
-        evaluation.parse_objective("uniform_coverage"), raw
-    )
+    raw["uniform_coverage"] = estimates.weighted_sum(OBJECTIVES["uniform_coverage"], raw)
     known |= {"uniform_coverage"} if resolution.has_mean else set()
     return raw, known, resolution.dents
 
@@ -153,11 +154,14 @@ def main() -> None:
     parser.add_argument("--case", action="append", choices=list(CASES))
     parser.add_argument("--replicas", type=int, default=320)
     parser.add_argument("--group", type=int, default=GROUP)
+    parser.add_argument("--groups", type=int, default=GROUPS)
     parser.add_argument("--csv", help="name of a file in benchmarks/results")
     arguments = parser.parse_args()
     found = []
     for name in arguments.case or CASES:
-        rows = list(rows_of(name, CASES[name], arguments.replicas, arguments.group))
+        rows = list(
+            rows_of(name, CASES[name], arguments.replicas, arguments.group, arguments.groups)
+        )
         print_table(rows)
         found += rows
     if arguments.csv:

@@ -34,8 +34,8 @@ ORDER = {
         "flexure+scene analytic checks propose"
     ),
     "chamberopt/coverage": "dents part_impacts+metrics field coverage_from_impacts "
-    "percentile coverage_intervals strength strength_intervals stress_law stress_model "
-    "stress_knowledge stress_profile",
+    "true_densities percentile coverage_intervals strength strength_intervals stress_law "
+    "stress_model stress_knowledge stress_profile",
     "chamberopt/simulation": "resting_balls trapped_balls settling effort replicas evaluation "
     "estimates evaluate time_curve field_values variations advice effect_pilot+budget_pilot "
     "error_law numerical_parameters+timed_replicas convergence recommendation",

@@ -51,7 +51,7 @@ from chamberopt.coverage.metrics import (
     parse_objective,
 )
 from chamberopt.coverage.part_impacts import Hits, TargetImpacts
-from chamberopt.coverage.percentile import in_order, sum_dents, time_to_98
+from chamberopt.coverage.percentile import sum_dents, time_to_98
 from chamberopt.coverage.strength_intervals import strength_estimates
 from chamberopt.coverage.stress_profile import stress_estimates
 from chamberopt.design.calibration import calibrated_strip
@@ -212,7 +212,7 @@ def window_estimates(
     process = design.process
     time_ratio = process.treatment_time / process.recorded_time
     batches = batches_of(prints)
-    sums = sum_dents(batches, len(gauge.area))._replace(has_levels=bool(design.steps))
+    sums = replace(sum_dents(batches, len(gauge.area)), has_levels=bool(design.steps))
     found = coverage_estimates(batches, sums, field.reach, time_ratio)
     found["time_to_98_s"] = time_to_98(
         found["p05_coverage"], sums, field.reach, time_ratio, process.treatment_time
@@ -220,7 +220,6 @@ def window_estimates(
     known_to = least_half_width(field.reach, prints)
     for name in SHARES & found.keys():
         found[name] = found[name].at_least_as_wide(known_to)
-    found |= in_order(found["p05_coverage"], found["p95_coverage"], "{}_coverage")
     return found, find_resolution(batches, sums, gauge, time_ratio, process.recorded_time)
 
 
