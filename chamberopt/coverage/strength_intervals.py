@@ -54,7 +54,7 @@ MAX_STEP = 0.055
 # the gear with 182 dents in a window the single step held the 5th percentile in half of the runs.
 # Three times the step held it in 89 of 100 runs with 15 % out of reach. Its step may also vanish by
 # chance: four times the step held it in 87 % of the groups of 8 on the gear, where the mean's step
-# is surely above 0, so that 2.5 times the mean's step is the least; twice that step held it in 90 %.
+# is surely above 0, so that 2.5 times the mean's step is the least. Twice that held it in 90 %.
 OF_STEP = {"saturation_time_s": 3.0, "strength_p05_um": 4.0}
 P05_OF_MEAN_STEP = 2.5
 MICROMETRES = 1e6
