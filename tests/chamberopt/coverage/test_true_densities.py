@@ -2,8 +2,14 @@
 
 import numpy as np
 import pytest
+from scipy.special import ndtri
 
-from chamberopt.coverage.true_densities import TrueDensities, count_roots, true_densities
+from chamberopt.coverage.true_densities import (
+    CountedRoots,
+    TrueDensities,
+    count_roots,
+    true_densities,
+)
 
 BATCHES, WINDOWS = 8, 20_000
 WEIGHT = 0.01  # share of a window that a dent takes
@@ -15,10 +21,14 @@ def found_from(density: np.ndarray, clusters: np.ndarray | float = 1.0) -> TrueD
     Args:
         density: true dent density of each window, per replica, (p,).
     """
+    return true_densities(counted_from(density, clusters))
+
+
+def counted_from(density: np.ndarray, clusters: np.ndarray | float = 1.0) -> CountedRoots:
     rng = np.random.default_rng(1)
     mean = density / (WEIGHT * clusters)
     shares = WEIGHT * clusters * rng.poisson(mean, (BATCHES, len(density)))
-    return true_densities(count_roots(shares, np.ones(BATCHES, dtype=int)))
+    return count_roots(shares, np.ones(BATCHES, dtype=int))
 
 
 def test_an_even_surface_has_the_same_density_at_all_percentiles() -> None:
@@ -26,12 +36,46 @@ def test_an_even_surface_has_the_same_density_at_all_percentiles() -> None:
     assert [found.at(share) for share in (0.05, 0.5, 0.95)] == pytest.approx([0.125] * 3, rel=0.03)
 
 
+def test_counting_explains_all_variance_of_an_even_surface() -> None:
+    counted = counted_from(np.full(WINDOWS, 0.125))
+    assert counted.variance is not None
+    # A root of a sum of n dents has the variance of one dent over 4 n: w / 4 per replica.
+    assert counted.variance.mean() == pytest.approx(WEIGHT / 4.0 / BATCHES, rel=0.03)
+    assert counted.true_variance == pytest.approx(0.0, abs=0.04 * counted.variance.mean())
+
+
+def test_more_variance_draws_the_percentiles_apart() -> None:
+    counted = counted_from(np.full(WINDOWS, 0.125))
+    even, wider = true_densities(counted), true_densities(counted, more=0.02**2)
+    assert wider.at(0.05) < 0.97 * even.at(0.05)
+    assert wider.at(0.95) > 1.03 * even.at(0.95)
+
+
+def test_wider_dents_scale_all_densities() -> None:
+    root, variance = counted_from(np.linspace(0.1, 0.2, WINDOWS))
+    assert variance is not None
+    one = true_densities(CountedRoots(root, variance))
+    scaled = true_densities(CountedRoots(2.0 * root, 4.0 * variance))  # no rounding
+    for share in (0.05, 0.5, 0.95):
+        assert scaled.at(share) == pytest.approx(4.0 * one.at(share))
+
+
 def test_a_normal_distribution_of_roots_is_found() -> None:
-    # 5 % of a normal distribution lie below its mean less 1.645 standard deviations.
-    root = np.random.default_rng(2).normal(0.4, 0.04, WINDOWS)
-    found = found_from(root**2)
-    for share, sign in ((0.05, -1.0), (0.95, 1.0)):
-        assert found.at(share) == pytest.approx((0.4 + sign * 1.645 * 0.04) ** 2, rel=0.02)
+    # Normal roots that are counted with a normal scatter are normal, and their variances add.
+    counted = 0.5 + 0.05 * ndtri((np.arange(WINDOWS) + 0.5) / WINDOWS)
+    found = true_densities(CountedRoots(counted, np.full(WINDOWS, 0.03**2)))
+    for share in (0.05, 0.3, 0.5, 0.95):
+        assert np.sqrt(found.at(share)) == pytest.approx(0.5 + 0.04 * ndtri(share), abs=6e-4)
+
+
+def test_mirrored_roots_have_mirrored_percentiles() -> None:
+    root = np.random.default_rng(3).gamma(9.0, 0.02, WINDOWS) + 0.2
+    variance = np.full(WINDOWS, 0.0004)
+    one = true_densities(CountedRoots(root, variance))
+    other = true_densities(CountedRoots(2.0 - root, variance))
+    for share in (0.05, 0.4, 0.95):
+        mirrored = 2.0 - np.sqrt(other.at(1.0 - share))
+        assert np.sqrt(one.at(share)) == pytest.approx(mirrored, abs=1e-6)
 
 
 def test_a_small_dense_part_does_not_move_the_rest() -> None:
