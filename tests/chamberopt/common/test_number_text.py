@@ -2,7 +2,8 @@
 
 import pytest
 
-from chamberopt.common.number_text import percent, plain
+from chamberopt.common.estimate import Estimate
+from chamberopt.common.number_text import percent, plain, share_in_words
 
 
 @pytest.mark.parametrize(
@@ -26,3 +27,12 @@ def test_a_share_has_no_exponent_and_is_100_only_if_it_is_all(share: float, text
 
 def test_seconds_have_no_exponent() -> None:
     assert [plain(value, 2) for value in (238.6, 23.86, 0.02386)] == ["239", "24", "0.024"]
+
+
+@pytest.mark.parametrize("half_width", [2e-2, 2e-3, 5e-4, 7e-5, 3e-6])
+def test_words_for_a_share_claim_no_more_than_its_interval(half_width: float) -> None:
+    words = share_in_words(Estimate(1.0, half_width))
+    assert (words == "") == (half_width > 1e-3)
+    if words:
+        claimed = float(words.removeprefix("more than ").removesuffix(" %")) / 100.0
+        assert 1.0 - 10.0 * half_width < claimed <= 1.0 - half_width  # and at most a nine less

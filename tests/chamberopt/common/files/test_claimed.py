@@ -1,15 +1,16 @@
-"""Claims of folders on Windows, which is simulated: its locks, and no descriptors of folders."""
+"""Claims of files and folders, also on Windows, which is simulated: locks, no folder descriptors."""
 
 import errno
 import os
 import sys
+import threading
 from pathlib import Path
 
 import pytest
 
 from chamberopt.common.errors import OutputTakenError
 from chamberopt.common.files import claimed, opened
-from chamberopt.common.files.claimed import claim_folder
+from chamberopt.common.files.claimed import claim_file, claim_folder
 from chamberopt.common.files.written import write_text
 
 
@@ -44,3 +45,16 @@ def test_a_folder_has_one_writer_on_windows(tmp_path: Path) -> None:
         with pytest.raises(OutputTakenError, match="is being written by process"):
             claim_folder(folder, lambda _: True).__enter__()
     assert [one.name for one in folder.iterdir()] == ["one.txt"]
+
+
+def test_a_writer_waits_until_the_other_ends(tmp_path: Path) -> None:
+    path = tmp_path / "one.txt"
+    other = claim_file(path)
+    other.__enter__()
+    with pytest.raises(OutputTakenError), claim_file(path):
+        pass
+    end = threading.Timer(0.1, other.__exit__, (None, None, None))
+    end.start()
+    with claim_file(path, wait=60.0):
+        pass
+    end.join()
