@@ -66,7 +66,9 @@ class CountedRoots(NamedTuple):
             share: share of the windows that do not exceed the percentile.
         """
         counting = 0.0 if self.variance is None else float(self.variance.mean())
-        return max(0.0, float(np.quantile(self.root, share)) + deviations * counting**0.5) ** 2
+        return (
+            max(0.0, float(np.quantile(self.root, share)) + deviations * math.sqrt(counting)) ** 2
+        )
 
 
 class TrueDensities(NamedTuple):

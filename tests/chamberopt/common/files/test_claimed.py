@@ -1,4 +1,4 @@
-"""Claims of files and folders, also on Windows, which is simulated: locks, no folder descriptors."""
+"""Claims of files and folders, also on Windows, which is simulated: locks, no folder descriptor."""
 
 import errno
 import os
