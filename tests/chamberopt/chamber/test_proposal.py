@@ -176,7 +176,7 @@ def test_what_faces_away_is_offered_for_leaving_out(
         mesh=mesh,
         known=known,
         design=SimpleNamespace(part=part),
-        chamber=SimpleNamespace(part=posed, source=np.arange(len(area))),
+        chamber=SimpleNamespace(part=posed, source=np.arange(len(area)), steps=()),
         reach=SimpleNamespace(mesh=mesh, share=np.where(toes, 0.5, 1.0)),
         tables={"part": {"mesh": str(tmp_path / "gear.obj")}, "part.target": target.keys},
         reasons={},
