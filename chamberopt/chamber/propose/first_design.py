@@ -233,7 +233,7 @@ def _proposed(
         "part.target": target.reason,
         "shot.diameter_mm": ball_reason,
         **({"shot.material": shot_reason} if shot_reason else {}),
-        "materials.part": "C0 and v0 are computed: to be calibrated"
+        "materials.part": "how balls rebound from it (C0, v0) is computed: to be calibrated"
         if wanted.alloy
         else "ALLOY NOT KNOWN, a guess: chamberopt materials lists alloys",
         "materials.wall": "hardened, as soft walls slow the balls; give yours",

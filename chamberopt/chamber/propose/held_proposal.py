@@ -84,7 +84,7 @@ def clamped_outside(made: Proposal, floor: Floor, shop: Shop | None) -> Proposal
     most_mm = math.floor(1e4 * WIDEST_GAP * made.design.shot.diameter) / 20.0
     keys = {"kind": "bore", "clearance_mm": min(MILLED_MM, most_mm)}
     tables = _with_table(made.tables, "sonotrode", "holder", keys)
-    text = "the part's own end, clamped outside; the wall, cut out round it, is split there"
+    text = "clamped where it stands out of the chamber; the wall, cut out round it, is split there"
     reasons = {**made.reasons, "holder.kind": text}
     return checked(tables, reasons, floor, made.known, made.mesh, shop)
 

@@ -271,7 +271,7 @@ def _with_prediction(
 ) -> Proposal:
     """Return a proposal with its wanted intensity, and in the reason the predicted one."""
     found = Comparison.with_prediction((wanted.low, wanted.high), predicted)
-    text = f"predicted {found.predicted}; for {wanted.low:g}-{wanted.high:g}A, {wanted.text}"
+    text = f"predicted {found.predicted}; aimed at {wanted.low:g}-{wanted.high:g}A, {wanted.text}"
     text += f"; {found.in_words}{more}"
     reasons = {**made.reasons, INTENSITY: text}
     ends = {"intensity_mmA": [wanted.low, wanted.high]}

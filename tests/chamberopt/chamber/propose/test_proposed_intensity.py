@@ -192,7 +192,7 @@ def test_a_calibration_is_named_in_the_design_and_limits_the_study(
 
     made = propose_intensity(bare, wanted, intensity, lambda _: bare, simulate)
     text = made.reasons["process.intensity_mmA"]
-    assert "predicted 0.200 ± 0.010 mmA; for 0.17-0.23A, asked: 0.17-0.23A; inside with" in text
+    assert "predicted 0.200 ± 0.010 mmA; aimed at 0.17-0.23A, asked: 0.17-0.23A; inside" in text
     folder = tmp_path / "proposed"
     folder.mkdir()
     (folder / "design.toml").write_text(design_text(made, folder))
@@ -311,7 +311,7 @@ def test_a_usual_intensity_is_aimed_at_and_is_no_wish(plate: Path, shop: Shop) -
     assert "chosen for the intensity" in free.reasons["sonotrode.amplitude_pv_um"]
     told = free.reasons[INTENSITY]
     assert told.startswith("predicted 0.")
-    assert "for 0.15-0.25A, usual for titanium of 8 mm" in told
+    assert "aimed at 0.15-0.25A, usual for titanium of 8 mm" in told
     assert f"# Almen intensity: {told}" in design_text(free, Path())
 
 
