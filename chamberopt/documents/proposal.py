@@ -24,7 +24,6 @@ WIDTH, INDENT = 79, 13  # columns
 MOST_LISTED = 6  # surfaces, without --verbose
 TO_SETTLE = re.compile(r"[A-Z][A-Z-]+(?: [A-Z-]{2,})*\b")  # at the beginning of a clause
 NO_MATTER = ("ZERO-TO-PEAK", "PEAK-TO-VALLEY", "WIDER", "SAE ")  # no matter of the shop
-BUILT = ("chamber", "held by", "masked by")  # rows whose reasons a toolmaker needs whole
 SIMULATED = "simulated"  # the row that is told with --verbose alone
 MINUTE, HOUR = 60.0, 3600.0  # s
 VALUE = re.compile(r"_(mm|g|um|pv_um|deg|s|khz)$")  # ends of names: units
@@ -43,7 +42,7 @@ def proposal_end(made: Proposal, left_out: Sequence[LeftOut], verbose: bool) -> 
 
     Args:
         left_out: what may be left out of the target, or is peened beside it.
-        verbose: each value has its whole reason, and all surfaces are listed.
+        verbose: what is simulated is told too, and all surfaces are listed.
     """
     lines, settle = [*_sentence(made), ""], []
     for row in _rows(made):
@@ -54,8 +53,7 @@ def proposal_end(made: Proposal, left_out: Sequence[LeftOut], verbose: bool) -> 
             settle += first
             if why and why != [row.value]:
                 of = f"{_name(key.rpartition('.')[2])}: " if key.endswith("_mm") else ""
-                text = "; ".join(why if verbose or row.name in BUILT else why[:1])
-                told += _wrapped(f"{'':{INDENT}}{of}{text}", INDENT)
+                told += _wrapped(f"{'':{INDENT}}{of}{'; '.join(why)}", INDENT)
         lines += told if verbose or row.name != SIMULATED else []
     for one in left_out:
         keys = " and ".join(f"part.target.{key}" for key in one.keys)

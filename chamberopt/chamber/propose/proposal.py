@@ -160,9 +160,12 @@ def faults(made: Proposal) -> tuple[int, int]:
 
 
 def new_warning(made: Proposal, before: Proposal) -> str:
-    """Return the first warning of a proposal that another one has not, or else its first."""
+    """Return the first warning of a proposal that another one has not, or else its first.
+
+    Where only gaps in which balls jam are new, it says so.
+    """
     new = [text for text in made.warnings if text not in before.warnings]
-    return (new or made.warnings)[0]
+    return next(iter(new or made.warnings), "balls jam in a gap")
 
 
 def touched(made: Proposal) -> np.ndarray:

@@ -19,6 +19,7 @@ from chamberopt.chamber.checks.jams import JAM_BAND, MAX_COSINE, MIN_AREA
 from chamberopt.chamber.largest_ball import largest_balls, spread_points
 from chamberopt.chamber.part import Part
 from chamberopt.chamber.reach import TOLERATED_OVERLAP
+from chamberopt.geometry.thickness import depth_below
 from chamberopt.geometry.triangles import areas, interpolate, unit_vectors
 
 POINTS = 8_000  # on the target, and as many on the rest of the part
@@ -27,6 +28,8 @@ AS_GOOD = 0.05  # share of the target's area within which two sizes serve alike
 # Balls in the charge: of sizes that need more, the largest is taken that serves as well. Thousands
 # of small balls make weak dents, are hard to get back from a chamber, and are slow to simulate.
 MANY = 3000
+DEEPEST, THIN_SHARE = 10e-3, 0.05  # m that is measured under a target; share that may be thin
+OF_THIN = 1.5  # diameter of the largest balls over that depth, by heart
 MOST_LISTED = 5  # sizes in a reason
 LARGEST_BALL = 3e-3  # m: larger balls are in use, but they are few and slow to cover
 MOST_BALLS = 10_000  # of a charge: more take hours to simulate
@@ -55,13 +58,22 @@ def charge_of(area: float, diameter: float) -> float:
 def sizes_to_try(part: Part, stock_mm: Sequence[float]) -> list[float]:
     """Return the diameters [m], in ascending order, of which a ball for a posed part is chosen.
 
+    Balls that are large beside the metal under thin places of the target would bend these.
+
     Args:
         stock_mm: diameters that there are [mm], in ascending order.
     """
     sides = np.sort(np.ptp(part.vertices, axis=0))[1:]
     least = math.sqrt(charge_of(float(sides.prod()), 1.0) / MOST_BALLS)
     sold = [1e-3 * one for one in stock_mm if 1e-3 * one <= LARGEST_BALL] or [1e-3 * stock_mm[0]]
-    return [size for size in sold if size >= least] or sold[-1:]
+    enough = [size for size in sold if size >= least] or sold[-1:]
+    most = OF_THIN * thinnest(part)
+    return [size for size in enough if size <= most] or enough[:1]
+
+
+def thinnest(part: Part) -> float:
+    """Return the depth of metal [m] than which a small share of a part's target has less."""
+    return depth_below(part.vertices, part.triangles, part.target, THIN_SHARE, DEEPEST)
 
 
 def fit_sizes(part: Part, diameters: Sequence[float]) -> list[SizeFit]:

@@ -107,8 +107,8 @@ def held_end(mesh: PartMesh, target: Target, turns: Turns, of_any: bool = False)
     of_end = middle > cut if is_top else middle < cut
     keys = {**target.keys, "box_mm": box_beyond(mesh, axis, not is_top, cut)}
     reason = (
-        f"{target.reason}; but for an end, {share:.0%} of its length, to hold it by: turn the part "
-        "end for end for it, or leave it bare"
+        f"{target.reason}; AN END IS LEFT BARE, {share:.0%} of its length, to hold it by: accept "
+        "it, or peen it in a second setup, end for end"
     )
     left = Target(keys, target.triangles & ~of_end, reason)
     points = np.eye(3)[axis] * (1.0 if is_top else -1.0)

@@ -22,7 +22,15 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from chamberopt.chamber.propose.proposal import Proposal, Wanted
-from chamberopt.chamber.propose.proposed_balls import fit_sizes, serving_sizes, sizes_to_try
+from chamberopt.chamber.propose.proposed_balls import (
+    DEEPEST,
+    OF_THIN,
+    THIN_SHARE,
+    fit_sizes,
+    serving_sizes,
+    sizes_to_try,
+    thinnest,
+)
 from chamberopt.chamber.propose.shop import ShopSonotrode, usual_shop
 from chamberopt.common.errors import InputError
 from chamberopt.common.number_text import plain
@@ -43,7 +51,6 @@ MOST_PILOTS = 5
 # Settings in the middle half of the range, by logarithms, count as equally good.
 MIDDLE = 0.5
 ON_N = 0.1016  # mmA: 0.004 in, below which N strips are taken (SAE J443)
-DEEPEST, THIN_SHARE = 10e-3, 0.05  # m that is measured under a target; share that may be thin
 INTENSITY = "process.intensity_mmA"  # whose reason stands in a design without a wish too
 MOST_LISTED = 3  # other settings in a reason
 
@@ -222,12 +229,13 @@ def with_expected_intensity(made: Proposal, predicted: PredictedIntensity | None
 
 def with_thin_places(made: Proposal) -> Proposal:
     """Return a proposal that names places of its target for which no intensity is usual."""
-    thin = _depth(made, THIN_SHARE)
+    thin = thinnest(made.chamber.part)
     if 1e3 * thin >= THIN_MM:
         return made
     text = (
         f"THIN PLACES: {THIN_SHARE:.0%} of the target has {plain(1e3 * thin, 2)} mm of metal or "
-        "less under it: smaller balls or less amplitude there, or a mask on its edges"
+        f"less under it, for which balls of at most {plain(1e3 * OF_THIN * thin, 2)} mm are "
+        "proposed (by heart): agree on its intensity, or mask its edges"
     )
     reason = f"{made.reasons['shot.diameter_mm']}; {text}"
     return replace(made, reasons={**made.reasons, "shot.diameter_mm": reason})

@@ -104,19 +104,24 @@ def propose_second_pose(
     is_hidden = not found.places and touched_share(made) < COVERED
     if not is_hidden and found.time_to_98 < max(SLOW, UNEVEN * found.mean_time):
         return made, found
+
+    def dropped(why: str) -> tuple[Proposal, Measured | None]:
+        reason = f"{made.reasons['part.rotate_deg']}; not turned over after half of the time: {why}"
+        return replace(made, reasons={**made.reasons, "part.rotate_deg": reason}), found
+
     try:
         two = _turned_over(made)
-    except InputError:  # what holds the part in the first pose does not in the second
-        return made, found
+    except InputError:
+        return dropped("what holds it here does not hold it there")
     in_air = any(one.pieces_in_air for one in two.chamber.steps) and not made.chamber.pieces_in_air
     if in_air or faults(two) > faults(made):
-        return made, found
+        return dropped("nothing would hold it" if in_air else new_warning(two, made).split(",")[0])
     after = measure(two)
     if after is None or not after.places:
-        return made, found
+        return dropped("no pilot resolved it")
     enough = after.time_to_98 <= QUICKER * found.time_to_98 or is_hidden
     if not enough or touched_share(two) < COVERED:
-        return made, found
+        return dropped(_after(after))
     before = f"{touched_share(made):.0%} of the target is in reach" if is_hidden else _after(found)
     reason = f"turned over after half of the time: by pilots {_after(after)}, in one pose {before}"
     return replace(two, reasons={**two.reasons, ".steps": reason}), after
@@ -131,7 +136,11 @@ def _turned_over(made: Proposal) -> Proposal:
     # Half a turn about the chamber's x after turns about x, y and z is one before them, with the
     # turns about y and z the other way.
     turned = [(x + 180.0) % 360.0, -y + 0.0, -z + 0.0]
-    steps = [{"name": "first"}, {"name": "turned_over", "part": {"rotate_deg": turned}}]
+    pose: dict[str, list[float]] = {"rotate_deg": turned}
+    if any(made.design.part.offset_mm):
+        along, across = made.design.part.offset_mm
+        pose["offset_mm"] = [along, -across]
+    steps = [{"name": "first"}, {"name": "turned_over", "part": pose}]
     design = made.design.changed({"steps": steps})
     chamber = build_chamber(design)
     (_, other), room = list(design.in_steps.values()), chamber.steps[1]

@@ -1,12 +1,17 @@
 """Balls that `new` proposes: by fillets, slots, and gaps in which they would jam."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 import trimesh
 from shapely import Polygon
 
 from chamberopt.chamber.part import Part
+from chamberopt.chamber.propose.first_design import propose
+from chamberopt.chamber.propose.proposal import Wanted
 from chamberopt.chamber.propose.proposed_balls import SizeFit, fit_sizes, propose_ball
+from chamberopt.chamber.propose.proposed_intensity import with_thin_places
 from chamberopt.geometry.triangles import areas
 
 
@@ -85,3 +90,13 @@ def test_fewer_balls_are_proposed_where_they_serve_nearly_as_much() -> None:
     diameter, reason = propose_ball([small, others[1]])
     assert diameter == 0.5e-3
     assert "MANY BALLS, some 4,000 under the whole part: 2 mm would serve 60%" in reason
+
+
+@pytest.mark.parametrize(("thick_mm", "most_mm"), [(0.6, 0.9), (1.0, 1.5), (20.0, 3.0)])
+def test_balls_are_small_beside_thin_metal(thick_mm: float, most_mm: float, tmp_path: Path) -> None:
+    """A sheet is bent by large balls; a block takes the largest that are proposed."""
+    trimesh.creation.box((60, 40, thick_mm)).export(tmp_path / "sheet.stl")
+    made = propose(tmp_path / "sheet.stl", Wanted("mm"), lambda _: [])
+    assert 0.6 * most_mm < 1e3 * made.design.shot.diameter <= most_mm
+    is_told = "THIN PLACES" in with_thin_places(made).reasons["shot.diameter_mm"]
+    assert is_told is (thick_mm < 2.0)

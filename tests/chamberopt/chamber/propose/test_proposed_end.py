@@ -115,7 +115,7 @@ def test_a_root_beside_the_target_is_an_end_to_hold(long: float, holds: bool) ->
 def test_a_blade_on_edge_goes_out_by_its_root(tmp_path: Path) -> None:
     """Its platform is the wall: no level top stays in the chamber, and one sonotrode does."""
     root = Manifold.cube((40, 20, 17)).translate([-20, -10, -17])
-    _, body = part_of(root + drum(18, 60).scale([1, 0.1, 1]))
+    _, body = part_of(root + drum(18, 60).scale([1, 0.3, 1]))
     lines = [f"v {x} {y} {z}" for x, y, z in body.vertices]
     for name, of_name in (("ROOT", False), ("BLADE", True)):
         rows = body.faces[(body.triangles_center[:, 2] > 0.0) == of_name] + 1

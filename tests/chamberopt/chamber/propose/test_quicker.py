@@ -191,5 +191,7 @@ def test_a_part_stays_in_one_pose_where_another_is_no_gain_or_not_held(
 ) -> None:
     made = poses[pose]
     found = uneven(first)
-    assert propose_second_pose(made, found, lambda _: measured(second)) == (made, found)
+    kept, same = propose_second_pose(made, found, lambda _: measured(second))
+    assert (kept.design, same) == (made.design, found)
+    assert ("not turned over" in kept.reasons["part.rotate_deg"]) is (first > 600.0)
     assert propose_second_pose(made, None, lambda _: measured(second)) == (made, None)
