@@ -104,7 +104,7 @@ def plane_gauge(area: float = 1e-6) -> Gauge:
     return Gauge(Windows(points, 0.5e-3), np.full(WINDOWS, area), None)
 
 
-@pytest.mark.parametrize("dents", [5.0, 12.0, 48.0])
+@pytest.mark.parametrize("dents", [5.0, pytest.param(12.0, marks=pytest.mark.long), 48.0])
 @pytest.mark.parametrize("field", FIELDS)
 def test_mean_and_deviation_have_no_bias_and_their_intervals_hold(field: str, dents: float) -> None:
     groups = list(groups_of(field, dents, 100))
@@ -119,7 +119,7 @@ def test_mean_and_deviation_have_no_bias_and_their_intervals_hold(field: str, de
             assert bias < 3.5 * noise + 1e-3, (name, bias)
 
 
-@pytest.mark.parametrize("dents", [25.0, 60.0])
+@pytest.mark.parametrize("dents", [25.0, pytest.param(60.0, marks=pytest.mark.long)])
 @pytest.mark.parametrize("field", ["even", "ramp"])
 def test_percentile_and_time_are_right_from_25_dents_on(field: str, dents: float) -> None:
     groups = list(groups_of(field, dents, 100))
