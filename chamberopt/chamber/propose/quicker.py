@@ -115,7 +115,7 @@ def propose_second_pose(
         return dropped("what holds it here does not hold it there")
     in_air = any(one.pieces_in_air for one in two.chamber.steps) and not made.chamber.pieces_in_air
     if in_air or faults(two) > faults(made):
-        return dropped("nothing would hold it" if in_air else new_warning(two, made).split(",")[0])
+        return dropped("nothing would hold it" if in_air else _beginning(new_warning(two, made)))
     after = measure(two)
     if after is None or not after.places:
         return dropped("no pilot resolved it")
@@ -174,8 +174,13 @@ def _harm(made: Proposal, first: Proposal) -> str:
     if made.chamber.pieces_in_air and not first.chamber.pieces_in_air:
         return "nothing would hold it"
     if faults(made) > faults(first):
-        return new_warning(made, first).split(",")[0]
+        return _beginning(new_warning(made, first))
     return ""
+
+
+def _beginning(warning: str) -> str:
+    """Return a warning up to its first comma or place."""
+    return warning.partition(",")[0].partition(" at (")[0]
 
 
 def _is_quicker(one: Way, other: Way) -> bool:
