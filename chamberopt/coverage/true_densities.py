@@ -51,10 +51,14 @@ class CountedRoots(NamedTuple):
     variance: np.ndarray | None
 
     @property
+    def counting(self) -> float:
+        """Mean variance by counting; 0 if it is not known."""
+        return 0.0 if self.variance is None else float(self.variance.mean())
+
+    @property
     def true_variance(self) -> float:
         """Variance over the target without that of counting; it may be below 0 by chance."""
-        counting = 0.0 if self.variance is None else float(self.variance.mean())
-        return float(self.root.var()) - counting
+        return float(self.root.var()) - self.counting
 
     def level(self, share: float, deviations: float) -> float:
         """Return the density that lies so many standard deviations of counting from a percentile.
@@ -65,10 +69,8 @@ class CountedRoots(NamedTuple):
         Args:
             share: share of the windows that do not exceed the percentile.
         """
-        counting = 0.0 if self.variance is None else float(self.variance.mean())
-        return (
-            max(0.0, float(np.quantile(self.root, share)) + deviations * math.sqrt(counting)) ** 2
-        )
+        moved = float(np.quantile(self.root, share)) + deviations * math.sqrt(self.counting)
+        return max(0.0, moved) ** 2
 
 
 class TrueDensities(NamedTuple):

@@ -12,6 +12,8 @@ import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
+from chamberopt.chamber.propose.proposed_intensity import INTENSITY
+from chamberopt.chamber.propose.proposed_target import area_in_mm2
 from chamberopt.common.errors import one_line
 from chamberopt.common.number_text import plain
 
@@ -48,7 +50,7 @@ def proposal_end(made: Proposal, left_out: Sequence[LeftOut], verbose: bool) -> 
     for row in _rows(made):
         told = _wrapped(f"{row.name:{INDENT}}{row.value}", INDENT)
         for key in row.keys:
-            reason = one_line(made.reasons.get(key, ""))
+            reason = one_line(made.reasons.get(key, ""))  # its beginning may be the row's value
             why, first = clauses(re.sub(f"^{re.escape(row.value)}[:;] ", "", reason))
             settle += first
             if why and why != [row.value]:
@@ -70,7 +72,7 @@ def clauses(reason: str) -> tuple[list[str], list[str]]:
     """Return the clauses of a reason: why a value is so, and what is to be settled about it."""
     why: list[str] = []
     settle: list[str] = []
-    for clause in filter(None, one_line(reason).split("; ")):
+    for clause in filter(None, reason.split("; ")):
         found = TO_SETTLE.match(clause)
         marks = found is not None and len(found[0]) > 3 and not found[0].startswith(NO_MATTER)
         (settle if marks else why).append(clause)
@@ -101,9 +103,9 @@ def _sentence(made: Proposal) -> list[str]:
     """Return what is proposed in one sentence."""
     shot, design, part = made.tables["shot"], made.design, made.chamber.part
     target = made.reasons["part.target"].partition(": ")[0]
-    area = plain(1e6 * float(part.area[part.target].sum()), 3)
+    area = area_in_mm2(float(part.area[part.target].sum()))
     return _wrapped(
-        f"Peen {one_line(target)} ({area} mm²) of {one_line(design.part.mesh_path.name)} for "
+        f"Peen {one_line(target)} ({area}) of {one_line(design.part.mesh_path.name)} for "
         f"{time_in_words(design.process.treatment_time)} with {design.shot.count:,} balls of "
         f"{shot['diameter_mm']:g} mm ({shot['material']}, {shot['mass_g']:g} g), the sonotrode "
         f"at {design.sonotrode.zero_to_peak_um:g} µm zero-to-peak.",
@@ -144,9 +146,9 @@ def _rows(made: Proposal) -> Iterator[_Row]:
     yield _Row("time", time, ("process.treatment_time_s", "process.coverage_percent"))
     if ".steps" in made.reasons:
         yield _Row("steps", made.reasons[".steps"].partition(": ")[0], (".steps",))
-    if "process.intensity_mmA" in made.reasons:
-        value = clauses(made.reasons["process.intensity_mmA"])[0][0]
-        yield _Row("intensity", value, ("process.intensity_mmA",))
+    if INTENSITY in made.reasons:
+        value = clauses(made.reasons[INTENSITY])[0][0]
+        yield _Row("intensity", value, (INTENSITY,))
     accuracy = design.process.accuracy
     simulated = f"{accuracy.replicas} replicas of {plain(accuracy.simulated_time, 3)} s"
     keys = tuple(f"process.accuracy.{key}" for key in tables["process.accuracy"])

@@ -7,12 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from chamberopt.chamber.build import Chamber
 from chamberopt.chamber.part import chosen_triangles
 from chamberopt.chamber.propose.proposal import Proposal, touched_share
 from chamberopt.chamber.propose.proposed_mask import is_met
-from chamberopt.chamber.propose.proposed_target import RUNNING, Surface
-from chamberopt.common.number_text import plain
+from chamberopt.chamber.propose.proposed_target import RUNNING, Surface, area_in_mm2
 from chamberopt.geometry.triangles import area_vectors, areas, rotation_matrix, unit_vectors
 
 AWAY_DEG = 105.0  # angle to the way down from which on a face is turned away from the sonotrode
@@ -34,7 +32,7 @@ class LeftOut:
 
 def find_left_out(proposal: Proposal) -> list[LeftOut]:
     """Return what of a proposed target faces away from the sonotrode or is hidden from the shot."""
-    mesh, part, chamber = proposal.mesh, proposal.design.part, proposal.chamber
+    mesh, part = proposal.mesh, proposal.design.part
     target, area = chosen_triangles(mesh, part.target), areas(mesh.vertices, mesh.triangles)
     down = -rotation_matrix(part.rotate_deg)[2]
     normals = unit_vectors(area_vectors(mesh.vertices, mesh.triangles))
@@ -57,23 +55,25 @@ def find_left_out(proposal: Proposal) -> list[LeftOut]:
     if hidden > LEAST and not part.target.reachable:
         found.append(LeftOut({"reachable": True}, f"the {hidden:.0%} that no ball touches here"))
     others = [one for one in proposal.known if not np.any(one.triangles & target)]
-    found += _met_beside(proposal, chamber, others[:MOST_LOOKED_AT])
+    found += _met_beside(proposal, others[:MOST_LOOKED_AT], area)
     return found
 
 
 def _met_beside(
-    proposal: Proposal, chamber: Chamber, others: Sequence[Surface]
+    proposal: Proposal, others: Sequence[Surface], area: np.ndarray
 ) -> Iterator[LeftOut]:
-    """Yield what the shot meets of the part beside its target, the largest surfaces by name."""
+    """Yield what the shot meets of the part beside its target, the largest surfaces by name.
+
+    Args:
+        area: areas of the part's triangles [m²], (m,).
+    """
     named = [one for one in others if "surface" in one.keys] or others
-    met = [one for one in named if is_met(proposal.design, chamber, one)]
+    met = [one for one in named if is_met(proposal.design, proposal.chamber, one)]
     if not met:
         return
     met.sort(key=lambda one: not RUNNING.search(one.name))
-    area = areas(proposal.mesh.vertices, proposal.mesh.triangles)
     names = [
-        f"{one.name} ({plain(1e6 * float(area[one.triangles].sum()), 3)} mm²)"
-        for one in met[:MOST_NAMED]
+        f"{one.name} ({area_in_mm2(float(area[one.triangles].sum()))})" for one in met[:MOST_NAMED]
     ]
     more = f" and {len(met) - MOST_NAMED} more" if len(met) > MOST_NAMED else ""
     runs = "runs or fits by its name, and " if RUNNING.search(met[0].name) else ""

@@ -285,7 +285,11 @@ def _faces(mesh: PartMesh) -> list[Surface]:
         if several > 1:
             key["alike"] = True
         marked = same[faces.of_triangle]
-        text = f"{several} faces alike, {_mm2(area)} in all" if several > 1 else _mm2(area)
+        text = (
+            f"{several} faces alike, {area_in_mm2(area)} in all"
+            if several > 1
+            else area_in_mm2(area)
+        )
         singles = np.flatnonzero(same) if 1 < several <= MOST_SINGLE else ()
         alone = ", ".join(
             f"{name}.{k} looks {_way(faces.normal(int(one)))}"
@@ -304,7 +308,9 @@ def _single(mesh: PartMesh, of: Surface, number: int) -> Surface | None:
     face = int(own[number - 1])
     key: dict[str, object] = {"at_mm": faces.place_mm(face), "crease_deg": CREASE_DEG}
     marked = faces.of_triangle == face
-    return Surface(f"{of.name}.{number}", {"faces": [key]}, marked, _mm2(float(faces.area[face])))
+    return Surface(
+        f"{of.name}.{number}", {"faces": [key]}, marked, area_in_mm2(float(faces.area[face]))
+    )
 
 
 def _way(normal: np.ndarray) -> str:
@@ -317,7 +323,7 @@ def _way(normal: np.ndarray) -> str:
 
 def _named(mesh: PartMesh, name: str, marked: np.ndarray) -> Surface:
     area = float(areas(mesh.vertices, mesh.triangles[marked]).sum())
-    return Surface(name, {"surface": [name]}, marked, _mm2(area))
+    return Surface(name, {"surface": [name]}, marked, area_in_mm2(area))
 
 
 def _is_vivid(name: str) -> bool:
@@ -373,5 +379,6 @@ def _joined(chosen: Sequence[Surface], reason: str) -> Target:
     return Target(keys, marked, f"{', '.join(one.name for one in chosen)}: {reason}")
 
 
-def _mm2(area: float) -> str:
+def area_in_mm2(area: float) -> str:
+    """Return an area [m²] as text in mm², whole from 100 on, so that surfaces are told apart."""
     return f"{plain(1e6 * area, 3)} mm²"
