@@ -6,10 +6,10 @@ It also shows what changes as the facets of the mesh shrink.
 
 The chamber is that of designs/plate_paper.toml: a cylinder with 30 balls of 3 mm, closed by a plate
 15 mm from the sonotrode. One number is fitted: the amplitude at which the analytical chamber covers
-39 % in 50 s, as the paper measured. The rest is prediction. The run writes docs/analytic.md,
-docs/images/analytic.png and benchmarks/results/analytic.csv and takes one CPU minute; the fitted
-amplitude goes into the design by hand. With --quick it is rough, takes seconds and writes to --out
-alone.
+39 % in 50 s, as the paper measured. The rest is prediction. The run writes
+docs/explanation/analytic.md, docs/images/analytic.png and benchmarks/results/analytic.csv and takes
+one CPU minute; the fitted amplitude goes into the design by hand. With --quick it is rough, takes
+seconds and writes to --out alone.
 """
 
 import argparse
@@ -55,7 +55,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         }
     facets = design.chamber.facets
     document, image, table = (
-        ROOT / "docs" / "analytic.md",
+        ROOT / "docs" / "explanation" / "analytic.md",
         IMAGES / "analytic.png",
         RESULTS / "analytic.csv",
     )

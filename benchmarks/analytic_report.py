@@ -44,7 +44,7 @@ def report(design: Design, effort: Effort, exact: Run, meshed: dict[int, Run]) -
             *_agreement(design, exact, meshed[n]),
             *_convergence(exact, meshed),
             "",
-            "![profiles and convergence](images/analytic.png)",
+            "![profiles and convergence](../images/analytic.png)",
             "",
         ]
     )

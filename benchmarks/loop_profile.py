@@ -3,7 +3,8 @@
     python benchmarks/loop_profile.py [scene ...]
 
 The loop is compiled once more with a profiler in it (sim_core/numerics/profiler.py). The last
-column says how much slower that makes it. What limits the loop is described in docs/core.md.
+column says how much slower that makes it. What limits the loop is described in
+docs/explanation/core.md.
 """
 
 import argparse

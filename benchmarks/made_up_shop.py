@@ -1,4 +1,4 @@
-"""The measurements of a made-up shop, for the worked example of docs/peening_examples.md.
+"""The measurements of a made-up shop, for the worked example of docs/tutorials/peening_examples.md.
 
 Writes designs/shop/measured.toml: two sets of Almen strips and one coupon, as the hidden machine of
 HIDDEN would give them in the chamber of designs/shop/coupon.toml, with the errors of reading that

@@ -1,4 +1,4 @@
-"""The pictures of docs/page.md: the program's page as a browser shows it.
+"""The pictures of docs/how_to/page.md: the program's page as a browser shows it.
 
     python benchmarks/page_pictures.py designs/parts/fir_tree.step FIR_TREE
     python benchmarks/page_pictures.py results/quickstart

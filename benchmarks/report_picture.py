@@ -1,4 +1,4 @@
-"""The picture of docs/report.md: a results folder's report as a browser shows it.
+"""The picture of docs/how_to/report.md: a results folder's report as a browser shows it.
 
     python benchmarks/report_picture.py results/quickstart [PICTURE.png]
 

@@ -1,4 +1,4 @@
-"""Draws the shapes of docs/chambers.md: python benchmarks/shapes.py"""
+"""Draws the shapes of docs/how_to/chambers.md: python benchmarks/shapes.py"""
 
 import sys
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""What a user waits for, and how fast the simulator is: every figure of docs/core.md's first table.
+"""What a user waits for, and how fast the simulator is: first table of docs/explanation/core.md.
 
     python benchmarks/speed.py [--before FOLDER] [--rows ROW ...]
 

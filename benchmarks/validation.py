@@ -1,4 +1,4 @@
-"""The tables and pictures of docs/validation.md: published cases beside what is simulated.
+"""The tables and pictures of docs/explanation/validation.md: published cases and simulations.
 
     python benchmarks/validation.py [--long] [--cases CASE ...]
 
@@ -33,7 +33,7 @@ from benchmarks.cases.row import Row
 from benchmarks.scenes import ROOT
 from benchmarks.table import RESULTS, write_csv
 
-PAGE = ROOT / "docs" / "validation.md"
+PAGE = ROOT / "docs" / "explanation" / "validation.md"
 HEAD = ("| case | quantity | reference | simulated | agree |", "|---|---|--:|--:|---|")
 BAR = r"\|"  # within a cell
 VERDICTS = {True: "yes", False: "**no**", None: ""}

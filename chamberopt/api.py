@@ -9,7 +9,7 @@
     chamberopt.show(result, "more-shot.png")
 
 A laboratory can measure candidates instead of simulating them: a Search proposes candidates, and
-the laboratory tells it the measured figures, see docs/search.md.
+the laboratory tells it the measured figures, see docs/how_to/search.md.
 
 The result's coverage.vtp has the coverage on a fine mesh of the part. part.vtp has the mean
 coverage of each of the part's own triangles. pyvista and ParaView read both files.
@@ -272,7 +272,7 @@ def calibrate(
     """Calibrate the model to the measurements in a file, and save the machine in a folder.
 
     Args:
-        measured: file of measurements (.toml), see docs/peening.md.
+        measured: file of measurements (.toml), see docs/explanation/peening.md.
         out: new or empty folder. It receives machine.toml, which designs name as their calibration.
         workers: number of threads, by default one per core; it does not change the result.
         progress: True for bars, False for nothing, or a function, called as
@@ -376,7 +376,7 @@ def impacts(
     """Return every impact on the part of a result, a row for each, in a pandas DataFrame.
 
     A result stores no impacts: it is simulated again, and must be the same to the last bit. An
-    impact takes about 100 bytes. The columns are those of docs/export.md.
+    impact takes about 100 bytes. The columns are those of docs/how_to/export.md.
 
     Args:
         frame: coordinates: "part", as in the part's file and in its unit, or "chamber", in mm.
@@ -408,7 +408,7 @@ def fields(result: Result, *, frame: FrameName = "part") -> DataFrame:
     """Return the values on each triangle of a result's part, such as coverage, in a DataFrame.
 
     Its rows are the triangles of part.vtp, its columns the centre of each triangle and the values
-    of docs/export.md. Units and meanings are in `fields(result).attrs["columns"]`.
+    of docs/how_to/export.md. Units and meanings are in `fields(result).attrs["columns"]`.
 
     Args:
         frame: coordinates: "part", as in the part's file and in its unit, or "chamber", in mm.

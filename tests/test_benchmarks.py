@@ -76,7 +76,7 @@ def test_the_analytical_chamber_beside_the_meshed_one(tmp_path: Path) -> None:
 
 
 def test_the_shipped_plate_of_the_paper_is_the_chamber_of_the_page() -> None:
-    page = (analytic.ROOT / "docs" / "analytic.md").read_text(encoding="utf-8")
+    page = (analytic.ROOT / "docs" / "explanation" / "analytic.md").read_text(encoding="utf-8")
     paper, plate = (
         load_design(analytic.ROOT / "designs" / f"{name}.toml") for name in ("plate_paper", "plate")
     )

@@ -21,7 +21,7 @@ QUICK = {
 
 def commands(page: str) -> list[list[str]]:
     """The commands of a page, as lists of words."""
-    text = (ROOT / "docs" / page).read_text(encoding="utf-8")
+    text = (ROOT / "docs" / "tutorials" / page).read_text(encoding="utf-8")
     return [line.split() for line in re.findall(r"^    (.*)$", text, re.MULTILINE)]
 
 

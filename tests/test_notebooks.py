@@ -51,7 +51,7 @@ CASES = pytest.mark.parametrize("notebook", NOTEBOOKS, ids=[one.stem for one in 
 
 @CASES
 def test_the_notebook_calls_what_there_is(notebook: Path) -> None:
-    """In a moment, beside the programs of README and docs/python.md, which run."""
+    """In a moment, beside the programs of README and docs/how_to/python.md, which run."""
     called = 0
     for node in ast.walk(ast.parse(code_of(notebook))):
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):

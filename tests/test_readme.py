@@ -50,7 +50,7 @@ def test_the_readmes_python_runs_as_printed(snippet: str, tmp_path: Path) -> Non
 @pytest.mark.long
 def test_the_page_for_science_prints_what_it_shows(tmp_path: Path) -> None:
     """Words as shown, and numbers within a tenth: on another processor a gas takes other paths."""
-    page = (ROOT / "docs/science.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs/how_to/science.md").read_text(encoding="utf-8")
     blocks, shown = (
         "".join(re.findall(BLOCK.format(kind), page, re.DOTALL)) for kind in ("python", "text")
     )
@@ -64,14 +64,14 @@ def test_the_page_on_python_runs_as_one_program(tmp_path: Path) -> None:
     pytest.importorskip("pandas")
     for name in ("designs", "studies"):
         (tmp_path / name).symlink_to(ROOT / name)
-    page = (ROOT / "docs/python.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs/how_to/python.md").read_text(encoding="utf-8")
     printed = run("".join(re.findall(BLOCK.format("python"), page, re.DOTALL)), tmp_path)
     for expected in ("±", "mean_normal_speed", "m/s", "replica", "ring.ply"):
         assert expected in printed
 
 
 def test_the_page_on_python_has_every_name() -> None:
-    page = (ROOT / "docs/python.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs/how_to/python.md").read_text(encoding="utf-8")
     assert [name for name in chamberopt.__all__ if f"`{name}`" not in page] == []
 
 

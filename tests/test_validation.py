@@ -1,4 +1,4 @@
-"""Quick rows of docs/validation.md; benchmarks/validation.py runs all of them."""
+"""Quick rows of docs/explanation/validation.md; benchmarks/validation.py runs all of them."""
 
 import math
 import re

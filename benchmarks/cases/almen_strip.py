@@ -72,7 +72,7 @@ def dents(case: Case) -> StripDents:
 
 
 def rows() -> Iterator[Row]:
-    """Trends of the intensity, fits to five points, and the example of docs/peening.md."""
+    """Trends of the intensity, fits to five points, and the example of peening.md in docs/."""
     for low in CASES[::2]:
         power = math.log(HIGH / LOW)
         one, other = strength(low), strength(low._replace(amplitude=HIGH))
@@ -115,7 +115,7 @@ def offsets(of_disc: StripDents) -> list[tuple[float, float]]:
 
 
 def example_design() -> Design:
-    """The example of docs/peening.md."""
+    """The example of docs/explanation/peening.md."""
     mass = 1e3 * DENSITY * math.pi / 6.0 * 3e-3**3 * 100
     return load_design(PLATE).changed(
         {

@@ -1,4 +1,4 @@
-"""One line of docs/validation.md: a figure that was simulated beside its reference."""
+"""One line of docs/explanation/validation.md: a figure that was simulated beside its reference."""
 
 import math
 from typing import NamedTuple

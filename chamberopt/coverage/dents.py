@@ -122,7 +122,8 @@ def thin_part_factor(
         mobility: Y, of the part at each dent [s/kg], (n,); 0 where it is rigid.
         hardness: B, of the part [Pa].
 
-    Source: C. Zener, Phys. Rev. 59 (1941) 669, with this force; docs/physics.md says how exact.
+    Source: C. Zener, Phys. Rev. 59 (1941) 669, with this force; docs/explanation/physics.md says
+    how exact.
     """
     force = 0.25 * np.pi * hardness * diameter**2
     zeta = np.divide(0.5 * mobility * force, normal_speed, out=0.0 * force, where=force > 0.0)

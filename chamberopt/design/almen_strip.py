@@ -41,7 +41,7 @@ STRIP_STEEL = Elastic(205e9, 0.29)
 STRIP_YIELD, STRIP_TENSILE = 1350e6, 1550e6  # Pa, by heart
 # Arc height of an A strip over peening strength [mmA/mm] before any strip of the machine is
 # measured: the median, and the standard deviation of its logarithm, a factor of 2.5. From one
-# published intensity 4.8 to 14 follow, by the restitution assumed (docs/peening.md).
+# published intensity 4.8 to 14 follow, by the restitution assumed (docs/explanation/peening.md).
 USUAL_K, USUAL_K_LOG_SD = 13.5, 0.90
 
 

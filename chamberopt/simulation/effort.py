@@ -27,7 +27,8 @@ LITTLE = 1.0 / 8.0  # share of a half-width that is not worth more replicas
 MUCH = 0.7  # share of a wanted half-width that is too much for what replicas do not narrow
 # Replicas that are added until an interval is narrow enough leave it too narrow by chance. If that
 # begins with 10 replicas and adds a quarter or more each time, a 95 % interval still holds the
-# truth in 94 % of cases (normal replicas; 92 % from 5 on, 90 % from 3 on: docs/accuracy.md).
+# truth in 94 % of cases (normal replicas; 92 % from 5 on, 90 % from 3 on:
+# docs/explanation/accuracy.md).
 MIN_REPLICAS_TO_STOP = 10
 MIN_GROWTH, MAX_GROWTH = 1.25, 2.0
 MIN_GROWTH_OF_DENTS = 1.05  # while a figure has no interval, there is none to be lucky with

@@ -80,5 +80,5 @@ def _met_beside(
     yield LeftOut(
         {},
         f"NOT MASKED: the shot also meets {', '.join(names)}{more}; {runs}what has to keep its "
-        "size and finish takes a [mask] (docs/chambers.md)",
+        "size and finish takes a [mask] (docs/how_to/chambers.md)",
     )

@@ -20,7 +20,7 @@ def example(name: Literal["gear", "plate", "blade", "fir_tree"], /, *, out: Out 
     ----------
     name
         A pinion on its shaft, a plate that closes the chamber, a compressor blade; or fir_tree,
-        a STEP file alone, for docs/tutorial.md.
+        a STEP file alone, for docs/tutorials/tutorial.md.
     """
     from chamberopt.common.files import (
         claim_folder,

@@ -1,7 +1,8 @@
 """Open, write, claim and remove files in a user's folders; only this package does so.
 
 Each output has one writer, overwrites nothing, and is written whole or not at all. No link is
-followed in a folder that the program writes to, or in its results and studies. See docs/trust.md.
+followed in a folder that the program writes to, or in its results and studies. See
+docs/reference/trust.md.
 """
 
 from chamberopt.common.files.claimed import (

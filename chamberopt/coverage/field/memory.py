@@ -1,9 +1,9 @@
 """Estimate the memory that the evaluation of a design takes, before it begins.
 
 Pairs of dents and windows are not included, because they are kept only while there is room for them
-(common/memory.py). The bytes were measured, see docs/trust.md. The number of impacts is estimated
-as in a gas of balls: n V A / 4 a second on an area A, with n balls per volume and the peak speed V
-of the sonotrode. This is 0.7 to 2.1 times the simulated number.
+(common/memory.py). The bytes were measured, see docs/reference/trust.md. The number of impacts is
+estimated as in a gas of balls: n V A / 4 a second on an area A, with n balls per volume and the
+peak speed V of the sonotrode. This is 0.7 to 2.1 times the simulated number.
 """
 
 from __future__ import annotations

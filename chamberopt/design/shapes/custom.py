@@ -162,7 +162,8 @@ def _run(path: Path, source: bytes) -> type[ChamberTable]:
         raise InputError(f"{path}: must define {wanted}; it defines {names}")
     if inspect.isabstract(shapes[0]):
         lacking = ", ".join(sorted(shapes[0].__abstractmethods__))
-        raise InputError(f"{path}: {names} does not define {lacking}(); see docs/chambers.md")
+        text = f"{names} does not define {lacking}(); see docs/how_to/chambers.md"
+        raise InputError(f"{path}: {text}")
     return _with_checks(path, shapes[0], digest)
 
 

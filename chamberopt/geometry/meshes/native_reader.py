@@ -21,8 +21,8 @@ from chamberopt.common.limits import limit_cpu_time, limit_memory, raise_cpu_tim
 from chamberopt.common.number_text import plain
 
 # Seconds of computing time. STEP files took 0.5 to 1 s up to 0.5 MB, and large files took 1.4 to
-# 4.5 s for each MB (docs/trust.md). A slow machine may take thrice as long, and the limits are ten
-# times as long again.
+# 4.5 s for each MB (docs/reference/trust.md). A slow machine may take thrice as long, and the
+# limits are ten times as long again.
 LEAST_SECONDS = 30.0
 VARIABLE = "CHAMBEROPT_READER_S"
 WALL_CLOCK_S = 1800.0  # limit for a child that waits, and where computing time has no limit

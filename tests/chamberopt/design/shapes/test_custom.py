@@ -221,7 +221,7 @@ def test_the_shipped_oblong_is_a_stadium() -> None:
 
 
 def test_the_one_in_the_docs_works(folder: Path) -> None:
-    docs = (ROOT / "docs" / "chambers.md").read_text(encoding="utf-8")
+    docs = (ROOT / "docs" / "how_to" / "chambers.md").read_text(encoding="utf-8")
     (folder / "pyramid.py").write_text(
         docs.split("```python\n")[1].split("```")[0], encoding="utf-8"
     )
