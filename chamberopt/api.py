@@ -9,7 +9,7 @@
     chamberopt.show(result, "more-shot.png")
 
 A laboratory can measure candidates instead of simulating them: a Search proposes candidates, and
-the laboratory tells it the measured figures, see docs/how_to/search.md.
+the laboratory tells it the measured figures, see docs/how_to/study.md.
 
 The result's coverage.vtp has the coverage on a fine mesh of the part. part.vtp has the mean
 coverage of each of the part's own triangles. pyvista and ParaView read both files.
@@ -272,7 +272,7 @@ def calibrate(
     """Calibrate the model to the measurements in a file, and save the machine in a folder.
 
     Args:
-        measured: file of measurements (.toml), see docs/explanation/peening.md.
+        measured: file of measurements (.toml), see docs/how_to/calibrate.md.
         out: new or empty folder. It receives machine.toml, which designs name as their calibration.
         workers: number of threads, by default one per core; it does not change the result.
         progress: True for bars, False for nothing, or a function, called as

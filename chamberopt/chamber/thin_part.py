@@ -38,7 +38,7 @@ LOSS = 0.02  # of the restitution; C0 of a metal is known no better
 SHARE = 0.01  # of the area of the target or a zone
 REACH = 5.0  # thickest plate that is measured, in diameters of the largest ball
 # Lengths l between a hit and an edge, below which waves that come back change e by more than 0.05
-# to 0.1 (docs/explanation/physics.md).
+# to 0.1 (docs/explanation/effects.md).
 NEAR_EDGE = 1.5
 UNKNOWN = 1.0  # ball diameters; below, plates of any metal lower e by 5 % and more
 HERTZ = 3.218  # duration of the contact in units of (m / k)^(2/5) v^(-1/5)
@@ -196,7 +196,7 @@ def _note(design: Design, name: str, thin: ThinTarget) -> str:
         f"restitution by more than {LOSS:.0%} on {thin.lowered:.0%} of it, at the median to "
         f"{thin.restitution:.2f} times at {design.sonotrode.rms_peak_speed:.2g} m/s (Zener 1941); "
         f"{thin.near_edge:.0%} of that is so near to an edge that the theory is rough there; "
-        "dents are narrower by an estimate (docs/explanation/physics.md); "
+        "dents are narrower by an estimate (docs/explanation/effects.md); "
         "effects.flexure = false leaves it out"
     )
 

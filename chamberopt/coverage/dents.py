@@ -122,7 +122,7 @@ def thin_part_factor(
         mobility: Y, of the part at each dent [s/kg], (n,); 0 where it is rigid.
         hardness: B, of the part [Pa].
 
-    Source: C. Zener, Phys. Rev. 59 (1941) 669, with this force; docs/explanation/physics.md says
+    Source: C. Zener, Phys. Rev. 59 (1941) 669, with this force; docs/explanation/effects.md says
     how exact.
     """
     force = 0.25 * np.pi * hardness * diameter**2

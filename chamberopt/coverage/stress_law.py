@@ -28,8 +28,8 @@ Notation
 The depth is scaled so that P ends at 1.25 d, and P does not fall towards the surface. The share w
 grows as half a cosine from 0.75 at the surface to 1 at the depth of the largest P, and at 0.35 of
 the layer at least. These two numbers, 1.25 and 0.75, were chosen so that published profiles are met
-(docs/explanation/peening.md). Each kind of profile can be moved by a factor that a measured profile
-of the metal gives (LawFactors).
+(docs/explanation/residual_stress.md). Each kind of profile can be moved by a factor that a measured
+profile of the metal gives (LawFactors).
 
     thick part   stress = -E e / (1 - nu)
     plate        k = 12 / H³ integral of e (H/2 - z)

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 Z = 1.96  # standard deviations to either end of a 95 % interval
 # A single intensity stands for itself and what lies above it: SAE AMS 2430, 3.11.1, as quoted (see
-# docs/explanation/peening.md): - 0, + 30 % or + 0.003 in, whichever is the greater.
+# docs/how_to/drawing.md): - 0, + 30 % or + 0.003 in, whichever is the greater.
 ABOVE_SHARE, ABOVE_MM = 0.30, 0.0762
 # mm on the strip of its type. Inches and thousandths of an inch lie outside.
 LEAST_MM, MOST_MM = 0.03, 1.5

@@ -32,7 +32,7 @@ from chamberopt.design.table_base import FileTable
 # about a half of their value.
 FRICTION = (0.5, 1.5)
 # v0 goes with the 5/2nd power of the dynamic yield pressure, which Johnson's formula takes from the
-# hardness: about a factor of two (docs/explanation/physics.md).
+# hardness: about a factor of two (docs/reference/physics.md).
 V0 = (0.5, 2.0)
 # Rms slopes of peened faces are 2 to 5 degrees, about 3 times or over 1.7.
 SLOPES = (0.6, 1.7)

@@ -182,7 +182,7 @@ EXPECTED = (
     "compression_depth_um",
 )
 OF_STRIPS = ("strength_um", "saturation_time_s", "compression_depth_um")
-DROP_SPEED = 3.0  # m/s, the speed of a ball that falls 0.46 m; docs/explanation/peening.md
+DROP_SPEED = 3.0  # m/s, the speed of a ball that falls 0.46 m; docs/how_to/calibrate.md
 SHEETS_OF = {
     "study": "The best chamber of a study, confirmed on fresh seeds",
     "simulation": "One simulated chamber",

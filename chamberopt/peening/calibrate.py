@@ -52,7 +52,7 @@ if TYPE_CHECKING:
     from chamberopt.common.progress import Progress
     from chamberopt.design.load import Design
 
-# Medians, and standard deviations of logarithms, before measuring: see docs/explanation/peening.md.
+# Medians, and standard deviations of logarithms, before measuring: docs/explanation/calibration.md.
 PRIORS: dict[Parameter, tuple[float, float]] = {
     "amplitude": (1.0, 0.10),
     "C0": (1.0, 0.04),

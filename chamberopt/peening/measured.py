@@ -24,7 +24,7 @@ from chamberopt.peening.strip import StripSize
 if TYPE_CHECKING:
     from chamberopt.design.load import Design
 
-# Standard deviations of measurements that come without any, see docs/explanation/peening.md.
+# Standard deviations of measurements that come without any, see docs/how_to/calibrate.md.
 ARC_PERCENT, COVERAGE_POINTS, DENT_PERCENT = 3.0, 3.0, 1.5
 DROP_PERCENT, IMPACTS_PERCENT = 1.5, 5.0
 SD_OF_METHOD = {"x-ray": 30.0, "hole drilling": 50.0}  # MPa
@@ -281,7 +281,7 @@ def load_measured(path: Path) -> tuple[Measured, dict[str, Design]]:
 
     Raises InputError with every problem of the file, or of the first design that cannot be used.
     """
-    example = "see docs/explanation/peening.md for an example"
+    example = "see docs/how_to/calibrate.md for an example"
     source, values = read_toml(path, "measurements", example)
     if {"part", "chamber"} <= values.keys():
         text = "this is a design file; a file of measurements is wanted, which names designs"

@@ -26,7 +26,7 @@ lambda e = 1 - 1.730 lambda. With the numbers of a plate put in, lambda is the f
              (E_b / (E_b + E_p))^(2/5)
 
 The restitution of a hit is that of the law, which stands for a rigid part, times e. That is exact
-where one of both is 1; docs/explanation/physics.md has its error where dents and waves take energy
+where one of both is 1; docs/explanation/effects.md has its error where dents and waves take energy
 together. Hits slower than elastic_below of the restitution lose nothing, here as on rigid parts.
 
 Sources: C. Zener, Phys. Rev. 59 (1941) 669; the mobility of a plate: L. Cremer, M. Heckl & B. A. T.

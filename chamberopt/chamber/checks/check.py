@@ -362,14 +362,14 @@ def _intensity_notes(design: Design) -> list[str]:
 def friction_notes(design: Design) -> list[str]:
     """Return a note on what leaving friction out changes, if the design leaves it out.
 
-    Source: docs/explanation/physics.md.
+    Source: docs/explanation/friction.md.
     """
     if design.effects.friction is not None or design.effects.auto:
         return []
     remedy = 'effects.friction = "catalogue" takes that of the metals'
     return [
         'effects.friction is "none", so the balls are smooth: in a cylinder, any mu from 0.1 to '
-        f"0.5 made the shot slower by 22 to 47 % (docs/explanation/physics.md); {remedy}"
+        f"0.5 made the shot slower by 22 to 47 % (docs/explanation/friction.md); {remedy}"
     ]
 
 

@@ -3,7 +3,7 @@
 Shot larger than half a fillet's radius, or a quarter of a slot's width, peens the fillet or slot
 less than the surface beside it, even if it touches everything.
 
-Source: ASTM B851, as quoted in docs/explanation/peening.md.
+Source: ASTM B851, as quoted in docs/how_to/drawing.md.
 """
 
 from __future__ import annotations
@@ -188,7 +188,7 @@ def _fillets(chamber: Chamber, chosen: np.ndarray, largest: float) -> list[str]:
     return [
         f"shot of {1e3 * largest:g} mm is larger than half the radius of the target's smallest "
         f"fillets ({fillet}, e.g. at {where}): the shot peens them less than what is beside them; "
-        "use smaller balls, or give them a zone of their own (docs/explanation/peening.md)"
+        "use smaller balls, or give them a zone of their own (docs/how_to/drawing.md)"
     ]
 
 
@@ -217,7 +217,7 @@ def _slots(reach: Reach, chamber: Chamber, chosen: np.ndarray, largest: float) -
     return [
         f"shot of {1e3 * largest:g} mm is larger than a quarter of the target's narrowest slot, "
         f"about {1e3 * width:.3g} mm wide, e.g. at {where}: few balls get to its bottom, and "
-        "slowly; use smaller balls, or give it a zone of its own (docs/explanation/peening.md)"
+        "slowly; use smaller balls, or give it a zone of its own (docs/how_to/drawing.md)"
     ]
 
 

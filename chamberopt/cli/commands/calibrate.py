@@ -26,7 +26,7 @@ def calibrate(
     Parameters
     ----------
     measured
-        File of measurements (.toml), see docs/explanation/peening.md.
+        File of measurements (.toml), see docs/how_to/calibrate.md.
     """
     from chamberopt.cli.teller import TerminalTeller
     from chamberopt.common.executor import open_executor

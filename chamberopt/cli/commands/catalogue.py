@@ -61,7 +61,7 @@ def materials(name: str | None = None, /, *, json: Json = False) -> None:
         "",
         f"v0 [m/s] of these balls: e = C0 for v < v0, C0 (v / v0)^(-1/4) above, C0 = {DEFAULT_C0};",
         "by Johnson's formula from E, HB and the ball's density: to calibrate "
-        "(docs/explanation/physics.md)",
+        "(docs/reference/physics.md)",
         "",
         *_friction({one.metal for one in listed}),
         *_sources(listed),

@@ -309,8 +309,8 @@ def test_a_wrong_file_is_refused_before_any_work(
 
 
 def test_the_example_of_the_docs_is_a_usable_file() -> None:
-    page = (Path(__file__).parents[3] / "docs/explanation/peening.md").read_text(encoding="utf-8")
-    example = page[page.index("## Calibrating to a machine") :].split("```toml\n")[1]
+    page = (Path(__file__).parents[3] / "docs/how_to/calibrate.md").read_text(encoding="utf-8")
+    example = page.split("```toml\n")[1]
     found = validate(Measured, tomllib.loads(example.split("```")[0]))
     assert len(found.strip[0].arc_mm) == 5
     assert found.prior.v0 is not None

@@ -40,7 +40,7 @@ def answered(search: chamberopt.Search, figures) -> chamberopt.Search:
 def test_the_example_of_the_docs_finds_its_optimum(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    page = (ROOT / "docs/how_to/search.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs/how_to/study.md").read_text(encoding="utf-8")
     (example,) = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
     monkeypatch.chdir(ROOT)
     names: dict = {}
