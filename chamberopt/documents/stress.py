@@ -22,9 +22,9 @@ HOW_PEENED = {
 }
 WHAT_IT_IS = (
     "An estimate: the mean under the surface, by the law of docs/explanation/residual_stress.md. "
-    "The law may be wrong by the factors of the last column, in all designs with this metal and shot "
-    "alike, whose ratios are better known. A measured profile of the metal is needed to know more. "
-    "Relaxation, cyclic softening and fatigue life are not told."
+    "The law may be wrong by the factors of the last column, in all designs with this metal and "
+    "shot alike, whose ratios are better known. A measured profile of the metal is needed to know "
+    "more. Relaxation, cyclic softening and fatigue life are not told."
 )
 
 
