@@ -56,7 +56,7 @@ def test_the_page_shows_the_rows_that_are_stored(name: str, case: validation.Cas
     page = validation.PAGE.read_text(encoding="utf-8")
     (table,) = re.findall(f"<!-- {name} -->(.*?)<!-- end of {name} -->", page, re.DOTALL)
     assert table.strip() == validation.table(validation.stored(name))
-    assert (case.picture is None) or f"(images/validation_{name}.png)" in page
+    assert (case.picture is None) or f"(../images/validation_{name}.png)" in page
 
 
 def test_every_row_has_its_verdict() -> None:
