@@ -193,7 +193,8 @@ class Effects(FileTable):
     """The effects that act on the shot.
 
     Friction and roughness that a design file leaves out are those of the catalogue
-    (materials/friction.py). Another effect that it leaves out is not simulated.
+    (materials/friction.py). Balls lie at rest, and thin parts bend, where chamber and part ask for
+    it. Gravity and collisions of balls are on. Drag and a turning part must be asked for.
     """
 
     auto: bool = Field(
