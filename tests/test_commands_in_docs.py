@@ -3,13 +3,16 @@
 import json
 import re
 import shutil
+import tomllib
 from pathlib import Path
 
 import pytest
 
 from benchmarks.made_up_shop import SHOP, compared
 from chamberopt.cli import main
+from chamberopt.design.zones import Zone
 from chamberopt.pictures.subprocess_drawing import missing_opengl
+from chamberopt.search.study import load_study
 
 ROOT = Path(__file__).parents[1]
 QUICK = {
@@ -77,3 +80,27 @@ def test_the_tutorial(
             make_quick(Path("chamber/design.toml"))
             make_quick(Path("chamber/study.toml"))
     assert Path("results/study/process_sheet.pdf").read_bytes().startswith(b"%PDF")
+
+
+def toml_blocks(page: str) -> list[str]:
+    """The examples of TOML on a page."""
+    text = (ROOT / "docs" / page).read_text(encoding="utf-8")
+    return re.findall(r"```toml\n(.*?)```", text, re.DOTALL)
+
+
+def test_the_forms_of_a_study_file_make_one_study(tmp_path: Path) -> None:
+    varied, limits, optimizer = toml_blocks("reference/study_file.md")
+    limits = re.sub(r'^"root.*\n', "", limits, flags=re.MULTILINE)  # the gear has no zone
+    optimizer = re.sub("^algorithm = .*\n", "", optimizer.removeprefix("[optimizer]\n"))
+    design = f'design = "{(ROOT / "designs/gear.toml").as_posix()}"\n'
+    path = tmp_path / "study.toml"
+    path.write_text(f"{design}{varied}{limits}[optimizer]\n{optimizer}", encoding="utf-8")
+    study = load_study(path)
+    assert len(study.vary) == 9
+    assert [phase.algorithm for phase in study.optimizer.phases] == ["sobol", "LN_BOBYQA"]
+
+
+def test_the_zones_of_the_page_on_drawings_are_valid() -> None:
+    (block,) = toml_blocks("how_to/drawing.md")
+    zones = [Zone.model_validate(one) for one in tomllib.loads(block)["zones"]]
+    assert [zone.is_spared for zone in zones] == [False, True]
