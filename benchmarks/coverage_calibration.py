@@ -54,7 +54,7 @@ CASES = {
     "plate, two ball sizes": Case("plate", {"shot.diameter_mm": None, "shot.mix": SIZES}, 4.0),
     "blade": Case("blade", {}, 10.0),
     "gear": Case("gear", {}, 1.5),
-    "gear as in the file, 15 % out of reach": Case("gear", {"part.smoothing": "off"}, 1.5),
+    "gear as in the file": Case("gear", {"part.smoothing": "off"}, 1.5),
     "gear, turning": Case("gear_turning", {}, 4.0),
 }
 
