@@ -9,7 +9,7 @@ import numpy as np
 
 from chamberopt.chamber.part import chosen_triangles
 from chamberopt.chamber.propose.proposal import Proposal, touched_share
-from chamberopt.chamber.propose.proposed_mask import is_met
+from chamberopt.chamber.propose.proposed_mask import MET, met_area
 from chamberopt.chamber.propose.proposed_target import RUNNING, Surface, area_in_mm2
 from chamberopt.geometry.triangles import area_vectors, areas, rotation_matrix, unit_vectors
 
@@ -17,6 +17,9 @@ AWAY_DEG = 105.0  # angle to the way down from which on a face is turned away fr
 LEAST = 0.02  # share of the target's area below which nothing is offered
 NEARLY_ALL, MOST_NAMED = 0.9, 3
 MOST_LOOKED_AT = 20  # surfaces, the largest
+# Share of the target's area from which on what is met of a surface is named, though most of it lies
+# outside of the chamber.
+PARTLY_MET = 0.05
 
 
 @dataclass(frozen=True)
@@ -55,28 +58,34 @@ def find_left_out(proposal: Proposal) -> list[LeftOut]:
     if hidden > LEAST and not part.target.reachable:
         found.append(LeftOut({"reachable": True}, f"the {hidden:.0%} that no ball touches here"))
     others = [one for one in proposal.known if not np.any(one.triangles & target)]
-    found += _met_beside(proposal, others[:MOST_LOOKED_AT], area)
+    found += _met_beside(proposal, others[:MOST_LOOKED_AT], float(area[target].sum()))
     return found
 
 
 def _met_beside(
-    proposal: Proposal, others: Sequence[Surface], area: np.ndarray
+    proposal: Proposal, others: Sequence[Surface], target_area: float
 ) -> Iterator[LeftOut]:
     """Yield what the shot meets of the part beside its target, the largest surfaces by name.
 
     Args:
-        area: areas of the part's triangles [m²], (m,).
+        target_area: area of the target [m²].
     """
     named = [one for one in others if "surface" in one.keys] or others
-    met = [one for one in named if is_met(proposal.design, proposal.chamber, one)]
+    areas_of = ((one, met_area(proposal.design, proposal.chamber, one)) for one in named)
+    met = [
+        (one, inside, whole)
+        for one, (inside, whole) in areas_of
+        if inside > min(MET * whole, PARTLY_MET * target_area)
+    ]
     if not met:
         return
-    met.sort(key=lambda one: not RUNNING.search(one.name))
+    met.sort(key=lambda one: (not RUNNING.search(one[0].name), one[1] <= MET * one[2]))
     names = [
-        f"{one.name} ({area_in_mm2(float(area[one.triangles].sum()))})" for one in met[:MOST_NAMED]
+        f"{one.name} ({area_in_mm2(inside)}{'' if inside > NEARLY_ALL * whole else ' of it'})"
+        for one, inside, whole in met[:MOST_NAMED]
     ]
     more = f" and {len(met) - MOST_NAMED} more" if len(met) > MOST_NAMED else ""
-    runs = "runs or fits by its name, and " if RUNNING.search(met[0].name) else ""
+    runs = "runs or fits by its name, and " if RUNNING.search(met[0][0].name) else ""
     yield LeftOut(
         {},
         f"NOT MASKED: the shot also meets {', '.join(names)}{more}; {runs}what has to keep its "

@@ -24,6 +24,7 @@ from typing import NamedTuple
 from chamberopt.chamber.propose.proposal import Proposal, Wanted
 from chamberopt.chamber.propose.proposed_balls import (
     DEEPEST,
+    LARGEST_BALL,
     OF_THIN,
     THIN_SHARE,
     fit_sizes,
@@ -31,6 +32,7 @@ from chamberopt.chamber.propose.proposed_balls import (
     sizes_to_try,
     thinnest,
 )
+from chamberopt.chamber.propose.proposed_budget import Measured
 from chamberopt.chamber.propose.shop import ShopSonotrode, usual_shop
 from chamberopt.common.errors import InputError
 from chamberopt.common.number_text import plain
@@ -196,6 +198,61 @@ def propose_intensity(
     others = _other(intensity, [x for x in settings if x != chosen], found)
     told = _with_amplitude(one, chosen), intensity, found[chosen].predicted
     return _told(*told, others, reason)
+
+
+def with_larger_balls(
+    made: Proposal,
+    wanted: Wanted,
+    intensity: WantedIntensity,
+    found: Measured | None,
+    again: Callable[[Wanted], Proposal],
+    measure: Callable[[Proposal], Measured | None],
+) -> Proposal:
+    """Return a proposal that tells what larger balls would do, where its own are too weak.
+
+    Larger balls give more intensity, and leave out narrow places of the target. Which counts more
+    is the user's choice, so both are told, each by a pilot.
+
+    Args:
+        found: what a pilot measured of the proposal; None if nothing.
+        again: proposes the design for other wishes.
+        measure: simulates a proposal briefly; None if that cannot be done.
+    """
+    if found is None or found.intensity is None or wanted.ball_mm is not None:
+        return made
+    off, now = intensity.off(found.intensity.value), setting_of(made)
+    if off >= 0.0:
+        return made
+    stock = (wanted.shop or usual_shop()).stock_mm(made.tables["shot"]["material"])
+    larger = [one for one in stock if now.ball_mm < one <= 1e3 * LARGEST_BALL]
+    needed = now.ball_mm * math.exp(-off / BALL_POWER)
+    ball = next((one for one in larger if one >= needed), larger[-1] if larger else None)
+    if ball is None:
+        return made
+    try:
+        other = again(replace(wanted, ball_mm=ball))
+    except InputError:  # no chamber with these balls
+        return made
+    most = max(_amplitudes(other.sonotrode)[1])
+    other = _with_amplitude(other, Setting(ball, most))
+    told = measure(other)
+    if told is None or told.intensity is None:
+        return made
+    both = fit_sizes(made.chamber.part, [1e-3 * now.ball_mm, 1e-3 * ball])
+    here, there = (
+        f"about {plain(value.value, 2)} mmA, {fit.served:.0%} of the target served, "
+        f"98 % after about {plain(pilot.time_to_98, 2)} s"
+        for value, pilot, fit in (
+            (found.intensity, found, both[0]),
+            (told.intensity, told, both[1]),
+        )
+    )
+    text = (
+        f"WITH LARGER BALLS, {setting_of(other).in_words}: {there}; WITH THESE, {now.in_words}: "
+        f"{here}; --ball-mm {ball:g} takes the larger ones, and [[steps]] one after the other"
+    )
+    reasons = {**made.reasons, INTENSITY: f"{made.reasons[INTENSITY]}; {text}"}
+    return replace(made, reasons=reasons)
 
 
 def usual_for(made: Proposal) -> WantedIntensity:

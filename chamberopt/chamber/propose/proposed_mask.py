@@ -34,9 +34,15 @@ NEVER = re.compile(
 
 def is_met(design: Design, chamber: Chamber, surface: Surface) -> bool:
     """Return whether a surface lies in the chamber for the most part, beside the target."""
+    inside, whole = met_area(design, chamber, surface)
+    return inside > MET * whole
+
+
+def met_area(design: Design, chamber: Chamber, surface: Surface) -> tuple[float, float]:
+    """Return the area of a surface in the chamber beside the target, and its whole area [m²]."""
     rows = chosen_on_part(design, Selection.model_validate(surface.keys), "")
     inside = chamber.exposed_area[rows & ~chamber.part.target].sum()
-    return bool(inside > MET * chamber.part.area[rows].sum())
+    return float(inside), float(chamber.part.area[rows].sum())
 
 
 def are_holes(

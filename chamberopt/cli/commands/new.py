@@ -94,6 +94,7 @@ def new(
         is_off,
         usual_for,
         with_expected_intensity,
+        with_larger_balls,
         with_thin_places,
     )
     from chamberopt.chamber.propose.quicker import Way, propose_quicker, propose_second_pose
@@ -180,6 +181,8 @@ def new(
                     made = replace(made, reasons={**made.reasons, **why_so})
                 found = measured(made)
                 made = as_no_wish(made) if seeks else made
+                pilots = again, lambda one: measured(one, False)
+                made = with_larger_balls(made, wanted, asked, found, *pilots)
             elif found is not None:
                 made = with_expected_intensity(made, found.intensity)
             made, found = propose_second_pose(made, found, lambda one: measured(one, False))
