@@ -9,6 +9,7 @@ these are tried, and what is proposed was simulated itself.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from typing import NamedTuple
@@ -37,6 +38,7 @@ SLOW = 600.0  # s until 98 % of the target are dented, from which on other ways 
 # many, and where that time is LONG. Pilots know a time to 10 to 20 %.
 DEARER, QUICKER = 0.6, 0.8
 LAYER = 2.0  # over half a layer
+RAISED = 1.0, 2.0, 3.0  # ball diameters by which a ceiling is raised for a second pose
 SAME = 0.999  # cosine between the directions that point up, from which on a pose is no other one
 
 
@@ -111,11 +113,14 @@ def propose_second_pose(
 
     try:
         two = _turned_over(made)
+        for balls in RAISED:  # under a ceiling that fits one pose, balls may jam in the other
+            if _new_harm(two, made):
+                two = min(two, _turned_over(made, balls), key=faults)
     except InputError:
         return dropped("what holds it here does not hold it there")
     in_air = any(one.pieces_in_air for one in two.chamber.steps) and not made.chamber.pieces_in_air
-    if in_air or faults(two) > faults(made):
-        return dropped("nothing would hold it" if in_air else _beginning(new_warning(two, made)))
+    if in_air or (harm := _new_harm(two, made)):
+        return dropped("nothing would hold it" if in_air else harm)
     after = measure(two)
     if after is None or not after.places:
         return dropped("no pilot resolved it")
@@ -127,10 +132,13 @@ def propose_second_pose(
     return replace(two, reasons={**two.reasons, ".steps": reason}), after
 
 
-def _turned_over(made: Proposal) -> Proposal:
+def _turned_over(made: Proposal, raised: float = 0.0) -> Proposal:
     """Return a proposal with a second step in which the part is turned over.
 
     Raises InputError if the chamber cannot be built round the part in this pose.
+
+    Args:
+        raised: by how many diameters of a ball the ceiling is raised.
     """
     x, y, z = made.design.part.rotate_deg
     # Half a turn about the chamber's x after turns about x, y and z is one before them, with the
@@ -141,15 +149,26 @@ def _turned_over(made: Proposal) -> Proposal:
         along, across = made.design.part.offset_mm
         pose["offset_mm"] = [along, -across]
     steps = [{"name": "first"}, {"name": "turned_over", "part": pose}]
-    design = made.design.changed({"steps": steps})
+    shot = made.design.shot
+    height = round(made.tables["chamber"]["height_mm"] + 1e3 * raised * shot.diameter, 1)
+    design = made.design.changed({"chamber.height_mm": height, "steps": steps})
     chamber = build_chamber(design)
     (_, other), room = list(design.in_steps.values()), chamber.steps[1]
     diameter = other.shot.diameter
     jams = jam_gaps(room, diameter, gaps_in_reach(shot_reach(other, room)))
+    reasons = made.reasons
+    if raised:
+        text = "high enough for both poses, so that no ball jams under the ceiling"
+        reasons = {**reasons, "chamber.height_mm": f"{reasons['chamber.height_mm']}; {text}"}
     return replace(
         made,
         design=design,
-        tables={"": {}, **made.tables} | {"": {**made.tables.get("", {}), "steps": steps}},
+        reasons=reasons,
+        tables={"": {}, **made.tables}
+        | {
+            "": {**made.tables.get("", {}), "steps": steps},
+            "chamber": {**made.tables["chamber"], "height_mm": height},
+        },
         chamber=chamber,
         jams=max(made.jams, tuple(jams), key=len),
         warnings=tuple(warnings(design, chamber)),
@@ -176,6 +195,18 @@ def _harm(made: Proposal, first: Proposal) -> str:
     if faults(made) > faults(first):
         return _beginning(new_warning(made, first))
     return ""
+
+
+def _new_harm(two: Proposal, made: Proposal) -> str:
+    """Return in words the harm that only a proposal with two poses does; empty if there is none.
+
+    A warning that holds in both poses, at another place in each, is no new one.
+    """
+    known = {_beginning(text) for text in made.warnings}
+    of_steps = (_beginning(re.sub(r"^step \w+: ", "", text)) for text in two.warnings)
+    new = [text for text in of_steps if text not in known]
+    jams = "balls jam in a gap" if len(two.jams) > len(made.jams) else ""
+    return next(iter(new), jams)
 
 
 def _beginning(warning: str) -> str:
