@@ -11,6 +11,7 @@ import numpy as np
 
 from chamberopt.chamber.build import build_chamber
 from chamberopt.chamber.checks.place_names import one_of
+from chamberopt.chamber.part import chosen_on_part
 from chamberopt.chamber.propose.proposal import (
     Proposal,
     Tables,
@@ -25,13 +26,16 @@ from chamberopt.chamber.propose.proposed_end import HeldEnd
 from chamberopt.chamber.propose.proposed_floor import Floor
 from chamberopt.chamber.propose.proposed_holder import end_holder, holder_choices
 from chamberopt.chamber.propose.proposed_mask import are_holes, pads, to_be_masked, to_be_plugged
-from chamberopt.chamber.propose.proposed_target import LONG, Target
+from chamberopt.chamber.propose.proposed_target import LONG, Target, area_in_mm2
 from chamberopt.chamber.propose.shop import Shop
 from chamberopt.common.errors import InputError, UnreadableError
 from chamberopt.common.progress import Progress
 from chamberopt.design.fixture import USUAL_SHELL_MM, WIDEST_GAP
+from chamberopt.design.part import Selection
 
 MILLED_MM = 0.2  # between a part and a wall that is milled or printed round it
+SEEN_OUT = 1e-3  # m by which a part stands out of a side
+MOST_JAWS, JAW_SHARE = 2, 0.05  # surfaces named to clamp a part by; least area over the largest
 MOST_HOLDERS = 6  # that are tried
 HIDDEN = 0.005  # share of the target that a holder may keep from the balls
 LEAST_LEFT, MOST_LEFT = 0.005, 0.15  # share of the target that is left out if no ball touches it
@@ -84,9 +88,30 @@ def clamped_outside(made: Proposal, floor: Floor, shop: Shop | None) -> Proposal
     most_mm = math.floor(1e4 * WIDEST_GAP * made.design.shot.diameter) / 20.0
     keys = {"kind": "bore", "clearance_mm": min(MILLED_MM, most_mm)}
     tables = _with_table(made.tables, "sonotrode", "holder", keys)
-    text = "clamped where it stands out of the chamber; the wall, cut out round it, is split there"
+    text = (
+        f"clamped where it stands out of the chamber {_outside_in_words(made)}; the wall, cut out "
+        "round it, is split there"
+    )
     reasons = {**made.reasons, "holder.kind": text}
     return checked(tables, reasons, floor, made.known, made.mesh, shop)
+
+
+def _outside_in_words(made: Proposal) -> str:
+    """Return in words at which sides a part stands out of its chamber, and with which surfaces."""
+    chamber, part = made.chamber, made.chamber.part
+    low, high = (end(chamber.vertices, axis=0) for end in (np.min, np.max))
+    beyond = high - part.vertices.max(axis=0), part.vertices.min(axis=0) - low
+    signs = zip(("+", "-"), beyond, strict=True)
+    sides = [f"{sign}{'xyz'[k]}" for sign, room in signs for k in range(3) if room[k] < -SEEN_OUT]
+    outside, areas = part.area - chamber.exposed_area, {}
+    for one in [one for one in made.known if "surface" in one.keys] or made.known:
+        rows = chosen_on_part(made.design, Selection.model_validate(one.keys), "")
+        if not np.any(rows & part.target):
+            areas[one.name] = float(outside[rows].sum())
+    least = JAW_SHARE * max(areas.values(), default=0.0)
+    most = sorted((one for one in areas if areas[one] > least), key=lambda one: -areas[one])
+    jaws = ", ".join(f"{one} ({area_in_mm2(areas[one])} of it)" for one in most[:MOST_JAWS])
+    return f"at {', '.join(sorted(sides))}{f' by {jaws}' if jaws else ''}"
 
 
 def hangs_by_a_face(made: Proposal) -> bool:
