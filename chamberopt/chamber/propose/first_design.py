@@ -45,7 +45,13 @@ from chamberopt.chamber.propose.proposal import (
     is_capped,
     nested,
 )
-from chamberopt.chamber.propose.proposed_arbor import Bore, find_bores, turning_bore, turning_pose
+from chamberopt.chamber.propose.proposed_arbor import (
+    RPM,
+    Bore,
+    find_bores,
+    turning_bore,
+    turning_pose,
+)
 from chamberopt.chamber.propose.proposed_balls import fit_sizes, propose_ball, sizes_to_try
 from chamberopt.chamber.propose.proposed_end import (
     HeldEnd,
@@ -273,6 +279,8 @@ def _proposed(
                     part["offset_mm"] = list(floor.offset_mm)
                 own = {**common, "part": part, **_floor_tables(floor)}
                 words = {"part.rotate_deg": f"{pose_in_words(mesh, known, placed)}: {why_so}"}
+                if turning is not None:
+                    words["effects.part_turn"] = f"A DRIVE TURNS IT at {RPM:g} rpm about its axis"
                 why = {**reasons, **words, **_floor_reasons(floor, is_local, goes_out)}
                 made = checked(own, why, floor, known, mesh, wanted.shop)
             except UnreadableError:

@@ -49,7 +49,7 @@ WIDER, SHORTEST, LONGEST = 2.0, 0.25, 0.4
 TIP, STRAIGHT = 0.1, 0.8
 PINS = "expanding pins, drawn from behind, in its"
 POTTED = (
-    "IT NARROWS TO ITS TIP: cast it into the block with polyurethane or an alloy that melts at "
+    "NO STRAIGHT END TO CLAMP: cast it into the block with polyurethane or an alloy that melts at "
     "70 °C, or give jaws its form"
 )
 WALL = 2e-3  # m: of a collar or block round an end
