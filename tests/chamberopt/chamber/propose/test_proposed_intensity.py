@@ -27,6 +27,7 @@ from chamberopt.chamber.propose.proposed_intensity import (
     settings_of,
     usual_for,
     with_expected_intensity,
+    with_larger_balls,
     with_thin_places,
 )
 from chamberopt.chamber.propose.shop import Shop, load_shop
@@ -329,3 +330,39 @@ def test_thin_places_are_told_of_every_metal(tmp_path: Path, shop: Shop, metal: 
         made = with_thin_places(propose(path, Wanted("mm", shop=shop, alloy=metal), lambda _: []))
         told = made.reasons["shot.diameter_mm"]
         assert ("THIN PLACES: 5% of the target has 1.5 mm of metal or less" in told) is is_thin
+
+
+def pilot_of(intensity: float, seconds: float) -> Measured:
+    """What a pilot says of a design with an intensity [mmA] and a time to 98 % [s]."""
+    predicted = PredictedIntensity.estimated(Estimate(intensity / 13.5e-3, 0.0))
+    common = 1e5, 1e4, seconds, True, 1.0, True, 0.01, 5e-3, 6.4, seconds
+    return Measured(*common, intensity=predicted)
+
+
+def test_where_balls_are_too_weak_the_next_larger_ones_are_told_beside_them(
+    plate: Path, shop: Shop
+) -> None:
+    """Balls of 1 mm give half of the least intensity, so that balls of 2 mm give it."""
+    wanted, asked = Wanted("mm", shop=shop), WantedIntensity(0.10, 0.15)
+
+    def again(other: Wanted) -> Proposal:
+        return propose(plate, other, lambda _: [])
+
+    made = again(replace(wanted, ball_mm=1.0))
+    made = with_expected_intensity(made, None)
+    weak, seen = pilot_of(0.05, 600.0), list[Setting]()
+
+    def measure(one: Proposal) -> Measured:
+        seen.append(setting_of(one))
+        return pilot_of(0.12, 100.0)
+
+    told = with_larger_balls(made, wanted, asked, weak, again, measure)
+    assert seen == [Setting(2.0, 40.0)]
+    assert told.design == made.design
+    text = told.reasons[INTENSITY]
+    assert "WITH LARGER BALLS, 2 mm at 40 µm: about 0.12 mmA, " in text
+    assert "of the target served, 98 % after about 100 s; WITH THESE, 1 mm at 40 µm" in text
+    for enough in (pilot_of(0.12, 600.0), pilot_of(0.2, 600.0), None):
+        assert with_larger_balls(made, wanted, asked, enough, again, measure) == made
+    fixed = replace(wanted, ball_mm=1.0)
+    assert with_larger_balls(made, fixed, asked, weak, again, measure) == made

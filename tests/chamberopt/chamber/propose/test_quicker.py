@@ -1,12 +1,14 @@
 """Poses and charges that are tried by pilots where a treatment takes long."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 import trimesh
 
+from chamberopt.chamber.propose import quicker
 from chamberopt.chamber.propose.first_design import propose
 from chamberopt.chamber.propose.pose import Pose, end_to_wall, pose_by_size
 from chamberopt.chamber.propose.proposal import Proposal, Wanted, with_charge
@@ -195,3 +197,24 @@ def test_a_part_stays_in_one_pose_where_another_is_no_gain_or_not_held(
     assert (kept.design, same) == (made.design, found)
     assert ("not turned over" in kept.reasons["part.rotate_deg"]) is (first > 600.0)
     assert propose_second_pose(made, None, lambda _: measured(second)) == (made, None)
+
+
+def test_a_warning_of_both_poses_is_no_reason_against_the_second(
+    poses: dict[Pose | None, Proposal], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its place differs from pose to pose. A warning of the second pose alone is a reason."""
+    slot = "balls are larger than a quarter of a slot, e.g. at ({}, 0, 0) mm: use smaller balls"
+    texts = [f"step first: {slot.format(1)}", f"step turned_over: {slot.format(2)}"]
+    lying = replace(poses["lying"], warnings=(slot.format(1),))
+
+    def pose_two(more: list[str]) -> Proposal:
+        monkeypatch.setattr(quicker, "warnings", lambda design, chamber: [*texts, *more])
+        return propose_second_pose(lying, uneven(900.0), lambda _: measured(400.0))[0]
+
+    assert pose_two([]).design.steps
+    kept = pose_two(["step turned_over: balls can come to rest on the part: 20 mm²"])
+    assert kept.design == lying.design
+    assert (
+        "after half of the time: balls can come to rest on the part"
+        in (kept.reasons["part.rotate_deg"])
+    )
