@@ -240,16 +240,16 @@ def with_larger_balls(
         return made
     both = fit_sizes(made.chamber.part, [1e-3 * now.ball_mm, 1e-3 * ball])
     here, there = (
-        f"about {plain(value.value, 2)} mmA, {fit.served:.0%} of the target served, "
-        f"98 % after about {plain(pilot.time_to_98, 2)} s"
+        f"about {plain(value.value, 2)} mmA, {fit.served:.0%} of the target served, 98 % after "
+        f"about {float(f'{pilot.time_to_98:.2g}'):g} s"
         for value, pilot, fit in (
             (found.intensity, found, both[0]),
             (told.intensity, told, both[1]),
         )
     )
     text = (
-        f"WITH LARGER BALLS, {setting_of(other).in_words}: {there}; WITH THESE, {now.in_words}: "
-        f"{here}; --ball-mm {ball:g} takes the larger ones, and [[steps]] one after the other"
+        f"WITH LARGER BALLS, {setting_of(other).in_words}: {there}, beside {here} with "
+        f"{now.in_words} (--ball-mm {ball:g} takes them, [[steps]] one after the other)"
     )
     reasons = {**made.reasons, INTENSITY: f"{made.reasons[INTENSITY]}; {text}"}
     return replace(made, reasons=reasons)

@@ -361,7 +361,7 @@ def test_where_balls_are_too_weak_the_next_larger_ones_are_told_beside_them(
     assert told.design == made.design
     text = told.reasons[INTENSITY]
     assert "WITH LARGER BALLS, 2 mm at 40 µm: about 0.12 mmA, " in text
-    assert "of the target served, 98 % after about 100 s; WITH THESE, 1 mm at 40 µm" in text
+    assert "of the target served, 98 % after about 100 s, beside about 0.05 mmA, " in text
     for enough in (pilot_of(0.12, 600.0), pilot_of(0.2, 600.0), None):
         assert with_larger_balls(made, wanted, asked, enough, again, measure) == made
     fixed = replace(wanted, ball_mm=1.0)
