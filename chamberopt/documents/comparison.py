@@ -1,4 +1,4 @@
-"""Tables of a comparison: design values that differ, figures, and which differences are real.
+"""Text and tables of a comparison: values that differ, figures, and which differences are real.
 
 Figures are the objective and the metrics, such as mean coverage. A difference is real if it is more
 than noise.
@@ -10,11 +10,76 @@ import math
 
 from chamberopt.common.estimate import CONFIDENCE, Estimate
 from chamberopt.common.number_text import estimate_text
+from chamberopt.documents.coverage import MAIN
 from chamberopt.documents.document import Table
+from chamberopt.documents.wording import Label, metric_label, objective_label
 from chamberopt.results.compare.comparison import Comparison
 from chamberopt.results.compare.difference import MAX_TIME_RATIO, Difference
 
 HEADER = ("difference", "real", "to know: simulate")
+MARK = " *"  # of a difference that is more than noise
+
+
+def comparison_end(comparison: Comparison, verbose: bool) -> list[Table | str]:
+    """Return the end of a comparison: a sentence for each later candidate, and the main figures.
+
+    Args:
+        verbose: all figures follow, by their names in files, with what would prove a difference.
+    """
+    first, *later = comparison.labels
+    shown = _main(comparison)
+    sentences = [_sentence(comparison, *shown[0], k) for k in range(len(later))] if shown else []
+    several = len(later) > 1
+    rows = [
+        [name, *map(_shown, values), *[""] * (not several)]
+        for name, values in comparison.parameters.items()
+    ]
+    for name, label in shown:
+        gaps, (one, *others) = comparison.differences[name], comparison.metrics[name]
+        marks = [MARK * (several and gap.real) for gap in gaps]
+        cells = [f"{label.number(x)}{mark}" for x, mark in zip(others, marks, strict=True)]
+        if not several:
+            cells += [f"{label.number(gaps[0].estimate, sign=True)}{MARK * gaps[0].real}"]
+        rows.append([label.with_unit, label.number(one), *cells])
+    heads = ["", *comparison.labels, *[f"{later[0]} - {first}"] * (not several)]
+    content: list[Table | str] = [*sentences, "", Table("", heads, rows, numbers=False), ""]
+    if verbose:
+        return [*content, *comparison_lines(comparison)]
+    legend = f"(±: 95 % intervals. *: differs from {first} by more than noise."
+    return [*content, f"{legend} --verbose and compare.txt have every figure.)"]
+
+
+def _main(comparison: Comparison) -> list[tuple[str, Label]]:
+    """Return the names and labels of the objective and the main figures of a comparison."""
+    goal = comparison.results[0].objective_name
+    names = [goal, *(name for name in MAIN if name != goal)]
+    is_calibrated = "almen_intensity" in comparison.metrics  # which takes the place of strength
+    names = [name for name in names if name in comparison.metrics]
+    names = [name for name in names if not (is_calibrated and name == "strength_um")]
+    labels = [objective_label(name) if name == goal else metric_label(name) for name in names]
+    texts = [label.text for label in labels]
+    both = zip(names, labels, strict=True)
+    return [(name, label) for k, (name, label) in enumerate(both) if label.text not in texts[:k]]
+
+
+def _sentence(comparison: Comparison, name: str, label: Label, k: int) -> str:
+    """Return in one sentence how a later candidate compares with the first one in a figure.
+
+    Args:
+        name, label: of the figure.
+        k: place of the candidate among the later ones.
+    """
+    first, later = comparison.labels[0], comparison.labels[1 + k]
+    before, after = (comparison.metrics[name][one] for one in (0, 1 + k))
+    gap = comparison.differences[name][k]
+    if not (before.has_number and after.has_number) or gap.in_words:
+        return f"Whether the {label.text} of {later} and {first} differs is not resolved."
+    values = f"the {label.text} is {label.format(after)}, that of {first} {label.format(before)}"
+    if gap.value == 0.0 and gap.half_width == 0.0:
+        return f"{later}: {values}: no difference."
+    change = label.format(gap.estimate, sign=True)
+    noise = "more than noise" if gap.real else "within the noise"
+    return f"{later}: {values}: a difference of {change}, {noise}."
 
 
 def comparison_lines(comparison: Comparison) -> list[Table | str]:

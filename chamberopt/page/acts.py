@@ -21,7 +21,7 @@ from chamberopt.common.files import (
 )
 from chamberopt.common.toml_fields import read_toml
 from chamberopt.design.load import is_study
-from chamberopt.documents.comparison import comparison_lines
+from chamberopt.documents.comparison import comparison_end
 from chamberopt.documents.report import answer_section
 from chamberopt.page.answers import part_answer, shape_answer
 from chamberopt.page.checker import Checker
@@ -76,7 +76,7 @@ def shown(folders: Sequence[Path]) -> dict[str, object]:
     if not several:
         result = load_result(folders[0])
         html = section(answer_section(result, load_start(result)), viewer) + html
-    text = terminal.text(comparison_lines(compare(folders))) if several else ""
+    text = terminal.text(comparison_end(compare(folders), False)) if several else ""
     return {"content": content, "html": html, "comparison": text}
 
 

@@ -6,7 +6,7 @@ from functools import partial
 from pathlib import Path
 
 from chamberopt.cli.console import print_remarks, print_result, results_folder
-from chamberopt.cli.options import Cluster, Json, Out, Workers, app
+from chamberopt.cli.options import Cluster, Json, Out, Verbose, Workers, app
 
 
 @app.command
@@ -17,6 +17,7 @@ def compare(
     cluster: Cluster = None,
     json: Json = False,
     out: Out = None,
+    verbose: Verbose = False,
 ) -> None:
     """Compare candidates for the same part: what differs, its effect on coverage, and whether that
     effect is larger than the noise.
@@ -31,7 +32,7 @@ def compare(
     """
     from chamberopt.cli.teller import TerminalTeller
     from chamberopt.common.executor import open_executor
-    from chamberopt.documents.comparison import comparison_lines
+    from chamberopt.documents.comparison import comparison_end
     from chamberopt.workflows.comparison_folder import COMPARE, compare_candidates
 
     workers_of = partial(open_executor, workers, cluster)
@@ -40,4 +41,4 @@ def compare(
             candidates, folder, workers_of, TerminalTeller(), treatment_time_s
         )
         print_remarks(remarks)
-    print_result(comparison_lines(comparison), folder, json, COMPARE)
+    print_result(comparison_end(comparison, verbose), folder, json, COMPARE)

@@ -19,7 +19,8 @@ from chamberopt.coverage.metrics import NEVER, find_metric
 from chamberopt.coverage.stress_knowledge import BANDS
 from chamberopt.design.calibration import Calibration, LawCalibration, Misfit, law_metal
 from chamberopt.design.load import load_design
-from chamberopt.documents.comparison import comparison_lines
+from chamberopt.documents.comparison import comparison_end, comparison_lines
+from chamberopt.documents.wording import metric_label
 from chamberopt.printers import terminal
 from chamberopt.results.arrays_file import ResultArrays
 from chamberopt.results.command_records import difference_record
@@ -305,3 +306,25 @@ def test_what_cannot_be_compared(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="another calibration than in"):
         compare(machines)
     compare([one, machines[0]])
+
+
+@pytest.mark.parametrize("names", [("b",), ("b", "c")])
+def test_the_end_is_a_sentence_for_each_and_the_main_figures_in_words(
+    tmp_path: Path, names: tuple[str, ...]
+) -> None:
+    """Of two the table has the difference, of more a mark on what differs from the first."""
+    folders = [left(tmp_path / one, 60 + 30 * (one == "b"), seed=ord(one)) for one in ("a", *names)]
+    both = compare(folders)
+    end = comparison_end(both, False)
+    text = terminal.text(end)
+    mean = metric_label("mean_coverage")
+    (gap, *_), values = both.differences["mean_coverage"], both.metrics["mean_coverage"]
+    shown = row(text, mean.with_unit)
+    assert all(mean.number(one) in shown for one in values)
+    assert (f"{mean.number(gap.estimate, sign=True)} *" in shown) is (len(names) == 1)
+    assert f"{mean.number(values[1])} *" in shown or len(names) == 1
+    sentences = [one for one in end if isinstance(one, str) and one.startswith((*names,))]
+    assert [one[0] for one in sentences] == [*names]
+    assert sentences[0].endswith("more than noise.")
+    assert "mean_coverage" not in text
+    assert "mean_coverage" in terminal.text(comparison_end(both, True))
