@@ -27,13 +27,16 @@ from chamberopt.common.errors import InputError
 from chamberopt.common.notebook import html_of
 from chamberopt.design.design import Design
 from chamberopt.design.load import load_design
+from chamberopt.results.compare.comparison import Comparison
 from chamberopt.results.load import Result, load_result
 from chamberopt.search.ask_and_tell import Search
+from chamberopt.search.run_sweep import SweepResult
 from chamberopt.search.study import Study, load_study
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
     from pandas import DataFrame
-    from pyvista import PolyData
+    from pyvista import Plotter, PolyData
     from trimesh import Trimesh
 
     from chamberopt.common.progress import Progress
@@ -41,8 +44,6 @@ if TYPE_CHECKING:
     from chamberopt.export.formats import FrameName
     from chamberopt.peening.virtual_strip import VirtualStrip
     from chamberopt.printers.notebook import PartsView
-    from chamberopt.results.compare.comparison import Comparison
-    from chamberopt.search.run_sweep import SweepResult
     from chamberopt.simulation.convergence import ConvergenceStudy
     from chamberopt.workflows.strip import StripPlace
 
@@ -52,6 +53,7 @@ __all__ = [
     "Search",
     "Study",
     "calibrate",
+    "chart",
     "compare",
     "fields",
     "impacts",
@@ -61,6 +63,7 @@ __all__ = [
     "measure_accuracy",
     "optimise",
     "peen_strip",
+    "plotter",
     "show",
     "simulate",
     "sweep",
@@ -339,11 +342,61 @@ def view(*results: Result) -> PartsView:
     """
     from chamberopt.printers.notebook import PartsView
 
-    if not results:
-        raise InputError("view: given no result; give one or more, as chamberopt.load_result reads")
-    for result in results:
-        _require("result", result, Result, "load_result")
+    _require_results("view", results)
     return PartsView(results)
+
+
+def chart(*results: Result) -> Figure:
+    """Return a chart of the coverage of results over peening time, as a figure of matplotlib.
+
+    Thick lines are means; 95 % of the area has more than thin ones. Bands are 95 % intervals.
+
+        figure = chamberopt.chart(result)
+        figure.axes[0].set_title("gear, 60 mm")
+        figure.savefig("gear.pdf")
+    """
+    from chamberopt.pictures.charts.colours import line_style
+    from chamberopt.pictures.charts.coverage import CoverageCurve, coverage_figure
+
+    _require_results("chart", results)
+    curves = [
+        CoverageCurve(one.folder.name, one.record.coverage_against_time, line_style(k))
+        for k, one in enumerate(results)
+    ]
+    return coverage_figure(curves, max(one.design.process.treatment_time for one in results))
+
+
+def plotter(
+    *results: Result,
+    quantity: str = "coverage",
+    time_s: float | None = None,
+    off_screen: bool = True,
+) -> Plotter:
+    """Return the parts of results in their chambers, drawn on a plotter of PyVista.
+
+        drawn = chamberopt.plotter(result, quantity="mean_normal_speed")
+        drawn.camera.zoom(1.5)
+        drawn.screenshot("gear.png")
+
+    Args:
+        quantity: what colours the parts, as `chamberopt inspect --quantity` names it.
+        time_s: peening time after which it is shown [s]; by default the treatment time.
+        off_screen: False for a window, which `.show()` opens.
+    Raises:
+        InputError: a result lacks the quantity, or its files were changed.
+    """
+    from chamberopt.viewer.opened_result import result_info
+    from chamberopt.viewer.plotter import ResultPlotter
+    from chamberopt.viewer.view_state import ViewState
+    from chamberopt.viewer.window import open_results
+
+    _require_results("plotter", results)
+    state = ViewState(quantity=quantity, time_s=time_s)
+    view = ResultPlotter(open_results([*map(result_info, results)], state), off_screen)
+    view.draw(state)
+    view.aim(state)
+    drawn: Plotter = view.plotter
+    return drawn
 
 
 def with_part(design: Design, mesh: Trimesh | PolyData, file: str | Path, *, unit: str) -> Design:
@@ -461,6 +514,20 @@ def _result_html(result: Result) -> str:
     return result_html(result)
 
 
+@html_of.register
+def _sweep_html(sweep: SweepResult) -> str:
+    from chamberopt.printers.notebook import sweep_html
+
+    return sweep_html(sweep)
+
+
+@html_of.register
+def _comparison_html(comparison: Comparison) -> str:
+    from chamberopt.printers.notebook import comparison_html
+
+    return comparison_html(comparison)
+
+
 def _require(name: str, given: object, kind: type, source: str) -> None:
     """Raise InputError unless an argument has the type `kind`.
 
@@ -481,3 +548,16 @@ def _require(name: str, given: object, kind: type, source: str) -> None:
 def _warn(remarks: Iterable[str]) -> None:
     for remark in remarks:
         warnings.warn(remark, stacklevel=3)
+
+
+def _require_results(name: str, results: Sequence[Result]) -> None:
+    """Raise InputError unless all of at least one value are results.
+
+    Args:
+        name: the function that they were given to.
+    """
+    if not results:
+        text = "given no result; give one or more, as chamberopt.load_result reads"
+        raise InputError(f"{name}: {text}")
+    for result in results:
+        _require("result", result, Result, "load_result")

@@ -1,8 +1,8 @@
-"""Compose short overviews of a design, a study or a result: a heading, a table, and notes."""
+"""Compose short overviews of a design, a study or what they give: a heading, a table, and notes."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import PurePath
 from typing import TYPE_CHECKING
 
@@ -10,17 +10,21 @@ import numpy as np
 
 from chamberopt.chamber.checks.check import notes
 from chamberopt.documents.answer import answer, answer_lines
+from chamberopt.documents.comparison import comparison_end
 from chamberopt.documents.coverage import figures, figures_table
 from chamberopt.documents.document import Block, Fold, Items, Section, Sentence, Table, values
 from chamberopt.documents.report import limits_of_intervals, notes_of
 from chamberopt.documents.sheet import amplitude_text, key_row
+from chamberopt.documents.terminal_lines import sweep_end
 from chamberopt.documents.wording import objective_label, plain
 from chamberopt.results.load import load_start
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
     from chamberopt.design.load import Design
+    from chamberopt.results.compare.comparison import Comparison
     from chamberopt.results.load import Result
+    from chamberopt.search.run_sweep import SweepResult
     from chamberopt.search.study import Study
 
 
@@ -88,6 +92,22 @@ def result_overview(result: Result) -> Section:
     if told:
         content.append(Fold("Notes and warnings", [Items(told)]))
     return Section(f"Result: {result.folder.resolve().name}", content)
+
+
+def sweep_overview(sweep: SweepResult) -> Section:
+    """Return the overview of a sweep: its best candidate, and what became of all."""
+    return Section(f"Sweep: {sweep.folder.resolve().name}", _blocks(sweep_end(sweep, (), False)))
+
+
+def comparison_overview(comparison: Comparison) -> Section:
+    """Return the overview of a comparison: a sentence for each candidate, and the main figures."""
+    title = f"Comparison with {comparison.labels[0]}"
+    return Section(title, _blocks(comparison_end(comparison, False)))
+
+
+def _blocks(lines: Sequence[Table | str]) -> list[Block]:
+    """Return the end of a command as blocks, without its empty lines."""
+    return [Sentence(one) if isinstance(one, str) else one for one in lines if one]
 
 
 def _shape(design: Design) -> str:

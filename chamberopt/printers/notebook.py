@@ -1,4 +1,4 @@
-"""Show a design, a study or a result in a notebook: an overview beside a picture.
+"""Show a design, a study or what they give in a notebook: an overview, often beside a picture.
 
 The HTML holds its picture, fetches nothing and runs no script. printers.html escapes all text. Only
 the 3D view of results needs a script, which a frame keeps from the notebook.
@@ -17,7 +17,13 @@ from chamberopt.chamber.build import build_chamber
 from chamberopt.common.errors import InputError
 from chamberopt.common.files import private_folder, read_file
 from chamberopt.documents.document import Section
-from chamberopt.documents.overview import design_overview, result_overview, study_overview
+from chamberopt.documents.overview import (
+    comparison_overview,
+    design_overview,
+    result_overview,
+    study_overview,
+    sweep_overview,
+)
 from chamberopt.pictures.coverage import draw_coverage
 from chamberopt.pictures.part import draw_part
 from chamberopt.pictures.part3d import PartScene
@@ -28,7 +34,9 @@ from chamberopt.results.load import summary
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
     from chamberopt.design.load import Design
+    from chamberopt.results.compare.comparison import Comparison
     from chamberopt.results.load import Result
+    from chamberopt.search.run_sweep import SweepResult
     from chamberopt.search.study import Study
 
 PNG = b"\x89PNG\r\n\x1a\n"
@@ -50,6 +58,16 @@ def study_html(study: Study) -> str:
 def result_html(result: Result) -> str:
     """Return the overview of a result as HTML, with the coverage drawn on its part."""
     return _shown(result_overview(result), *_coverage(result))
+
+
+def sweep_html(sweep: SweepResult) -> str:
+    """Return the overview of a sweep as HTML."""
+    return _shown(sweep_overview(sweep), b"", "")
+
+
+def comparison_html(comparison: Comparison) -> str:
+    """Return the overview of a comparison as HTML."""
+    return _shown(comparison_overview(comparison), b"", "")
 
 
 @dataclass(frozen=True)

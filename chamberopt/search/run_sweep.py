@@ -18,6 +18,7 @@ import numpy as np
 
 from chamberopt.common.errors import InputError
 from chamberopt.common.executor import SerialExecutor, share
+from chamberopt.common.notebook import ShownInNotebook
 from chamberopt.common.progress import Progress
 from chamberopt.design.design import SHAPE
 from chamberopt.search.ask_and_tell import Search
@@ -54,7 +55,7 @@ class SweepPlan:
 
 
 @dataclass(frozen=True)
-class SweepResult:
+class SweepResult(ShownInNotebook):
     """The result of a sweep: its trials in the order of the plan, and their total run time [s]."""
 
     study: Study

@@ -208,9 +208,14 @@ def coverage_over_time_figure(
         curves: coverage at several times, by the name of the result.
         treatment_time: treatment time of the design [s].
     """
+    drawn = [CoverageCurve(name, rows, STYLES[name]) for name, rows in curves.items()]
+    return coverage_figure(drawn, treatment_time)
+
+
+def coverage_figure(drawn: Sequence[CoverageCurve], treatment_time: float) -> Figure:
+    """Return a chart of curves of coverage over peening time, up to the treatment time [s]."""
     figure = new_figure(*NARROW)
     axes = figure.subplots()
-    drawn = [CoverageCurve(name, rows, STYLES[name]) for name, rows in curves.items()]
     draw_coverage_over_time(axes, drawn, treatment_time)
     axes.set_title("thick: mean; thin: 95 % of the area has more", loc="left", fontsize=SMALL)
     if len(drawn) > 1:

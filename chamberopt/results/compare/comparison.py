@@ -15,6 +15,7 @@ import numpy as np
 
 from chamberopt.common.errors import InputError
 from chamberopt.common.estimate import Estimate
+from chamberopt.common.notebook import ShownInNotebook
 from chamberopt.coverage.metrics import parse_objective
 from chamberopt.coverage.stress_knowledge import stress_bands
 from chamberopt.coverage.stress_model import measured_law
@@ -139,7 +140,7 @@ STOPPING_RULES = ("process.accuracy.objective_half_width", "process.accuracy.max
 
 
 @dataclass(frozen=True)
-class Comparison:
+class Comparison(ShownInNotebook):
     """The comparison of two or more results of the same part with the first of them.
 
     Args:

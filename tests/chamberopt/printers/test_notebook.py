@@ -18,11 +18,16 @@ import pytest
 import chamberopt.api
 from chamberopt.chamber.build import build_chamber
 from chamberopt.common.errors import InputError
+from chamberopt.common.estimate import Estimate
 from chamberopt.common.notebook import html_of
 from chamberopt.documents.wording import metric_label
 from chamberopt.printers import notebook
+from chamberopt.results.compare.comparison import compare
+from chamberopt.search.run_sweep import SweepResult, plan_sweep
 from chamberopt.search.study import Study
+from chamberopt.search.trial_log import Trial
 from chamberopt.workflows.save_run import save_simulation
+from tests.helpers.opengl import needs_opengl
 from tests.helpers.synthetic import DESIGNS, plate_design, poisson_evaluation
 
 HOSTILE = "<script>alert(1)<b onload='x'>&"
@@ -181,3 +186,41 @@ def test_objects_nobody_told_of_are_shown_as_text() -> None:
         [sys.executable, "-c", code], capture_output=True, text=True, check=True
     )
     assert answer.stdout.split() == ["None", "False"]
+
+
+def test_a_comparison_and_a_sweep_give_their_best_and_their_figures(
+    hostile: Path, tmp_path: Path, pictures: list[str]
+) -> None:
+    first = saved_result(hostile, tmp_path)
+    other = tmp_path / "other"
+    shutil.copytree(first.folder, other)
+    found = shown(compare([first.folder, other]))
+    assert "Comparison with" in found.words
+    assert "other: the uniform coverage is" in found.words
+    assert metric_label("mean_coverage").text in found.words
+    study = Study(design=plate_design(), vary={"shot.mass_g": (3.0, 6.5)})
+    values = {"shot.mass_g": 4.0}, (Estimate(0.4, 0.01),), {"mean_coverage": Estimate(0.5, 0.01)}
+    trial = Trial(0, "sweep", (0.5,), *values, 0.0, 0.4, True, "", 4)
+    found = shown(SweepResult(study, plan_sweep(study, 2, None), tmp_path, (trial,), 3.0))
+    assert "The best of 1 candidates" in found.words.replace("\u00a0", " ")
+
+
+def test_charts_and_plotters_are_there_to_be_changed(
+    hostile: Path, tmp_path: Path, pictures: list[str]
+) -> None:
+    result = saved_result(hostile, tmp_path)
+    (axes,) = chamberopt.chart(result, result).axes
+    assert len([line for line in axes.lines if line.get_color() != "none"]) >= 4
+    assert axes.get_xlabel() == "peening time [s]"
+    for function in (chamberopt.chart, chamberopt.plotter):
+        with pytest.raises(InputError, match=f"^{function.__name__}: given no result"):
+            function()
+
+
+@needs_opengl
+def test_a_plotter_holds_the_part(hostile: Path, tmp_path: Path, pictures: list[str]) -> None:
+    drawn = chamberopt.plotter(saved_result(hostile, tmp_path), quantity="coverage")
+    assert drawn.actors
+    drawn.screenshot(tmp_path / "drawn.png")
+    drawn.close()
+    assert (tmp_path / "drawn.png").read_bytes().startswith(notebook.PNG)
