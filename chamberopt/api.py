@@ -19,6 +19,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterable, Sequence
+from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -39,6 +40,7 @@ if TYPE_CHECKING:
     from pyvista import Plotter, PolyData
     from trimesh import Trimesh
 
+    from chamberopt.chamber.propose.pose import Pose
     from chamberopt.common.progress import Progress
     from chamberopt.design.calibration import Calibration
     from chamberopt.export.formats import FrameName
@@ -64,6 +66,7 @@ __all__ = [
     "optimise",
     "peen_strip",
     "plotter",
+    "propose",
     "show",
     "simulate",
     "sweep",
@@ -71,6 +74,74 @@ __all__ = [
     "view",
     "with_part",
 ]
+
+
+def propose(
+    part: str | Path,
+    out: str | Path,
+    *,
+    target: Sequence[str] = (),
+    unit: str | None = None,
+    material: str = "",
+    shot: str = "",
+    ball_mm: float | None = None,
+    shape: str | None = None,
+    pose: Pose | None = None,
+    shop: str | Path | None = None,
+    intensity: str | None = None,
+    coverage: float | None = None,
+    calibration: str | Path | None = None,
+    pilot: bool = True,
+    workers: int | None = None,
+    progress: bool = True,
+) -> Design:
+    """Propose a first design for a part, write it to a folder with studies, and return it.
+
+    The file design.toml has the reason for each value beside it. The arguments are the options of
+    `chamberopt new`.
+
+    Args:
+        part: the part's file.
+        out: new or empty folder.
+        target: what is to be peened: names of the file, or "all"; by default the likeliest.
+        unit: of the numbers in the part's file, if it states none; "guess" takes the likeliest.
+        material: alloy of the part.
+        shot: material of the balls.
+        pilot: simulate some seconds, so that times are estimates.
+        workers: number of threads, by default one per core; it does not change the result.
+        progress: False to show no steps.
+    Raises:
+        InputError: the part cannot be used, or no chamber can be built round it as wished.
+    """
+    from chamberopt.chamber.propose import first_design
+    from chamberopt.chamber.propose.proposal import Wanted
+    from chamberopt.chamber.propose.shop import load_shop
+    from chamberopt.common.executor import local_executor
+    from chamberopt.common.files import claim_folder, whole_or_nothing
+    from chamberopt.common.progress import no_steps
+    from chamberopt.geometry.meshes.units import STATED
+    from chamberopt.workflows.propose import DESIGN, Wishes, require_file, write_proposal
+    from chamberopt.workflows.simulate import teller_of
+
+    of_shop = None if shop is None else load_shop(Path(shop))
+    machine = None if calibration is None else Path(calibration)
+    wanted = Wanted(
+        unit or STATED, shape, material, shot, ball_mm, pose, of_shop, machine, coverage
+    )
+    wishes, names, path = Wishes(wanted, intensity, pilot), tuple(target), Path(part)
+    require_file(path)
+    wishes.require_possible()
+    with ExitStack() as open_:
+        if not progress:
+            open_.enter_context(no_steps())
+        first = first_design.propose(path, wanted, lambda _: names)
+        folder = open_.enter_context(claim_folder(out))
+        open_.enter_context(whole_or_nothing(folder))
+        executor = open_.enter_context(local_executor(workers))
+        given = first, path, wishes, lambda _: names, folder, executor
+        done = write_proposal(*given, teller_of(progress))
+    _warn(done.made.warnings)
+    return load_design(Path(out) / DESIGN)
 
 
 def simulate(

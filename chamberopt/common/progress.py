@@ -24,7 +24,7 @@ Progress = Callable[[int, int, "float | None"], None]
 # s until a step gets a line in a log; each further line comes after twice the time
 FIRST_LINE = 30.0
 LEAST_PAUSE = 0.2  # s between JSON lines of a step
-_json_lines = False
+_json_lines = _is_quiet = False
 # display on the terminal now, at most one: steps within steps share it
 _displays: list[Display] = []
 
@@ -33,6 +33,17 @@ def write_json_lines() -> None:
     """Make all later steps write their progress as lines of JSON."""
     global _json_lines
     _json_lines = True
+
+
+@contextmanager
+def no_steps() -> Iterator[None]:
+    """Show no step during a `with` block, in no thread."""
+    global _is_quiet
+    before, _is_quiet = _is_quiet, True
+    try:
+        yield
+    finally:
+        _is_quiet = before
 
 
 @contextmanager
@@ -49,6 +60,9 @@ def step(
     cell. To a log or a pipe, a long step writes a plain line now and then.
     """
     stream = stream or sys.stderr
+    if _is_quiet:
+        yield _untold
+        return
     if _json_lines:
         write = _json_writer(what, stream)
         write(0, total or 0, None)
@@ -69,6 +83,10 @@ def step(
         finally:
             display.refresh()
             display.remove_task(row)
+
+
+def _untold(done: int, total: int, best: float | None) -> None:
+    """Ignore the progress of a step that is not shown."""
 
 
 def _is_notebook() -> bool:

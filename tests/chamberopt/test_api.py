@@ -7,6 +7,7 @@ from pathlib import Path
 from types import ModuleType
 
 import pytest
+import trimesh
 
 import chamberopt
 from chamberopt.common.errors import InputError
@@ -104,3 +105,22 @@ def test_designs_are_compared_and_a_strip_is_peened(
     assert not peened.is_calibrated
     assert peened.intensity.value > 0.0
     assert (tmp_path / "strip" / "strip.json").is_file()
+
+
+def test_a_first_design_is_proposed_as_by_the_command(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("chamberopt.workflows.propose.draw_target", lambda *_: "no picture")
+    part, out = tmp_path / "box.stl", tmp_path / "box"
+    trimesh.creation.box((20, 20, 30)).export(part)
+    quiet = {"pilot": False, "progress": False}
+    with pytest.raises(InputError, match="does not state the unit"):
+        chamberopt.propose(part, out, **quiet)  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="--intensity: it takes pilot runs"):
+        chamberopt.propose(part, out, intensity="0.2-0.3A", **quiet)  # type: ignore[arg-type]
+    assert not out.exists()
+    design = chamberopt.propose(part, out, unit="mm", material="42CrMo4", **quiet)  # type: ignore[arg-type]
+    assert design.materials.part.alloy == "42CrMo4"
+    assert sorted(one.name for one in out.iterdir()) == ["design.toml", "study.toml"]
+    assert chamberopt.load_study(out / "study.toml").design == design
+    assert capfd.readouterr() == ("", "")

@@ -5,16 +5,10 @@ from __future__ import annotations
 import json as json_format
 from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from chamberopt.cli.console import print_json, print_remarks, show, table_lines
 from chamberopt.cli.options import Json, Out, app
 from chamberopt.cli.prepare import advise_effects
-
-if TYPE_CHECKING:
-    from chamberopt.chamber.build import Chamber
-    from chamberopt.chamber.reach import Reach
-    from chamberopt.design.load import Design
 
 
 @app.command
@@ -59,6 +53,7 @@ def _check(file: Path, pilot: bool, screenshot: Path | None, json: bool, out: Pa
     from chamberopt.common.files import write_text
     from chamberopt.common.progress import step
     from chamberopt.geometry.meshes.surface_error import SurfaceError
+    from chamberopt.pictures.part import draw_target
     from chamberopt.results.vtp_files import write_chamber
     from chamberopt.search.study import Study, load
     from chamberopt.search.study.parameters import setting
@@ -86,7 +81,7 @@ def _check(file: Path, pilot: bool, screenshot: Path | None, json: bool, out: Pa
         facts = describe(design, chamber, reach)
     if screenshot is not None:
         with step("drawing"):
-            draw_target(chamber, reach, screenshot, design)
+            print_remarks([draw_target(chamber, reach, screenshot, design)])
     if isinstance(loaded, Study):
         facts["vary"] = {
             name: {"values": list(varied.texts), "start": setting(design, name)}
@@ -108,31 +103,3 @@ def _check(file: Path, pilot: bool, screenshot: Path | None, json: bool, out: Pa
         write_chamber(out, chamber)
     if json:
         print_json(facts)
-
-
-def draw_target(
-    chamber: Chamber, reach: Reach, screenshot: Path, design: Design | None = None
-) -> None:
-    """Draw the part with its target, and mark triangles of the target that are out of reach.
-
-    With steps, the part stands as in the first, and what is marked is out of reach in all of them.
-
-    Where the part is thin, further views show how soft it is.
-    """
-    from chamberopt.chamber.checks.check import shot_reach
-    from chamberopt.chamber.flexure import softness_of_part
-    from chamberopt.chamber.reach import reached_part_share
-    from chamberopt.pictures.part import draw_part
-
-    part, missed = chamber.part, chamber.part.target
-    rooms = [(reach, chamber)]
-    if design is not None and chamber.steps:
-        steps = zip(design.in_steps.values(), chamber.steps, strict=True)
-        rooms = [(shot_reach(one, room), room) for one, room in steps]
-    for found, room in rooms:
-        missed = missed & (reached_part_share(found, room.source, len(part.triangles)) <= 0.5)
-    corners = part.vertices[part.triangles]
-    softness = None if design is None else softness_of_part(design, part)
-    more = {"missed": missed, "softness": softness}
-    remark = draw_part(corners, part.name, screenshot, part.target, chamber=chamber, **more)
-    print_remarks([remark or f"picture in {screenshot}"])

@@ -15,10 +15,9 @@ from chamberopt.cli.options import Out, Verbose, app
 from chamberopt.common.errors import one_line
 
 if TYPE_CHECKING:
-    from chamberopt.chamber.propose.proposal import Proposal
     from chamberopt.chamber.propose.proposed_target import Surface
 
-PICK, USUAL, NONE = "pick", "usual", "none"
+PICK = "pick"  # in the place of names of surfaces
 
 
 @app.command
@@ -85,62 +84,36 @@ def new(
         Simulate some seconds, so that the treatment time and what is simulated are estimates. It
         takes seconds, and the first time minutes to compile the simulator.
     """
-    import chamberopt.pictures.part  # noqa: F401  # imported before the folder is claimed
     from chamberopt.chamber.propose.first_design import propose
-    from chamberopt.chamber.propose.left_out import find_left_out
     from chamberopt.chamber.propose.proposal import Wanted
-    from chamberopt.chamber.propose.proposed_intensity import (
-        as_no_wish,
-        is_off,
-        usual_for,
-        with_expected_intensity,
-        with_larger_balls,
-        with_thin_places,
-    )
-    from chamberopt.chamber.propose.quicker import Way, propose_quicker, propose_second_pose
     from chamberopt.chamber.propose.shop import load_shop
-    from chamberopt.chamber.propose.text import design_text, study_texts
-    from chamberopt.cli.commands.check import draw_target
-    from chamberopt.cli.prepare import measured, with_intensity, with_measured_budget
+    from chamberopt.cli.teller import TerminalTeller
     from chamberopt.common.errors import InputError
-    from chamberopt.common.files import claim_folder, whole_or_nothing, write_text
-    from chamberopt.common.progress import step
-    from chamberopt.common.toml_fields import allowed_range
-    from chamberopt.design.intensity import WantedIntensity
-    from chamberopt.design.process import Process
-    from chamberopt.design.shot import ShotSize
+    from chamberopt.common.executor import local_executor
+    from chamberopt.common.files import claim_folder, whole_or_nothing
     from chamberopt.documents.proposal import proposal_end
     from chamberopt.geometry.meshes.units import STATED, UnknownUnitError
     from chamberopt.results.vtp_files import pyvista
+    from chamberopt.workflows.propose import DESIGN, Wishes, require_file, write_proposal
 
-    _require_file(part)
-    low, high = allowed_range(ShotSize.model_fields["diameter_mm"])
-    if ball_mm is not None and not low <= ball_mm <= high:
-        allowed = f"from {low:g} to {high:g} mm"
-        raise InputError(f"--ball-mm: given {ball_mm:g}; allowed: {allowed}")
-    low, high = allowed_range(Process.model_fields["coverage_percent"])
-    if coverage is not None and not low <= coverage <= high:
-        raise InputError(f"--coverage: given {coverage:g}; allowed: from {low:g} to {high:g} %")
-    is_usual = intensity == USUAL
-    asked = None if intensity in (None, USUAL, NONE) else WantedIntensity.parse(intensity)
-    if is_usual and not material:
-        raise InputError("--intensity: usual follows from the alloy; give --material")
-    if intensity not in (None, NONE) and not pilot:
-        raise InputError("--intensity: it takes pilot runs; leave out --no-pilot")
+    require_file(part)
     if PICK in target and not sys.stdin.isatty():
         raise InputError("--target: pick asks, and nobody answers here; give names or faces")
-
     of_shop = None if shop is None else load_shop(shop)
     wanted = Wanted(
         unit or STATED, shape, material, shot, ball_mm, pose, of_shop, calibration, coverage
     )
+    wishes = Wishes(wanted, intensity, pilot)
+    wishes.require_possible()
 
-    chosen: Sequence[str] = target
+    picked: list[Sequence[str]] = []
 
     def choose(known: Sequence[Surface]) -> Sequence[str]:
-        nonlocal chosen
-        chosen = _picked(known) if PICK in target else target
-        return chosen
+        if PICK not in target:
+            return target
+        if not picked:  # asked once, however many designs are tried
+            picked.append(_picked(known))
+        return picked[0]
 
     out = out or Path(part.stem if part.suffix else f"{part.name}_chamber")
     with claim_folder(out):
@@ -151,72 +124,18 @@ def new(
         if not sys.stdin.isatty():
             raise
         wanted = replace(wanted, unit=_asked_unit(part, error.sizes))
+        wishes = replace(wishes, geometry=wanted)
         made = propose(part, wanted, choose)
 
-    def again(other: Wanted) -> Proposal:
-        return propose(part, other, lambda _: chosen)
-
     pyvista()  # before the folder is claimed: Ctrl-C during an import would leave the folder behind
-    with claim_folder(out) as folder, whole_or_nothing(folder):
-        with step("drawing"):  # before the pilots, so that it can be looked at meanwhile
-            draw_target(made.chamber, made.reach, folder / "design.png")
-        if pilot:
-            drawn = made.chamber
-            way = Way(made, wanted, measured(made))
-            made, wanted, found = propose_quicker(way, again, lambda one: measured(one, False))
-            why_so = {"part.rotate_deg": made.reasons["part.rotate_deg"]}
-            # A stated alloy has a usual intensity, which a proposal should not miss.
-            seeks = material and intensity is None and found and is_off(made, found.intensity)
-            if is_usual or seeks:
-                asked = usual_for(made)
-            if asked:
-                try:
-                    made = with_intensity(made, wanted, asked, again)
-                except InputError:  # which is no reason to stop if nobody asked
-                    if not seeks:
-                        raise
-                    asked = None
-            if asked:
-                if wanted.pose != pose:  # by pilots, and not as asked
-                    made = replace(made, reasons={**made.reasons, **why_so})
-                found = measured(made)
-                made = as_no_wish(made) if seeks else made
-                pilots = again, lambda one: measured(one, False)
-                made = with_larger_balls(made, wanted, asked, found, *pilots)
-            elif found is not None:
-                made = with_expected_intensity(made, found.intensity)
-            made, found = propose_second_pose(made, found, lambda one: measured(one, False))
-            made = with_thin_places(made)
-            made = with_measured_budget(made, found)
-            if made.chamber is not drawn:
-                with step("drawing"):
-                    draw_target(made.chamber, made.reach, folder / "design.png")
-        left_out = find_left_out(made)
-        write_text(folder / "design.toml", design_text(made, folder, left_out))
-        studies = study_texts(made, "design.toml")
-        for name, text in studies.items():
-            write_text(folder / name, text)
-    show(proposal_end(made, left_out, verbose))
-    print_remarks(f"note: {one_line(text)}" for text in made.mesh.notes)
-    print_remarks(f"warning: {text}" for text in made.warnings)
-    show(
-        [f"design in {folder / 'design.toml'}", *(f"study in {folder / name}" for name in studies)]
-    )
-
-
-def _require_file(part: Path) -> None:
-    """Raise InputError unless the part is a plain file whose name can stand in a design file."""
-    from chamberopt.common.errors import InputError
-
-    if not part.is_file():
-        what = "is a folder" if part.is_dir() else "is no plain file"
-        what = what if part.exists() else "no such file"
-        raise InputError(f"{part}: {what}; give the file of the part, from CAD or a scanner")
-    try:
-        str(part.resolve()).encode()
-    except UnicodeEncodeError:
-        text = "its path is not UTF-8, so that no design can name it; rename the file or its folder"
-        raise InputError(f"{part}: {text}") from None
+    with claim_folder(out) as folder, whole_or_nothing(folder), local_executor() as executor:
+        given = made, part, wishes, choose, folder, executor
+        done = write_proposal(*given, TerminalTeller())
+    show(proposal_end(done.made, done.left_out, verbose))
+    print_remarks(f"note: {one_line(text)}" for text in done.made.mesh.notes)
+    print_remarks(f"warning: {text}" for text in done.made.warnings)
+    studies = (f"study in {folder / name}" for name in done.studies)
+    show([f"design in {folder / DESIGN}", *studies])
 
 
 def _asked_unit(part: Path, sizes: Mapping[str, str]) -> str:

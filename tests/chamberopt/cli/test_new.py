@@ -198,7 +198,7 @@ def test_a_guess_is_said_and_no_folder_is_held_while_the_design_is_made(
         return propose(*given)
 
     monkeypatch.setattr("chamberopt.chamber.propose.first_design.propose", watched)
-    monkeypatch.setattr("chamberopt.cli.commands.check.draw_target", lambda *_: None)
+    monkeypatch.setattr("chamberopt.workflows.propose.draw_target", lambda *_: "no picture")
     assert main(["new", "box.stl", "--unit", "guess", "--out", "out", "--no-pilot"]) == 0
     said = capfd.readouterr()
     assert "1. UNIT GUESSED: the part measures 20 x 20 x 30 mm." in said.out
@@ -250,15 +250,15 @@ def test_a_pilot_that_cannot_run_leaves_the_starts_and_says_so(
 
     monkeypatch.chdir(tmp_path)
     trimesh.creation.box((20, 20, 30)).export("box.stl")
-    monkeypatch.setattr("chamberopt.cli.prepare.compile_with_message", lambda *_: None)
-    monkeypatch.setattr("chamberopt.simulation.budget_pilot.measure_budget", fails)
-    monkeypatch.setattr("chamberopt.cli.commands.check.draw_target", lambda *_: None)
+    monkeypatch.setattr("chamberopt.cli.teller.compile_with_message", lambda *_: None)
+    monkeypatch.setattr("chamberopt.workflows.propose.measure_budget", fails)
+    monkeypatch.setattr("chamberopt.workflows.propose.draw_target", lambda *_: "no picture")
     assert main(["new", "box.stl", "--unit", "mm"]) == 0
     assert "warning: no pilot, treatment and simulated time are starts" in capfd.readouterr().err
     assert "NOT MEASURED by a pilot, a start" in Path("box/design.toml").read_text("utf-8")
 
     measured = Measured(1e5, 1e4, 250.0, True, 60.0, True, 0.01, 5e-3, 6.4, 200.0)
-    monkeypatch.setattr("chamberopt.simulation.budget_pilot.measure_budget", lambda *_: measured)
+    monkeypatch.setattr("chamberopt.workflows.propose.measure_budget", lambda *_: measured)
     assert main(["new", "box.stl", "--unit", "mm", "--out", "piloted"]) == 0
     process = load_design("piloted/design.toml").process
     assert process.treatment_time == 360.0
@@ -280,10 +280,10 @@ def test_a_usual_intensity_that_no_pilot_tells_is_no_reason_to_stop(
     found = Measured(1e5, 1e4, 250.0, True, 60.0, True, 0.01, 5e-3, 6.4, 200.0, intensity=off)
     monkeypatch.chdir(tmp_path)
     trimesh.creation.box((20, 20, 30)).export("box.stl")
-    monkeypatch.setattr("chamberopt.cli.prepare.compile_with_message", lambda *_: None)
-    monkeypatch.setattr("chamberopt.simulation.budget_pilot.measure_budget", lambda *_: found)
-    monkeypatch.setattr("chamberopt.peening.intensity_pilot.predict_intensity", lambda *_: None)
-    monkeypatch.setattr("chamberopt.cli.commands.check.draw_target", lambda *_: None)
+    monkeypatch.setattr("chamberopt.cli.teller.compile_with_message", lambda *_: None)
+    monkeypatch.setattr("chamberopt.workflows.propose.measure_budget", lambda *_: found)
+    monkeypatch.setattr("chamberopt.workflows.propose.predict_intensity", lambda *_: None)
+    monkeypatch.setattr("chamberopt.workflows.propose.draw_target", lambda *_: "no picture")
     words = ["new", "box.stl", "--unit", "mm", "--material", "Ti-6Al-4V"]
     assert main(words) == 0
     said = capfd.readouterr().out

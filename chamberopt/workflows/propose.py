@@ -1,0 +1,228 @@
+"""Propose a first design for a part. Python users and the command line share this workflow.
+
+The design by rules of thumb comes first. Pilot simulations then choose its pose, charge, balls and
+amplitude, and tell its treatment time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from chamberopt.chamber.propose.first_design import propose
+from chamberopt.chamber.propose.left_out import LeftOut, find_left_out
+from chamberopt.chamber.propose.proposed_budget import Asked, propose_budget, with_budget
+from chamberopt.chamber.propose.proposed_intensity import (
+    as_no_wish,
+    is_off,
+    propose_intensity,
+    usual_for,
+    with_expected_intensity,
+    with_larger_balls,
+    with_thin_places,
+)
+from chamberopt.chamber.propose.quicker import Way, propose_quicker, propose_second_pose
+from chamberopt.chamber.propose.text import design_text, study_texts
+from chamberopt.common.errors import InputError
+from chamberopt.common.files import write_text
+from chamberopt.common.toml_fields import allowed_range
+from chamberopt.design.intensity import WantedIntensity
+from chamberopt.design.process import Process
+from chamberopt.design.shot import ShotSize
+from chamberopt.peening.intensity_pilot import predict_intensity
+from chamberopt.pictures.part import draw_target
+from chamberopt.results.vtp_files import pyvista
+from chamberopt.simulation.budget_pilot import measure_budget
+from sim_core import SimulationError
+
+if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
+    from chamberopt.chamber.propose.proposal import Proposal, Wanted
+    from chamberopt.chamber.propose.proposed_budget import Measured
+    from chamberopt.chamber.propose.proposed_intensity import IntensityPilot
+    from chamberopt.chamber.propose.proposed_target import Surface
+    from chamberopt.workflows.simulate import Teller
+
+USUAL, NONE = "usual", "none"  # in the place of an intensity
+Chooser = Callable[["Sequence[Surface]"], Sequence[str]]
+DESIGN, PICTURE = "design.toml", "design.png"
+PILOT = "pilot run (--no-pilot leaves it out)"
+
+
+@dataclass(frozen=True)
+class Wishes:
+    """What is wished of a proposal.
+
+    Attributes:
+        geometry: wishes that rules of thumb follow.
+        intensity: an Almen intensity, USUAL, NONE, or None to aim at the usual one if the alloy is
+            given.
+        pilot: simulate some seconds, so that times are estimates.
+    """
+
+    geometry: Wanted
+    intensity: str | None = None
+    pilot: bool = True
+
+    def require_possible(self) -> None:
+        """Raise InputError for wishes that are out of range or contradict each other."""
+        ball_mm, coverage = self.geometry.ball_mm, self.geometry.coverage
+        low, high = allowed_range(ShotSize.model_fields["diameter_mm"])
+        if ball_mm is not None and not low <= ball_mm <= high:
+            allowed = f"from {low:g} to {high:g} mm"
+            raise InputError(f"--ball-mm: given {ball_mm:g}; allowed: {allowed}")
+        low, high = allowed_range(Process.model_fields["coverage_percent"])
+        if coverage is not None and not low <= coverage <= high:
+            raise InputError(f"--coverage: given {coverage:g}; allowed: from {low:g} to {high:g} %")
+        self.asked_intensity()
+        if self.intensity == USUAL and not self.geometry.alloy:
+            raise InputError("--intensity: usual follows from the alloy; give --material")
+        if self.intensity not in (None, NONE) and not self.pilot:
+            raise InputError("--intensity: it takes pilot runs; leave out --no-pilot")
+
+    def asked_intensity(self) -> WantedIntensity | None:
+        """Return the intensity that is asked for by its numbers. Raises InputError for others."""
+        named = self.intensity in (None, USUAL, NONE)
+        return None if self.intensity is None or named else WantedIntensity.parse(self.intensity)
+
+
+@dataclass(frozen=True)
+class Proposed:
+    """A proposal that was written.
+
+    Attributes:
+        made: the proposal.
+        left_out: what may be left out of its target, or is peened beside it.
+        studies: names of the study files.
+    """
+
+    made: Proposal
+    left_out: Sequence[LeftOut]
+    studies: Sequence[str]
+
+
+def require_file(part: Path) -> None:
+    """Raise InputError unless the part is a plain file whose name can stand in a design file."""
+    if not part.is_file():
+        what = "is a folder" if part.is_dir() else "is no plain file"
+        what = what if part.exists() else "no such file"
+        raise InputError(f"{part}: {what}; give the file of the part, from CAD or a scanner")
+    try:
+        str(part.resolve()).encode()
+    except UnicodeEncodeError:
+        text = "its path is not UTF-8, so that no design can name it; rename the file or its folder"
+        raise InputError(f"{part}: {text}") from None
+
+
+def write_proposal(
+    first: Proposal,
+    path: Path,
+    wishes: Wishes,
+    choose: Chooser,
+    folder: Path,
+    executor: Executor,
+    teller: Teller,
+) -> Proposed:
+    """Improve a first proposal by pilots, and write its design, studies and picture into a folder.
+
+    Raises InputError if an intensity that was asked for cannot be told.
+
+    Args:
+        first: the proposal by rules of thumb for the part at `path`, with these wishes.
+        choose: picks the names of the surfaces to peen from all surfaces, as for `first`.
+    """
+    pyvista()
+    with teller.step("drawing"):  # before the pilots, so that it can be looked at meanwhile
+        teller.tell(draw_target(first.chamber, first.reach, folder / PICTURE))
+    made = first
+    if wishes.pilot:
+        made = _Pilots(path, wishes, choose, executor, teller).improve(first)
+    if made.chamber is not first.chamber:
+        with teller.step("drawing"):
+            teller.tell(draw_target(made.chamber, made.reach, folder / PICTURE))
+    left_out = find_left_out(made)
+    write_text(folder / DESIGN, design_text(made, folder, left_out))
+    studies = study_texts(made, DESIGN)
+    for name, text in studies.items():
+        write_text(folder / name, text)
+    return Proposed(made, left_out, list(studies))
+
+
+@dataclass(frozen=True)
+class _Pilots:
+    """Pilot simulations of proposals for the part in a file."""
+
+    path: Path
+    wishes: Wishes
+    choose: Chooser
+    executor: Executor
+    teller: Teller
+
+    def improve(self, first: Proposal) -> Proposal:
+        """Return a proposal that pilots chose, with its treatment time and what to simulate.
+
+        Raises InputError if an intensity that was asked for cannot be told.
+        """
+        quietly = partial(self._measure, is_told=False)
+        way = Way(first, self.wishes.geometry, self._measure(first))
+        made, wanted, found = propose_quicker(way, self._again, quietly)
+        why_so = {"part.rotate_deg": made.reasons["part.rotate_deg"]}
+        intensity, asked = self.wishes.intensity, self.wishes.asked_intensity()
+        # A stated alloy has a usual intensity, which a proposal should not miss.
+        seeks = bool(wanted.alloy and intensity is None and found and is_off(made, found.intensity))
+        if intensity == USUAL or seeks:
+            asked = usual_for(made)
+        if asked:
+            try:
+                made = propose_intensity(made, wanted, asked, self._again, self._predict)
+            except InputError:  # which is no reason to stop if nobody asked
+                if not seeks:
+                    raise
+                asked = None
+        if asked:
+            if wanted.pose != self.wishes.geometry.pose:  # by pilots, and not as asked
+                made = replace(made, reasons={**made.reasons, **why_so})
+            found = self._measure(made)
+            made = as_no_wish(made) if seeks else made
+            made = with_larger_balls(made, wanted, asked, found, self._again, quietly)
+        elif found is not None:
+            made = with_expected_intensity(made, found.intensity)
+        made, found = propose_second_pose(made, found, quietly)
+        return _with_measured_budget(with_thin_places(made), found)
+
+    def _again(self, other: Wanted) -> Proposal:
+        return propose(self.path, other, self.choose)
+
+    def _measure(self, made: Proposal, is_told: bool = True) -> Measured | None:
+        """Return what the budget of a proposal follows from; None where no pilot can tell it.
+
+        The reason is told then, unless is_told is false.
+        """
+        try:
+            self.teller.compile(made.design, made.chamber, None)
+            with self.teller.step(PILOT) as progress:
+                return measure_budget(made.design, made.chamber, self.executor, progress)
+        except (InputError, SimulationError) as error:
+            text = f"warning: no pilot, treatment and simulated time are starts: {error}"
+            if is_told:
+                self.teller.tell(text)
+            return None
+
+    def _predict(self, made: Proposal) -> IntensityPilot | None:
+        """Return the intensity of a proposal; None if hardly a dent fell."""
+        self.teller.compile(made.design, made.chamber, None)
+        with self.teller.step("pilot run of the intensity") as progress:
+            return predict_intensity(made.design, made.chamber, self.executor, progress)
+
+
+def _with_measured_budget(made: Proposal, found: Measured | None) -> Proposal:
+    """Return a proposal whose treatment time and budget follow from a pilot, if one could run."""
+    if found is None:
+        return made
+    is_limited = not made.design.why_no_intensity
+    asked = Asked(made.design.process.coverage_percent, made.strength_dents, is_limited)
+    return with_budget(made, propose_budget(found, asked))
