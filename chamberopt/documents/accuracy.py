@@ -4,16 +4,59 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from chamberopt.simulation.numerical_parameters import FACETS, setting_text, short_name
+from chamberopt.common.number_text import plain
+from chamberopt.documents.document import Table
+from chamberopt.simulation.numerical_parameters import FACETS, TIME, setting_text, short_name
 from chamberopt.simulation.recommendation import ACCURACIES, recommend
 
 if TYPE_CHECKING:
     from chamberopt.common.estimate import Estimate
     from chamberopt.simulation.convergence import ConvergenceStudy
+    from chamberopt.simulation.recommendation import Recommendation
+
+
+def accuracy_end(study: ConvergenceStudy, verbose: bool) -> list[Table | str]:
+    """Return the end of the command `accuracy`: a sentence, what each accuracy costs, and settings.
+
+    Args:
+        verbose: what was measured of each numerical parameter follows.
+    """
+    found = [recommend(study, accuracy) for accuracy in ACCURACIES]
+    head = ("half-width", "replicas", "each of", "CPU s")
+    table = Table("", head, [_cost(one) for one in found])
+    blocks = [line for one in found for line in ("", *one.lines)]
+    more = ["", *accuracy_lines(study)] if verbose else []
+    total = f"{study.cpu_s:.0f} CPU s without compiling, {study.wall_s:.0f} s in all"
+    if study.left_out:
+        total += f"; left out by --budget-s: {', '.join(map(short_name, study.left_out))}"
+    return [_sentence(study, found[1]), "", table, *blocks, *more, "", total]
+
+
+def _sentence(study: ConvergenceStudy, one: Recommendation) -> str:
+    """Return in one sentence what an accuracy of the objective costs, and half of the error."""
+    text = f"± {one.accuracy:g} of the uniform coverage"
+    if not one.replicas:
+        return f"{text} is not reachable with these settings: {'; '.join(one.remarks)}."
+    _, count, simulated, seconds = _cost(one)
+    text += f" takes about {seconds} CPU s: {count} replicas of {simulated}"
+    law = study.law
+    if law is not None and law.halving is not None:
+        middle, low, high = (plain(value, 2) for value in law.halving)
+        text += f"; half the error costs {middle} times as much ({low} to {high})"
+    return f"{text}."
+
+
+def _cost(one: Recommendation) -> tuple[str, str, str, str]:
+    """Return the accuracy, replicas, simulated time of each, and CPU seconds as a table's row."""
+    accuracy = f"± {one.accuracy:g}"
+    if not one.replicas:
+        return accuracy, "-", "-", "not reachable"
+    seconds = plain(one.cpu_s, 2 if one.cpu_s < 100.0 else 3)
+    return accuracy, f"{one.replicas}", f"{setting_text(one.settings[TIME])} s", seconds
 
 
 def accuracy_lines(study: ConvergenceStudy) -> list[str]:
-    """Return the lines that the command `accuracy` prints about a study."""
+    """Return lines on the reference, on more replicas, and on each numerical parameter."""
     lines = [
         describe_reference(study),
         "",
@@ -35,12 +78,7 @@ def accuracy_lines(study: ConvergenceStudy) -> list[str]:
         cpu = f"{run.cpu.value:.3f} ± {run.cpu.half_width:.3f}"
         biases = "".join(f"{_signed(bias):>21}" for bias in (run.bias, run.mean_bias))
         lines.append(f"{short_name(run.parameter):24}{run.setting:>24}{cpu:>19}{biases}")
-    for accuracy in ACCURACIES:
-        lines += ["", *recommend(study, accuracy).lines]
-    total = f"{study.cpu_s:.0f} CPU s without compiling, {study.wall_s:.0f} s in all"
-    if study.left_out:
-        total += f"; left out by --budget-s: {', '.join(map(short_name, study.left_out))}"
-    return [*lines, "", total]
+    return lines
 
 
 def _signed(bias: Estimate) -> str:
