@@ -36,7 +36,7 @@ def _sentence(study: ConvergenceStudy, one: Recommendation) -> str:
     """Return in one sentence what an accuracy of the objective costs, and half of the error."""
     text = f"± {one.accuracy:g} of the uniform coverage"
     if not one.replicas:
-        return f"{text} is not reachable with these settings: {'; '.join(one.remarks)}."
+        return f"{text} is not reachable with these settings: {one.remarks[-1]}."  # what limits it
     _, count, simulated, seconds = _cost(one)
     text += f" takes about {seconds} CPU s: {count} replicas of {simulated}"
     law = study.law

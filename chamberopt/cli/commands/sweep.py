@@ -60,7 +60,7 @@ def sweep(
     from chamberopt.search.run_sweep import plan_sweep
     from chamberopt.search.study import load_study
     from chamberopt.search.study_folder import open_study_folder
-    from chamberopt.workflows.optimise import sweep_study
+    from chamberopt.workflows.optimise import read_sweep, sweep_study
 
     values = given_values(accuracy, time)
     loaded = load_study(study, values)
@@ -71,7 +71,9 @@ def sweep(
     claim = partial(open_study_folder, loaded, plan=plan.as_json())
     with console.claimed_folder(out, name, claim) as folder:
         if folder.finished:
-            console.print_finished(folder.path, "sweep", [], json)
+            found = read_sweep(folder, plan)
+            end = sweep_end(found, [best_row_note(found)], verbose)
+            console.print_finished(folder.path, "sweep", end, json)
             return
         command = resume_command(study, folder.path, plan.as_json(), as_options(values))
         with resume_note(folder, command):
