@@ -163,7 +163,7 @@ def numeric_fields(
         name = prefix + name
         types = _alternatives(field.annotation)
         value = None if is_class else getattr(table, name.removeprefix(prefix))
-        inner = value if isinstance(value, BaseModel) else _table_of(field)
+        inner = value if isinstance(value, BaseModel) else table_of(field)
         items = value if isinstance(value, tuple) and value else (None,)
         if isinstance(items[0], BaseModel):
             for i, item in enumerate(items):
@@ -225,6 +225,13 @@ def key_lines(source: str) -> dict[str, int]:
 
 def describe_allowed(field: FieldInfo) -> str:
     """Return what a field accepts: 'a number from 2 to 2000 mm (inner height of the chamber)'."""
+    extra = field.json_schema_extra if isinstance(field.json_schema_extra, dict) else {}
+    text = accepted_values(field) + (f" {extra['unit']}" if extra.get("unit") else "")
+    return text + (f" ({field.description})" if field.description else "")
+
+
+def accepted_values(field: FieldInfo) -> str:
+    """Return what a field accepts, without unit and meaning: 'a number from 2 to 2000'."""
     bounds: dict[str, str] = {}
     for constraint in field.metadata:
         found = ((k, getattr(constraint, k, None)) for k in ("ge", "le"))
@@ -233,7 +240,7 @@ def describe_allowed(field: FieldInfo) -> str:
     kind = _alternatives(field.annotation)[0]
     if "form" in extra:
         text = str(extra["form"])
-    elif _table_of(field):
+    elif table_of(field):
         text = "a table"
     else:
         text = TYPE_NAMES.get(kind) or ", ".join(f'"{choice}"' for choice in get_args(kind))
@@ -241,8 +248,7 @@ def describe_allowed(field: FieldInfo) -> str:
         text += f" from {bounds['ge']} to {bounds['le']}"
     elif "ge" in bounds:
         text += f" of at least {bounds['ge']}"
-    text += f" {extra['unit']}" if extra.get("unit") else ""
-    return text + (f" ({field.description})" if field.description else "")
+    return text
 
 
 def _dotted(loc: tuple[int | str, ...]) -> str:
@@ -273,7 +279,7 @@ def _bare(annotation: Any) -> Any:
     return get_args(annotation)[0] if get_origin(annotation) is Annotated else annotation
 
 
-def _table_of(field: FieldInfo, of_rows: bool = False) -> type[BaseModel] | None:
+def table_of(field: FieldInfo, of_rows: bool = False) -> type[BaseModel] | None:
     """Return the pydantic model of a field that is a table, or None for other fields.
 
     With `of_rows`, a field that is a list of tables gives the model of these tables.
@@ -308,7 +314,7 @@ def _find_field(
         if isinstance(step, int) or free_name:
             free_name = False
             continue
-        table = model if field is None else _table_of(field) or _table_of(field, of_rows=True)
+        table = model if field is None else table_of(field) or table_of(field, of_rows=True)
         if table is None:
             break
         model, field = table, table.model_fields.get(step)
@@ -398,5 +404,5 @@ def _all_names(model: type[BaseModel], prefix: str = "") -> Iterator[str]:
     """Yield the dotted names of all keys of a model and its tables."""
     for name, field in model.model_fields.items():
         yield prefix + name
-        if (table := _table_of(field)) is not None:
+        if (table := table_of(field)) is not None:
             yield from _all_names(table, f"{prefix}{name}.")

@@ -1,0 +1,144 @@
+"""Tables of every key of the program's files, from the pydantic models that read them.
+
+A key's meaning is its description there; for a key that is a table, the table's docstring.
+"""
+
+from collections.abc import Iterator, Mapping
+from typing import Annotated, Any, get_args, get_origin
+
+from docutils import nodes
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
+from pydantic_core import PydanticUndefined
+
+from chamberopt.chamber.propose.shop import Shop
+from chamberopt.common.toml_errors import accepted_values, table_of
+from chamberopt.design.calibration import Calibration
+from chamberopt.design.design import Design
+from chamberopt.design.shapes import SHAPES
+from chamberopt.design.shapes.base import ChamberTable
+from chamberopt.peening.measured import Measured
+from chamberopt.search.study.schema import Study
+
+HEAD = ["{.keys}", "| key | meaning | value | default |", "|---|---|---|---|"]
+CUSTOM = "A file of one's own (`shape = \"my_shape.py\"`) adds keys of its own."
+
+
+def of_file(model: type[BaseModel]) -> str:
+    """Return a heading and a table for each table of a file, as MyST text."""
+    names: dict[type[BaseModel], str] = {}
+    _name_tables(model, "", names)
+    lines: list[str] = []
+    for table, name in names.items():
+        lines += _table(table, name, name and f"[{name}]" or "The file", table.model_fields, names)
+        if table is ChamberTable:
+            lines += _shapes(names)
+    return "\n".join(lines)
+
+
+PAGES = {
+    "docs/reference/design": Design,
+    "docs/reference/study": Study,
+    "docs/reference/shop": Shop,
+    "docs/reference/measurements": Measured,
+    "docs/reference/machine": Calibration,
+}
+
+
+def meaning(field: FieldInfo) -> str:
+    """Return what a key says: its description, or what its table says; "" if there is neither."""
+    if field.description:
+        return field.description
+    table = _inner(field)
+    return "" if table is None else _summary(table)
+
+
+def every_key(model: type[BaseModel], prefix: str = "") -> Iterator[tuple[str, FieldInfo]]:
+    """Yield the dotted name and the field of each key of a file, also of tables in tables."""
+    for key, field in model.model_fields.items():
+        yield prefix + key, field
+        if (table := _inner(field)) not in (None, Design):
+            yield from every_key(table, f"{prefix}{key}.")
+
+
+def make_linkable(app: Any, tree: nodes.document) -> None:
+    """Let pages link to a key, as in [time](../reference/design.md#process-treatment_time_s)."""
+    found = app.env.metadata[app.env.current_document.docname]
+    slugs = found.setdefault("myst_slugs", {})
+    for node in tree.findall(nodes.inline):
+        for name in node.get("names", []):
+            slugs[name] = (0, node["ids"][0], node.astext())
+
+
+def _name_tables(model: type[BaseModel], name: str, names: dict[type[BaseModel], str]) -> None:
+    """Enter a table and the tables in it into `names`, each where the file has it first."""
+    names[model] = name
+    for key, field in model.model_fields.items():
+        table = _inner(field)
+        if table is not None and table is not Design and table not in names:
+            _name_tables(table, f"{name}.{key}".strip("."), names)
+
+
+def _shapes(names: dict[type[BaseModel], str]) -> Iterator[str]:
+    """Yield the lines of the keys that only chambers of one shape have."""
+    for name, shape in SHAPES.items():
+        fields = shape.model_fields.items()
+        own = {key: one for key, one in fields if key not in ChamberTable.model_fields}
+        title = f'[chamber] with shape = "{name}"'
+        yield from _table(shape, f"chamber-{name}", title, own, names)
+    yield f"\n{CUSTOM}\n"
+
+
+def _table(
+    model: type[BaseModel],
+    name: str,
+    title: str,
+    fields: Mapping[str, FieldInfo],
+    names: Mapping[type[BaseModel], str],
+) -> Iterator[str]:
+    yield from ["", f"## {title}", "", _summary(model), "", *HEAD]
+    for key, field in fields.items():
+        anchor = f"{name}.{key}".strip(".").replace(".", "-")
+        value, table = accepted_values(field), _inner(field)
+        if table not in (None, Design):
+            inside = names[table]
+            value = f"{value}: [[{inside}]](#{inside.replace('.', '').lower()})"
+        extra = field.json_schema_extra if isinstance(field.json_schema_extra, dict) else {}
+        unit = f" {extra['unit']}" if extra.get("unit") else ""
+        cells = [f"[`{key}`]{{#{anchor}}}", meaning(field), value + unit, _default(field)]
+        yield "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
+    yield ""
+
+
+def _inner(field: FieldInfo) -> type[BaseModel] | None:
+    """Return the model of a key that is a table, a list of tables or a table of named tables."""
+    if (table := table_of(field) or table_of(field, of_rows=True)) is not None:
+        return table
+    if get_origin(field.annotation) is not dict:
+        return None
+    _, value = get_args(field.annotation)
+    value = get_args(value)[0] if get_origin(value) is Annotated else value
+    return value if isinstance(value, type) and issubclass(value, BaseModel) else None
+
+
+def _summary(model: type[BaseModel]) -> str:
+    return " ".join((model.__doc__ or "").split("\n\n")[0].split())
+
+
+def _default(field: FieldInfo) -> str:
+    if field.is_required():
+        return "required"
+    if field.default is PydanticUndefined or field.default in (None, (), ""):
+        return "–"
+    return f"`{_toml(field.default)}`"
+
+
+def _toml(value: object) -> str:
+    """Return a value as a TOML file writes it."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, tuple):
+        return f"[{', '.join(map(_toml, value))}]"
+    if isinstance(value, str):
+        return f'"{value}"'
+    return f"{value:g}" if isinstance(value, float) else str(value)
