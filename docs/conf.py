@@ -9,6 +9,8 @@ import sys
 from functools import partial
 from pathlib import Path
 
+from docutils import nodes
+
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT))
 
@@ -54,10 +56,18 @@ def add_what_is_made(app, page: str, source: list[str]) -> None:
         source[0] += "\n\n" + MADE[page]()
 
 
+def make_keys_linkable(app, tree: nodes.document) -> None:
+    """Let pages link to a key, as in [time](../reference/design.md#process-treatment_time_s)."""
+    slugs = app.env.metadata[app.env.current_document.docname].setdefault("myst_slugs", {})
+    for node in tree.findall(nodes.inline):
+        for name in node.get("names", []):
+            slugs[name] = (0, node["ids"][0], node.astext())
+
+
 def setup(app) -> None:
     """Called by Sphinx before it reads the pages."""
     app.connect("source-read", add_what_is_made)
-    app.connect("doctree-read", keys.make_linkable)
+    app.connect("doctree-read", make_keys_linkable)
     app.connect("autodoc-process-docstring", docstrings.adapt, priority=400)  # before napoleon
     app.connect("autodoc-process-signature", docstrings.shorten)
     app.connect("env-get-outdated", lambda *_: [*MADE, "docs/reference/python"])

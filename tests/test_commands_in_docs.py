@@ -1,20 +1,33 @@
-"""The commands of worked examples in docs/ run as printed, on settings that make them quick."""
+"""The commands of worked examples in docs/ run as printed, on settings that make them quick.
+
+The commands of all pages name what there is, and tables in TOML have keys that there are.
+"""
 
 import json
 import re
+import shlex
 import shutil
 import tomllib
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from benchmarks.made_up_shop import SHOP, compared
 from chamberopt.cli import main
+from chamberopt.cli.command_line import app
+from chamberopt.common.toml_errors import key_lines
 from chamberopt.design.zones import Zone
 from chamberopt.pictures.subprocess_drawing import missing_opengl
 from chamberopt.search.study import load_study
+from docs.generators.keys import PAGES as FILES
+from docs.generators.keys import every_key, meaning
 
 ROOT = Path(__file__).parents[1]
+PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")])
+OF_PAGES = pytest.mark.parametrize("page", PAGES, ids=[one.stem for one in PAGES])
+# Tables whose keys are names: of numbers, metrics, or parts of a design.
+NAMED = ("vary", "constraints", "tolerances", "objective.sum", "search_accuracy", "steps")
 QUICK = {
     "replicas": "3\npoints = 1000", "simulated_time_s": "0.05", "warmup_time_s": "0.02",
     "evaluations": "2", "confirm": "1", "confirm_replicas": "3",
@@ -26,6 +39,55 @@ def commands(page: str) -> list[list[str]]:
     """The commands of a page, as lists of words."""
     text = (ROOT / "docs" / "tutorials" / page).read_text(encoding="utf-8")
     return [line.split() for line in re.findall(r"^    (.*)$", text, re.MULTILINE)]
+
+
+def blocks(page: Path) -> Iterator[str]:
+    """The lines of a page that stand in blocks of code."""
+    text = page.read_text(encoding="utf-8")
+    fenced = re.findall(r"^ *```\w*\n(.*?)^ *```", text, re.DOTALL | re.MULTILINE)
+    return iter([*fenced, *re.findall(r"(?:^    .*\n)+", text, re.MULTILINE)])
+
+
+@OF_PAGES
+def test_commands_of_a_page_name_what_there_is(page: Path) -> None:
+    """Command and options; arguments in capitals and dots stand for something."""
+    lines = [line.strip() for block in blocks(page) for line in block.splitlines()]
+    if page.stem == "CHANGELOG":  # what has been
+        lines = []
+    for line in lines:
+        line = line.partition(" > ")[0]
+        words = shlex.split(line, comments=True) if re.match(r"(chamberopt|python) ", line) else []
+        if words[:1] == ["python"] and words[1:2] != ["-m"]:
+            assert (ROOT / words[1]).is_file(), line
+        elif words[:2] == ["python", "-m"] and words[2].startswith(("benchmarks", "tests")):
+            assert (ROOT / f"{words[2].replace('.', '/')}.py").is_file(), line
+        elif words[:1] == ["chamberopt"] and "…" not in line and "[" not in line:
+            app.parse_args(words[1:], exit_on_error=False, print_error=False)
+
+
+@OF_PAGES
+def test_keys_in_a_page_are_keys_of_a_file(page: Path) -> None:
+    known = {name for model in FILES.values() for name, _ in every_key(model)}
+    text = page.read_text(encoding="utf-8")
+    for block in re.findall(r"^ *```toml\n(.*?)^ *```", text, re.DOTALL | re.MULTILINE):
+        for name in key_lines(block):
+            plain = re.sub(r"\.\d+\b", "", name)
+            assert plain in known or plain.startswith(NAMED), f"{name} is no key of a file"
+
+
+def test_every_key_says_what_it_means() -> None:
+    said = {name: meaning(one) for model in FILES.values() for name, one in every_key(model)}
+    assert len(said) > 200
+    assert [name for name, text in said.items() if not text] == []
+
+
+def test_the_gallery_has_every_picture() -> None:
+    gallery = (ROOT / "docs/gallery.md").read_text(encoding="utf-8")
+    pictures = [path.name for path in (ROOT / "docs/images").iterdir()]
+    assert sorted(re.findall(r"\(images/(.*?)\)", gallery)) == sorted(pictures)
+    # Each picture, or each group of pictures, stands below a command.
+    for part in re.split(r"^## ", gallery, flags=re.MULTILINE)[1:]:
+        assert re.match(r".*\n\n    (chamberopt|python) ", part)
 
 
 def make_quick(path: Path) -> None:

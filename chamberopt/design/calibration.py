@@ -78,7 +78,7 @@ class LawCalibration(FileTable):
     metal: str = Field(description="of the coupon, with its strengths")
     log_mean: Several[float] = list_field("3 numbers", "means of their logarithms")
     log_covariance: Several[Several[float]] = list_field("3 lists of 3 numbers", "of these")
-    misfit: Misfit
+    misfit: Misfit = Field(description="how well the law explains the measured profiles")
 
     def _problems(self) -> Iterator[Problem]:
         if len(self.log_mean) != len(LAW) or max(map(abs, self.log_mean)) > MAX_LOG:

@@ -4,9 +4,8 @@ A key's meaning is its description there; for a key that is a table, the table's
 """
 
 from collections.abc import Iterator, Mapping
-from typing import Annotated, Any, get_args, get_origin
+from typing import Annotated, get_args, get_origin
 
-from docutils import nodes
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
@@ -57,17 +56,11 @@ def every_key(model: type[BaseModel], prefix: str = "") -> Iterator[tuple[str, F
     """Yield the dotted name and the field of each key of a file, also of tables in tables."""
     for key, field in model.model_fields.items():
         yield prefix + key, field
-        if (table := _inner(field)) not in (None, Design):
+        table = _inner(field)
+        if table is not None and table is not Design:
             yield from every_key(table, f"{prefix}{key}.")
-
-
-def make_linkable(app: Any, tree: nodes.document) -> None:
-    """Let pages link to a key, as in [time](../reference/design.md#process-treatment_time_s)."""
-    found = app.env.metadata[app.env.current_document.docname]
-    slugs = found.setdefault("myst_slugs", {})
-    for node in tree.findall(nodes.inline):
-        for name in node.get("names", []):
-            slugs[name] = (0, node["ids"][0], node.astext())
+        for shape in SHAPES.values() if table is ChamberTable else ():
+            yield from ((f"{prefix}{key}.{own}", field) for own, field in _own_keys(shape).items())
 
 
 def _name_tables(model: type[BaseModel], name: str, names: dict[type[BaseModel], str]) -> None:
@@ -82,11 +75,15 @@ def _name_tables(model: type[BaseModel], name: str, names: dict[type[BaseModel],
 def _shapes(names: dict[type[BaseModel], str]) -> Iterator[str]:
     """Yield the lines of the keys that only chambers of one shape have."""
     for name, shape in SHAPES.items():
-        fields = shape.model_fields.items()
-        own = {key: one for key, one in fields if key not in ChamberTable.model_fields}
         title = f'[chamber] with shape = "{name}"'
-        yield from _table(shape, f"chamber-{name}", title, own, names)
+        yield from _table(shape, f"chamber-{name}", title, _own_keys(shape), names)
     yield f"\n{CUSTOM}\n"
+
+
+def _own_keys(shape: type[ChamberTable]) -> dict[str, FieldInfo]:
+    """Return the keys that not every chamber has."""
+    fields = shape.model_fields.items()
+    return {key: field for key, field in fields if key not in ChamberTable.model_fields}
 
 
 def _table(
@@ -100,7 +97,7 @@ def _table(
     for key, field in fields.items():
         anchor = f"{name}.{key}".strip(".").replace(".", "-")
         value, table = accepted_values(field), _inner(field)
-        if table not in (None, Design):
+        if table is not None and table is not Design:
             inside = names[table]
             value = f"{value}: [[{inside}]](#{inside.replace('.', '').lower()})"
         extra = field.json_schema_extra if isinstance(field.json_schema_extra, dict) else {}
