@@ -59,6 +59,9 @@ def _opening(design: Design, effort: Effort) -> list[str]:
     return [
         "# The analytical chamber beside the meshed one",
         "",
+        "For those who ask what triangles cost in accuracy. At the end you know how near a meshed "
+        "chamber is to exact surfaces.",
+        "",
         *_paragraph(
             "Written by `python benchmarks/analytic.py`; every figure on this page is from that "
             f"run. Intervals are 95 %, over {effort.replicas} replicas of {effort.seconds:g} s "

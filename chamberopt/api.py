@@ -500,7 +500,7 @@ def impacts(
     """Return every impact on the part of a result, a row for each, in a pandas DataFrame.
 
     A result stores no impacts: it is simulated again, and must be the same to the last bit. An
-    impact takes about 100 bytes. The columns are those of docs/how_to/export.md.
+    impact takes about 100 bytes. The columns are those of docs/reference/exports.md.
 
     Args:
         frame: coordinates: "part", as in the part's file and in its unit, or "chamber", in mm.
@@ -532,7 +532,7 @@ def fields(result: Result, *, frame: FrameName = "part") -> DataFrame:
     """Return the values on each triangle of a result's part, such as coverage, in a DataFrame.
 
     Its rows are the triangles of part.vtp, its columns the centre of each triangle and the values
-    of docs/how_to/export.md. Units and meanings are in `fields(result).attrs["columns"]`.
+    of docs/reference/exports.md. Units and meanings are in `fields(result).attrs["columns"]`.
 
     Args:
         frame: coordinates: "part", as in the part's file and in its unit, or "chamber", in mm.

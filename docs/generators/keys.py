@@ -20,7 +20,7 @@ from chamberopt.peening.measured import Measured
 from chamberopt.search.study.schema import Study
 
 HEAD = ["{.keys}", "| key | meaning | value | default |", "|---|---|---|---|"]
-CUSTOM = "A file of one's own (`shape = \"my_shape.py\"`) adds keys of its own."
+CUSTOM = 'A file of one\'s own (`shape = "my_shape.py"`) adds keys of its own.'
 
 
 def of_file(model: type[BaseModel]) -> str:

@@ -6,7 +6,7 @@ DOCS = Path(__file__).parents[1]
 # Each kind of page is a folder of docs/. Pages that are not named follow in alphabetical order.
 KINDS = {
     "tutorials": ("Tutorials", ["tutorial", "peening_examples"]),
-    "how_to": ("How-to guides", ["page", "parts", "chambers", "setups", "search"]),
+    "how_to": ("How-to guides", ["propose", "page", "parts", "chambers", "setups", "search"]),
     "reference": ("Reference", ["commands", "design", "study", "shop", "measurements", "machine"]),
     "explanation": ("Explanation", ["physics", "peening", "accuracy", "validation"]),
 }
@@ -23,13 +23,11 @@ def section() -> str:
     lists = []
     for folder, (caption, first) in KINDS.items():
         names = sorted(path.stem for path in (DOCS / folder).glob("*.md"))
-        names = [*first, *(name for name in names if name not in first)]
+        names = sorted(names, key=lambda name: first.index(name) if name in first else len(first))
         lists.append(_toctree(caption, [f"{folder}/{name}" for name in names]))
     about = [f"{title} <{page}>" for title, page in PROJECT.items()]
     return "\n".join([*lists, _toctree("The project", about)])
 
 
 def _toctree(caption: str, entries: list[str]) -> str:
-    return "\n".join(
-        ["```{toctree}", ":hidden:", f":caption: {caption}", "", *entries, "```", ""]
-    )
+    return "\n".join(["```{toctree}", ":hidden:", f":caption: {caption}", "", *entries, "```", ""])

@@ -148,7 +148,9 @@ def test_a_damaged_file_is_read_or_refused_in_one_line(tmp_path: Path, name: str
 
 
 def test_the_table_in_the_docs_lists_every_format() -> None:
-    table = (Path(__file__).parents[4] / "docs" / "how_to" / "parts.md").read_text(encoding="utf-8")
+    table = (Path(__file__).parents[4] / "docs" / "reference" / "part_files.md").read_text(
+        encoding="utf-8"
+    )
     for one in MESH_FORMATS:
         for suffix in one.suffixes:
             assert f"`{suffix}`" in table, suffix
