@@ -29,7 +29,7 @@ def of_file(model: type[BaseModel]) -> str:
     _name_tables(model, "", names)
     lines: list[str] = []
     for table, name in names.items():
-        lines += _table(table, name, name and f"[{name}]" or "The file", table.model_fields, names)
+        lines += _table(table, name, f"[{name}]" if name else "The file", table.model_fields, names)
         if table is ChamberTable:
             lines += _shapes(names)
     return "\n".join(lines)
