@@ -40,7 +40,9 @@ html_static_path = ["static"]
 templates_path = ["static"]
 html_css_files = ["site.css"]
 html_copy_source = False
+html_show_copyright = False
 html_show_sphinx = False
+html_search_scorer = "docs/static/scorer.js"
 
 # What is made from the program stands at the end of these pages.
 MADE = {
