@@ -37,7 +37,7 @@ def of_file(model: type[BaseModel]) -> str:
 
 PAGES = {
     "docs/reference/design": Design,
-    "docs/reference/study": Study,
+    "docs/reference/study_file": Study,
     "docs/reference/shop": Shop,
     "docs/reference/measurements": Measured,
     "docs/reference/machine": Calibration,

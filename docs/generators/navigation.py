@@ -6,9 +6,9 @@ DOCS = Path(__file__).parents[1]
 # Each kind of page is a folder of docs/. Pages that are not named follow in alphabetical order.
 KINDS = {
     "tutorials": ("Tutorials", ["tutorial", "peening_examples"]),
-    "how_to": ("How-to guides", ["propose", "page", "parts", "chambers", "setups", "search"]),
-    "reference": ("Reference", ["commands", "design", "study", "shop", "measurements", "machine"]),
-    "explanation": ("Explanation", ["physics", "peening", "accuracy", "validation"]),
+    "how_to": ("How-to guides", ["propose", "page", "parts", "chambers", "setups", "study"]),
+    "reference": ("Reference", ["commands", "design", "study_file", "shop", "measurements", "machine"]),
+    "explanation": ("Explanation", ["proposal", "peening", "accuracy", "validation"]),
 }
 PROJECT = {
     "What the program can do": "../README",
