@@ -13,13 +13,18 @@ from pydantic_core import PydanticUndefined
 from chamberopt.chamber.propose.shop import Shop
 from chamberopt.common.toml_errors import accepted_values, table_of
 from chamberopt.design.calibration import Calibration
-from chamberopt.design.design import Design
+from chamberopt.design.design import AnyShape, Design
 from chamberopt.design.shapes import SHAPES
 from chamberopt.design.shapes.base import ChamberTable
 from chamberopt.peening.measured import Measured
 from chamberopt.search.study.schema import Study
 
 HEAD = ["{.keys}", "| key | meaning | value | default |", "|---|---|---|---|"]
+# Files of their own, of which another file gives the path.
+OTHER_FILES = {
+    Design: "[keys of a design](design.md)",
+    Calibration: "[keys of a machine](machine.md)",
+}
 CUSTOM = 'A file of one\'s own (`shape = "my_shape.py"`) adds keys of its own.'
 
 
@@ -29,7 +34,10 @@ def of_file(model: type[BaseModel]) -> str:
     _name_tables(model, "", names)
     lines: list[str] = []
     for table, name in names.items():
-        lines += _table(table, name, f"[{name}]" if name else "The file", table.model_fields, names)
+        fields = dict(table.model_fields)
+        if table is ChamberTable:
+            fields["shape"] = AnyShape.model_fields["shape"]  # which lists them
+        lines += _table(table, name, f"[{name}]" if name else "The file", fields, names)
         if table is ChamberTable:
             lines += _shapes(names)
     return "\n".join(lines)
@@ -57,7 +65,7 @@ def every_key(model: type[BaseModel], prefix: str = "") -> Iterator[tuple[str, F
     for key, field in model.model_fields.items():
         yield prefix + key, field
         table = _inner(field)
-        if table is not None and table is not Design:
+        if table is not None and table not in OTHER_FILES:
             yield from every_key(table, f"{prefix}{key}.")
         for shape in SHAPES.values() if table is ChamberTable else ():
             yield from ((f"{prefix}{key}.{own}", field) for own, field in _own_keys(shape).items())
@@ -68,7 +76,7 @@ def _name_tables(model: type[BaseModel], name: str, names: dict[type[BaseModel],
     names[model] = name
     for key, field in model.model_fields.items():
         table = _inner(field)
-        if table is not None and table is not Design and table not in names:
+        if table is not None and table not in (*OTHER_FILES, *names):
             _name_tables(table, f"{name}.{key}".strip("."), names)
 
 
@@ -97,14 +105,28 @@ def _table(
     for key, field in fields.items():
         anchor = f"{name}.{key}".strip(".").replace(".", "-")
         value, table = accepted_values(field), _inner(field)
-        if table is not None and table is not Design:
-            inside = names[table]
-            value = f"{value}: [[{inside}]](#{inside.replace('.', '').lower()})"
+        if table in OTHER_FILES:
+            value += f" ({OTHER_FILES[table]})"
+        elif table is not None:
+            value = _linked(value, names[table], f"{name}.{key}".strip("."))
         extra = field.json_schema_extra if isinstance(field.json_schema_extra, dict) else {}
         unit = f" {extra['unit']}" if extra.get("unit") else ""
         cells = [f"[`{key}`]{{#{anchor}}}", meaning(field), value + unit, _default(field)]
         yield "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
     yield ""
+
+
+def _linked(value: str, section: str, name: str) -> str:
+    """Return what a key that is a table accepts, with a link to the section of this table.
+
+    Args:
+        section: name under which the table has its section.
+        name: name of the key, which is another if it holds a table like that.
+    """
+    target = f"(#{section.replace('.', '').lower()})"
+    if f"[[{section}]]" in value:
+        return value.replace(f"[[{section}]]", f"[\\[\\[{section}\\]\\]]{target}")
+    return f"{value}: {'' if section == name else 'as '}[\\[{section}\\]]{target}"
 
 
 def _inner(field: FieldInfo) -> type[BaseModel] | None:

@@ -7,7 +7,10 @@ DOCS = Path(__file__).parents[1]
 KINDS = {
     "tutorials": ("Tutorials", ["tutorial", "peening_examples"]),
     "how_to": ("How-to guides", ["propose", "page", "parts", "chambers", "setups", "study"]),
-    "reference": ("Reference", ["commands", "design", "study_file", "shop", "measurements", "machine"]),
+    "reference": (
+        "Reference",
+        ["commands", "design", "study_file", "shop", "measurements"],
+    ),
     "explanation": ("Explanation", ["proposal", "peening", "accuracy", "validation"]),
 }
 PROJECT = {

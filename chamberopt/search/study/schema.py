@@ -192,7 +192,10 @@ class Study(FileTable, ShownInNotebook):
 
     RENAMED: ClassVar[dict[str, str]] = {"draft": "search_accuracy"}  # former names of keys
 
-    design: Design = Field(description="design that the search starts from")
+    design: Design = Field(
+        description="design that the search starts from",
+        json_schema_extra={"form": "the path of a design, relative to this file"},
+    )
     vary: dict[str, Vary] = Field(
         min_length=1,
         max_length=MAX_NAMES,
