@@ -39,7 +39,8 @@ def inspect(
     quantity
         coverage, impacts, speed, p90-speed, angle, dent, energy, interval, strength (the
         peening strength S of a place), almen (its intensity, if the design is calibrated),
-        saturation (its time), depth (of compression) or zones.
+        saturation (its time), moved (how far the surface is from the file's facets), zones, depth
+        (of compression) or stress (at the surface, if the design has [stress]).
     time_s
         Show coverage, impacts and energy after this time instead of the treatment time.
     below
