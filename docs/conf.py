@@ -37,12 +37,14 @@ python_use_unqualified_type_names = True
 html_theme = "furo"  # light and dark, narrow and wide
 html_title = "chamberopt"
 html_static_path = ["static"]
-templates_path = ["static"]
+templates_path = ["templates"]
 html_css_files = ["site.css"]
 html_copy_source = False
+html_domain_indices = False
+html_use_index = False
 html_show_copyright = False
 html_show_sphinx = False
-html_search_scorer = "docs/static/scorer.js"
+html_search_scorer = "docs/templates/scorer.js"
 
 # What is made from the program stands at the end of these pages.
 MADE = {

@@ -7,10 +7,7 @@ DOCS = Path(__file__).parents[1]
 KINDS = {
     "tutorials": ("Tutorials", ["tutorial", "peening_examples"]),
     "how_to": ("How-to guides", ["propose", "page", "parts", "chambers", "setups", "study"]),
-    "reference": (
-        "Reference",
-        ["commands", "design", "study_file", "shop", "measurements"],
-    ),
+    "reference": ("Reference", ["commands", "design", "study_file", "shop", "measurements"]),
     "explanation": ("Explanation", ["proposal", "peening", "accuracy", "validation"]),
 }
 PROJECT = {
@@ -33,4 +30,16 @@ def section() -> str:
 
 
 def _toctree(caption: str, entries: list[str]) -> str:
-    return "\n".join(["```{toctree}", ":hidden:", f":caption: {caption}", "", *entries, "```", ""])
+    return "\n".join(
+        [
+            "```{toctree}",
+            ":hidden:",
+            ":titlesonly:",
+            ":maxdepth: 1",
+            f":caption: {caption}",
+            "",
+            *entries,
+            "```",
+            "",
+        ]
+    )
