@@ -5,6 +5,7 @@ Added while it is built are the keys of files, the commands, the names of Python
 pages beside each page. Nothing is fetched, neither here nor by a page in a browser.
 """
 
+import re
 import sys
 from functools import partial
 from pathlib import Path
@@ -54,8 +55,13 @@ MADE = {
 }
 
 
-def add_what_is_made(app, page: str, source: list[str]) -> None:
-    """Add the text that is made from the program to a page."""
+# A link whose label is the file's name has the page's title on the site: [page.md](how_to/page.md)
+NAMED_BY_FILE = re.compile(r"\[[\w/.]*?(\w+\.md)\](?=\([\w/.]*?\1(#[^)]*)?\))")
+
+
+def prepare(app, page: str, source: list[str]) -> None:
+    """Add the text that is made from the program to a page, and take file names out of links."""
+    source[0] = NAMED_BY_FILE.sub("[]", source[0])
     if page in MADE:
         source[0] += "\n\n" + MADE[page]()
 
@@ -70,7 +76,7 @@ def make_keys_linkable(app, tree: nodes.document) -> None:
 
 def setup(app) -> None:
     """Called by Sphinx before it reads the pages."""
-    app.connect("source-read", add_what_is_made)
+    app.connect("source-read", prepare)
     app.connect("doctree-read", make_keys_linkable)
     app.connect("autodoc-process-docstring", docstrings.adapt, priority=400)  # before napoleon
     app.connect("autodoc-process-signature", docstrings.shorten)
