@@ -1,31 +1,39 @@
 """Docstrings of this repository in the form that napoleon reads.
 
 The house form leaves out what a reader of the code does not need: the heading of the attributes of
-a record, and the marks of a drawing or an example, which are indented by four more columns.
+a record, and the mark of a drawing or an example, which is indented by four more columns.
 """
 
 import re
+from itertools import groupby
 from typing import Any
 
 from pydantic import BaseModel
 
 ATTRIBUTE = re.compile(r"\w+(, \w+)*: ")
+SECTION = re.compile(r"(Args|Returns|Raises|Yields|Attributes|Notes?|Sources?|Examples?):$")
+LITERAL = "::"  # what follows is shown as it is
 
 
 def adapt(app: Any, what: str, name: str, of: object, options: Any, lines: list[str]) -> None:
     """Change the lines of a docstring in place: the handler of autodoc-process-docstring."""
     changed: list[str] = []
-    is_paragraph = True  # the next line begins a paragraph
-    in_attributes = False
-    for line in lines:
-        if is_paragraph and line.startswith("    ") and not _heads_section(changed):
-            changed += ["::", ""]
-        if is_paragraph:
-            in_attributes = what == "class" and bool(ATTRIBUTE.match(line))
-            if in_attributes:
-                changed.append("Attributes:")
-        changed.append(f"    {line}" if in_attributes and line.strip() else line)
-        is_paragraph = not line.strip() and not (changed and _in_drawing(changed))
+    before = ""  # the last line that is not indented
+    for is_blank, group in groupby(lines, lambda line: not line.strip()):
+        paragraph = list(group)
+        if is_blank:
+            changed += paragraph
+            continue
+        if paragraph[0].startswith("    "):
+            if before != LITERAL and not SECTION.match(before):
+                changed += [LITERAL, ""]
+                before = LITERAL
+        elif what == "class" and ATTRIBUTE.match(paragraph[0]):
+            changed.append("Attributes:")
+            paragraph = [f"    {line}" for line in paragraph]
+        else:
+            before = next(line for line in reversed(paragraph) if not line.startswith(" "))
+        changed += paragraph
     lines[:] = changed
 
 
@@ -34,18 +42,3 @@ def shorten(app: Any, what: str, name: str, of: object, options: Any, *signature
     if what == "class" and isinstance(of, type) and issubclass(of, BaseModel):
         return "", None
     return None
-
-
-def _heads_section(lines: list[str]) -> bool:
-    """True if what comes before is the heading of a section such as Args, or inside one."""
-    before = next((line for line in reversed(lines) if line and not line.startswith(" ")), "")
-    return before.endswith(":") and before[:-1] in (
-        "Args", "Returns", "Raises", "Yields", "Attributes", "Source", "Sources", "Example",
-        "Examples", "Note", ":",
-    )  # fmt: skip
-
-
-def _in_drawing(lines: list[str]) -> bool:
-    """True if the last paragraph is one of the indented blocks that were marked already."""
-    before = next((line for line in reversed(lines) if line and not line.startswith(" ")), "")
-    return before == "::"
