@@ -32,6 +32,7 @@ autodoc_typehints_format = "short"
 autodoc_default_options = {"members": True, "exclude-members": "model_config"}
 napoleon_numpy_docstring = False
 napoleon_use_ivar = True
+highlight_language = "none"
 toc_object_entries_show_parents = "hide"
 python_use_unqualified_type_names = True
 
