@@ -1,0 +1,1 @@
+"""Tests of benchmarks/ whose tables an auditor reads."""
