@@ -4,6 +4,8 @@
 amplitude_pv_um = 4                      # 4 µm more or less than given
 "shot.mass_g" = ["-10 %", "0 %"]         # the loss until shot is added
 "process.treatment_time_s" = "2 %"
+
+A design without the table is simulated over the usual tolerance of the amplitude (USUAL).
 """
 
 from __future__ import annotations
@@ -24,6 +26,11 @@ from chamberopt.common.toml_fields import allowed_range
 SHORT_NAMES = {key: f"sonotrode.{key}" for key in ("amplitude_um", "amplitude_pv_um")}
 # A design gives one of the two. Peak to valley is twice zero-to-peak.
 TWINS = {"amplitude_um": ("amplitude_pv_um", 2.0), "amplitude_pv_um": ("amplitude_um", 0.5)}
+# SAE AMS 2580A, Table 1, sonotrode vibration amplitude: 0.00016 in (0.004 mm) more or less. Read as
+# SONATS quotes it, who says that it is peak to valley ("Importance of key parameters", on the pages
+# of sonats-et.com). The standard itself was not read, and no other tolerance of it.
+USUAL = {"amplitude_pv_um": 4.0}
+USUAL_IN_WORDS = "± 4 µm peak to valley (SAE AMS 2580A, Table 1, as SONATS quotes it)"
 FORM = 'a number, a share such as "2 %", or [low, high] of these, such as ["-10 %", "0 %"]'
 
 

@@ -17,7 +17,7 @@ from chamberopt.design.calibration import why_no_intensity
 from chamberopt.design.fixture import LEAST_GAP_MM, TIGHT_GAP, WIDEST_GAP
 from chamberopt.design.intensity import PredictedIntensity
 from chamberopt.design.materials import alloys, find
-from chamberopt.design.tolerances import tolerance_box
+from chamberopt.design.tolerances import USUAL, USUAL_IN_WORDS, tolerance_box
 from chamberopt.documents.answer import answer, answer_lines
 from chamberopt.documents.coverage import figures
 from chamberopt.documents.document import Block, Document, Section, Sentence, Table
@@ -166,8 +166,17 @@ def _slow_time(result: Result) -> Iterator[str]:
 MOST_ROWS = 4  # sizes of shot, or further sonotrodes; the report has all of them
 MOST_KEYS = 8  # numbers of the chamber
 FULL = 0.98  # mean coverage from which on the target counts as covered
-DIGEST = 12  # characters of the result's digest in the title block
-TO_FILL = ("drawing no.", "revision", "drawn by, date", "checked by, date", "set up by, date")
+DIGEST = 12  # characters of a digest in the title block
+REVISION = "revision"
+TO_FILL = ("drawing no.", REVISION, "drawn by, date", "checked by, date", "set up by, date")
+DESIGN_OF = {
+    "study": "best.toml",
+    "simulation": "design.toml",
+}  # file of the sheet's design, by kind
+REQUALIFY = (
+    "Requalify after: another sonotrode, chamber, holder, lot of parts or balls; a number out of "
+    "tolerance; a program version that moved figures."
+)
 UNITS = {"mm": "mm", "deg": "degrees", "um": "µm"}
 EXPECTED = (
     "mean_coverage",
@@ -199,8 +208,10 @@ class AsBuilt(NamedTuple):
     openings: Sequence[Opening] = ()  # through which the part goes out
 
 
-def process_sheet(result: Result, built: AsBuilt) -> Document:
+def process_sheet(result: Result, built: AsBuilt, revision: str = "") -> Document:
     """Return the process sheet of a result as a document.
+
+    Without a revision its field is left to be filled in.
 
     Its sections are the first page, with sentences of the kind "warning" for the top; tables that
     may go on further pages; and the title block, where a name without a value is to be filled in.
@@ -212,9 +223,11 @@ def process_sheet(result: Result, built: AsBuilt) -> Document:
     red = [
         Sentence(text, "warning") for text in (*alarms(result), *_wide_face(result, built.face_mm))
     ]
-    content: list[Block] = [*red, *setting_tables(result, built), checks, *calibrated]
+    requalify = Sentence(REQUALIFY)
+    content: list[Block] = [*red, *setting_tables(result, built), checks, *calibrated, requalify]
     name = f"{result.design.part.mesh_path.name}: {result.folder.resolve().name}"
-    block = Table("", (), [*title_block(result, name).items()], numbers=False)
+    fields = title_block(result, name) | ({REVISION: revision} if revision else {})
+    block = Table("", (), [*fields.items()], numbers=False)
     return Document(
         name,
         f"{SHEETS_OF[record.kind]}; simulated {record.created[:10]}",
@@ -233,11 +246,16 @@ def title_block(result: Result, name: str) -> dict[str, str]:
     record = result.record
     return {
         "design": name,
-        "made with": f"chamberopt {record.versions['chamberopt']}",
-        "simulated": record.created[:10],
+        "chamberopt, simulated": f"{record.versions['chamberopt']}, {record.created[:10]}",
+        "design, sha256": design_sha256(result)[:DIGEST],
         "result, sha256": record.sha256[:DIGEST],
         **dict.fromkeys(TO_FILL, ""),
     }
+
+
+def design_sha256(result: Result) -> str:
+    """Return the digest of the file of the sheet's design in the results folder."""
+    return result.record.files.get(DESIGN_OF[result.record.kind], "")
 
 
 def chamber_limits(result: Result) -> dict[str, tuple[float, float, float]]:
@@ -502,8 +520,10 @@ def _tolerances(result: Result) -> Iterator[Row]:
     for name, (low, high) in box.items():
         yield name, f"{plain(low)} to {plain(high)}, as designed {plain(result.design.value(name))}"
     found = result.record.tolerances
-    if not box:
-        yield "", "The design has no [tolerances]: how far its numbers may be off is not known."
+    if result.design.tolerances is None:
+        low, high = (_peak_to_valley(result) + sign * USUAL["amplitude_pv_um"] for sign in (-1, 1))
+        usual = f"{plain(low)} to {plain(high)} µm, {USUAL_IN_WORDS}"
+        yield "", f"Amplitude: {usual}. The design has no [tolerances]: others are not known."
     elif found is None:
         yield "", "What they cost was not simulated: chamberopt simulate --tolerances tells it."
     else:
@@ -523,9 +543,8 @@ def _warnings(result: Result) -> Iterator[Row]:
 
 def _identity(result: Result) -> Iterator[Row]:
     record = result.record
-    yield "program", f"chamberopt {record.versions['chamberopt']}"
-    yield "simulated", f"{record.created[:10]}, {record.replicas} replicas"
-    yield "seed", str(result.seeds[0])
+    program = f"chamberopt {record.versions['chamberopt']}, {record.created[:10]}"
+    yield "simulated by", f"{program}, {record.replicas} replicas, seed {result.seeds[0]}"
     yield "part, sha256", record.part_sha256
     if record.shape_sha256:
         yield "shape, sha256", record.shape_sha256
@@ -538,9 +557,14 @@ def first_checks(result: Result) -> Table:
     return Table("", ("Measure first", "expected", "measured"), rows, numbers=False)
 
 
+def _peak_to_valley(result: Result) -> float:
+    """Return the amplitude of the sonotrode, peak to valley [µm]."""
+    return 2.0 * result.design.sonotrode.zero_to_peak_um
+
+
 def _checks(result: Result) -> Iterator[Row]:
     design, calibration = result.design, result.design.calibration
-    wanted = 2.0 * design.sonotrode.zero_to_peak_um
+    wanted = _peak_to_valley(result)
     expected = f"{plain(wanted)} µm peak to valley"
     if calibration is not None:
         factor, sd = calibration.factor("amplitude"), 1.96 * calibration.log_sd("amplitude")

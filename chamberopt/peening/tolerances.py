@@ -43,7 +43,7 @@ from chamberopt.common.estimate import (
     paired_difference,
 )
 from chamberopt.coverage.metrics import find_metric
-from chamberopt.design.tolerances import require_tolerances, tolerance_box
+from chamberopt.design.tolerances import USUAL, require_tolerances, tolerance_box
 from chamberopt.peening.calibration_errors import moved_designs, with_open_errors
 from chamberopt.peening.responses import (
     back_from_scale,
@@ -101,15 +101,21 @@ class ToleratedNumber:
 def plan_tolerances(design: Design) -> tuple[ToleratedNumber, ...]:
     """Return the numbers of a design that have tolerances, each with the change that is simulated.
 
-    Raises InputError if no number has a tolerance, or if the design cannot have the least or the
-    largest value that a tolerance allows.
+    Raises InputError if the table of tolerances is empty, or if the design cannot have the least
+    or the largest value that a tolerance allows.
     """
+    design = with_usual_tolerances(design)
     box = tolerance_box(design)
     if not box:
-        remedy = 'add a table [tolerances], such as "shot.mass_g" = "2 %"'
-        raise InputError(f"tolerances: the design has none; {remedy}")
+        remedy = 'give one, such as "shot.mass_g" = "2 %", or leave the table out'
+        raise InputError(f"tolerances: the table is empty; {remedy}")
     require_tolerances(design)
     return tuple(_planned(design, name, *ends) for name, ends in box.items())
+
+
+def with_usual_tolerances(design: Design) -> Design:
+    """Return the design with the usual tolerance of its amplitude if it has no [tolerances]."""
+    return design.changed({"tolerances": USUAL}) if design.tolerances is None else design
 
 
 def effective_move(design: Design, number: ToleratedNumber) -> float:

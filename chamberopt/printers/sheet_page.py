@@ -14,6 +14,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from chamberopt.chamber.checks.openings import find_openings
+from chamberopt.common.errors import InputError
 from chamberopt.common.files import claim_file, write_bytes
 from chamberopt.documents.document import Block, Document, Section, Sentence, Table
 from chamberopt.documents.sheet import AsBuilt, chamber_limits, process_sheet
@@ -51,6 +52,7 @@ MM_PER_PT = 25.4 / 72.0
 LEADING = 1.25  # height of a line over the size of its letters
 NAMES = 0.52  # share of a column's width that names may take at most
 MOST_LINES = 4  # lines of a text; a longer text ends in an ellipsis
+MOST_REVISION = 20  # characters
 ALL_LINES = 40  # the same where a text must be whole, and may go on further pages
 
 
@@ -217,23 +219,31 @@ def _font(bold: bool) -> FontProperties:
     return FontProperties(size=1.0, weight="bold" if bold else "normal")
 
 
-def write_sheet(result: str | Path, path: str | Path | None = None) -> tuple[Path, Document]:
+def write_sheet(
+    result: str | Path, path: str | Path | None = None, revision: str = ""
+) -> tuple[Path, Document]:
     """Write the process sheet of a results folder.
 
     Args:
         path: path of the page, by default RESULT/process_sheet.pdf.
+        revision: for the title block, at most MOST_REVISION characters; empty: room to write it.
 
     Returns:
         Path of the page, and the document on it.
 
     Raises:
-        InputError: the folder is no finished result, or the path holds anything but a sheet.
+        InputError: the folder is no finished result, the path holds anything but a sheet, or the
+            revision is too long or cannot be printed.
     """
+    if len(revision) > MOST_REVISION or not revision.isprintable():
+        allowed = f"allowed: at most {MOST_REVISION} characters that can be printed"
+        raise InputError(f"revision: given {revision!r}; {allowed}")
     loaded = load_result(result)
     path = require_free_page(loaded.folder / SHEET if path is None else path, SHEET_FILE)
     with claim_file(path):
         chamber = load_chamber(loaded)
-        sheet = process_sheet(loaded, AsBuilt(face_size_mm(chamber), find_openings(chamber)))
+        built = AsBuilt(face_size_mm(chamber), find_openings(chamber))
+        sheet = process_sheet(loaded, built, revision)
         pages = draw_sheet(sheet, chamber, chamber_limits(loaded), loaded.design.sonotrode.blocks)
         _save(path, pages, sheet.name)
     return path, sheet

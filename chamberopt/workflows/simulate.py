@@ -18,7 +18,7 @@ from chamberopt.coverage.field.memory import PROCESS, evaluation_bytes, how_many
 from chamberopt.design.ranges import variants
 from chamberopt.peening.calibration_errors import evaluate_calibrated
 from chamberopt.peening.range_result import Spreads
-from chamberopt.peening.tolerances import simulate_tolerances
+from chamberopt.peening.tolerances import simulate_tolerances, with_usual_tolerances
 from chamberopt.simulation.effect_pilot import with_effects_resolved
 from chamberopt.simulation.effort import Effort
 from chamberopt.simulation.evaluate import ReplicaPlan
@@ -162,6 +162,8 @@ def simulate_design(
             too much memory.
     """
     warnings = None
+    if settings.tolerances:
+        design = with_usual_tolerances(design)
     if settings.analytic:
         design.require_one_step("an exact cavity in place of the mesh")
     if chamber is None:

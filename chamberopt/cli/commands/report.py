@@ -18,7 +18,15 @@ Page = Annotated[Path | None, Parameter(name="--out", help=_PAGE)]
 
 
 @app.command
-def report(result: Path, /, *, sheet: bool = False, json: Json = False, out: Page = None) -> None:
+def report(
+    result: Path,
+    /,
+    *,
+    sheet: bool = False,
+    revision: str = "",
+    json: Json = False,
+    out: Page = None,
+) -> None:
     """Write a result as one HTML page: the answer with its uncertainty, the chamber in 3D, and how
     it was found.
 
@@ -31,14 +39,22 @@ def report(result: Path, /, *, sheet: bool = False, json: Json = False, out: Pag
     sheet
         Write a process sheet instead: A4 (.pdf) to print, with drawing, settings, what to
         expect and what to measure first.
+    revision
+        Revision in the title block of the process sheet; without it there is room to write one.
     """
+    from chamberopt.common.errors import InputError
     from chamberopt.common.progress import step
     from chamberopt.printers.json_values import json_values
     from chamberopt.printers.report_page import write_report
     from chamberopt.printers.sheet_page import write_sheet
 
+    if revision and not sheet:
+        raise InputError("--revision: it is printed on the process sheet; add --sheet")
     with step(f"writing the {'sheet' if sheet else 'page'}"):
-        path, document = (write_sheet if sheet else write_report)(result, out)
+        if sheet:
+            path, document = write_sheet(result, out, revision)
+        else:
+            path, document = write_report(result, out)
     if json:
         print_json({**json_values(document), "sheet" if sheet else "report": str(path)})
         return

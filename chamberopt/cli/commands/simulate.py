@@ -44,7 +44,7 @@ def simulate(
         Use the exact cylinder, box or prism instead of its triangles, if the chamber is one.
     tolerances
         Also simulate what the design's [tolerances] do: a further run for each, and one for the
-        worst corner.
+        worst corner. Without the table the amplitude has the usual tolerance, 4 µm peak to valley.
     ranges
         Also simulate the ends of what is not calibrated (friction, v0, slopes of faces), in as many
         replicas again, and say how far the figures may be off by it.
@@ -52,6 +52,7 @@ def simulate(
     from chamberopt.cli.teller import TerminalTeller
     from chamberopt.common.executor import open_executor
     from chamberopt.design.load import load_design
+    from chamberopt.design.tolerances import USUAL_IN_WORDS
     from chamberopt.documents.terminal_lines import result_end
     from chamberopt.peening.tolerances import plan_tolerances
     from chamberopt.workflows.simulate import SimulationSettings, simulate_design
@@ -61,6 +62,9 @@ def simulate(
         candidate = candidate.changed(values)
     if tolerances:
         plan_tolerances(candidate)  # reports wrong tolerances before the work begins
+        if candidate.tolerances is None:
+            taken = f"the usual tolerance of the amplitude is taken: {USUAL_IN_WORDS}"
+            console.print_remarks([f"the design has no [tolerances]; {taken}"])
     elif candidate.tolerances:
         console.print_remarks(["the design has [tolerances]; --tolerances simulates them too"])
     with (

@@ -13,7 +13,12 @@ from chamberopt.common.executor import SerialExecutor
 from chamberopt.design.load import Design
 from chamberopt.peening.responses import combine, on_scale, scale_of
 from chamberopt.peening.tolerance_result import EffectEnds, ToleranceResult
-from chamberopt.peening.tolerances import find_tolerances, plan_tolerances, simulate_tolerances
+from chamberopt.peening.tolerances import (
+    find_tolerances,
+    plan_tolerances,
+    simulate_tolerances,
+    with_usual_tolerances,
+)
 from chamberopt.simulation.evaluate import evaluate
 from chamberopt.simulation.evaluation import Evaluation
 from chamberopt.simulation.variations import RunsProgress, Variations
@@ -217,9 +222,26 @@ def test_a_step_that_the_design_cannot_have_is_made_smaller() -> None:
     assert number.changed.value("chamber.sonotrode_distance_mm") < 15.0
 
 
-def test_a_design_without_tolerances_is_refused() -> None:
-    with pytest.raises(InputError, match=r"tolerances: the design has none; add a table"):
-        plan_tolerances(PLATE)
+def test_a_design_without_tolerances_has_the_usual_one() -> None:
+    """4 µm peak to valley, given in either way: 25 ± 2 µm zero to peak, 50 ± 4 peak to valley."""
+    (number,) = plan_tolerances(PLATE)
+    assert (number.name, number.low, number.high) == ("sonotrode.amplitude_um", 23.0, 27.0)
+    twice = {"sonotrode.amplitude_um": None, "sonotrode.amplitude_pv_um": 50.0}
+    (number,) = plan_tolerances(PLATE.changed(twice))
+    assert (number.name, number.low, number.high) == ("sonotrode.amplitude_pv_um", 46.0, 54.0)
+    assert with_usual_tolerances(tolerated({"shot.mass_g": "2 %"})).tolerances.keys() == {
+        "shot.mass_g"
+    }
+
+
+def test_an_empty_table_of_tolerances_is_refused() -> None:
+    with pytest.raises(InputError, match=r"tolerances: the table is empty; give one"):
+        plan_tolerances(tolerated({}))
+
+
+def test_a_face_that_hardly_moves_cannot_have_the_usual_tolerance() -> None:
+    with pytest.raises(InputError, match=r"tolerances\.amplitude_pv_um"):
+        plan_tolerances(PLATE.changed({"sonotrode.amplitude_um": 1.0}))
 
 
 def test_a_short_real_run() -> None:

@@ -1,5 +1,6 @@
 """The process sheet is on A4 pages, says what the result holds, and nothing on it overlaps."""
 
+import hashlib
 import math
 import re
 from dataclasses import replace
@@ -19,6 +20,7 @@ from chamberopt.design.shape_surface import TAG_SONOTRODE
 from chamberopt.documents.coverage import figures
 from chamberopt.documents.document import Document, Section, Sentence, Table
 from chamberopt.documents.sheet import (
+    REQUALIFY,
     AsBuilt,
     alarms,
     chamber_limits,
@@ -34,6 +36,7 @@ from chamberopt.pictures.part_drawing import draw_chamber
 from chamberopt.pictures.section import cut, face_size_mm, inside, section_planes
 from chamberopt.printers.sheet_page import (
     HEIGHT,
+    MARGIN,
     WIDTH,
     _save,
     broken,
@@ -81,7 +84,8 @@ def test_its_figures_are_those_of_the_report(folder: Path) -> None:
     assert rows["Shot"]["balls"] == "30 of Ø 3 mm"
     assert rows["Chamber"]["diameter"] == "50 mm"
     assert rows["Made with"]["part, sha256"] == load_result(folder).record.part_sha256
-    assert "how far its numbers may be off is not known" in rows["Tolerances"][""]
+    assert "Amplitude: 46 to 54 µm, ± 4 µm peak to valley" in rows["Tolerances"][""]
+    assert "others are not known" in rows["Tolerances"][""]
     assert "was not checked" in rows["Warnings"][""]
     assert "Not in these figures" not in rows
     result = load_result(folder)
@@ -322,6 +326,30 @@ def test_it_is_one_a4_page_and_replaces_only_an_older_one(
     assert precious.read_bytes() == b"%PDF-1.4 of somebody"
     with pytest.raises(InputError, match=r"one \.pdf file"):
         write_sheet(folder, tmp_path / "sheet.html")
+
+
+def test_an_auditor_finds_version_digests_revision_and_what_requalifies(
+    folder: Path, capsys: pytest.CaptureFixture
+) -> None:
+    result = load_result(folder)
+    sheet = process_sheet(result, AsBuilt((50.0,)), revision="B")
+    fields = dict(sheet.sections[-1].content[0].rows)
+    design = hashlib.sha256((folder / "design.toml").read_bytes()).hexdigest()
+    assert fields["chamberopt, simulated"].startswith(f"{result.record.versions['chamberopt']}, ")
+    assert fields["design, sha256"] == design[:12]
+    assert fields["result, sha256"] == result.record.sha256[:12]
+    assert (fields["revision"], fields["drawing no."]) == ("B", "")
+    assert title_block(result, "a name")["revision"] == ""
+    assert sheet.sections[0].content[-1] == Sentence(REQUALIFY)
+    assert len(broken(REQUALIFY, WIDTH - 2 * MARGIN, 7.0)) == 1  # one line
+    for given, told in (
+        (["--revision", "B"], "--revision: it is printed on the process sheet; add --sheet"),
+        (["--sheet", "--revision", 21 * "x"], "revision: given "),
+        (["--sheet", "--revision", "a\nb"], "at most 20 characters that can be printed"),
+    ):
+        assert main(["report", str(folder), *given]) == 2
+        assert told in capsys.readouterr().err
+    assert not (folder / "process_sheet.pdf").exists()
 
 
 def test_a_section_has_its_area_without_holes() -> None:

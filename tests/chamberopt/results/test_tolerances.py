@@ -129,7 +129,9 @@ def test_what_no_command_writes_is_refused(folder: Path, key: str) -> None:
 
 def test_the_command_refuses_before_any_work(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
     save_design(plate_design(), tmp_path / "plate.toml")
+    with (tmp_path / "plate.toml").open("a", encoding="utf-8") as file:
+        file.write("\n[tolerances]\n")
     out = tmp_path / "out"
     assert main(["simulate", str(tmp_path / "plate.toml"), "--tolerances", "--out", str(out)]) == 2
-    assert capsys.readouterr().err.startswith("tolerances: the design has none; add a table")
+    assert capsys.readouterr().err.startswith("tolerances: the table is empty; give one")
     assert not out.exists()
