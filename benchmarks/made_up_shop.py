@@ -6,8 +6,11 @@ HIDDEN would give them in the chamber of designs/shop/coupon.toml, with the erro
 
     python -m benchmarks.made_up_shop
     python -m benchmarks.made_up_shop --compare designs/shop/machine.toml
+    python -m benchmarks.made_up_shop --coupons
 
-The second command shows whether the calibration's 95 % intervals hold the hidden machine.
+The second command shows whether the calibration's 95 % intervals hold the hidden machine. The third
+writes designs/shop/measured_coupon.toml, for docs/how_to/coupons.md: what the shop measures where
+strips cannot go, a coupon, two ball drops and the amplitude.
 
 HIDDEN, factors on what designs/shop/coupon.toml says, and the constants of its strips
     amplitude 0.94    the sonotrode moves 6 % less than its display says
@@ -43,16 +46,27 @@ HEADING = """\
 # One whole strip a time; arcs in mm; coverage of the plate's middle, and 30 dents on it.
 
 """
+OF_COUPONS = """\
+# MADE UP, not measured: what a shop with hidden parameters would have read, with errors of reading.
+# Written by `python -m benchmarks.made_up_shop --coupons`, where the hidden parameters stand.
+# Coverage of the plate's middle, and 30 dents on it; two ball drops; the amplitude by laser.
+
+"""
+LASER_SET_PV_UM = 80.0
+LASER_SD = 0.03  # of an amplitude, as a share; what `chamberopt calibrate` assumes
 
 
-def measurements(seed: int) -> dict[str, Any]:
-    """The values of the file of measurements, rounded as a shop writes them."""
+def measurements(seed: int, coupons: bool = False) -> dict[str, Any]:
+    """The values of the file of measurements, rounded as a shop writes them.
+
+    Args:
+        coupons: a coupon, ball drops and the amplitude, and no strips.
+    """
     design = load_design(SHOP / "coupon.toml")
     truth = {name: math.log(value) for name, value in HIDDEN.items()}
+    rng = np.random.default_rng(seed)
     with tempfile.TemporaryDirectory() as folder:
-        values = measure(
-            design, truth, np.random.default_rng(seed), Path(folder), seed, StripSize()
-        )
+        values = measure(design, truth, rng, Path(folder), seed, StripSize())
     for one in (*values["strip"], *values["coupon"]):
         one["amplitude_pv_um"] = 2.0 * one.pop("amplitude_um")
     for strip in values["strip"]:
@@ -62,7 +76,14 @@ def measurements(seed: int) -> dict[str, Any]:
             seen["percent"] = round(seen["percent"])
         for name in ("mean", "p90"):
             coupon["dent_mm"][name] = round(coupon["dent_mm"][name], 4)
-    del values["drop"]  # this shop drops no balls
+    if coupons:
+        del values["strip"]
+        for drop in values["drop"]:
+            drop["restitution"] = round(drop["restitution"], 3)
+        seen = HIDDEN["amplitude"] * LASER_SET_PV_UM * (1.0 + LASER_SD * float(rng.normal()))
+        values["amplitude"] = {"set_pv_um": LASER_SET_PV_UM, "measured_pv_um": round(seen, 1)}
+    else:
+        del values["drop"]  # this shop drops no balls
     return {**values, "design": "coupon.toml"}
 
 
@@ -88,15 +109,19 @@ def compared(machine: Path) -> list[dict[str, Any]]:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--out", type=Path, default=SHOP / "measured.toml")
+    parser.add_argument("--coupons", action="store_true", help="a coupon, and no strips")
+    parser.add_argument("--out", type=Path, help="by default in designs/shop")
     parser.add_argument("--compare", type=Path, help="machine.toml, instead of writing a file")
     arguments = parser.parse_args()
     if arguments.compare:
         print_table(compared(arguments.compare))
         return
-    values = {"design": "", **measurements(arguments.seed)}  # the design first
-    arguments.out.write_text(HEADING + tomlkit.dumps(values), encoding="utf-8")
-    print(f"wrote {arguments.out}")
+    coupons = arguments.coupons
+    values = {"design": "", **measurements(arguments.seed, coupons)}  # the design first
+    out = arguments.out or SHOP / ("measured_coupon.toml" if coupons else "measured.toml")
+    heading = OF_COUPONS if coupons else HEADING
+    out.write_text(heading + tomlkit.dumps(values), encoding="utf-8")
+    print(f"wrote {out}")
 
 
 if __name__ == "__main__":

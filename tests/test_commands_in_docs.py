@@ -13,6 +13,8 @@ from pathlib import Path
 
 import pytest
 
+from benchmarks.blind_prediction import compared as compared_blind
+from benchmarks.blind_prediction import predicted
 from benchmarks.made_up_shop import SHOP, compared
 from chamberopt.cli import main
 from chamberopt.cli.command_line import app
@@ -36,8 +38,8 @@ QUICK = {
 
 
 def commands(page: str) -> list[list[str]]:
-    """The commands of a page, as lists of words."""
-    text = (ROOT / "docs" / "tutorials" / page).read_text(encoding="utf-8")
+    """The commands of a page of docs, as lists of words."""
+    text = (ROOT / "docs" / page).read_text(encoding="utf-8")
     return [line.split() for line in re.findall(r"^    (.*)$", text, re.MULTILINE)]
 
 
@@ -107,7 +109,11 @@ def test_the_peening_examples(
     for name in ("designs/shop/coupon", "designs/gear_zones", "studies/gear_zones"):
         make_quick(tmp_path / f"{name}.toml")
     monkeypatch.chdir(tmp_path)
-    words = [rest for program, *rest in commands("peening_examples.md") if program == "chamberopt"]
+    words = [
+        rest
+        for program, *rest in commands("tutorials/peening_examples.md")
+        if program == "chamberopt"
+    ]
     assert [name for name, *_ in words] == ["calibrate", "run", "report", "simulate", "report"]
     for command in words:
         assert main(command) == 0, (command, capsys.readouterr().err)
@@ -119,6 +125,28 @@ def test_the_peening_examples(
     for folder in ("gear_study", "gear"):
         page = (tmp_path / "results" / folder / "report.html").read_text(encoding="utf-8")
         assert "Limits, by the whole interval" in page
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("page", ["coupons", "blind_prediction"])
+def test_what_an_auditor_asks_of_a_shop(
+    page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    shutil.copytree(ROOT / "designs", tmp_path / "designs")
+    for name in ("coupon", "blind"):
+        make_quick(tmp_path / f"designs/shop/{name}.toml")
+    monkeypatch.chdir(tmp_path)
+    words = [rest for program, *rest in commands(f"how_to/{page}.md") if program == "chamberopt"]
+    assert len(words) >= 3
+    for command in words:
+        assert main(command) == 0, (command, capsys.readouterr().err)
+    if page == "coupons":
+        assert (tmp_path / "results/coupon_machine/machine.toml").is_file()
+    else:
+        results = [Path("results/blind"), Path("results/blind_strip")]
+        found = {name: value for name, (value, _) in predicted(*results).items()}
+        assert len(found) == 6  # coverage and five arcs
+        assert all(row["holds"] == "yes" for row in compared_blind(predicted(*results), found))
 
 
 def test_the_shipped_calibration_holds_the_hidden_machine() -> None:
@@ -133,7 +161,7 @@ def test_the_tutorial(
 ) -> None:
     pytest.importorskip("gmsh", reason="STEP needs the extra cad", exc_type=ImportError)
     monkeypatch.chdir(tmp_path)
-    for program, *words in commands("tutorial.md"):
+    for program, *words in commands("tutorials/tutorial.md"):
         if program == "cd":
             monkeypatch.chdir(words[0])
         elif words[0] != "inspect" or not missing_opengl():

@@ -39,6 +39,7 @@ def test_the_newest_version_needs_a_reason(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(drift, "read", lambda: read(tmp_path / "drift.csv"))
+    monkeypatch.setattr(drift, "write", lambda rows: write(rows, tmp_path / "drift.csv"))
     assert drift.main([]) == 2
     rows = [figure(0.5, 0.03), figure(0.7, 0.03, "b"), figure(0.7, 0.03, "c")]
     write(rows[::-1], tmp_path / "drift.csv")
@@ -53,6 +54,9 @@ def test_the_newest_version_needs_a_reason(
     assert "| plate | mean_coverage | 0.5 ± 0.03 | **0.7 ± 0.03** |" in told
     assert "record it with --why" in told
     assert drift.main([]) == 0
+    assert drift.main(["explain", "--why", "friction is on"]) == 0
+    assert drift.main(["--check"]) == 0
+    assert [row.why for row in read(tmp_path / "drift.csv")] == ["", "friction is on"]
 
 
 def test_a_reason_is_kept_with_its_version() -> None:
