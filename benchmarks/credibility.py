@@ -219,7 +219,7 @@ FACTORS = (
         "Uncalibrated, inputs are a catalogue's. With a calibration they are measured, with "
         "errors: level 2 for "
         "that design.",
-        (Page("explanation/peening.md", "Calibrating to a machine"), Command("calibrate")),
+        (Page("explanation/calibration.md"), Command("calibrate")),
         "calibrate, and keep measurements and machine.toml with the sheet",
     ),
     Factor(
@@ -238,7 +238,7 @@ FACTORS = (
         "What each unknown number does to a figure is simulated; which conclusions survive "
         "friction was looked at "
         "for chambers of three parts.",
-        (Page("explanation/physics.md", "Which conclusions of a study survive"),
+        (Page("explanation/friction.md", "Which conclusions of a study survive"),
          Benchmark("friction_ranking", "friction_ranking_gear.csv"),
          Benchmark("response_steps", "response_steps.csv")),
         "the same for all unknowns, on parts of users",
@@ -286,11 +286,11 @@ BOUNDS = (
           File("chamberopt/chamber/checks/calibration.py", "another material has other constants")),
     Bound("metal of the part", "hardness alone for dents; residual stress not for strongly "
     "hardening metals",
-          (Page("explanation/peening.md", "Residual stress and depth of compression"),),
+          (Page("explanation/residual_stress.md"),),
           "refuses residual stress of such metals",
           File("chamberopt/coverage/stress_knowledge.py", "hardens_strongly")),
     Bound("dents", "strips: of about a tenth of the ball's diameter; residual stress: up to .4",
-          (Page("explanation/peening.md", "Residual stress and depth of compression"),),
+          (Page("explanation/residual_stress.md"),),
           "gives no residual stress beyond .4; says nothing of strips",
           File("chamberopt/coverage/stress_knowledge.py", "WIDEST_DENT = 0.4")),
     Bound("shape of the chamber", "cylinders against exact surfaces and practice; other shapes "
@@ -301,7 +301,7 @@ BOUNDS = (
           File("chamberopt/chamber/checks/fillets.py", "coarse facets")),
     Bound("fillets and slots", "shot of half of a fillet's radius and a quarter of a slot's "
     "width (ASTM B851, by a "
-          "quotation)", (Page("explanation/peening.md", "Zones and limits"),),
+          "quotation)", (Page("how_to/drawing.md"),),
           "warns of larger shot", File("chamberopt/chamber/checks/fillets.py", "use smaller "
           "balls")),
     Bound("numbers of dents", "3 a window for means, 25 for single places",
@@ -309,7 +309,7 @@ BOUNDS = (
           "gives no interval: not resolved",
           File("chamberopt/coverage/coverage_intervals.py", "not resolved")),
     Bound("wear, temperature, air that streams, broken balls", "not simulated",
-          (Page("explanation/physics.md", "What is left out"),), "says nothing", None),
+          (Page("reference/physics.md", "What is left out"),), "says nothing", None),
 )  # fmt: skip
 
 KNOWN_WRONGS = (
@@ -320,12 +320,12 @@ KNOWN_WRONGS = (
     "0.7 to 1 by it.",
      Page("explanation/validation.md", "What is not reproduced, and why")),
     ("Saturation times by a shop's fits are off by -36 to +15 %; intensities by -1 to +3 %.",
-     Page("explanation/peening.md", "A virtual strip")),
+     Page("explanation/peening.md", "Arc height of a virtual strip")),
     ("The depth of compression is a sixth too small on the mean of seven profiles, all of air "
     "blast.",
-     Page("explanation/peening.md", "Residual stress and depth of compression")),
+     Page("explanation/residual_stress.md")),
     ("Strengths of dents grow faster with the amplitude than the stress layer: not both are right.",
-     Page("explanation/peening.md", "Residual stress and depth of compression")),
+     Page("explanation/residual_stress.md")),
     ("Perfectly smooth parallel faces let a ball hop on one spot for ever.",
      Page("explanation/validation.md", "What is not reproduced, and why")),
 )  # fmt: skip

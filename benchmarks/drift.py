@@ -5,7 +5,8 @@
                                                        newest version moved, and no reason is kept
     python -m benchmarks.drift record                  simulate, append this version, print
         [--checkout FOLDER] [--why TEXT]
-    python -m benchmarks.drift explain --why TEXT      keep the reason with the newest version
+    python -m benchmarks.drift explain --why TEXT      keep a reason with the newest version,
+        [--commit COMMIT]                              or with another
 
 `record` simulates the designs of DESIGNS as their files say, on their own seeds and with the
 budget of BUDGET, and appends value and half-width of each figure to benchmarks/results/drift.csv
@@ -246,15 +247,15 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--check", action="store_true")
     parser.add_argument("--checkout", type=Path, default=ROOT)
     parser.add_argument("--why", default="", help="why figures of this version differ")
+    parser.add_argument("--commit", help="of the version that is explained")
     options = parser.parse_args(arguments)
-    rows = read()
     if options.action == "record":
         new = record(options.checkout.resolve(), options.why)
-        write(sorted([row for row in rows if row.commit != new[0].commit] + new, key=_made))
-        rows = read()
+        write(sorted([row for row in read() if row.commit != new[0].commit] + new, key=_made))
+    rows = read()
     if options.action == "explain" and rows:
-        newest = versions(rows)[-1][1]
-        write([row._replace(why=options.why) if row.commit == newest else row for row in rows])
+        chosen = options.commit or versions(rows)[-1][1]
+        write([row._replace(why=options.why) if row.commit == chosen else row for row in rows])
         rows = read()
     if not rows:
         print(f"error: nothing is recorded in {FILE}: record first", file=sys.stderr)

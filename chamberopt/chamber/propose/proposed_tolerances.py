@@ -5,13 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from chamberopt.design.tolerances import USUAL
+
 # Permissible deviations of lengths, ISO 2768-1 class m: up to a nominal size, and either way [mm].
 # By heart: the standard could not be read here.
 ISO_2768_M = ((6.0, 0.1), (30.0, 0.2), (120.0, 0.3), (400.0, 0.5), (1000.0, 0.8), (2000.0, 1.2))
 # Lengths that are set up. In plan the wall follows the sonotrode's face, with less clearance.
 LENGTHS = ("height_mm", "sonotrode_distance_mm")
-# Of the amplitude [µm]: SAE AMS 2580A has 4 µm peak-to-valley, as read at SONATS (usual_shop.toml).
-OF_AMPLITUDE = {"amplitude_um": 2.0, "amplitude_pv_um": 4.0}
+PEAK_TO_VALLEY_UM = USUAL["amplitude_pv_um"]
+OF_AMPLITUDE = {"amplitude_um": 0.5 * PEAK_TO_VALLEY_UM, "amplitude_pv_um": PEAK_TO_VALLEY_UM}
 REASON = "heights: ISO 2768-m; amplitude: SAE AMS 2580A; what they cost: simulate --tolerances"
 
 
