@@ -58,7 +58,7 @@ class Page:
 
 
 @dataclass(frozen=True)
-class Tests:
+class Suite:
     """A file or folder of tests, or one of its functions."""
 
     path: str
@@ -136,7 +136,7 @@ class File:
         return f"`{self.path}`"
 
 
-Evidence = Page | Tests | Benchmark | Command | File
+Evidence = Page | Suite | Benchmark | Command | File
 
 
 @dataclass(frozen=True)
@@ -178,7 +178,7 @@ FACTORS = (
         "bits on any number of workers.",
         (Page("explanation/validation.md"), Benchmark("split_invariance", "split_invariance.csv"),
          Benchmark("facet_invariance", "facet_invariance.csv"), Benchmark("mutants"),
-         Tests("sim_core"), Tests("hard_cases")),
+         Suite("sim_core"), Suite("hard_cases")),
         "somebody who did not write the program",
     ),
     Factor(
@@ -202,7 +202,7 @@ FACTORS = (
         "version to version.",
         (File("CHANGELOG.md", "figures change"), File(".ci/run", "pytest"),
          File("requirements.lock", "sha256"),
-         Benchmark("drift", "drift.csv"), Tests("test_architecture.py")),
+         Benchmark("drift", "drift.csv"), Suite("test_architecture.py")),
         "releases that are tagged, each with its drift table and the long tests passed",
     ),
     Factor(
@@ -210,7 +210,7 @@ FACTORS = (
         "The program says where a design lies beyond what is covered, in `check`, on the sheet "
         "in red, and in notes. "
         "The envelope is that of the evidence, not of machines.",
-        (Command("check"), Tests("chamberopt/printers/test_sheet.py",
+        (Command("check"), Suite("chamberopt/printers/test_sheet.py",
          "test_what_forbids_to_use_it_is_in_red")),
         "an envelope from measured machines",
     ),
@@ -230,7 +230,7 @@ FACTORS = (
         (Benchmark("interval_calibration", "intervals_stopping.csv"),
          Benchmark("coverage_calibration", "coverage_calibration.csv"),
          Benchmark("synthetic_shops", "synthetic_shops.csv"), Benchmark("ranges", "ranges.csv"),
-         Command("simulate --tolerances"), Tests("chamberopt/coverage/test_coverage_intervals.py")),
+         Command("simulate --tolerances"), Suite("chamberopt/coverage/test_coverage_intervals.py")),
         "the model's error from measured machines, in the intervals",
     ),
     Factor(
@@ -254,8 +254,8 @@ FACTORS = (
         "A result is data with digests; sheet and report name version, seed and digests; what "
         "requalifies is "
         "printed.",
-        (Page("reference/trust.md"), Tests("chamberopt/cli/test_moved_results.py"),
-         Tests("chamberopt/printers/test_sheet.py",
+        (Page("reference/trust.md"), Suite("chamberopt/cli/test_moved_results.py"),
+         Suite("chamberopt/printers/test_sheet.py",
               "test_an_auditor_finds_version_digests_revision_and_what_requalifies")),
         "the shop's own control of designs and sheets",
     ),

@@ -13,7 +13,7 @@ from benchmarks.credibility import (
     Factor,
     File,
     Page,
-    Tests,
+    Suite,
     problems,
     with_tables,
 )
@@ -34,8 +34,8 @@ def test_the_page_shows_what_the_commands_print() -> None:
     [
         (Page("explanation/nothing.md"), "no such page"),
         (Page("explanation/accuracy.md", "Nothing"), "no section Nothing"),
-        (Tests("nothing.py"), "no such tests"),
-        (Tests("benchmarks/test_credibility.py", "test_nothing"), "no test test_nothing"),
+        (Suite("nothing.py"), "no such tests"),
+        (Suite("benchmarks/test_credibility.py", "test_nothing"), "no test test_nothing"),
         (Benchmark("nothing"), "no such command"),
         (Benchmark("drift", "nothing.csv"), "no such results"),
         (Command("nothing"), "no such command"),
