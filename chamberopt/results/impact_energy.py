@@ -20,10 +20,10 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from chamberopt.chamber.checks.place_names import surface_names
+from chamberopt.chamber.checks.place_names import CEILING, SIDE_WALL, SONOTRODE, surface_names
 from chamberopt.common.errors import InputError
 from chamberopt.common.estimate import Estimate, estimate
-from chamberopt.design.shape_surface import TAG_PART, TAG_SONOTRODE, TAG_WALL
+from chamberopt.design.shape_surface import TAG_PART, TAG_WALL
 from chamberopt.geometry.triangles import areas
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 BLOCKS = 10  # pieces of the recorded time, whose scatter gives the intervals
 PART, BALLS = "the part", "ball on ball"
-FACE_BINS, ANGLES, HEIGHTS = 40, 60, 24  # bins of the maps
+FACE_BINS, ANGLES, HEIGHTS = 24, 36, 12  # bins of the maps
 SAMPLES = 200_000  # points on all surfaces, from which the areas of bins are found
 
 
@@ -136,7 +136,7 @@ def simulate_energy(
         lost_by_pairs = energy_lost(both, pairs.normal_speed, e)
         surfaces.append(_surface(BALLS, np.nan, *how, lost_by_pairs, seconds))
     surfaces.sort(key=lambda one: -one.lost_power.value)
-    return ImpactEnergy(seconds, tuple(surfaces), _maps(chamber, log, energy / seconds))
+    return ImpactEnergy(seconds, tuple(surfaces), _maps(chamber, names, log, energy / seconds))
 
 
 def _names(chamber: Chamber) -> np.ndarray:
@@ -174,8 +174,10 @@ def _surface(
     return SurfaceEnergy(name, area, *(estimate(one, 0.0) for one in sums))
 
 
-def _maps(chamber: Chamber, log: ImpactLog, power: np.ndarray) -> tuple[EnergyMap, ...]:
-    """Return maps of the sonotrode's face from above and of the wall unrolled about the axis."""
+def _maps(
+    chamber: Chamber, names: np.ndarray, log: ImpactLog, power: np.ndarray
+) -> tuple[EnergyMap, ...]:
+    """Return maps of sonotrode and ceiling from above, and of the wall unrolled about the axis."""
     rng = np.random.default_rng(0)
     of_triangle = areas(chamber.vertices, chamber.triangles)
     chosen = rng.choice(len(of_triangle), SAMPLES, p=of_triangle / of_triangle.sum())
@@ -186,11 +188,12 @@ def _maps(chamber: Chamber, log: ImpactLog, power: np.ndarray) -> tuple[EnergyMa
     points = a + u[:, None] * (b - a) + v[:, None] * (c - a)
     each = of_triangle.sum() / SAMPLES
     found = []
-    for tag, title, unrolled in (
-        (TAG_SONOTRODE, "sonotrode, from above", False),
-        (TAG_WALL, "wall, unrolled", True),
+    for name, title, unrolled in (
+        (SONOTRODE, "sonotrode, from above", False),
+        (CEILING, "ceiling, from above", False),
+        (SIDE_WALL, "side wall, unrolled", True),
     ):
-        on, hit = chamber.tags[chosen] == tag, chamber.tags[log.triangle] == tag
+        on, hit = names[chosen] == name, names[log.triangle] == name
         if not on.any():
             continue
         places, hits = (_flat(one, unrolled) for one in (points[on], log.position[hit]))

@@ -11,7 +11,7 @@ from chamberopt.cli.prepare import compile_with_message, load_replica, seconds_o
 
 @app.command
 def energy(result: Path, picture: Path, /, *, replica: int = 0) -> None:
-    """Show where the energy of the shot goes: shares by surface, and maps of sonotrode and wall.
+    """Show where the energy of the shot goes: shares by surface, maps of sonotrode and walls.
 
     The replica is simulated again, with the impacts on all surfaces: a result has those on the part
     alone.

@@ -51,7 +51,7 @@ def test_maps_have_the_power_of_their_surface(still: RebuiltReplica) -> None:
     """Power over area, times areas of bins: Ø 50 mm by 15 mm have 2356 mm² of wall."""
     found = simulate_energy(still)
     by_name = {one.name: one for one in found.surfaces}
-    face, wall = found.maps
+    face, wall = found.maps  # the plate closes the chamber: there is no ceiling
     of_wall = sum(
         one.impact_power.value
         for name, one in by_name.items()
