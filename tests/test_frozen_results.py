@@ -147,6 +147,7 @@ MASKS = {
     r"\b[0-9a-f]{64}\b": MASKED,
     r"(?<=sha256 )([0-9a-f]{30,}( [0-9a-f]+)?|[0-9a-f]{12}\b)": MASKED,  # of a sheet, broken or cut
     r"(?<=chamberopt )\d[\w.]*": MASKED,
+    r"(?<=chamberopt, simulated )\d[\w.]*": MASKED,
     r"[\d.]+(?= MB)": MASKED,
     r"(?<=candidates in )[\d.]+ \w+": MASKED,
     rf"^({TIMED})\n.*$": rf"\1\n{MASKED}",
