@@ -73,7 +73,7 @@ class Suite:
         return ""
 
     def __str__(self) -> str:
-        return f"`tests/{self.path}{'::' if self.name else ''}{self.name}`"
+        return f"`tests/{self.path}`"
 
 
 @dataclass(frozen=True)
