@@ -161,7 +161,7 @@ def _law_at(design: Design, tag: int | None, speed: np.ndarray) -> np.ndarray:
     laws = {None: materials.shot, TAG_PART: materials.part, TAG_WALL: materials.wall}
     law = laws.get(tag, materials.sonotrode).restitution
     slow = speed < design.process.accuracy.elastic_below
-    return np.where(slow, 1.0, restitution_at(speed, law))
+    return np.asarray(np.where(slow, 1.0, restitution_at(speed, law)))
 
 
 def _surface(
@@ -201,8 +201,8 @@ def _maps(
         counts = (ANGLES, HEIGHTS) if unrolled else (FACE_BINS, FACE_BINS)
         edges = [np.linspace(low[k], high[k], counts[k] + 1) for k in range(2)]
         hits = np.clip(hits, low, high)  # centres of balls lie a radius off the surface
-        area = each * np.histogram2d(*places.T, bins=edges)[0]
-        energy = np.histogram2d(*hits.T, bins=edges, weights=power[hit])[0]
+        area = each * np.histogramdd(places, bins=edges)[0]
+        energy = np.histogramdd(hits, bins=edges, weights=power[hit])[0]
         with np.errstate(invalid="ignore", divide="ignore"):
             density = np.where(area > 0.0, energy / area, np.nan)
         found.append(EnergyMap(title, edges[0], edges[1], density, unrolled))
@@ -212,5 +212,5 @@ def _maps(
 def _flat(points: np.ndarray, unrolled: bool) -> np.ndarray:
     """Return points (n, 3) as x and y [m], or as angle about the axis [degrees] and height [m]."""
     if not unrolled:
-        return points[:, :2]
+        return np.asarray(points[:, :2])
     return np.c_[np.degrees(np.arctan2(points[:, 1], points[:, 0])), points[:, 2]]
