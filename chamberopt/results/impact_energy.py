@@ -213,4 +213,5 @@ def _flat(points: np.ndarray, unrolled: bool) -> np.ndarray:
     """Return points (n, 3) as x and y [m], or as angle about the axis [degrees] and height [m]."""
     if not unrolled:
         return np.asarray(points[:, :2])
-    return np.c_[np.degrees(np.arctan2(points[:, 1], points[:, 0])), points[:, 2]]
+    angle = np.degrees(np.arctan2(points[:, 1], points[:, 0]))
+    return np.stack([angle, points[:, 2]], axis=1)
