@@ -23,11 +23,17 @@ def compile_for(
 ) -> None:
     """Compile the simulator for a design, and tell of it because the first time takes a minute.
 
+    It is compiled for each step of a design with several.
+
     Args:
         tell: called with a sentence for the user.
     Raises:
         InputError: the shot does not fit, or the part cannot turn. It is raised early.
     """
+    if chamber.steps:
+        for one, its_room in zip(design.in_steps.values(), chamber.steps, strict=True):
+            compile_for(one, its_room, None, tell)
+        return
     room, seed = cavity or chamber_mesh(chamber), replica_seed(design.process.seed, 0)
     with step("placing the shot"):
         flexure = flexure_of_surfaces(design, chamber, room)
