@@ -194,3 +194,10 @@ def test_the_zones_of_the_page_on_drawings_are_valid() -> None:
     (block,) = toml_blocks("how_to/drawing.md")
     zones = [Zone.model_validate(one) for one in tomllib.loads(block)["zones"]]
     assert [zone.is_spared for zone in zones] == [False, True]
+
+
+@OF_PAGES
+def test_no_line_of_a_page_is_taken_for_a_comment(page: Path) -> None:
+    """The site leaves out lines that begin with a per cent sign."""
+    lines = page.read_text(encoding="utf-8").splitlines()
+    assert not [line for line in lines if line.lstrip().startswith("%")]

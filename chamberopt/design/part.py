@@ -138,8 +138,8 @@ class SmoothingTable(FileTable):
     )
     limit_deg: float = quantity(1, 30, "degrees", "largest angle between facets", 6.0)
     narrow_mm: float = quantity(
-        0.001, 10, "mm", "width below which facets are not divided: a tenth of a ball's radius",
-        0.06,
+        0.001, 10, "mm",
+        "width below which facets are not divided: a tenth of the radius of balls of 1.2 mm", 0.06,
     )  # fmt: skip
     tolerance_mm: float | None = quantity(
         0, 10, "mm", "the farthest that the surface may move; absent: as far as its facets tell",

@@ -32,7 +32,7 @@ COMMANDS: dict[str, dict[str, tuple[str, ...]]] = {
     "strip": {"--type": ("A", "N", "C", "x"), "--at": ("lid", "x", ""), "--disc-mm": NUMBERS,
               "--distance-mm": NUMBERS, "--workers": NUMBERS, "--json": (), "--out": OUTPUTS},
     "compare": {"--treatment-time-s": NUMBERS, "--json": (), "--out": OUTPUTS},
-    "report": {"--json": (), "--sheet": (),
+    "report": {"--json": (), "--sheet": (), "--revision": NAMES,
                "--out": (*OUTPUTS, "page.html", "sheet.pdf", "result/result.json")},
     "export": {"--to": ("vtk", "csv", "abaqus", "impacts-csv", "study", "x", "", "step", "stl"),
                "--frame": ("part", "chamber", "x"), "--replicas": NUMBERS, "--json": (),
@@ -43,6 +43,7 @@ COMMANDS: dict[str, dict[str, tuple[str, ...]]] = {
                 "--screenshot": ("p.png", "p.x", "/p/p.png"), "--json": ()},
     "dents": {"--replica": NUMBERS, "--at-s": ("0", "-1", "nan", "inf", "x", "0.1"),
               "--view": ("1,2,3", "0,0,0", "x"), "--pixels": NUMBERS},
+    "energy": {"--replica": NUMBERS},
     "replay": {"--replica": NUMBERS, "--from-s": NUMBERS, "--span-ms": ("0", "-1", "nan", "x", "1"),
                "--frames": ("0", "-1", "x", "2", "1"), "--fps": NUMBERS, "--size": ("0", "9", "x")},
 }  # fmt: skip
@@ -51,11 +52,12 @@ FIRST = {
     "sweep": ("study.toml",), "accuracy": ("design.toml",), "report": ("result", "study"),
     "strip": ("design.toml",),
     "compare": ("result", "study"), "export": ("result", "study"), "inspect": ("result", "study"),
-    "dents": ("result",), "replay": ("result",),
+    "dents": ("result",), "energy": ("result",), "replay": ("result",),
 }  # fmt: skip
 SECOND = {
     "compare": ("result", "study", "sweep"),
     "dents": ("p.png", "p.x", "/p/p.png", "result"),
+    "energy": ("p.png", "p.x", "/p/p.png", "result"),
     "replay": ("p.gif", "p.x", "p.mp4", ""),
 }
 

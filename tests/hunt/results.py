@@ -34,7 +34,8 @@ LOOK = (
     ["inspect", "{}", "--html", "page.html"],
 )
 SIMULATE_AGAIN = (
-    ["dents", "{}", "d.png"], ["replay", "{}", "r.gif"], ["export", "{}", "--to", "impacts-csv"],
+    ["dents", "{}", "d.png"], ["replay", "{}", "r.gif"], ["energy", "{}", "e.png"],
+    ["export", "{}", "--to", "impacts-csv"],
     ["export", "{}", "--to", "fields-abaqus"], ["export", "{}", "--to", "chamber-3mf"],
 )  # fmt: skip
 FORMULAS = ("=1+1", "=cmd|' /C calc'!A0", "+1+1", "-2+3", "@SUM(A1)", "\t=1", "\r=1", '="a"')
