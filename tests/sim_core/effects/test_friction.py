@@ -28,11 +28,15 @@ ROOM = box((0.05, 0.05, 0.05))
 HUGE = 1e9  # mu: every hit sticks
 
 
+# m/s: a hit with restitution 0 leaves about 1e-17 m/s of one sign or the other, by the processor
+ROUNDING = 1e-9
+
+
 def physics(mu: float, beta0: float, e: float = 1.0) -> Physics:
     """Without weight; the same law everywhere."""
     return Physics(
         WEIGHTLESS,
-        uniform_restitution(e, 1e3, 0.0),
+        uniform_restitution(e, 1e3, ROUNDING),
         friction=Friction(((mu, beta0),) * 3, (mu, beta0)),
     )
 
