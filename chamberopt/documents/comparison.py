@@ -10,9 +10,9 @@ import math
 
 from chamberopt.common.estimate import CONFIDENCE, Estimate
 from chamberopt.common.number_text import estimate_text
-from chamberopt.documents.coverage import MAIN
+from chamberopt.documents.coverage import labels_of, main_names
 from chamberopt.documents.document import Table
-from chamberopt.documents.wording import Label, metric_label, objective_label
+from chamberopt.documents.wording import Label
 from chamberopt.results.compare.comparison import Comparison
 from chamberopt.results.compare.difference import MAX_TIME_RATIO, Difference
 
@@ -27,7 +27,10 @@ def comparison_end(comparison: Comparison, verbose: bool) -> list[Table | str]:
         verbose: all figures follow, by their names in files, with what would prove a difference.
     """
     first, *later = comparison.labels
-    shown = _main(comparison)
+    goal = comparison.results[0].objective_name
+    goal = goal if goal in comparison.metrics else ""  # results of different objectives share none
+    labels = labels_of(goal, comparison.metrics)
+    shown = [(name, labels[name]) for name in main_names(goal, labels)]
     sentences = [_sentence(comparison, *shown[0], k) for k in range(len(later))] if shown else []
     several = len(later) > 1
     rows = [
@@ -47,19 +50,6 @@ def comparison_end(comparison: Comparison, verbose: bool) -> list[Table | str]:
         return [*content, *comparison_lines(comparison)]
     legend = f"(±: 95 % intervals. *: differs from {first} by more than noise."
     return [*content, f"{legend} --verbose and compare.txt have every figure.)"]
-
-
-def _main(comparison: Comparison) -> list[tuple[str, Label]]:
-    """Return the names and labels of the objective and the main figures of a comparison."""
-    goal = comparison.results[0].objective_name
-    names = [goal, *(name for name in MAIN if name != goal)]
-    is_calibrated = "almen_intensity" in comparison.metrics  # which takes the place of strength
-    names = [name for name in names if name in comparison.metrics]
-    names = [name for name in names if not (is_calibrated and name == "strength_um")]
-    labels = [objective_label(name) if name == goal else metric_label(name) for name in names]
-    texts = [label.text for label in labels]
-    both = zip(names, labels, strict=True)
-    return [(name, label) for k, (name, label) in enumerate(both) if label.text not in texts[:k]]
 
 
 def _sentence(comparison: Comparison, name: str, label: Label, k: int) -> str:

@@ -5,7 +5,7 @@ Figures are the objective and the metrics, such as mean coverage.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -68,14 +68,12 @@ def figures(result: Result, start: Result | None) -> list[Figure]:
 
     Metrics of zones and of single steps are left out, and so is a metric that is the objective.
     """
-    label = objective_label(result.objective_name)
-    before = None if start is None else start.objective
-    entries = [(result.objective_name, label, result.objective, before)]
-    entries += [
-        (name, metric_label(name), metric, start.metrics.get(name) if start else None)
-        for name, metric in result.metrics.items()
-        if metric_label(name).text != label.text and "." not in name
-    ]
+    goal = result.objective_name
+    afters, befores = (
+        {} if one is None else {**one.metrics, goal: one.objective} for one in (result, start)
+    )
+    labels = labels_of(goal, result.metrics)
+    entries = [(name, label, afters[name], befores.get(name)) for name, label in labels.items()]
     return [
         Figure(
             name,
@@ -87,6 +85,30 @@ def figures(result: Result, start: Result | None) -> list[Figure]:
         )
         for name, label, after, before in entries
     ]
+
+
+def labels_of(goal: str, metrics: Iterable[str]) -> dict[str, Label]:
+    """Return the labels of an objective and of metrics, by their names, the objective first.
+
+    Metrics of zones and of single steps are left out, and so is a metric that is the objective.
+
+    Args:
+        goal: the objective's name; empty for metrics alone.
+    """
+    first = {goal: objective_label(goal)} if goal else {}
+    known = {label.text for label in first.values()}
+    others = {name: metric_label(name) for name in metrics if "." not in name}
+    return first | {name: label for name, label in others.items() if label.text not in known}
+
+
+def main_names(goal: str, names: Iterable[str]) -> list[str]:
+    """Return those of some names that are the objective's or of main metrics.
+
+    Where the Almen intensity is known, peening strength is none of them.
+    """
+    names = list(names)
+    chosen = [name for name in MAIN if name != "strength_um" or "almen_intensity" not in names]
+    return [name for name in names if name == goal or name in chosen]
 
 
 def change(after: Estimate, before: Estimate, result: Result, start: Result) -> Estimate:
@@ -107,9 +129,8 @@ def main_figures(shown: Sequence[Figure]) -> list[Figure]:
 
     Where it is not, the peening strength takes its place.
     """
-    names = {one.name for one in shown}
-    chosen = [name for name in MAIN if name != "strength_um" or "almen_intensity" not in names]
-    return [shown[0], *(one for one in shown[1:] if one.name in chosen)]
+    names = main_names(shown[0].name, (one.name for one in shown))
+    return [one for one in shown if one.name in names]
 
 
 def tiles(shown: Sequence[Figure]) -> Tiles:

@@ -14,13 +14,13 @@ from typing import TYPE_CHECKING, get_args
 from chamberopt.common.number_text import counted, estimate_text
 from chamberopt.common.number_text import plain as ascii_number
 from chamberopt.documents.answer import answer, answer_lines
-from chamberopt.documents.coverage import Figure, figures, figures_table, main_figures
+from chamberopt.documents.coverage import Figure, figures, figures_table, labels_of, main_figures
 from chamberopt.documents.document import About, Table
 from chamberopt.documents.ranges import range_lines, range_texts
 from chamberopt.documents.stress import stress_sentence
 from chamberopt.documents.study import influence_sentences, influences, tried_sentence
 from chamberopt.documents.tolerances import tolerance_lines, tolerance_sentences
-from chamberopt.documents.wording import metric_label, objective_label, plain
+from chamberopt.documents.wording import objective_label, plain
 from chamberopt.results.load import load_result, load_start, load_trials
 
 if TYPE_CHECKING:
@@ -80,13 +80,9 @@ def sweep_end(result: SweepResult, notes: Iterable[str], verbose: bool) -> list[
     if best is None or best.objective is None:
         return [f"None of {count} candidates meets the constraints.", *last]
     name = study.objective.goals[0]
-    label, found = objective_label(name), {name: best.objective, **best.metrics}
-    shown = [Figure(name, label, best.objective)]
-    shown += [
-        Figure(one, metric_label(one), value)
-        for one, value in best.metrics.items()
-        if metric_label(one).text != label.text
-    ]
+    found = {**best.metrics, name: best.objective}
+    labels = labels_of(name, best.metrics)
+    shown, label = [Figure(one, labels[one], found[one]) for one in labels], labels[name]
     parameters = {name: [plain(value, 5)] for name, value in best.parameters.items()}
     sentence = (
         f"The best of {count} candidates, number {best.number + 1}, has this {label.text}: "
