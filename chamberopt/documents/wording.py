@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -12,6 +12,7 @@ from chamberopt.common.errors import InputError
 from chamberopt.common.estimate import Estimate
 from chamberopt.common.number_text import estimate_text
 from chamberopt.coverage.metrics import OBJECTIVES, find_metric, is_number, parse_objective
+from chamberopt.documents.document import Table
 
 if TYPE_CHECKING:
     from chamberopt.results.impact_energy import ImpactEnergy
@@ -132,10 +133,10 @@ def per_cent(value: float) -> str:
     return f"{100.0 * value:.0f} %"
 
 
-def energy_lines(found: ImpactEnergy) -> list[str]:
-    """Return the lines that the command `energy` prints: a row for each surface, and their sum."""
+def energy_lines(found: ImpactEnergy) -> list[Table | str]:
+    """Return what the command `energy` prints: a row for each surface, and their sum."""
     total, head = found.lost, ("", "mm²", "impacts/s", "mW/cm²", "lost, mW", "share, %")
-    rows = [head]
+    rows = []
     for one in found.surfaces:
         over_area = 0.1 * one.impact_power.value / one.area
         rows.append((
@@ -147,18 +148,8 @@ def energy_lines(found: ImpactEnergy) -> list[str]:
             plain(100.0 * one.lost_power.value / total, 3) if total else "",
         ))  # fmt: skip
     rows.append(("all", "", "", "", plain(1e3 * total, 3), "100"))
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    lines = ["  ".join(_justified(row, widths)).rstrip() for row in rows]
     return [
-        *lines,
+        Table("", head, rows),
         "mW/cm²: energy of impacts over area. Lost: to normal rebounds, ± 95 % by tenths of "
         f"{plain(found.seconds)} s; what friction takes is not in it.",
     ]
-
-
-def _justified(row: Sequence[str], widths: Sequence[int]) -> list[str]:
-    first, *others = (
-        text.ljust(width) if k == 0 else text.rjust(width)
-        for k, (text, width) in enumerate(zip(row, widths, strict=True))
-    )
-    return [first, *others]

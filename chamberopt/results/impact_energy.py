@@ -14,6 +14,7 @@ is not in it: the log has no spins.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple
@@ -21,6 +22,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from chamberopt.chamber.checks.place_names import CEILING, SIDE_WALL, SONOTRODE, surface_names
+from chamberopt.chamber.largest_ball import spread_points
 from chamberopt.common.errors import InputError
 from chamberopt.common.estimate import Estimate, estimate
 from chamberopt.design.shape_surface import TAG_PART, TAG_WALL
@@ -35,7 +37,7 @@ if TYPE_CHECKING:
 BLOCKS = 10  # pieces of the recorded time, whose scatter gives the intervals
 PART, BALLS = "the part", "ball on ball"
 FACE_BINS, ANGLES, HEIGHTS = 24, 36, 12  # bins of the maps
-SAMPLES = 200_000  # points on all surfaces, from which the areas of bins are found
+SAMPLES = 200_000  # points on all surfaces, and some more, from which the areas of bins are found
 
 
 class SurfaceEnergy(NamedTuple):
@@ -178,22 +180,16 @@ def _maps(
     chamber: Chamber, names: np.ndarray, log: ImpactLog, power: np.ndarray
 ) -> tuple[EnergyMap, ...]:
     """Return maps of sonotrode and ceiling from above, and of the wall unrolled about the axis."""
-    rng = np.random.default_rng(0)
-    of_triangle = areas(chamber.vertices, chamber.triangles)
-    chosen = rng.choice(len(of_triangle), SAMPLES, p=of_triangle / of_triangle.sum())
-    u, v = rng.random((2, SAMPLES))
-    inside = u + v > 1.0
-    u[inside], v[inside] = 1.0 - u[inside], 1.0 - v[inside]
-    a, b, c = (chamber.vertices[chamber.triangles[chosen, k]] for k in range(3))
-    points = a + u[:, None] * (b - a) + v[:, None] * (c - a)
-    each = of_triangle.sum() / SAMPLES
+    shape = chamber.vertices, chamber.triangles
+    spacing = np.full(len(chamber.triangles), math.sqrt(areas(*shape).sum() / SAMPLES))
+    triangle, points, stands_for = spread_points(*shape, spacing)
     found = []
     for name, title, unrolled in (
         (SONOTRODE, "sonotrode, from above", False),
         (CEILING, "ceiling, from above", False),
         (SIDE_WALL, "side wall, unrolled", True),
     ):
-        on, hit = names[chosen] == name, names[log.triangle] == name
+        on, hit = names[triangle] == name, names[log.triangle] == name
         if not on.any():
             continue
         places, hits = (_flat(one, unrolled) for one in (points[on], log.position[hit]))
@@ -201,7 +197,7 @@ def _maps(
         counts = (ANGLES, HEIGHTS) if unrolled else (FACE_BINS, FACE_BINS)
         edges = [np.linspace(low[k], high[k], counts[k] + 1) for k in range(2)]
         hits = np.clip(hits, low, high)  # centres of balls lie a radius off the surface
-        area = each * np.histogramdd(places, bins=edges)[0]
+        area = np.histogramdd(places, bins=edges, weights=stands_for[on])[0]
         energy = np.histogramdd(hits, bins=edges, weights=power[hit])[0]
         with np.errstate(invalid="ignore", divide="ignore"):
             density = np.where(area > 0.0, energy / area, np.nan)

@@ -13,6 +13,7 @@ from chamberopt.chamber.scene import build_scene
 from chamberopt.cli import main
 from chamberopt.common.errors import InputError
 from chamberopt.documents.wording import energy_lines
+from chamberopt.printers import terminal
 from chamberopt.results.impact_energy import BALLS, PART, energy_lost, require_mesh, simulate_energy
 from chamberopt.results.rebuild import RebuiltReplica
 from sim_core import energies, simulate
@@ -74,7 +75,7 @@ def test_a_rebound_by_hand() -> None:
 
 def test_the_table_adds_up(still: RebuiltReplica) -> None:
     found = simulate_energy(still)
-    head, *rows = energy_lines(found)
+    head, *rows = terminal.text(energy_lines(found)).splitlines()
     assert head.split()[-2:] == ["share,", "%"]
     shares = [float(row.split()[-1]) for row in rows[: len(found.surfaces)]]
     assert math.isclose(sum(shares), 100.0, abs_tol=0.5)
