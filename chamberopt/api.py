@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterable, Sequence
-from contextlib import ExitStack
+from contextlib import nullcontext
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -116,8 +116,7 @@ def propose(
     from chamberopt.chamber.propose import first_design
     from chamberopt.chamber.propose.proposal import Wanted
     from chamberopt.chamber.propose.shop import load_shop
-    from chamberopt.common.executor import local_executor
-    from chamberopt.common.files import claim_folder, whole_or_nothing
+    from chamberopt.common.files import claim_folder
     from chamberopt.common.progress import no_steps
     from chamberopt.geometry.meshes.units import STATED
     from chamberopt.workflows.propose import DESIGN, Wishes, require_file, write_proposal
@@ -131,15 +130,12 @@ def propose(
     wishes, names, path = Wishes(wanted, intensity, pilot), tuple(target), Path(part)
     require_file(path)
     wishes.require_possible()
-    with ExitStack() as open_:
-        if not progress:
-            open_.enter_context(no_steps())
+    with claim_folder(out):
+        pass  # reports a folder that is taken before the work begins
+    with nullcontext() if progress else no_steps():
         first = first_design.propose(path, wanted, lambda _: names)
-        folder = open_.enter_context(claim_folder(out))
-        open_.enter_context(whole_or_nothing(folder))
-        executor = open_.enter_context(local_executor(workers))
-        given = first, path, wishes, lambda _: names, folder, executor
-        done = write_proposal(*given, teller_of(progress))
+        given = first, path, wishes, lambda _: names, Path(out)
+        done = write_proposal(*given, teller_of(progress), workers)
     _warn(done.made.warnings)
     return load_design(Path(out) / DESIGN)
 

@@ -61,7 +61,7 @@ def step(
     """
     stream = stream or sys.stderr
     if _is_quiet:
-        yield _untold
+        yield untold
         return
     if _json_lines:
         write = _json_writer(what, stream)
@@ -85,7 +85,7 @@ def step(
             display.remove_task(row)
 
 
-def _untold(done: int, total: int, best: float | None) -> None:
+def untold(done: int, total: int, best: float | None) -> None:
     """Ignore the progress of a step that is not shown."""
 
 

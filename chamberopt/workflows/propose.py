@@ -7,6 +7,7 @@ amplitude, and tell its treatment time.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -27,7 +28,8 @@ from chamberopt.chamber.propose.proposed_intensity import (
 from chamberopt.chamber.propose.quicker import Way, propose_quicker, propose_second_pose
 from chamberopt.chamber.propose.text import design_text, study_texts
 from chamberopt.common.errors import InputError
-from chamberopt.common.files import write_text
+from chamberopt.common.executor import local_executor
+from chamberopt.common.files import claim_folder, whole_or_nothing, write_text
 from chamberopt.common.toml_fields import allowed_range
 from chamberopt.design.intensity import WantedIntensity
 from chamberopt.design.process import Process
@@ -123,24 +125,34 @@ def write_proposal(
     path: Path,
     wishes: Wishes,
     choose: Chooser,
-    folder: Path,
-    executor: Executor,
+    out: Path,
     teller: Teller,
+    workers: int | None = None,
 ) -> Proposed:
     """Improve a first proposal by pilots, and write its design, studies and picture into a folder.
 
     Raises InputError if an intensity that was asked for cannot be told.
 
     Args:
+        out: new or empty folder.
+        workers: number of threads of the pilots, by default one per core.
         first: the proposal by rules of thumb for the part at `path`, with these wishes.
         choose: picks the names of the surfaces to peen from all surfaces, as for `first`.
     """
-    pyvista()
+    pyvista()  # before the folder is claimed: Ctrl-C during an import would leave the folder behind
+    with ExitStack() as kept:
+        folder = kept.enter_context(claim_folder(out))
+        kept.enter_context(whole_or_nothing(folder))
+        executor = kept.enter_context(local_executor(workers))
+        return _written(first, _Pilots(path, wishes, choose, executor, teller), folder)
+
+
+def _written(first: Proposal, pilots: _Pilots, folder: Path) -> Proposed:
+    """Write what pilots make of a first proposal into a folder."""
+    teller = pilots.teller
     with teller.step("drawing"):  # before the pilots, so that it can be looked at meanwhile
         teller.tell(draw_target(first.chamber, first.reach, folder / PICTURE))
-    made = first
-    if wishes.pilot:
-        made = _Pilots(path, wishes, choose, executor, teller).improve(first)
+    made = pilots.improve(first) if pilots.wishes.pilot else first
     if made.chamber is not first.chamber:
         with teller.step("drawing"):
             teller.tell(draw_target(made.chamber, made.reach, folder / PICTURE))

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from chamberopt.chamber.analytic import analytic_cavity
 from chamberopt.chamber.build import build_chamber
-from chamberopt.common.progress import step
+from chamberopt.common.progress import step, untold
 from chamberopt.coverage.field.memory import PROCESS, evaluation_bytes, how_many_fit
 from chamberopt.design.ranges import variants
 from chamberopt.peening.calibration_errors import evaluate_calibrated
@@ -58,7 +58,7 @@ class Teller:
             total: number of units that the step counts; None if it counts nothing.
         """
         if self._progress is None or total is None:
-            return nullcontext(_uncounted)
+            return nullcontext(untold)
         return nullcontext(self._progress)
 
     def compile(self, design: Design, chamber: Chamber, cavity: AnalyticCavity | None) -> None:
@@ -100,10 +100,6 @@ def teller_of(progress: Progress | bool) -> Teller:
     if progress is True:
         return StepTeller()
     return Teller(progress or None)
-
-
-def _uncounted(done: int, total: int, best: float | None) -> None:
-    """Ignore the progress of a step. This is the Teller's function if none was given."""
 
 
 @dataclass(frozen=True)

@@ -89,11 +89,9 @@ def new(
     from chamberopt.chamber.propose.shop import load_shop
     from chamberopt.cli.teller import TerminalTeller
     from chamberopt.common.errors import InputError
-    from chamberopt.common.executor import local_executor
-    from chamberopt.common.files import claim_folder, whole_or_nothing
+    from chamberopt.common.files import claim_folder
     from chamberopt.documents.proposal import proposal_end
     from chamberopt.geometry.meshes.units import STATED, UnknownUnitError
-    from chamberopt.results.vtp_files import pyvista
     from chamberopt.workflows.propose import DESIGN, Wishes, require_file, write_proposal
 
     require_file(part)
@@ -127,15 +125,12 @@ def new(
         wishes = replace(wishes, geometry=wanted)
         made = propose(part, wanted, choose)
 
-    pyvista()  # before the folder is claimed: Ctrl-C during an import would leave the folder behind
-    with claim_folder(out) as folder, whole_or_nothing(folder), local_executor() as executor:
-        given = made, part, wishes, choose, folder, executor
-        done = write_proposal(*given, TerminalTeller())
+    done = write_proposal(made, part, wishes, choose, out, TerminalTeller())
     show(proposal_end(done.made, done.left_out, verbose))
     print_remarks(f"note: {one_line(text)}" for text in done.made.mesh.notes)
     print_remarks(f"warning: {text}" for text in done.made.warnings)
-    studies = (f"study in {folder / name}" for name in done.studies)
-    show([f"design in {folder / DESIGN}", *studies])
+    studies = (f"study in {out / name}" for name in done.studies)
+    show([f"design in {out / DESIGN}", *studies])
 
 
 def _asked_unit(part: Path, sizes: Mapping[str, str]) -> str:
