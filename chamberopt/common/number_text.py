@@ -59,6 +59,11 @@ def plain(value: float | str, digits: int = 4) -> str:
     return text.rstrip("0").rstrip(".") if "." in text else text
 
 
+def rounded(value: float, digits: int) -> str:
+    """Return a number rounded to some digits, also before the point: 2800 for 2805 to two."""
+    return f"{float(f'{value:.{digits}g}'):g}"
+
+
 def counted(count: float, noun: str) -> str:
     """Return a number of things with two digits, such as "1 dent" or "27 dents".
 

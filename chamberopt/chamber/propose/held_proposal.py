@@ -11,7 +11,6 @@ import numpy as np
 
 from chamberopt.chamber.build import build_chamber
 from chamberopt.chamber.checks.place_names import one_of
-from chamberopt.chamber.part import chosen_on_part
 from chamberopt.chamber.propose.proposal import (
     Proposal,
     Tables,
@@ -25,13 +24,18 @@ from chamberopt.chamber.propose.proposed_arbor import Bore
 from chamberopt.chamber.propose.proposed_end import HeldEnd
 from chamberopt.chamber.propose.proposed_floor import Floor
 from chamberopt.chamber.propose.proposed_holder import end_holder, holder_choices
-from chamberopt.chamber.propose.proposed_mask import are_holes, pads, to_be_masked, to_be_plugged
-from chamberopt.chamber.propose.proposed_target import LONG, Target, area_in_mm2
+from chamberopt.chamber.propose.proposed_mask import (
+    are_holes,
+    pads,
+    rows_of,
+    to_be_masked,
+    to_be_plugged,
+)
+from chamberopt.chamber.propose.proposed_target import LONG, Target, area_in_mm2, named_or_all
 from chamberopt.chamber.propose.shop import Shop
 from chamberopt.common.errors import InputError, UnreadableError
 from chamberopt.common.progress import Progress
 from chamberopt.design.fixture import USUAL_SHELL_MM, WIDEST_GAP
-from chamberopt.design.part import Selection
 
 MILLED_MM = 0.2  # between a part and a wall that is milled or printed round it
 SEEN_OUT = 1e-3  # m by which a part stands out of a side
@@ -104,8 +108,8 @@ def _outside_in_words(made: Proposal) -> str:
     signs = zip(("+", "-"), beyond, strict=True)
     sides = [f"{sign}{'xyz'[k]}" for sign, room in signs for k in range(3) if room[k] < -SEEN_OUT]
     outside, areas = part.area - chamber.exposed_area, {}
-    for one in [one for one in made.known if "surface" in one.keys] or made.known:
-        rows = chosen_on_part(made.design, Selection.model_validate(one.keys), "")
+    for one in named_or_all(made.known):
+        rows = rows_of(made.design, one.keys)
         if not np.any(rows & part.target):
             areas[one.name] = float(outside[rows].sum())
     least = JAW_SHARE * max(areas.values(), default=0.0)

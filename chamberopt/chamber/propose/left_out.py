@@ -10,7 +10,7 @@ import numpy as np
 from chamberopt.chamber.part import chosen_triangles
 from chamberopt.chamber.propose.proposal import Proposal, touched_share
 from chamberopt.chamber.propose.proposed_mask import MET, met_area
-from chamberopt.chamber.propose.proposed_target import RUNNING, Surface, area_in_mm2
+from chamberopt.chamber.propose.proposed_target import RUNNING, Surface, area_in_mm2, named_or_all
 from chamberopt.geometry.triangles import area_vectors, areas, rotation_matrix, unit_vectors
 
 AWAY_DEG = 105.0  # angle to the way down from which on a face is turned away from the sonotrode
@@ -70,8 +70,8 @@ def _met_beside(
     Args:
         target_area: area of the target [m²].
     """
-    named = [one for one in others if "surface" in one.keys] or others
-    areas_of = ((one, met_area(proposal.design, proposal.chamber, one)) for one in named)
+    design, chamber = proposal.design, proposal.chamber
+    areas_of = ((one, met_area(design, chamber, one)) for one in named_or_all(others))
     met = [
         (one, inside, whole)
         for one, (inside, whole) in areas_of

@@ -12,6 +12,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from chamberopt.chamber.propose.proposal import REPLICAS, Proposal, touched_share
+from chamberopt.common.number_text import rounded
 from chamberopt.design.intensity import PredictedIntensity
 
 DENTS, MARGIN = 25.0, 1.3  # needed in a window; over what is needed, as a pilot is short
@@ -113,7 +114,7 @@ def propose_budget(found: Measured, asked: Asked | None = None) -> Budget:
     widest = max(1.0, WIDEST * found.target / USUAL_GAUGE)
     gauge = min(_rounded_up(max(1.0, needed / dents)), float(f"{widest:.2g}"))
     expected = (
-        f"about {_plain(dents * gauge, 2)} dents in a window by a pilot; {needed:.0f} would do"
+        f"about {rounded(dents * gauge, 2)} dents in a window by a pilot; {needed:.0f} would do"
     )
     few = f"; TOO FEW DENTS within {MINUTES:g} minutes on two cores; give more"
     wider = f"WIDER than the usual 1 mm²: enough dents within {MINUTES:g} minutes on two cores"
@@ -168,7 +169,7 @@ def _said_of_treatment(found: Measured, treatment: float, coverage_percent: floa
         treatment: the treatment time [s].
         coverage_percent: wanted coverage, if one was asked for.
     """
-    spread = f" ± {_plain(found.spread, 1)}" if math.isfinite(found.spread) else ""
+    spread = f" ± {rounded(found.spread, 1)}" if math.isfinite(found.spread) else ""
     what = "95 % of the target is 98 % covered"
     if not found.places:
         what = "the target is 98 % covered ON AVERAGE (places are out of reach or not resolved)"
@@ -177,12 +178,12 @@ def _said_of_treatment(found: Measured, treatment: float, coverage_percent: floa
     long = f"; LONG: {_said_of_long(found)}" if found.time_to_98 > LONG else ""
     wanted = ""
     if coverage_percent is not None:
-        times = _plain(coverage_percent / 100.0, 3)
+        times = rounded(coverage_percent / 100.0, 3)
         wanted = f", {times} times that for the {coverage_percent:g} % that is asked for"
-    multiple = _plain(treatment / found.time_to_98, 2)
+    multiple = rounded(treatment / found.time_to_98, 2)
     return (
-        f"an estimate, rounded up: after about {_plain(found.time_to_98, 2)}{spread} s {what}"
-        f"{friction}, by a pilot of {_plain(found.simulated, 2)} simulated s{wanted}{more}: "
+        f"an estimate, rounded up: after about {rounded(found.time_to_98, 2)}{spread} s {what}"
+        f"{friction}, by a pilot of {rounded(found.simulated, 2)} simulated s{wanted}{more}: "
         f"{multiple} times the time to 98 %{long}"
     )
 
@@ -192,15 +193,10 @@ def _said_of_long(found: Measured) -> str:
     uneven = found.time_to_98 / found.mean_time
     if uneven > UNEVEN:
         return (
-            f"the least covered places take {_plain(uneven, 2)} times as long as the target on "
+            f"the least covered places take {rounded(uneven, 2)} times as long as the target on "
             "average: [[steps]] in further poses, turned over or round, may do"
         )
     return "few balls get to the target, or slowly: a larger sonotrode, harder balls or the study"
-
-
-def _plain(value: float, digits: int) -> str:
-    """Return a number rounded to some digits, without an exponent: 5000, not 5e+03."""
-    return f"{float(f'{value:.{digits}g}'):g}"
 
 
 def _rounded_up(value: float) -> float:

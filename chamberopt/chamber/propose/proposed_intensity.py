@@ -35,7 +35,7 @@ from chamberopt.chamber.propose.proposed_balls import (
 from chamberopt.chamber.propose.proposed_budget import Measured
 from chamberopt.chamber.propose.shop import ShopSonotrode, usual_shop
 from chamberopt.common.errors import InputError
-from chamberopt.common.number_text import plain
+from chamberopt.common.number_text import plain, rounded
 from chamberopt.design.almen_strip import OVER_A
 from chamberopt.design.intensity import (
     THIN_MM,
@@ -241,7 +241,7 @@ def with_larger_balls(
     both = fit_sizes(made.chamber.part, [1e-3 * now.ball_mm, 1e-3 * ball])
     here, there = (
         f"about {plain(value.value, 2)} mmA, {fit.served:.0%} of the target served, 98 % after "
-        f"about {float(f'{pilot.time_to_98:.2g}'):g} s"
+        f"about {rounded(pilot.time_to_98, 2)} s"
         for value, pilot, fit in (
             (found.intensity, found, both[0]),
             (told.intensity, told, both[1]),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -40,9 +40,14 @@ def is_met(design: Design, chamber: Chamber, surface: Surface) -> bool:
 
 def met_area(design: Design, chamber: Chamber, surface: Surface) -> tuple[float, float]:
     """Return the area of a surface in the chamber beside the target, and its whole area [m²]."""
-    rows = chosen_on_part(design, Selection.model_validate(surface.keys), "")
+    rows = rows_of(design, surface.keys)
     inside = chamber.exposed_area[rows & ~chamber.part.target].sum()
     return float(inside), float(chamber.part.area[rows].sum())
+
+
+def rows_of(design: Design, keys: Mapping[str, Any]) -> np.ndarray:
+    """Return the rows of the part's triangles that the keys of a selection choose, (m,) bool."""
+    return np.asarray(chosen_on_part(design, Selection.model_validate(keys), ""))
 
 
 def are_holes(
@@ -62,9 +67,9 @@ def to_be_plugged(
     found, area = [], chamber.part.area
     named = np.zeros(len(area), dtype=bool)
     if names:
-        named = chosen_on_part(design, Selection.model_validate({"surface": list(names)}), "")
+        named = rows_of(design, {"surface": list(names)})
     for bore in bores:
-        rows = chosen_on_part(design, Selection.model_validate({"faces": [bore.wall]}), "")
+        rows = rows_of(design, {"faces": [bore.wall]})
         whole, inside = area[rows].sum(), chamber.exposed_area[rows].sum()
         is_named = area[rows & named].sum() > MOSTLY * whole
         if is_named or (1.0 - MOSTLY) * whole < inside < MOSTLY * whole:

@@ -379,6 +379,11 @@ def _joined(chosen: Sequence[Surface], reason: str) -> Target:
     return Target(keys, marked, f"{', '.join(one.name for one in chosen)}: {reason}")
 
 
+def named_or_all(known: Sequence[Surface]) -> Sequence[Surface]:
+    """Return the surfaces that have a name in the part's file; all if none has."""
+    return [one for one in known if "surface" in one.keys] or known
+
+
 def area_in_mm2(area: float) -> str:
     """Return an area [m²] as text in mm², whole from 100 on, so that surfaces are told apart."""
     return f"{plain(1e6 * area, 3)} mm²"

@@ -31,6 +31,7 @@ from chamberopt.chamber.propose.proposal import (
 from chamberopt.chamber.propose.proposed_balls import MOST_BALLS
 from chamberopt.chamber.propose.proposed_budget import COVERED, LONG, UNEVEN, Measured
 from chamberopt.common.errors import InputError
+from chamberopt.common.number_text import rounded
 from chamberopt.geometry.triangles import rotation_matrix
 
 SLOW = 600.0  # s until 98 % of the target are dented, from which on other ways are tried
@@ -114,7 +115,7 @@ def propose_second_pose(
     try:
         two = _turned_over(made)
         for balls in RAISED:  # under a ceiling that fits one pose, balls may jam in the other
-            if _new_harm(two, made):
+            if "jam in" in _new_harm(two, made):
                 two = min(two, _turned_over(made, balls), key=faults)
     except InputError:
         return dropped("what holds it here does not hold it there")
@@ -230,7 +231,7 @@ def _sonotrodes(made: Proposal) -> int:
 def _after(found: Measured | None) -> str:
     if found is None:
         return "no pilot"
-    return f"98 % after about {float(f'{found.time_to_98:.2g}'):g} s"
+    return f"98 % after about {rounded(found.time_to_98, 2)} s"
 
 
 def _with_pose_told(best: Way, first: Way, tried: list[tuple[Way, str]]) -> Way:
