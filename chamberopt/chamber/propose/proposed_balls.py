@@ -25,6 +25,7 @@ from chamberopt.geometry.triangles import areas, interpolate, unit_vectors
 POINTS = 8_000  # on the target, and as many on the rest of the part
 MISSED = 0.05  # share of the target's area that a larger ball may fail to touch
 AS_GOOD = 0.05  # share of the target's area within which two sizes serve alike
+MOSTLY = 0.8  # share of the target's area that balls serve which an intensity takes, by heart
 # Balls in the charge: of sizes that need more, the largest is taken that serves as well. Thousands
 # of small balls make weak dents, are hard to get back from a chamber, and are slow to simulate.
 MANY = 3000
@@ -136,6 +137,16 @@ def serving_sizes(fits: Sequence[SizeFit]) -> list[float]:
         and one.touched >= best.touched - MISSED
         and one.served >= best.served - AS_GOOD
     ]
+
+
+def mostly_serving(fits: Sequence[SizeFit]) -> list[SizeFit]:
+    """Return the sizes larger than the proposed ball that serve MOSTLY of the target and jam not.
+
+    Args:
+        fits: sizes in ascending order.
+    """
+    largest = propose_ball(fits)[0]
+    return [one for one in fits if one.diameter > largest and one.served >= MOSTLY and not one.jam]
 
 
 def propose_ball(fits: Sequence[SizeFit]) -> tuple[float, str]:

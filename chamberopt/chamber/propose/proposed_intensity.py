@@ -17,7 +17,7 @@ proposed was simulated itself.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -28,6 +28,7 @@ from chamberopt.chamber.propose.proposed_balls import (
     OF_THIN,
     THIN_SHARE,
     fit_sizes,
+    mostly_serving,
     serving_sizes,
     sizes_to_try,
     thinnest,
@@ -81,15 +82,39 @@ class IntensityPilot(NamedTuple):
     dents: float
 
 
-def settings_of(made: Proposal, wanted: Wanted) -> list[Setting]:
+class Settings(NamedTuple):
+    """What may be set for an intensity.
+
+    Attributes:
+        serving: balls that serve the target as well as any, with all amplitudes of the sonotrode.
+        larger: larger balls that serve most of it, with all amplitudes.
+        served: share of the target that each size serves, by diameter [mm].
+    """
+
+    serving: list[Setting]
+    larger: list[Setting]
+    served: dict[float, float]
+
+
+def settings_of(made: Proposal, wanted: Wanted) -> Settings:
     """Return the balls that the geometry allows, each with all amplitudes of the sonotrode."""
-    balls = [1e3 * made.design.shot.diameter]
-    if wanted.ball_mm is None:
-        stock = (wanted.shop or usual_shop()).stock_mm(made.tables["shot"]["material"])
-        part = made.chamber.part
-        balls = [1e3 * one for one in serving_sizes(fit_sizes(part, sizes_to_try(part, stock)))]
     amplitudes = _amplitudes(made.sonotrode)[1]
-    return [Setting(round(ball, 4), one) for ball in balls for one in amplitudes]
+
+    def with_each(diameters: Iterable[float]) -> list[Setting]:
+        return [Setting(_in_mm(ball), one) for ball in diameters for one in amplitudes]
+
+    if wanted.ball_mm is not None:
+        return Settings(with_each([made.design.shot.diameter]), [], {})
+    stock = (wanted.shop or usual_shop()).stock_mm(made.tables["shot"]["material"])
+    part = made.chamber.part
+    fits = fit_sizes(part, sizes_to_try(part, stock))
+    larger = with_each(one.diameter for one in mostly_serving(fits))
+    served = {_in_mm(one.diameter): one.served for one in fits}
+    return Settings(with_each(serving_sizes(fits)), larger, served)
+
+
+def _in_mm(diameter: float) -> float:
+    return round(1e3 * diameter, 4)
 
 
 def setting_of(made: Proposal) -> Setting:
@@ -153,6 +178,9 @@ def propose_intensity(
 ) -> Proposal:
     """Return a proposal with balls and an amplitude for a wanted intensity, and the reasons.
 
+    Where all balls that serve the target as well as any are too weak, larger ones are taken that
+    serve most of it, and what this costs is told.
+
     Args:
         made: the proposal by geometry alone.
         again: proposes the design for other wishes.
@@ -164,7 +192,9 @@ def propose_intensity(
     if calibration is not None and calibration.not_mmA:
         text = f"the calibration has arc heights of a {calibration.strips}, which are not mmA"
         raise InputError(f"--calibration: {text}; calibrate with whole strips")
-    settings, by_ball = settings_of(made, wanted), {setting_of(made).ball_mm: made}
+    possible = settings_of(made, wanted)
+    settings, larger = possible.serving, possible.larger
+    by_ball = {setting_of(made).ball_mm: made}
     reason = made.reasons["shot.diameter_mm"]
     found: dict[Setting, IntensityPilot] = {}
     chosen, pilots = setting_of(made), 0
@@ -192,12 +222,37 @@ def propose_intensity(
             settings = [one for one in settings if one != chosen]
         else:
             found[chosen] = predicted
+            simulated = _values(found)
+            if all(intensity.off(expected_intensity(x, simulated)) < 0.0 for x in settings):
+                settings, larger = [*settings, *larger], []
         left = settings if pilots < MOST_PILOTS else [*found]
         chosen = choose(intensity, left, _values(found))
-    one = replace(by_ball[chosen.ball_mm], strength_dents=found[chosen].dents)
+    one = by_ball[chosen.ball_mm]
+    if chosen in possible.larger:
+        reason = _of_larger(chosen, setting_of(made).ball_mm, possible, _values(found))
+        one = replace(one, reasons={**one.reasons, "shot.diameter_mm": reason})
+    one = replace(one, strength_dents=found[chosen].dents)
     others = _other(intensity, [x for x in settings if x != chosen], found)
     told = _with_amplitude(one, chosen), intensity, found[chosen].predicted
     return _told(*told, others, reason)
+
+
+def _of_larger(
+    chosen: Setting, small: float, possible: Settings, simulated: Mapping[Setting, float]
+) -> str:
+    """Return in words why balls were chosen that serve less of the target than smaller ones do.
+
+    Args:
+        small: diameter of the balls that geometry alone would have given [mm].
+        simulated: intensities of settings that were simulated [mmA].
+    """
+    of_small = [one for one in possible.serving if one.ball_mm == small]
+    best = max(expected_intensity(one, simulated) for one in of_small)
+    return (
+        f"LARGER BALLS FOR THE INTENSITY: they serve {possible.served[chosen.ball_mm]:.0%} of the "
+        f"target, and {small:g} mm would serve {possible.served[small]:.0%}, with about "
+        f"{plain(best, 2)} mmA"
+    )
 
 
 def with_larger_balls(

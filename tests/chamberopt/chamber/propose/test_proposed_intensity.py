@@ -10,7 +10,7 @@ import trimesh
 
 from chamberopt.chamber.propose.first_design import propose
 from chamberopt.chamber.propose.proposal import Proposal, Wanted
-from chamberopt.chamber.propose.proposed_balls import SizeFit, serving_sizes
+from chamberopt.chamber.propose.proposed_balls import SizeFit, mostly_serving, serving_sizes
 from chamberopt.chamber.propose.proposed_budget import Asked, Measured, propose_budget
 from chamberopt.chamber.propose.proposed_intensity import (
     AMPLITUDE_POWER,
@@ -18,6 +18,7 @@ from chamberopt.chamber.propose.proposed_intensity import (
     MOST_PILOTS,
     IntensityPilot,
     Setting,
+    Settings,
     as_no_wish,
     choose,
     expected_intensity,
@@ -77,7 +78,10 @@ def test_where_none_gives_it_the_nearest_is_chosen(
 
 def test_balls_that_serve_less_or_jam_or_are_too_many_are_not_tried() -> None:
     fits = [fit(0.5, count=9000), fit(1), fit(1.5, jam=1.5e-3), fit(2), fit(3, served=0.5)]
-    assert serving_sizes([replace(one, suits=one.served > 0.9) for one in fits]) == [1e-3, 2e-3]
+    fits = [replace(one, suits=one.served > 0.9) for one in fits]
+    assert serving_sizes(fits) == [1e-3, 2e-3]
+    more = [fit(2.2, served=0.85, suits=False), fit(2.5, served=0.85, jam=2.5e-3), fits[-1]]
+    assert mostly_serving([*fits[:-1], *more]) == more[:1]
 
 
 @dataclass
@@ -140,12 +144,11 @@ def test_machines_of_other_laws_are_found_by_pilots(
     made = propose_intensity(bare, wanted, intensity, again, law.simulate)
     assert 1 <= law.pilots <= MOST_PILOTS
     one = setting_of(made)
-    assert one in settings_of(bare, wanted)  # of the shop's balls and its amplitudes
+    possible = [*settings_of(bare, wanted).serving, *settings_of(bare, wanted).larger]
+    assert one in possible  # of the shop's balls and its amplitudes
     assert made.tables["sonotrode"]["amplitude_pv_um"] == 2.0 * one.amplitude_um
     value = law.level * one.ball_mm**law.p * one.amplitude_um**law.q
-    reach = [
-        law.level * x.ball_mm**law.p * x.amplitude_um**law.q for x in settings_of(bare, wanted)
-    ]
+    reach = [law.level * x.ball_mm**law.p * x.amplitude_um**law.q for x in possible]
     if any(not intensity.off(x) for x in reach):
         assert not intensity.off(value)
         assert "the value is inside" in made.reasons["process.intensity_mmA"]
@@ -154,12 +157,39 @@ def test_machines_of_other_laws_are_found_by_pilots(
     assert made.design.process.intensity_mmA == (intensity.low, intensity.high)
 
 
+@pytest.mark.parametrize(("given", "ball_mm"), [("0.10-0.15A", 1.5), ("0.03-0.05A", 1.0)])
+def test_larger_balls_that_serve_most_are_taken_only_for_the_intensity(
+    plate: Path, shop: Shop, given: str, ball_mm: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With I = D A / 500 mmA, balls of 1 mm reach 0.08 mmA."""
+    wanted, law = Wanted("mm", shop=shop), Machine(2e-3, q=1.0)
+    by_size = {
+        ball: propose(plate, replace(wanted, ball_mm=ball), lambda _: []) for ball in (1.0, 1.5)
+    }
+    small, large = ([one for one in SETTINGS if one.ball_mm == ball] for ball in (1.0, 1.5))
+    possible = Settings(small, large, {1.0: 0.97, 1.5: 0.85})
+    monkeypatch.setattr(
+        "chamberopt.chamber.propose.proposed_intensity.settings_of", lambda *_: possible
+    )
+    made = propose_intensity(
+        by_size[1.0],
+        wanted,
+        WantedIntensity.parse(given),
+        lambda other: by_size[other.ball_mm or 0.0],
+        law.simulate,
+    )
+    assert setting_of(made).ball_mm == ball_mm
+    reason = made.reasons["shot.diameter_mm"]
+    told = "they serve 85% of the target, and 1 mm would serve 97%, with about 0.08 mmA"
+    assert (told in reason) == (ball_mm == 1.5)
+
+
 def test_what_is_written_loads_and_has_the_band_beside_the_value(
     plate: Path, shop: Shop, tmp_path: Path
 ) -> None:
     wanted = Wanted("mm", ball_mm=2.0, shop=shop, coverage=200.0)
     bare = propose(plate, wanted, lambda _: [])
-    assert {one.ball_mm for one in settings_of(bare, wanted)} == {2.0}  # as asked
+    assert {one.ball_mm for one in settings_of(bare, wanted).serving} == {2.0}  # as asked
     far = WantedIntensity.parse("1.0-1.2A")
     made = propose_intensity(bare, wanted, far, lambda _: bare, Machine(2.0e-3).simulate)
     reason = made.reasons["process.intensity_mmA"]
