@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from chamberopt.chamber.checks.check import shot_reach
+from chamberopt.chamber.checks.check import touched
 from chamberopt.chamber.flexure import softness_of_part
-from chamberopt.chamber.reach import reached_part_share
 from chamberopt.pictures.actors import FAULT, NO_RENDER, add_edges
 from chamberopt.pictures.camera import cells_of, near_directions, near_views, pushed_back, seen_area
 from chamberopt.pictures.charts.colours import BLUE, KINDS
@@ -56,9 +55,7 @@ ALL = 0.999  # share of the target's area from which it is wholly in the chamber
 OPPOSITE = np.array([(1.0, -1.6, 0.7), (-1.0, 1.6, -0.7)])
 
 
-def draw_target(
-    chamber: Chamber, reach: Reach, screenshot: Path, design: Design | None = None
-) -> str:
+def draw_target(design: Design, chamber: Chamber, reach: Reach, screenshot: Path) -> str:
     """Draw the part with its target, and mark triangles of the target that are out of reach.
 
     With steps, the part stands as in the first, and what is marked is out of reach in all of them.
@@ -67,16 +64,10 @@ def draw_target(
 
     Return in words where the picture is, or why there is none.
     """
-    part, missed = chamber.part, chamber.part.target
-    rooms = [(reach, chamber)]
-    if design is not None and chamber.steps:
-        steps = zip(design.in_steps.values(), chamber.steps, strict=True)
-        rooms = [(shot_reach(one, room), room) for one, room in steps]
-    for found, room in rooms:
-        missed = missed & (reached_part_share(found, room.source, len(part.triangles)) <= 0.5)
+    part = chamber.part
+    missed = part.target & (touched(design, chamber, reach) <= 0.5)
     corners = part.vertices[part.triangles]
-    softness = None if design is None else softness_of_part(design, part)
-    more = {"missed": missed, "softness": softness}
+    more = {"missed": missed, "softness": softness_of_part(design, part)}
     remark = draw_part(corners, part.name, screenshot, part.target, chamber=chamber, **more)
     return remark or f"picture in {screenshot}"
 

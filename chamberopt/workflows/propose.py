@@ -151,11 +151,11 @@ def _written(first: Proposal, pilots: _Pilots, folder: Path) -> Proposed:
     """Write what pilots make of a first proposal into a folder."""
     teller = pilots.teller
     with teller.step("drawing"):  # before the pilots, so that it can be looked at meanwhile
-        teller.tell(draw_target(first.chamber, first.reach, folder / PICTURE))
+        teller.tell(draw_target(first.design, first.chamber, first.reach, folder / PICTURE))
     made = pilots.improve(first) if pilots.wishes.pilot else first
     if made.chamber is not first.chamber:
         with teller.step("drawing"):
-            teller.tell(draw_target(made.chamber, made.reach, folder / PICTURE))
+            teller.tell(draw_target(made.design, made.chamber, made.reach, folder / PICTURE))
     left_out = find_left_out(made)
     write_text(folder / DESIGN, design_text(made, folder, left_out))
     studies = study_texts(made, DESIGN)

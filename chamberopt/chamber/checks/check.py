@@ -227,6 +227,23 @@ def shot_reach(design: Design, chamber: Chamber) -> Reach:
     )
 
 
+def touched(design: Design, chamber: Chamber, reach: Reach) -> np.ndarray:
+    """Return the share of each triangle of the part that the balls can touch, (m,).
+
+    With steps it is that of the step in which they touch most of it.
+
+    Args:
+        reach: the points of the chamber's surface that the shot reaches, without steps.
+    """
+    rooms = [(reach, chamber)]
+    if chamber.steps:
+        steps = zip(design.in_steps.values(), chamber.steps, strict=True)
+        rooms = [(shot_reach(one, room), room) for one, room in steps]
+    count = len(chamber.part.triangles)
+    each = [reached_part_share(found, room.source, count) for found, room in rooms]
+    return np.asarray(np.max(each, axis=0))
+
+
 def warnings(design: Design, chamber: Chamber, reach: Reach | None = None) -> list[str]:
     """Return warnings about values that are allowed but probably not intended, with remedies.
 

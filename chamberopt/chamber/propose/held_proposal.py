@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from chamberopt.chamber.build import build_chamber
+from chamberopt.chamber.checks.check import touched
 from chamberopt.chamber.checks.place_names import one_of
 from chamberopt.chamber.propose.proposal import (
     Proposal,
@@ -17,7 +18,6 @@ from chamberopt.chamber.propose.proposal import (
     checked,
     faults,
     new_warning,
-    touched,
     touched_share,
 )
 from chamberopt.chamber.propose.proposed_arbor import Bore
@@ -188,8 +188,8 @@ def only_touched(made: Proposal, floor: Floor, shop: Shop | None) -> Proposal:
     if not LEAST_LEFT < hidden < MOST_LEFT:
         return made
     target = {**made.tables["part.target"], "reachable": True}
-    part = made.chamber.part
-    left = np.where(part.target, (1.0 - touched(made)) * part.area, 0.0)
+    part, share = made.chamber.part, touched(made.design, made.chamber, made.reach)
+    left = np.where(part.target, (1.0 - share) * part.area, 0.0)
     place = one_of(part.vertices[part.triangles].mean(axis=1), left)
     text = f"leaves out the {hidden:.1%} that no ball touches here, such as at {place}"
     reasons = {**made.reasons, "part.target.reachable": text}

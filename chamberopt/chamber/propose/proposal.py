@@ -8,10 +8,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from chamberopt.chamber.build import Chamber, build_chamber
-from chamberopt.chamber.checks.check import shot_reach, warnings
+from chamberopt.chamber.checks.check import shot_reach, touched, warnings
 from chamberopt.chamber.checks.jams import JamGap, gaps_in_reach, jam_gaps
 from chamberopt.chamber.propose.pose import Pose
 from chamberopt.chamber.propose.proposed_balls import MOST_BALLS, charge_of
@@ -20,7 +18,7 @@ from chamberopt.chamber.propose.proposed_target import Sizes, Surface
 from chamberopt.chamber.propose.proposed_tolerances import REASON as OF_LENGTHS
 from chamberopt.chamber.propose.proposed_tolerances import propose_tolerances
 from chamberopt.chamber.propose.shop import Shop, ShopSonotrode
-from chamberopt.chamber.reach import Reach, reached_part_share
+from chamberopt.chamber.reach import Reach
 from chamberopt.chamber.scene import MAX_BALLS
 from chamberopt.common.errors import InputError
 from chamberopt.common.toml_fields import allowed_range
@@ -168,23 +166,9 @@ def new_warning(made: Proposal, before: Proposal) -> str:
     return next(iter(new or made.warnings), "balls jam in a gap")
 
 
-def touched(made: Proposal) -> np.ndarray:
-    """Return the share of each triangle of the part that the balls can touch, (m,).
-
-    With steps it is that of the step in which they touch most of it.
-    """
-    rooms = [(made.reach, made.chamber)]
-    if made.chamber.steps:
-        steps = zip(made.design.in_steps.values(), made.chamber.steps, strict=True)
-        rooms = [(shot_reach(one, room), room) for one, room in steps]
-    count = len(made.chamber.part.triangles)
-    each = [reached_part_share(reach, room.source, count) for reach, room in rooms]
-    return np.asarray(np.max(each, axis=0))
-
-
 def touched_share(made: Proposal) -> float:
     """Return the share of the target's area that the balls can touch."""
-    part, share = made.chamber.part, touched(made)
+    part, share = made.chamber.part, touched(made.design, made.chamber, made.reach)
     return float(share[part.target] @ part.area[part.target] / part.area[part.target].sum())
 
 

@@ -81,7 +81,7 @@ def _check(file: Path, pilot: bool, screenshot: Path | None, json: bool, out: Pa
         facts = describe(design, chamber, reach)
     if screenshot is not None:
         with step("drawing"):
-            print_remarks([draw_target(chamber, reach, screenshot, design)])
+            print_remarks([draw_target(design, chamber, reach, screenshot)])
     if isinstance(loaded, Study):
         facts["vary"] = {
             name: {"values": list(varied.texts), "start": setting(design, name)}
