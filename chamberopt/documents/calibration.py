@@ -10,6 +10,8 @@ import numpy as np
 
 from chamberopt.common.number_text import plain
 from chamberopt.design.calibration import TIME_ERROR, Parameter
+from chamberopt.documents.document import Table
+from chamberopt.documents.terminal_lines import note_lines
 from chamberopt.peening.measured import falls
 from chamberopt.peening.profile_fit import law_prior
 
@@ -30,13 +32,60 @@ WORDS: dict[Parameter, tuple[str, str]] = {
 UNKNOWN = 1.5  # standard deviation of a logarithm: a 95 % interval of a factor of 20 either way
 NOT_SETTLED = 0.5  # standard deviations
 FAR = 3.0  # standard deviations from the prior mean
+EXPLAINED = "The model explains what was measured"
+# Why a misfit is bad, and what follows: one to measurements, and one to profiles of stress.
+OF_MEASURED = (
+    "the model does not explain your {}",
+    ", so that all intervals are wider; look at the picture, check the measurements and what the "
+    "design assumes",
+)
+OF_PROFILES = ("the law does not have the shape of your profiles", "")
+
+
+def calibration_end(
+    found: Calibrated, predictions: Sequence[Prediction], verbose: bool
+) -> list[Table | str]:
+    """Return the end of the command `calibrate`: a sentence, what is known now, and notes.
+
+    Args:
+        verbose: the parameters and the misfits to each kind of measurement follow, and all notes.
+    """
+    both = (
+        *((one, OF_MEASURED) for one in found.table.misfits),
+        *((law.misfit, OF_PROFILES) for law in found.table.stress),
+    )
+    bad = [(one, faults) for one, faults in both if one.error_scale != 1.0]
+    kinds = ", ".join(one.kind for one, _ in bad)
+    sentence = f"The model does not explain what was measured: {kinds}" if bad else EXPLAINED
+    first = next(iter(predictions), None)
+    if first is not None:
+        now, before = _percent(first.sd), _percent(first.sd_before)
+        sentence += f"; the {first.words} of its design is known to {now} (before: {before})"
+    table = Table(
+        "",
+        ("standard deviation of the", "before", "now", "best measured next", "then"),
+        [
+            (one.words, _percent(one.sd_before), _percent(one.sd))
+            + ((one.next_name, _percent(one.next_sd)) if one.next_name else ("-", "-"))
+            for one in predictions
+        ],
+        numbers=False,
+    )
+    more = _lines(found, predictions) if verbose else [_misfit_line(*one) for one in bad]
+    notes = note_lines(calibration_notes(found), verbose)
+    return [f"{sentence}.", "", table, "", *more, *notes]
 
 
 def calibration_lines(found: Calibrated, predictions: Sequence[Prediction]) -> list[str]:
-    """Return the lines that the command `calibrate` prints.
+    """Return the lines of calibration.txt.
 
     They give the parameters, the misfits, the predictions and the most useful next measurement.
     """
+    return [*_lines(found, predictions), *(f"note: {text}" for text in calibration_notes(found))]
+
+
+def _lines(found: Calibrated, predictions: Sequence[Prediction]) -> list[str]:
+    """Return the lines of calibration.txt without its notes."""
     prior, table = found.posterior.prior, found.table
     lines = [f"{'parameter':32}{'before':>20}{'now':>20}    (median ± standard deviation)"]
     for k, name in enumerate(prior.names):
@@ -46,22 +95,14 @@ def calibration_lines(found: Calibrated, predictions: Sequence[Prediction]) -> l
         now = _value(table.log_mean[k], table.log_sd(name), unit)
         lines.append(f"{words:32}{before:>20}{now:>20}")
     lines += ["", "how well the model explains what was measured"]
-    for one in table.misfits:
-        lines.append(
-            _misfit_line(
-                one,
-                f"the model does not explain your {one.kind}",
-                ", so that all intervals are "
-                "wider; look at the picture, check the measurements and what the design assumes",
-            )
-        )
+    lines += [_misfit_line(one, OF_MEASURED) for one in table.misfits]
     for law in table.stress:
         lines += ["", f"the law of residual stress for {law.metal}"]
         for k, words in enumerate(("depths", "largest stress", "stress at the surface")):
             before = _value(0.0, float(law_prior().sd[k]), "")
             now = _value(law.log_mean[k], math.sqrt(law.log_covariance[k][k]), "")
             lines.append(f"{words + ', times':32}{before:>20}{now:>20}")
-        lines.append(_misfit_line(law.misfit, "the law does not have the shape of your profiles"))
+        lines.append(_misfit_line(law.misfit, OF_PROFILES))
     peak_to_valley, balls = 2e6 * found.design.sonotrode.amplitude, found.design.shot.count
     as_designed = f"as designed ({peak_to_valley:g} µm peak to valley, {balls} balls)"
     lines += ["", f"{as_designed}: standard deviations"]
@@ -70,14 +111,15 @@ def calibration_lines(found: Calibrated, predictions: Sequence[Prediction]) -> l
         if figure.next_name:
             spread += f"; with {figure.next_name}: {_percent(figure.next_sd)}"
         lines.append(f"{figure.words:32}{spread}")
-    return [*lines, *(f"note: {text}" for text in calibration_notes(found))]
+    return lines
 
 
-def _misfit_line(one: Misfit, else_why: str, then: str = "") -> str:
+def _misfit_line(one: Misfit, faults: tuple[str, str]) -> str:
     """Return a line with chi² of a kind of measurement, and a verdict."""
+    why, then = faults
     text = f"chi² = {plain(one.chi2, 2)} of {one.values} value{'s' * (one.values > 1)}"
     scale = f"their errors are taken {plain(one.error_scale, 2)} times as large"
-    verdict = "well" if one.error_scale == 1.0 else f"{else_why}: {scale}{then}"
+    verdict = "well" if one.error_scale == 1.0 else f"{why.format(one.kind)}: {scale}{then}"
     return f"{one.kind:32}{text:30}{verdict}"
 
 

@@ -102,7 +102,7 @@ def note_lines(notes: Iterable[str], verbose: bool = True) -> Iterator[str]:
     shown = every if verbose else every[:MOST_NOTES]
     yield from shown
     if left := len(every) - len(shown):
-        yield f"and {counted(left, 'more note')}: --verbose, or in the report"
+        yield f"and {counted(left, 'more note')}: --verbose shows all"
 
 
 def replicas_text(design: Design) -> str:

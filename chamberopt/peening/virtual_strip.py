@@ -212,12 +212,12 @@ def peen_strip(
         drawn_at=slower * drawn_at,
         drawn=drawn,
         fits=kirk_fits(slower * at, np.array([one.value for one in points])),
-        notes=(
+        notes=(  # what makes the numbers wrong, what they mean, and how they were found
+            *_few_dents(dents),
+            *((note,) if note else ()),
             *((why_not, ONLY_RATIOS) if why_not else _calibrated_notes(setting, intensity.value)),
             *setting.notes,
             FITS,
-            *((note,) if note else ()),
-            *_few_dents(dents),
             *resting_notes([one.resting for one in replicas if one.resting], len(replicas)),
             *trapped_notes([one.trapped for one in replicas], design),
         ),

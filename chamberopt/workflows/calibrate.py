@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from chamberopt.design.load import Design
     from chamberopt.peening.calibrate import Calibrated
     from chamberopt.peening.measured import Measured
+    from chamberopt.peening.next_measurement import Prediction
     from chamberopt.workflows.simulate import Teller
 
 MACHINE = "machine.toml"
@@ -40,7 +41,7 @@ def calibrate_machine(
     folder: Path,
     executor: Executor,
     teller: Teller,
-) -> tuple[Calibrated, list[str]]:
+) -> tuple[Calibrated, list[Prediction]]:
     """Calibrate the model to measurements, and save the machine in a new or empty folder.
 
     Args:
@@ -48,7 +49,7 @@ def calibrate_machine(
         designs: the designs that were measured, by name, from load_measured.
 
     Returns:
-        The calibration, and the lines of calibration.txt.
+        The calibration, and what it predicts of its design.
     """
     with teller.step("building the chambers"), private_folder() as lids:
         prepared = prepare(measured, designs, Path(lids))
@@ -61,15 +62,15 @@ def calibrate_machine(
             table = calibrate_law(measured, designs, found.table, executor)
             found = replace(found, table=table)
     with teller.step("writing and drawing"):
-        lines = save_calibration(folder, found)
-    return found, lines
+        predictions = save_calibration(folder, found)
+    return found, predictions
 
 
-def save_calibration(folder: Path, found: Calibrated) -> list[str]:
+def save_calibration(folder: Path, found: Calibrated) -> list[Prediction]:
     """Write machine.toml, design.toml and calibration.txt, .png and .json of a calibration.
 
     Returns:
-        The lines of calibration.txt.
+        What the calibration predicts of its design.
     """
     predictions = predict(found)
     lines = calibration_lines(found, predictions)
@@ -80,7 +81,7 @@ def save_calibration(folder: Path, found: Calibrated) -> list[str]:
     calibration_picture(folder / "calibration.png", found)
     record = calibration_record(found, predictions, calibration_notes(found))
     write_record(folder / "calibration.json", record)
-    return lines
+    return predictions
 
 
 def machine_text(table: Calibration) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from chamberopt.cli import console
-from chamberopt.cli.options import Cluster, Json, Out, Workers, app
+from chamberopt.cli.options import Cluster, Json, Out, Verbose, Workers, app
 
 
 @app.command
@@ -17,6 +17,7 @@ def calibrate(
     cluster: Cluster = None,
     json: Json = False,
     out: Out = None,
+    verbose: Verbose = False,
 ) -> None:
     """Calibrate the model to a machine: strips, coupons, ball drops, amplitude, impact rates.
 
@@ -30,6 +31,7 @@ def calibrate(
     """
     from chamberopt.cli.teller import TerminalTeller
     from chamberopt.common.executor import open_executor
+    from chamberopt.documents.calibration import calibration_end
     from chamberopt.peening.measured import load_measured
     from chamberopt.workflows.calibrate import calibrate_machine
 
@@ -38,5 +40,5 @@ def calibrate(
         console.results_folder(out, measured.stem) as folder,
         open_executor(workers, cluster) as executor,
     ):
-        _, lines = calibrate_machine(loaded, designs, folder, executor, TerminalTeller())
-    console.print_result(lines, folder, json, "calibration.json")
+        found, known = calibrate_machine(loaded, designs, folder, executor, TerminalTeller())
+    console.print_result(calibration_end(found, known, verbose), folder, json, "calibration.json")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from cyclopts import Parameter
 
 from chamberopt.cli import console
-from chamberopt.cli.options import Cluster, Json, Out, Workers, app
+from chamberopt.cli.options import Cluster, Json, Out, Verbose, Workers, app
 from chamberopt.common.errors import InputError
 
 if TYPE_CHECKING:
@@ -34,6 +34,7 @@ def strip(
     cluster: Cluster = None,
     json: Json = False,
     out: Out = None,
+    verbose: Verbose = False,
 ) -> None:
     """Peen a virtual Almen strip: its saturation curve, intensity and saturation time.
 
@@ -60,8 +61,7 @@ def strip(
     from chamberopt.common.executor import open_executor
     from chamberopt.design.load import load_design
     from chamberopt.design.zones import LID
-    from chamberopt.documents.strip import strip_lines
-    from chamberopt.documents.terminal_lines import note_lines
+    from chamberopt.documents.strip import strip_end
     from chamberopt.workflows.strip import StripPlace, peen_strip_in
 
     place = StripPlace(strip_type, at, _size(disc_mm, size_mm), distance_mm)
@@ -74,8 +74,8 @@ def strip(
         open_executor(workers, cluster) as executor,
     ):
         peened, advice = peen_strip_in(loaded, place, folder, executor, TerminalTeller())
-    notes = note_lines([*map(str, advice), *peened.notes])
-    console.print_result([*strip_lines(peened), *notes], folder, json, "strip.json")
+    end = strip_end(peened, map(str, advice), verbose)
+    console.print_result(end, folder, json, "strip.json")
 
 
 def _size(disc_mm: float | None, size_mm: tuple[float, float] | None) -> StripSize:

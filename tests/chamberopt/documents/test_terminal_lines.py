@@ -12,8 +12,8 @@ from chamberopt.documents.wording import metric_label, objective_label
     ("count", "verbose", "last"),
     [
         (3, False, "note: 2"),
-        (4, False, "and 1 more note: --verbose, or in the report"),
-        (9, False, "and 6 more notes: --verbose, or in the report"),
+        (4, False, "and 1 more note: --verbose shows all"),
+        (9, False, "and 6 more notes: --verbose shows all"),
         (9, True, "note: 8"),
     ],
 )

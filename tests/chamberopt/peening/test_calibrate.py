@@ -19,7 +19,7 @@ from chamberopt.coverage.part_impacts import Hits
 from chamberopt.design.calibration import Parameter, calibrated_strip
 from chamberopt.design.design import Design, validate
 from chamberopt.design.load import load_design, save_design
-from chamberopt.documents.calibration import calibration_lines
+from chamberopt.documents.calibration import calibration_end, calibration_lines
 from chamberopt.peening.calibrate import Calibrated, calibrate, prepare
 from chamberopt.peening.kirk_fit import heights
 from chamberopt.peening.measured import Measured, load_measured
@@ -28,6 +28,7 @@ from chamberopt.peening.posterior import TOGETHER, fit_surface
 from chamberopt.peening.probes import ArcProbe, Impacts, PartProbe
 from chamberopt.peening.setups import DropModel, Setup, exact_calibration
 from chamberopt.peening.strip import StripSize, strip_cells
+from chamberopt.printers import terminal
 from chamberopt.workflows.calibrate import save_calibration
 from tests.helpers.synthetic import plate_design
 
@@ -190,6 +191,10 @@ def test_the_result_is_a_machine_that_designs_can_name(found: Calibrated, tmp_pa
     text = "\n".join(calibration_lines(found, predict(found)))
     assert "arc heights" in text
     assert "does not explain" not in text
+    end = terminal.text(calibration_end(found, predict(found), verbose=False))
+    assert end.startswith("The model explains what was measured; the Almen intensity of its design")
+    assert "chi²" not in end
+    assert "chi²" in terminal.text(calibration_end(found, predict(found), verbose=True))
 
 
 def _text(folder: Path, design: Any) -> str:
@@ -224,6 +229,9 @@ def test_what_the_model_cannot_explain_is_said_and_widens_intervals(
     text = "\n".join(calibration_lines(worse, predict(worse)))
     assert "does not explain your arc heights: their errors are taken" in text
     assert "strip.1 (60 µm peak to valley): the arc after 160 s is below an earlier one" in text
+    end = terminal.text(calibration_end(worse, predict(worse), verbose=False))
+    assert end.startswith("The model does not explain what was measured: arc heights")
+    assert "does not explain your arc heights: their errors are taken" in end
 
 
 def test_parameters_that_nobody_expects_widen_intervals_too(tmp_path: Path) -> None:

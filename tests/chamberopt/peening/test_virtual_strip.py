@@ -19,10 +19,11 @@ from chamberopt.common.executor import SerialExecutor
 from chamberopt.coverage.strength import strip_dents
 from chamberopt.design.calibration import NO_CALIBRATION, NO_STRIPS, TIME_ERROR
 from chamberopt.design.load import load_design, save_design
-from chamberopt.documents.strip import strip_lines
+from chamberopt.documents.strip import strip_end
 from chamberopt.peening import virtual_strip
 from chamberopt.peening.strip import StripSize, strip_cells
 from chamberopt.peening.virtual_strip import VirtualStrip, peen_strip, strip_in_lid
+from chamberopt.printers import terminal
 from chamberopt.simulation.replicas import Replica, ReplicaSetting
 from chamberopt.simulation.trapped_balls import NOT_TRAPPED
 from tests.chamberopt.peening.test_strip import STRIP, hits_at, middles
@@ -80,7 +81,7 @@ def test_without_a_calibration_heights_are_strengths(tmp_path: Path) -> None:
     heights = strength / 0.9 * (1.0 - 0.1 ** np.array([0.25, 0.5, 1.0, 2.0, 4.0]))
     assert [one.value for one in found.heights] == pytest.approx(heights.tolist())
     assert NO_CALIBRATION in found.notes
-    assert "mmA" not in "".join(strip_lines(found))
+    assert "mmA" not in terminal.text(strip_end(found, [], verbose=True)).partition("note:")[0]
 
 
 @pytest.mark.usefixtures("_known_impacts")
