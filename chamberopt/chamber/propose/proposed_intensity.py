@@ -251,7 +251,7 @@ def _of_larger(
     return (
         f"LARGER BALLS FOR THE INTENSITY: they serve {possible.served[chosen.ball_mm]:.0%} of the "
         f"target, and {small:g} mm would serve {possible.served[small]:.0%}, with about "
-        f"{plain(best, 2)} mmA"
+        f"{plain(best, 2)} mmA (--ball-mm {small:g} takes these)"
     )
 
 

@@ -127,7 +127,7 @@ def propose_second_pose(
         return dropped("no pilot resolved it")
     enough = after.time_to_98 <= QUICKER * found.time_to_98 or is_hidden
     if not enough or touched_share(two) < COVERED:
-        return dropped(_after(after))
+        return dropped(f"by a pilot {_after(after)} then too")
     before = f"{touched_share(made):.0%} of the target is in reach" if is_hidden else _after(found)
     reason = f"turned over after half of the time: by pilots {_after(after)}, in one pose {before}"
     return replace(two, reasons={**two.reasons, ".steps": reason}), after
