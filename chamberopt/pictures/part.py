@@ -42,14 +42,14 @@ COLOURS = {
 # Restitution of a thin part over that of a rigid one, by bands, and their colours: greens, which
 # mean nothing else in the picture.
 BANDS = (0.5, 0.7, 0.9, 0.98)
-SOFTER = "times the restitution of a rigid part, where the target is thin"
+SOFTER = "flexure, the restitution of the thin target over that of a rigid part"
 BAND_COLOURS = {
     PLAIN: COLOURS[PLAIN],
-    1: ("#00441b", f"below 0.5 {SOFTER}"),
+    1: ("#00441b", "below 0.5"),
     2: ("#238b45", "0.5 to 0.7"),
     3: ("#74c476", "0.7 to 0.9"),
     4: ("#c7e9c0", "0.9 to 0.98"),
-    5: (BLUE, "target that is stiff: 0.98 and more"),
+    5: (BLUE, "0.98 and more"),
 }
 ALL = 0.999  # share of the target's area from which it is wholly in the chamber
 OPPOSITE = np.array([(1.0, -1.6, 0.7), (-1.0, 1.6, -0.7)])
@@ -126,7 +126,7 @@ def render_part(job: dict[str, Any]) -> None:
     if softness is not None:
         bands = np.where(marked | missed, 1 + np.searchsorted(BANDS, softness, "right"), PLAIN)
         part, shown = _coloured(job, bands, beyond=False)
-        rows.append(Row(f"{job['title']}: flexure", _panels(job, part, shown, BAND_COLOURS)))
+        rows.append(Row(f"{job['title']}: {SOFTER}", _panels(job, part, shown, BAND_COLOURS)))
         legend += [BAND_COLOURS[k] for k in np.unique(bands) if k != PLAIN]
     write_page(job["picture"], rows, legend, remarks=[f"part as it stands: {size_text(part)}"])
 
