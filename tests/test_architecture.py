@@ -51,7 +51,7 @@ ORDER = {
     "chamberopt/pictures": "charts+quantities camera drawn_part actors+overlay+subprocess_drawing "
     "view picture_page panels coverage+dents+difference+film+part+part3d "
     "section part_drawing comparison",
-    "chamberopt/cli": "interrupt+options+resume console prepare teller commands command_line",
+    "chamberopt/cli": "facts+interrupt+options+resume console prepare teller commands command_line",
     "sim_core": "errors numerics balls effects geometry motion impulses scene contact detect loop",
 }
 # Only these files or packages import the library.

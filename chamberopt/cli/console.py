@@ -10,7 +10,7 @@ from contextlib import AbstractContextManager, ExitStack, contextmanager
 from dataclasses import asdict, is_dataclass
 from itertools import count
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TextIO, TypeVar
+from typing import TYPE_CHECKING, TextIO, TypeVar
 
 from chamberopt.common.errors import visible
 
@@ -128,33 +128,3 @@ def print_finished(folder: Path, what: str, content: Sequence[Table | str], as_j
     again = "to run it again, give another folder (--out)"
     print_remarks([f"{folder}: this {what} is finished, nothing was run; {again}"])
     print_result(content, folder, as_json)
-
-
-def table_lines(table: Mapping[str, Any], prefix: str = "") -> list[str]:
-    """Return a nested table as lines of text in aligned columns.
-
-    A note or warning in the table is a line of its own.
-    """
-    lines: list[str] = []
-    for name, value in table.items():
-        label = f"{prefix + name:33} "
-        if isinstance(value, Mapping) and set(value) == {"low", "start", "high"}:
-            start = value["start"]  # a text if the design has none
-            shown = start if isinstance(start, str) else f"{start:g}"
-            lines.append(f"{label}{shown} in {value['low']:g} .. {value['high']:g}")
-        elif isinstance(value, Mapping):
-            lines += table_lines(value, f"{prefix}{name}.")
-        elif name in ("notes", "warnings"):
-            lines += [f"{name.removesuffix('s')}: {text}" for text in value]
-        else:
-            text = _list_text(value, name) if isinstance(value, list) else f"{value}"
-            lines.append(label + text)
-    return lines
-
-
-def _list_text(values: list[Any], name: str) -> str:
-    """Return a list as text. Sizes are written "1 x 2 x 3", other values with commas between."""
-    if values and isinstance(values[0], float):
-        separator = " x " if name.startswith("bounding_box") else ", "
-        return separator.join(f"{value:g}" for value in values)
-    return ", ".join(values) or "none"

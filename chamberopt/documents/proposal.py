@@ -48,14 +48,14 @@ def proposal_end(made: Proposal, left_out: Sequence[LeftOut], verbose: bool) -> 
     """
     lines, settle = [*_sentence(made), ""], []
     for row in _rows(made):
-        told = _wrapped(f"{row.name:{INDENT}}{row.value}", INDENT)
+        told = wrapped(f"{row.name:{INDENT}}{row.value}", INDENT)
         for key in row.keys:
             reason = one_line(made.reasons.get(key, ""))  # its beginning may be the row's value
             why, first = clauses(re.sub(f"^{re.escape(row.value)}[:;] ", "", reason))
             settle += first
             if why and why != [row.value]:
                 of = f"{_name(key.rpartition('.')[2])}: " if key.endswith("_mm") else ""
-                told += _wrapped(f"{'':{INDENT}}{of}{'; '.join(why)}", INDENT)
+                told += wrapped(f"{'':{INDENT}}{of}{'; '.join(why)}", INDENT)
         lines += told if verbose or row.name != SIMULATED else []
     for one in left_out:
         keys = " and ".join(f"part.target.{key}" for key in one.keys)
@@ -64,7 +64,7 @@ def proposal_end(made: Proposal, left_out: Sequence[LeftOut], verbose: bool) -> 
     if settle:
         lines += ["", "To be settled before it is built:"]
         for number, text in enumerate(settle, 1):
-            lines += _wrapped(f"{number:2}. {_as_sentence(one_line(text))}", 4)
+            lines += wrapped(f"{number:2}. {_as_sentence(one_line(text))}", 4)
     return [*lines, "", *surface_lines(made.known, len(made.known) if verbose else MOST_LISTED)]
 
 
@@ -85,7 +85,7 @@ def surface_lines(known: Sequence[Surface], most: int) -> list[str]:
     for one in known[:most]:
         place = f", one at {one.keys['faces'][0]['at_mm']} mm" if "faces" in one.keys else ""
         alone = f"; {one.alone}" if one.alone else ""
-        lines += _wrapped(f"  {one_line(one.name)}: {one.text}{place}{alone}", 4)
+        lines += wrapped(f"  {one_line(one.name)}: {one.text}{place}{alone}", 4)
     more = [f"  and {len(known) - most} more: --target pick"] if len(known) > most else []
     return ["Surfaces to choose from (--target):", *lines, *more]
 
@@ -104,7 +104,7 @@ def _sentence(made: Proposal) -> list[str]:
     shot, design, part = made.tables["shot"], made.design, made.chamber.part
     target = made.reasons["part.target"].partition(": ")[0]
     area = area_in_mm2(float(part.area[part.target].sum()))
-    return _wrapped(
+    return wrapped(
         f"Peen {one_line(target)} ({area}) of {one_line(design.part.mesh_path.name)} for "
         f"{time_in_words(design.process.treatment_time)} with {design.shot.count:,} balls of "
         f"{shot['diameter_mm']:g} mm ({shot['material']}, {shot['mass_g']:g} g), the sonotrode "
@@ -170,7 +170,7 @@ def _as_sentence(text: str) -> str:
     return text if text.endswith(".") else f"{text}."
 
 
-def _wrapped(text: str, indent: int) -> list[str]:
+def wrapped(text: str, indent: int) -> list[str]:
     """Return a text in lines of at most WIDTH columns, all but the first one indented."""
     leading = len(text) - len(text.lstrip())
     lines = textwrap.wrap(

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json as json_format
+from collections.abc import Mapping
 from contextlib import ExitStack
 from pathlib import Path
+from typing import Any
 
-from chamberopt.cli.console import print_json, print_remarks, show, table_lines
-from chamberopt.cli.options import Json, Out, app
+from chamberopt.cli.console import print_json, print_remarks, show
+from chamberopt.cli.options import Json, Out, Verbose, app
 from chamberopt.cli.prepare import advise_effects
 
 
@@ -20,6 +22,7 @@ def check(
     screenshot: Path | None = None,
     json: Json = False,
     out: Out = None,
+    verbose: Verbose = False,
 ) -> None:
     """Check a design or study file: geometry, volumes, shot, warnings, and the effects it needs.
 
@@ -44,14 +47,18 @@ def check(
             claims.enter_context(claim_file(picture_path(screenshot)))
         if out is not None:
             claims.enter_context(whole_or_nothing(claims.enter_context(claim_folder(out))))
-        _check(file, pilot, screenshot, json, out)
+        _check(file, pilot, screenshot, json, out, verbose)
 
 
-def _check(file: Path, pilot: bool, screenshot: Path | None, json: bool, out: Path | None) -> None:
+def _check(
+    file: Path, pilot: bool, screenshot: Path | None, json: bool, out: Path | None, verbose: bool
+) -> None:
     from chamberopt.chamber.build import build_chamber
     from chamberopt.chamber.checks.check import describe, first_facts, shot_reach
+    from chamberopt.cli.facts import facts_lines, table_lines
     from chamberopt.common.files import write_text
     from chamberopt.common.progress import step
+    from chamberopt.documents.terminal_lines import note_lines
     from chamberopt.geometry.meshes.surface_error import SurfaceError
     from chamberopt.pictures.part import draw_target
     from chamberopt.results.vtp_files import write_chamber
@@ -73,7 +80,11 @@ def _check(file: Path, pilot: bool, screenshot: Path | None, json: bool, out: Pa
             print_remarks([remark or f"picture in {screenshot}"])
             error.__notes__.clear()  # the notes tell how to see the faults
         raise
-    first_lines = table_lines(first_facts(design, chamber))
+
+    def lines_of(facts: Mapping[str, Any]) -> list[str]:
+        return table_lines(facts) if verbose else facts_lines(design, facts)
+
+    first_lines = lines_of(first_facts(design, chamber))
     if not json:
         show(first_lines)  # the other facts take longer, above all the first time
     with step("finding what the shot reaches"):
@@ -90,10 +101,11 @@ def _check(file: Path, pilot: bool, screenshot: Path | None, json: bool, out: Pa
             for name, varied in loaded.vary.items()
         }
         facts["evaluations"] = loaded.optimizer.evaluations
-    if out is not None:
-        facts["folder"] = str(out)
     if not json:
-        show(line for line in table_lines(facts) if line not in first_lines)
+        show(line for line in lines_of(facts) if line not in first_lines)
+        if not verbose:
+            show(["", *(f"warning: {text}" for text in facts["warnings"])])
+            show([*note_lines(facts["notes"], verbose), ""])
     facts["effects"] = advise_effects(design, chamber) if pilot else groups(design, chamber)
     if not json:
         show(f"effect: {one['said']}" for one in facts["effects"])
@@ -101,5 +113,7 @@ def _check(file: Path, pilot: bool, screenshot: Path | None, json: bool, out: Pa
     if out is not None:
         write_text(out / "check.json", json_format.dumps(facts, indent=2) + "\n")
         write_chamber(out, chamber)
+        if not json:
+            show([f"results in {out}"])
     if json:
-        print_json(facts)
+        print_json(facts if out is None else {**facts, "folder": str(out)})

@@ -334,8 +334,20 @@ class TestCheck:
     def test_shipped(self, name: str, chamberopt: Said) -> None:
         status, out, err = chamberopt("check", ROOT / f"{name}.toml")
         assert (status, err) == (0, "")
-        assert "shot.balls" in out
+        assert " balls of " in out
         assert "effect: gravity is on: g H / V² = " in out
+        assert max(map(len, out.partition("\n\n")[0].splitlines())) < 80
+
+    def test_all_facts_by_their_names_with_verbose(self, chamberopt: Said) -> None:
+        words = chamberopt("check", ROOT / "designs" / "gear_zones.toml")[1].splitlines()
+        names = chamberopt("check", ROOT / "designs" / "gear_zones.toml", "-v")[1].splitlines()
+        assert "shot         735 balls of 1 mm, 3.002 g, 0.32 % of the chamber" in words
+        assert "             shot.mass_g: 3, from 2.7 to 3" in words
+        assert f"{'shot.balls':33} 735" in names
+        assert f"{'tolerances.shot.mass_g':33} 3 in 2.7 .. 3" in names
+        warned = [line for line in names if line.startswith("warning: ")]
+        assert warned
+        assert set(warned) <= set(words)
 
     def test_plate_has_the_papers_thirty_balls(self, chamberopt: Said) -> None:
         status, out, _ = chamberopt("check", ROOT / "designs" / "plate.toml", "--json")
