@@ -280,7 +280,7 @@ def _proposed(
                 own = {**common, "part": part, **_floor_tables(floor)}
                 words = {"part.rotate_deg": f"{pose_in_words(mesh, known, placed)}: {why_so}"}
                 if turning is not None:
-                    words["effects.part_turn"] = f"A DRIVE TURNS IT at {RPM:g} rpm about its axis"
+                    words["effects.part_turn"] = f"TURNED BY A DRIVE, at {RPM:g} rpm"
                 why = {**reasons, **words, **_floor_reasons(floor, is_local, goes_out)}
                 made = checked(own, why, floor, known, mesh, wanted.shop)
             except UnreadableError:

@@ -194,7 +194,7 @@ def _said_of_long(found: Measured) -> str:
     if uneven > UNEVEN:
         return (
             f"the least covered places take {rounded(uneven, 2)} times as long as the target on "
-            "average: [[steps]] in further poses, turned over or round, may do"
+            "average: [[steps]] in further poses, or more room beside these, may do"
         )
     return "few balls get to the target, or slowly: a larger sonotrode, harder balls or the study"
 

@@ -54,11 +54,7 @@ class Floor(NamedTuple):
     @property
     def blocks(self) -> Blocks | None:
         """Blocks of which the floor is made, as they lie in the chamber; None for one sonotrode."""
-        blocks = self.face.blocks
-        if blocks is None or not _is_turned(self.sizes):
-            return blocks
-        x, y = blocks.size_mm
-        return Blocks(size_mm=(y, x), columns=blocks.rows, rows=blocks.columns)
+        return self.face.laid(_is_turned(self.sizes)).blocks
 
     @property
     def excess(self) -> tuple[float, ...]:
@@ -192,7 +188,7 @@ def _over_the_face(sizes: Sizes, shop: Shop, face: Face) -> Floor:
 
     A wall that goes round the face stands beside it by the clearance, which is not simulated.
     """
-    clear = f"{shop.clearance_mm:g} mm clear"
+    clear, name = f"{shop.clearance_mm:g} mm clear", face.laid(_is_turned(sizes)).in_words
 
     def room(sides: Iterable[float]) -> str:
         """Return in words how wide the room must be where its wall goes round the face."""
@@ -211,12 +207,12 @@ def _over_the_face(sizes: Sizes, shop: Shop, face: Face) -> Floor:
     ):
         more = min(plan[key] - float(sizes.plan[key]) for key in plan)
         wider = replace(sizes, plan={**sizes.plan, **plan}, gap=sizes.gap + 5e-4 * more)
-        text = f"the face of {face.in_words}, the wall round it {room(plan.values())}"
+        text = f"the face of {name}, the wall round it {room(plan.values())}"
         return Floor(wider, face, text)
     where = f"ends over its face, {clear}"
     if sides := [one for key, one in plan.items() if float(sizes.plan.get(key, 0.0)) >= one]:
         where = f"goes round it on two sides, {room(sides)} there, and ends over its face elsewhere"
-    return Floor(sizes, face, f"on {face.in_words}: the wall {where}")
+    return Floor(sizes, face, f"on {name}: the wall {where}")
 
 
 def _along(sizes: Sizes, face: Face) -> tuple[float, float]:

@@ -113,6 +113,14 @@ class Face(NamedTuple):
             return f"sonotrode {self.sonotrode.in_words}"
         return f"{self.blocks.in_words} ({self.sonotrode.name})"
 
+    def laid(self, is_turned: bool) -> Face:
+        """Return the face as its blocks lie in a chamber: columns along x, or along y if turned."""
+        if self.blocks is None or not is_turned:
+            return self
+        x, y = self.blocks.size_mm
+        turned = Blocks(size_mm=(y, x), columns=self.blocks.rows, rows=self.blocks.columns)
+        return self._replace(blocks=turned)
+
 
 class StockBalls(FileTable):
     """Balls of one material that a shop has in stock."""

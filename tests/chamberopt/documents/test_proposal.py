@@ -50,6 +50,7 @@ def test_verbose_has_every_reason_and_every_surface(made: Proposal) -> None:
         ("ZERO-TO-PEAK, half", ["ZERO-TO-PEAK, half"], []),
         ("SAE AMS 2430 says", ["SAE AMS 2430 says"], []),
         ("LONG: turn it", [], ["LONG: turn it"]),
+        ("TURNED BY A DRIVE, at 60 rpm", [], ["TURNED BY A DRIVE, at 60 rpm"]),
     ],
 )
 def test_clauses_in_capitals_are_to_be_settled(

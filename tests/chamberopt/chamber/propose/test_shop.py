@@ -226,3 +226,11 @@ def test_balls_are_in_stock_and_do_not_enter_the_clearance() -> None:
         shop(DISC, clearance_mm=2.0, balls=[{"material": "steel", "diameters_mm": [3.0]}]).stock_mm(
             "steel"
         )
+
+
+def test_blocks_are_told_as_they_lie_in_the_chamber() -> None:
+    blocks = Blocks(size_mm=(80.0, 80.0), columns=2)
+    (one,) = (one for one in usual_shop().floors_of_blocks() if one.blocks == blocks)
+    assert "side by side, 2 × 1 (" in one.laid(False).in_words
+    assert "side by side, 1 × 2 (" in one.laid(True).in_words
+    assert one.laid(True).laid(True) == one
