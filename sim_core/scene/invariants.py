@@ -164,7 +164,14 @@ def triangles_near(mesh: TriangleMesh, points: np.ndarray, reach: float) -> np.n
 
     The numbers of some triangles farther away may be among them.
     """
-    projection, near = _projection(mesh, 0), np.zeros(len(mesh.triangles), dtype=np.bool_)
+    return _near(_projection(mesh, 0), mesh, points, reach)
+
+
+def _near(
+    projection: _Projection, mesh: TriangleMesh, points: np.ndarray, reach: float
+) -> np.ndarray:
+    """Return the numbers of the triangles of a projection of the mesh as `triangles_near` does."""
+    near = np.zeros(len(mesh.triangles), dtype=np.bool_)
     wide = reach * (1.0 + 1e-9) + 1e-12 * float(np.abs(mesh.bounds).max())  # widened for rounding
     _mark_near(projection, np.ascontiguousarray(points @ projection.axes.T), wide, near)
     return np.flatnonzero(near)
@@ -248,6 +255,35 @@ def beneath_mean_plane(
         lifted = points[here] + (depth[here] + LIFT * radii[here])[:, None] * up
         inside[here] |= contained(mesh, lifted, corners)
     return inside
+
+
+class TurnedSurface:
+    """The surface of a mesh whose part has turned, for questions about many points."""
+
+    def __init__(self, mesh: TriangleMesh, corners: np.ndarray) -> None:
+        """Project the present corners of the triangles [m], (m, 3, 3), along two directions."""
+        cells = max(1, math.isqrt(len(corners) // IN_CELL))
+        self.mesh, self.corners = mesh, corners
+        self.projections = [_project(corners, mesh, k, cells) for k in range(2)]
+
+    def near(self, points: np.ndarray, reach: float) -> np.ndarray:
+        """Return the corners of all triangles within ``reach`` [m] of any of the points (n, 3)."""
+        return np.asarray(self.corners[_near(self.projections[0], self.mesh, points, reach)])
+
+    def encloses(self, points: np.ndarray) -> np.ndarray:
+        """Return True for points (n, 3) [m] that the triangles enclose.
+
+        Where two rays do not agree, as one passes through a slit between the part and a wall, the
+        solid angle decides, which takes all triangles for each point.
+        """
+        crossed = np.zeros((2, len(points)), dtype=np.int64)
+        for one, count in zip(self.projections, crossed, strict=True):
+            _count(one, np.ascontiguousarray(points @ one.axes.T), count)
+        odd = crossed % 2 == 1
+        unclear = (crossed < 0).any(axis=0) | (odd[0] != odd[1])
+        inside = odd[0].copy()
+        inside[unclear] = enclosed(self.corners, points[unclear])
+        return np.asarray(inside)
 
 
 def enclosed(corners: np.ndarray, points: np.ndarray) -> np.ndarray:

@@ -14,7 +14,13 @@ from sim_core.errors import SceneError
 from sim_core.geometry.analytic import AnalyticCavity, periods_of
 from sim_core.geometry.mesh import TriangleMesh
 from sim_core.numerics.jit import jit
-from sim_core.scene.invariants import clearance, contained, enclosed, triangles_near, turned_corners
+from sim_core.scene.invariants import (
+    TurnedSurface,
+    clearance,
+    contained,
+    triangles_near,
+    turned_corners,
+)
 
 BATCH = 256  # positions tried at once
 MAX_FAILURES = 40  # batches without a free place before the shot is refused
@@ -94,11 +100,11 @@ def _free_selector(
             return np.asarray(points[contained(mesh, points)])
 
         return free
-    corners = turned_corners(mesh, part_rotation)
+    surface = TurnedSurface(mesh, turned_corners(mesh, part_rotation))
 
     def free_of_turned(points: np.ndarray, reach: float) -> np.ndarray:
-        points = points[clearance(corners, points, reach) >= reach]
-        return np.asarray(points[enclosed(corners, points)])
+        points = points[clearance(surface.near(points, reach), points, reach) >= reach]
+        return np.asarray(points[surface.encloses(points)])
 
     return free_of_turned
 

@@ -24,10 +24,10 @@ from sim_core.numerics.computed_once import computed_once
 from sim_core.scene.analytic_scene import require_clear, require_supported
 from sim_core.scene.bent_faces import require_profiles
 from sim_core.scene.invariants import (
+    TurnedSurface,
     beneath_mean_plane,
     clearance,
     contained,
-    enclosed,
     narrowest_gap,
     triangles_near,
     turned_corners,
@@ -217,7 +217,7 @@ class Scene:
         inside = (
             contained(self.mesh, balls.positions)
             if corners is None
-            else enclosed(corners, balls.positions)
+            else TurnedSurface(self.mesh, corners).encloses(balls.positions)
         )
         outside = np.flatnonzero(~inside)
         vibrations, radii = self.physics.vibrations, 0.5 * balls.diameters[outside]

@@ -4,7 +4,15 @@ import numpy as np
 import trimesh
 
 from sim_core import TriangleMesh
-from sim_core.scene.invariants import clearance, closest_pair, contained, triangles_near
+from sim_core.scene.invariants import (
+    RAYS,
+    TurnedSurface,
+    clearance,
+    closest_pair,
+    contained,
+    enclosed,
+    triangles_near,
+)
 from tests.helpers.scenes.cavities import balls_at, box, box_around, cylinder
 
 
@@ -23,8 +31,6 @@ def test_containment_agrees_with_what_the_shape_says() -> None:
 
 
 def test_a_point_in_line_with_edges_and_corners_is_judged_by_another_ray() -> None:
-    from sim_core.scene.invariants import RAYS
-
     room = box((1.0, 1.0, 1.0))
     middle = np.array([0.5, 0.5, 0.5])
     through_corner = np.array([1.0, 1.0, 1.0]) - 0.4 * RAYS[0]
@@ -72,3 +78,29 @@ def test_a_mesh_of_many_triangles_is_judged_as_when_every_triangle_is_asked() ->
             of_near = clearance(mesh.corners[near], points[:20], reach)
             np.testing.assert_array_equal(of_near, clearance(mesh.corners, points[:20], reach))
     assert len(triangles_near(mesh, points[:1], 1e-3)) < 0.1 * len(mesh.triangles)
+
+
+def test_a_turned_surface_encloses_what_its_solid_angle_says() -> None:
+    """Also where a ray leaves by a slit of 1 µm, as between a turned part and a wall."""
+    ball = trimesh.creation.icosphere(subdivisions=3, radius=0.03)
+    mesh = box_around(ball, 0.05)
+    corners = mesh.corners.copy()
+    turn = trimesh.transformations.rotation_matrix(0.3, [0.2, 0.5, 1.0])[:3, :3]
+    of_ball = np.abs(corners).max(axis=(1, 2)) < 0.04
+    corners[of_ball] = corners[of_ball] @ turn.T
+    ceiling = (corners[..., 2] > 0.049).all(axis=1)
+    corners[ceiling, :, 0] *= 1.0 - 2e-5  # slits beside the walls at x = -50 and 50 mm
+    slit = np.array([0.05 - 0.5e-6, 0.01, 0.05])
+    beneath = slit - 0.005 * RAYS[0] / np.linalg.norm(RAYS[0])
+    points = np.random.default_rng(4).uniform(-0.06, 0.06, (2000, 3))
+    points = np.concatenate([points, [beneath]])
+    surface = TurnedSurface(mesh, corners)
+    expected = enclosed(corners, points)
+    assert expected[-1]
+    assert 0.3 < expected.mean() < 0.7
+    np.testing.assert_array_equal(surface.encloses(points), expected)
+    near = surface.near(points[:20], 3e-3)
+    assert len(near) < 0.5 * len(corners)
+    np.testing.assert_array_equal(
+        clearance(near, points[:20], 3e-3), clearance(corners, points[:20], 3e-3)
+    )
