@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
+from chamberopt.chamber.propose.pose import Pose
+from chamberopt.chamber.propose.proposal import Wanted
 from chamberopt.chamber.propose.proposed_target import SHAPES, named_surfaces
 from chamberopt.chamber.propose.shop import load_shop
 from chamberopt.common.errors import InputError
@@ -20,6 +23,7 @@ from chamberopt.geometry.meshes.surface_error import format_box
 from chamberopt.geometry.meshes.units import METRES_PER, STATED, UnknownUnitError
 from chamberopt.page.acts import Acts, free_folder, path_inside
 from chamberopt.page.started_commands import OneCommand
+from chamberopt.workflows.propose import Wishes
 
 PART_NAME = re.compile(r"\w[\w .,()+-]{0,150}")
 MOST_NAMES = 40  # names of a part's surfaces that the page lists
@@ -108,12 +112,16 @@ class Front:
             "material": (asked["material"], [one.name for one in alloys()]),
             "shot": (asked["shot"], [one.name for one in balls()]),
             "shape": (asked["shape"], SHAPES),
+            "pose": (asked["pose"], get_args(Pose)),
         }
         arguments = ["new", f"./{part.relative_to(self._folder).as_posix()}"]
         for option, (given, allowed) in wanted.items():
             if given and given not in allowed:
                 raise InputError(f"{option}: given {given}; allowed: {', '.join(allowed)}")
             arguments += [f"--{option}={given}"] if given else []
+        wishes = {name: str(asked[name]).strip() for name in ("intensity", "coverage", "ball-mm")}
+        _require_possible(wishes, str(asked["material"]), bool(asked["pilot"]))
+        arguments += [f"--{name}={text}" for name, text in wishes.items() if text]
         arguments += [f"--target={name}" for name in map(str, asked["target"])]
         if asked["shop"]:
             shop = path_inside(self._folder, str(asked["shop"]))
@@ -136,6 +144,18 @@ class Front:
             self.acts.close()
         self.acts = None
         return {}
+
+
+def _require_possible(wishes: Mapping[str, str], alloy: str, pilot: bool) -> None:
+    """Raise InputError, in the words of `new`, for wishes that it would refuse."""
+    numbers: dict[str, float | None] = {}
+    for name in ("coverage", "ball-mm"):
+        try:
+            numbers[name] = float(wishes[name]) if wishes[name] else None
+        except ValueError:
+            raise InputError(f"--{name}: given {wishes[name]!r}; give a number") from None
+    wanted = Wanted(alloy=alloy, ball_mm=numbers["ball-mm"], coverage=numbers["coverage"])
+    Wishes(wanted, wishes["intensity"] or None, pilot).require_possible()
 
 
 def _plain_files(folder: Path) -> list[Path]:

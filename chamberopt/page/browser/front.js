@@ -89,19 +89,47 @@ function tell({ steps, lines, exit }) {
   find("error").replaceChildren(...(exit ? onPage(lines.join("\n")) : []));
 }
 
-find("propose").addEventListener("click", () => attempt(async () => {
-  const chosen = (id) => find(id).value;
+const WISHES = ["material", "intensity", "coverage", "shop", "shot", "ball-mm", "pose", "shape"]; // options of `new`
+const NUMBERS = ["coverage", "ball-mm"];
+
+// Say a message beside the field of the option that it begins with; give whether there is such a field.
+function besideField(text) {
+  for (const one of document.querySelectorAll(".wrong")) one.remove();
+  for (const id of WISHES) find(id).removeAttribute("aria-invalid");
+  const id = /^--([\w-]+): /.exec(text)?.[1], field = find(id), fold = field?.closest("details");
+  if (!WISHES.includes(id)) return false;
+  if (fold) fold.open = true;
+  field.setAttribute("aria-invalid", "true");
+  field.after(element("span", { className: "wrong", role: "alert" }, ...onPage(text)));
+  field.focus();
+  return true;
+}
+
+async function started() {
   const target = [...find("names").querySelectorAll("input:checked")].map((one) => one.value);
-  const started = await ask("/propose", { ...known, target, pilot: find("pilot").checked,
-    material: chosen("material"), shot: chosen("shot"), shape: chosen("shape"), shop: chosen("shop") });
-  const design = `${started.out}/design.toml`;
+  const wishes = Object.fromEntries(WISHES.map((id) => [id, find(id).value.trim()]));
+  for (const id of NUMBERS) wishes[id] = wishes[id].replace(",", ".");
+  besideField("");
+  try { return await ask("/propose", { ...known, ...wishes, target, pilot: find("pilot").checked }); } catch (error) {
+    if (!besideField(error.message)) throw error;
+    return null;
+  }
+}
+
+find("propose").addEventListener("click", () => attempt(async () => {
+  const begun = await started();
+  if (!begun) return;
+  const design = `${begun.out}/design.toml`;
   find("made").hidden = false;
   find("next").hidden = find("picture").hidden = find("propose").disabled = true;
   find("made").scrollIntoView({ behavior: "smooth" });
-  const ended = await followed(tell, started);
+  const ended = await followed(tell, begun);
   find("propose").disabled = false;
-  if (ended.exit !== 0) return;
-  find("picture").src = `/files/${started.out.split("/").map(encodeURIComponent).join("/")}/design.png`;
+  if (ended.exit !== 0) {
+    find("made").hidden = besideField(ended.lines.at(-1) ?? "");
+    return;
+  }
+  find("picture").src = `/files/${begun.out.split("/").map(encodeURIComponent).join("/")}/design.png`;
   find("next").hidden = find("picture").hidden = false;
   find("open-made").onclick = () => attempt(() => open(design));
   find("open-made").focus();

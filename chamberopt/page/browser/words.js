@@ -22,7 +22,8 @@ export function inUnits(name, fact) {
 
 // What options of the command line are called on the page.
 const OPTIONS = { target: "what is peened", unit: "the unit of the part", material: "alloy of the part", shot: "balls",
-  shape: "form of the chamber", shop: "what your shop has", "no-pilot": "without simulating some seconds" };
+  shape: "form of the chamber", shop: "what your shop has", intensity: "Almen intensity", coverage: "coverage", "ball-mm": "ball diameter in mm",
+  pose: "pose of the part", "no-pilot": "the choice not to simulate" };
 const TABLES = "part|chamber|shot|sonotrode|sonotrodes|materials|effects|process|holder|mask|zones|tolerances|ranges";
 const KEY = new RegExp(`(?<![\\w./])(?:${TABLES})(?:\\.\\w+)+|--(?:${Object.keys(OPTIONS).join("|")})(?![\\w-])`, "g");
 const FILE = /\.(?:toml|json|html|pdf|png|st[lp]|step|obj|ply|3mf|off|nas|bdf|dat|fem|inp|msh|data|vt[kpu]|vtkhdf)$/i; // no key

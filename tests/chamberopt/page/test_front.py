@@ -17,7 +17,7 @@ from tests.hunt.meshes import ROOT
 
 PROPOSED = {
     "part": "box.stl", "unit": "mm", "material": "", "shot": "steel", "shape": "", "target": [],
-    "shop": "", "pilot": False,
+    "shop": "", "pilot": False, "intensity": "", "coverage": "", "ball-mm": "", "pose": "",
 }  # fmt: skip
 
 
@@ -53,13 +53,16 @@ def test_a_part_becomes_a_design_that_opens(front: Served, tmp_path: Path) -> No
     names = front.ask("/look", {"part": "fir_tree.step", "unit": ""})["names"]
     assert ["FIR_TREE", "1796 mm²"] in names
     assert "#ff0000" not in dict(names)  # the colour of just this surface
-    started = front.ask("/propose", PROPOSED | known | {"unit": "mm", "material": "IN718"})
+    wishes = {"unit": "mm", "material": "IN718", "coverage": "200", "ball-mm": "1.2"}
+    started = front.ask("/propose", PROPOSED | known | wishes)
     assert started["out"] == "part"
     assert "running" in front.ask("/propose", PROPOSED)["error"]
     while (now := json.loads(front.get("/status").read()))["exit"] is None:
         time.sleep(0.2)
     assert now["exit"] == 0, now["lines"]
     design = load_design(tmp_path / "part" / "design.toml")
+    assert design.process.coverage_percent == 200
+    assert design.shot.diameter == pytest.approx(1.2e-3)
     assert (tmp_path / "part" / design.part.mesh).samefile(tmp_path / "part.STL")
     assert front.get("/files/part/design.png").status == 200
     assert "no design is open" in front.ask("/read", {})["error"]
@@ -78,10 +81,18 @@ def test_a_wrong_file_or_wish_is_answered_in_words(front: Served, tmp_path: Path
     names = "evil.toml", "..%2Fx.stl", "%2Ftmp%2Fx.stl", ".x.stl", ""
     for name, said in (("box.stl", "already"), *((name, "not a part") for name in names)):
         assert said in upload(front, name, box)["error"]
-    wrong = {"unit": "ft", "material": "--help", "shape": "own.py", "shot": "gravel"}
+    wrong = {"unit": "ft", "material": "--help", "shape": "own.py", "shot": "gravel", "pose": "up"}
     for option, given in wrong.items():
         error = front.ask("/propose", PROPOSED | {option: given})["error"]
         assert f"{option}: given {given}; allowed" in error
+    for wish, said in (
+        ({"coverage": "5"}, "--coverage: given 5; allowed: from 100 to 1000 %"),
+        ({"ball-mm": "large"}, "--ball-mm: given 'large'; give a number"),
+        ({"intensity": "15A"}, "--intensity: given '15A'"),
+        ({"intensity": "usual", "pilot": True}, "give --material"),
+        ({"intensity": "0.15A"}, "--intensity: it takes pilot runs"),
+    ):
+        assert said in front.ask("/propose", PROPOSED | wish)["error"]
     for option in ("part", "shop"):
         error = front.ask("/propose", PROPOSED | {option: "../x.stl"})["error"]
         assert "outside the folder" in error
