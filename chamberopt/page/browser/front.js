@@ -90,7 +90,7 @@ function tell({ steps, lines, exit }) {
 }
 
 const WISHES = ["material", "intensity", "coverage", "shop", "shot", "ball-mm", "pose", "shape"]; // options of `new`
-const NUMBERS = ["coverage", "ball-mm"];
+const NUMBERS = ["intensity", "coverage", "ball-mm"];
 
 // Say a message beside the field of the option that it begins with; give whether there is such a field.
 function besideField(text) {
@@ -108,7 +108,7 @@ function besideField(text) {
 async function started() {
   const target = [...find("names").querySelectorAll("input:checked")].map((one) => one.value);
   const wishes = Object.fromEntries(WISHES.map((id) => [id, find(id).value.trim()]));
-  for (const id of NUMBERS) wishes[id] = wishes[id].replace(",", ".");
+  for (const id of NUMBERS) wishes[id] = wishes[id].replace(/(\d),(?=\d)/g, "$1."); // a decimal comma
   besideField("");
   try { return await ask("/propose", { ...known, ...wishes, target, pilot: find("pilot").checked }); } catch (error) {
     if (!besideField(error.message)) throw error;
