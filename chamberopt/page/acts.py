@@ -29,6 +29,7 @@ from chamberopt.page.edited_file import EditedFile, custom_shape, design_fields
 from chamberopt.page.further_study import write_further_study
 from chamberopt.page.picking import Picker
 from chamberopt.page.started_commands import OneCommand
+from chamberopt.page.structure import restructured
 from chamberopt.page.study_answers import candidate_answer, candidates_answer, model_answer, version
 from chamberopt.printers import terminal
 from chamberopt.printers.html import section
@@ -115,6 +116,15 @@ class Acts:
 
     def shape(self, asked: Any) -> bytes:
         return shape_answer(self._file(asked).with_changes(asked["changes"]))
+
+    def fields(self, asked: Any) -> list[dict[str, object]]:
+        """Return the numbers and choices of the design with some values changed."""
+        return design_fields(self._file(asked).changed(asked["changes"]))
+
+    def structure(self, asked: Any) -> dict[str, object]:
+        """Return changes after which the design has another shape or kind of holder."""
+        file, name, wanted = self._file(asked), str(asked["name"]), str(asked["value"])
+        return restructured(file.design, asked["changes"], name, wanted, file.with_changes)
 
     def cavity(self, asked: Any) -> bytes:
         file = self._file(asked)

@@ -8,6 +8,7 @@ import stat
 import time
 import tomllib
 from collections.abc import Iterator, Mapping
+from copy import copy
 from pathlib import Path
 from typing import Any
 
@@ -19,8 +20,10 @@ from chamberopt.common.limits import MAX_TEXT_BYTES
 from chamberopt.common.toml_errors import numeric_fields, text_choices
 from chamberopt.common.toml_fields import read_toml
 from chamberopt.design.design import Design, validate
+from chamberopt.design.fixture import HOLDER_KEYS, Holder
 from chamberopt.design.materials import BY_NAME
 from chamberopt.design.shapes.base import is_custom
+from chamberopt.page.structure import KIND, NO_HOLDER, SHAPE, may_change, structure_choices
 
 # New values of keys by their dotted names, in the file's units; None takes a key out of the file.
 Changes = Mapping[str, Any]
@@ -56,6 +59,7 @@ class EditedFile:
                 "and begin again with --trust-shape if you trust it"
             )
         self.design = validate(Design, data, self.path, self.text)
+        self.structure = structure_choices(self.design)
 
     @property
     def folder(self) -> Path:
@@ -74,6 +78,15 @@ class EditedFile:
         text = self.changed_text(changes)
         return validate(Design, tomllib.loads(text), self.path, text)
 
+    def changed(self, changes: Changes) -> EditedFile:
+        """Return the file as it would be with some values changed, to list its fields.
+
+        Raises InputError, which names every problem, if the changed design is not valid.
+        """
+        made = copy(self)
+        made.text, made.design = self.changed_text(changes), self.with_changes(changes)
+        return made
+
     def changed_text(self, changes: Changes) -> str:
         """Return the text of the file with some values changed.
 
@@ -88,10 +101,16 @@ class EditedFile:
 
         document, known = tomlkit.parse(self.text), field_names(self.design)
         for name, value in changes.items():
-            if name not in known and not PICKED.fullmatch(name):
+            is_own = name in known or PICKED.fullmatch(name)
+            if not is_own and not may_change(self.design, name, value):
                 raise InputError(f"{name}: not changed on the page; change it in the file")
             try:
-                self._change(document, name, value)
+                if (name, value) == (KIND, NO_HOLDER):
+                    self._change(document, "holder", None)
+                else:
+                    self._change(document, name, value)
+                    if name in (SHAPE, KIND):  # the reason behind it was that of another one
+                        document[name.split(".")[0]][name.split(".")[1]].trivia.comment = ""
             except (TOMLKitError, ValueError, TypeError, AttributeError, IndexError) as error:
                 raise InputError(
                     f"{name}: the page cannot change it where the file says it ({error}); write "
@@ -261,7 +280,18 @@ def design_fields(file: EditedFile) -> list[dict[str, object]]:
         row = {"name": name, "value": design.setting(name), "choices": allowed, "text": text}
         row |= {"reason": reasons.get(name, "")}
         rows.append(row)
-    return rows
+    return [*_structure_rows(file), *rows]
+
+
+def _structure_rows(file: EditedFile) -> Iterator[dict[str, object]]:
+    """Yield what the page shows of the chamber's shape and the kind of holder."""
+    holder, chamber = file.design.holder, file.design.chamber
+    values = {SHAPE: chamber.shape, KIND: NO_HOLDER if holder is None else holder.kind}
+    texts = {SHAPE: "the sizes that it needs are proposed", KIND: "what holds the part"}
+    reasons = comments(file.text)
+    for name, allowed in file.structure.items():
+        row = {"name": name, "value": values[name], "choices": allowed, "text": texts[name]}
+        yield row | {"reason": reasons.get(name, ""), "is_structure": True}
 
 
 def comments(text: str) -> dict[str, str]:
@@ -294,6 +324,9 @@ def _numbers(design: Design) -> Iterator[tuple[str, FieldInfo]]:
     Items of lists that the design leaves out, and a holder or mask that it has not, are skipped.
     """
     absent = [f"{table}." for table in ("holder", "mask") if getattr(design, table) is None]
+    if design.holder is not None:  # keys of other kinds
+        own = ("kind", "axis", *HOLDER_KEYS[design.holder.kind])
+        absent += [f"holder.{key}" for key in Holder.model_fields if key not in own]
     hidden = (*NOT_SHOWN, *absent)
     for name, field in numeric_fields(design):
         in_list = name.rpartition(".")[2].isdecimal()

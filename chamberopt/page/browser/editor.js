@@ -4,7 +4,7 @@ import { fillSurfaces, fillTarget, showChosen } from "./target.js";
 import { fillRun, follow } from "./run.js";
 import { closeResults } from "./results.js";
 import "./study/study.js";
-import { ask, attempt, element, isUnsaved, listen, read, say, state, undo, unpack } from "./state.js";
+import { ask, attempt, element, isUnsaved, listen, read, say, state, undo, unpack, value } from "./state.js";
 import { inUnits, inWords, onPage } from "./words.js";
 import { showCavity, showPart, showShape, showState } from "./scene.js";
 
@@ -17,6 +17,21 @@ for (const tab of document.querySelectorAll("nav button")) tab.addEventListener(
   for (const one of document.querySelectorAll(".tab")) one.hidden = one.id !== tab.dataset.tab;
   if (tab.dataset.tab !== "results") closeResults();
 });
+
+// Another shape or holder has other numbers, also where a change is undone.
+const structure = () => JSON.stringify(["chamber.shape", "holder.kind"].map(value));
+let shownOf = "";
+async function followFields() {
+  const now = structure();
+  if (now === shownOf) return;
+  shownOf = now;
+  try {
+    const fields = await ask("/fields", { changes: state.changes });
+    if (now !== shownOf) return;
+    state.fields = fields;
+    makeFields();
+  } catch (error) { if (now === shownOf) shownOf = ""; } // asked again with the next change; the shape says what is wrong
+}
 
 // The shape follows at once: the newest changes are asked for as soon as the last answer is here.
 let asking = false, asked = null, timer = 0, round = 0;
@@ -90,12 +105,14 @@ listen((what) => {
     find("file").textContent = `${state.file.folder.split(/[\\/]/).pop()}: ${state.file.file}`;
     find("file").title = state.file.folder;
     document.title = `${state.file.file}: chamberopt`;
+    shownOf = structure();
     makeFields();
     fillTarget();
     fillRun();
     asked = null;
   } else {
     showValues();
+    followFields();
     fillSurfaces();
     showChosen();
   }

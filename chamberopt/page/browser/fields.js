@@ -1,6 +1,6 @@
 // A slider and a field for every number of the design, grouped by its tables; the ends of sliders bound a study.
-import { change, element, endMove, original, say, state, value } from "./state.js";
-import { inWords } from "./words.js";
+import { attempt, change, element, endMove, original, restructure, say, state, value } from "./state.js";
+import { choiceInWords, inWords } from "./words.js";
 
 const OPEN = ["chamber", "shot", "sonotrode"], POSE = ["part.rotate_deg", "part.offset_mm"];
 const rows = new Map();
@@ -8,24 +8,28 @@ export const ends = new Map(); // low and high of each slider, by name
 export const varied = new Set();
 
 export function makeFields() {
-  const groups = new Map(), pose = document.getElementById("pose-fields");
+  const groups = new Map(), pose = document.getElementById("pose-fields"), numbers = document.getElementById("numbers");
+  const opened = new Map([...numbers.children].map((group) => [group.id, group.open])), focused = document.activeElement?.id;
   rows.clear();
   pose.replaceChildren();
-  for (const field of state.file.fields) {
+  for (const field of state.fields) {
     const isPose = POSE.some((name) => field.name.startsWith(name));
     if (isPose && state.file.is_drawn) continue; // where its file has it
     const table = field.name.slice(0, field.name.indexOf(".", field.name.startsWith("process.accuracy") ? 8 : 0));
     const row = field.choices ? choiceRow(field) : numberRow(field);
     if (isPose) { pose.append(row); continue; }
-    if (!groups.has(table)) groups.set(table, element("details", { open: OPEN.includes(table) }, element("summary", { textContent: inWords(table.split(".").reverse().join(" of ")), title: `[${table}]` })));
+    if (!groups.has(table)) groups.set(table, element("details", { id: `of-${table}`, open: opened.get(`of-${table}`) ?? OPEN.includes(table) }, element("summary", { textContent: inWords(table.split(".").reverse().join(" of ")), title: `[${table}]` })));
     groups.get(table).append(row);
   }
-  document.getElementById("numbers").replaceChildren(...groups.values());
+  numbers.replaceChildren(...groups.values());
+  document.getElementById(focused)?.focus();
+  for (const name of varied) if (!rows.has(name)) varied.delete(name);
+  document.dispatchEvent(new Event("varied"));
   showValues();
 }
 
 const AXES = ["x", "y", "z"];
-const axis = (name) => AXES[/(?:deg|mm)\.([012])$/.exec(name)?.[1]] ?? "";
+const axis = (name) => AXES[/(?:deg|mm|axis)\.([012])$/.exec(name)?.[1]] ?? "";
 const keyOf = (field) => field.name.split(".").slice(field.name.startsWith("process.accuracy") ? 2 : 1).join(".");
 
 // What a number is, in words, and why the file has it; its key is the tip.
@@ -34,8 +38,11 @@ const label = (field) => element("label", { title: `${field.name} in the file`, 
   ...(field.reason && field.reason !== field.text ? [element("small", { textContent: field.reason })] : []));
 
 function choiceRow(field) {
-  const select = element("select", { id: field.name }, ...field.choices.map((one) => element("option", { textContent: one })));
-  select.addEventListener("change", () => change({ [field.name]: select.value }));
+  const select = element("select", { id: field.name }, ...field.choices.map((one) => element("option", { value: one, textContent: choiceInWords(one) })));
+  select.addEventListener("change", () => {
+    if (!field.is_structure) change({ [field.name]: select.value });
+    else attempt(() => restructure(field.name, select.value)).then(showValues); // as it was where it is refused
+  });
   rows.set(field.name, { show: (now) => { select.value = now; }, row: null });
   return element("div", { className: "field" }, label(field), select);
 }

@@ -1,10 +1,10 @@
 // The front page: a part's file, what is known of it, and the design that `new` proposes.
 import { ask, attempt, element, say } from "./state.js";
 import { bars, followed } from "./steps.js";
-import { onPage } from "./words.js";
+import { choiceInWords, onPage } from "./words.js";
 
 const find = (id) => document.getElementById(id);
-const option = (text) => element("option", { textContent: text, value: text });
+const option = (text) => element("option", { textContent: choiceInWords(text), value: text });
 const known = { part: "", unit: "" };
 
 // Show what the folder has, with a part chosen, by default the one that the page begins with; give its name.

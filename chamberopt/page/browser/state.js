@@ -2,7 +2,7 @@
 import { onPage } from "./words.js";
 
 const listeners = [];
-export const state = { file: null, changes: {}, past: [], shown: {}, showing: "" };
+export const state = { file: null, fields: [], changes: {}, past: [], shown: {}, showing: "" };
 export const listen = (hear) => listeners.push(hear);
 const tell = (what) => { for (const hear of listeners) hear(what); };
 
@@ -40,6 +40,7 @@ export function unpack(buffer, at = 0) {
 
 export async function read(path = "/read", question = {}, before = () => {}) {
   state.file = await ask(path, question);
+  state.fields = state.file.fields; // those of the design with its changes, which may have another shape
   await before();
   state.changes = {};
   state.past = [];
@@ -47,7 +48,8 @@ export async function read(path = "/read", question = {}, before = () => {}) {
   tell("read");
 }
 
-export const original = (name) => state.file.fields.find((one) => one.name === name)?.value ?? null;
+// What the file has, or where it has no such number, what the design with its shape or holder takes by default.
+export const original = (name) => [...state.file.fields, ...state.fields].find((one) => one.name === name)?.value ?? null;
 export const value = (name) => name in state.changes ? state.changes[name] : original(name);
 
 // Change values by dotted name; null takes a key out of the file. A slider's moves are undone as one.
@@ -58,6 +60,17 @@ export function change(values, move = "") {
   state.changes = { ...state.changes, ...values };
   for (const name of Object.keys(values))
     if (state.file.fields.some((one) => one.name === name) && state.changes[name] === original(name)) delete state.changes[name];
+  showChanges();
+  tell("changed");
+}
+
+// Change the chamber's shape or the holder, with the keys that go with it, to which the server gives values.
+export async function restructure(name, wanted) {
+  const before = state.changes, made = await ask("/structure", { changes: before, name, value: wanted });
+  if (state.changes !== before) return; // something else was changed meanwhile
+  say("");
+  state.past.push(before);
+  Object.assign(state, { changes: made, move: "" });
   showChanges();
   tell("changed");
 }

@@ -5,11 +5,11 @@ const UNIT = new RegExp(`_(${Object.keys(UNITS).sort((a, b) => b.length - a.leng
 
 export const unitOf = (name) => UNITS[UNIT.exec(name)?.[1]] ?? "";
 // "sonotrode_distance_mm" is "Sonotrode distance"; symbols such as C0 stay.
-export const inWords = (name) => name.replace(UNIT, "").replace("_pv", ", peak to valley").replace(/_/g, " ")
+export const inWords = (name) => name.replace(UNIT, "").replace(/\.[012]$/, "").replace("_pv", ", peak to valley").replace(/[_.]/g, " ")
   .replace(/^[a-z]{3}/, (first) => first[0].toUpperCase() + first.slice(1));
 // "chamber.height_mm" is "Chamber height [mm]", and "part.offset_mm.0" "Part offset, x [mm]".
 export function named(name) {
-  const axis = /(?:deg|mm)\.([012])$/.exec(name)?.[1], words = inWords(name.replace(/\./g, " ").replace(/ (?=[012]$)/, "."));
+  const axis = /(?:deg|mm|axis)\.([012])$/.exec(name)?.[1], words = inWords(name.replace(/\./g, " ").replace(/ (?=[012]$)/, "."));
   return `${words}${axis ? `, ${"xyz"[axis]}` : ""}${unitOf(name) ? ` [${unitOf(name)}]` : ""}`;
 }
 // A fact with its unit: numbers to four digits, shares as per cent.
@@ -19,6 +19,11 @@ export function inUnits(name, fact) {
   const text = Array.isArray(fact) ? fact.map(number).join(", ") : number(fact);
   return unitOf(name) ? `${text} ${unitOf(name)}` : text;
 }
+
+// What choices are called on the page.
+const CHOICES = { conformal: "conformal: follows the part", "": "none: the part hangs in the air", rod: "rod on a face", collar: "collar round an end or a shaft",
+  plate: "plate on a face or round a root", arbor: "arbor: a shaft through a hole", bore: "the part itself, out through the wall", random_phase: "random phase" };
+export const choiceInWords = (choice) => CHOICES[choice] ?? choice;
 
 // What options of the command line are called on the page.
 const OPTIONS = { target: "what is peened", unit: "the unit of the part", material: "alloy of the part", shot: "balls",

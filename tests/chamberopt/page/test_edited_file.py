@@ -4,10 +4,12 @@ import difflib
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from chamberopt.common.errors import InputError
 from chamberopt.page.edited_file import EditedFile, design_fields
+from chamberopt.page.structure import restructured
 from tests.hunt.base import write_base
 
 
@@ -139,3 +141,67 @@ def test_a_file_keeps_its_mode(file: EditedFile) -> None:
     file.path.chmod(0o400)
     with pytest.raises(InputError, match="read-only"):
         EditedFile(file.path, False).save({"chamber.height_mm": 32})
+
+
+def restructured_by(file: EditedFile, changes: dict[str, Any], name: str, wanted: str) -> Any:
+    return restructured(file.design, changes, name, wanted, file.with_changes)
+
+
+def test_another_shape_has_its_own_keys_and_the_files_own_come_back(file: EditedFile) -> None:
+    """The part is 16 mm wide, turned by 10 degrees and 1 mm beside the axis; `new` leaves 15 mm."""
+    before = file.path.read_text()
+    moved = {"chamber.height_mm": 31, "chamber.diameter_mm": 44}
+    box = restructured_by(file, moved, "chamber.shape", "box")
+    half_x, half_y = 8 * (np.cos(np.radians(10)) + np.sin(np.radians(10))) + np.array([1, 0])
+    lengths = {"length_mm": np.ceil(2 * (half_x + 15)), "width_mm": np.ceil(2 * (half_y + 15))}
+    plan = {f"chamber.{key}": length for key, length in lengths.items()}
+    dropped = {"chamber.diameter_mm": None}
+    assert box == {"chamber.height_mm": 31, "chamber.shape": "box", **dropped, **plan}
+    names = {row["name"]: row for row in design_fields(file.changed(box))}
+    assert names["chamber.shape"]["value"] == "box"
+    assert names["chamber.length_mm"]["value"] == lengths["length_mm"]
+    assert "chamber.diameter_mm" not in names
+    prism = restructured_by(file, box | {"chamber.length_mm": 50}, "chamber.shape", "prism")
+    assert file.with_changes(prism).value("chamber.sides") == 6
+    again = restructured_by(file, prism, "chamber.shape", "cylinder")
+    assert again == {"chamber.height_mm": 31}
+    file.save(box)
+    assert differing(before, file.path.read_text()) == [
+        '-shape = "cylinder"', "-diameter_mm = 40", "-height_mm = 30   # to try",
+        '+shape = "box"', "+height_mm = 31   # to try",
+        f"+length_mm = {lengths['length_mm']}", f"+width_mm = {lengths['width_mm']}",
+    ]  # fmt: skip
+
+
+def test_a_holder_is_put_in_changed_and_taken_out(file: EditedFile) -> None:
+    before = file.path.read_text()
+    rod = restructured_by(file, {}, "holder.kind", "rod")
+    assert rod == {"holder.kind": "rod"}
+    names = {row["name"]: row for row in design_fields(file.changed(rod))}
+    assert names["holder.axis.2"]["value"] == 1.0
+    assert "holder.diameter_mm" in names
+    assert "holder.grip_mm" not in names  # of a collar
+    file.save({**rod, "holder.diameter_mm": 6})
+    assert differing(before, file.path.read_text())[-3:] == [
+        "+[holder]", '+kind = "rod"', "+diameter_mm = 6",
+    ]  # fmt: skip
+    held = EditedFile(file.path, False)
+    bore = restructured_by(held, {"holder.diameter_mm": 7}, "holder.kind", "bore")
+    assert bore == {"holder.kind": "bore", "holder.diameter_mm": None}
+    assert restructured_by(held, bore, "holder.kind", "rod") == {}
+    held.save(restructured_by(held, bore, "holder.kind", ""))
+    assert EditedFile(file.path, False).design == file.design
+
+
+def test_a_shape_that_is_not_offered_is_refused(file: EditedFile) -> None:
+    """A shape may be a Python file, which would be run; an arbor needs a hole's walls."""
+    for name, wanted in (
+        ("chamber.shape", "own.py"), ("chamber.shape", "imported"),
+        ("holder.kind", "arbor"), ("part.mesh", "x"),
+    ):  # fmt: skip
+        with pytest.raises(InputError, match=f"{name}: given {wanted}; allowed: "):
+            restructured_by(file, {}, name, wanted)
+        with pytest.raises(InputError, match=f"{name}: not changed on the page"):
+            file.save({name: wanted})
+    with pytest.raises(InputError, match=r"holder\.at: not changed on the page"):
+        file.save({"holder.at": {"surface": "all"}})

@@ -106,6 +106,26 @@ def test_a_slider_moves_and_is_undone_as_one(opened: Page) -> None:
     assert opened.page.locator("#undo").is_disabled()
 
 
+def test_shape_and_holder_are_chosen_in_words(opened: Page) -> None:
+    page, shown = opened.page, lambda name: opened.page.locator(f'[id="{name}"]')
+    shown("chamber.shape").select_option(label="box")
+    expect(shown("chamber.length_mm")).not_to_have_value("", timeout=WAIT)
+    expect(shown("chamber.diameter_mm")).to_have_count(0)
+    opened.put("chamber.length_mm", 48)
+    page.click("#of-holder summary")
+    shown("holder.kind").select_option(label="rod on a face")
+    expect(shown("holder.axis.2")).to_have_value("1", timeout=WAIT)
+    expect(page.locator("#legend")).to_contain_text("holder", timeout=WAIT)  # the cavity is cut
+    assert page.locator("#error").is_hidden()
+    shown("holder.kind").select_option(label="none: the part hangs in the air")
+    expect(shown("holder.axis.2")).to_have_count(0)
+    for _ in range(4):
+        page.click("#undo")
+    expect(shown("chamber.diameter_mm")).to_have_value("40", timeout=WAIT)
+    assert shown("holder.kind").input_value() == ""
+    assert page.locator("#undo").is_disabled()
+
+
 def test_what_is_refused_is_said_and_the_newest_counts(opened: Page) -> None:
     opened.put("chamber.height_mm", 4)
     expect(opened.page.locator("#error")).to_contain_text("not below height of the chamber = 4")
