@@ -131,6 +131,9 @@ class Part:
     sha256: str = ""  # of the mesh file as it was read
     unit: str = ""  # of the numbers in the file
     names: tuple[str, ...] = ()  # of the file's groups
+    # Number in `names` of the surface that the file names there, -1 for none, (m,) int32. None if
+    # the file names no surface of its own.
+    surface: np.ndarray | None = None
     file: PartOfFile | None = None  # None only for parts without a file
     zones: dict[str, np.ndarray] = field(default_factory=dict)  # triangles of each zone, (m,) bool
     # Unit normals outward of the surface behind the triangles, at their corners, (m, 3, 3) float32.
@@ -153,6 +156,11 @@ class Part:
     def corners_with_normals(self) -> np.ndarray:
         """Return the triangles' corners [m] and unit normals of the surface there, (m, 3, 6)."""
         return np.concatenate([self.vertices[self.triangles], self.corner_normals], axis=2)
+
+    def surface_name(self, triangle: int) -> str:
+        """Return how the file names the surface at a triangle, or "" if it does not."""
+        number = -1 if self.surface is None else int(self.surface[triangle])
+        return self.names[number] if number >= 0 else ""
 
     def normals_in_cavity(
         self, vertices: np.ndarray, triangles: np.ndarray, source: np.ndarray
@@ -227,6 +235,7 @@ def posed_part(design: Design) -> tuple[Part, list[str]]:
         sha256=mesh.sha256,
         unit=mesh.unit,
         names=tuple(mesh.groups),
+        surface=named_surface(mesh),
         file=PartOfFile(
             simulated=replace(mesh, groups={}, notes=(), normals=None),
             original=None if mesh is given else replace(given, groups={}, notes=(), normals=None),
@@ -240,6 +249,24 @@ def posed_part(design: Design) -> tuple[Part, list[str]]:
         thickness=thickness,
     )
     return part, [*mesh.notes, *_smoothing_notes(part), *thin_notes]
+
+
+def named_surface(mesh: PartMesh) -> np.ndarray | None:
+    """Return the number of the group that names the surface at each triangle, -1 for none, (m,).
+
+    Of several groups with a triangle it is that of the fewest triangles, and of equal ones that
+    with the shortest name. A colour counts only where no other group is, and the group of all
+    triangles nowhere. Return None if no group is left.
+    """
+    size = {name: int(marked.sum()) for name, marked in mesh.groups.items()}
+    last_first = sorted(
+        (name for name, count in size.items() if 0 < count < len(mesh.triangles)),
+        key=lambda name: (not name.startswith("#"), -size[name], -len(name)),
+    )
+    found, number = np.full(len(mesh.triangles), -1, np.int32), {n: k for k, n in enumerate(size)}
+    for name in last_first:
+        found[mesh.groups[name]] = number[name]
+    return found if last_first else None
 
 
 def _smoothing_notes(part: Part) -> list[str]:

@@ -91,6 +91,7 @@ def part_scene(result: Result, title: str, max_triangles: int = MAX_TRIANGLES) -
     of_point = np.zeros(target.n_points, dtype=int)
     of_point[np.asarray(target.regular_faces)] = row.reshape(-1, 1)
     zones = [zone.name for zone in result.design.zones] if ZONE in arrays.elements else []
+    surface = arrays.chamber.part.surface
     is_closed = not len(border_edges(arrays.chamber.part.triangles))  # or drawn as a piece
     data = {
         "title": title,
@@ -117,6 +118,8 @@ def part_scene(result: Result, title: str, max_triangles: int = MAX_TRIANGLES) -
         "impacts": _packed(arrays.elements["impacts"][triangles], "<i4"),
         "zone": _packed(arrays.elements[ZONE][triangles] if zones else triangles[:0], "<i4"),
         "zones": zones,
+        "surface": _packed(triangles[:0] if surface is None else surface[triangles], "<i4"),
+        "names": () if surface is None else arrays.chamber.part.names,
         "surfaces": _surfaces(part, rest, chamber, on_deflector, eye)
         | {
             name: _shape(MM * one.vertices, one.triangles) | {"kind": name}

@@ -156,6 +156,7 @@ RULES: dict[str, Rule] = {
     f"{PART}.area": Rule("float64", "triangles", 0.0, LARGEST),
     f"{PART}.target": Rule("bool", "triangles", *MARK),
     f"{PART}.zones.*": Rule("bool", "triangles", *MARK),
+    f"{PART}.surface": Rule(WHOLE, "triangles", -1, MAX_NUMBER),
     f"{PART}.normals": Rule("float32", "triangles 3 3", -STEEPEST, STEEPEST),
     f"{PART}.hollow": Rule("float32", "triangles", -STEEPEST, STEEPEST),
     f"{PART}.thickness": Rule("float32", "triangles", 0.0, np.inf),
@@ -291,6 +292,8 @@ def _require_chamber(chamber: Chamber) -> None:
     for unit in (part.unit, *(mesh.unit for mesh in meshes)):
         if unit not in METRES_PER:
             raise ValueError(f"unit {unit!r}")
+    if part.surface is not None and (part.surface >= len(part.names)).any():
+        raise ValueError("a surface of its part is without its name")
     if not 0.0 < chamber.volume <= LARGEST:
         raise ValueError(f"volume {chamber.volume!r}")
 

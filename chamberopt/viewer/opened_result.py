@@ -72,6 +72,7 @@ class OpenedResult:
         arrays = read_result_arrays(self._path(ARRAYS_FILE))
         self.surface, self.chamber = arrays.part, arrays.cavity
         self.part = DrawnPart(arrays.field, chamber=self.chamber)
+        self._surface_name = arrays.chamber.part.surface_name
 
     def _path(self, name: str) -> Path:
         return unchanged_file(self.folder, name, self.info.sha256)
@@ -133,6 +134,8 @@ class OpenedResult:
             return [*lines, "outside the chamber or hidden"]
         if not surface["target"][triangle]:
             lines.append("not in the target")
+        if name := self._surface_name(triangle):
+            lines.append(f"surface {name}")
         of_zones = [name for name in self.info.zones if surface[f"{ZONE}_{name}"][triangle]]
         lines += [f"zone {name}" for name in of_zones]
         for name in self.quantities:

@@ -11,7 +11,7 @@ function showParts({ quantities, scenes, scales, kinds }) {
   for (const scene of scenes) {
     for (const table of [scene.columns, scene.own])
       for (const name of Object.keys(table)) table[name] = new Float32Array(bytes(table[name]));
-    for (const name of ["triangle", "number", "element", "impacts", "zone"]) scene[name] = new Int32Array(bytes(scene[name]));
+    for (const name of ["triangle", "number", "element", "impacts", "zone", "surface"]) scene[name] = new Int32Array(bytes(scene[name]));
     for (const surface of Object.values(scene.surfaces)) {
       if (surface.points) surface.points = new Float32Array(bytes(surface.points));
       surface.triangles = new Uint32Array(bytes(surface.triangles));
@@ -125,6 +125,7 @@ function showParts({ quantities, scenes, scales, kinds }) {
       return [now ? `coverage after ${number(seconds())} s` : one.label, `${number(value)} ${one.unit}`];
     });
     rows.unshift(["place x, y, z", Measure.at(hit.place)]);
+    if (scene.names.length) rows.splice(1, 0, ["surface", scene.names[scene.surface[t]] ?? "no name"]);
     if (scene.zones.length) rows.splice(1, 0, ["zone", scene.zones[scene.zone[t] - 1] ?? "none"]);
     rows.push([`coverage of the triangle after ${number(scene.treatment)} s`, `${number(scene.own.coverage[t])} %`],
       ["width of its 95 % interval", `${number(scene.own.interval[t])} %`],

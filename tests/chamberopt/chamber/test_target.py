@@ -1,5 +1,6 @@
 """The target by names of the part's file, alone and with other conditions; its elements."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -9,8 +10,10 @@ import trimesh
 
 from chamberopt.chamber.build import Chamber, build_chamber
 from chamberopt.chamber.checks.check import describe
+from chamberopt.chamber.part import named_surface
 from chamberopt.common.errors import InputError
 from chamberopt.design.load import Design, load_design, save_design
+from chamberopt.geometry.meshes.part_mesh import read_part_cached
 from chamberopt.geometry.triangles import area_vectors
 
 GEAR = Path(__file__).resolve().parents[3] / "designs" / "gear.toml"
@@ -70,6 +73,23 @@ def test_a_name_that_the_file_does_not_have_is_refused_with_those_it_has(
 ) -> None:
     with pytest.raises(InputError, match=said):
         build_chamber(design_of(tmp_path, {"surface": surface}))
+
+
+def test_each_triangle_has_the_name_of_its_surface(tmp_path: Path) -> None:
+    part = build_chamber(design_of(tmp_path, {})).part
+    up = area_vectors(part.vertices, part.triangles)[:, 2] > 0.99 * part.area
+    assert {part.surface_name(k) for k in np.flatnonzero(up)} == {"Top"}
+    assert {part.surface_name(k) for k in range(12)} == {"Top", "bottom", "left", "right", "ends"}
+
+
+def test_of_several_names_the_closest_is_taken(tmp_path: Path) -> None:
+    """As a STEP file has them: a body's name and colour, a name and an alias of a surface in it."""
+    mesh = read_part_cached(design_of(tmp_path, {}).part.mesh_path, "mm")
+    groups = {"BODY": range(12), "#9999a6": range(3, 12), "ROOT_2": [2, 3], "ROOT": [2, 3]}
+    marks = {name: np.isin(np.arange(12), own) for name, own in groups.items()}
+    found = named_surface(replace(mesh, groups=marks))
+    assert found.tolist() == [-1, -1, 3, 3, *[1] * 8]
+    assert named_surface(replace(mesh, groups={"BODY": marks["BODY"]})) is None
 
 
 def test_a_file_without_names_says_so() -> None:

@@ -2,6 +2,7 @@
 
 import io
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -9,9 +10,12 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 
+from chamberopt.chamber.build import build_chamber
 from chamberopt.printers.report_page import write_part_page, write_report
+from chamberopt.workflows.save_run import save_simulation
 from tests.helpers.results.browser import WAIT, chromium, expect, needs_chromium
-from tests.helpers.results.report_folders import studied_once
+from tests.helpers.results.report_folders import DESIGN, studied_once
+from tests.helpers.synthetic import poisson_evaluation
 
 pytestmark = needs_chromium
 DRAWN = "body[data-drawn=yes]"
@@ -102,7 +106,8 @@ def test_the_slider_shows_coverage_at_other_times(shown: OpenPage) -> None:
     assert np.abs(shown.pixels() - after).max() > 0.2
 
 
-def test_pointing_at_the_target_shows_its_numbers_and_the_triangles(shown: OpenPage) -> None:
+def told_at_the_target(shown: OpenPage) -> str:
+    """What is said of a place of the target, at which the pointer then is."""
     shown.page.evaluate("document.getElementById('part-0').scrollIntoView({block: 'center'})")
     box = shown.page.locator("#part-0").bounding_box()
     label = shown.page.locator("#label")
@@ -111,17 +116,33 @@ def test_pointing_at_the_target_shows_its_numbers_and_the_triangles(shown: OpenP
             shown.page.mouse.move(box["x"] + across * box["width"], box["y"] + down * box["height"])
             shown.page.wait_for_timeout(150)
             if label.is_visible():
-                told = label.inner_text()
-                assert "element" in told
-                assert "simulated impacts on the triangle" in told
-                for unit in ("%", "1/mm²", "m/s", "°"):
-                    assert unit in told
-                shown.page.mouse.down()  # a click keeps them
-                shown.page.mouse.up()
-                assert shown.page.locator("#places tbody tr").count() == 1
-                assert shown.page.locator("#places").is_visible()
-                return
+                return str(label.inner_text())
     pytest.fail("no triangle of the target answered to the pointer")
+
+
+def test_pointing_at_the_target_shows_its_numbers_and_the_triangles(shown: OpenPage) -> None:
+    told = told_at_the_target(shown)
+    assert "element" in told
+    assert "surface" not in told  # the file has no names
+    assert "simulated impacts on the triangle" in told
+    for unit in ("%", "1/mm²", "m/s", "°"):
+        assert unit in told
+    shown.page.mouse.down()  # a click keeps them
+    shown.page.mouse.up()
+    assert shown.page.locator("#places tbody tr").count() == 1
+    assert shown.page.locator("#places").is_visible()
+
+
+def test_pointing_names_the_surface(browser: Any, tmp_path: Path) -> None:
+    chamber = build_chamber(DESIGN)
+    numbers = np.where(chamber.part.target, 1, -1).astype(np.int32)
+    part = replace(chamber.part, names=("body", "FLANK"), surface=numbers)
+    evaluation = poisson_evaluation(DESIGN, chamber, 60.0)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("chamberopt.workflows.save_run.draw_coverage", lambda *_: None)
+        save_simulation(tmp_path / "named", DESIGN, replace(chamber, part=part), evaluation)
+    write_part_page([tmp_path / "named"], tmp_path / "part.html")
+    assert "surface\tFLANK" in told_at_the_target(OpenPage(browser, tmp_path / "part.html"))
 
 
 def test_a_section_shows_the_inside_of_the_part(shown: OpenPage) -> None:

@@ -93,6 +93,9 @@ def wrong_chambers() -> dict[str, Chamber]:
             one, part=replace(part, file=replace(file, simulated=short))
         ),
         "unit 'mile'": replace(one, part=replace(part, unit="mile")),
+        "surface of its part is without its name": replace(
+            one, part=replace(part, surface=np.zeros(len(part.triangles), dtype=np.int32))
+        ),
         "without its part": replace(one, part=replace(part, file=None)),
         "simulated.groups.top' is an array that no result has": replace(
             one, part=replace(part, file=replace(file, simulated=with_groups))
