@@ -199,15 +199,18 @@ def coverage_section(
 
 def _table(shown: Sequence[Figure]) -> Table:
     rows = [(one.label.with_unit, one.label.number(one.result)) for one in shown]
-    return _with_ranges(Table("± 95 % intervals", ("", "± 95 %"), rows), shown)
+    return with_ranges(Table("± 95 % intervals", ("", "± 95 %"), rows), shown)
 
 
-def _with_ranges(table: Table, shown: Sequence[Figure]) -> Table:
-    """Return a table of figures with a last column for their ranges, if any has one."""
+def with_ranges(table: Table, shown: Sequence[Figure]) -> Table:
+    """Return a table of figures with a last column for their ranges, if any has one.
+
+    Rows of other things, such as parameters, have no range.
+    """
     if not any(one.range_text for one in shown):
         return table
     ranges = {one.label.with_unit: one.range_text for one in shown}
-    rows = [(*row, ranges[row[0]]) for row in table.rows]
+    rows = [(*row, ranges.get(row[0], "")) for row in table.rows]
     return Table(table.caption, (*table.head, "range"), rows)
 
 
@@ -224,7 +227,7 @@ def _compared(shown: Sequence[Figure]) -> Table:
         for one in shown
         if one.start is not None and one.change is not None
     ]
-    return _with_ranges(Table("± 95 % intervals", head, rows), shown)
+    return with_ranges(Table("± 95 % intervals", head, rows), shown)
 
 
 def _standing(changed: Estimate) -> str:

@@ -14,7 +14,14 @@ from typing import TYPE_CHECKING, get_args
 from chamberopt.common.number_text import counted, estimate_text
 from chamberopt.common.number_text import plain as ascii_number
 from chamberopt.documents.answer import answer, answer_lines
-from chamberopt.documents.coverage import Figure, figures, figures_table, labels_of, main_figures
+from chamberopt.documents.coverage import (
+    Figure,
+    figures,
+    figures_table,
+    labels_of,
+    main_figures,
+    with_ranges,
+)
 from chamberopt.documents.document import About, Table
 from chamberopt.documents.ranges import range_lines, range_texts
 from chamberopt.documents.stress import stress_sentence
@@ -116,13 +123,16 @@ def replicas_text(design: Design) -> str:
 def _table(
     head: Sequence[str], parameters: Mapping[str, Sequence[str]], shown: Sequence[Figure]
 ) -> Table:
-    """Return a table of parameters and main figures, with a column for each design of `head`."""
+    """Return a table of parameters and main figures, with a column for each design of `head`.
+
+    A last column has the ranges of the last design over what is not calibrated, if they are known.
+    """
     rows = [(name, *values) for name, values in parameters.items()]
     rows += [
         (one.label.with_unit, *map(one.label.number, filter(None, (one.start, one.result))))
         for one in main_figures(shown)
     ]
-    return Table("", ("", *head), rows)
+    return with_ranges(Table("", ("", *head), rows), shown)
 
 
 def _all_figures(result: Result, start: Result | None) -> Iterator[str]:

@@ -13,6 +13,7 @@ from chamberopt.chamber.build import build_chamber
 from chamberopt.common.errors import InputError
 from chamberopt.common.executor import SerialExecutor
 from chamberopt.design.ranges import unknowns
+from chamberopt.documents.document import Table
 from chamberopt.documents.ranges import range_texts
 from chamberopt.documents.report import report
 from chamberopt.documents.sheet import AsBuilt, cautions, process_sheet
@@ -198,7 +199,14 @@ def test_a_study_says_whether_its_best_stays_best(
     assert load_result(tmp_path / "start").record.ranges == found.start
     sentence = "The best design stays better than the start at both ends of v0."
     assert sentence in [one.text for one in report(read).answer_lines]
-    assert sentence in result_end(tmp_path, verbose=False)
+    said = result_end(tmp_path, verbose=False)
+    assert sentence in said
+    (table,) = [one for one in said if isinstance(one, Table)]
+    assert table.head == ("", "start", "best", "range")
+    rows = {name: values for name, *values in table.rows}
+    assert rows["shot.mass_g"][-1] == ""
+    of_best = range_texts(read.record.ranges)["time_to_98_s"]
+    assert rows[metric_label("time_to_98_s").with_unit][-1] == of_best
 
 
 def test_an_end_that_cannot_be_simulated_is_told(
