@@ -18,7 +18,7 @@ from chamberopt.chamber.checks.check import (
     shot_reach,
     with_clearance,
 )
-from chamberopt.chamber.part import preview_part
+from chamberopt.chamber.part import named_surface, preview_part
 from chamberopt.chamber.propose.proposed_target import named_surfaces
 from chamberopt.chamber.reach import reached_part_share
 from chamberopt.chamber.scene import chamber_mesh
@@ -35,14 +35,20 @@ ARRAY_TYPES = {"f": "<f4", "i": "<u4", "u": "<u4", "b": "u1"}
 
 
 def part_answer(design: Design) -> bytes:
-    """Return the part as its file has it [mm], its named surfaces with areas, and the colours."""
+    """Return the part as its file has it [mm], its named surfaces with areas, and the colours.
+
+    The number of a triangle in `surface` is that of the name of its surface in `groups`.
+    """
     mesh = preview_part(design).mesh
     names = [[one.name, one.text] for one in named_surfaces(mesh)]
     box = [round(1e3 * float(side), 4) for side in mesh.size]
     head = {"names": names, "box_mm": box, "unit": mesh.unit, "notes": list(mesh.notes)}
     head |= {"kinds": KINDS, "states": STATES, "edges": EDGES}
     head |= {"closed": not len(border_edges(mesh.triangles))}  # or a piece of a drawn set-up
-    return packed(head, points=1e3 * mesh.vertices, triangles=mesh.triangles)
+    named = named_surface(mesh)
+    head |= {"groups": list(mesh.groups)}
+    surface = {} if named is None else {"surface": named.astype(np.uint32)}  # -1 is no number then
+    return packed(head, points=1e3 * mesh.vertices, triangles=mesh.triangles, **surface)
 
 
 def shape_answer(design: Design) -> bytes:

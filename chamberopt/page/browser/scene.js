@@ -133,6 +133,17 @@ function dimensions() {
 // Number of the part's triangle below the pointer, or null.
 export function triangleAt(event) { return view.at(event, ["part"])?.triangle ?? null; }
 
+// What is said of the place under the pointer: how the part's file names its surface, what it is, and where.
+const under = document.getElementById("under");
+view.renderer.domElement.addEventListener("pointermove", (event) => {
+  const hit = event.buttons || !placed ? null : view.at(event, ["part"]);
+  under.hidden = !hit;
+  if (!hit) return;
+  const name = part.groups[part.surface?.[hit.triangle]], [kind] = part.kinds[part.states[placed.state[hit.triangle]]];
+  under.textContent = `${name ? `${name}, ` : ""}${kind}, at ${Measure.at(hit.place)}`;
+});
+view.renderer.domElement.addEventListener("pointerleave", () => { under.hidden = true; });
+
 // Handles at the part's middle: "rotate", "translate" or "" for none.
 export function setHandles(mode) {
   if (!handles) {

@@ -9,7 +9,7 @@ from matplotlib.colors import to_rgb
 
 from chamberopt.cli import main
 from chamberopt.pictures.charts.colours import KINDS
-from tests.chamberopt.page.browser_page import ON_SCREEN, SIDE, Page
+from tests.chamberopt.page.browser_page import FIND, ON_SCREEN, SIDE, Page
 from tests.chamberopt.page.conftest import Served
 from tests.helpers.results.browser import WAIT, chromium, expect, needs_chromium
 
@@ -144,6 +144,8 @@ def test_a_click_picks_the_face_and_turns_it_down(opened: Page) -> None:
     opened.wait("data-checked=reach")
     side = opened.click_side()
     expect(opened.page.locator("#chosen")).to_contain_text("faces = [")
+    opened.page.mouse.move(*opened.page.evaluate(FIND, side)[1:])
+    expect(opened.page.locator("#under")).to_contain_text("target, at ")
     assert int(opened.page.evaluate("document.body.dataset.picked")) == side
     opened.tab("pose")
     opened.page.click("#down")
