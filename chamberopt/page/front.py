@@ -15,6 +15,8 @@ from chamberopt.chamber.propose.shop import load_shop
 from chamberopt.common.errors import InputError
 from chamberopt.common.files import check_new_file, write_bytes
 from chamberopt.common.toml_fields import read_toml
+from chamberopt.design.calibration import Calibration
+from chamberopt.design.design import validate
 from chamberopt.design.load import is_study
 from chamberopt.design.materials import alloys, balls
 from chamberopt.geometry.meshes.formats import SUFFIXES, is_mesh_name
@@ -65,7 +67,7 @@ class Front:
         return self.command.status()
 
     def front(self, _: object) -> dict[str, object]:
-        """Return what the front page offers: parts, designs and shops here, and the catalogue."""
+        """Return what the front page offers: files of this folder by kind, and the catalogue."""
         tables = _tables(self._folder)
         return {
             "folder": str(self._folder),
@@ -74,6 +76,7 @@ class Front:
             "suffixes": SUFFIXES,
             "designs": [name for name, kind in tables if kind == "design"],
             "shops": [name for name, kind in tables if kind == "shop"],
+            "calibrations": [name for name, kind in tables if kind == "calibration"],
             "alloys": [one.name for one in alloys()],
             "balls": [one.name for one in balls()],
             "shapes": SHAPES,
@@ -123,9 +126,10 @@ class Front:
         _require_possible(wishes, str(asked["material"]), bool(asked["pilot"]))
         arguments += [f"--{name}={text}" for name, text in wishes.items() if text]
         arguments += [f"--target={name}" for name in map(str, asked["target"])]
-        if asked["shop"]:
-            shop = path_inside(self._folder, str(asked["shop"]))
-            arguments += [f"--shop=./{shop.relative_to(self._folder).as_posix()}"]
+        for option in ("shop", "calibration"):
+            if asked[option]:
+                file = path_inside(self._folder, str(asked[option]))
+                arguments += [f"--{option}=./{file.relative_to(self._folder).as_posix()}"]
         arguments += [] if asked["pilot"] else ["--no-pilot"]
         out = free_folder(self._folder, Path(part.stem))
         return {"out": out, **self.command.start([*arguments, f"--out={out}"], self._folder)}
@@ -164,16 +168,28 @@ def _plain_files(folder: Path) -> list[Path]:
 
 
 def _tables(folder: Path) -> list[tuple[str, str]]:
-    """Return path and kind of each design, study and shop in a folder and the folders in it."""
+    """Return path and kind of each design, study, shop and calibration in a folder.
+
+    The folders in it are looked into too.
+    """
     found = []
     for path in sorted([*folder.glob("*.toml"), *folder.glob("*/*.toml")]):
         if path.resolve() != path:
             continue  # a link to elsewhere
         with suppress(InputError):
-            data = read_toml(path, "design")[1]
-            kind = "study" if is_study(data) else "design" if "chamber" in data else ""
-            if not kind:
-                load_shop(path)
-                kind = "shop"
-            found.append((path.relative_to(folder).as_posix(), kind))
+            found.append((path.relative_to(folder).as_posix(), _kind(path)))
     return found
+
+
+def _kind(path: Path) -> str:
+    """Return what a TOML file is. Raises InputError for none of design, study, machine and shop."""
+    data = read_toml(path, "design")[1]
+    if is_study(data):
+        return "study"
+    if "chamber" in data:
+        return "design"
+    with suppress(InputError):
+        validate(Calibration, data, path)
+        return "calibration"
+    load_shop(path)
+    return "shop"

@@ -15,9 +15,11 @@ async function show(part) {
   find("part").replaceChildren(element("option", { value: "", textContent: "choose…" }), ...here.parts.map(option));
   find("here").hidden = !here.parts.length;
   find("part").value = part ?? here.first;
-  for (const [id, names] of [["material", here.alloys], ["shot", here.balls], ["shape", here.shapes], ["shop", here.shops]])
+  for (const [id, names] of [["material", here.alloys], ["shot", here.balls], ["shape", here.shapes], ["shop", here.shops],
+    ["calibration", here.calibrations]])
     find(id).replaceChildren(find(id).options[0], ...names.map(option));
   find("of-shop").hidden = !here.shops.length;
+  find("of-calibration").hidden = !here.calibrations.length;
   find("designs").hidden = !here.designs.length;
   find("designs").querySelector("ul").replaceChildren(...here.designs.map((name) => {
     const button = element("button", { textContent: "Open" });
@@ -89,7 +91,7 @@ function tell({ steps, lines, exit }) {
   find("error").replaceChildren(...(exit ? onPage(lines.join("\n")) : []));
 }
 
-const WISHES = ["material", "intensity", "coverage", "shop", "shot", "ball-mm", "pose", "shape"]; // options of `new`
+const WISHES = ["material", "intensity", "coverage", "shop", "calibration", "shot", "ball-mm", "pose", "shape"]; // options of `new`
 const NUMBERS = ["intensity", "coverage", "ball-mm"];
 
 // Say a message beside the field of the option that it begins with; give whether there is such a field.

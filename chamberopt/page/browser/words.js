@@ -28,7 +28,7 @@ export const choiceInWords = (choice) => CHOICES[choice] ?? choice;
 // What options of the command line are called on the page.
 const OPTIONS = { target: "what is peened", unit: "the unit of the part", material: "alloy of the part", shot: "balls",
   shape: "form of the chamber", shop: "what your shop has", intensity: "Almen intensity", coverage: "coverage", "ball-mm": "ball diameter in mm",
-  pose: "pose of the part", "no-pilot": "the choice not to simulate" };
+  pose: "pose of the part", calibration: "calibration of the machine", "no-pilot": "the choice not to simulate" };
 const TABLES = "part|chamber|shot|sonotrode|sonotrodes|materials|effects|process|holder|mask|zones|tolerances|ranges";
 const KEY = new RegExp(`(?<![\\w./])(?:${TABLES})(?:\\.\\w+)+|--(?:${Object.keys(OPTIONS).join("|")})(?![\\w-])`, "g");
 const FILE = /\.(?:toml|json|html|pdf|png|st[lp]|step|obj|ply|3mf|off|nas|bdf|dat|fem|inp|msh|data|vt[kpu]|vtkhdf)$/i; // no key

@@ -17,7 +17,8 @@ from tests.hunt.meshes import ROOT
 
 PROPOSED = {
     "part": "box.stl", "unit": "mm", "material": "", "shot": "steel", "shape": "", "target": [],
-    "shop": "", "pilot": False, "intensity": "", "coverage": "", "ball-mm": "", "pose": "",
+    "shop": "", "calibration": "", "pilot": False, "intensity": "", "coverage": "", "ball-mm": "",
+    "pose": "",
 }  # fmt: skip
 
 
@@ -41,7 +42,9 @@ def of_front(front: Served) -> dict[str, Any]:
 def test_a_part_becomes_a_design_that_opens(front: Served, tmp_path: Path) -> None:
     box = trimesh.creation.box((30.0, 20.0, 10.0)).export(file_type="stl")
     assert upload(front, "part.STL", box) == {"part": "part.STL"}
+    shutil.copy(ROOT / "designs/shop/machine.toml", tmp_path)
     here = of_front(front)
+    assert here["calibrations"] == ["machine.toml"]
     assert here["parts"] == ["box.stl", "part.STL"]
     assert here["designs"] == ["design.toml"]
     assert "42CrMo4" in here["alloys"]
@@ -53,7 +56,8 @@ def test_a_part_becomes_a_design_that_opens(front: Served, tmp_path: Path) -> No
     names = front.ask("/look", {"part": "fir_tree.step", "unit": ""})["names"]
     assert ["FIR_TREE", "1796 mm²"] in names
     assert "#ff0000" not in dict(names)  # the colour of just this surface
-    wishes = {"unit": "mm", "material": "IN718", "coverage": "200", "ball-mm": "1.2"}
+    wishes = {"unit": "mm", "material": "IN718", "coverage": "200", "ball-mm": "1.2",
+              "calibration": "machine.toml"}  # fmt: skip
     started = front.ask("/propose", PROPOSED | known | wishes)
     assert started["out"] == "part"
     assert "running" in front.ask("/propose", PROPOSED)["error"]
@@ -61,6 +65,7 @@ def test_a_part_becomes_a_design_that_opens(front: Served, tmp_path: Path) -> No
         time.sleep(0.2)
     assert now["exit"] == 0, now["lines"]
     design = load_design(tmp_path / "part" / "design.toml")
+    assert design.calibration is not None
     assert design.process.coverage_percent == 200
     assert design.shot.diameter == pytest.approx(1.2e-3)
     assert (tmp_path / "part" / design.part.mesh).samefile(tmp_path / "part.STL")
@@ -93,7 +98,7 @@ def test_a_wrong_file_or_wish_is_answered_in_words(front: Served, tmp_path: Path
         ({"intensity": "0.15A"}, "--intensity: it takes pilot runs"),
     ):
         assert said in front.ask("/propose", PROPOSED | wish)["error"]
-    for option in ("part", "shop"):
+    for option in ("part", "shop", "calibration"):
         error = front.ask("/propose", PROPOSED | {option: "../x.stl"})["error"]
         assert "outside the folder" in error
     assert "outside the folder" in front.ask("/look", {"part": "../x", "unit": ""})["error"]
