@@ -99,10 +99,23 @@ def _with_kind(holder: Holder | None, changes: Mapping[str, Any], kind: str) -> 
 
 
 def _plan(design: Design, shape: str) -> dict[str, float | str]:
-    """Return the keys of the form in plan that `new` proposes for the pose of a design's part."""
+    """Return the keys of the form in plan that `new` proposes for the pose of a design's part.
+
+    Where the part goes out through the side walls now, it is the form round the target alone.
+    """
     part = preview_part(design)
-    points = part.vertices - [0.0, 0.0, part.vertices[:, 2].min()]
-    top = float(points[part.mesh.triangles[part.target], 2].max())
+    walls = design.chamber.surface(part.vertices, part.mesh.triangles).vertices
+    below = part.vertices[part.vertices[:, 2] < walls[:, 2].max(), :2]
+    is_within = (below >= walls[:, :2].min(axis=0)) & (below <= walls[:, :2].max(axis=0))
     # The part may stand beside the chamber's axis: with its mirror image, the axis is the middle.
+    points = part.vertices - [0.0, 0.0, part.vertices[:, 2].min()]
     both = np.concatenate([points, points * [-1.0, -1.0, 1.0]])
-    return propose_sizes(both, top, max(design.shot.diameters), shape).plan
+    corners = np.unique(part.mesh.triangles[part.target])
+    target = both[np.r_[corners, corners + len(points)]]
+    return propose_sizes(
+        both,
+        float(target[:, 2].max()),
+        max(design.shot.diameters),
+        shape,
+        target=None if is_within.all() else target,
+    ).plan

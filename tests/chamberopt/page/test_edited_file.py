@@ -6,10 +6,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+import trimesh
 
 from chamberopt.common.errors import InputError
 from chamberopt.page.edited_file import EditedFile, design_fields
 from chamberopt.page.structure import restructured
+from tests.helpers.mesh_files import write_stl
 from tests.hunt.base import write_base
 
 
@@ -171,6 +173,16 @@ def test_another_shape_has_its_own_keys_and_the_files_own_come_back(file: Edited
         '+shape = "box"', "+height_mm = 31   # to try",
         f"+length_mm = {lengths['length_mm']}", f"+width_mm = {lengths['width_mm']}",
     ]  # fmt: skip
+
+
+def test_where_the_part_goes_out_through_the_walls_the_shape_is_round_the_target(
+    file: EditedFile,
+) -> None:
+    """A bar of 60 mm in a cylinder of 40 mm, whose target is the 16 mm in the middle."""
+    bar = trimesh.creation.box((60, 16, 16)).subdivide_to_size(4.0)
+    write_stl(file.folder / "box.stl", bar.vertices[bar.faces])
+    changes = restructured_by(EditedFile(file.path, False), {}, "chamber.shape", "prism")
+    assert 2 * (8 * np.sqrt(2) + 15) < changes["chamber.across_mm"] < 60
 
 
 def test_a_holder_is_put_in_changed_and_taken_out(file: EditedFile) -> None:
