@@ -27,6 +27,7 @@ MOST_LISTED = 6  # surfaces, without --verbose
 TO_SETTLE = re.compile(r"[A-Z][A-Z-]+(?: [A-Z-]{2,})*\b")  # at the beginning of a clause
 NO_MATTER = ("ZERO-TO-PEAK", "PEAK-TO-VALLEY", "WIDER", "SAE ")  # no matter of the shop
 SIMULATED = "simulated"  # the row that is told with --verbose alone
+KINDS = {"bore": "the part itself, out through a wall"}  # of holders, in words
 MINUTE, HOUR = 60.0, 3600.0  # s
 VALUE = re.compile(r"_(mm|g|um|pv_um|deg|s|khz)$")  # ends of names: units
 
@@ -136,7 +137,7 @@ def _rows(made: Proposal) -> Iterator[_Row]:
             )
             kind = own.get(table, {}).get("kind", "pad" if "axis" in own.get(table, {}) else "")
             keys = tuple(f"{one}.{key}" for one, values in own.items() for key in values)
-            value = ", ".join(filter(None, (str(kind), sizes)))
+            value = ", ".join(filter(None, (KINDS.get(kind, str(kind)), sizes)))
             whys = [why for key in keys for why in clauses(made.reasons.get(key, ""))[0]]
             yield _Row(name, value or next(iter(whys), "see the design"), keys)
     count = f"{design.shot.count:,} of {tables['shot']['diameter_mm']:g} mm"

@@ -80,7 +80,7 @@ from chamberopt.design.fixture import WIDEST_GAP
 from chamberopt.design.materials import CATALOGUE, USUAL, alloy, ball, balls
 from chamberopt.geometry.meshes.part_mesh import PartMesh, read_part
 from chamberopt.geometry.meshes.surface_error import format_box
-from chamberopt.geometry.meshes.units import GUESSED
+from chamberopt.geometry.meshes.units import BY_SIZE
 from chamberopt.geometry.triangles import rotation_matrix
 
 REACHES = 0.95  # of a part's length, from which on a target reaches both of its ends
@@ -88,7 +88,8 @@ AT_WALL = 2.0  # ball diameters from the target to the wall through which its en
 WIDER = (1.0, 1.4, 2.0)  # factors on the room round the part that are tried
 AMPLITUDE_UM = 40.0  # zero-to-peak; the nearest that the sonotrode can set is taken
 USUAL_PART, WALL, SONOTRODE = "42CrMo4", "100Cr6", "Ti-6Al-4V"  # of the catalogue
-CERAMIC, IMPLANT = "zirconia", "ELI"  # balls for an alloy of implants, by a word of its name
+# Balls for aluminium and for an alloy of implants, which a word of its name tells.
+CERAMIC, IMPLANT = "zirconia", "ELI"
 # Materials of balls, and least hardness of steel balls over the part's. A part as hard as they are
 # is hardly dented: in pilots of a gear of 650 HB tungsten carbide left 9 times the dents.
 STEEL, HARD, HARDER = "steel", "tungsten_carbide", 1.25
@@ -234,7 +235,9 @@ def _proposed(
     half_ball = f"{plain(1e3 * WIDEST_GAP * diameter, 3)} mm, half a ball"
     reasons = {
         "sonotrode.blocks": f"{BLOCKS} {half_ball}",
-        "part.unit": ("UNIT GUESSED: " if any(GUESSED in note for note in mesh.notes) else "")
+        "part.unit": (
+            "UNIT GUESSED: " if any(f"({BY_SIZE})" in note for note in mesh.notes) else ""
+        )
         + f"the part measures {format_box(mesh.size)}",
         "part.target": target.reason,
         "shot.diameter_mm": ball_reason,
@@ -330,7 +333,8 @@ def _shot(name: str, part: str, shop: Shop) -> tuple[str, str]:
     not known.
 
     Args:
-        name: the wanted material; if it is empty, steel, or a harder one for a hard part.
+        name: the wanted material; if it is empty, steel, a harder one for a hard part, or a
+            ceramic where steel must leave no iron.
         part: the part's alloy.
     """
     if name and ball(name).hardness_HB is None:
@@ -338,8 +342,10 @@ def _shot(name: str, part: str, shop: Shop) -> tuple[str, str]:
         text = "the hardness of these balls is not known, and their restitution follows from it"
         raise InputError(f"--shot: given {name!r}; {text}; give one of {known}")
     hardness = alloy(part).hardness_HB
-    if not name and IMPLANT in part.split() and _has(shop, CERAMIC):
-        return CERAMIC, "steel leaves iron on an alloy of implants"
+    of = "an alloy of implants" if IMPLANT in part.split() else ""
+    of = of or ("aluminium" if alloy(part).metal == "aluminium" else "")
+    if not name and of and _has(shop, CERAMIC):
+        return CERAMIC, f"steel leaves iron on {of}"
     if name or (ball(STEEL).hardness_HB or 0.0) >= HARDER * hardness or not _has(shop, HARD):
         found = ball(name or STEEL).name
         return found, IRON.get(alloy(part).metal, "") if found == STEEL else ""

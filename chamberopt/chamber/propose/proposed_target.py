@@ -146,6 +146,7 @@ SELDOM = re.compile(
 )
 # Names of what runs in bearings: where they are no target, its size and finish must stay.
 RUNNING = re.compile(r"(?<![a-z])(?:pin|journal|race|bearing|zapfen)s?(?![a-z])", re.I)
+BY_SIZE = "CHOSEN BY SIZE ALONE: confirm that it is what fails in use (--target takes another)"
 AS_LARGE = 0.9  # of the largest face's area: the target takes a face as large, e.g. a blade's back
 PATTERN = 6  # number of alike faces that make a repeated feature, such as teeth
 COLOUR, VIVID = re.compile(r"#([0-9a-f]{2})([0-9a-f]{2})([0-9a-f]{2})$", re.I), 100
@@ -234,6 +235,9 @@ def propose_target(mesh: PartMesh, known: Sequence[Surface], wanted: Iterable[st
         texts = [f"{one.name} ({one.text})" for one in others[:RUNNERS_UP]]
         return f"; after it {' and '.join(texts)}" if texts else ""
 
+    def by_size(text: str, others: Sequence[Surface]) -> str:
+        return f"{text}{beside(others)}{f'; {BY_SIZE}' if others else ''}"
+
     special = [
         one
         for one in named
@@ -247,7 +251,7 @@ def propose_target(mesh: PartMesh, known: Sequence[Surface], wanted: Iterable[st
             return _joined(likely, "by its name, as such are usually peened" + beside(rest))
     if special:
         special.sort(key=lambda one: SELDOM.search(one.name) is not None)
-        return _joined(special[:1], "the largest surface that the file names" + beside(special[1:]))
+        return _joined(special[:1], by_size("the largest surface that the file names", special[1:]))
     repeated = [one for one in faces if one.keys["faces"][0].get("alike")]
     counts = {one.name: _count(one) for one in repeated}
     features = [one for one in repeated if counts[one.name] >= PATTERN]
@@ -260,7 +264,7 @@ def propose_target(mesh: PartMesh, known: Sequence[Surface], wanted: Iterable[st
         return _joined(pattern, text + beside(others))
     sizes = [area[one.triangles].sum() for one in faces]
     large = [one for one, size in zip(faces, sizes, strict=True) if size >= AS_LARGE * sizes[0]]
-    return _joined(large, "the largest between sharp edges" + beside(faces[len(large) :]))
+    return _joined(large, by_size("the largest between sharp edges", faces[len(large) :]))
 
 
 def _faces(mesh: PartMesh) -> list[Surface]:

@@ -26,6 +26,7 @@ UNIT_COMMENT = re.compile(rb"\bunits?\b[\"' ]*[=:][\"' ]*(\w+)", re.I)
 # m: longest side of the bounding box of a part that can be peened in a chamber.
 MIN_SIZE, MAX_SIZE = 5e-4, 3.0
 GUESSED = "unit guessed as"  # start of the note on a unit that is not certain
+BY_SIZE = "by its size"  # reason for a unit of which the file says nothing
 # Units that exporters write, the most likely first, and the sizes [m] for which they are guessed.
 # Inches and centimetres are never guessed, because their sizes overlap with millimetres.
 GUESSED_UNITS = ("mm", "m", "um")
@@ -104,7 +105,7 @@ def _guess(path: Path, content: bytes, sides: np.ndarray, may_guess: bool) -> tu
         )
     for unit in GUESSED_UNITS:
         if unit in possible:
-            return unit, "by its size"
+            return unit, BY_SIZE
     raise InputError(
         f"{path}: the unit cannot be guessed from a longest side of {sides.max():.5g}; "
         "give part.unit, one of " + ", ".join(f'"{unit}"' for unit in METRES_PER)
