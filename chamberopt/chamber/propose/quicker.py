@@ -250,7 +250,8 @@ def _with_pose_told(best: Way, first: Way, tried: list[tuple[Way, str]]) -> Way:
     if len(texts) == 1:
         return best
     pose, _, why = best.made.reasons["part.rotate_deg"].rpartition(": ")
-    tried_ones = f"poses tried by pilots: {', '.join(texts)}"
+    ball = first.made.tables["shot"]["diameter_mm"]  # those of the proposal may be others
+    tried_ones = f"poses tried by pilots with balls of {ball:g} mm: {', '.join(texts)}"
     reason = f"{pose}: {why}; {tried_ones}" if best is first else f"{pose}: {tried_ones}"
     reasons = {**best.made.reasons, "part.rotate_deg": reason}
     return best._replace(made=replace(best.made, reasons=reasons))
