@@ -87,11 +87,11 @@ def _cells_of(boxes: np.ndarray, side: int) -> _Cells:
 
 @computed_once(32)
 def _projection(mesh: TriangleMesh, k: int) -> _Projection:
-    return _project(mesh.corners, mesh, k, max(1, math.isqrt(len(mesh.triangles) // IN_CELL)))
+    return _project(mesh.corners, mesh, k)
 
 
-def _project(triangles: np.ndarray, mesh: TriangleMesh, k: int, cells: int = 1) -> _Projection:
-    """Return the triangles (m, 3, 3) [m] projected along direction RAYS[k], in ``cells``² cells.
+def _project(triangles: np.ndarray, mesh: TriangleMesh, k: int) -> _Projection:
+    """Return the triangles (m, 3, 3) [m] projected along direction RAYS[k], in cells.
 
     The mesh gives the scale of rounding.
     """
@@ -103,7 +103,8 @@ def _project(triangles: np.ndarray, mesh: TriangleMesh, k: int, cells: int = 1) 
     low, high = corners.min(axis=1), corners.max(axis=1)
     boxes = np.stack([low[:, 0], high[:, 0], low[:, 1], high[:, 1]], axis=1)
     border = BORDER * float(np.ptp(mesh.vertices, axis=0).max()) ** 2
-    return _Projection(corners, boxes, _cells_of(boxes, cells), axes, border)
+    cells = _cells_of(boxes, max(1, math.isqrt(len(triangles) // IN_CELL)))
+    return _Projection(corners, boxes, cells, axes, border)
 
 
 @jit
@@ -177,6 +178,13 @@ def _near(
     return np.flatnonzero(near)
 
 
+def _crossed(projection: _Projection, points: np.ndarray) -> np.ndarray:
+    """Return how many triangles the ray from each point (n, 3) [m] crosses, (n,); -1: undecided."""
+    crossed = np.zeros(len(points), dtype=np.int64)
+    _count(projection, np.ascontiguousarray(points @ projection.axes.T), crossed)
+    return crossed
+
+
 @jit
 def _count(projection: _Projection, points: np.ndarray, crossed: np.ndarray) -> None:
     for i in range(len(points)):
@@ -188,10 +196,6 @@ def contained(
 ) -> np.ndarray:
     """Tell which points are inside the mesh, by the parity of crossings along a ray.
 
-    A turned part that goes through a wall leaves slits in the surface. A point that is
-    outside by the parity then counts as outside only if the surface's solid angle, which a slit
-    hardly changes, says so too.
-
     Args:
         mesh: the surface.
         points: positions [m], shape (n, 3).
@@ -201,19 +205,17 @@ def contained(
     Returns:
         True for each point inside, shape (n,) bool.
     """
+    if corners is not None:
+        return TurnedSurface(mesh, corners).encloses(points)
     points = np.asarray(points, dtype=np.float64)
     inside = np.zeros(len(points), dtype=np.bool_)
     undecided = np.arange(len(points))
     for k in range(len(RAYS)):
-        projection = _projection(mesh, k) if corners is None else _project(corners, mesh, k)
-        crossed = np.zeros(len(undecided), dtype=np.int64)
-        _count(projection, np.ascontiguousarray(points[undecided] @ projection.axes.T), crossed)
+        crossed = _crossed(_projection(mesh, k), points[undecided])
         inside[undecided] = crossed % 2 == 1
         undecided = undecided[crossed < 0]
         if len(undecided) == 0:
             break
-    if corners is not None:
-        inside[~inside] = enclosed(corners, points[~inside])
     return inside
 
 
@@ -262,9 +264,8 @@ class TurnedSurface:
 
     def __init__(self, mesh: TriangleMesh, corners: np.ndarray) -> None:
         """Project the present corners of the triangles [m], (m, 3, 3), along two directions."""
-        cells = max(1, math.isqrt(len(corners) // IN_CELL))
         self.mesh, self.corners = mesh, corners
-        self.projections = [_project(corners, mesh, k, cells) for k in range(2)]
+        self.projections = [_project(corners, mesh, k) for k in range(2)]
 
     def near(self, points: np.ndarray, reach: float) -> np.ndarray:
         """Return the corners of all triangles within ``reach`` [m] of any of the points (n, 3)."""
@@ -276,9 +277,7 @@ class TurnedSurface:
         Where two rays do not agree, as one passes through a slit between the part and a wall, the
         solid angle decides, which takes all triangles for each point.
         """
-        crossed = np.zeros((2, len(points)), dtype=np.int64)
-        for one, count in zip(self.projections, crossed, strict=True):
-            _count(one, np.ascontiguousarray(points @ one.axes.T), count)
+        crossed = np.array([_crossed(one, points) for one in self.projections])
         odd = crossed % 2 == 1
         unclear = (crossed < 0).any(axis=0) | (odd[0] != odd[1])
         inside = odd[0].copy()

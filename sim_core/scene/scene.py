@@ -24,7 +24,6 @@ from sim_core.numerics.computed_once import computed_once
 from sim_core.scene.analytic_scene import require_clear, require_supported
 from sim_core.scene.bent_faces import require_profiles
 from sim_core.scene.invariants import (
-    TurnedSurface,
     beneath_mean_plane,
     clearance,
     contained,
@@ -214,12 +213,7 @@ class Scene:
             )
         turn = self.physics_at_start.part_rotation
         corners = None if turn is None else turned_corners(self.mesh, turn)
-        inside = (
-            contained(self.mesh, balls.positions)
-            if corners is None
-            else TurnedSurface(self.mesh, corners).encloses(balls.positions)
-        )
-        outside = np.flatnonzero(~inside)
+        outside = np.flatnonzero(~contained(self.mesh, balls.positions, corners))
         vibrations, radii = self.physics.vibrations, 0.5 * balls.diameters[outside]
         points = balls.positions[outside]
         outside = outside[~beneath_mean_plane(self.mesh, vibrations, points, radii, corners)]
