@@ -232,13 +232,11 @@ def _proposed(
     tables["shot"]["diameter_mm"] = round(1e3 * diameter, 4)
     if not (end or wanted.pose) and (hanging := _hanging(mesh, target, turns, diameter, wanted)):
         turns, pose_reason = hanging, ON_END
+    is_guessed = any(f"({BY_SIZE})" in note for note in mesh.notes)
     half_ball = f"{plain(1e3 * WIDEST_GAP * diameter, 3)} mm, half a ball"
     reasons = {
         "sonotrode.blocks": f"{BLOCKS} {half_ball}",
-        "part.unit": (
-            "UNIT GUESSED: " if any(f"({BY_SIZE})" in note for note in mesh.notes) else ""
-        )
-        + f"the part measures {format_box(mesh.size)}",
+        "part.unit": f"{'UNIT GUESSED: ' * is_guessed}the part measures {format_box(mesh.size)}",
         "part.target": target.reason,
         "shot.diameter_mm": ball_reason,
         **({"shot.material": shot_reason} if shot_reason else {}),
@@ -342,13 +340,12 @@ def _shot(name: str, part: str, shop: Shop) -> tuple[str, str]:
         text = "the hardness of these balls is not known, and their restitution follows from it"
         raise InputError(f"--shot: given {name!r}; {text}; give one of {known}")
     hardness = alloy(part).hardness_HB
-    of = "an alloy of implants" if IMPLANT in part.split() else ""
-    of = of or ("aluminium" if alloy(part).metal == "aluminium" else "")
-    if not name and of and _has(shop, CERAMIC):
-        return CERAMIC, f"steel leaves iron on {of}"
+    is_implant, metal = IMPLANT in part.split(), alloy(part).metal
+    if not name and (is_implant or metal == "aluminium") and _has(shop, CERAMIC):
+        return CERAMIC, f"steel leaves iron on {'an alloy of implants' if is_implant else metal}"
     if name or (ball(STEEL).hardness_HB or 0.0) >= HARDER * hardness or not _has(shop, HARD):
         found = ball(name or STEEL).name
-        return found, IRON.get(alloy(part).metal, "") if found == STEEL else ""
+        return found, IRON.get(metal, "") if found == STEEL else ""
     return HARD, f"harder than the part, of {hardness:g} HB, which steel balls hardly dent"
 
 
