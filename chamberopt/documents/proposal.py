@@ -102,14 +102,14 @@ def time_in_words(seconds: float) -> str:
 
 def _sentence(made: Proposal) -> list[str]:
     """Return what is proposed in one sentence."""
-    shot, design, part = made.tables["shot"], made.design, made.chamber.part
+    design, part = made.design, made.chamber.part
+    balls = " and then ".join(_balls(made))
     target = made.reasons["part.target"].partition(": ")[0]
     area = area_in_mm2(float(part.area[part.target].sum()))
     return wrapped(
         f"Peen {one_line(target)} ({area}) of {one_line(design.part.mesh_path.name)} for "
-        f"{time_in_words(design.process.treatment_time)} with {design.shot.count:,} balls of "
-        f"{shot['diameter_mm']:g} mm ({shot['material']}, {shot['mass_g']:g} g), the sonotrode "
-        f"at {design.sonotrode.zero_to_peak_um:g} µm zero-to-peak.",
+        f"{time_in_words(design.process.treatment_time)} with {balls}, the sonotrode at "
+        f"{design.sonotrode.zero_to_peak_um:g} µm zero-to-peak.",
         0,
     )
 
@@ -140,8 +140,7 @@ def _rows(made: Proposal) -> Iterator[_Row]:
             value = ", ".join(filter(None, (KINDS.get(kind, str(kind)), sizes)))
             whys = [why for key in keys for why in clauses(made.reasons.get(key, ""))[0]]
             yield _Row(name, value or next(iter(whys), "see the design"), keys)
-    count = f"{design.shot.count:,} of {tables['shot']['diameter_mm']:g} mm"
-    balls = f"{count}, {tables['shot']['material']}, {tables['shot']['mass_g']:g} g in all"
+    balls = ", then ".join(_balls(made))
     yield _Row("balls", balls, ("shot.diameter_mm", "shot.mass_g", "shot.material"))
     time = time_in_words(design.process.treatment_time)
     yield _Row("time", time, ("process.treatment_time_s", "process.coverage_percent"))
@@ -154,6 +153,16 @@ def _rows(made: Proposal) -> Iterator[_Row]:
     simulated = f"{accuracy.replicas} replicas of {plain(accuracy.simulated_time, 3)} s"
     keys = tuple(f"process.accuracy.{key}" for key in tables["process.accuracy"])
     yield _Row(SIMULATED, simulated, keys)
+
+
+def _balls(made: Proposal) -> Iterator[str]:
+    """Yield the charge of balls of each size, in the order in which they are taken."""
+    material, seen = made.tables["shot"]["material"], set()
+    for one in made.design.in_steps.values():
+        size = 1e3 * one.shot.diameter
+        if size not in seen:
+            seen.add(size)
+            yield f"{one.shot.count:,} balls of {size:g} mm ({material}, {1e3 * one.shot.mass:g} g)"
 
 
 def _numbers(table: Mapping[str, object]) -> Iterator[tuple[str, float]]:

@@ -15,17 +15,24 @@ from typing import TYPE_CHECKING
 
 from chamberopt.chamber.propose.first_design import propose
 from chamberopt.chamber.propose.left_out import LeftOut, find_left_out
-from chamberopt.chamber.propose.proposed_budget import Asked, propose_budget, with_budget
+from chamberopt.chamber.propose.proposed_budget import measured_budget, with_budget
 from chamberopt.chamber.propose.proposed_intensity import (
     as_no_wish,
+    beside_larger,
     is_off,
+    larger_balls,
     propose_intensity,
+    setting_of,
     usual_for,
     with_expected_intensity,
-    with_larger_balls,
     with_thin_places,
 )
-from chamberopt.chamber.propose.quicker import Way, propose_quicker, propose_second_pose
+from chamberopt.chamber.propose.proposed_steps import (
+    propose_second_pose,
+    with_finer_balls,
+    without_finer,
+)
+from chamberopt.chamber.propose.quicker import Way, propose_quicker
 from chamberopt.chamber.propose.text import design_text, study_texts
 from chamberopt.common.errors import InputError
 from chamberopt.common.executor import local_executor
@@ -188,6 +195,7 @@ class _Pilots:
         seeks = bool(wanted.alloy and intensity is None and found and is_off(made, found.intensity))
         if intensity == USUAL or seeks:
             asked = usual_for(made)
+        by_geometry = setting_of(made).ball_mm
         if asked:
             try:
                 made = propose_intensity(made, wanted, asked, self._again, self._predict)
@@ -195,16 +203,25 @@ class _Pilots:
                 if not seeks:
                     raise
                 asked = None
-        if asked:
-            if wanted.pose != self.wishes.geometry.pose:  # by pilots, and not as asked
-                made = replace(made, reasons={**made.reasons, **why_so})
-            found = self._measure(made)
-            made = as_no_wish(made) if seeks else made
-            made = with_larger_balls(made, wanted, asked, found, self._again, quietly)
-        elif found is not None:
-            made = with_expected_intensity(made, found.intensity)
-        made, found = propose_second_pose(made, found, quietly)
-        return _with_measured_budget(with_thin_places(made), found)
+        if not asked:
+            if found is not None:
+                made = with_expected_intensity(made, found.intensity)
+            return _in_budget(*propose_second_pose(made, found, quietly))
+        if wanted.pose != self.wishes.geometry.pose:  # by pilots, and not as asked
+            made = replace(made, reasons={**made.reasons, **why_so})
+        found = self._measure(made)
+        larger = larger_balls(made, wanted, asked, found, self._again, quietly)
+        coarse = larger or (made, found)
+        if seeks:
+            made, coarse = as_no_wish(made), (as_no_wish(coarse[0]), coarse[1])
+        coarse = propose_second_pose(*coarse, quietly)
+        two, why = with_finer_balls(*coarse, by_geometry, quietly)
+        if two is not None:
+            return with_thin_places(two)
+        if larger is None or found is None:
+            return _in_budget(without_finer(coarse[0], why), coarse[1])
+        made = beside_larger(made, found, *larger, why)
+        return _in_budget(*propose_second_pose(made, found, quietly))
 
     def _again(self, other: Wanted) -> Proposal:
         return propose(self.path, other, self.choose)
@@ -231,10 +248,7 @@ class _Pilots:
             return predict_intensity(made.design, made.chamber, self.executor, progress)
 
 
-def _with_measured_budget(made: Proposal, found: Measured | None) -> Proposal:
+def _in_budget(made: Proposal, found: Measured | None) -> Proposal:
     """Return a proposal whose treatment time and budget follow from a pilot, if one could run."""
-    if found is None:
-        return made
-    is_limited = not made.design.why_no_intensity
-    asked = Asked(made.design.process.coverage_percent, made.strength_dents, is_limited)
-    return with_budget(made, propose_budget(found, asked))
+    made = with_thin_places(made)
+    return made if found is None else with_budget(made, measured_budget(made, found))

@@ -60,7 +60,12 @@ from chamberopt.chamber.propose.proposed_end import (
     held_end,
     local_room,
 )
-from chamberopt.chamber.propose.proposed_floor import Floor, floor_on_sonotrode, require_room
+from chamberopt.chamber.propose.proposed_floor import (
+    Floor,
+    floor_on_sonotrode,
+    of_blocks,
+    require_room,
+)
 from chamberopt.chamber.propose.proposed_target import (
     Surface,
     Target,
@@ -72,11 +77,9 @@ from chamberopt.chamber.propose.proposed_target import (
 )
 from chamberopt.chamber.propose.shop import Shop, usual_shop
 from chamberopt.common.errors import InputError, UnreadableError
-from chamberopt.common.number_text import plain
 from chamberopt.common.progress import step
 from chamberopt.common.toml_fields import MAX_COORDINATE_MM
 from chamberopt.design.design import Design, validate
-from chamberopt.design.fixture import WIDEST_GAP
 from chamberopt.design.materials import CATALOGUE, USUAL, alloy, ball, balls
 from chamberopt.geometry.meshes.part_mesh import PartMesh, read_part
 from chamberopt.geometry.meshes.surface_error import format_box
@@ -101,7 +104,6 @@ IRON = {
     "zirconia (by heart)",
 }
 TREATMENT_S, HALF_WIDTH, MOST_REPLICAS = 300.0, 0.03, 24
-BLOCKS = "LARGER THAN ONE SONOTRODE: several side by side, driven alike; gaps between them below"
 BETWEEN = "a plate that fits between the faces of the part, like the two walls beside them"
 CUT_OUT = "plates, cut out round it"
 OWN_WALL, OWN_LID = "the part itself is the wall", f"the part itself is the lid: {CUT_OUT}"
@@ -233,9 +235,8 @@ def _proposed(
     if not (end or wanted.pose) and (hanging := _hanging(mesh, target, turns, diameter, wanted)):
         turns, pose_reason = hanging, ON_END
     is_guessed = any(f"({BY_SIZE})" in note for note in mesh.notes)
-    half_ball = f"{plain(1e3 * WIDEST_GAP * diameter, 3)} mm, half a ball"
     reasons = {
-        "sonotrode.blocks": f"{BLOCKS} {half_ball}",
+        "sonotrode.blocks": of_blocks(diameter),
         "part.unit": f"{'UNIT GUESSED: ' * is_guessed}the part measures {format_box(mesh.size)}",
         "part.target": target.reason,
         "shot.diameter_mm": ball_reason,

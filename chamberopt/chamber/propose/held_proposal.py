@@ -89,8 +89,7 @@ def held(
 
 def clamped_outside(made: Proposal, floor: Floor, shop: Shop | None) -> Proposal:
     """Return a proposal whose part, which goes out of the chamber, is held where it does."""
-    most_mm = math.floor(1e4 * WIDEST_GAP * made.design.shot.diameter) / 20.0
-    keys = {"kind": "bore", "clearance_mm": min(MILLED_MM, most_mm)}
+    keys = {"kind": "bore", "clearance_mm": bore_clearance_mm(made.design.shot.diameter)}
     tables = _with_table(made.tables, "sonotrode", "holder", keys)
     text = (
         f"clamped where it stands out of the chamber {_outside_in_words(made)}; the wall, cut out "
@@ -98,6 +97,14 @@ def clamped_outside(made: Proposal, floor: Floor, shop: Shop | None) -> Proposal
     )
     reasons = {**made.reasons, "holder.kind": text}
     return checked(tables, reasons, floor, made.known, made.mesh, shop)
+
+
+def bore_clearance_mm(ball: float) -> float:
+    """Return the clearance of a bore [mm] in which no ball of a diameter [m] wedges.
+
+    As the part may lie against one side of its bore, it is a quarter of a ball at most.
+    """
+    return min(MILLED_MM, math.floor(1e4 * WIDEST_GAP * ball) / 20.0)
 
 
 def _outside_in_words(made: Proposal) -> str:

@@ -1,9 +1,9 @@
-"""A proposed design with its reasons and its check, and the charge and ranges that follow."""
+"""A proposed design with its reasons and check, and its charge, ranges and tolerances."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -15,8 +15,6 @@ from chamberopt.chamber.propose.pose import Pose
 from chamberopt.chamber.propose.proposed_balls import MOST_BALLS, charge_of
 from chamberopt.chamber.propose.proposed_floor import Floor
 from chamberopt.chamber.propose.proposed_target import Sizes, Surface
-from chamberopt.chamber.propose.proposed_tolerances import REASON as OF_LENGTHS
-from chamberopt.chamber.propose.proposed_tolerances import propose_tolerances
 from chamberopt.chamber.propose.shop import Shop, ShopSonotrode
 from chamberopt.chamber.reach import Reach
 from chamberopt.chamber.scene import MAX_BALLS
@@ -26,6 +24,7 @@ from chamberopt.design.design import Design, validate
 from chamberopt.design.shape_surface import TAG_SONOTRODE
 from chamberopt.design.shapes.base import ParametricChamber
 from chamberopt.design.shot import ShotTable
+from chamberopt.design.tolerances import USUAL
 from chamberopt.geometry.meshes.part_mesh import PartMesh
 from chamberopt.geometry.meshes.surface_error import format_box
 from chamberopt.geometry.triangles import areas
@@ -37,6 +36,14 @@ LARGEST_MM = allowed_range(ParametricChamber.model_fields["height_mm"])[1]  # si
 HEAVIEST_G = allowed_range(ShotTable.model_fields["mass_g"])[1]
 REPLICAS = 10  # the fewest that a wanted half-width takes
 CAPPED = "less than half a layer of balls"
+# Permissible deviations of lengths, ISO 2768-1 class m: up to a nominal size, and either way [mm].
+# By heart: the standard could not be read here.
+ISO_2768_M = ((6.0, 0.1), (30.0, 0.2), (120.0, 0.3), (400.0, 0.5), (1000.0, 0.8), (2000.0, 1.2))
+# Lengths that are set up. In plan the wall follows the sonotrode's face, with less clearance.
+LENGTHS = ("height_mm", "sonotrode_distance_mm")
+PEAK_TO_VALLEY_UM = USUAL["amplitude_pv_um"]
+OF_AMPLITUDE = {"amplitude_um": 0.5 * PEAK_TO_VALLEY_UM, "amplitude_pv_um": PEAK_TO_VALLEY_UM}
+OF_LENGTHS = "heights: ISO 2768-m; amplitude: SAE AMS 2580A; what they cost: simulate --tolerances"
 Tables = dict[str, dict[str, Any]]
 """Tables of a design file by dotted name, as TOML values."""
 
@@ -106,9 +113,8 @@ def checked(
         raise InputError(f"{text} {most}; check --unit, or cut the part down to what is peened")
     design = validate(Design, nested(tables))
     chamber = build_chamber(design)
-    face = float(areas(chamber.vertices, chamber.triangles)[chamber.tags == TAG_SONOTRODE].sum())
     diameter, ball_mass = design.shot.diameter, design.shot.ball_mass
-    mass_g, reason = propose_charge(face, diameter, ball_mass)
+    mass_g, reason = propose_charge(sonotrode_area(chamber), diameter, ball_mass)
     tables = {**tables, "shot": {**tables["shot"], "mass_g": mass_g}}
     tables["tolerances"] = propose_tolerances(tables)
     design = validate(Design, nested(tables))
@@ -131,6 +137,12 @@ def checked(
         jams=tuple(jam_gaps(chamber, diameter, gaps_in_reach(reach))),
         sonotrode=floor.face.sonotrode,
     )
+
+
+def sonotrode_area(chamber: Chamber) -> float:
+    """Return the area of a chamber's first sonotrode [m²]."""
+    area = areas(chamber.vertices, chamber.triangles)
+    return float(area[chamber.tags == TAG_SONOTRODE].sum())
 
 
 def with_charge(made: Proposal, factor: float) -> Proposal:
@@ -166,10 +178,32 @@ def new_warning(made: Proposal, before: Proposal) -> str:
     return next(iter(new or made.warnings), "balls jam in a gap")
 
 
+def beginning(warning: str) -> str:
+    """Return a warning up to its first comma or place."""
+    return warning.partition(",")[0].partition(" at (")[0]
+
+
 def touched_share(made: Proposal) -> float:
     """Return the share of the target's area that the balls can touch."""
     part, share = made.chamber.part, touched(made.design, made.chamber, made.reach)
     return float(share[part.target] @ part.area[part.target] / part.area[part.target].sum())
+
+
+def propose_tolerances(tables: Mapping[str, Mapping[str, Any]]) -> dict[str, float]:
+    """Return how far heights in the chamber and the amplitude may lie off, by dotted name.
+
+    Args:
+        tables: tables of the design file.
+    """
+    lengths = {key: tables["chamber"][key] for key in LENGTHS}
+    found = {f"chamber.{key}": _deviation_mm(one) for key, one in lengths.items()}
+    set_ = {key: one for key, one in OF_AMPLITUDE.items() if key in tables["sonotrode"]}
+    return found | {f"sonotrode.{key}": one for key, one in set_.items()}
+
+
+def _deviation_mm(length: float) -> float:
+    """Return the permissible deviation of a length, both in mm."""
+    return next(off for most, off in ISO_2768_M if length <= most)
 
 
 class Range(NamedTuple):

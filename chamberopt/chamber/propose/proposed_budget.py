@@ -8,6 +8,7 @@ a window, the mean the more, the longer the treatment is (chamberopt/coverage/co
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -75,6 +76,11 @@ class Measured(NamedTuple):
     settled: bool = True
     intensity: PredictedIntensity | None = None
 
+    @property
+    def in_words(self) -> str:
+        """The time to 98 %."""
+        return f"98 % after about {rounded(self.time_to_98, 2)} s"
+
 
 class Budget(NamedTuple):
     """Treatment time, simulated time of each replica, and gauge, each with its reason."""
@@ -133,6 +139,30 @@ def propose_budget(found: Measured, asked: Asked | None = None) -> Budget:
     least = max(SLOWER * DENTS, strength_dents if in_search else 0.0)
     share = min(1.0, least / (dents * gauge)) if found.places else 1.0
     return Budget(treatment, time, gauge, warmup, reasons, REPLICAS * time * share)
+
+
+def measured_budget(made: Proposal, found: Measured) -> Budget:
+    """Return the budget of a proposal that follows from a pilot."""
+    is_limited = not made.design.why_no_intensity
+    asked = Asked(made.design.process.coverage_percent, made.strength_dents, is_limited)
+    return propose_budget(found, asked)
+
+
+def in_turn(budgets: Sequence[Budget]) -> Budget:
+    """Return the budget of steps, one after another, of which each has a budget of its own."""
+    reasons = {key: text for one in reversed(budgets) for key, text in one.reasons.items()}
+    for key, field in (("treatment_time_s", "treatment"), ("accuracy.simulated_time_s", "time")):
+        name = f"process.{key}"
+        each = ((getattr(one, field), one.reasons[name]) for one in budgets)
+        reasons[name] = "; then ".join(f"{rounded(time, 3)} s, {text}" for time, text in each)
+    return Budget(
+        treatment=sum(one.treatment for one in budgets),
+        time=_rounded_up(sum(one.time for one in budgets)),
+        gauge_mm2=max(one.gauge_mm2 for one in budgets),
+        warmup=max(one.warmup for one in budgets),
+        reasons=reasons,
+        search_time=sum(one.search_time for one in budgets),
+    )
 
 
 def with_budget(made: Proposal, budget: Budget) -> Proposal:

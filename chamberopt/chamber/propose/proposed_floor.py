@@ -26,6 +26,8 @@ import numpy as np
 from chamberopt.chamber.propose.proposed_target import Sizes
 from chamberopt.chamber.propose.shop import Face, Shop
 from chamberopt.common.errors import InputError
+from chamberopt.common.number_text import plain
+from chamberopt.design.fixture import WIDEST_GAP
 from chamberopt.design.sonotrode import Blocks
 
 TIGHTER = 0.6  # share of the room beside the part that is left, so that the walls stand upright
@@ -34,6 +36,14 @@ FARTHER = 1.5  # factor by which the sonotrode's distance may grow, so that wall
 WIDEST = 25e-3  # m: how far a leaning wall may move out up to the ceiling
 HELD = 1e-9  # m: a floor that must move in by no more lies within a face
 WHOLE = 1.25  # a face up to so much larger than the wanted floor becomes the whole floor
+
+
+def of_blocks(ball: float) -> str:
+    """Return what is said of a floor of several sonotrodes, for a diameter of the balls [m]."""
+    return (
+        "LARGER THAN ONE SONOTRODE: several side by side, driven alike; gaps between them below "
+        f"{plain(1e3 * WIDEST_GAP * ball, 3)} mm, half a ball"
+    )
 
 
 class Floor(NamedTuple):

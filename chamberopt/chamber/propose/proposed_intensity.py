@@ -36,7 +36,7 @@ from chamberopt.chamber.propose.proposed_balls import (
 from chamberopt.chamber.propose.proposed_budget import Measured
 from chamberopt.chamber.propose.shop import ShopSonotrode, usual_shop
 from chamberopt.common.errors import InputError
-from chamberopt.common.number_text import plain, rounded
+from chamberopt.common.number_text import plain
 from chamberopt.design.almen_strip import OVER_A
 from chamberopt.design.intensity import (
     THIN_MM,
@@ -56,6 +56,7 @@ MIDDLE = 0.5
 ON_N = 0.1016  # mmA: 0.004 in, below which N strips are taken (SAE J443)
 INTENSITY = "process.intensity_mmA"  # whose reason stands in a design without a wish too
 MOST_LISTED = 3  # other settings in a reason
+LARGER = "LARGER BALLS FOR THE INTENSITY"
 
 
 class Setting(NamedTuple):
@@ -249,24 +250,23 @@ def _of_larger(
     of_small = [one for one in possible.serving if one.ball_mm == small]
     best = max(expected_intensity(one, simulated) for one in of_small)
     return (
-        f"LARGER BALLS FOR THE INTENSITY: they serve {possible.served[chosen.ball_mm]:.0%} of the "
+        f"{LARGER}: they serve {possible.served[chosen.ball_mm]:.0%} of the "
         f"target, and {small:g} mm would serve {possible.served[small]:.0%}, with about "
         f"{plain(best, 2)} mmA (--ball-mm {small:g} takes these)"
     )
 
 
-def with_larger_balls(
+def larger_balls(
     made: Proposal,
     wanted: Wanted,
     intensity: WantedIntensity,
     found: Measured | None,
     again: Callable[[Wanted], Proposal],
     measure: Callable[[Proposal], Measured | None],
-) -> Proposal:
-    """Return a proposal that tells what larger balls would do, where its own are too weak.
+) -> tuple[Proposal, Measured] | None:
+    """Return a proposal with larger balls and its pilot, where one's own balls are too weak.
 
-    Larger balls give more intensity, and leave out narrow places of the target. Which counts more
-    is the user's choice, so both are told, each by a pilot.
+    It is None where they are not, or no pilot resolves the intensity of larger ones.
 
     Args:
         found: what a pilot measured of the proposal; None if nothing.
@@ -274,40 +274,59 @@ def with_larger_balls(
         measure: simulates a proposal briefly; None if that cannot be done.
     """
     if found is None or found.intensity is None or wanted.ball_mm is not None:
-        return made
+        return None
     off, now = intensity.off(found.intensity.value), setting_of(made)
     if off >= 0.0:
-        return made
+        return None
     stock = (wanted.shop or usual_shop()).stock_mm(made.tables["shot"]["material"])
     larger = [one for one in stock if now.ball_mm < one <= 1e3 * LARGEST_BALL]
     needed = now.ball_mm * math.exp(-off / BALL_POWER)
     ball = next((one for one in larger if one >= needed), larger[-1] if larger else None)
     if ball is None:
-        return made
+        return None
     try:
         other = again(replace(wanted, ball_mm=ball))
     except InputError:  # no chamber with these balls
-        return made
-    most = max(_amplitudes(other.sonotrode)[1])
-    other = _with_amplitude(other, Setting(ball, most))
+        return None
+    other = _with_amplitude(other, Setting(ball, max(_amplitudes(other.sonotrode)[1])))
     told = measure(other)
     if told is None or told.intensity is None:
-        return made
-    both = fit_sizes(made.chamber.part, [1e-3 * now.ball_mm, 1e-3 * ball])
+        return None
+    other = _with_prediction(other, intensity, told.intensity)
+    reason = f"larger ones for the intensity: {now.in_words} give {_about(found)}"
+    return replace(other, reasons={**other.reasons, "shot.diameter_mm": reason}), told
+
+
+def beside_larger(
+    made: Proposal, found: Measured, other: Proposal, told: Measured, why: str
+) -> Proposal:
+    """Return a proposal that tells what larger balls would do.
+
+    They give more intensity, and leave out narrow places of the target. Which counts more is the
+    user's choice, so both are told, each by a pilot.
+
+    Args:
+        found: what a pilot measured of the proposal.
+        other, told: the proposal with larger balls, and what a pilot measured of it.
+        why: why finer balls after the larger ones are not proposed.
+    """
+    now, then = setting_of(made), setting_of(other)
+    both = fit_sizes(made.chamber.part, [1e-3 * now.ball_mm, 1e-3 * then.ball_mm])
     here, there = (
-        f"about {plain(value.value, 2)} mmA, {fit.served:.0%} of the target served, 98 % after "
-        f"about {rounded(pilot.time_to_98, 2)} s"
-        for value, pilot, fit in (
-            (found.intensity, found, both[0]),
-            (told.intensity, told, both[1]),
-        )
+        f"{_about(pilot)}, {fit.served:.0%} of the target served, {pilot.in_words}"
+        for pilot, fit in zip((found, told), both, strict=True)
     )
     text = (
-        f"WITH LARGER BALLS, {setting_of(other).in_words}: {there}, beside {here} with "
-        f"{now.in_words} (--ball-mm {ball:g} takes them, [[steps]] one after the other)"
+        f"WITH LARGER BALLS, {then.in_words}: {there}, beside {here} with {now.in_words} "
+        f"(--ball-mm {then.ball_mm:g} takes them); not one after the other: {why}"
     )
     reasons = {**made.reasons, INTENSITY: f"{made.reasons[INTENSITY]}; {text}"}
     return replace(made, reasons=reasons)
+
+
+def _about(found: Measured) -> str:
+    """Return the intensity that a pilot measured, in words."""
+    return "" if found.intensity is None else f"about {plain(found.intensity.value, 2)} mmA"
 
 
 def usual_for(made: Proposal) -> WantedIntensity:

@@ -3,35 +3,29 @@
 A part that stands on one sonotrode is dented slowly at its upper end, as few balls get there. Lying
 or on edge, over several sonotrodes if it is long, it may take a fifth of the time. A whole layer of
 balls dents faster than half a layer in a roomy chamber, and slower where the balls are in each
-other's way. A part that lies gets few balls on its upper side, until it is turned over. So all of
-these are tried, and what is proposed was simulated itself.
+other's way. So all of these are tried, and what is proposed was simulated itself.
 """
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
-from chamberopt.chamber.build import build_chamber
-from chamberopt.chamber.checks.check import shot_reach, warnings
-from chamberopt.chamber.checks.jams import gaps_in_reach, jam_gaps
 from chamberopt.chamber.propose.pose import AT_SIDE
 from chamberopt.chamber.propose.proposal import (
     Proposal,
     Wanted,
+    beginning,
     faults,
     new_warning,
-    touched_share,
     with_charge,
 )
 from chamberopt.chamber.propose.proposed_balls import MOST_BALLS
-from chamberopt.chamber.propose.proposed_budget import COVERED, LONG, UNEVEN, Measured
+from chamberopt.chamber.propose.proposed_budget import LONG, Measured
 from chamberopt.common.errors import InputError
-from chamberopt.common.number_text import rounded
 from chamberopt.geometry.triangles import rotation_matrix
 
 SLOW = 600.0  # s until 98 % of the target are dented, from which on other ways are tried
@@ -39,7 +33,6 @@ SLOW = 600.0  # s until 98 % of the target are dented, from which on other ways 
 # many, and where that time is LONG. Pilots know a time to 10 to 20 %.
 DEARER, QUICKER = 0.6, 0.8
 LAYER = 2.0  # over half a layer
-RAISED = 1.0, 2.0, 3.0  # ball diameters by which a ceiling is raised for a second pose
 SAME = 0.999  # cosine between the directions that point up, from which on a pose is no other one
 
 
@@ -61,7 +54,7 @@ def propose_quicker(
         measure: simulates a proposal briefly; None if that cannot be done.
     """
     best, tried = first, []
-    if _is_slow(first) and first.wanted.pose is None and not _turns(first.made):
+    if _is_slow(first) and first.wanted.pose is None and not turns(first.made):
         for pose in AT_SIDE:
             wanted = replace(first.wanted, pose=pose)
             try:
@@ -83,104 +76,19 @@ def propose_quicker(
         if _is_quicker(Way(made, best.wanted, found), best):
             reason = (
                 f"a whole layer of balls on the sonotrode: {made.design.shot.count}; by pilots "
-                f"{_after(found)}, with half a layer {_after(best.found)}"
+                f"{_said(found)}, with half a layer {_said(best.found)}"
             )
             made = replace(made, reasons={**made.reasons, "shot.mass_g": reason})
             best = Way(made, best.wanted, found)
     return best
 
 
-def propose_second_pose(
-    made: Proposal, found: Measured | None, measure: Callable[[Proposal], Measured | None]
-) -> tuple[Proposal, Measured | None]:
-    """Return a proposal with a second step, turned over, and its pilot, where that is worth it.
-
-    It is tried where single places rule a slow treatment, or where balls cannot touch enough of the
-    target in one pose. What holds the part must hold it in both poses.
-
-    Args:
-        found: what a pilot measured of the proposal; None if nothing.
-        measure: simulates a proposal briefly; None if that cannot be done.
-    """
-    if found is None or _turns(made):
-        return made, found
-    is_hidden = not found.places and touched_share(made) < COVERED
-    if not is_hidden and found.time_to_98 < max(SLOW, UNEVEN * found.mean_time):
-        return made, found
-
-    def dropped(why: str) -> tuple[Proposal, Measured | None]:
-        reason = f"{made.reasons['part.rotate_deg']}; not turned over after half of the time: {why}"
-        return replace(made, reasons={**made.reasons, "part.rotate_deg": reason}), found
-
-    try:
-        two = _turned_over(made)
-        for balls in RAISED:  # under a ceiling that fits one pose, balls may jam in the other
-            if "jam in" in _new_harm(two, made):
-                two = min(two, _turned_over(made, balls), key=faults)
-    except InputError:
-        return dropped("what holds it here does not hold it there")
-    in_air = any(one.pieces_in_air for one in two.chamber.steps) and not made.chamber.pieces_in_air
-    if in_air or (harm := _new_harm(two, made)):
-        return dropped("nothing would hold it" if in_air else harm)
-    after = measure(two)
-    if after is None or not after.places:
-        return dropped("no pilot resolved it")
-    enough = after.time_to_98 <= QUICKER * found.time_to_98 or is_hidden
-    if not enough or touched_share(two) < COVERED:
-        return dropped(f"by a pilot {_after(after)} then too")
-    before = f"{touched_share(made):.0%} of the target is in reach" if is_hidden else _after(found)
-    reason = f"turned over after half of the time: by pilots {_after(after)}, in one pose {before}"
-    return replace(two, reasons={**two.reasons, ".steps": reason}), after
-
-
-def _turned_over(made: Proposal, raised: float = 0.0) -> Proposal:
-    """Return a proposal with a second step in which the part is turned over.
-
-    Raises InputError if the chamber cannot be built round the part in this pose.
-
-    Args:
-        raised: by how many diameters of a ball the ceiling is raised.
-    """
-    x, y, z = made.design.part.rotate_deg
-    # Half a turn about the chamber's x after turns about x, y and z is one before them, with the
-    # turns about y and z the other way.
-    turned = [(x + 180.0) % 360.0, -y + 0.0, -z + 0.0]
-    pose: dict[str, list[float]] = {"rotate_deg": turned}
-    if any(made.design.part.offset_mm):
-        along, across = made.design.part.offset_mm
-        pose["offset_mm"] = [along, -across]
-    steps = [{"name": "first"}, {"name": "turned_over", "part": pose}]
-    shot = made.design.shot
-    height = round(made.tables["chamber"]["height_mm"] + 1e3 * raised * shot.diameter, 1)
-    design = made.design.changed({"chamber.height_mm": height, "steps": steps})
-    chamber = build_chamber(design)
-    (_, other), room = list(design.in_steps.values()), chamber.steps[1]
-    diameter = other.shot.diameter
-    jams = jam_gaps(room, diameter, gaps_in_reach(shot_reach(other, room)))
-    reasons = made.reasons
-    if raised:
-        text = "high enough for both poses, so that no ball jams under the ceiling"
-        reasons = {**reasons, "chamber.height_mm": f"{reasons['chamber.height_mm']}; {text}"}
-    return replace(
-        made,
-        design=design,
-        reasons=reasons,
-        tables={"": {}, **made.tables}
-        | {
-            "": {**made.tables.get("", {}), "steps": steps},
-            "chamber": {**made.tables["chamber"], "height_mm": height},
-        },
-        chamber=chamber,
-        jams=max(made.jams, tuple(jams), key=len),
-        warnings=tuple(warnings(design, chamber)),
-    )
-
-
 def _is_slow(way: Way) -> bool:
     return way.found is not None and way.found.time_to_98 > SLOW
 
 
-def _turns(made: Proposal) -> bool:
+def turns(made: Proposal) -> bool:
+    """Return whether the part of a proposal turns about an axis."""
     return made.design.effects.part_turn is not None
 
 
@@ -194,25 +102,8 @@ def _harm(made: Proposal, first: Proposal) -> str:
     if made.chamber.pieces_in_air and not first.chamber.pieces_in_air:
         return "nothing would hold it"
     if faults(made) > faults(first):
-        return _beginning(new_warning(made, first))
+        return beginning(new_warning(made, first))
     return ""
-
-
-def _new_harm(two: Proposal, made: Proposal) -> str:
-    """Return in words the harm that only a proposal with two poses does; empty if there is none.
-
-    A warning that holds in both poses, at another place in each, is no new one.
-    """
-    known = {_beginning(text) for text in made.warnings}
-    of_steps = (_beginning(re.sub(r"^step \w+: ", "", text)) for text in two.warnings)
-    new = [text for text in of_steps if text not in known]
-    jams = "balls jam in a gap" if len(two.jams) > len(made.jams) else ""
-    return next(iter(new), jams)
-
-
-def _beginning(warning: str) -> str:
-    """Return a warning up to its first comma or place."""
-    return warning.partition(",")[0].partition(" at (")[0]
 
 
 def _is_quicker(one: Way, other: Way) -> bool:
@@ -228,10 +119,8 @@ def _sonotrodes(made: Proposal) -> int:
     return 1 if blocks is None else blocks.count
 
 
-def _after(found: Measured | None) -> str:
-    if found is None:
-        return "no pilot"
-    return f"98 % after about {rounded(found.time_to_98, 2)} s"
+def _said(found: Measured | None) -> str:
+    return "no pilot" if found is None else found.in_words
 
 
 def _with_pose_told(best: Way, first: Way, tried: list[tuple[Way, str]]) -> Way:
@@ -243,7 +132,7 @@ def _with_pose_told(best: Way, first: Way, tried: list[tuple[Way, str]]) -> Way:
     texts = []
     for one, harm in [(first, ""), *tried]:
         name = named(one)
-        what = harm or _after(one.found)
+        what = harm or _said(one.found)
         count = _sonotrodes(one.made)
         on, taken = f" on {count} sonotrodes" if count > 1 else "", " (taken)" * (one is best)
         texts.append(f"{name}{on} {what}{taken}")

@@ -20,15 +20,16 @@ from chamberopt.chamber.propose.proposed_intensity import (
     Setting,
     Settings,
     as_no_wish,
+    beside_larger,
     choose,
     expected_intensity,
     is_off,
+    larger_balls,
     propose_intensity,
     setting_of,
     settings_of,
     usual_for,
     with_expected_intensity,
-    with_larger_balls,
     with_thin_places,
 )
 from chamberopt.chamber.propose.shop import Shop, load_shop
@@ -386,13 +387,17 @@ def test_where_balls_are_too_weak_the_next_larger_ones_are_told_beside_them(
         seen.append(setting_of(one))
         return pilot_of(0.12, 100.0)
 
-    told = with_larger_balls(made, wanted, asked, weak, again, measure)
+    larger = larger_balls(made, wanted, asked, weak, again, measure)
+    assert larger is not None
     assert seen == [Setting(2.0, 40.0)]
+    assert setting_of(larger[0]) == seen[0]
+    told = beside_larger(made, weak, *larger, "they jam")
     assert told.design == made.design
     text = told.reasons[INTENSITY]
     assert "WITH LARGER BALLS, 2 mm at 40 µm: about 0.12 mmA, " in text
     assert "of the target served, 98 % after about 100 s, beside about 0.05 mmA, " in text
+    assert text.endswith("; not one after the other: they jam")
     for enough in (pilot_of(0.12, 600.0), pilot_of(0.2, 600.0), None):
-        assert with_larger_balls(made, wanted, asked, enough, again, measure) == made
+        assert larger_balls(made, wanted, asked, enough, again, measure) is None
     fixed = replace(wanted, ball_mm=1.0)
-    assert with_larger_balls(made, fixed, asked, weak, again, measure) == made
+    assert larger_balls(made, fixed, asked, weak, again, measure) is None

@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 import trimesh
 
-from chamberopt.chamber.propose import quicker
+from chamberopt.chamber.propose import proposed_steps
 from chamberopt.chamber.propose.first_design import propose
 from chamberopt.chamber.propose.pose import Pose, end_to_wall, pose_by_size
 from chamberopt.chamber.propose.proposal import Proposal, Wanted, with_charge
 from chamberopt.chamber.propose.proposed_budget import Measured
-from chamberopt.chamber.propose.quicker import Way, propose_quicker, propose_second_pose
+from chamberopt.chamber.propose.proposed_steps import propose_second_pose
+from chamberopt.chamber.propose.quicker import Way, propose_quicker
 from chamberopt.chamber.propose.text import design_text
 from chamberopt.design.load import load_design
 from chamberopt.geometry.triangles import rotation_matrix
@@ -208,7 +209,7 @@ def test_a_warning_of_both_poses_is_no_reason_against_the_second(
     lying = replace(poses["lying"], warnings=(slot.format(1),))
 
     def pose_two(more: list[str]) -> Proposal:
-        monkeypatch.setattr(quicker, "warnings", lambda design, chamber: [*texts, *more])
+        monkeypatch.setattr(proposed_steps, "warnings", lambda design, chamber: [*texts, *more])
         return propose_second_pose(lying, uneven(900.0), lambda _: measured(400.0))[0]
 
     assert pose_two([]).design.steps

@@ -2,7 +2,7 @@
 
 import pytest
 
-from chamberopt.chamber.propose.proposed_tolerances import propose_tolerances
+from chamberopt.chamber.propose.proposal import propose_tolerances
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,265 @@
+"""Propose steps: the part turned over, or finer balls after coarse ones, if pilots speak for it.
+
+A part that lies gets few balls on its upper side, until it is turned over. Balls that are large
+enough for an intensity do not get into narrow fillets and slots; finer ones after them do, in the
+same chamber, and leave a weaker intensity there.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+from chamberopt.chamber.build import build_chamber
+from chamberopt.chamber.checks.check import shot_reach, warnings
+from chamberopt.chamber.checks.jams import gaps_in_reach, jam_gaps
+from chamberopt.chamber.propose.held_proposal import bore_clearance_mm
+from chamberopt.chamber.propose.proposal import (
+    Proposal,
+    beginning,
+    faults,
+    propose_charge,
+    sonotrode_area,
+    touched_share,
+)
+from chamberopt.chamber.propose.proposed_balls import AS_GOOD, MANY, fit_sizes
+from chamberopt.chamber.propose.proposed_budget import (
+    COVERED,
+    UNEVEN,
+    Budget,
+    Measured,
+    in_turn,
+    measured_budget,
+    with_budget,
+)
+from chamberopt.chamber.propose.proposed_floor import of_blocks
+from chamberopt.chamber.propose.proposed_intensity import LARGER, setting_of
+from chamberopt.chamber.propose.quicker import QUICKER, SLOW, turns
+from chamberopt.common.errors import InputError
+from chamberopt.common.number_text import plain, rounded
+
+RAISED = 1.0, 2.0, 3.0  # ball diameters by which a ceiling is raised for a second pose
+LEAST_SERVED = 0.25  # share of the target that coarse balls serve before finer ones, by heart
+TOO_LARGE = "shot of "  # how warnings of fillets and slots begin
+Steps = list[dict[str, Any]]
+"""The [[steps]] of a design file."""
+
+
+def propose_second_pose(
+    made: Proposal, found: Measured | None, measure: Callable[[Proposal], Measured | None]
+) -> tuple[Proposal, Measured | None]:
+    """Return a proposal with a second step, turned over, and its pilot, where that is worth it.
+
+    It is tried where single places rule a slow treatment, or where balls cannot touch enough of the
+    target in one pose. What holds the part must hold it in both poses.
+
+    Args:
+        found: what a pilot measured of the proposal; None if nothing.
+        measure: simulates a proposal briefly; None if that cannot be done.
+    """
+    if found is None or turns(made):
+        return made, found
+    is_hidden = not found.places and touched_share(made) < COVERED
+    if not is_hidden and found.time_to_98 < max(SLOW, UNEVEN * found.mean_time):
+        return made, found
+
+    def dropped(why: str) -> tuple[Proposal, Measured | None]:
+        reason = f"{made.reasons['part.rotate_deg']}; not turned over after half of the time: {why}"
+        return replace(made, reasons={**made.reasons, "part.rotate_deg": reason}), found
+
+    try:
+        two = _turned_over(made)
+        for balls in RAISED:  # under a ceiling that fits one pose, balls may jam in the other
+            if "jam in" in _new_harm(two, made):
+                two = min(two, _turned_over(made, balls), key=faults)
+    except InputError:
+        return dropped("what holds it here does not hold it there")
+    in_air = any(one.pieces_in_air for one in two.chamber.steps) and not made.chamber.pieces_in_air
+    if in_air or (harm := _new_harm(two, made)):
+        return dropped("nothing would hold it" if in_air else harm)
+    after = measure(two)
+    if after is None or not after.places:
+        return dropped("no pilot resolved it")
+    enough = after.time_to_98 <= QUICKER * found.time_to_98 or is_hidden
+    if not enough or touched_share(two) < COVERED:
+        return dropped(f"by a pilot {after.in_words} then too")
+    before = f"{touched_share(made):.0%} of the target is in reach" if is_hidden else found.in_words
+    reason = f"turned over after half of the time: by pilots {after.in_words}, in one pose {before}"
+    return replace(two, reasons={**two.reasons, ".steps": reason}), after
+
+
+def _turned_over(made: Proposal, raised: float = 0.0) -> Proposal:
+    """Return a proposal with a second step in which the part is turned over.
+
+    Raises InputError if the chamber cannot be built round the part in this pose.
+
+    Args:
+        raised: by how many diameters of a ball the ceiling is raised.
+    """
+    x, y, z = made.design.part.rotate_deg
+    # Half a turn about the chamber's x after turns about x, y and z is one before them, with the
+    # turns about y and z the other way.
+    turned = [(x + 180.0) % 360.0, -y + 0.0, -z + 0.0]
+    pose: dict[str, list[float]] = {"rotate_deg": turned}
+    if any(made.design.part.offset_mm):
+        along, across = made.design.part.offset_mm
+        pose["offset_mm"] = [along, -across]
+    height = made.tables["chamber"]["height_mm"] + 1e3 * raised * made.design.shot.diameter
+    two = _with_values(
+        made,
+        {"chamber": {"height_mm": round(height, 1)}},
+        [{"name": "first"}, {"name": "turned_over", "part": pose}],
+    )
+    if not raised:
+        return two
+    text = "high enough for both poses, so that no ball jams under the ceiling"
+    reason = f"{made.reasons['chamber.height_mm']}; {text}"
+    return replace(two, reasons={**two.reasons, "chamber.height_mm": reason})
+
+
+def with_finer_balls(
+    coarse: Proposal,
+    found: Measured | None,
+    finer_mm: float,
+    measure: Callable[[Proposal], Measured | None],
+) -> tuple[Proposal | None, str]:
+    """Return a proposal in which finer balls follow coarse ones, or None and why not.
+
+    Each size peens until it has covered what it touches by itself.
+
+    Args:
+        coarse: a proposal whose balls give the intensity, and serve too little of the target.
+        found: what a pilot measured of it; None if nothing.
+        finer_mm: diameter of the balls that follow.
+        measure: simulates a proposal briefly; None if that cannot be done.
+    """
+    coarse_mm = setting_of(coarse).ball_mm
+    if found is None or found.intensity is None:
+        return None, "no pilot resolved the coarse balls"
+    if finer_mm >= coarse_mm:
+        return None, "no smaller balls serve more"
+    try:
+        finer = _with_shot(coarse, finer_mm)
+        fine, most = fit_sizes(finer.chamber.part, [1e-3 * finer_mm, 1e-3 * coarse_mm])
+        shares = f"{coarse_mm:g} mm serve {most.served:.0%}, {finer_mm:g} mm {fine.served:.0%}"
+        if fine.served <= most.served + AS_GOOD or most.served < LEAST_SERVED:
+            return None, shares
+        if harm := _new_harm(finer, coarse):
+            return None, harm
+        after = measure(finer)
+        if after is None:
+            return None, "no pilot resolved the finer balls"
+        budgets = [measured_budget(coarse, found), measured_budget(finer, after)]
+        two = _one_after_the_other(coarse, finer, budgets)
+    except InputError as error:
+        return None, str(error)
+    first, second = (f"{rounded(one.treatment, 3)} s" for one in budgets)
+    weaker = f", about {plain(after.intensity.value, 2)} mmA," if after.intensity else ""
+    count, mass_g = finer.design.shot.count, finer.tables["shot"]["mass_g"]
+    reason = (
+        f"{coarse_mm:g} mm balls for {first}, then {finer_mm:g} mm for {second}: the first for "
+        f"the intensity, about {plain(found.intensity.value, 2)} mmA on the {most.served:.0%} of "
+        f"the target that they serve; the second, {count:,} balls ({mass_g:g} g){weaker} for "
+        f"narrow places: they serve {fine.served:.0%}; each until it has covered by itself what it "
+        "touches; TWO INTENSITIES: narrow places get that of the finer balls alone: agree on it, "
+        f"or take one size (--ball-mm {finer_mm:g} or {coarse_mm:g})"
+    )
+    return replace(two, reasons={**two.reasons, ".steps": reason}), ""
+
+
+def without_finer(coarse: Proposal, why: str) -> Proposal:
+    """Return a proposal with coarse balls that tells why no finer ones follow, if it has such."""
+    reason = coarse.reasons["shot.diameter_mm"]
+    if not reason.startswith(LARGER):
+        return coarse
+    reasons = {**coarse.reasons, "shot.diameter_mm": f"{reason}; no finer balls after them: {why}"}
+    return replace(coarse, reasons=reasons)
+
+
+def _with_shot(made: Proposal, ball_mm: float) -> Proposal:
+    """Return a proposal with balls of another diameter [mm] in the same chamber and poses.
+
+    Raises InputError if the chamber cannot be built with them.
+    """
+    ball_mass = made.design.shot.ball_mass * (ball_mm / setting_of(made).ball_mm) ** 3
+    mass_g, _ = propose_charge(sonotrode_area(made.chamber), 1e-3 * ball_mm, ball_mass)
+    mass_g = min(mass_g, float(f"{1e3 * MANY * ball_mass:.2g}"))
+    values: dict[str, dict[str, Any]] = {"shot": {"diameter_mm": ball_mm, "mass_g": mass_g}}
+    if made.tables.get("holder", {}).get("kind") == "bore":
+        values["holder"] = {"clearance_mm": bore_clearance_mm(1e-3 * ball_mm)}
+    return _with_values(made, values, _steps(made))
+
+
+def _one_after_the_other(coarse: Proposal, finer: Proposal, budgets: Sequence[Budget]) -> Proposal:
+    """Return a proposal with the steps of one with coarse balls, and after them finer ones.
+
+    Args:
+        budgets: of both, whose treatment times become the shares of their steps.
+    """
+    own = _steps(coarse) or [{"name": "coarse"}]
+    shares = [one.treatment / len(own) for one in budgets]
+    shot = {key: finer.tables["shot"][key] for key in ("diameter_mm", "mass_g")}
+    names = [f"finer_{step['name']}" if len(own) > 1 else "finer" for step in own]
+    steps = [{**step, "time_share": shares[0]} for step in own]
+    for step, name in zip(own, names, strict=True):
+        steps.append({**step, "name": name, "time_share": shares[1], "shot": shot})
+    holder = {key: finer.tables[key] for key in ("holder",) if key in finer.tables}
+    two, why = _with_values(coarse, holder, steps), {}
+    if "part.target.reachable" in two.reasons:
+        why["part.target.reachable"] = "leaves out what balls of neither size touch here"
+    if two.design.sonotrode.blocks is not None:
+        why["sonotrode.blocks"] = of_blocks(finer.design.shot.diameter)
+    two = replace(two, reasons={**two.reasons, **why})
+    return with_budget(two, in_turn(budgets))
+
+
+def _steps(made: Proposal) -> Steps:
+    return list(made.tables.get("", {}).get("steps", []))
+
+
+def _with_values(made: Proposal, values: Mapping[str, Mapping[str, Any]], steps: Steps) -> Proposal:
+    """Return a proposal with other values and steps in its tables, built and checked again.
+
+    Raises InputError if the chamber cannot be built with them.
+
+    Args:
+        values: by table and key.
+    """
+    tables = {"": {}, **made.tables}
+    for name, one in values.items():
+        tables[name] = {**tables[name], **one}
+    if steps:
+        tables[""] = {**tables[""], "steps": steps}
+    changes = {f"{name}.{key}": x for name, one in values.items() for key, x in one.items()}
+    design = made.design.changed({**changes, "steps": steps or None})
+    chamber = build_chamber(design)
+    rooms = list(zip(design.in_steps.values(), chamber.steps or (chamber,), strict=True))
+    reaches = [shot_reach(one, room) for one, room in rooms]
+    jams = [
+        tuple(jam_gaps(room, one.shot.diameter, gaps_in_reach(reach)))
+        for (one, room), reach in zip(rooms, reaches, strict=True)
+    ]
+    return replace(
+        made,
+        design=design,
+        tables={name: one for name, one in tables.items() if one or name},
+        chamber=chamber,
+        reach=reaches[0],
+        jams=max(jams, key=len),
+        warnings=tuple(warnings(design, chamber)),
+    )
+
+
+def _new_harm(two: Proposal, made: Proposal) -> str:
+    """Return in words the harm that only a proposal with two poses does; empty if there is none.
+
+    A warning that holds in both steps, at another place in each, is no new one. That balls are too
+    large for fillets and slots is no harm: it counts in what they serve.
+    """
+    known = {beginning(text) for text in made.warnings}
+    of_steps = (beginning(re.sub(r"^step \w+: ", "", text)) for text in two.warnings)
+    new = [text for text in of_steps if text not in known and not text.startswith(TOO_LARGE)]
+    jams = "balls jam in a gap" if len(two.jams) > len(made.jams) else ""
+    return next(iter(new), jams)

@@ -1,0 +1,108 @@
+"""Finer balls that follow coarse ones in steps, each until it has covered what it touches."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+import trimesh
+
+from chamberopt.chamber.propose.first_design import propose
+from chamberopt.chamber.propose.proposal import Proposal, Wanted
+from chamberopt.chamber.propose.proposed_budget import Measured, propose_budget
+from chamberopt.chamber.propose.proposed_intensity import LARGER
+from chamberopt.chamber.propose.proposed_steps import with_finer_balls, without_finer
+from chamberopt.chamber.propose.text import design_text
+from chamberopt.common.errors import InputError
+from chamberopt.common.estimate import Estimate
+from chamberopt.design.intensity import PredictedIntensity
+from chamberopt.design.load import load_design
+from chamberopt.documents.proposal import proposal_end
+
+SLOT, COARSE, FINER = 5.0, 3.0, 1.0  # mm: balls of a quarter of the slot serve it
+
+
+def pilot(seconds: float, intensity: float) -> Measured:
+    """What a pilot says of a design whose target is covered after some time [s]."""
+    predicted = PredictedIntensity.estimated(Estimate(intensity / 13.5e-3, 0.0))
+    common = 1e5, 1e4, seconds, True, 1.0, True, 0.01, 5e-3, 6.4, seconds
+    return Measured(*common, intensity=predicted)
+
+
+@pytest.fixture(scope="module")
+def coarse(tmp_path_factory: pytest.TempPathFactory) -> Proposal:
+    """A block with a slot, peened on all sides with balls that are too large for the slot."""
+    path = tmp_path_factory.mktemp("slotted") / "slotted.stl"
+    block = trimesh.creation.box((30.0, 20.0, 20.0))
+    slot = trimesh.creation.box((SLOT, 30.0, 30.0))
+    slot.apply_translation((0.0, 0.0, -10.0))
+    block.difference(slot).export(path)
+    return propose(path, Wanted("mm", ball_mm=COARSE), lambda known: [one.name for one in known])
+
+
+def test_each_size_peens_for_its_own_time_in_one_chamber(coarse: Proposal, tmp_path: Path) -> None:
+    seen: list[Proposal] = []
+
+    def measure(one: Proposal) -> Measured:
+        seen.append(one)
+        return pilot(300.0, 0.1)
+
+    two, why = with_finer_balls(coarse, pilot(600.0, 0.3), FINER, measure)
+    assert two is not None, why
+    (tmp_path / "design.toml").write_text(design_text(two, tmp_path), "utf-8")
+    design = load_design(tmp_path / "design.toml")
+    first, second = design.in_steps.values()
+    times = [propose_budget(pilot(one, 0.1)).treatment for one in (600.0, 300.0)]
+    assert [one.process.treatment_time for one in (first, second)] == pytest.approx(times)
+    assert design.process.treatment_time == pytest.approx(sum(times))
+    assert [1e3 * one.shot.diameter for one in (first, second)] == pytest.approx([COARSE, FINER])
+    assert first.chamber == second.chamber
+    assert first.shot.mass == coarse.design.shot.mass
+    (alone,) = seen  # the finer balls are simulated by themselves
+    assert alone.design.shot == second.shot
+    assert two.chamber.pieces_in_air == coarse.chamber.pieces_in_air
+    told = two.reasons[".steps"]
+    assert told.startswith("3 mm balls for 900 s, then 1 mm for 420 s: ")
+    assert "about 0.3 mmA on the" in told
+    assert "TWO INTENSITIES" in told
+    lines = " ".join(" ".join(proposal_end(two, [], verbose=False)).split())
+    assert "balls of 3 mm (steel" in lines
+    assert " and then " in lines
+    assert ". TWO INTENSITIES: narrow places" in lines
+
+
+@pytest.mark.parametrize(
+    ("found", "finer_mm", "why"),
+    [
+        (None, FINER, "no pilot resolved the coarse balls"),
+        (pilot(600.0, 0.3), COARSE, "no smaller ball"),
+        (pilot(600.0, 0.3), 2.5, "3 mm serve"),  # which are as large beside the slot
+    ],
+)
+def test_one_size_stays_where_finer_ones_bring_nothing(
+    coarse: Proposal, found: Measured | None, finer_mm: float, why: str
+) -> None:
+    def never(_: Proposal) -> Measured:
+        raise AssertionError
+
+    two, told = with_finer_balls(coarse, found, finer_mm, never)
+    assert two is None
+    assert told.startswith(why)
+
+
+def test_what_stands_against_finer_balls_is_told(
+    coarse: Proposal, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found = pilot(600.0, 0.3)
+    two, why = with_finer_balls(coarse, found, FINER, lambda _: None)
+    assert (two, why) == (None, "no pilot resolved the finer balls")
+    larger = replace(coarse, reasons={**coarse.reasons, "shot.diameter_mm": f"{LARGER}: 80%"})
+    reason = without_finer(larger, why).reasons["shot.diameter_mm"]
+    assert reason == f"{LARGER}: 80%; no finer balls after them: {why}"
+    assert without_finer(coarse, why) == coarse
+
+    def refused(*_: object) -> Proposal:
+        raise InputError("part: outside of the chamber")
+
+    monkeypatch.setattr("chamberopt.chamber.propose.proposed_steps.build_chamber", refused)
+    two, why = with_finer_balls(coarse, found, FINER, lambda _: found)
+    assert (two, why) == (None, "part: outside of the chamber")
