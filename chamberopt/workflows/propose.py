@@ -22,11 +22,11 @@ from chamberopt.chamber.propose.proposed_intensity import (
     is_off,
     larger_balls,
     propose_intensity,
-    setting_of,
     usual_for,
     with_expected_intensity,
     with_thin_places,
 )
+from chamberopt.chamber.propose.proposed_setting import setting_of
 from chamberopt.chamber.propose.proposed_steps import (
     propose_second_pose,
     with_finer_balls,

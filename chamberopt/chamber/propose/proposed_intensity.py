@@ -1,23 +1,9 @@
-"""Choose the balls and the amplitude that give a wanted Almen intensity, from pilot simulations.
-
-Notation
-    D   diameter of the balls
-    A   amplitude of the sonotrode
-    I   Almen intensity, in proportion to peening strength
-
-    I ~ D^p A^q        p = BALL_POWER, q = AMPLITUDE_POWER
-
-The strength of an impact of speed v is d²/D ~ D v (1 - e²)^(1/2), by Kirk's formula of the dent d
-(coverage/dents.py). Where restitution e is constant and the balls are fast enough for gravity to
-matter little, all speeds go with that of the sonotrode, so that p = q = 1. As e falls with speed,
-fast shot gains less, and q is a little less. The law only says which pilot to run next: what is
-proposed was simulated itself.
-"""
+"""Choose the balls and the amplitude that give a wanted Almen intensity, from pilot simulations."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -28,13 +14,22 @@ from chamberopt.chamber.propose.proposed_balls import (
     OF_THIN,
     THIN_SHARE,
     fit_sizes,
-    mostly_serving,
-    serving_sizes,
-    sizes_to_try,
     thinnest,
 )
 from chamberopt.chamber.propose.proposed_budget import Measured
-from chamberopt.chamber.propose.shop import ShopSonotrode, usual_shop
+from chamberopt.chamber.propose.proposed_setting import (
+    AMPLITUDE_POWER,
+    BALL_POWER,
+    Setting,
+    Settings,
+    amplitudes_of,
+    choose,
+    expected_intensity,
+    setting_of,
+    settings_of,
+    with_amplitude,
+)
+from chamberopt.chamber.propose.shop import usual_shop
 from chamberopt.common.errors import InputError
 from chamberopt.common.number_text import plain
 from chamberopt.design.almen_strip import OVER_A
@@ -49,26 +44,11 @@ from chamberopt.design.intensity import (
 from chamberopt.design.materials import alloy
 from chamberopt.geometry.thickness import depth_below
 
-BALL_POWER, AMPLITUDE_POWER = 1.0, 0.9
 MOST_PILOTS = 5
-# Settings in the middle half of the range, by logarithms, count as equally good.
-MIDDLE = 0.5
 ON_N = 0.1016  # mmA: 0.004 in, below which N strips are taken (SAE J443)
 INTENSITY = "process.intensity_mmA"  # whose reason stands in a design without a wish too
 MOST_LISTED = 3  # other settings in a reason
 LARGER = "LARGER BALLS FOR THE INTENSITY"
-
-
-class Setting(NamedTuple):
-    """What a shop can set for an intensity: diameter of the balls [mm], and amplitude [µm]."""
-
-    ball_mm: float
-    amplitude_um: float  # zero-to-peak
-
-    @property
-    def in_words(self) -> str:
-        """Both with their units."""
-        return f"{self.ball_mm:g} mm at {self.amplitude_um:g} µm"
 
 
 class IntensityPilot(NamedTuple):
@@ -81,93 +61,6 @@ class IntensityPilot(NamedTuple):
 
     predicted: PredictedIntensity
     dents: float
-
-
-class Settings(NamedTuple):
-    """What may be set for an intensity.
-
-    Attributes:
-        serving: balls that serve the target as well as any, with all amplitudes of the sonotrode.
-        larger: larger balls that serve most of it, with all amplitudes.
-        served: share of the target that each size serves, by diameter [mm].
-    """
-
-    serving: list[Setting]
-    larger: list[Setting]
-    served: dict[float, float]
-
-
-def settings_of(made: Proposal, wanted: Wanted) -> Settings:
-    """Return the balls that the geometry allows, each with all amplitudes of the sonotrode."""
-    amplitudes = _amplitudes(made.sonotrode)[1]
-
-    def with_each(diameters: Iterable[float]) -> list[Setting]:
-        return [Setting(_in_mm(ball), one) for ball in diameters for one in amplitudes]
-
-    if wanted.ball_mm is not None:
-        return Settings(with_each([made.design.shot.diameter]), [], {})
-    stock = (wanted.shop or usual_shop()).stock_mm(made.tables["shot"]["material"])
-    part = made.chamber.part
-    fits = fit_sizes(part, sizes_to_try(part, stock))
-    larger = with_each(one.diameter for one in mostly_serving(fits))
-    served = {_in_mm(one.diameter): one.served for one in fits}
-    return Settings(with_each(serving_sizes(fits)), larger, served)
-
-
-def _in_mm(diameter: float) -> float:
-    return round(1e3 * diameter, 4)
-
-
-def setting_of(made: Proposal) -> Setting:
-    """Return the balls and the amplitude of a proposal."""
-    return Setting(made.tables["shot"]["diameter_mm"], made.design.sonotrode.zero_to_peak_um)
-
-
-def _amplitudes(one: ShopSonotrode) -> tuple[str, dict[float, float]]:
-    """Return the design's key of a sonotrode's amplitudes, and its values by zero-to-peak [µm]."""
-    if one.amplitudes_um is not None:
-        return "amplitude_um", {value: value for value in one.amplitudes_um}
-    assert one.amplitudes_pv_um is not None
-    return "amplitude_pv_um", {0.5 * value: value for value in one.amplitudes_pv_um}
-
-
-def expected_intensity(setting: Setting, simulated: Mapping[Setting, float]) -> float:
-    """Return the intensity [mmA] of a setting, by the law from the simulated one nearest to it.
-
-    Args:
-        simulated: intensities of settings that were simulated [mmA], at least one.
-    """
-
-    def distance(other: Setting) -> float:
-        return sum(abs(math.log(a / b)) for a, b in zip(setting, other, strict=True))
-
-    near = min(simulated, key=distance)
-    return simulated[near] * _ratio(setting, near)
-
-
-def _ratio(setting: Setting, other: Setting) -> float:
-    """Return by the law the intensity of a setting over that of another one."""
-    balls, amplitudes = (one / two for one, two in zip(setting, other, strict=True))
-    return math.pow(balls, BALL_POWER) * math.pow(amplitudes, AMPLITUDE_POWER)
-
-
-def choose(
-    wanted: WantedIntensity, settings: Sequence[Setting], simulated: Mapping[Setting, float]
-) -> Setting:
-    """Return the setting for an intensity: of the largest amplitude in the middle of the range.
-
-    The same intensity takes the less time the larger the amplitude, with smaller balls. Where no
-    setting is in the middle half of the range, it is the one nearest to the middle.
-    """
-    off = {
-        one: abs(math.log(max(expected_intensity(one, simulated), 1e-9) / wanted.middle))
-        for one in settings
-    }
-    half = 0.5 * MIDDLE * math.log(wanted.high / wanted.low)
-    middle = [one for one in settings if off[one] <= half]
-    if middle:
-        return max(middle, key=lambda one: (one.amplitude_um, -off[one]))
-    return min(settings, key=lambda one: off[one])
 
 
 def propose_intensity(
@@ -208,7 +101,7 @@ def propose_intensity(
             chosen = choose(intensity, settings, _values(found))
             continue
         by_ball[chosen.ball_mm] = one
-        one = _with_amplitude(one, chosen)
+        one = with_amplitude(one, chosen)
         if setting_of(one) != chosen:  # another sonotrode carries the chamber for these balls
             settings = [setting_of(one), *(x for x in settings if x != chosen)]
             chosen = setting_of(one)
@@ -234,7 +127,7 @@ def propose_intensity(
         one = replace(one, reasons={**one.reasons, "shot.diameter_mm": reason})
     one = replace(one, strength_dents=found[chosen].dents)
     others = _other(intensity, [x for x in settings if x != chosen], found)
-    told = _with_amplitude(one, chosen), intensity, found[chosen].predicted
+    told = with_amplitude(one, chosen), intensity, found[chosen].predicted
     return _told(*told, others, reason)
 
 
@@ -288,7 +181,7 @@ def larger_balls(
         other = again(replace(wanted, ball_mm=ball))
     except InputError:  # no chamber with these balls
         return None
-    other = _with_amplitude(other, Setting(ball, max(_amplitudes(other.sonotrode)[1])))
+    other = with_amplitude(other, Setting(ball, max(amplitudes_of(other.sonotrode)[1])))
     told = measure(other)
     if told is None or told.intensity is None:
         return None
@@ -432,7 +325,7 @@ def _told(
         others: further settings in the range, in words.
         by_geometry: reason for the balls that geometry alone would have given.
     """
-    key = _amplitudes(made.sonotrode)[0]
+    key = amplitudes_of(made.sonotrode)[0]
     off, more = wanted.off(predicted.value), others
     if off:
         more = f"; NO BALLS AND AMPLITUDE GIVE THIS INTENSITY: {_needed(made, off)}"
@@ -476,12 +369,3 @@ def _other(
 
 def _values(found: Mapping[Setting, IntensityPilot]) -> dict[Setting, float]:
     return {setting: one.predicted.value for setting, one in found.items()}
-
-
-def _with_amplitude(made: Proposal, setting: Setting) -> Proposal:
-    """Return a proposal with the amplitude of a setting that its sonotrode has."""
-    key, values = _amplitudes(made.sonotrode)
-    near = min(values, key=lambda one: abs(one - setting.amplitude_um))
-    tables = {**made.tables, "sonotrode": {**made.tables["sonotrode"], key: values[near]}}
-    design = made.design.changed({f"sonotrode.{key}": values[near]})
-    return replace(made, tables=tables, design=design)

@@ -35,7 +35,8 @@ from chamberopt.chamber.propose.proposed_budget import (
     with_budget,
 )
 from chamberopt.chamber.propose.proposed_floor import of_blocks
-from chamberopt.chamber.propose.proposed_intensity import LARGER, setting_of
+from chamberopt.chamber.propose.proposed_intensity import LARGER
+from chamberopt.chamber.propose.proposed_setting import setting_of
 from chamberopt.chamber.propose.quicker import QUICKER, SLOW, turns
 from chamberopt.common.errors import InputError
 from chamberopt.common.number_text import plain, rounded

@@ -13,24 +13,26 @@ from chamberopt.chamber.propose.proposal import Proposal, Wanted
 from chamberopt.chamber.propose.proposed_balls import SizeFit, mostly_serving, serving_sizes
 from chamberopt.chamber.propose.proposed_budget import Asked, Measured, propose_budget
 from chamberopt.chamber.propose.proposed_intensity import (
-    AMPLITUDE_POWER,
     INTENSITY,
     MOST_PILOTS,
     IntensityPilot,
-    Setting,
-    Settings,
     as_no_wish,
     beside_larger,
-    choose,
-    expected_intensity,
     is_off,
     larger_balls,
     propose_intensity,
-    setting_of,
-    settings_of,
     usual_for,
     with_expected_intensity,
     with_thin_places,
+)
+from chamberopt.chamber.propose.proposed_setting import (
+    AMPLITUDE_POWER,
+    Setting,
+    Settings,
+    choose,
+    expected_intensity,
+    setting_of,
+    settings_of,
 )
 from chamberopt.chamber.propose.shop import Shop, load_shop
 from chamberopt.chamber.propose.text import design_text, study_texts
