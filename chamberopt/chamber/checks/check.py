@@ -256,28 +256,34 @@ def warnings(design: Design, chamber: Chamber, reach: Reach | None = None) -> li
     texts = first_warnings(design, chamber, reach.mesh)
     for name, surface in _to_be_peened(design, chamber).items():
         texts += surface_warnings(reach, surface, name, design.part.target.reachable)
-    return texts + _wall_warnings(design, chamber, reach)
-
-
-def _wall_warnings(design: Design, chamber: Chamber, reach: Reach) -> list[str]:
-    """Return warnings about facets, pockets, gaps and fillets, from where the shot reaches."""
-    texts = facet_warnings(chamber.part, reach.diameter, _reached_share(reach, chamber.on_target))
-    texts += pocket_warnings(reach, chamber)
-    turns = design.effects.part_turn is not None
-    texts += gap_warnings(reach, chamber, design.shot.diameters, turns)
+    texts += _wall_warnings(design, chamber, reach)
     return texts + fillet_warnings(reach, chamber, max(design.shot.diameters))
 
 
+def _wall_warnings(design: Design, chamber: Chamber, reach: Reach) -> list[str]:
+    """Return warnings about facets, pockets and gaps, from where the shot reaches."""
+    texts = facet_warnings(chamber.part, reach.diameter, _reached_share(reach, chamber.on_target))
+    texts += pocket_warnings(reach, chamber)
+    turns = design.effects.part_turn is not None
+    return [*texts, *gap_warnings(reach, chamber, design.shot.diameters, turns)]
+
+
 def _step_warnings(design: Design, chamber: Chamber) -> list[str]:
-    """Return the warnings of each step, and one on what no ball can touch in any of them."""
-    part, found = chamber.part, {}
+    """Return the warnings of each step, and one on what no ball can touch in any of them.
+
+    Of narrow fillets and slots only the steps with the finest balls warn, as these get there.
+    """
+    part, found, steps = chamber.part, {}, design.in_steps
     shares, balls = np.zeros(len(part.triangles)), set()
-    for (name, one), room in zip(design.in_steps.items(), chamber.steps, strict=True):
+    finest = min(max(one.shot.diameters) for one in steps.values())
+    for (name, one), room in zip(steps.items(), chamber.steps, strict=True):
         reach = shot_reach(one, room)
         own = reached_part_share(reach, room.source, len(part.triangles))
         shares = np.maximum(shares, own * room.exposed_area)
         balls.add(f"{1e3 * reach.diameter:g}")
         walls = _wall_warnings(one, room, reach)
+        if max(one.shot.diameters) == finest:
+            walls += fillet_warnings(reach, room, finest)
         found[name] = [*first_warnings(one, room, reach.mesh, False), *walls]
     texts = told_of_steps(found)
     spared = {one.name for one in design.zones if one.is_spared}

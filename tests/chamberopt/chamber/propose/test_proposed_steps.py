@@ -60,6 +60,8 @@ def test_each_size_peens_for_its_own_time_in_one_chamber(coarse: Proposal, tmp_p
     (alone,) = seen  # the finer balls are simulated by themselves
     assert alone.design.shot == second.shot
     assert two.chamber.pieces_in_air == coarse.chamber.pieces_in_air
+    warned = [one for one in two.warnings if "shot of" in one]  # the slot is for the finer balls
+    assert [one.partition(" mm")[0] for one in warned] == ["step finer: shot of 1"]
     told = two.reasons[".steps"]
     assert told.startswith("3 mm balls for 900 s, then 1 mm for 420 s: ")
     assert "about 0.3 mmA on the" in told
