@@ -18,8 +18,8 @@ from chamberopt.common.errors import one_line
 from chamberopt.common.number_text import plain
 
 if TYPE_CHECKING:
-    from chamberopt.chamber.propose.left_out import LeftOut
     from chamberopt.chamber.propose.proposal import Proposal
+    from chamberopt.chamber.propose.proposed_mask import LeftOut
     from chamberopt.chamber.propose.proposed_target import Surface
 
 WIDTH, INDENT = 79, 13  # columns

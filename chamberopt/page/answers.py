@@ -90,7 +90,7 @@ def check_answers(design: Design) -> Iterator[bytes]:
     yield packed(head, **{**surface, **_bodies(design, chamber)}, state=state, **own)
 
     reach = shot_reach(design, chamber)
-    facts = describe(design, chamber, reach)
+    facts = describe(design, chamber)
     share = reached_part_share(reach, chamber.source, len(part.triangles))
     state[part.target & (chamber.exposed_area > 0.0) & (share <= 0.5)] = MISSED
     head = {name: facts.pop(name) for name in ("notes", "warnings")}

@@ -28,7 +28,6 @@ from chamberopt.results.vtp_files import (
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
-    from chamberopt.chamber.reach import Reach
     from chamberopt.design.load import Design
 
 
@@ -55,7 +54,7 @@ ALL = 0.999  # share of the target's area from which it is wholly in the chamber
 OPPOSITE = np.array([(1.0, -1.6, 0.7), (-1.0, 1.6, -0.7)])
 
 
-def draw_target(design: Design, chamber: Chamber, reach: Reach, screenshot: Path) -> str:
+def draw_target(design: Design, chamber: Chamber, screenshot: Path) -> str:
     """Draw the part with its target, and mark triangles of the target that are out of reach.
 
     With steps, the part stands as in the first, and what is marked is out of reach in all of them.
@@ -65,7 +64,7 @@ def draw_target(design: Design, chamber: Chamber, reach: Reach, screenshot: Path
     Return in words where the picture is, or why there is none.
     """
     part = chamber.part
-    missed = part.target & (touched(design, chamber, reach) <= 0.5)
+    missed = part.target & (touched(design, chamber) <= 0.5)
     corners = part.vertices[part.triangles]
     more = {"missed": missed, "softness": softness_of_part(design, part)}
     remark = draw_part(corners, part.name, screenshot, part.target, chamber=chamber, **more)

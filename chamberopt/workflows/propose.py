@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from chamberopt.chamber.propose.first_design import propose
-from chamberopt.chamber.propose.left_out import LeftOut, find_left_out
 from chamberopt.chamber.propose.proposed_budget import measured_budget, with_budget
 from chamberopt.chamber.propose.proposed_intensity import (
     as_no_wish,
@@ -26,6 +25,7 @@ from chamberopt.chamber.propose.proposed_intensity import (
     with_expected_intensity,
     with_thin_places,
 )
+from chamberopt.chamber.propose.proposed_mask import LeftOut, find_left_out
 from chamberopt.chamber.propose.proposed_setting import setting_of
 from chamberopt.chamber.propose.proposed_steps import (
     propose_second_pose,
@@ -158,11 +158,11 @@ def _written(first: Proposal, pilots: _Pilots, folder: Path) -> Proposed:
     """Write what pilots make of a first proposal into a folder."""
     teller = pilots.teller
     with teller.step("drawing"):  # before the pilots, so that it can be looked at meanwhile
-        teller.tell(draw_target(first.design, first.chamber, first.reach, folder / PICTURE))
+        teller.tell(draw_target(first.design, first.chamber, folder / PICTURE))
     made = pilots.improve(first) if pilots.wishes.pilot else first
     if made.chamber is not first.chamber:
         with teller.step("drawing"):
-            teller.tell(draw_target(made.design, made.chamber, made.reach, folder / PICTURE))
+            teller.tell(draw_target(made.design, made.chamber, folder / PICTURE))
     left_out = find_left_out(made)
     write_text(folder / DESIGN, design_text(made, folder, left_out))
     studies = study_texts(made, DESIGN)

@@ -50,11 +50,9 @@ Facts = dict[str, object]
 """JSON values by name, with the unit in the name."""
 
 
-def describe(design: Design, chamber: Chamber, reach: Reach | None = None) -> dict[str, Any]:
+def describe(design: Design, chamber: Chamber) -> dict[str, Any]:
     """Return facts and warnings about a design and its chamber, as JSON values with named units.
 
-    Args:
-        reach: the points of the surface that the shot reaches, if they are already known.
     Raises:
         InputError: there are too many balls, or the part cannot turn.
         sim_core.SceneError: the cavity is not closed; the message says where.
@@ -62,7 +60,7 @@ def describe(design: Design, chamber: Chamber, reach: Reach | None = None) -> di
     if chamber.steps:
         return _describe_steps(design, chamber)
     require_ball_count(design)
-    reach = shot_reach(design, chamber) if reach is None else reach
+    reach = shot_reach(design, chamber)
     axis = turning_axis(design, chamber.part)
     require_turnable(design, reach.mesh, axis)
     if not design.effects.auto:  # a scene is built to see if the shot fits
@@ -87,7 +85,7 @@ def describe(design: Design, chamber: Chamber, reach: Reach | None = None) -> di
             "simulated_s_in_all": _rounded(simulated),
         },
         "notes": notes(design, chamber),
-        "warnings": warnings(design, chamber, reach),
+        "warnings": warnings(design, chamber),
     }
 
 
@@ -217,42 +215,32 @@ def notes(design: Design, chamber: Chamber) -> list[str]:
 def shot_reach(design: Design, chamber: Chamber) -> Reach:
     """Return the points of a chamber's surface that the shot reaches. A turning part is at rest.
 
-    The search takes a second or two.
+    The search takes a second or two, the first time that a chamber is asked for balls of a size.
     """
-    return find_reach(
-        chamber_mesh(chamber),
-        min(design.shot.diameters),
-        design.shot.diameter,
-        chamber.part.normals_in_cavity(chamber.vertices, chamber.triangles, chamber.source),
-    )
+    sizes = min(design.shot.diameters), design.shot.diameter
+    if sizes not in chamber.reaches:
+        own = chamber.vertices, chamber.triangles, chamber.source
+        normals = chamber.part.normals_in_cavity(*own)
+        chamber.reaches[sizes] = find_reach(chamber_mesh(chamber), *sizes, normals)
+    return chamber.reaches[sizes]
 
 
-def touched(design: Design, chamber: Chamber, reach: Reach) -> np.ndarray:
+def touched(design: Design, chamber: Chamber) -> np.ndarray:
     """Return the share of each triangle of the part that the balls can touch, (m,).
 
     With steps it is that of the step in which they touch most of it.
-
-    Args:
-        reach: the points of the chamber's surface that the shot reaches, without steps.
     """
-    rooms = [(reach, chamber)]
-    if chamber.steps:
-        steps = zip(design.in_steps.values(), chamber.steps, strict=True)
-        rooms = [(shot_reach(one, room), room) for one, room in steps]
+    rooms = zip(design.in_steps.values(), chamber.steps or (chamber,), strict=True)
     count = len(chamber.part.triangles)
-    each = [reached_part_share(found, room.source, count) for found, room in rooms]
+    each = [reached_part_share(shot_reach(one, room), room.source, count) for one, room in rooms]
     return np.asarray(np.max(each, axis=0))
 
 
-def warnings(design: Design, chamber: Chamber, reach: Reach | None = None) -> list[str]:
-    """Return warnings about values that are allowed but probably not intended, with remedies.
-
-    Args:
-        reach: the points of the surface that the shot reaches, if they are already known.
-    """
+def warnings(design: Design, chamber: Chamber) -> list[str]:
+    """Return warnings about values that are allowed but probably not intended, with remedies."""
     if chamber.steps:
         return _step_warnings(design, chamber)
-    reach = shot_reach(design, chamber) if reach is None else reach
+    reach = shot_reach(design, chamber)
     texts = first_warnings(design, chamber, reach.mesh)
     for name, surface in _to_be_peened(design, chamber).items():
         texts += surface_warnings(reach, surface, name, design.part.target.reachable)

@@ -195,7 +195,7 @@ def only_touched(made: Proposal, floor: Floor, shop: Shop | None) -> Proposal:
     if not LEAST_LEFT < hidden < MOST_LEFT:
         return made
     target = {**made.tables["part.target"], "reachable": True}
-    part, share = made.chamber.part, touched(made.design, made.chamber, made.reach)
+    part, share = made.chamber.part, touched(made.design, made.chamber)
     left = np.where(part.target, (1.0 - share) * part.area, 0.0)
     place = one_of(part.vertices[part.triangles].mean(axis=1), left)
     text = f"leaves out the {hidden:.1%} that no ball touches here, such as at {place}"

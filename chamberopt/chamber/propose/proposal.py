@@ -16,7 +16,6 @@ from chamberopt.chamber.propose.proposed_balls import MOST_BALLS, charge_of
 from chamberopt.chamber.propose.proposed_floor import Floor
 from chamberopt.chamber.propose.proposed_target import Sizes, Surface
 from chamberopt.chamber.propose.shop import Shop, ShopSonotrode
-from chamberopt.chamber.reach import Reach
 from chamberopt.chamber.scene import MAX_BALLS
 from chamberopt.common.errors import InputError
 from chamberopt.common.toml_fields import allowed_range
@@ -74,7 +73,6 @@ class Proposal:
     known: tuple[Surface, ...]  # surfaces to choose the target from
     mesh: PartMesh
     chamber: Chamber
-    reach: Reach
     warnings: tuple[str, ...]
     jams: tuple[JamGap, ...]  # gaps of chamber and part in which the balls jam
     sonotrode: ShopSonotrode  # whose face carries the chamber
@@ -118,9 +116,8 @@ def checked(
     tables = {**tables, "shot": {**tables["shot"], "mass_g": mass_g}}
     tables["tolerances"] = propose_tolerances(tables)
     design = validate(Design, nested(tables))
-    reach = shot_reach(design, chamber)
     reasons = {**reasons, "shot.mass_g": f"{reason}: {design.shot.count}", "tolerances": OF_LENGTHS}
-    found = tuple(warnings(design, chamber, reach))
+    found = tuple(warnings(design, chamber))
     if math.isinf(floor.lean):
         found = (f"chamber: {floor.reason}", *found)
     ranges = propose_ranges(sizes, mass_g, 1e3 * diameter, ball_mass)
@@ -132,9 +129,8 @@ def checked(
         known=tuple(known),
         mesh=mesh,
         chamber=chamber,
-        reach=reach,
         warnings=found,
-        jams=tuple(jam_gaps(chamber, diameter, gaps_in_reach(reach))),
+        jams=tuple(jam_gaps(chamber, diameter, gaps_in_reach(shot_reach(design, chamber)))),
         sonotrode=floor.face.sonotrode,
     )
 
@@ -155,7 +151,7 @@ def with_charge(made: Proposal, factor: float) -> Proposal:
         design=design,
         tables={**made.tables, "shot": {**made.tables["shot"], "mass_g": mass_g}},
         bounds={**made.bounds, "shot.mass_g": _masses(mass_g, ball_mass)._asdict()},
-        warnings=tuple(warnings(design, made.chamber, made.reach)),
+        warnings=tuple(warnings(design, made.chamber)),
     )
 
 
@@ -185,7 +181,7 @@ def beginning(warning: str) -> str:
 
 def touched_share(made: Proposal) -> float:
     """Return the share of the target's area that the balls can touch."""
-    part, share = made.chamber.part, touched(made.design, made.chamber, made.reach)
+    part, share = made.chamber.part, touched(made.design, made.chamber)
     return float(share[part.target] @ part.area[part.target] / part.area[part.target].sum())
 
 

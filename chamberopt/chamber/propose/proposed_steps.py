@@ -43,7 +43,8 @@ from chamberopt.common.number_text import plain, rounded
 
 RAISED = 1.0, 2.0, 3.0  # ball diameters by which a ceiling is raised for a second pose
 LEAST_SERVED = 0.25  # share of the target that coarse balls serve before finer ones, by heart
-TOO_LARGE = "shot of "  # how warnings of fillets and slots begin
+# How warnings begin of fillets and slots that are too narrow, and of what no ball touches.
+NOT_SERVED = re.compile(r"shot of |[\d.]+% of ")
 Steps = list[dict[str, Any]]
 """The [[steps]] of a design file."""
 
@@ -84,7 +85,7 @@ def propose_second_pose(
     if after is None or not after.places:
         return dropped("no pilot resolved it")
     enough = after.time_to_98 <= QUICKER * found.time_to_98 or is_hidden
-    if not enough or touched_share(two) < COVERED:
+    if not enough or (is_hidden and touched_share(two) < COVERED):
         return dropped(f"by a pilot {after.in_words} then too")
     before = f"{touched_share(made):.0%} of the target is in reach" if is_hidden else found.in_words
     reason = f"turned over after half of the time: by pilots {after.in_words}, in one pose {before}"
@@ -236,18 +237,15 @@ def _with_values(made: Proposal, values: Mapping[str, Mapping[str, Any]], steps:
     changes = {f"{name}.{key}": x for name, one in values.items() for key, x in one.items()}
     design = made.design.changed({**changes, "steps": steps or None})
     chamber = build_chamber(design)
-    rooms = list(zip(design.in_steps.values(), chamber.steps or (chamber,), strict=True))
-    reaches = [shot_reach(one, room) for one, room in rooms]
-    jams = [
-        tuple(jam_gaps(room, one.shot.diameter, gaps_in_reach(reach)))
-        for (one, room), reach in zip(rooms, reaches, strict=True)
-    ]
+    jams = (
+        tuple(jam_gaps(room, one.shot.diameter, gaps_in_reach(shot_reach(one, room))))
+        for one, room in zip(design.in_steps.values(), chamber.steps or (chamber,), strict=True)
+    )
     return replace(
         made,
         design=design,
         tables={name: one for name, one in tables.items() if one or name},
         chamber=chamber,
-        reach=reaches[0],
         jams=max(jams, key=len),
         warnings=tuple(warnings(design, chamber)),
     )
@@ -256,11 +254,11 @@ def _with_values(made: Proposal, values: Mapping[str, Mapping[str, Any]], steps:
 def _new_harm(two: Proposal, made: Proposal) -> str:
     """Return in words the harm that only a proposal with two poses does; empty if there is none.
 
-    A warning that holds in both steps, at another place in each, is no new one. That balls are too
-    large for fillets and slots is no harm: it counts in what they serve.
+    A warning that holds in both steps, at another place in each, is no new one. That balls do not
+    get to some of the target is no harm: it counts in what they serve and touch.
     """
     known = {beginning(text) for text in made.warnings}
     of_steps = (beginning(re.sub(r"^step \w+: ", "", text)) for text in two.warnings)
-    new = [text for text in of_steps if text not in known and not text.startswith(TOO_LARGE)]
+    new = [text for text in of_steps if text not in known and not NOT_SERVED.match(text)]
     jams = "balls jam in a gap" if len(two.jams) > len(made.jams) else ""
     return next(iter(new), jams)

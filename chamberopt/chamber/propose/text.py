@@ -9,9 +9,9 @@ from typing import Any, NamedTuple
 
 import tomlkit
 
-from chamberopt.chamber.propose.left_out import LeftOut
 from chamberopt.chamber.propose.proposal import Proposal
 from chamberopt.chamber.propose.proposed_intensity import INTENSITY
+from chamberopt.chamber.propose.proposed_mask import LeftOut
 from chamberopt.chamber.propose.proposed_target import Surface
 from chamberopt.common.errors import one_line
 from chamberopt.design.almen_strip import USUAL_K, USUAL_K_LOG_SD

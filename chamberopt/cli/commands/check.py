@@ -54,7 +54,7 @@ def _check(
     file: Path, pilot: bool, screenshot: Path | None, json: bool, out: Path | None, verbose: bool
 ) -> None:
     from chamberopt.chamber.build import build_chamber
-    from chamberopt.chamber.checks.check import describe, first_facts, shot_reach
+    from chamberopt.chamber.checks.check import describe, first_facts
     from chamberopt.cli.facts import facts_lines, table_lines
     from chamberopt.common.files import write_text
     from chamberopt.common.progress import step
@@ -88,11 +88,10 @@ def _check(
     if not json:
         show(first_lines)  # the other facts take longer, above all the first time
     with step("finding what the shot reaches"):
-        reach = shot_reach(design, chamber)
-        facts = describe(design, chamber, reach)
+        facts = describe(design, chamber)
     if screenshot is not None:
         with step("drawing"):
-            print_remarks([draw_target(design, chamber, reach, screenshot)])
+            print_remarks([draw_target(design, chamber, screenshot)])
     if isinstance(loaded, Study):
         facts["vary"] = {
             name: {"values": list(varied.texts), "start": setting(design, name)}

@@ -12,9 +12,9 @@ from shapely import Polygon
 
 from chamberopt.chamber.part import chosen_triangles
 from chamberopt.chamber.propose.first_design import _shot, propose
-from chamberopt.chamber.propose.left_out import find_left_out
 from chamberopt.chamber.propose.pose import pose_in_words
 from chamberopt.chamber.propose.proposal import Wanted, propose_charge, propose_ranges
+from chamberopt.chamber.propose.proposed_mask import find_left_out
 from chamberopt.chamber.propose.proposed_target import Sizes, Surface, propose_target, surfaces
 from chamberopt.chamber.propose.shop import StockBalls, usual_shop
 from chamberopt.chamber.propose.text import design_text
@@ -168,7 +168,7 @@ def test_what_faces_away_is_offered_for_leaving_out(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The heel ends of a bevel gear's teeth face away from the sonotrode, its apex down."""
-    monkeypatch.setattr("chamberopt.chamber.propose.left_out.met_area", lambda *_: (0.0, 1.0))
+    monkeypatch.setattr("chamberopt.chamber.propose.proposed_mask.met_area", lambda *_: (0.0, 1.0))
     mesh = read_part(FOUR_PARTS["bevel_gear"].write(tmp_path), "mm")
     known = surfaces(mesh)
     target, area = propose_target(mesh, known, []), areas(mesh.vertices, mesh.triangles)

@@ -4,8 +4,8 @@ import pytest
 import trimesh
 
 from chamberopt.chamber.propose.first_design import propose
-from chamberopt.chamber.propose.left_out import LeftOut
 from chamberopt.chamber.propose.proposal import Proposal, Wanted
+from chamberopt.chamber.propose.proposed_mask import LeftOut
 from chamberopt.documents.proposal import WIDTH, clauses, proposal_end, time_in_words
 
 

@@ -10,9 +10,8 @@ import numpy as np
 import pytest
 
 from chamberopt.chamber.build import Chamber, build_chamber
-from chamberopt.chamber.checks.check import describe, shot_reach, warnings
+from chamberopt.chamber.checks.check import describe, warnings
 from chamberopt.chamber.checks.gaps import find_ledges
-from chamberopt.chamber.reach import Reach
 from chamberopt.design.design import Design, validate
 from chamberopt.design.load import load_design
 from chamberopt.design.shapes import TAG_SONOTRODE
@@ -29,26 +28,6 @@ def made(name: str, **values: float) -> tuple[Design, Chamber]:
     return design, build_chamber(design)
 
 
-KNOWN: list[tuple[Chamber, Reach]] = []
-
-
-def found_in(design: Design, chamber: Chamber) -> Reach:
-    """What the shot reaches, found once a chamber: none of these tests changes its balls."""
-    for other, reach in KNOWN:
-        if other is chamber:
-            return reach
-    KNOWN.append((chamber, shot_reach(design, chamber)))
-    return KNOWN[-1][1]
-
-
-def warned(design: Design, chamber: Chamber) -> list[str]:
-    return warnings(design, chamber, found_in(design, chamber))
-
-
-def described(design: Design, chamber: Chamber) -> dict[str, Any]:
-    return describe(design, chamber, found_in(design, chamber))
-
-
 def without_gravity(design: Design) -> Design:
     return design.model_copy(
         update={"effects": design.effects.model_copy(update={"gravity": False})}
@@ -63,7 +42,7 @@ def gear() -> tuple[Design, Chamber]:
 def test_a_level_top_is_warned_of_with_area_place_and_remedy(gear: tuple[Design, Chamber]) -> None:
     """The gear's upper face: a toothed disc between radius 20 and 22 mm, less the shaft."""
     design, chamber = gear
-    (said,) = (text for text in warned(design, chamber) if "come to rest" in text)
+    (said,) = (text for text in warnings(design, chamber) if "come to rest" in text)
     assert "come to rest on the part, which neither vibrates nor turns" in said
     assert "around (0.0, 0.0, 25.0) mm in the chamber's frame, at z = 25 mm" in said
     assert "effects.part_turn" in said
@@ -79,7 +58,7 @@ def test_a_design_without_friction_says_what_that_means(gear: tuple[Design, Cham
     design, chamber = gear
 
     def notes(effects: Any, design: Design = design) -> list[str]:
-        found = described(design.changed({"effects": effects}), chamber)["notes"]
+        found = describe(design.changed({"effects": effects}), chamber)["notes"]
         return [text for text in found if "friction" in text]
 
     assert not notes({})  # the catalogue has it
@@ -128,20 +107,20 @@ def test_nothing_comes_to_rest_under_a_lid_or_on_a_part_that_turns() -> None:
 
 def test_a_turning_part_is_described_in_the_chambers_frame() -> None:
     design, chamber = made("gear_turning")
-    turn = described(design, chamber)["part_turn"]
+    turn = describe(design, chamber)["part_turn"]
     assert turn["rpm"] == 30.0
     assert turn["axis"] == pytest.approx([0.0, -1.0, 0.0], abs=1e-12)
     assert turn["through_mm"][0] == pytest.approx(0.0, abs=1e-3)
     assert turn["through_mm"][2] == pytest.approx(15.0 + 22.0, abs=0.1)
-    assert "part_turn" not in described(*made("plate"))
+    assert "part_turn" not in describe(*made("plate"))
 
 
 def test_a_part_through_the_side_wall_is_warned_of(gear: tuple[Design, Chamber]) -> None:
     """No warning for a shaft through the ceiling, a lid, or a shaft that turns in the wall."""
-    assert not any("side wall between z" in text for text in warned(*gear))
+    assert not any("side wall between z" in text for text in warnings(*gear))
     for name in ("plate", "gear_turning"):
-        assert not any("side wall between z" in text for text in warned(*made(name))), name
-    said = " ".join(warned(*made("gear", chamber__diameter_mm=42.0, shot__diameter_mm=4.0)))
+        assert not any("side wall between z" in text for text in warnings(*made(name))), name
+    said = " ".join(warnings(*made("gear", chamber__diameter_mm=42.0, shot__diameter_mm=4.0)))
     assert "goes out through the side wall between z = 15 and 25 mm" in said
     assert "chamber.diameter_mm" in said
 
@@ -150,12 +129,12 @@ def test_a_part_that_turns_down_to_the_sonotrode_is_warned_of() -> None:
     """The gear turned about a line 6.9 mm below its own axis comes down to 1.2 mm."""
     eccentric = {"effects.part_turn.through_mm.1": -6.9}
     design, chamber = made("gear_turning")
-    said = " ".join(warned(design.changed(eccentric), chamber))
+    said = " ".join(warnings(design.changed(eccentric), chamber))
     assert (
         "the gap between turning part and sonotrode is 1.16 mm, narrower than a ball of 1.5 mm"
         in said
     )
-    assert "turning part" not in " ".join(warned(design, chamber))
+    assert "turning part" not in " ".join(warnings(design, chamber))
     # 5 degrees to each side, a point 22 mm under the gear's axis hardly gets lower than at rest
     swings = design.changed(eccentric)
     motion = swings.effects.part_turn.model_copy(
@@ -164,7 +143,7 @@ def test_a_part_that_turns_down_to_the_sonotrode_is_warned_of() -> None:
     swings = swings.model_copy(
         update={"effects": swings.effects.model_copy(update={"part_turn": motion})}
     )
-    assert "turning part" not in " ".join(warned(swings, chamber))
+    assert "turning part" not in " ".join(warnings(swings, chamber))
 
 
 def test_balls_that_would_meet_but_are_let_through_each_other_are_warned_of() -> None:
@@ -172,10 +151,10 @@ def test_balls_that_would_meet_but_are_let_through_each_other_are_warned_of() ->
     through = design.model_copy(
         update={"effects": design.effects.model_copy(update={"ball_collisions": False})}
     )
-    assert any("effects.ball_collisions is false" in text for text in warned(through, chamber))
-    assert not any("ball_collisions" in text for text in warned(design, chamber))
+    assert any("effects.ball_collisions is false" in text for text in warnings(through, chamber))
+    assert not any("ball_collisions" in text for text in warnings(design, chamber))
     alone = through.changed({"shot.mass_g": 1e-3 * round(1e6 * design.shot.ball_mass)})
-    assert not any("ball_collisions" in text for text in warned(alone, chamber))
+    assert not any("ball_collisions" in text for text in warnings(alone, chamber))
 
 
 def test_what_a_ball_can_touch_is_a_fact_and_what_it_cannot_a_warning() -> None:
@@ -193,12 +172,14 @@ def test_what_a_ball_can_touch_is_a_fact_and_what_it_cannot_a_warning() -> None:
     assert float(said.split("%")[0]) == pytest.approx(share, abs=0.1)
     assert 5.0 < share < 35.0  # the roots of the teeth
     assert "part.target.reachable = true" in said
-    assert not any("cannot be touched" in text for text in warned(*made("plate")))
+    assert not any("cannot be touched" in text for text in warnings(*made("plate")))
 
 
 def test_a_gap_too_low_for_a_ball_is_warned_of_with_its_place_and_width() -> None:
     (said,) = (
-        text for text in warned(*made("gear", chamber__height_mm=26.0)) if "the gap between" in text
+        text
+        for text in warnings(*made("gear", chamber__height_mm=26.0))
+        if "the gap between" in text
     )
     assert "the gap between the ceiling and the part's upper side at (" in said
     assert ", 25.5) mm in the chamber's frame is 1 to 1.0" in said
@@ -207,7 +188,9 @@ def test_a_gap_too_low_for_a_ball_is_warned_of_with_its_place_and_width() -> Non
         "the gap" in said
     )
     (said,) = (
-        text for text in warned(*made("gear", chamber__diameter_mm=46.0)) if "gaps between" in text
+        text
+        for text in warnings(*made("gear", chamber__diameter_mm=46.0))
+        if "gaps between" in text
     )
     assert said.startswith("each of 20 gaps between the part's side and the wall, one at (")
     assert "no ball gets in there; enlarge the chamber" in said
@@ -215,7 +198,7 @@ def test_a_gap_too_low_for_a_ball_is_warned_of_with_its_place_and_width() -> Non
 
 def test_a_chamber_that_leaks_is_refused_with_the_place(gear: tuple[Design, Chamber]) -> None:
     design, chamber = gear
-    assert described(design, chamber)["chamber"]["closed"] == "yes"
+    assert describe(design, chamber)["chamber"]["closed"] == "yes"
     gone = int((chamber.tags == TAG_SONOTRODE).argmax())
     columns = {
         name: np.delete(getattr(chamber, name), gone, axis=0)
@@ -236,13 +219,13 @@ def test_a_chamber_that_leaks_is_refused_with_the_place(gear: tuple[Design, Cham
 def test_a_sonotrode_that_comes_near_the_part_is_warned_of(gear: tuple[Design, Chamber]) -> None:
     """A design is kept ten amplitudes away; a cavity made elsewhere may be nearer."""
     design, chamber = gear
-    assert described(design, chamber)["chamber"]["sonotrode_clearance_mm"] == pytest.approx(15.0)
+    assert describe(design, chamber)["chamber"]["sonotrode_clearance_mm"] == pytest.approx(15.0)
     floor = np.unique(chamber.triangles[chamber.tags == TAG_SONOTRODE])
     vertices = chamber.vertices.copy()
     vertices[floor, 2] = 14.7e-3
     quick = design.changed({"shot.diameter_mm": 4.0})  # what large balls reach is found sooner
     (said,) = (
-        text for text in warned(quick, replace(chamber, vertices=vertices)) if "apart" in text
+        text for text in warnings(quick, replace(chamber, vertices=vertices)) if "apart" in text
     )
     assert "part and sonotrode are only 0.3 mm apart, less than ten amplitudes of 40 µm" in said
     assert "chamber.sonotrode_distance_mm" in said

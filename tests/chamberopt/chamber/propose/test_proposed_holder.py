@@ -8,10 +8,10 @@ import trimesh
 from manifold3d import CrossSection, Manifold
 
 from chamberopt.chamber.propose.first_design import propose
-from chamberopt.chamber.propose.left_out import find_left_out
 from chamberopt.chamber.propose.proposal import Wanted
 from chamberopt.chamber.propose.proposed_end import held_end
 from chamberopt.chamber.propose.proposed_holder import HolderChoice, end_holder, holder_choices
+from chamberopt.chamber.propose.proposed_mask import find_left_out
 from chamberopt.chamber.propose.proposed_target import WHOLE, Target
 from chamberopt.chamber.propose.text import design_text
 from chamberopt.geometry.meshes.part_mesh import PartMesh

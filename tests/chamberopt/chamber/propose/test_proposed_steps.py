@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 import trimesh
 
+from chamberopt.chamber.propose import proposed_steps
 from chamberopt.chamber.propose.first_design import propose
 from chamberopt.chamber.propose.proposal import Proposal, Wanted
 from chamberopt.chamber.propose.proposed_budget import Measured, propose_budget
@@ -102,9 +103,17 @@ def test_what_stands_against_finer_balls_is_told(
     assert reason == f"{LARGER}: 80%; no finer balls after them: {why}"
     assert without_finer(coarse, why) == coarse
 
+    for text, harm in (
+        ("0.6% of the target cannot be touched, at", ""),
+        ("balls jam, at", "balls jam"),
+    ):
+        monkeypatch.setattr(proposed_steps, "warnings", lambda *_, said=text: [said])
+        _, why = with_finer_balls(coarse, found, FINER, lambda _: None)
+        assert why == (harm or "no pilot resolved the finer balls")
+
     def refused(*_: object) -> Proposal:
         raise InputError("part: outside of the chamber")
 
-    monkeypatch.setattr("chamberopt.chamber.propose.proposed_steps.build_chamber", refused)
+    monkeypatch.setattr(proposed_steps, "build_chamber", refused)
     two, why = with_finer_balls(coarse, found, FINER, lambda _: found)
     assert (two, why) == (None, "part: outside of the chamber")
