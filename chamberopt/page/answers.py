@@ -10,14 +10,8 @@ import numpy as np
 
 from chamberopt.chamber.bores_and_deflectors import on_deflectors
 from chamberopt.chamber.build import Chamber, build_chamber
-from chamberopt.chamber.checks.check import (
-    describe,
-    first_facts,
-    first_warnings,
-    notes,
-    shot_reach,
-    with_clearance,
-)
+from chamberopt.chamber.checks.check import first_warnings, notes, shot_reach
+from chamberopt.chamber.checks.facts import describe, first_facts, with_clearance
 from chamberopt.chamber.part import named_surface, preview_part
 from chamberopt.chamber.propose.proposed_target import named_surfaces
 from chamberopt.chamber.reach import reached_part_share

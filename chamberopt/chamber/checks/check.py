@@ -1,15 +1,15 @@
-"""Collect facts and warnings about a design before it is simulated, such as volumes and shot."""
+"""Warn of a design before it is simulated, and tell what its shot reaches."""
 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from chamberopt.chamber.build import NOTED_HIDDEN, TARGET, hidden_share, selection_of, told_of_steps
 from chamberopt.chamber.checks.calibration import calibration_warnings
-from chamberopt.chamber.checks.fillets import facet_warnings, fillet_warnings, touched_by_curvature
+from chamberopt.chamber.checks.fillets import facet_warnings, fillet_warnings
 from chamberopt.chamber.checks.gaps import (
     MIN_MISSED_SHARE,
     find_ledges,
@@ -19,20 +19,17 @@ from chamberopt.chamber.checks.gaps import (
 )
 from chamberopt.chamber.checks.place_names import CEILING, SIDE_WALL, mm2, surface_names
 from chamberopt.chamber.dimensionless import free_path
-from chamberopt.chamber.flexure import flexure_facts, flexure_of_surfaces
 from chamberopt.chamber.part import turning_axis
 from chamberopt.chamber.reach import Reach, find_reach, reached_part_share
-from chamberopt.chamber.replica_seed import replica_seed
-from chamberopt.chamber.scene import build_scene, chamber_mesh, require_ball_count, require_turnable
+from chamberopt.chamber.scene import chamber_mesh
 from chamberopt.common.number_text import plain
 from chamberopt.design.almen_strip import USUAL_K_LOG_SD
-from chamberopt.design.shape_surface import TAG_PART, TAG_SONOTRODE, TAG_WALL, is_sonotrode
-from chamberopt.design.tolerances import require_tolerances, tolerance_box
-from chamberopt.geometry.triangles import areas, edge_keys, sides_of, tetrahedron_volumes
+from chamberopt.design.shape_surface import TAG_PART, TAG_SONOTRODE
+from chamberopt.geometry.triangles import areas, edge_keys, sides_of
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
-    from chamberopt.chamber.part import Axis, Part
+    from chamberopt.chamber.part import Axis
     from chamberopt.design.load import Design
     from chamberopt.design.sonotrode import VibratingFace
     from sim_core import TriangleMesh
@@ -45,159 +42,6 @@ MIN_AMPLITUDES = 10.0  # between part and sonotrode, as for sonotrode_distance_m
 MAX_HIDDEN_SHARE = 0.05  # of the target's area; a larger share means a misplaced ceiling or wall
 MIN_MASKED = 1e-4  # share of the target under a mask that is worth a warning
 MIN_FREE_PATH = 10.0  # chamber heights; on longer paths few balls meet another ball before a dent
-
-Facts = dict[str, object]
-"""JSON values by name, with the unit in the name."""
-
-
-def describe(design: Design, chamber: Chamber) -> dict[str, Any]:
-    """Return facts and warnings about a design and its chamber, as JSON values with named units.
-
-    Raises:
-        InputError: there are too many balls, or the part cannot turn.
-        sim_core.SceneError: the cavity is not closed; the message says where.
-    """
-    if chamber.steps:
-        return _describe_steps(design, chamber)
-    require_ball_count(design)
-    reach = shot_reach(design, chamber)
-    axis = turning_axis(design, chamber.part)
-    require_turnable(design, reach.mesh, axis)
-    if not design.effects.auto:  # a scene is built to see if the shot fits
-        flexure = flexure_of_surfaces(design, chamber, reach.mesh)
-        build_scene(design, reach.mesh, replica_seed(design.process.seed, 0), axis, flexure)
-    process = design.process
-    accuracy = process.accuracy
-    simulated = accuracy.replicas * (process.recorded_time + accuracy.warmup_time)
-    return {
-        **with_clearance(first_facts(design, chamber), reach.mesh),
-        **_zone_facts(reach, chamber),
-        **_fixture_facts(design, chamber),
-        **_turn_facts(design, chamber.part),
-        **flexure_facts(design, chamber),
-        "materials": {name: law.in_words for name, law in design.materials},
-        "reach": _reach_facts(reach, chamber),
-        **_tolerance_facts(design),
-        "replicas": {
-            "count": accuracy.replicas,
-            "recorded_s": _rounded(process.recorded_time),
-            "warmup_s": _rounded(accuracy.warmup_time),
-            "simulated_s_in_all": _rounded(simulated),
-        },
-        "notes": notes(design, chamber),
-        "warnings": warnings(design, chamber),
-    }
-
-
-def _describe_steps(design: Design, chamber: Chamber) -> dict[str, Any]:
-    """Return facts and warnings about a design with steps, first those of its first step."""
-    steps = [*zip(design.in_steps.items(), chamber.steps, strict=True)]
-    found = {name: describe(one, room) for (name, one), room in steps}
-    first, told = found[steps[0][0][0]], {}
-    for (name, one), room in steps:
-        facts = found[name]
-        told[name] = {
-            "treatment_time_s": _rounded(one.process.treatment_time),
-            "recorded_s": _rounded(one.process.recorded_time),
-            "lowest_point_mm": facts["part"]["lowest_point_mm"],
-            "target_exposed_area_mm2": facts["target"]["exposed_area_mm2"],
-            "target_reachable_share": facts["reach"]["target_reachable_share"],
-            "free_volume_cm3": _rounded(room.volume * 1e6),
-            "balls": facts["shot"]["balls"],
-        }
-    accuracy, own = design.process.accuracy, len(found) * design.process.accuracy.warmup_time
-    replicas = first["replicas"] | {
-        "recorded_s": _rounded(design.process.recorded_time),
-        "simulated_s_in_all": _rounded(accuracy.replicas * (design.process.recorded_time + own)),
-    }
-    return {
-        **first,
-        **with_clearance(first_facts(design, chamber), chamber.mesh),
-        "replicas": replicas,
-        "steps": told,
-        "notes": notes(design, chamber),
-        "warnings": warnings(design, chamber),
-    }
-
-
-def first_facts(design: Design, chamber: Chamber) -> dict[str, Facts]:
-    """Return the facts that are known as soon as the chamber is built, by subject and name."""
-    part, shot = chamber.part, design.shot
-    exposed = chamber.exposed_area > 0.0
-    box, low = np.ptp(part.vertices, axis=0), part.vertices.min(axis=0)
-    shape = design.chamber.surface(part.vertices, part.triangles)  # without the part
-    shape_volume = float(tetrahedron_volumes(shape.vertices, shape.triangles).sum())
-    return {
-        "part": {
-            "mesh": str(design.part.mesh_path),
-            "unit": part.unit,
-            "names": list(part.names),
-            "triangles": len(part.triangles),
-            "bounding_box_mm": [_rounded(side * 1e3) for side in box],
-            "box_middle_mm": [_rounded(x * 1e3) for x in low[:2] + 0.5 * box[:2]],  # from the axis
-            "lowest_point_mm": _rounded(low[2] * 1e3),
-            "area_mm2": _rounded(part.area.sum() * 1e6),
-            "exposed_area_mm2": _rounded(chamber.exposed_area.sum() * 1e6),
-            **_smoothing_facts(part, min(shot.diameters)),
-        },
-        "target": {
-            "triangles": int(part.target.sum()),
-            "exposed_triangles": int((part.target & exposed).sum()),
-            "area_mm2": _rounded(part.area[part.target].sum() * 1e6),
-            "exposed_area_mm2": _rounded(chamber.exposed_area[part.target].sum() * 1e6),
-        },
-        "chamber": {
-            "shape": design.chamber.shape,
-            "shape_volume_cm3": _rounded(shape_volume * 1e6),
-            "free_volume_cm3": _rounded(chamber.volume * 1e6),
-            "part_triangles": int((chamber.tags == TAG_PART).sum()),
-            "sonotrode_triangles": int(is_sonotrode(chamber.tags).sum()),
-            "wall_triangles": int((chamber.tags == TAG_WALL).sum()),
-        },
-        "sonotrode": {
-            "amplitude_um": _rounded(1e6 * design.sonotrode.amplitude),
-            "amplitude_pv_um": _rounded(2e6 * design.sonotrode.amplitude),
-            "peak_speed_m_s": _rounded(design.sonotrode.peak_speed),
-        },
-        "shot": {
-            "balls": shot.count,
-            "ball_mass_mg": _rounded(shot.ball_mass * 1e6),
-            "mass_g": _rounded(shot.count * shot.ball_mass * 1e3),
-            "packing_fraction": _rounded(shot.volume / chamber.volume),
-        },
-    }
-
-
-def _smoothing_facts(part: Part, ball: float) -> Facts:
-    """Return facts on how facets of the target's curved surfaces were smoothed; none without any.
-
-    Args:
-        ball: diameter of the smallest ball [m].
-    """
-    facts = part.smoothing
-    if facts is None or not facts.facet_turn:
-        return {}
-    return {
-        "facets_deg": _rounded(float(np.degrees(facts.facet_turn))),
-        "given_triangles": facts.given_triangles,
-        "smoothed_share": _rounded(facts.moved_share),
-        "smoothed_at_most_mm": _rounded(facts.largest_move * 1e3),
-        "volume_change": _rounded(facts.volume_change),
-        "blunt_creases": facts.blunt_creases,
-        "coarse_facets_share": _rounded(facts.coarse_share),
-        "touched_by_curvature": _rounded(touched_by_curvature(part, ball)),
-    }
-
-
-def with_clearance(facts: dict[str, Facts], mesh: TriangleMesh) -> dict[str, Facts]:
-    """Return the facts of `first_facts` with the distance between sonotrode and part added.
-
-    Args:
-        mesh: closed mesh of the chamber.
-    """
-    clearance = _rounded(sonotrode_clearance(mesh) * 1e3)
-    more = {"closed": "yes", "sonotrode_clearance_mm": clearance}
-    return {**facts, "chamber": facts["chamber"] | more}
 
 
 def notes(design: Design, chamber: Chamber) -> list[str]:
@@ -250,7 +94,7 @@ def warnings(design: Design, chamber: Chamber) -> list[str]:
 
 def _wall_warnings(design: Design, chamber: Chamber, reach: Reach) -> list[str]:
     """Return warnings about facets, pockets and gaps, from where the shot reaches."""
-    texts = facet_warnings(chamber.part, reach.diameter, _reached_share(reach, chamber.on_target))
+    texts = facet_warnings(chamber.part, reach.diameter, reached_share(reach, chamber.on_target))
     texts += pocket_warnings(reach, chamber)
     turns = design.effects.part_turn is not None
     return [*texts, *gap_warnings(reach, chamber, design.shot.diameters, turns)]
@@ -395,70 +239,10 @@ def amplitude_notes(design: Design) -> list[str]:
     ]
 
 
-def _reach_facts(reach: Reach, chamber: Chamber) -> Facts:
-    """Return area and share of the target and of the part that the smallest balls can touch."""
-    size = areas(chamber.vertices, chamber.triangles)
-    facts: Facts = {"ball_mm": _rounded(reach.diameter * 1e3)}
-    for name, rows in (("target", chamber.on_target), ("part", chamber.tags == TAG_PART)):
-        share = _reached_share(reach, rows)
-        facts[f"{name}_reachable_mm2"] = _rounded(share * size[rows].sum() * 1e6)
-        facts[f"{name}_reachable_share"] = _rounded(share)
-    return facts
-
-
-def _reached_share(reach: Reach, rows: np.ndarray) -> float:
+def reached_share(reach: Reach, rows: np.ndarray) -> float:
     """Return the share of the area of the marked cavity triangles (k,) that the ball can touch."""
     size = areas(reach.mesh.vertices, reach.mesh.triangles)[rows]
     return float(reach.share[rows] @ size / size.sum())
-
-
-def _zone_facts(reach: Reach, chamber: Chamber) -> dict[str, Facts]:
-    """Return the size of each zone, and the share of it that the smallest balls can touch.
-
-    The share is of the zone's area inside the cavity.
-    """
-    part = chamber.part
-    share = reached_part_share(reach, chamber.source, len(part.triangles))
-    facts: dict[str, Facts] = {}
-    for name, zone in part.zones.items():
-        exposed = chamber.exposed_area[zone]
-        facts[f"zone {name}"] = {
-            "triangles": int(zone.sum()),
-            "area_mm2": _rounded(part.area[zone].sum() * 1e6),
-            "exposed_area_mm2": _rounded(exposed.sum() * 1e6),
-            "reachable_share": _rounded(share[zone] @ exposed / exposed.sum()),
-        }
-    return facts
-
-
-def _turn_facts(design: Design, part: Part) -> dict[str, Facts]:
-    """Return motion and axis of a turning part, in the chamber's frame; nothing if none turns."""
-    turn, line = design.effects.part_turn, turning_axis(design, part)
-    if turn is None or line is None:
-        return {}
-    point, axis = line
-    swing = {"angle_deg": turn.angle_deg, "frequency_hz": turn.frequency_hz}
-    pose = {
-        "through_mm": [_rounded(x * 1e3) for x in point],
-        "axis": [_rounded(x) for x in axis / np.linalg.norm(axis)],
-    }
-    return {"part_turn": {**(swing if turn.rpm is None else {"rpm": turn.rpm}), **pose}}
-
-
-def _fixture_facts(design: Design, chamber: Chamber) -> dict[str, Facts]:
-    """Return size and place of holder and mask, and the area of the part under each."""
-    facts: dict[str, Facts] = {}
-    if design.holder is not None and design.holder.kind == "bore":
-        facts["holder"] = {"kind": "bore", "clearance_mm": design.holder.clearance_mm}
-    for name, one in chamber.fixtures.items():
-        facts[name] = {
-            "kind": one.kind,
-            "size_mm": [_rounded(1e3 * side) for side in one.size],
-            "length_mm": _rounded(1e3 * one.length),
-            "covered_mm2": _rounded(1e6 * one.covered),
-            "covered_target_mm2": _rounded(1e6 * one.covered_target),
-        }
-    return facts
 
 
 def _mask_warnings(chamber: Chamber) -> list[str]:
@@ -472,19 +256,6 @@ def _mask_warnings(chamber: Chamber) -> list[str]:
         f"({mm2(mask.covered_target)}), which counts as not covered: leave these faces out of "
         "[part.target], or mask fewer faces"
     ]
-
-
-def _tolerance_facts(design: Design) -> dict[str, Facts]:
-    """Return the lowest, given and highest value of each number of a design that has a tolerance.
-
-    Raises InputError if the design is not valid at either end of a range.
-    """
-    require_tolerances(design)
-    box = tolerance_box(design)
-    ranges: Facts = {
-        k: {"low": a, "start": design.value(k), "high": b} for k, (a, b) in box.items()
-    }
-    return {"tolerances": ranges} if box else {}
 
 
 def _side_wall_warnings(design: Design, chamber: Chamber) -> list[str]:
@@ -576,8 +347,3 @@ def _lowest_height(line: Axis, points: np.ndarray, amplitude: float | None) -> f
     largest = np.pi if amplitude is None else amplitude
     furthest = np.minimum(np.abs(np.arctan2(ahead, across)) + largest, np.pi)
     return float((point[2] + along[:, 2] + np.hypot(across, ahead) * np.cos(furthest)).min())
-
-
-def _rounded(value: float) -> float:
-    """Return the value rounded to six digits, for readers."""
-    return float(f"{value:.6g}")

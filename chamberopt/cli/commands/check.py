@@ -54,7 +54,7 @@ def _check(
     file: Path, pilot: bool, screenshot: Path | None, json: bool, out: Path | None, verbose: bool
 ) -> None:
     from chamberopt.chamber.build import build_chamber
-    from chamberopt.chamber.checks.check import describe, first_facts
+    from chamberopt.chamber.checks.facts import describe, first_facts
     from chamberopt.cli.facts import facts_lines, table_lines
     from chamberopt.common.files import write_text
     from chamberopt.common.progress import step

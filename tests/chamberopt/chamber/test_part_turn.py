@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from chamberopt.chamber.build import build_chamber
-from chamberopt.chamber.checks.check import describe
+from chamberopt.chamber.checks.facts import describe
 from chamberopt.chamber.part import Axis, posed_part, turning_axis
 from chamberopt.chamber.scene import build_scene, chamber_mesh, require_turnable
 from chamberopt.common.errors import InputError

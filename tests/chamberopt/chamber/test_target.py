@@ -9,7 +9,7 @@ import pytest
 import trimesh
 
 from chamberopt.chamber.build import Chamber, build_chamber
-from chamberopt.chamber.checks.check import describe
+from chamberopt.chamber.checks.facts import describe
 from chamberopt.chamber.part import named_surface
 from chamberopt.common.errors import InputError
 from chamberopt.design.load import Design, load_design, save_design

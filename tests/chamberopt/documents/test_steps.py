@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from chamberopt.chamber.build import build_chamber
-from chamberopt.chamber.checks.check import describe
+from chamberopt.chamber.checks.facts import describe
 from chamberopt.common.errors import InputError
 from chamberopt.common.executor import SerialExecutor
 from chamberopt.design.load import Design, load_design

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from chamberopt.chamber.build import build_chamber
-from chamberopt.chamber.checks.check import describe
+from chamberopt.chamber.checks.facts import describe
 from chamberopt.design.load import load_design
 from tests.chamberopt.page.conftest import Served
 from tests.hunt.base import write_base

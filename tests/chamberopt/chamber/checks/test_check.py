@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from chamberopt.chamber.build import Chamber, build_chamber
-from chamberopt.chamber.checks.check import describe, warnings
+from chamberopt.chamber.checks.check import warnings
+from chamberopt.chamber.checks.facts import describe
 from chamberopt.chamber.checks.gaps import find_ledges
 from chamberopt.design.design import Design, validate
 from chamberopt.design.load import load_design

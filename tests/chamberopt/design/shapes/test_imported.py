@@ -12,7 +12,7 @@ import pytest
 import trimesh
 
 from chamberopt.chamber.build import Chamber, build_chamber
-from chamberopt.chamber.checks.check import describe
+from chamberopt.chamber.checks.facts import describe
 from chamberopt.common.errors import InputError
 from chamberopt.common.executor import SerialExecutor
 from chamberopt.design.design import Design, validate
