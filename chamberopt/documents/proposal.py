@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from chamberopt.chamber.propose.proposed_intensity import INTENSITY
 from chamberopt.chamber.propose.proposed_target import area_in_mm2
 from chamberopt.common.errors import one_line
+from chamberopt.common.key_words import in_words
 from chamberopt.common.number_text import plain
 
 if TYPE_CHECKING:
@@ -29,7 +30,6 @@ NO_MATTER = ("ZERO-TO-PEAK", "PEAK-TO-VALLEY", "WIDER", "SAE ")  # no matter of 
 SIMULATED = "simulated"  # the row that is told with --verbose alone
 KINDS = {"bore": "the part itself, out through a wall"}  # of holders, in words
 MINUTE, HOUR = 60.0, 3600.0  # s
-VALUE = re.compile(r"_(mm|g|um|pv_um|deg|s|khz)$")  # ends of names: units
 
 
 class _Row(NamedTuple):
@@ -55,7 +55,7 @@ def proposal_end(made: Proposal, left_out: Sequence[LeftOut], verbose: bool) -> 
             why, first = clauses(re.sub(f"^{re.escape(row.value)}[:;] ", "", reason))
             settle += first
             if why and why != [row.value]:
-                of = f"{_name(key.rpartition('.')[2])}: " if key.endswith("_mm") else ""
+                of = f"{in_words(key.rpartition('.')[2])}: " if key.endswith("_mm") else ""
                 told += wrapped(f"{'':{INDENT}}{of}{'; '.join(why)}", INDENT)
         lines += told if verbose or row.name != SIMULATED else []
     for one in left_out:
@@ -124,7 +124,7 @@ def _rows(made: Proposal) -> Iterator[_Row]:
     yield _Row("pose", pose, ("part.rotate_deg", "effects.part_turn"))
     chamber = dict(tables["chamber"])
     shape = chamber.pop("shape", "cylinder")
-    sizes = ", ".join(f"{_name(key)} {value:g}" for key, value in _numbers(chamber))
+    sizes = ", ".join(f"{in_words(key)} {value:g}" for key, value in _numbers(chamber))
     yield _Row("chamber", f"{shape}: {sizes} mm", tuple(f"chamber.{key}" for key in chamber))
     blocks = design.sonotrode.blocks
     face = made.sonotrode.in_words if blocks is None else blocks.in_words
@@ -133,7 +133,9 @@ def _rows(made: Proposal) -> Iterator[_Row]:
         own = {key: one for key, one in tables.items() if key.partition(".")[0] == table}
         if own:
             sizes = ", ".join(
-                f"{_name(key)} {value:g} mm" for one in own.values() for key, value in _numbers(one)
+                f"{in_words(key)} {value:g} mm"
+                for one in own.values()
+                for key, value in _numbers(one)
             )
             kind = own.get(table, {}).get("kind", "pad" if "axis" in own.get(table, {}) else "")
             keys = tuple(f"{one}.{key}" for one, values in own.items() for key in values)
@@ -169,11 +171,6 @@ def _numbers(table: Mapping[str, object]) -> Iterator[tuple[str, float]]:
     for key, value in table.items():
         if isinstance(value, int | float) and not isinstance(value, bool) and key.endswith("_mm"):
             yield key, float(value)
-
-
-def _name(key: str) -> str:
-    """Return the name of a value without its unit, in words."""
-    return VALUE.sub("", key).replace("_", " ")
 
 
 def _as_sentence(text: str) -> str:

@@ -11,6 +11,7 @@ import numpy as np
 
 from chamberopt.chamber.fixture import size_in_words
 from chamberopt.common.estimate import Estimate
+from chamberopt.common.key_words import in_words, unit_of
 from chamberopt.common.number_text import estimate_text, percent
 from chamberopt.coverage.coverage_intervals import NOT_RESOLVED
 from chamberopt.design.calibration import why_no_intensity
@@ -177,7 +178,6 @@ REQUALIFY = (
     "Requalify after: another sonotrode, chamber, holder, lot of parts or balls; a number out of "
     "tolerance; a program version that moved figures."
 )
-UNITS = {"mm": "mm", "deg": "degrees", "um": "µm"}
 EXPECTED = (
     "mean_coverage",
     "p05_coverage",
@@ -404,18 +404,15 @@ def key_row(key: str, value: Any) -> Row:
 
     In `key`, the unit is the end of the name, e.g. "height_mm".
     """
-    start, _, end = key.rpartition("_")
-    unit = UNITS.get(end, "")
-    name = start if unit else key
     if isinstance(value, bool):
         text = "yes" if value else "no"
     elif isinstance(value, int | float):
-        text = f"{plain(value)} {unit}".rstrip()
+        text = f"{plain(value)} {unit_of(key)}".rstrip()
     else:
         names = value if isinstance(value, list) else [value]
         is_text = all(isinstance(one, str) for one in names)
         text = ", ".join(names) if is_text else "see the report"
-    return name.replace("_", " "), text
+    return in_words(key), text
 
 
 def _sonotrode(result: Result, face_mm: tuple[float, ...]) -> Iterator[Row]:

@@ -1,4 +1,4 @@
-"""Text for a terminal at the end of a simulation, a study or a sweep: a sentence and a table.
+"""Text for a terminal at the end of a simulation, study, sweep or strip: a sentence and a table.
 
 The table has the main figures in words. With --verbose, all figures follow by the names that files
 have for them, and all notes.
@@ -28,11 +28,14 @@ from chamberopt.documents.stress import stress_sentence
 from chamberopt.documents.study import influence_sentences, influences, tried_sentence
 from chamberopt.documents.tolerances import tolerance_lines, tolerance_sentences
 from chamberopt.documents.wording import objective_label, plain
+from chamberopt.pictures.charts.strip import MULTIPLE_NAMES, fit_text
+from chamberopt.results.command_records import FIT_NAMES
 from chamberopt.results.load import load_result, load_start, load_trials
 
 if TYPE_CHECKING:
     from chamberopt.common.estimate import Estimate
     from chamberopt.design.load import Design
+    from chamberopt.peening.virtual_strip import VirtualStrip
     from chamberopt.results.load import Result
     from chamberopt.search.run_sweep import SweepResult
 
@@ -160,3 +163,31 @@ def _all_figures(result: Result, start: Result | None) -> Iterator[str]:
 def _line(name: str, estimate: Estimate) -> str:
     """Return a line with the name of a metric or objective, its estimate and interval."""
     return f"{name:33} {estimate_text(estimate)}"
+
+
+def strip_end(strip: VirtualStrip, notes: Iterable[str], verbose: bool) -> list[Table | str]:
+    """Return the end of the command `strip`: a sentence, the five arc heights and notes.
+
+    Args:
+        notes: notes on the design, which come before those on the strip.
+        verbose: the curves that were fitted to the arc heights follow, and all notes.
+    """
+    what, height = "peening strength S", "arc strength, not calibrated"
+    if strip.is_calibrated:
+        what, height = "Almen intensity I", f"arc height, {strip.unit}"
+    sentence = (
+        f"{strip.setting.type} strip, {strip.setting.place}: {what} "
+        f"{estimate_text(strip.intensity, unit=strip.unit)}, saturation time T "
+        f"{estimate_text(strip.time, unit='s')}."
+    )
+    rows = [
+        (name, f"{ascii_number(float(time), 3)} s", estimate_text(arc, unit=strip.unit))
+        for name, time, arc in zip(MULTIPLE_NAMES, strip.at, strip.heights, strict=True)
+    ]
+    fits = [
+        f"fit of {name}: {fit_text(fit, strip)}"
+        for name, fit in zip(FIT_NAMES, strip.fits, strict=True)
+    ]
+    table = Table("", ("after", "", height), rows)
+    more = ["", *fits] if verbose else []
+    return [sentence, "", table, *more, "", *note_lines([*notes, *strip.notes], verbose)]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping
+from itertools import groupby
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,9 @@ from chamberopt.chamber.reach import reached_part_share
 from chamberopt.chamber.scene import chamber_mesh
 from chamberopt.design.design import Design
 from chamberopt.design.shape_surface import TAG_PART, TAG_WALL, is_sonotrode
+from chamberopt.documents.facts import facts_in_words
 from chamberopt.geometry.triangles import border_edges, sharp_edges
+from chamberopt.page.page_words import Words, on_page
 from chamberopt.pictures.charts.colours import EDGES, KINDS
 
 # Where a triangle of the part is: numbers of these kinds.
@@ -71,9 +74,9 @@ def check_answers(design: Design) -> Iterator[bytes]:
     chamber = build_chamber(design)
     mesh = chamber_mesh(chamber)
     head: dict[str, Any] = {
-        "facts": with_clearance(first_facts(design, chamber), mesh),
-        "notes": notes(design, chamber),
-        "warnings": first_warnings(design, chamber, mesh),
+        "facts": _facts(design, with_clearance(first_facts(design, chamber), mesh)),
+        "notes": [on_page(text) for text in notes(design, chamber)],
+        "warnings": [on_page(text) for text in first_warnings(design, chamber, mesh)],
     }
     part = chamber.part
     state = _state(part.target, part.zones)
@@ -84,11 +87,17 @@ def check_answers(design: Design) -> Iterator[bytes]:
     yield packed(head, **{**surface, **_bodies(design, chamber)}, state=state, **own)
 
     reach = shot_reach(design, chamber)
-    facts = describe(design, chamber)
+    found = describe(design, chamber)
     share = reached_part_share(reach, chamber.source, len(part.triangles))
     state[part.target & (chamber.exposed_area > 0.0) & (share <= 0.5)] = MISSED
-    head = {name: facts.pop(name) for name in ("notes", "warnings")}
-    yield packed({"facts": facts, **head}, state=state)
+    head = {name: [on_page(text) for text in found[name]] for name in ("notes", "warnings")}
+    yield packed({"facts": _facts(design, found), **head}, state=state)
+
+
+def _facts(design: Design, found: Mapping[str, Any]) -> list[tuple[str, list[Words]]]:
+    """Return subjects and the facts of each, in words, one after the other."""
+    each = groupby(facts_in_words(design, found), lambda one: one.subject)
+    return [(subject, [on_page(one.text) for one in facts]) for subject, facts in each]
 
 
 def _state(target: np.ndarray, zones: dict[str, np.ndarray]) -> np.ndarray:

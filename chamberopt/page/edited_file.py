@@ -16,6 +16,7 @@ from pydantic.fields import FieldInfo
 
 from chamberopt.common.errors import InputError
 from chamberopt.common.files import claim_file, open_plain, write_bytes
+from chamberopt.common.key_words import inner_first, title, title_with_unit, unit_of
 from chamberopt.common.limits import MAX_TEXT_BYTES
 from chamberopt.common.toml_errors import numeric_fields, text_choices
 from chamberopt.common.toml_fields import read_toml
@@ -23,6 +24,7 @@ from chamberopt.design.design import Design, validate
 from chamberopt.design.fixture import HOLDER_KEYS, Holder
 from chamberopt.design.materials import BY_NAME
 from chamberopt.design.shapes.base import is_custom
+from chamberopt.page.page_words import choices
 from chamberopt.page.structure import KIND, NO_HOLDER, SHAPE, may_change, structure_choices
 
 # New values of keys by their dotted names, in the file's units; None takes a key out of the file.
@@ -261,8 +263,8 @@ NOT_SHOWN = (
 def design_fields(file: EditedFile) -> list[dict[str, object]]:
     """Return what the page shows of each number and choice in a design, in the order of the file.
 
-    Each row has the name, value, unit, allowed range and explanation, and the reason that the file
-    has behind it.
+    Each row has the name, also in words, value, unit, allowed range and explanation, and the reason
+    that the file has behind it.
     """
     design, varied = file.design, set(file.design.numbers())
     reasons = comments(file.text)
@@ -270,28 +272,47 @@ def design_fields(file: EditedFile) -> list[dict[str, object]]:
     for name, field in _numbers(design):
         row: dict[str, Any] = {"name": name, "value": _value(design, name), **_bounds(field)}
         extra = field.json_schema_extra if isinstance(field.json_schema_extra, dict) else {}
-        row |= {"unit": extra.get("unit", "") or _unit(name), "text": field.description or ""}
+        row |= {"unit": extra.get("unit", "") or unit_of(name), "text": field.description or ""}
         row |= {"whole": field.annotation is int, "varies": name in varied}
         row |= {"fixed": file.is_fixed(name)}
         rows.append(row | {"reason": reasons.get(name.removesuffix(".0"), "")})
     for name, allowed in _choices(design).items():
         table, key = name.split(".")
         text = type(getattr(design, table)).model_fields[key].description or ""
-        row = {"name": name, "value": design.setting(name), "choices": allowed, "text": text}
+        row = {
+            "name": name,
+            "value": design.setting(name),
+            "choices": choices(allowed),
+            "text": text,
+        }
         row |= {"reason": reasons.get(name, "")}
         rows.append(row)
-    return [*_structure_rows(file), *rows]
+    return [row | _words(row["name"]) for row in [*_structure_rows(file), *rows]]
 
 
-def _structure_rows(file: EditedFile) -> Iterator[dict[str, object]]:
+def _words(name: str) -> dict[str, str]:
+    """Return the table of a number or choice and its name in it, in words, and both as one."""
+    steps = name.split(".")
+    depth = 2 if name.startswith("process.accuracy.") else 1
+    table, key = ".".join(steps[:depth]), ".".join(steps[depth:])
+    group = inner_first(table)
+    return {
+        "table": table,
+        "group": group[0].upper() + group[1:],
+        "label": title(key),
+        "in_full": title_with_unit(name),
+    }
+
+
+def _structure_rows(file: EditedFile) -> Iterator[dict[str, Any]]:
     """Yield what the page shows of the chamber's shape and the kind of holder."""
     holder, chamber = file.design.holder, file.design.chamber
     values = {SHAPE: chamber.shape, KIND: NO_HOLDER if holder is None else holder.kind}
     texts = {SHAPE: "the sizes that it needs are proposed", KIND: "what holds the part"}
     reasons = comments(file.text)
     for name, allowed in file.structure.items():
-        row = {"name": name, "value": values[name], "choices": allowed, "text": texts[name]}
-        yield row | {"reason": reasons.get(name, ""), "is_structure": True}
+        row = {"name": name, "value": values[name], "choices": choices(allowed)}
+        yield row | {"text": texts[name]} | {"reason": reasons.get(name, ""), "is_structure": True}
 
 
 def comments(text: str) -> dict[str, str]:
@@ -360,9 +381,3 @@ def _bounds(field: FieldInfo) -> dict[str, float]:
             if (value := getattr(constraint, key, None)) is not None:
                 found[name] = float(value)
     return found
-
-
-def _unit(name: str) -> str:
-    """Return the unit that a key's name ends with, as text, or "" if it names none."""
-    key = name.rstrip("0123456789.").rpartition(".")[2]
-    return {"mm": "mm", "deg": "degrees", "um": "µm", "s": "s"}.get(key.rpartition("_")[2], "")

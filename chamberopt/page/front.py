@@ -24,6 +24,7 @@ from chamberopt.geometry.meshes.part_mesh import read_part_cached
 from chamberopt.geometry.meshes.surface_error import format_box
 from chamberopt.geometry.meshes.units import METRES_PER, STATED, UnknownUnitError
 from chamberopt.page.acts import Acts, free_folder, path_inside
+from chamberopt.page.page_words import choices
 from chamberopt.page.started_commands import OneCommand
 from chamberopt.workflows.propose import Wishes
 
@@ -79,7 +80,7 @@ class Front:
             "calibrations": [name for name, kind in tables if kind == "calibration"],
             "alloys": [one.name for one in alloys()],
             "balls": [one.name for one in balls()],
-            "shapes": SHAPES,
+            "shapes": choices(SHAPES),
         }
 
     def upload(self, name: str, content: bytes) -> dict[str, object]:

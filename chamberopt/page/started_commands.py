@@ -14,7 +14,9 @@ from typing import Any
 
 from chamberopt.common.child import GRACE_S, start_python
 from chamberopt.common.errors import InputError
+from chamberopt.page.page_words import on_page
 
+WARNING = "warning: "  # begins a line
 MOST_LINES = 200  # lines of a command's remarks that the page shows, the last ones
 COMMAND = (
     "from chamberopt.common.child import interrupt_with_parent; interrupt_with_parent(); "
@@ -51,16 +53,21 @@ class StartedCommand:
         """Return what the page shows of the command: printed lines and progress of its steps.
 
         The value `exit` is the exit status of the command, or None while it runs. `result` is the
-        folder of the result that it will leave, if any.
+        folder of the result that it will leave, if any. Its warnings, and its lines where it
+        failed, are in the words of the page too.
         """
         code = self._process.poll()
         if code is not None:
             self._reader.join(5.0)
+        lines = self._lines[-MOST_LINES:]
+        warnings = [one.removeprefix(WARNING) for one in lines if one.startswith(WARNING)]
         return {
             "command": f"chamberopt {' '.join(self.arguments)}",
             "result": self._result,
             "steps": [] if code is not None else list(self._steps.values()),
-            "lines": self._lines[-MOST_LINES:],
+            "lines": lines,
+            "warnings": [on_page(text) for text in warnings],
+            "error": [on_page(text) for text in lines] if code else [],
             "exit": code,
         }
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from chamberopt.common.errors import InputError
 from chamberopt.common.estimate import Estimate, finite_or_none
+from chamberopt.common.key_words import title_with_unit
 from chamberopt.common.limits import MAX_RESULT_BYTES, require_size
 from chamberopt.coverage.metrics import parse_objective
 from chamberopt.design.design import Design
@@ -75,7 +76,13 @@ def candidates_answer(folder: Path) -> dict[str, object]:
         "sentence": tried_sentence(trials),
         "objectives": [label.with_unit for label in labels],
         "varied": [
-            {"name": name, "low": one.bounds[0], "high": one.bounds[1], "texts": one.texts}
+            {
+                "name": name,
+                "label": title_with_unit(name),
+                "low": one.bounds[0],
+                "high": one.bounds[1],
+                "texts": one.texts,
+            }
             for name, one in inputs.vary.items()
         ],
         "candidates": rows,
@@ -108,13 +115,15 @@ def candidate_answer(folder: Path, number: int, design: Design) -> dict[str, obj
     for name, metric in trial.metrics.items():
         label = metric_label(name)
         figures.append((label.text, label.format(metric)))
+    values = {name: one for name, one in trial.parameters.items() if one != NONE}
     return {
         "number": number,
         "kind": _kind(trial),
         "reason": trial.reason,
-        "values": {name: one for name, one in trial.parameters.items() if one != NONE},
+        "values": values,
+        "numbers": [(title_with_unit(name), str(one)) for name, one in values.items()],
         "figures": list(dict(figures).items()),
-        "differs": inputs.differences(design),
+        "differs": [title_with_unit(name) for name in inputs.differences(design)],
     }
 
 

@@ -55,9 +55,10 @@ def _check(
 ) -> None:
     from chamberopt.chamber.build import build_chamber
     from chamberopt.chamber.checks.facts import describe, first_facts
-    from chamberopt.cli.facts import facts_lines, table_lines
+    from chamberopt.cli.facts import table_lines
     from chamberopt.common.files import write_text
     from chamberopt.common.progress import step
+    from chamberopt.documents.facts import facts_lines
     from chamberopt.documents.terminal_lines import note_lines
     from chamberopt.geometry.meshes.surface_error import SurfaceError
     from chamberopt.pictures.part import draw_target

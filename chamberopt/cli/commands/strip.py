@@ -61,7 +61,7 @@ def strip(
     from chamberopt.common.executor import open_executor
     from chamberopt.design.load import load_design
     from chamberopt.design.zones import LID
-    from chamberopt.documents.strip import strip_end
+    from chamberopt.documents.terminal_lines import strip_end
     from chamberopt.workflows.strip import StripPlace, peen_strip_in
 
     place = StripPlace(strip_type, at, _size(disc_mm, size_mm), distance_mm)

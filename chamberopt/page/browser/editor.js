@@ -4,8 +4,7 @@ import { fillSurfaces, fillTarget, showChosen } from "./target.js";
 import { fillRun, follow } from "./run.js";
 import { closeResults } from "./results.js";
 import "./study/study.js";
-import { ask, attempt, element, isUnsaved, listen, read, say, state, undo, unpack, value } from "./state.js";
-import { inUnits, inWords, onPage } from "./words.js";
+import { ask, attempt, element, isUnsaved, listen, onPage, read, say, state, undo, unpack, value, wordsOf } from "./state.js";
 import { showCavity, showPart, showShape, showState } from "./scene.js";
 
 const find = (id) => document.getElementById(id);
@@ -46,7 +45,7 @@ async function followShape() {
       if (answer.state.length !== fillTarget.part.triangles.length / 3) await showPartOf(); // its file has changed
       showShape(answer);
       document.body.dataset.shape = String(Number(document.body.dataset.shape ?? 0) + 1);
-    } catch (error) { if (asked === state.shown) refuse(error.message); }
+    } catch (error) { if (asked === state.shown) refuse(wordsOf(error)); }
   }
   asking = false;
 }
@@ -74,7 +73,7 @@ function followCavity() {
     } catch (error) {
       if (mine !== round) return;
       if (error.superseded) timer = setTimeout(followCavity, AGAIN); // by another page of this design
-      else refuse(error.message);
+      else refuse(wordsOf(error));
     }
   }, QUIET);
 }
@@ -88,16 +87,8 @@ function sayOf({ facts, warnings, notes }) {
   const list = (texts) => texts.map((text) => element("li", {}, ...onPage(text)));
   find("warnings").replaceChildren(...list(warnings));
   find("notes").replaceChildren(...list(notes));
-  const rows = [];
-  for (const [table, inner] of Object.entries(facts)) {
-    const known = inner && typeof inner === "object" && !Array.isArray(inner) ? Object.entries(inner) : [["", inner]];
-    rows.push(element("dt", { className: "of", textContent: inWords(table) }));
-    for (const [name, fact] of known) {
-      const text = name === "mesh" ? fact.split(/[\\/]/).pop() : inUnits(name || table, fact); // a path without its folder
-      rows.push(element("dt", { textContent: inWords(name), title: `${table}.${name}` }), element("dd", { textContent: text, title: String(fact) }));
-    }
-  }
-  find("facts").replaceChildren(...rows);
+  find("facts").replaceChildren(...facts.flatMap(([subject, told]) => [element("dt", { textContent: subject[0].toUpperCase() + subject.slice(1) }),
+    ...told.map((words) => element("dd", {}, ...onPage(words)))]));
 }
 
 listen((what) => {

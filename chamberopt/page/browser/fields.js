@@ -1,6 +1,5 @@
 // A slider and a field for every number of the design, grouped by its tables; the ends of sliders bound a study.
 import { attempt, change, element, endMove, original, restructure, say, state, value } from "./state.js";
-import { choiceInWords, inWords } from "./words.js";
 
 const OPEN = ["chamber", "shot", "sonotrode"], POSE = ["part.rotate_deg", "part.offset_mm"];
 const rows = new Map();
@@ -15,10 +14,10 @@ export function makeFields() {
   for (const field of state.fields) {
     const isPose = POSE.some((name) => field.name.startsWith(name));
     if (isPose && state.file.is_drawn) continue; // where its file has it
-    const table = field.name.slice(0, field.name.indexOf(".", field.name.startsWith("process.accuracy") ? 8 : 0));
+    const { table } = field;
     const row = field.choices ? choiceRow(field) : numberRow(field);
     if (isPose) { pose.append(row); continue; }
-    if (!groups.has(table)) groups.set(table, element("details", { id: `of-${table}`, open: opened.get(`of-${table}`) ?? OPEN.includes(table) }, element("summary", { textContent: inWords(table.split(".").reverse().join(" of ")), title: `[${table}]` })));
+    if (!groups.has(table)) groups.set(table, element("details", { id: `of-${table}`, open: opened.get(`of-${table}`) ?? OPEN.includes(table) }, element("summary", { textContent: field.group, title: `[${table}]` })));
     groups.get(table).append(row);
   }
   numbers.replaceChildren(...groups.values());
@@ -28,17 +27,13 @@ export function makeFields() {
   showValues();
 }
 
-const AXES = ["x", "y", "z"];
-const axis = (name) => AXES[/(?:deg|mm|axis)\.([012])$/.exec(name)?.[1]] ?? "";
-const keyOf = (field) => field.name.split(".").slice(field.name.startsWith("process.accuracy") ? 2 : 1).join(".");
-
 // What a number is, in words, and why the file has it; its key is the tip.
 const label = (field) => element("label", { title: `${field.name} in the file`, htmlFor: field.name },
-  element("b", { textContent: [inWords(keyOf(field)), axis(field.name)].filter(Boolean).join(", ") }), ` ${field.text}`,
+  element("b", { textContent: field.label }), ` ${field.text}`,
   ...(field.reason && field.reason !== field.text ? [element("small", { textContent: field.reason })] : []));
 
 function choiceRow(field) {
-  const select = element("select", { id: field.name }, ...field.choices.map((one) => element("option", { value: one, textContent: choiceInWords(one) })));
+  const select = element("select", { id: field.name }, ...field.choices.map(([value, textContent]) => element("option", { value, textContent })));
   select.addEventListener("change", () => {
     if (!field.is_structure) change({ [field.name]: select.value });
     else attempt(() => restructure(field.name, select.value)).then(showValues); // as it was where it is refused
@@ -82,7 +77,7 @@ function numberRow(field) {
   slider.addEventListener("change", endMove);
   box.addEventListener("change", () => {
     const text = box.value.trim().replace(",", "."), now = text === "" ? null : Number(text);
-    if (Number.isNaN(now)) say(`${field.name}: given ${box.value}, which is no number`);
+    if (Number.isNaN(now)) say(`${field.in_full}: given ${box.value}, which is no number`);
     else change({ [field.name]: now });
   });
   for (const end of [low, high]) end.addEventListener("change", newEnds);

@@ -1,10 +1,9 @@
 // The front page: a part's file, what is known of it, and the design that `new` proposes.
-import { ask, attempt, element, say } from "./state.js";
+import { ask, attempt, element, onPage, say, wordsOf } from "./state.js";
 import { bars, followed } from "./steps.js";
-import { choiceInWords, onPage } from "./words.js";
 
 const find = (id) => document.getElementById(id);
-const option = (text) => element("option", { textContent: choiceInWords(text), value: text });
+const option = (one) => element("option", { value: [one].flat()[0], textContent: [one].flat().at(-1) }); // a text, or a pair with its words
 const known = { part: "", unit: "" };
 
 // Show what the folder has, with a part chosen, by default the one that the page begins with; give its name.
@@ -80,29 +79,28 @@ drop.addEventListener("drop", (event) => attempt(() => bring(event.dataTransfer.
 find("file").addEventListener("change", () => attempt(() => bring(find("file").files[0])));
 find("part").addEventListener("change", () => attempt(() => look(find("part").value)));
 
-function tell({ steps, lines, exit }) {
-  const remarks = (kind) => lines.filter((line) => line.startsWith(kind)).map((line) => line.slice(kind.length));
+function tell({ steps, lines, warnings, error, exit }) {
   find("stop").hidden = exit !== null;
   find("progress").replaceChildren(...bars(steps));
-  find("warnings").replaceChildren(...remarks("warning: ").map((text) => element("li", {}, ...onPage(text))));
+  find("warnings").replaceChildren(...warnings.map((words) => element("li", {}, ...onPage(words))));
   find("printed").textContent = lines.join("\n");
   find("printed-fold").hidden = !lines.length;
   find("error").hidden = !exit;
-  find("error").replaceChildren(...(exit ? onPage(lines.join("\n")) : []));
+  find("error").replaceChildren(...error.flatMap((words) => [...onPage(words), "\n"]));
 }
 
 const WISHES = ["material", "intensity", "coverage", "shop", "calibration", "shot", "ball-mm", "pose", "shape"]; // options of `new`
 const NUMBERS = ["intensity", "coverage", "ball-mm"];
 
 // Say a message beside the field of the option that it begins with; give whether there is such a field.
-function besideField(text) {
+function besideField(text, words) {
   for (const one of document.querySelectorAll(".wrong")) one.remove();
   for (const id of WISHES) find(id).removeAttribute("aria-invalid");
   const id = /^--([\w-]+): /.exec(text)?.[1], field = find(id), fold = field?.closest("details");
   if (!WISHES.includes(id)) return false;
   if (fold) fold.open = true;
   field.setAttribute("aria-invalid", "true");
-  field.after(element("span", { className: "wrong", role: "alert" }, ...onPage(text)));
+  field.after(element("span", { className: "wrong", role: "alert" }, ...onPage(words)));
   field.focus();
   return true;
 }
@@ -113,7 +111,7 @@ async function started() {
   for (const id of NUMBERS) wishes[id] = wishes[id].replace(/(\d),(?=\d)/g, "$1."); // a decimal comma
   besideField("");
   try { return await ask("/propose", { ...known, ...wishes, target, pilot: find("pilot").checked }); } catch (error) {
-    if (!besideField(error.message)) throw error;
+    if (!besideField(error.message, wordsOf(error))) throw error;
     return null;
   }
 }
@@ -128,7 +126,7 @@ find("propose").addEventListener("click", () => attempt(async () => {
   const ended = await followed(tell, begun);
   find("propose").disabled = false;
   if (ended.exit !== 0) {
-    find("made").hidden = besideField(ended.lines.at(-1) ?? "");
+    find("made").hidden = besideField(ended.lines.at(-1) ?? "", ended.error.at(-1));
     return;
   }
   find("picture").src = `/files/${begun.out.split("/").map(encodeURIComponent).join("/")}/design.png`;

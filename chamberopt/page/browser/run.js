@@ -2,7 +2,6 @@
 import { ask, attempt, element, isUnsaved, say, state, read } from "./state.js";
 import { ends, varied } from "./fields.js";
 import { bars, followed } from "./steps.js";
-import { named } from "./words.js";
 
 const find = (id) => document.getElementById(id);
 
@@ -23,7 +22,7 @@ function allow() {
 find("of").addEventListener("change", allow);
 
 function showVaried() {
-  const items = [...varied].map((name) => element("li", { title: name, textContent: `${named(name)}: ${ends.get(name).join(" … ")}` }));
+  const items = [...varied].map((name) => element("li", { title: name, textContent: `${state.fields.find((one) => one.name === name)?.in_full}: ${ends.get(name).join(" … ")}` }));
   find("varied").replaceChildren(...(items.length ? items : [element("li", { textContent: "nothing is ticked" })]));
 }
 document.addEventListener("varied", showVaried);

@@ -1,5 +1,4 @@
 // What the page knows: the file as read, changes not yet saved, and questions to the server.
-import { onPage } from "./words.js";
 
 const listeners = [];
 export const state = { file: null, fields: [], changes: {}, past: [], shown: {}, showing: "" };
@@ -22,7 +21,7 @@ export async function ask(path, question) {
   if (isBytes) return answer.arrayBuffer();
   if (answer.status === 403) throw new Error(await answer.text());
   const told = await answer.json().catch(() => ({ error: `the server failed at this (${answer.status})` }));
-  if (told.superseded || told.error) throw Object.assign(new Error(told.error), { superseded: Boolean(told.superseded) });
+  if (told.superseded || told.error) throw Object.assign(new Error(told.error), { superseded: Boolean(told.superseded), words: told.words });
   return told;
 }
 
@@ -98,6 +97,11 @@ export function show(values, words = "") {
 export const isUnsaved = () => Object.keys(state.changes).length > 0;
 
 let fading = 0;
+// Text, or a message of the server: texts, and pairs of words with what they are in a file as a tip.
+export const onPage = (words) => [words].flat().map((one) => typeof one === "string" ? one
+  : element("abbr", { textContent: one[0], title: one[1] }));
+export const wordsOf = (error) => error.words ?? error.message;
+
 export function say(text, good = false) {
   const box = document.getElementById("message");
   box.replaceChildren(...onPage(text));
@@ -109,7 +113,7 @@ export function say(text, good = false) {
 
 // Run an act; what goes wrong is said on the page.
 export async function attempt(act) {
-  try { say(""); return await act(); } catch (error) { say(error.message); return undefined; }
+  try { say(""); return await act(); } catch (error) { say(wordsOf(error)); return undefined; }
 }
 
 export function element(tag, properties = {}, ...inner) {

@@ -344,7 +344,7 @@ class TestCheck:
         assert "shot         735 balls of 1 mm, 3.002 g, 0.32 % of the chamber" in words
         assert "             shot.mass_g: 3, from 2.7 to 3" in words
         assert f"{'shot.balls':33} 735" in names
-        assert f"{'tolerances.shot.mass_g':33} 3 in 2.7 .. 3" in names
+        assert f"{'tolerances.shot.mass_g':33} 3, from 2.7 to 3" in names
         warned = [line for line in names if line.startswith("warning: ")]
         assert warned
         assert set(warned) <= set(words)

@@ -109,10 +109,16 @@ def test_every_number_has_its_bounds_unit_and_description(file: EditedFile) -> N
     assert rows["chamber.height_mm"] == {
         "name": "chamber.height_mm", "value": 30.0, "least": 2.0, "most": 2000.0, "unit": "mm",
         "text": "inner height, sonotrode to ceiling", "whole": False, "varies": True,
-        "fixed": False, "reason": "to try",
+        "fixed": False, "reason": "to try", "table": "chamber", "group": "Chamber",
+        "label": "Height", "in_full": "Chamber height [mm]",
     }  # fmt: skip
     assert rows["part.offset_mm.0"]["value"] == 1.0
-    assert rows["sonotrode.motion"]["choices"] == ("sinusoidal", "random_phase")
+    assert rows["sonotrode.motion"]["choices"] == [
+        ("sinusoidal", "sinusoidal"),
+        ("random_phase", "random phase"),
+    ]
+    assert rows["part.offset_mm.0"]["in_full"] == "Part offset, x [mm]"
+    assert rows["process.accuracy.replicas"]["group"] == "Accuracy of the process"
     for name in file.design.numbers():
         tables = ("effects.part_turn", "sonotrode.amplitude_profile", "sonotrode.blocks")
         absent = name.startswith(tables) and name[-1].isdecimal()

@@ -8,6 +8,8 @@ import pytest
 from matplotlib.colors import to_rgb
 
 from chamberopt.cli import main
+from chamberopt.design.load import load_design
+from chamberopt.documents.facts import facts_in_words
 from chamberopt.pictures.charts.colours import KINDS
 from tests.chamberopt.page.browser_page import FIND, ON_SCREEN, SIDE, Page
 from tests.chamberopt.page.conftest import Served
@@ -37,8 +39,9 @@ def test_a_number_changes_the_shape_the_facts_and_one_line(opened: Page) -> None
     report = opened.served.folder / "checked"
     assert main(["check", str(opened.served.folder / "design.toml"), "--out", str(report)]) == 0
     facts = json.loads((report / "check.json").read_text())
-    for table, name in (("chamber", "free_volume_cm3"), ("reach", "target_reachable_mm2")):
-        assert float(said[f"{table}.{name}"]) == facts[table][name]
+    facts["part"]["mesh"] = "part.stl"
+    told = facts_in_words(load_design(opened.served.folder / "design.toml"), facts)
+    assert said == [one.text for one in told]
 
 
 def test_a_section_is_filled_in_the_colours_of_the_legend(opened: Page) -> None:

@@ -16,6 +16,7 @@ import pytest
 from chamberopt.chamber.build import build_chamber
 from chamberopt.chamber.checks.facts import describe
 from chamberopt.design.load import load_design
+from chamberopt.documents.facts import facts_in_words
 from tests.chamberopt.page.conftest import Served
 from tests.hunt.base import write_base
 
@@ -166,13 +167,23 @@ def test_it_says_what_check_says_and_older_questions_are_dropped(served: Served)
     assert served.ask("/reach", {"number": int.from_bytes(first[:4], "little")})["superseded"]
     reach = head(served.ask("/reach", {"number": int.from_bytes(second[:4], "little")}))
     design = load_design(served.folder / "design.toml").changed(changes)
-    facts = json.loads(json.dumps(describe(design, build_chamber(design))))
-    assert reach["facts"] == {k: v for k, v in facts.items() if k not in ("notes", "warnings")}
-    assert reach["notes"] == facts["notes"]
-    assert reach["warnings"] == facts["warnings"]
+    facts = describe(design, build_chamber(design))
+    assert told(reach) == [(one.subject, one.text) for one in facts_in_words(design, facts)]
+    assert list(map(as_said, reach["notes"])) == facts["notes"]
+    assert list(map(as_said, reach["warnings"])) == facts["warnings"]
     quick = head(second[4:])
-    assert set(quick["warnings"]) <= set(facts["warnings"])
-    assert all(facts[name] == found for name, found in quick["facts"].items())
+    assert set(map(as_said, quick["warnings"])) <= set(facts["warnings"])
+    assert told(quick)
+    assert set(told(quick)) <= set(told(reach))
+
+
+def as_said(words: list[str | list[str]]) -> str:
+    """A message with its keys, of which the page has words."""
+    return "".join(one if isinstance(one, str) else one[1] for one in words)
+
+
+def told(answer: dict) -> list[tuple[str, str]]:
+    return [(subject, as_said(one)) for subject, facts in answer["facts"] for one in facts]
 
 
 def test_the_shape_is_that_of_the_design(served: Served) -> None:

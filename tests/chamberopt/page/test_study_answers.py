@@ -67,7 +67,7 @@ def test_figures_of_a_candidate_are_in_words_with_units_and_intervals(out: Path)
     assert figures["mean coverage of the target"] == "50 %"
     assert answer["differs"] == []
     other = design.changed({"sonotrode.amplitude_um": 20, "chamber.height_mm": 33})
-    assert candidate_answer(out, 1, other)["differs"] == ["sonotrode.amplitude_um"]
+    assert candidate_answer(out, 1, other)["differs"] == ["Sonotrode amplitude [µm]"]
     with pytest.raises(InputError, match="not a candidate of study"):
         candidate_answer(out, 99, design)
 

@@ -19,7 +19,7 @@ from chamberopt.common.executor import SerialExecutor
 from chamberopt.coverage.strength import strip_dents
 from chamberopt.design.calibration import NO_CALIBRATION, NO_STRIPS, TIME_ERROR
 from chamberopt.design.load import load_design, save_design
-from chamberopt.documents.strip import strip_end
+from chamberopt.documents.terminal_lines import strip_end
 from chamberopt.peening import virtual_strip
 from chamberopt.peening.strip import StripSize, strip_cells
 from chamberopt.peening.virtual_strip import VirtualStrip, peen_strip, strip_in_lid

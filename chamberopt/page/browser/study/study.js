@@ -2,7 +2,6 @@
 import { ask, attempt, change, element, say, show } from "../state.js";
 import { followToEnd, running } from "../run.js";
 import { Plot, parallel } from "./plots.js";
-import { named } from "../words.js";
 
 const EVERY = 2000; // ms between looks at a study
 const find = (id) => document.getElementById(id);
@@ -59,7 +58,7 @@ async function look() {
 
 // Names of axes, tips and marks of the candidates.
 function prepared(now) {
-  const axes = now.varied.map((one) => ({ ...one, label: named(one.name) }));
+  const axes = now.varied;
   for (const one of now.candidates) {
     const figure = one.objective ? `: ${short(one.objective[0])}${one.objective[1] ? ` ± ${short(one.objective[1])}` : ""}` : "";
     one.tip = [`candidate ${one.number}, ${WORDS[one.kind]}${figure}`, ...axes.map(({ name, label }) => `${label}: ${one.values[name]}`)].join("\n");
@@ -195,10 +194,10 @@ async function choose(number) {
   const rows = (pairs) => element("table", {}, ...pairs.map(([name, text]) => element("tr", {}, element("th", { textContent: name }), element("td", { textContent: text }))));
   const take = element("button", { id: "take", textContent: "Take these numbers into the design" });
   take.addEventListener("click", () => { change(one.values); say("taken: save the design, or undo", true); });
-  const other = one.differs.length ? [element("p", { className: "warning", textContent: `The open design is not the one of this study: it differs in ${one.differs.slice(0, 4).map(named).join(", ")}${one.differs.length > 4 ? ` and ${one.differs.length - 4} more` : ""}. The chamber shown is that of the open design with these numbers.` })] : [];
+  const other = one.differs.length ? [element("p", { className: "warning", textContent: `The open design is not the one of this study: it differs in ${one.differs.slice(0, 4).join(", ")}${one.differs.length > 4 ? ` and ${one.differs.length - 4} more` : ""}. The chamber shown is that of the open design with these numbers.` })] : [];
   find("chosen-candidate").replaceChildren(element("h3", { textContent: `Candidate ${number}` }),
     element("p", { textContent: `${WORDS[one.kind]}${one.reason ? `: ${one.reason}` : ""}` }), ...other,
-    rows(Object.entries(one.values).map(([name, value]) => [named(name), String(value)])), element("p", {}, take), rows(one.figures));
+    rows(one.numbers), element("p", {}, take), rows(one.figures));
   document.body.dataset.candidate = String(number);
   show(one.values, `candidate ${number} is shown`);
 }

@@ -1,0 +1,70 @@
+"""Words and units for the dotted names of numbers, in files and among facts.
+
+The end of a name is its unit: "chamber.height_mm" is a "height" in "mm".
+"""
+
+from __future__ import annotations
+
+import re
+
+# Units by the ends of names; of a share, per cent.
+UNITS = {
+    "mm": "mm", "mm2": "mm²", "cm3": "cm³", "um": "µm", "deg": "degrees", "khz": "kHz", "hz": "Hz",
+    "mg": "mg", "g": "g", "kg_m3": "kg/m³", "m_s": "m/s", "mm_s": "mm/s", "s": "s", "ms": "ms",
+    "HB": "HB", "MPa": "MPa", "GPa": "GPa", "share": "%",
+}  # fmt: skip
+_ITEM = re.compile(r"\.([012])$")
+_UNIT = re.compile(rf"_({'|'.join(sorted(UNITS, key=len, reverse=True))})$")
+_ALONG = re.compile(r"(?:deg|mm|axis)\.([012])$")  # along x, y and z
+
+
+def unit_of(name: str) -> str:
+    """Return the unit that a name ends with, or "" if it names none.
+
+    >>> unit_of("part.offset_mm.0")
+    'mm'
+    """
+    found = _UNIT.search(_ITEM.sub("", name))
+    return UNITS[found[1]] if found else ""
+
+
+def in_words(name: str) -> str:
+    """Return a name in words without its unit and its place in a list.
+
+    >>> in_words("sonotrode_distance_mm")
+    'sonotrode distance'
+    """
+    text = _UNIT.sub("", _ITEM.sub("", name)).replace("_pv", ", peak to valley")
+    return text.replace("_", " ").replace(".", " ")
+
+
+def title(name: str) -> str:
+    """Return a name in words as a title, with its axis where it is of a place or an angle.
+
+    >>> title("part.offset_mm.0")
+    'Part offset, x'
+    """
+    words = in_words(name)
+    words = words[:1].upper() + words[1:] if words[:3].isalpha() else words  # a symbol stays
+    along = _ALONG.search(name)
+    return f"{words}, {'xyz'[int(along[1])]}" if along else words
+
+
+def title_with_unit(name: str) -> str:
+    """Return a name as a title with its unit.
+
+    >>> title_with_unit("chamber.height_mm")
+    'Chamber height [mm]'
+    """
+    unit = unit_of(name)
+    return f"{title(name)} [{unit}]" if unit else title(name)
+
+
+def inner_first(name: str) -> str:
+    """Return a dotted name in words, its innermost step first.
+
+    >>> inner_first("chamber.holes.0.diameter_mm")
+    'diameter of the 1 of the holes of the chamber'
+    """
+    steps = reversed(name.split("."))
+    return " of the ".join(str(int(s) + 1) if s.isdecimal() else in_words(s) for s in steps)
