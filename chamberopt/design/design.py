@@ -279,11 +279,11 @@ class Design(FileTable, ShownInNotebook):
         """Return the dotted names, such as shot.mass_g, of all continuous numbers that may vary."""
         return tuple(
             name
-            for name, field in self._numeric_fields()
+            for name, field in self.numeric_fields()
             if field.annotation is not int and not name.startswith(NOT_VARIED)
         )
 
-    def _numeric_fields(self) -> Iterator[tuple[str, FieldInfo]]:
+    def numeric_fields(self) -> Iterator[tuple[str, FieldInfo]]:
         """Yield the dotted name and the field of every number, also of those that steps change."""
         yield from toml_errors.numeric_fields(self)
         for k, (step, one) in enumerate(
@@ -355,7 +355,7 @@ class Design(FileTable, ShownInNotebook):
 
         Raises InputError if there is no such number, or it is not set in this design.
         """
-        known = [known for known, _ in self._numeric_fields()]
+        known = [known for known, _ in self.numeric_fields()]
         if name not in known:
             hint = toml_errors.did_you_mean(name, known)
             raise InputError(f"{name}: not a number of a design; {hint}")

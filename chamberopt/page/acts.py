@@ -20,16 +20,17 @@ from chamberopt.common.files import (
     write_text,
 )
 from chamberopt.common.toml_fields import read_toml
+from chamberopt.design.design import Design
 from chamberopt.design.load import is_study
 from chamberopt.documents.comparison import comparison_end
 from chamberopt.documents.report import answer_section
-from chamberopt.page.answers import part_answer, shape_answer
+from chamberopt.page.answers import part_answer, shape_answer, step_texts
 from chamberopt.page.checker import Checker
 from chamberopt.page.edited_file import EditedFile, custom_shape, design_fields
 from chamberopt.page.further_study import write_further_study
 from chamberopt.page.picking import Picker
 from chamberopt.page.started_commands import OneCommand
-from chamberopt.page.structure import restructured
+from chamberopt.page.structure import picked_surfaces, restructured
 from chamberopt.page.study_answers import candidate_answer, candidates_answer, model_answer, version
 from chamberopt.printers import terminal
 from chamberopt.printers.html import section
@@ -115,11 +116,13 @@ class Acts:
         return part_answer(self._file(asked).design)
 
     def shape(self, asked: Any) -> bytes:
-        return shape_answer(self._file(asked).with_changes(asked["changes"]))
+        return shape_answer(
+            self._file(asked).with_changes(asked["changes"]), int(asked.get("step", 0))
+        )
 
-    def fields(self, asked: Any) -> list[dict[str, object]]:
-        """Return the numbers and choices of the design with some values changed."""
-        return design_fields(self._file(asked).changed(asked["changes"]))
+    def fields(self, asked: Any) -> dict[str, object]:
+        """Return numbers, choices, steps and picked surfaces of the design with its changes."""
+        return _told_of(self._file(asked).changed(asked["changes"]))
 
     def structure(self, asked: Any) -> dict[str, object]:
         """Return changes after which the design has another shape or kind of holder."""
@@ -129,7 +132,8 @@ class Acts:
     def cavity(self, asked: Any) -> bytes:
         file = self._file(asked)
         file.with_changes(asked["changes"])  # so that a wrong value is told at once
-        number, answer = self._checker.cavity(file.changed_text(asked["changes"]))
+        text, step = file.changed_text(asked["changes"]), int(asked.get("step", 0))
+        number, answer = self._checker.cavity(text, step)
         return number.to_bytes(4, "little") + answer
 
     def reach(self, asked: Any) -> bytes:
@@ -170,15 +174,12 @@ class Acts:
 
     def _as_read(self, file: EditedFile) -> dict[str, object]:
         design = file.design
-        surfaces = {"part.target": "target"}
-        surfaces |= {f"zones.{k}.target": f"zone {z.name}" for k, z in enumerate(design.zones)}
         return {
             "read": file.digest,
             "file": file.path.name,
             "folder": str(file.folder),
-            "fields": design_fields(file),
-            "surfaces": surfaces,
-            "target": design.part.target.model_dump(mode="json", exclude_defaults=True),
+            **_told_of(file),
+            "chosen": {name: _chosen(design, name) for name in picked_surfaces(design)},
             "is_drawn": design.chamber.setup() is not None,
             "files": _files_beside(file.path),
         }
@@ -316,6 +317,24 @@ class Acts:
         """Return the first new or empty folder of results/NAME, results/NAME-2 and so on."""
         self.inside("results")  # the folder may be a link to elsewhere
         return free_folder(self._path.parent, Path("results", name))
+
+
+def _told_of(file: EditedFile) -> dict[str, object]:
+    design = file.design
+    return {
+        "fields": design_fields(file),
+        "surfaces": picked_surfaces(design),
+        "steps": step_texts(design),
+    }
+
+
+def _chosen(design: Design, table: str) -> dict[str, object]:
+    """Return what the file says of a table that clicks on faces change."""
+    first, *others = table.split(".")
+    found: Any = getattr(design, first)
+    for step in others:
+        found = found[int(step)] if isinstance(found, tuple) else getattr(found, step, None)
+    return {} if found is None else found.model_dump(mode="json", exclude_defaults=True)
 
 
 def path_inside(folder: Path, name: str) -> Path:

@@ -13,11 +13,13 @@ from chamberopt.chamber.bores_and_deflectors import on_deflectors
 from chamberopt.chamber.build import Chamber, build_chamber
 from chamberopt.chamber.checks.check import first_warnings, notes, shot_reach
 from chamberopt.chamber.checks.facts import describe, first_facts, with_clearance
-from chamberopt.chamber.part import named_surface, preview_part
+from chamberopt.chamber.part import chosen_on_part, chosen_triangles, named_surface, preview_part
 from chamberopt.chamber.propose.proposed_target import named_surfaces
 from chamberopt.chamber.reach import reached_part_share
 from chamberopt.chamber.scene import chamber_mesh
+from chamberopt.common.number_text import percent, plain
 from chamberopt.design.design import Design
+from chamberopt.design.part import Selection
 from chamberopt.design.shape_surface import TAG_PART, TAG_WALL, is_sonotrode
 from chamberopt.documents.facts import facts_in_words
 from chamberopt.geometry.triangles import border_edges, sharp_edges
@@ -25,8 +27,8 @@ from chamberopt.page.page_words import Words, on_page
 from chamberopt.pictures.charts.colours import EDGES, KINDS
 
 # Where a triangle of the part is: numbers of these kinds.
-STATES = "rest", "target", "outside", "unreached", "zone"
-REST, TARGET, BEYOND, MISSED, ZONE = range(5)
+STATES = "rest", "target", "outside", "unreached", "zone", "holder", "mask"
+REST, TARGET, BEYOND, MISSED, ZONE, HELD, MASKED = range(7)
 # Types of arrays that Three.js takes; single precision is about 1e-5 mm.
 ARRAY_TYPES = {"f": "<f4", "i": "<u4", "u": "<u4", "b": "u1"}
 
@@ -48,11 +50,40 @@ def part_answer(design: Design) -> bytes:
     return packed(head, points=1e3 * mesh.vertices, triangles=mesh.triangles, **surface)
 
 
-def shape_answer(design: Design) -> bytes:
-    """Return the chamber's shape without the part [mm], the part's pose in it, and its target."""
+def step_texts(design: Design) -> list[str]:
+    """Return name and time of each step of a design; an empty list for a design without steps."""
+    if not design.steps:
+        return []
+    whole = sum(one.time_share for one in design.steps)
+    times = (plain(one.process.treatment_time, 3) for one in design.in_steps.values())
+    return [
+        f"{step.name}: {time} s, {percent(step.time_share / whole)} of the time"
+        for step, time in zip(design.steps, times, strict=True)
+    ]
+
+
+def _in_step(design: Design, step: int) -> Design:
+    """Return the design of one of its steps, or the design itself if it has no such step."""
+    designs = [*design.in_steps.values()]
+    return designs[step] if 0 <= step < len(designs) else designs[0]
+
+
+def shape_answer(design: Design, step: int = 0) -> bytes:
+    """Return the chamber's shape without the part [mm], the part's pose in it, and its target.
+
+    Args:
+        step: number of the step that is shown, for a design with steps.
+    """
+    design = _in_step(design, step)
     part = preview_part(design)
     shape = design.chamber.surface(part.vertices, part.mesh.triangles)
-    state = _state(part.target, part.zones)
+    chosen = {
+        name: chosen_triangles(part.mesh, at, f"{name}.at") for name, at in _fixture_faces(design)
+    }
+    state = _state(part.target, part.zones, chosen)
+    zone = np.zeros(len(state), np.uint8)
+    for k, one in enumerate(part.zones.values(), 1):
+        zone[one] = k
     low, high = shape.vertices.min(axis=0), shape.vertices.max(axis=0)
     own = part.vertices
     head = {
@@ -62,32 +93,40 @@ def shape_answer(design: Design) -> bytes:
         "part_mm": [(1e3 * own.min(axis=0)).tolist(), (1e3 * own.max(axis=0)).tolist()],
         "target_triangles": int(part.target.sum()),
         "balls": design.shot.count,
+        "zones": [*part.zones],  # zone k + 1 has name k
     }
-    return packed(head, **_surface(shape.vertices, shape.triangles, shape.tags), state=state)
+    surface = _surface(shape.vertices, shape.triangles, shape.tags)
+    return packed(head, **surface, state=state, zone=zone)
 
 
-def check_answers(design: Design) -> Iterator[bytes]:
+def check_answers(design: Design, step: int = 0) -> Iterator[bytes]:
     """Yield what the command `check` tells of a design, as two answers to the page.
 
     The first has the cavity. The second takes longer and has what the shot can reach.
+
+    Args:
+        step: number of the step whose chamber is shown, for a design with steps. Facts are of all.
     """
-    chamber = build_chamber(design)
-    mesh = chamber_mesh(chamber)
+    whole = build_chamber(design)
+    one = _in_step(design, step)
+    chamber = whole.steps[step] if 0 <= step < len(whole.steps) else (*whole.steps, whole)[0]
+    mesh = chamber_mesh(whole)
     head: dict[str, Any] = {
-        "facts": _facts(design, with_clearance(first_facts(design, chamber), mesh)),
-        "notes": [on_page(text) for text in notes(design, chamber)],
-        "warnings": [on_page(text) for text in first_warnings(design, chamber, mesh)],
+        "facts": _facts(design, with_clearance(first_facts(design, whole), mesh)),
+        "notes": [on_page(text) for text in notes(design, whole)],
+        "warnings": [on_page(text) for text in first_warnings(design, whole, mesh)],
     }
     part = chamber.part
-    state = _state(part.target, part.zones)
+    chosen = {name: chosen_on_part(one, at, f"{name}.at") for name, at in _fixture_faces(one)}
+    state = _state(part.target, part.zones, chosen)
     state[part.target & (chamber.exposed_area <= 0.0)] = BEYOND
     remeshed = part.file is not None and part.file.original is not None
     own = {"part_points": 1e3 * part.vertices, "part_triangles": part.triangles} if remeshed else {}
     surface = _surface(chamber.vertices, chamber.triangles, chamber.tags)
-    yield packed(head, **{**surface, **_bodies(design, chamber)}, state=state, **own)
+    yield packed(head, **{**surface, **_bodies(one, chamber)}, state=state, **own)
 
-    reach = shot_reach(design, chamber)
-    found = describe(design, chamber)
+    reach = shot_reach(one, chamber)
+    found = describe(design, whole)
     share = reached_part_share(reach, chamber.source, len(part.triangles))
     state[part.target & (chamber.exposed_area > 0.0) & (share <= 0.5)] = MISSED
     head = {name: [on_page(text) for text in found[name]] for name in ("notes", "warnings")}
@@ -100,11 +139,26 @@ def _facts(design: Design, found: Mapping[str, Any]) -> list[tuple[str, list[Wor
     return [(subject, [on_page(one.text) for one in facts]) for subject, facts in each]
 
 
-def _state(target: np.ndarray, zones: dict[str, np.ndarray]) -> np.ndarray:
-    """Return for each triangle of the part where it is: in a ZONE, TARGET or REST, (m,)."""
+def _fixture_faces(design: Design) -> Iterator[tuple[str, Selection]]:
+    """Yield the name of holder and mask, and the faces that the design chooses for each."""
+    for name, fixture in (("holder", design.holder), ("mask", design.mask)):
+        if fixture is not None and fixture.at is not None:
+            yield name, fixture.at
+
+
+def _state(
+    target: np.ndarray, zones: dict[str, np.ndarray], fixtures: dict[str, np.ndarray]
+) -> np.ndarray:
+    """Return for each triangle of the part where it is, one of STATES, (m,).
+
+    Args:
+        fixtures: triangles that holder and mask are to touch, (m,) bool each.
+    """
     state = np.where(target, TARGET, REST).astype(np.uint8)
     for zone in zones.values():
         state[zone] = ZONE
+    for name, faces in fixtures.items():
+        state[faces] = HELD if name == "holder" else MASKED
     return state
 
 

@@ -38,8 +38,11 @@ class Checker:
         self._now, self._spare = self._start(), self._start()
         self._asked: dict[Child, int] = {}  # number of the question that a child works at
 
-    def cavity(self, text: str) -> tuple[int, bytes]:
+    def cavity(self, text: str, step: int = 0) -> tuple[int, bytes]:
         """Return the number of this question, and the cavity of the design with this text.
+
+        Args:
+            step: number of the step whose chamber is shown, for a design with steps.
 
         Raises:
             InputError, SceneError: the design cannot be built.
@@ -53,7 +56,7 @@ class Checker:
             while self._now in self._asked or self._now.pid is None:
                 self._replace()
             self._asked[self._now] = mine
-            self._now.ask(_check, self._path, text)
+            self._now.ask(_check, self._path, text, step)
             return mine, self._answer(self._now, mine)
 
     def reach(self, number: int) -> bytes:
@@ -111,13 +114,13 @@ def _read_ahead(path: Path, text: str) -> Iterator[bytes]:
     yield from ()
 
 
-def _check(path: Path, text: str) -> Iterator[bytes]:
+def _check(path: Path, text: str, step: int) -> Iterator[bytes]:
     """Yield the cavity of the design with this text, then the reach of its shot.
 
     Raises InputError or SceneError if the design cannot be built.
     """
     try:
-        yield from check_answers(validate(Design, tomllib.loads(text), path, text))
+        yield from check_answers(validate(Design, tomllib.loads(text), path, text), step)
     except (InputError, SceneError):
         raise
     except Exception as error:  # a fault of the program, whose message must not blame the design

@@ -18,23 +18,33 @@ from chamberopt.common.errors import InputError
 from chamberopt.common.files import claim_file, open_plain, write_bytes
 from chamberopt.common.key_words import inner_first, title, title_with_unit, unit_of
 from chamberopt.common.limits import MAX_TEXT_BYTES
-from chamberopt.common.toml_errors import numeric_fields, text_choices
+from chamberopt.common.toml_errors import text_choices
 from chamberopt.common.toml_fields import read_toml
 from chamberopt.design.design import Design, validate
 from chamberopt.design.fixture import HOLDER_KEYS, Holder
 from chamberopt.design.materials import BY_NAME
 from chamberopt.design.shapes.base import is_custom
 from chamberopt.page.page_words import choices
-from chamberopt.page.structure import KIND, NO_HOLDER, SHAPE, may_change, structure_choices
+from chamberopt.page.structure import (
+    KIND,
+    MASK_KIND,
+    NO_HOLDER,
+    NO_MASK,
+    OF_MASK,
+    SHAPE,
+    mask_kind,
+    may_change,
+    structure_choices,
+)
 
 # New values of keys by their dotted names, in the file's units; None takes a key out of the file.
 Changes = Mapping[str, Any]
 LONGEST_SAVE_S = 5.0  # wait for another page's save, which takes a tenth of a second
 LATE_WRITE_S = 0.05  # an editor takes far less from opening a file to writing it
-# Keys that the page changes beside its fields: zones, and the choices of a target or zone.
+# Keys that the page changes beside its fields: zones, and the faces of target, zone or fixture.
 PICKED = re.compile(
-    r"(part\.target|zones\.\d+\.target)\.(surface|faces|direction|angle_deg|box_mm|radius_mm)"
-    r"|zones\.\d+"
+    r"(part\.target|zones\.\d+\.target|holder\.at|mask\.at)"
+    r"\.(surface|faces|direction|angle_deg|box_mm|radius_mm)|zones\.\d+"
 )
 
 
@@ -87,6 +97,7 @@ class EditedFile:
         """
         made = copy(self)
         made.text, made.design = self.changed_text(changes), self.with_changes(changes)
+        made.structure = self.structure | structure_choices(made.design)
         return made
 
     def changed_text(self, changes: Changes) -> str:
@@ -102,14 +113,15 @@ class EditedFile:
         from tomlkit.exceptions import TOMLKitError
 
         document, known = tomlkit.parse(self.text), field_names(self.design)
-        for name, value in changes.items():
+        # What is taken out goes first: it may be chosen anew after that.
+        for name, value in sorted(changes.items(), key=lambda one: one[1] not in (None, "")):
             is_own = name in known or PICKED.fullmatch(name)
             if not is_own and not may_change(self.design, name, value):
                 raise InputError(f"{name}: not changed on the page; change it in the file")
             try:
-                if (name, value) == (KIND, NO_HOLDER):
-                    self._change(document, "holder", None)
-                else:
+                if (name, value) in ((KIND, NO_HOLDER), (MASK_KIND, NO_MASK)):
+                    self._change(document, name.split(".")[0], None)
+                elif name != MASK_KIND:  # the keys that make it this kind come with it
                     self._change(document, name, value)
                     if name in (SHAPE, KIND):  # the reason behind it was that of another one
                         document[name.split(".")[0]][name.split(".")[1]].trivia.comment = ""
@@ -253,10 +265,10 @@ def _table(value: dict[str, object]) -> object:
 # Fields of the page: each number and choice of a design with unit, bounds and description.
 
 # Tables without fields: their numbers are measured, or chosen by clicks on the part, or mesh the
-# part, which would become another part, or are of a step, as the page shows the first one.
+# part, which would become another part.
 NOT_SHOWN = (
     "calibration.", "part.target.", "zones.", "tolerances.", "ranges.", "part.tessellation.",
-    "holder.at.", "mask.at.", "steps.",
+    "holder.at.", "mask.at.",
 )  # fmt: skip
 
 
@@ -287,15 +299,17 @@ def design_fields(file: EditedFile) -> list[dict[str, object]]:
         }
         row |= {"reason": reasons.get(name, "")}
         rows.append(row)
-    return [row | _words(row["name"]) for row in [*_structure_rows(file), *rows]]
+    return [row | _words(design, row["name"]) for row in [*_structure_rows(file), *rows]]
 
 
-def _words(name: str) -> dict[str, str]:
+def _words(design: Design, name: str) -> dict[str, str]:
     """Return the table of a number or choice and its name in it, in words, and both as one."""
     steps = name.split(".")
-    depth = 2 if name.startswith("process.accuracy.") else 1
+    depth = 2 if name.startswith(("process.accuracy.", "steps.")) else 1
     table, key = ".".join(steps[:depth]), ".".join(steps[depth:])
     group = inner_first(table)
+    if steps[0] == "steps":
+        group = f"step {(design.steps or ())[int(steps[1])].name}"
     return {
         "table": table,
         "group": group[0].upper() + group[1:],
@@ -305,10 +319,12 @@ def _words(name: str) -> dict[str, str]:
 
 
 def _structure_rows(file: EditedFile) -> Iterator[dict[str, Any]]:
-    """Yield what the page shows of the chamber's shape and the kind of holder."""
+    """Yield what the page shows of the chamber's shape and the kinds of holder and mask."""
     holder, chamber = file.design.holder, file.design.chamber
     values = {SHAPE: chamber.shape, KIND: NO_HOLDER if holder is None else holder.kind}
+    values |= {MASK_KIND: mask_kind(file.design)}
     texts = {SHAPE: "the sizes that it needs are proposed", KIND: "what holds the part"}
+    texts |= {MASK_KIND: "what keeps the shot from the faces that it covers"}
     reasons = comments(file.text)
     for name, allowed in file.structure.items():
         row = {"name": name, "value": values[name], "choices": choices(allowed)}
@@ -348,8 +364,10 @@ def _numbers(design: Design) -> Iterator[tuple[str, FieldInfo]]:
     if design.holder is not None:  # keys of other kinds
         own = ("kind", "axis", *HOLDER_KEYS[design.holder.kind])
         absent += [f"holder.{key}" for key in Holder.model_fields if key not in own]
+    of_mask = {"shell": ("axis",), "plugs": OF_MASK, "block": ("thickness_mm",), NO_MASK: ()}
+    absent += [f"mask.{key}" for key in of_mask[mask_kind(design)]]
     hidden = (*NOT_SHOWN, *absent)
-    for name, field in numeric_fields(design):
+    for name, field in design.numeric_fields():
         in_list = name.rpartition(".")[2].isdecimal()
         if not name.startswith(hidden) and (not in_list or _value(design, name) is not None):
             yield name, field
@@ -369,7 +387,10 @@ def _value(design: Design, name: str) -> object:
     """Return the number of the design with this dotted name, or None if it is not set."""
     value: Any = design
     for step in name.split("."):
-        value = value[int(step)] if isinstance(value, tuple) else getattr(value, step, None)
+        if isinstance(value, tuple | list):
+            value = value[int(step)]
+        else:
+            value = value.get(step) if isinstance(value, dict) else getattr(value, step, None)
     return value
 
 

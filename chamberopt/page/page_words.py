@@ -21,6 +21,9 @@ CHOICES = {
     "plate": "plate on a face or round a root",
     "arbor": "arbor: a shaft through a hole",
     "bore": "the part itself, out through the wall",
+    "shell": "shell on the faces",
+    "plugs": "plugs that fill holes",
+    "block": "block on the faces, up to the wall",
     "random_phase": "random phase",
 }
 OPTIONS = {
@@ -41,7 +44,8 @@ _TABLES = (
     "part|chamber|shot|sonotrode|sonotrodes|materials|effects|process|holder|mask|zones|"
     "tolerances|ranges"
 )
-_KEY = re.compile(rf"(?<![\w./])(?:{_TABLES})(?:\.\w+)+|--(?:{'|'.join(OPTIONS)})(?![\w-])")
+_DOTTED = rf"(?:{_TABLES})(?:\.\w+)+"
+_KEY = re.compile(rf"\[{_DOTTED}\]|(?<![\w./]){_DOTTED}|--(?:{'|'.join(OPTIONS)})(?![\w-])")
 _FILES = (".toml", ".json", ".html", ".pdf", ".png", *SUFFIXES)  # "part.stl" is no key
 
 
@@ -57,7 +61,8 @@ def on_page(text: str) -> Words:
         found = match[0]
         if found.lower().endswith(_FILES):
             continue
-        words = OPTIONS.get(found[2:]) or inner_first(found.removeprefix("effects."))
+        key = found.strip("[]").removeprefix("effects.")
+        words = OPTIONS.get(found[2:]) or inner_first(key)
         made += [text[at : match.start()]] * (match.start() > at)
         made.append((words, found))
         at = match.end()

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from chamberopt.chamber.part import preview_part
+from chamberopt.chamber.part import PartPreview, chosen_triangles, preview_part
 from chamberopt.chamber.propose.pose import square_to_walls, turns_down
 from chamberopt.chamber.propose.proposed_target import SHAPES, propose_sizes
 from chamberopt.common.errors import InputError
@@ -15,9 +15,10 @@ from chamberopt.design.part import MAX_FACES, FaceAt, Selection
 from chamberopt.geometry.faces import Faces
 from chamberopt.geometry.meshes.part_mesh import PartMesh
 from chamberopt.geometry.triangles import rotation_matrix
+from chamberopt.page.structure import MASK_KIND, OF_MASK, picked_surfaces
 
 DIGITS = 4  # decimals of a place [mm]: a tenth of a micrometre
-TARGET_TABLE = "part.target"
+TARGET_TABLE, HOLDER_TABLE, MASK_TABLE = "part.target", "holder.at", "mask.at"
 OTHER_WAYS = ("surface", "direction", "angle_deg", "box_mm", "radius_mm")
 Row = dict[str, Any]  # an item of `faces` in a target's table
 
@@ -52,7 +53,7 @@ class Picker:
         """
         preview = preview_part(design)
         mesh, faces = preview.mesh, self._faces(preview.mesh, crease_deg)
-        selection, chosen = _selection(design, table, preview.target, preview.zones)
+        selection, chosen = _selection(design, table, preview)
         default = Selection()
         ways = [key for key in OTHER_WAYS if getattr(selection, key) != getattr(default, key)]
         if not ways and not selection.faces and add:  # the first face replaces the whole surface
@@ -84,7 +85,11 @@ class Picker:
             rows.append(_row(faces, int(lacking), crease_deg))
         if len(rows) > MAX_FACES:
             raise InputError(f"{table}: {len(rows)} faces, more than {MAX_FACES}; take all alike")
-        return {f"{table}.faces": rows, **{f"{table}.{key}": None for key in ways}}
+        others: dict[str, object] = {f"{table}.{key}": None for key in ways}
+        if table == MASK_TABLE and design.mask is None:  # the file may have had another one
+            others = {f"{table}.{key}": None for key in OTHER_WAYS}
+            others |= {MASK_KIND: "shell", **{f"mask.{key}": None for key in OF_MASK}}
+        return {f"{table}.faces": rows, **others}
 
     def face(self, design: Design, triangle: int, crease_deg: float, alike: bool) -> Row:
         """Return the face to which a triangle belongs, as an item of a design's list `faces`."""
@@ -139,22 +144,23 @@ class Picker:
         return not (self._mask(row, mesh) & ~mask).any()
 
 
-def _selection(
-    design: Design, table: str, target: np.ndarray, zones: dict[str, np.ndarray]
-) -> tuple[Selection, np.ndarray]:
+def _selection(design: Design, table: str, preview: PartPreview) -> tuple[Selection, np.ndarray]:
     """Return the table of a target, and True for each triangle that it chooses, shape (m,).
 
     Args:
-        table: dotted name of the target, e.g. part.target.
-        target: triangles of the part's target, shape (m,) bool.
-        zones: triangles of each zone by its name.
+        table: dotted name of the target, zone or fixture, e.g. part.target.
     """
+    if table not in picked_surfaces(design):
+        raise InputError(f"{table}: not picked; allowed: {', '.join(picked_surfaces(design))}")
     if table == TARGET_TABLE:
-        return design.part.target, target
-    places = {f"zones.{k}.target": zone for k, zone in enumerate(design.zones)}
-    if table not in places:
-        raise InputError(f"{table}: no target; there are {', '.join([TARGET_TABLE, *places])}")
-    return places[table].target, zones[places[table].name]
+        return design.part.target, preview.target
+    if table in (HOLDER_TABLE, MASK_TABLE):
+        fixture = design.holder if table == HOLDER_TABLE else design.mask
+        if fixture is None or fixture.at is None:
+            return Selection(), np.zeros_like(preview.target)
+        return fixture.at, chosen_triangles(preview.mesh, fixture.at, table)
+    zone = design.zones[int(table.split(".")[1])]
+    return zone.target, preview.zones[zone.name]
 
 
 def _face_of(faces: Faces, triangle: int) -> int:

@@ -1,4 +1,4 @@
-"""Change the chamber's shape, or the kind of holder, of the design that a page edits.
+"""Change the chamber's shape, or the kind of holder or mask, of the design that a page edits.
 
 Each shape and each kind has keys of its own, which a change takes out or puts in.
 """
@@ -10,39 +10,78 @@ from typing import Any
 
 import numpy as np
 
-from chamberopt.chamber.part import preview_part
+from chamberopt.chamber.part import chosen_triangles, preview_part
 from chamberopt.chamber.propose.proposed_target import SHAPES, propose_sizes
 from chamberopt.common.errors import InputError
 from chamberopt.design import shapes
 from chamberopt.design.design import Design
 from chamberopt.design.fixture import HOLDER_KEYS, Holder
 from chamberopt.design.shapes import ParametricChamber
+from chamberopt.geometry.triangles import area_vectors
 
 SHAPE, KIND, NO_HOLDER = "chamber.shape", "holder.kind", ""
+# Kinds of masks by the keys of the file that make them; the file has no key for the kind.
+MASK_KIND, NO_MASK = "mask.kind", ""
+MASK_KINDS: dict[str, dict[str, Any]] = {
+    "shell": {},
+    "plugs": {"plugs": True},
+    "block": {},  # with an axis, which the way of its faces gives
+}
+OF_MASK = ("axis", "plugs", "thickness_mm")  # keys that a mask may have beside its faces
 # Keys of a chamber that stay, with their values, when its shape changes; and those of its shapes.
 STAY = {*ParametricChamber.model_fields} - {"shape"}
 OF_SHAPES = {key for name in SHAPES for key in shapes.SHAPES[name].model_fields} - STAY - {"shape"}
 
 
 def structure_choices(design: Design) -> dict[str, tuple[str, ...]]:
-    """Return the shapes and the kinds of holder that a page may give a design, by dotted name.
+    """Return the shapes and the kinds of holder and mask that a page may give a design.
 
-    A drawn set-up has its own, and each of several steps may. An own shape stays. An arbor needs
-    the walls of a hole, and is there only if the design has chosen faces for its holder.
+    They are by dotted name. A drawn set-up has its own, and each of several steps may. An own shape
+    stays. An arbor needs the walls of a hole, and is there only if the design has chosen faces for
+    its holder. A mask begins with its first face.
     """
     if design.chamber.setup() is not None or design.steps is not None:
         return {}
     has_faces = design.holder is not None and design.holder.at is not None
     kinds = (kind for kind in HOLDER_KEYS if kind != "arbor" or has_faces)
     of_chamber = {SHAPE: SHAPES} if design.chamber.shape in SHAPES else {}
-    return {**of_chamber, KIND: (NO_HOLDER, *kinds)}
+    of_mask = {MASK_KIND: (NO_MASK, *MASK_KINDS)} if design.mask is not None else {}
+    return {**of_chamber, KIND: (NO_HOLDER, *kinds), **of_mask}
+
+
+def mask_kind(design: Design) -> str:
+    """Return which of MASK_KINDS a design's mask is, or NO_MASK."""
+    if design.mask is None:
+        return NO_MASK
+    return "plugs" if design.mask.plugs else "shell" if design.mask.axis is None else "block"
+
+
+def picked_surfaces(design: Design) -> dict[str, str]:
+    """Return in words what clicks on faces choose in a design, by the dotted name of its table.
+
+    A drawn set-up has its own holder and mask, each of several steps may, and a part that turns has
+    no mask.
+    """
+    found = {"part.target": "the target"}
+    found |= {f"zones.{k}.target": f"zone {zone.name}" for k, zone in enumerate(design.zones)}
+    if design.chamber.setup() is not None or design.steps is not None:
+        return found
+    if design.holder is not None and "at" in HOLDER_KEYS[design.holder.kind]:
+        found["holder.at"] = "what the holder clamps"
+    if design.effects.part_turn is None:
+        found["mask.at"] = "what a mask covers"
+    return found
 
 
 def may_change(design: Design, name: str, value: object) -> bool:
-    """Return True if a page may give a key of the shape or holder of a design this value."""
+    """Return True if a page may give a key of shape, holder or mask of a design this value."""
     choices, (table, _, key) = structure_choices(design), name.partition(".")
     if name in (SHAPE, KIND):
         return value in choices.get(name, ())
+    if table == "mask" and KIND in choices:
+        if name == MASK_KIND:
+            return value in (NO_MASK, *MASK_KINDS)
+        return key.partition(".")[0] in OF_MASK
     if table == "holder" and KIND in choices:
         first = key.partition(".")[0]
         return first in Holder.model_fields and (first != "at" or value is None)
@@ -65,18 +104,20 @@ def restructured(
     Args:
         design: the design as its file has it.
         changes: new values by dotted name until now.
-        name: SHAPE or KIND.
+        name: SHAPE, KIND or MASK_KIND.
         wanted: the shape, or the kind.
         changed: returns the design with some values changed.
 
     Raises:
         InputError: the page does not offer this, or the changes until now make no valid design.
     """
-    allowed = structure_choices(design).get(name, ())
+    allowed = structure_choices(changed(changes) if name == MASK_KIND else design).get(name, ())
     if wanted not in allowed:
         raise InputError(f"{name}: given {wanted}; allowed: {', '.join(allowed) or 'no change'}")
     if name == KIND:
         return _with_kind(design.holder, changes, wanted)
+    if name == MASK_KIND:
+        return _with_mask(changed(changes), changes, wanted)
     kept = {
         one: value
         for one, value in changes.items()
@@ -96,6 +137,28 @@ def _with_kind(holder: Holder | None, changes: Mapping[str, Any], kind: str) -> 
     given = set() if holder is None or kind == NO_HOLDER else holder.model_fields_set
     stay = {"kind", "axis", *({"at"} & {*HOLDER_KEYS.get(kind, ())})}
     return {**kept, KIND: kind, **{f"holder.{key}": None for key in given - stay}}
+
+
+def _with_mask(design: Design, changes: Mapping[str, Any], kind: str) -> dict[str, Any]:
+    faces = {name: one for name, one in changes.items() if name.startswith("mask.at.")}
+    kept = {name: one for name, one in changes.items() if not name.startswith("mask.")}
+    if kind == NO_MASK:
+        return {**kept, MASK_KIND: NO_MASK}
+    keys = {f"mask.{key}": MASK_KINDS[kind].get(key) for key in OF_MASK}
+    if kind == "block":
+        keys["mask.axis"] = _way_out(design)
+    return {**kept, **faces, MASK_KIND: kind, **keys}
+
+
+def _way_out(design: Design) -> list[float]:
+    """Return the way along x, y or z of the chamber that the faces of a design's mask look most."""
+    part = preview_part(design)
+    assert design.mask is not None
+    faces = chosen_triangles(part.mesh, design.mask.at, "mask.at")
+    normal = area_vectors(part.vertices, part.mesh.triangles[faces]).sum(axis=0)
+    way = np.zeros(3)
+    way[np.abs(normal).argmax()] = np.sign(normal[np.abs(normal).argmax()]) or 1.0
+    return [float(one) for one in way]
 
 
 def _plan(design: Design, shape: str) -> dict[str, float | str]:

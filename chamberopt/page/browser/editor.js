@@ -4,8 +4,8 @@ import { fillSurfaces, fillTarget, showChosen } from "./target.js";
 import { fillRun, follow } from "./run.js";
 import { closeResults } from "./results.js";
 import "./study/study.js";
-import { ask, attempt, element, isUnsaved, listen, onPage, read, say, state, undo, unpack, value, wordsOf } from "./state.js";
-import { showCavity, showPart, showShape, showState } from "./scene.js";
+import { ask, attempt, element, isUnsaved, listen, onPage, read, say, showStep, state, takeTold, undo, unpack, wordsOf } from "./state.js";
+import { lookAnew, setHandles, showCavity, showPart, showShape, showState } from "./scene.js";
 
 const find = (id) => document.getElementById(id);
 const AGAIN = 3000; // ms after which a check that another page has superseded is asked again
@@ -17,19 +17,35 @@ for (const tab of document.querySelectorAll("nav button")) tab.addEventListener(
   if (tab.dataset.tab !== "results") closeResults();
 });
 
-// Another shape or holder has other numbers, also where a change is undone.
-const structure = () => JSON.stringify(["chamber.shape", "holder.kind"].map(value));
+// Another shape, holder or mask has other numbers, also where a change is undone; steps have their times.
+const KINDS = /^(chamber\.shape|holder\.kind|mask\.kind|zones\.\d+|steps\..*|process\.treatment_time_s)$/;
+const structure = () => JSON.stringify(Object.entries(state.changes).filter(([name]) => KINDS.test(name)));
 let shownOf = "";
 async function followFields() {
   const now = structure();
   if (now === shownOf) return;
   shownOf = now;
   try {
-    const fields = await ask("/fields", { changes: state.changes });
+    const told = await ask("/fields", { changes: state.changes });
     if (now !== shownOf) return;
-    state.fields = fields;
+    takeTold(told);
     makeFields();
+    fillSurfaces();
+    fillSteps();
   } catch (error) { if (now === shownOf) shownOf = ""; } // asked again with the next change; the shape says what is wrong
+}
+
+// The steps of the design; the view shows the chamber of one.
+function fillSteps() {
+  find("steps").hidden = !state.steps.length;
+  find("of-first").hidden = !state.step;
+  find("down").disabled = state.step > 0;
+  for (const one of document.querySelectorAll("input[name=handles]")) one.disabled = state.step > 0;
+  find("steps").replaceChildren(find("steps").firstElementChild, ...state.steps.map((text, k) => {
+    const button = element("button", { textContent: text, ariaPressed: String(k === state.step) });
+    button.addEventListener("click", () => { if (k !== state.step) showStep(k); });
+    return button;
+  }));
 }
 
 // The shape follows at once: the newest changes are asked for as soon as the last answer is here.
@@ -40,7 +56,7 @@ async function followShape() {
   while (asked !== state.shown) {
     const changes = asked = state.shown;
     try {
-      const answer = unpack(await ask("/shape", { changes }));
+      const answer = unpack(await ask("/shape", { changes, step: state.step }));
       refuse("");
       if (answer.state.length !== fillTarget.part.triangles.length / 3) await showPartOf(); // its file has changed
       showShape(answer);
@@ -54,21 +70,24 @@ async function followShape() {
 function followCavity() {
   clearTimeout(timer);
   find("said").classList.add("waiting");
+  busy("cutting the part out of the chamber …");
   document.body.dataset.checked = "";
   const mine = ++round;
   timer = setTimeout(async () => {
     try {
-      const buffer = await ask("/cavity", { changes: state.shown });
+      const buffer = await ask("/cavity", { changes: state.shown, step: state.step });
       if (mine !== round) return;
       const cavity = unpack(buffer, 4);
       showCavity(cavity);
       sayOf(cavity);
       document.body.dataset.checked = "cavity";
+      busy("finding what the balls reach …");
       const reach = unpack(await ask("/reach", { number: new DataView(buffer).getUint32(0, true) }));
       if (mine !== round) return;
       showState(reach.state);
       sayOf(reach);
       find("said").classList.remove("waiting");
+      busy("");
       document.body.dataset.checked = "reach";
     } catch (error) {
       if (mine !== round) return;
@@ -78,7 +97,10 @@ function followCavity() {
   }, QUIET);
 }
 
+function busy(text) { find("busy").textContent = text; }
+
 function refuse(text) {
+  if (text) busy("");
   find("error").replaceChildren(...onPage(text));
   find("error").hidden = !text;
 }
@@ -100,7 +122,13 @@ listen((what) => {
     makeFields();
     fillTarget();
     fillRun();
+    fillSteps();
     asked = null;
+  } else if (what === "step") {
+    fillSteps();
+    setHandles("");
+    asked = null;
+    lookAnew();
   } else {
     showValues();
     followFields();

@@ -5,6 +5,7 @@ const CLEAR = 0.16, FACE = 0.6; // opacity of walls and sonotrode
 const BODIES = ["deflectors", "holder", "mask"]; // that not every chamber has
 export const view = new View3D(document.getElementById("view"));
 new Tools([view], document.getElementById("tools"));
+let bodies = null, through = false;
 let part = null, handles = null, grip = null, placed = null, coloured = [];
 
 export function showPart(buffer) {
@@ -63,17 +64,31 @@ function walls(answer) {
   surface("walls", "wall", CLEAR, answer.walls);
   surface("deflectors", "wall", CLEAR, answer.deflectors);
   surface("sonotrode", "sonotrode", view.camera.position.z < 0 ? 0.15 : FACE, answer.sonotrode); // from below the part is seen through it
-  for (const name of ["holder", "mask"]) surface(name, name, 1, answer[`${name}_triangles`], answer[`${name}_points`]);
+  bodies = answer;
+  for (const name of ["holder", "mask"]) surface(name, name, through ? 0.35 : 1, answer[`${name}_triangles`], answer[`${name}_points`]);
   view.lines("edges", answer.edges.slice(), part.edges);
 }
+
+// Holder and mask are seen through while their faces are chosen.
+export function seeThrough(now) {
+  if (through === now) return;
+  through = now;
+  if (bodies) walls(bodies);
+}
+
+// The next shape, of another step, is looked at as a whole.
+export function lookAnew() { placed = null; }
 
 const mid = (a, b) => a.map((x, i) => 0.5 * (x + b[i]));
 const middle = () => mid(...placed.part_mm);
 const short = (x) => String(Number(x.toPrecision(4)));
 
 function lookAtAll() {
-  const [low, high] = placed.shape_mm, size = Math.hypot(...high.map((x, i) => x - low[i]));
-  const centre = mid(low, high), way = wayToTarget();
+  // A part that goes far out of its chamber is not seen to its end.
+  const [inner, outer] = placed.shape_mm, room = 0.4 * Math.hypot(...outer.map((x, i) => x - inner[i]));
+  const low = inner.map((x, i) => Math.min(x, Math.max(x - room, placed.part_mm[0][i])));
+  const high = outer.map((x, i) => Math.max(x, Math.min(x + room, placed.part_mm[1][i])));
+  const size = Math.hypot(...high.map((x, i) => x - low[i])), centre = mid(low, high), way = wayToTarget();
   view.look({ middle: centre, eye: centre.map((x, i) => x + 2.3 * size * way[i]), size });
 }
 
@@ -133,6 +148,7 @@ function dimensions() {
 // Number of the part's triangle below the pointer, or null.
 export function triangleAt(event) { return view.at(event, ["part"])?.triangle ?? null; }
 
+const CHOSEN = { holder: "clamped by the holder", mask: "covered by the mask" };
 // What is said of the place under the pointer: how the part's file names its surface, what it is, and where.
 const under = document.getElementById("under");
 view.renderer.domElement.addEventListener("pointermove", (event) => {
@@ -140,7 +156,8 @@ view.renderer.domElement.addEventListener("pointermove", (event) => {
   under.hidden = !hit;
   if (!hit) return;
   const name = part.groups[part.surface?.[hit.triangle]], [kind] = part.kinds[part.states[placed.state[hit.triangle]]];
-  under.textContent = `${name ? `${name}, ` : ""}${kind}, at ${Measure.at(hit.place)}`;
+  const zone = placed.zones[placed.zone[hit.triangle] - 1], words = CHOSEN[part.states[placed.state[hit.triangle]]] ?? kind;
+  under.textContent = [name, words === "zone" ? `zone ${zone}` : words, `at ${Measure.at(hit.place)}`].filter(Boolean).join(", ");
 });
 view.renderer.domElement.addEventListener("pointerleave", () => { under.hidden = true; });
 

@@ -1,7 +1,7 @@
 // What the page knows: the file as read, changes not yet saved, and questions to the server.
 
 const listeners = [];
-export const state = { file: null, fields: [], changes: {}, past: [], shown: {}, showing: "" };
+export const state = { file: null, fields: [], surfaces: {}, steps: [], step: 0, changes: {}, past: [], shown: {}, showing: "" };
 export const listen = (hear) => listeners.push(hear);
 const tell = (what) => { for (const hear of listeners) hear(what); };
 
@@ -39,12 +39,24 @@ export function unpack(buffer, at = 0) {
 
 export async function read(path = "/read", question = {}, before = () => {}) {
   state.file = await ask(path, question);
-  state.fields = state.file.fields; // those of the design with its changes, which may have another shape
+  takeTold(state.file);
   await before();
   state.changes = {};
   state.past = [];
   showChanges();
   tell("read");
+}
+
+// Fields, picked surfaces and steps of the design with its changes, which may have another shape.
+export function takeTold({ fields, surfaces, steps }) {
+  Object.assign(state, { fields, surfaces, steps });
+  if (state.step >= steps.length) state.step = 0;
+}
+
+// Show the chamber of another step.
+export function showStep(step) {
+  state.step = step;
+  tell("step");
 }
 
 // What the file has, or where it has no such number, what the design with its shape or holder takes by default.

@@ -1,15 +1,16 @@
 // Choosing the target and zones by clicking faces, or by names of the file, and turning a face down.
 import { ask, attempt, change, element, say, state } from "./state.js";
-import { setHandles, triangleAt, view } from "./scene.js";
+import { seeThrough, setHandles, triangleAt, view } from "./scene.js";
 
 const find = (id) => document.getElementById(id);
 const KEYS = ["surface", "faces", "direction", "angle_deg", "box_mm", "radius_mm"];
+const FIXTURES = ["holder.at", "mask.at"], WHOLE = { "holder.at": "what reaches farthest along its axis" };
 let newZone = false;
 
 export function fillTarget() {
   fillSurfaces();
   find("names").replaceChildren(...fillTarget.part.names.map(([name, text]) => {
-    const button = element("button", { textContent: name, title: "make it the target" });
+    const button = element("button", { textContent: name, title: "add it, or take it away, as a click does" });
     button.addEventListener("click", () => choose(name));
     return element("li", {}, button, ` ${text}`);
   }));
@@ -18,7 +19,7 @@ export function fillTarget() {
 }
 
 export function fillSurfaces() {
-  const surfaces = { ...state.file.surfaces }, chosen = find("surface").value;
+  const surfaces = { ...state.surfaces }, chosen = find("surface").value;
   for (const [name, zone] of Object.entries(state.changes)) if (/^zones\.\d+$/.test(name)) surfaces[`${name}.target`] = `zone ${zone.name}`;
   find("surface").replaceChildren(...Object.entries(surfaces).map(([table, name]) => element("option", { value: table, textContent: name })));
   if (chosen in surfaces) find("surface").value = chosen;
@@ -28,7 +29,10 @@ export function fillSurfaces() {
 // What the file will say of the target, as far as the page has changed it.
 export function showChosen() {
   const table = find("surface").value, added = state.changes[table.replace(/\.target$/, "")]?.target;
-  const kept = { ...(table === "part.target" ? state.file.target : added) };
+  const kept = { ...(added ?? state.file.chosen[table]) };
+  find("whole").textContent = WHOLE[table] ?? "the whole surface";
+  find("whole").hidden = table === "mask.at"; // no mask is a kind of mask, among the numbers
+  seeThrough(FIXTURES.includes(table) && !find("target").hidden);
   for (const key of KEYS) {
     const now = state.changes[`${table}.${key}`];
     if (now === null) delete kept[key]; else if (now !== undefined) kept[key] = now;
@@ -39,7 +43,7 @@ export function showChosen() {
 // The names that the target is chosen by, as far as it is chosen by names.
 function names() {
   const table = find("surface").value, now = state.changes[`${table}.surface`];
-  const kept = now === undefined ? (table === "part.target" ? state.file.target.surface : []) : now;
+  const kept = now === undefined ? state.file.chosen[table]?.surface : now;
   return [kept ?? []].flat().filter((name) => name !== "all");
 }
 
@@ -52,11 +56,12 @@ function choose(name) {
 
 // Choose by these keys alone.
 function only(keys) {
-  const table = find("surface").value;
-  change(Object.fromEntries(KEYS.map((key) => [`${table}.${key}`, keys[key] ?? null])));
+  const table = find("surface").value, none = table === "holder.at" && !Object.keys(keys).length ? { [table]: null } : {};
+  change({ ...Object.fromEntries(KEYS.map((key) => [`${table}.${key}`, keys[key] ?? null])), ...none });
 }
 find("whole").addEventListener("click", () => only({}));
 find("surface").addEventListener("change", showChosen);
+for (const tab of document.querySelectorAll("nav button")) tab.addEventListener("click", showChosen);
 
 let clicks = Promise.resolve(); // one after the other, each on what the one before has made
 async function click(event) {

@@ -6,7 +6,8 @@ from pathlib import Path
 import numpy as np
 
 from chamberopt.chamber.part import preview_part
-from chamberopt.page.answers import part_answer
+from chamberopt.design.design import Design
+from chamberopt.page.answers import part_answer, shape_answer, step_texts
 from tests.chamberopt.chamber.test_target import design_of
 
 
@@ -21,3 +22,19 @@ def test_each_triangle_has_the_number_of_its_name(tmp_path: Path) -> None:
     marks = preview_part(design).mesh.groups
     for name in ("Top", "bottom", "left", "right", "ends"):
         assert (np.array(head["groups"])[numbers[marks[name]]] == name).all()
+
+
+def test_each_step_has_its_pose_and_its_share_of_the_time(tmp_path: Path) -> None:
+    steps = [{"name": "up"}, {"name": "down", "time_share": 3, "part": {"rotate_deg": [180, 0, 0]}}]
+    design = Design.model_validate(design_of(tmp_path, {}).model_dump() | {"steps": steps})
+    whole = design.process.treatment_time
+    assert step_texts(design) == [
+        f"up: {0.25 * whole:g} s, 25 % of the time",
+        f"down: {0.75 * whole:g} s, 75 % of the time",
+    ]
+    for step, turned in enumerate((1.0, -1.0)):
+        answer = shape_answer(design, step)
+        head = json.loads(answer[4 : 4 + int.from_bytes(answer[:4], "little")])
+        np.testing.assert_allclose(
+            np.diag(np.reshape(head["rotation"], (3, 3))), [1, turned, turned]
+        )

@@ -13,6 +13,7 @@ from chamberopt.design.design import Design
 from chamberopt.geometry.triangles import area_vectors, rotation_matrix
 from chamberopt.page.edited_file import EditedFile
 from chamberopt.page.picking import Picker
+from chamberopt.page.structure import KIND, MASK_KIND, mask_kind, restructured
 from tests.chamberopt.design.test_shipped_parts import PARTS
 from tests.helpers.mesh_files import write_stl
 from tests.hunt.base import write_base
@@ -34,9 +35,11 @@ class Edited:
     def design(self) -> Design:
         return self.file.with_changes(self.changes)
 
-    def click(self, triangle: int, *, add: bool = True, alike: bool = False) -> None:
+    def click(
+        self, triangle: int, *, add: bool = True, alike: bool = False, of: str = TARGET
+    ) -> None:
         design = self.design
-        self.changes |= self.picker.with_face(design, TARGET, triangle, 30.0, alike, add)
+        self.changes |= self.picker.with_face(design, of, triangle, 30.0, alike, add)
 
 
 @pytest.fixture
@@ -83,7 +86,7 @@ def test_what_changes_nothing_or_leaves_nothing_is_refused(gear: Edited) -> None
         gear.click(triangle, add=False)
     with pytest.raises(InputError, match="the part has 9920"):
         gear.click(9920)
-    with pytest.raises(InputError, match="no target; there are "):
+    with pytest.raises(InputError, match="not picked; allowed: "):
         gear.picker.with_face(gear.design, "zones.0.target", 0, 30.0, alike=False, add=True)
 
 
@@ -129,3 +132,31 @@ def test_a_face_down_is_squared_and_the_chamber_fits(tmp_path: Path) -> None:
     chamber = page.design.chamber
     assert chamber.diameter_mm > np.hypot(120, 60)
     assert chamber.height_mm > 1e3 * high[2] > 1e3 * low[2] > 6
+
+
+def test_faces_of_holder_and_mask_are_clicked_as_those_of_the_target(gear: Edited) -> None:
+    triangle = side(gear.design)
+    with pytest.raises(
+        InputError, match=r"holder\.at: not picked; allowed: part\.target, mask\.at"
+    ):
+        gear.click(triangle, of="holder.at")
+    gear.changes |= restructured(gear.file.design, {}, KIND, "collar", gear.file.with_changes)
+    before = chosen(gear.design)
+    gear.click(triangle, of="holder.at")
+    gear.click(triangle, of="mask.at", alike=True)
+    design = gear.design
+    assert (chosen(design) == before).all()
+    assert design.holder is not None
+    assert design.holder.at is not None
+    assert [one.alike for one in design.holder.at.faces or ()] == [False]
+    assert design.mask is not None
+    assert [one.alike for one in design.mask.at.faces or ()] == [True]
+    assert mask_kind(design) == "shell"
+    for kind in ("plugs", "block", "shell"):
+        made = restructured(gear.file.design, gear.changes, MASK_KIND, kind, gear.file.with_changes)
+        assert mask_kind(gear.file.with_changes(made)) == kind
+    gone = restructured(gear.file.design, gear.changes, MASK_KIND, "", gear.file.with_changes)
+    assert gear.file.with_changes(gone).mask is None
+    gear.changes = gone
+    gear.click(triangle, of="mask.at")  # and another one after that
+    assert gear.design.mask is not None
