@@ -67,7 +67,7 @@ class StartedCommand:
             "steps": [] if code is not None else list(self._steps.values()),
             "lines": lines,
             "warnings": [on_page(text) for text in warnings],
-            "error": [on_page(text) for text in lines] if code else [],
+            "fault": [on_page(text) for text in lines] if code else [],
             "exit": code,
         }
 

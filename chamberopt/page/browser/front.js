@@ -79,14 +79,14 @@ drop.addEventListener("drop", (event) => attempt(() => bring(event.dataTransfer.
 find("file").addEventListener("change", () => attempt(() => bring(find("file").files[0])));
 find("part").addEventListener("change", () => attempt(() => look(find("part").value)));
 
-function tell({ steps, lines, warnings, error, exit }) {
+function tell({ steps, lines, warnings, fault, exit }) {
   find("stop").hidden = exit !== null;
   find("progress").replaceChildren(...bars(steps));
   find("warnings").replaceChildren(...warnings.map((words) => element("li", {}, ...onPage(words))));
   find("printed").textContent = lines.join("\n");
   find("printed-fold").hidden = !lines.length;
   find("error").hidden = !exit;
-  find("error").replaceChildren(...error.flatMap((words) => [...onPage(words), "\n"]));
+  find("error").replaceChildren(...fault.flatMap((words) => [...onPage(words), "\n"]));
 }
 
 const WISHES = ["material", "intensity", "coverage", "shop", "calibration", "shot", "ball-mm", "pose", "shape"]; // options of `new`
@@ -126,7 +126,7 @@ find("propose").addEventListener("click", () => attempt(async () => {
   const ended = await followed(tell, begun);
   find("propose").disabled = false;
   if (ended.exit !== 0) {
-    find("made").hidden = besideField(ended.lines.at(-1) ?? "", ended.error.at(-1));
+    find("made").hidden = besideField(ended.lines.at(-1) ?? "", ended.fault.at(-1));
     return;
   }
   find("picture").src = `/files/${begun.out.split("/").map(encodeURIComponent).join("/")}/design.png`;
