@@ -280,11 +280,13 @@ def calibrate(
                 setup.add_run(place, simulator(setup, values, executor, seed))
                 runs += 1
                 if progress:
-                    progress(runs, max(MIN_ROUNDS, number + 1) * count, None)
+                    progress(runs, MAX_ROUNDS * count, None)
         _centre_at(setups, centre)
         known = find_posterior(data, prior, known.mean, _bounds(known, at, centre, REACH * steps))
         if number + 1 >= MIN_ROUNDS and _moved(known, at, centre) < STAYS:
             break
+    if progress:
+        progress(runs, runs, None)  # no further round is needed
     _centre_at(setups, known.mean[at])
     bounds = _bounds(known, at, known.mean[at], REACH * steps)
     known = explaining_posterior(data, prior, known.mean, bounds)

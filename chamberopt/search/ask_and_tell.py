@@ -82,7 +82,9 @@ class Search:
     Args:
         folder: where trials are recorded; trials on record are not asked for again. By default
             nothing is recorded.
-        progress: called after each trial as progress(trials done, trials in all, best score).
+        progress: called after each trial as progress(done, total, best score). It counts in trials
+            of a sweep. Of a study it counts in evaluations with all replicas that the search gives
+            to a candidate, and `total` is the most that may follow, so that it never grows.
         points: the candidates of a sweep as points of the unit cube, shape (n, d); by default the
             search finds its candidates itself.
         has_promise: whether a candidate that was never evaluated is worth a confirmation.
@@ -107,6 +109,10 @@ class Search:
         self._answers: dict[int, Figures] = {}  # of confirmations, by number
         self._best: dict[str, float] = {}  # score among the feasible trials of each stage
         self._last_end = 0.0  # of an evaluation, by the clock
+        # Of the confirmation, in evaluations: what a candidate of this round costs, what is done,
+        # and the most that is left. They only tell the progress.
+        self._round_cost, self._confirm_done = 0.0, 0.0
+        self._confirm_left = confirmation_cost(study)
         settings = study.optimizer
         if study.objective.pareto and settings.algorithm == "auto" and not settings.phases:
             settings = settings.model_copy(update={"phases": PARETO_PHASES})
@@ -295,7 +301,9 @@ class Search:
         places = self._promising(settings.confirm)
         confirmed: dict[int, ConfirmedCandidate] = {}  # by position in places
         again = list(range(len(places)))
-        for _ in range(settings.confirm_rounds):
+        for number in range(settings.confirm_rounds):
+            self._round_cost = confirmation_cost(self._study, 1, number, rounds=1)
+            self._confirm_left = confirmation_cost(self._study, len(again), number)
             begun = []
             for i in again:
                 while len(self._asked) >= settings.batch:
@@ -313,6 +321,8 @@ class Search:
             if not best:
                 break
         self.confirmed = tuple(confirmed.values())
+        self._confirm_left = 0.0
+        self._tell_progress(None)
 
     def _confirmed(self, searched: int | None, candidate: Candidate) -> ConfirmedCandidate | None:
         """Return a candidate with its confirmed figures; None if its evaluation failed.
@@ -430,10 +440,12 @@ class Search:
         self._learn(asked.candidate, trial, answer)
         # Trials from the record but the last one are not shown.
         known = len(self._folder.recorded.trials) if self._folder else 0
-        if self._progress and len(self.trials) >= known:
+        if trial.stage == "confirm":
+            self._confirm_done += self._round_cost
+            self._confirm_left -= self._round_cost
+        if len(self.trials) >= known:
             # The best of the few that are confirmed would look like a fall of the best so far.
-            best = None if trial.stage == "confirm" else self._best.get(trial.stage)
-            self._progress(len(self.trials), self._expected(), best)
+            self._tell_progress(None if trial.stage == "confirm" else self._best.get(trial.stage))
         return trial
 
     def _record(self, asked: _Asked, answer: Figures | InputError) -> Trial:
@@ -457,18 +469,53 @@ class Search:
         if trial.feasible:
             self._best[trial.stage] = max(trial.score, self._best.get(trial.stage, -math.inf))
 
-    def _expected(self) -> int:
-        """Return how many trials there will be in all, as far as can be told now.
+    def _tell_progress(self, best: float | None) -> None:
+        """Tell what is done and the most that there will be.
 
-        Candidates that cost only a part of an evaluation leave budget for more candidates.
+        Candidates that cost only a part of an evaluation, or nothing, leave budget for more
+        candidates. So trials would be no measure.
         """
+        if self._progress is None:
+            return
         if self._sweep is not None:
-            return len(self._sweep)
-        settings, searched = self._study.optimizer, len(self._search.scores)
-        expected = searched + 1 + settings.confirm
-        if self.trials[-1].stage == "search":
-            expected += math.ceil(settings.evaluations - self._search.spent)
-        return max(len(self.trials), expected)
+            self._progress(len(self.trials), len(self._sweep), best)
+            return
+        budget = self._study.optimizer.evaluations
+        is_over = any(one.stage == "confirm" for one in self.trials[-1:])
+        searched = budget if is_over else min(self._search.spent, budget)
+        whole = _whole(budget + self._confirm_done + self._confirm_left)
+        left = _whole(budget - searched + self._confirm_left)
+        self._progress(whole - left, whole, best)
+
+
+def _whole(cost: float) -> int:
+    """Return a cost rounded up to whole evaluations, but for rounding errors."""
+    return math.ceil(cost - 1e-6)
+
+
+def most_evaluations(study: Study) -> int:
+    """Return the most evaluations that a study may take, its confirmation included."""
+    return _whole(study.optimizer.evaluations + confirmation_cost(study))
+
+
+def confirmation_cost(
+    study: Study, count: int | None = None, begin: int = 0, rounds: int | None = None
+) -> float:
+    """Return the most that rounds of confirmation may cost, in evaluations of the search.
+
+    Args:
+        count: number of candidates in each; by default all that are confirmed and the start.
+        begin: number of the first round.
+        rounds: number of rounds; by default all that may follow.
+    """
+    settings, accuracy = study.optimizer, study.design.process.accuracy
+    count = 1 + settings.confirm if count is None else count
+    if accuracy.objective_half_width is not None:  # one round, in which it sets the replicas
+        return float(count) if begin == 0 else 0.0
+    each = settings.confirm_replicas / accuracy.replicas
+    end = settings.confirm_rounds if rounds is None else begin + rounds
+    # A further round doubles the replicas, and keeps those that there are.
+    return count * sum(each * 2.0 ** max(0, number - 1) for number in range(begin, end))
 
 
 def _why_impossible(candidate: Candidate) -> InputError | None:

@@ -168,7 +168,8 @@ def run_study(
         study: the study of the folder, with its effects resolved.
         folder: folder of the study. If this very study was interrupted in it, it is resumed, and
             the result is the same, bit for bit, as without the interruption.
-        progress: called as progress(done, total, best) after each evaluation.
+        progress: called as progress(done, total, best) after each evaluation, in evaluations with
+            all replicas; `total` is the most that may follow, and never grows.
         simulator: replaces the simulation, e.g. in tests.
         stop: called before each evaluation; the study stops with KeyboardInterrupt if it is True.
         at_once: number of evaluations that memory can hold at a time; by default optimizer.batch.

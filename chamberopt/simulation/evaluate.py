@@ -114,6 +114,8 @@ def evaluate(
     while True:
         found = run.look_after_more(progress)
         if run.step.stopped_by:
+            if progress:
+                progress(found.replicas, found.replicas, None)  # no more are needed
             return found
 
 
@@ -223,7 +225,7 @@ class _Run:
         for replica in run_in_order(simulate_replica, self.setting, *how):
             replicas.append(replica)
             if progress:
-                progress(len(replicas), count, None)
+                progress(len(replicas), max(count, self.effort.most), None)
             self.look()
         simulated = time.perf_counter()
         hits, seen = self.look()

@@ -10,6 +10,7 @@ from chamberopt.chamber.build import build_chamber
 from chamberopt.common.executor import core_count, open_executor
 from chamberopt.coverage.field.memory import PROCESS, evaluation_bytes, how_many_fit
 from chamberopt.results.load import load_trials
+from chamberopt.search.ask_and_tell import most_evaluations
 from chamberopt.search.run_study import StudyResult, run_study
 from chamberopt.search.run_sweep import SweepPlan, SweepResult, run_sweep
 from chamberopt.simulation.effort import Effort
@@ -69,7 +70,7 @@ def optimise_study(
         chamber = build_chamber(folder.study.design)
     at_once = _candidates_at_once(folder.study, chamber, teller)
     study, advice = _prepare(folder, chamber, executor, teller)
-    with teller.step("evaluations", study.optimizer.evaluations) as progress:
+    with teller.step("evaluations", most_evaluations(study)) as progress:
         result = run_study(study, folder, executor, progress, stop=stop, at_once=at_once)
     ranges, failed = None, []
     if with_ranges:

@@ -174,7 +174,7 @@ def simulate_design(
         variants(design)  # before the work begins
     teller.compile(design, chamber, cavity)
     found, ranges = None, None
-    with teller.step(settings.step, design.process.accuracy.replicas) as progress:
+    with teller.step(settings.step, Effort.of(design.process.accuracy).most) as progress:
         what = design, chamber, executor, progress
         if settings.tolerances:
             evaluation, found = simulate_tolerances(*what, settings.analytic)

@@ -21,7 +21,13 @@ def bowl_shares(design) -> np.ndarray:
 
 
 def run_bowl(
-    folder: Path, simulator, optimizer: dict | None = None, design=GEAR, at_once=None, **tables
+    folder: Path,
+    simulator,
+    optimizer: dict | None = None,
+    design=GEAR,
+    at_once=None,
+    progress=None,
+    **tables,
 ):
     settings = {
         "evaluations": 16,
@@ -34,7 +40,7 @@ def run_bowl(
         Study(design=design, vary=VARY, optimizer=settings, **tables),
         folder,
         SerialExecutor(),
-        None,
+        progress,
         simulator,
         at_once=at_once,
     )

@@ -9,6 +9,14 @@ from chamberopt.search.study import Study
 from chamberopt.search.study_folder import open_study_folder
 
 
+def assert_total_never_grows(progress: list[tuple[int, int, float | None]]) -> None:
+    """What was told of a study's progress: it never falls behind, and its end is all there is."""
+    done, totals = ([one[k] for one in progress] for k in (0, 1))
+    assert done == sorted(done)
+    assert totals == sorted(totals, reverse=True)
+    assert done[-1] == totals[-1]
+
+
 def run_in_folder(
     study: Study, path: Path, executor=None, progress=None, simulator=None, stop=None, at_once=None
 ) -> StudyResult:

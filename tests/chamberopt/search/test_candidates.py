@@ -15,7 +15,7 @@ from chamberopt.common.executor import SerialExecutor
 from chamberopt.search.study import Study
 from chamberopt.search.trial_log import read_trials
 from tests.helpers.known_optima import GEAR, NO_FRILLS, VARY, bowl, bowl_shares, run_bowl
-from tests.helpers.studies import run_in_folder
+from tests.helpers.studies import assert_total_never_grows, run_in_folder
 from tests.helpers.synthetic import judged
 
 
@@ -39,6 +39,7 @@ def test_scores_suit_objectives_of_any_size(tmp_path: Path) -> None:
 
 def test_the_plainly_bad_get_few_replicas_and_close_calls_more(tmp_path: Path) -> None:
     asked: list[tuple[str, int | None]] = []
+    progress: list[tuple[int, int, float | None]] = []
 
     def simulator(design, stream, replicas):
         asked.append((stream, replicas))
@@ -46,9 +47,10 @@ def test_the_plainly_bad_get_few_replicas_and_close_calls_more(tmp_path: Path) -
         rng = np.random.default_rng(np.frombuffer(bowl_shares(design).tobytes(), dtype=np.uint32))
         return judged(bowl(bowl_shares(design)) + rng.normal(0.0, 0.02, count))
 
-    result = run_bowl(
-        tmp_path, simulator, {"first_replicas": 4, "confirm_rounds": 3, "evaluations": 12}
-    )
+    settings = {"first_replicas": 4, "confirm_rounds": 3, "evaluations": 12}
+    told = lambda *now: progress.append(now)  # noqa: E731
+    result = run_bowl(tmp_path, simulator, settings, progress=told)
+    assert_total_never_grows(progress)
     searched = [one for one in read_trials(tmp_path) if one.stage == "search"]
     assert {one.replicas for one in searched} == {4, 8}
     bar = max(t.objective.low for t in result.trials if t.stage == "search")

@@ -225,7 +225,12 @@ def accurate(coverage: float, most: int) -> Design:
 
 def test_replicas_are_added_until_the_accuracy_holds_or_the_budget_ends() -> None:
     chamber = build_chamber(accurate(0.2, 100))
-    loose = evaluate(accurate(0.2, 100), chamber, SerialExecutor())
+    told: list[tuple[int, int]] = []
+    loose = evaluate(
+        accurate(0.2, 100), chamber, SerialExecutor(), progress=lambda *now: told.append(now[:2])
+    )
+    assert told[0] == (1, 100)
+    assert told[-1] == (loose.replicas, loose.replicas)
     assert loose.stopped_by == "accuracy"
     assert loose.objective.half_width <= 0.2
     assert loose.replicas >= MIN_REPLICAS_TO_STOP
