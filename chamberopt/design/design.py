@@ -142,6 +142,12 @@ class Design(FileTable, ShownInNotebook):
         }
 
     @property
+    def ball_diameters(self) -> tuple[float, ...]:
+        """Diameters of the balls of all steps [m], in ascending order, each once."""
+        found = {one for step in self.in_steps.values() for one in step.shot.diameters}
+        return tuple(sorted(found))
+
+    @property
     def has_like_steps(self) -> bool:
         """True if all steps throw balls of the same sizes with the same sonotrodes."""
         like = {

@@ -33,6 +33,7 @@ from chamberopt.results.load import load_start
 
 if TYPE_CHECKING:
     from chamberopt.chamber.checks.openings import Opening
+    from chamberopt.design.shot import ShotTable
     from chamberopt.design.sonotrode import VibratingFace
     from chamberopt.documents.coverage import Figure
     from chamberopt.results.load import Result
@@ -356,7 +357,7 @@ def _chamber(result: Result, openings: Sequence[Opening]) -> Iterator[Row]:
         if several:
             yield what, f"{len(several)}: see the report"
     yield from _fixtures(result, openings)
-    ball = 1e3 * min(result.design.shot.diameters)
+    ball = 1e3 * min(result.design.ball_diameters)
     widest = f"{plain(max(math.floor(100.0 * TIGHT_GAP * ball) / 100.0, LEAST_GAP_MM))} mm"
     yield "gaps", f"of joints and openings, and round the sonotrode: at most {widest}, or sealed"
     if volume := result.record.chamber.volume_mm3:
@@ -420,7 +421,7 @@ def _sonotrode(result: Result, face_mm: tuple[float, ...]) -> Iterator[Row]:
     yield "face in the chamber", _face(face_mm)
     if design.sonotrode.blocks is not None:
         yield "made of", f"{design.sonotrode.blocks.in_words}, driven alike: simulated as one face"
-        gap = plain(1e3 * WIDEST_GAP * min(design.shot.diameters), 3)
+        gap = plain(1e3 * WIDEST_GAP * min(design.ball_diameters), 3)
         yield "gaps between the blocks", f"below {gap} mm, half a ball"
     yield "frequency", f"{plain(design.sonotrode.frequency_khz)} kHz"
     yield "amplitude", amplitude_text(design.sonotrode)
@@ -453,12 +454,16 @@ def _shot(result: Result) -> Iterator[Row]:
         sizes.append(("balls", f"{text}, {plain(mass, 3)} g" if several else text))
     yield from _first(sizes, "sizes")
     asked = _limited(result, "shot.mass_g", f"asked: {plain(shot.mass_g)} g")
-    yield "mass of these balls", f"{plain(_weighed_g(result))} g ({asked})"
+    yield "mass of these balls", f"{plain(_weighed_g(shot))} g ({asked})"
+    for name, one in result.design.in_steps.items():
+        if one.shot != shot:
+            counts = (f"{count:,} of Ø {plain(1e3 * size)} mm" for size, count in one.shot.sizes)
+            yield f"balls, step {name}", f"{', '.join(counts)}: {plain(_weighed_g(one.shot))} g"
 
 
-def _weighed_g(result: Result) -> float:
+def _weighed_g(shot: ShotTable) -> float:
     """Return the mass of the simulated balls together [g]. Their number is whole."""
-    return 1e3 * result.design.shot.ball_mass * result.design.shot.count
+    return 1e3 * shot.ball_mass * shot.count
 
 
 def _steps(result: Result) -> Iterator[Row]:
@@ -591,7 +596,8 @@ def _checks(result: Result) -> Iterator[Row]:
     else:
         text = metric_label("almen_intensity").format(intensity)
         yield "intensity by A strips at the target", text
-    yield "mass of the shot, before and after", f"{plain(_weighed_g(result))} g before"
+    masses = {plain(_weighed_g(one.shot)): None for one in design.in_steps.values()}
+    yield "mass of the shot, before and after", f"{' g, then '.join(masses)} g before"
 
 
 def calibrated_to(result: Result) -> Iterator[Sentence]:

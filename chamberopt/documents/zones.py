@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from chamberopt.common.key_words import in_words, unit_of
 from chamberopt.coverage.metrics import METRICS, STEPS
 from chamberopt.design.process import NONE
 from chamberopt.design.zones import LIMITED
@@ -111,8 +112,12 @@ def turned(rotate_deg: Sequence[float]) -> str:
     return ", then ".join(f"{plain(angle)}° about {axis}" for axis, angle in turns if angle)
 
 
+# How a step's keys are told that a plain name and unit would not tell as clearly.
+OF_KEYS = {"shot.diameter_mm": "balls of {} mm", "shot.mass_g": "{} g of balls"}
+
+
 def changes_in_words(step: Step) -> str:
-    """Return what a step changes in the design: the pose in words, other keys as the file says."""
+    """Return what a step changes in the design, in words."""
     texts = []
     for name, change in step.changes.items():
         if not isinstance(change, dict):
@@ -123,10 +128,13 @@ def changes_in_words(step: Step) -> str:
                 texts.append(
                     f"part turned {turned(value)}" if any(value) else "part as in its file"
                 )
+            elif told := OF_KEYS.get(f"{name}.{key}"):
+                texts.append(told.format(plain(value)))
             elif isinstance(value, int | float | str) and value:
-                texts.append(f"{name}.{key} = {value if isinstance(value, str) else plain(value)}")
+                of = value if isinstance(value, str) else f"{plain(value)} {unit_of(key)}".rstrip()
+                texts.append(f"{name} {in_words(key)} {of}")
             elif value:
-                texts.append(f"{name}.{key}: see the design")
+                texts.append(f"{name} {in_words(key)}: see the design")
     return ", ".join(texts) or "as the design"
 
 

@@ -211,7 +211,7 @@ def beside_larger(
     )
     text = (
         f"WITH LARGER BALLS, {then.in_words}: {there}, beside {here} with {now.in_words} "
-        f"(--ball-mm {then.ball_mm:g} takes them); not one after the other: {why}"
+        f"(--ball-mm {then.ball_mm:g} takes them), and not one after the other: {why}"
     )
     reasons = {**made.reasons, INTENSITY: f"{made.reasons[INTENSITY]}; {text}"}
     return replace(made, reasons=reasons)

@@ -148,11 +148,15 @@ def with_finer_balls(
         shares = f"{coarse_mm:g} mm serve {most.served:.0%}, {finer_mm:g} mm {fine.served:.0%}"
         if fine.served <= most.served + AS_GOOD or most.served < LEAST_SERVED:
             return None, shares
+        for balls in RAISED:  # a ceiling that suits the coarse balls may hold the finer ones
+            if "gap" in (harm := _new_harm(finer, coarse)):
+                coarse = _raised(coarse, balls * finer_mm)
+                finer, found = _with_shot(coarse, finer_mm), None
         if harm := _new_harm(finer, coarse):
             return None, harm
-        after = measure(finer)
-        if after is None:
-            return None, "no pilot resolved the finer balls"
+        found, after = found or measure(coarse), measure(finer)
+        if found is None or found.intensity is None or after is None:
+            return None, "no pilot resolved both sizes"
         budgets = [measured_budget(coarse, found), measured_budget(finer, after)]
         two = _one_after_the_other(coarse, finer, budgets)
     except InputError as error:
@@ -169,6 +173,15 @@ def with_finer_balls(
         f"or take one size (--ball-mm {finer_mm:g} or {coarse_mm:g})"
     )
     return replace(two, reasons={**two.reasons, ".steps": reason}), ""
+
+
+def _raised(made: Proposal, by_mm: float) -> Proposal:
+    """Return a proposal whose ceiling is higher [mm]. Raises InputError if it cannot be built."""
+    height = round(made.tables["chamber"]["height_mm"] + by_mm, 1)
+    higher = _with_values(made, {"chamber": {"height_mm": height}}, _steps(made))
+    text = "high enough for both sizes of balls, so that none jams under the ceiling"
+    reason = f"{made.reasons['chamber.height_mm'].removesuffix('; ' + text)}; {text}"
+    return replace(higher, reasons={**made.reasons, "chamber.height_mm": reason})
 
 
 def without_finer(coarse: Proposal, why: str) -> Proposal:

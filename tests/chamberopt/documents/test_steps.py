@@ -69,7 +69,7 @@ def test_answer_report_and_sheet_have_a_line_for_each_step(result: Result) -> No
     assert ("peening time", "10 s, all steps together") in rows
 
 
-def test_changes_are_told_as_the_file_has_them() -> None:
+def test_changes_are_told_in_words() -> None:
     fine = {
         "name": "fine", "chamber": {"height_mm": 25.0}, "shot": {"diameter_mm": 2.0},
         "holder": "none", "mask": {"at": {"direction": (0.0, 0.0, 1.0), "angle_deg": (0.0, 5.0)}},
@@ -77,7 +77,7 @@ def test_changes_are_told_as_the_file_has_them() -> None:
     design = short_design().changed({"steps": ({"name": "one"}, fine)})
     assert [changes_in_words(step) for step in design.steps or ()] == [
         "as the design",
-        "chamber.height_mm = 25, shot.diameter_mm = 2, no holder, mask.at: see the design",
+        "chamber height 25 mm, balls of 2 mm, no holder, mask at: see the design",
     ]
 
 

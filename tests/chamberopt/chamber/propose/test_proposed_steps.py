@@ -97,7 +97,7 @@ def test_what_stands_against_finer_balls_is_told(
 ) -> None:
     found = pilot(600.0, 0.3)
     two, why = with_finer_balls(coarse, found, FINER, lambda _: None)
-    assert (two, why) == (None, "no pilot resolved the finer balls")
+    assert (two, why) == (None, "no pilot resolved both sizes")
     larger = replace(coarse, reasons={**coarse.reasons, "shot.diameter_mm": f"{LARGER}: 80%"})
     reason = without_finer(larger, why).reasons["shot.diameter_mm"]
     assert reason == f"{LARGER}: 80%; no finer balls after them: {why}"
@@ -109,7 +109,18 @@ def test_what_stands_against_finer_balls_is_told(
     ):
         monkeypatch.setattr(proposed_steps, "warnings", lambda *_, said=text: [said])
         _, why = with_finer_balls(coarse, found, FINER, lambda _: None)
-        assert why == (harm or "no pilot resolved the finer balls")
+        assert why == (harm or "no pilot resolved both sizes")
+
+    low, told = coarse.design.chamber.height_mm, "the gap between two sides"
+    monkeypatch.setattr(
+        proposed_steps,
+        "warnings",
+        lambda one, _: [told] * (one.chamber.height_mm < low + 2.0 and one.shot.diameter < 2e-3),
+    )
+    two, why = with_finer_balls(coarse, found, FINER, lambda _: pilot(300.0, 0.1))
+    assert two is not None, why  # raised by one ball, then by two
+    assert two.design.chamber.height_mm == low + 3.0 * FINER
+    assert "high enough for both sizes" in two.reasons["chamber.height_mm"]
 
     def refused(*_: object) -> Proposal:
         raise InputError("part: outside of the chamber")
