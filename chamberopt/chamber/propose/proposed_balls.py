@@ -92,18 +92,20 @@ def fit_sizes(part: Part, diameters: Sequence[float]) -> list[SizeFit]:
     triangle, point, area = spread_points(part.vertices, part.triangles, spacing)
     corners = part.vertices[part.triangles[triangle]]
     normal = unit_vectors(interpolate(part.corner_normals[triangle], corners, point))
-    overlap = TOLERATED_OVERLAP * 0.5 * min(diameters)
-    widest = max(diameters) / OF_SLOT
-    radius, obstacle, cosine = largest_balls(mesh, point, normal, 0.5 * widest, overlap)
-    across = np.where((obstacle >= 0) & (cosine < MAX_COSINE), 2.0 * radius, np.inf)
-    width = across - overlap
     edges = inner_edges(part.vertices, part.triangles, part.target, part.hollow)
     fillet = np.full(len(size), np.inf)  # radius of the smallest fillet at each triangle
     round_ = edges.radius > 0.0
     np.minimum.at(fillet, edges.triangles[round_].ravel(), np.repeat(edges.radius[round_], 2))
     on, whole = part.target[triangle], float(area[part.target[triangle]].sum())
-    fits = []
+    fits, tolerance = [], 0.0
     for one in diameters:
+        overlap = tolerated_overlap(one)
+        if overlap != tolerance:  # another class of sizes begins
+            tolerance = overlap
+            widest = max(x for x in diameters if tolerated_overlap(x) == overlap) / OF_SLOT
+            radius, obstacle, cosine = largest_balls(mesh, point, normal, 0.5 * widest, overlap)
+            across = np.where((obstacle >= 0) & (cosine < MAX_COSINE), 2.0 * radius, np.inf)
+            width = across - overlap
         in_slot = on & (across < one / OF_SLOT)
         small = round_ & (OF_FILLET * edges.radius < one)
         held = (width >= JAM_BAND[0] * one) & (width <= JAM_BAND[1] * one)
@@ -116,6 +118,16 @@ def fit_sizes(part: Part, diameters: Sequence[float]) -> list[SizeFit]:
         count = round(charge_of(float(np.sort(np.ptp(part.vertices, axis=0))[1:].prod()), one))
         fits.append(SizeFit(one, touch, serve, bool(suits), jam, count))
     return fits
+
+
+def tolerated_overlap(diameter: float) -> float:
+    """Return how far a ball may reach into surfaces [m], for a diameter [m].
+
+    It is that of the next smaller power of two of millimetres, so that few searches serve all
+    sizes, and what a size serves does not depend on the sizes beside it.
+    """
+    class_mm = 2.0 ** math.floor(math.log2(1e3 * diameter) + 1e-9)
+    return 0.5e-3 * TOLERATED_OVERLAP * class_mm
 
 
 def serving_sizes(fits: Sequence[SizeFit]) -> list[float]:

@@ -47,6 +47,17 @@ def test_a_ball_touches_what_its_radius_lets_it() -> None:
     assert max(one.served for one in fits) < 0.15
 
 
+def test_what_a_size_serves_does_not_depend_on_the_sizes_beside_it() -> None:
+    """On a round shaft in coarse facets, a ball reaches over edges by a hundredth of its radius."""
+    shaft = trimesh.creation.annulus(4.0, 20.0, 10.0, sections=36)
+    shaft.apply_scale(1e-3)
+    part = part_of(shaft, np.ones(len(shaft.faces), dtype=bool))
+    alone = fit_sizes(part, [3e-3])
+    for beside in ([0.4e-3], [1e-3, 2e-3]):
+        assert fit_sizes(part, [*beside, 3e-3])[-1] == alone[0]
+    assert alone[0].touched > 0.95
+
+
 @pytest.mark.parametrize(
     ("width_mm", "chosen", "said"),
     [
