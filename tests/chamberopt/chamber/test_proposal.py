@@ -173,14 +173,15 @@ def test_what_faces_away_is_offered_for_leaving_out(
     known = surfaces(mesh)
     target, area = propose_target(mesh, known, []), areas(mesh.vertices, mesh.triangles)
     heels, toes = (next(o.triangles for o in known if o.name == f"face {k}") for k in (7, 9))
+    share = np.where(toes, 0.5, 1.0)
+    monkeypatch.setattr("chamberopt.chamber.propose.proposal.touched", lambda *_: share)
     part = SimpleNamespace(target=Target(**target.keys), rotate_deg=(0.0, 0.0, 0.0))
     posed = SimpleNamespace(triangles=mesh.triangles, target=target.triangles, area=area)
     made = SimpleNamespace(
         mesh=mesh,
         known=known,
         design=SimpleNamespace(part=part),
-        chamber=SimpleNamespace(part=posed, source=np.arange(len(area)), steps=()),
-        reach=SimpleNamespace(mesh=mesh, share=np.where(toes, 0.5, 1.0)),
+        chamber=SimpleNamespace(part=posed),
         tables={"part": {"mesh": str(tmp_path / "gear.obj")}, "part.target": target.keys},
         reasons={},
     )
