@@ -135,7 +135,7 @@ def saturation_time(rate: np.ndarray) -> np.ndarray:
     high = np.where(some, 5.0 / weakest, 0.0)
     for _ in range(HALVINGS):
         middle = np.sqrt(low * high)
-        grows = _gain(rate, middle)[0] > 0.0
+        grows = _doubling_adds(rate, middle)
         low, high = np.where(grows, middle, low), np.where(grows, high, middle)
     return np.asarray(low)
 
@@ -176,9 +176,22 @@ def _gain(rate: np.ndarray, time: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         time: the time T of each window, (p,).
     """
     left = np.exp(-rate * time[:, None])
-    gain = (1.0 - left**2).sum(axis=1) - SATURATED * (1.0 - left).sum(axis=1)
-    slope = (rate * (2.0 * left**2 - SATURATED * left)).sum(axis=1)
+    square = left**2
+    gain = (1.0 - square).sum(axis=1) - SATURATED * (1.0 - left).sum(axis=1)
+    slope = (rate * (2.0 * square - SATURATED * left)).sum(axis=1)
     return gain, slope
+
+
+def _doubling_adds(rate: np.ndarray, time: np.ndarray) -> np.ndarray:
+    """Return where twice the time T adds more than 10 % of strength, h(2 T) > 1.1 h(T), (p,).
+
+    With l = exp(-L T), the part of h(2 T) - 1.1 h(T) at a level is 1 - l² - 1.1 (1 - l), which is
+    (1 - l) (l - 0.1).
+
+    Args: as of `_gain`.
+    """
+    left = np.exp(rate * -time[:, None])
+    return np.asarray(np.einsum("pn,pn->p", 1.0 - left, left - (SATURATED - 1.0)) > 0.0)
 
 
 def strength_at(rate: np.ndarray, time: np.ndarray, highest: float) -> np.ndarray:
