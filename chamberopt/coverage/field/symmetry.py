@@ -151,7 +151,14 @@ def find_symmetry(chamber: Chamber, mesh: TriangleMesh) -> Symmetry | None:
 
     count = len(corners)
     few = np.linspace(0, count - 1, min(FEW, count)).astype(int)
-    for copies in range(MAX_COPIES, 1, -1):
+    numbers = np.arange(MAX_COPIES, 1, -1)
+    # Few turns are left by one search for all, which costs less than a search for each.
+    places = corners[few].reshape(-1, 3)
+    turned = turn_about_axis(
+        np.tile(places, (len(numbers), 1)), np.repeat(2.0 * np.pi / numbers, len(places))
+    )
+    on_surface = closest_points(mesh, turned, 2.0 * TOLERANCE).triangle >= 0
+    for copies in numbers[on_surface.reshape(len(numbers), -1).all(axis=1)].tolist():
         angle = 2.0 * np.pi / copies
         if is_kept(angle, few) and is_kept(angle, np.arange(count)):
             return Symmetry(copies, mesh, chamber.source)
