@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import hashlib
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
+from weakref import WeakValueDictionary
 
 import numpy as np
 
@@ -263,6 +265,13 @@ class Reach:
     share: np.ndarray  # (k,), share of each triangle of the cavity that the ball can touch
 
 
+# The latest reach, and those that are in use, by a digest of all on which they depend. A chamber
+# whose target is what the shot reaches takes it two or three times: to choose the target, to check
+# the chamber, and, of a proposal, to see whether such a target is worth proposing.
+_in_use: WeakValueDictionary[bytes, Reach] = WeakValueDictionary()
+_latest: list[Reach] = []
+
+
 def find_reach(
     mesh: TriangleMesh,
     diameter: float,
@@ -284,6 +293,23 @@ def find_reach(
     radius = 0.5 * diameter
     near_cell = radius + 1.01 * np.sqrt(3.0) * cell_edge(mesh, radius)
     max_radius = max(near_cell, MEASURED_WIDTH * 0.5 * (largest or diameter))
+    digest = hashlib.sha256(repr((diameter, max_radius)).encode())
+    for array in (mesh.vertices, mesh.triangles, mesh.tags, normals):
+        if array is not None:
+            digest.update(f"{array.dtype} {array.shape}".encode() + array.tobytes())
+    key = digest.digest()
+    found = _in_use.get(key)
+    if found is None:
+        found = _in_use[key] = _find_reach(mesh, diameter, max_radius, normals)
+    _latest[:] = [found]
+    return found
+
+
+def _find_reach(
+    mesh: TriangleMesh, diameter: float, max_radius: float, normals: np.ndarray | None
+) -> Reach:
+    """Find what `find_reach` finds, with the largest ball at each point up to a radius [m]."""
+    radius = 0.5 * diameter
     touches, widest = find_touches(mesh, diameter, max_radius, normals)
     overlap = TOLERATED_OVERLAP * radius
     region, volume = find_regions(mesh, touches, radius - overlap, widest)
