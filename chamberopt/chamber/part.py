@@ -216,7 +216,9 @@ def posed_part(design: Design) -> tuple[Part, list[str]]:
         zone.name: _chosen(given, zone.target, f"zones.{k}.target")
         for k, zone in enumerate(design.zones)
     }
-    found = _simulated(given, table.target, table.smoothing, design.zones, _is_wall(design))
+    # What the shot reaches is asked later, and of the same triangles.
+    surface = table.target.model_copy(update={"reachable": False})
+    found = _simulated(given, surface, table.smoothing, design.zones, _is_wall(design))
     mesh, origin = found.mesh, found.origin
     turn, shift = _pose(given, mesh.vertices, design)
     vertices = snap_to_grid(mesh.vertices @ turn.T + shift)
@@ -343,7 +345,9 @@ def chosen_on_part(design: Design, wanted: Selection, field: str) -> np.ndarray:
         InputError: no triangle meets all conditions.
     """
     given, table = _part_of_file(design), design.part
-    found = _simulated(given, table.target, table.smoothing, design.zones, _is_wall(design))
+    # What the shot reaches is asked later, and of the same triangles.
+    surface = table.target.model_copy(update={"reachable": False})
+    found = _simulated(given, surface, table.smoothing, design.zones, _is_wall(design))
     return np.asarray(_chosen(given, wanted, field)[found.origin])
 
 
