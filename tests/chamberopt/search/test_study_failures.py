@@ -14,6 +14,7 @@ from collections.abc import Callable
 from concurrent.futures import BrokenExecutor, ProcessPoolExecutor
 from dataclasses import replace
 from pathlib import Path
+from typing import ClassVar
 
 import pytest
 
@@ -26,6 +27,7 @@ from chamberopt.design.load import save_design
 from chamberopt.results.load import load_result
 from chamberopt.search.judge import FAILURE_PENALTY
 from chamberopt.search.study import load_study
+from chamberopt.simulation.evaluation import Evaluation
 from tests.helpers.results.resumable_study import calls, history, logged, run, study
 from tests.helpers.synthetic import plate_design, poisson_evaluation
 
@@ -204,7 +206,9 @@ ROWS = 7  # five searched, then the start and the best confirmed
 
 
 class TestCommandLine:
-    """`chamberopt run` with an simulator of milliseconds; all around it is real."""
+    """`chamberopt run` with a simulator of milliseconds; all around it is real."""
+
+    known: ClassVar[dict[tuple[str, str], Evaluation]] = {}  # by design and stream of seeds
 
     @pytest.fixture
     def evaluated(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list:
@@ -222,9 +226,12 @@ class TestCommandLine:
         def simulator(design, stream, replicas):
             done.append((stream, design.shot.mass_g))
             self.at.get(len(done), lambda: None)()
-            return poisson_evaluation(
-                design, chamber, 4.0 * design.shot.mass_g, 3, seed=len(stream)
-            )
+            key = design.model_dump_json(), stream
+            if key not in self.known:  # most tests evaluate the same candidates
+                self.known[key] = poisson_evaluation(
+                    design, chamber, 4.0 * design.shot.mass_g, 3, seed=len(stream)
+                )
+            return self.known[key]
 
         self.at: dict[int, Callable[[], None]] = {}
         monkeypatch.setattr("chamberopt.search.run_study.ChamberSimulator", lambda *_: simulator)
