@@ -28,7 +28,7 @@ from chamberopt.chamber.bores_and_deflectors import (
 )
 from chamberopt.chamber.fixture import Fixture, with_fixtures
 from chamberopt.chamber.part import Part, posed_part
-from chamberopt.chamber.reach import Reach, find_reach, reached_part_share
+from chamberopt.chamber.reach import find_reach, reached_part_share
 from chamberopt.common.errors import InputError
 from chamberopt.design.shape_surface import (
     TAG_PART,
@@ -100,11 +100,6 @@ class Chamber:
         from sim_core import TriangleMesh
 
         return TriangleMesh(self.vertices, self.triangles, self.tags)
-
-    @cached_property
-    def reaches(self) -> dict[tuple[float, float], Reach]:
-        """What balls reach, if known, by their smallest and mean diameter [m]."""
-        return {}
 
     @property
     def pieces_in_air(self) -> int:

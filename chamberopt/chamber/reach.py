@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import hashlib
+from collections import OrderedDict
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
-from weakref import WeakValueDictionary
 
 import numpy as np
 
@@ -265,11 +265,11 @@ class Reach:
     share: np.ndarray  # (k,), share of each triangle of the cavity that the ball can touch
 
 
-# The latest reach, and those that are in use, by a digest of all on which they depend. A chamber
-# whose target is what the shot reaches takes it two or three times: to choose the target, to check
-# the chamber, and, of a proposal, to see whether such a target is worth proposing.
-_in_use: WeakValueDictionary[bytes, Reach] = WeakValueDictionary()
-_latest: list[Reach] = []
+# The latest reaches, by a digest of all on which they depend. A chamber takes its own several times
+# over: to choose a target that the shot reaches, to check each step, to draw, and, of a proposal, to
+# see whether such a target is worth proposing.
+MOST_KNOWN = 4
+_known: OrderedDict[bytes, Reach] = OrderedDict()
 
 
 def find_reach(
@@ -298,10 +298,10 @@ def find_reach(
         if array is not None:
             digest.update(f"{array.dtype} {array.shape}".encode() + array.tobytes())
     key = digest.digest()
-    found = _in_use.get(key)
-    if found is None:
-        found = _in_use[key] = _find_reach(mesh, diameter, max_radius, normals)
-    _latest[:] = [found]
+    found = _known.pop(key, None) or _find_reach(mesh, diameter, max_radius, normals)
+    _known[key] = found  # as the latest
+    while len(_known) > MOST_KNOWN:
+        _known.popitem(last=False)
     return found
 
 

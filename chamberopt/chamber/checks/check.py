@@ -61,12 +61,9 @@ def shot_reach(design: Design, chamber: Chamber) -> Reach:
 
     The search takes a second or two, the first time that a chamber is asked for balls of a size.
     """
-    sizes = min(design.shot.diameters), design.shot.diameter
-    if sizes not in chamber.reaches:
-        own = chamber.vertices, chamber.triangles, chamber.source
-        normals = chamber.part.normals_in_cavity(*own)
-        chamber.reaches[sizes] = find_reach(chamber_mesh(chamber), *sizes, normals)
-    return chamber.reaches[sizes]
+    normals = chamber.part.normals_in_cavity(chamber.vertices, chamber.triangles, chamber.source)
+    smallest, mean = min(design.shot.diameters), design.shot.diameter
+    return find_reach(chamber_mesh(chamber), smallest, mean, normals)
 
 
 def touched(design: Design, chamber: Chamber) -> np.ndarray:
