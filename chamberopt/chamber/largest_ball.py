@@ -46,9 +46,14 @@ class TouchPoints(NamedTuple):
 
 
 def find_touch_points(
-    mesh: TriangleMesh, normals: np.ndarray, spacing: np.ndarray, max_radius: float, overlap: float
+    mesh: TriangleMesh,
+    normals: np.ndarray,
+    spacing: np.ndarray,
+    max_radius: float,
+    overlap: float,
+    chosen: np.ndarray | None = None,
 ) -> TouchPoints:
-    """Return points on all triangles of a mesh, and the largest ball that touches at each point.
+    """Return points on the triangles of a mesh, and the largest ball that touches at each point.
 
     Each triangle has at least one point.
 
@@ -57,9 +62,18 @@ def find_touch_points(
         spacing: distance between the points on each triangle [m], shape (m,).
         max_radius: limit of the balls' radius [m].
         overlap: depth to which a ball may reach into a surface [m].
+        chosen: marks the triangles whose points are wanted, (m,) bool; None for all. Their points
+            do not depend on the choice.
     """
     triangle, point, area = spread_points(mesh.vertices, mesh.triangles, spacing)
-    normal = unit_vectors(interpolate(normals[triangle], mesh.corners[triangle], point))
+    if chosen is not None:
+        rows = chosen[triangle]
+        triangle, point, area = triangle[rows], point[rows], area[rows]
+    # Where the normals of all corners are equal there is nothing to interpolate.
+    normal = np.ascontiguousarray(normals[triangle, 0])
+    bent = np.flatnonzero((normals != normals[:, :1]).any(axis=(1, 2))[triangle])
+    own = triangle[bent]
+    normal[bent] = unit_vectors(interpolate(normals[own], mesh.corners[own], point[bent]))
     balls = largest_balls(mesh, point, normal, max_radius, overlap)
     return TouchPoints(triangle, point, normal, area, *balls)
 

@@ -174,15 +174,16 @@ def _require_closed(vertices: np.ndarray, triangles: np.ndarray) -> None:
         raise SceneError(f"mesh triangle {twice[0] // 3} uses one vertex twice; remove it")
     forward = edges[:, 0] * len(vertices) + edges[:, 1]
     backward = edges[:, 1] * len(vertices) + edges[:, 0]
-    keys, counts = np.unique(forward, return_counts=True)
-    if counts.max() > 1:
-        edge = np.flatnonzero(forward == keys[counts > 1][0])
+    keys = np.sort(forward)
+    again = np.flatnonzero(keys[1:] == keys[:-1])
+    if len(again):
+        edge = np.flatnonzero(forward == keys[again[0]])
         named = f"triangles {edge[0] // 3} and {edge[1] // 3}"
         raise SceneError(
             f"mesh {named} run along a shared edge the same way: flipped or overlapping triangles"
         )
-    lonely = np.flatnonzero(~np.isin(backward, keys))
-    if len(lonely):
+    if not np.array_equal(np.sort(backward), keys):
+        lonely = np.flatnonzero(~np.isin(backward, keys))
         where = np.round(vertices[edges[lonely[0]]].mean(axis=0), 6).tolist()
         raise SceneError(
             f"mesh is not closed: {len(lonely)} open edge(s), the first on triangle "

@@ -64,14 +64,22 @@ class Gaps(NamedTuple):
     widest: float  # width up to which gaps are measured [m]
 
 
-def find_gaps(chamber: Chamber, diameters: Sequence[float]) -> Gaps:
+def find_gaps(
+    chamber: Chamber, diameters: Sequence[float], beside_walls: bool = False
+) -> Gaps:
     """Measure the gaps of a chamber for balls of some diameters [m], in a fraction of a second.
 
     It is not found whether a ball gets there at all, for which `shot_reach` takes seconds.
+
+    Args:
+        beside_walls: whether only gaps beside walls and sonotrode, and their mouths, are wanted,
+            not those of the part alone. The part is then measured near walls only.
     """
     normals = chamber.part.normals_in_cavity(chamber.vertices, chamber.triangles, chamber.source)
-    limit = MEASURED_WIDTH * 0.5 * max(diameters)
-    touches, spacing = find_touches(chamber_mesh(chamber), min(diameters), limit, normals)
+    limit, largest = MEASURED_WIDTH * 0.5 * max(diameters), max(diameters)
+    # From the wall to a jammed ball's middle, to the middle of a ball at the mouth, and to its face.
+    near = 0.5 * JAM_BAND[1] * largest + largest + limit if beside_walls else None
+    touches, spacing = find_touches(chamber_mesh(chamber), min(diameters), limit, normals, near)
     return _gaps(touches, None, spacing, min(diameters))
 
 

@@ -39,7 +39,7 @@ def tight_gaps(chamber: Chamber, diameters: Sequence[float]) -> Iterator[TightGa
     """
     from scipy.spatial import KDTree
 
-    gaps, largest = find_gaps(chamber, diameters), max(diameters)
+    gaps, largest = find_gaps(chamber, diameters, beside_walls=True), max(diameters)
     touches, names = gaps.touches, surface_names(chamber)
     tight = np.flatnonzero(gaps.width <= JAM_BAND[1] * largest)
     free = (touches.radius >= 0.5 * largest) & (gaps.width > JAM_BAND[1] * largest)
