@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 import shapely
 
-from sim_core.geometry.mesh import TriangleMesh, edge_partners, normals_towards_shot
+from sim_core.geometry.mesh import TriangleMesh, normals_towards_shot
 from sim_core.numerics.jit import jit
 
 # A corner this near the plane [m] lies in it. The value is below the promised accuracy of contacts,
@@ -89,13 +89,17 @@ def find_flat_faces(
     seed = seeds[:found].copy()
     outlines = _outlines(of_triangle, partners, found)
     frames = np.zeros((found, 3, 3))
-    for k, outline in enumerate(outlines):
-        start = corners[outline // 3, outline % 3]
-        edge = corners[outline // 3, (outline % 3 + 1) % 3] - start
+    if found:
+        border = np.concatenate(outlines)
+        edge = corners[border // 3, (border % 3 + 1) % 3] - corners[border // 3, border % 3]
         length = np.linalg.norm(edge, axis=1)
-        frames[k, 0] = corners[seed[k], 0]
-        frames[k, 1] = edge[length.argmax()] / length.max()
-        frames[k, 2] = np.cross(normals[seed[k]], frames[k, 1])
+        sizes = np.array([len(one) for one in outlines])
+        face, first = np.repeat(np.arange(found), sizes), np.cumsum(sizes) - sizes
+        is_longest = np.flatnonzero(length == np.maximum.reduceat(length, first)[face])
+        longest = is_longest[np.unique(face[is_longest], return_index=True)[1]]
+        frames[:, 0] = corners[seed, 0]
+        frames[:, 1] = edge[longest] / length[longest, None]
+        frames[:, 2] = np.cross(normals[seed], frames[:, 1])
     return FlatFaces(of_triangle, seed, frames, outlines)
 
 
@@ -328,7 +332,7 @@ def surface_triangles(
     amplitude = np.zeros(len(corners))
     for tag, largest in zip(vibrating_tags, amplitudes, strict=True):
         amplitude[mesh.tags == tag] = largest
-    partners, tolerance = edge_partners(mesh.triangles), in_plane_tolerance(mesh.vertices)
+    partners, tolerance = mesh.partners, in_plane_tolerance(mesh.vertices)
     return SurfaceTriangles(
         mesh,
         corners,

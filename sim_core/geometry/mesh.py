@@ -88,10 +88,15 @@ class TriangleMesh:
         """
         return np.asarray(0.5 * (self.vertices.min(axis=0) + self.vertices.max(axis=0)))
 
-    @property
+    @cached_property
     def bounds(self) -> np.ndarray:
         """Lowest and highest corner of the bounding box [m], shape (2, 3)."""
         return np.stack([self.vertices.min(axis=0), self.vertices.max(axis=0)])
+
+    @cached_property
+    def partners(self) -> np.ndarray:
+        """For each directed edge the edge that runs the opposite way, as `edge_partners` has it."""
+        return edge_partners(self.triangles)
 
     @property
     def volume(self) -> float:

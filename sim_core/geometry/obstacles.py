@@ -17,7 +17,6 @@ import numpy as np
 
 from sim_core.errors import SceneError
 from sim_core.geometry.flat_faces import LONE, SurfaceTriangles, cover_with_quadrangles
-from sim_core.geometry.mesh import edge_partners
 from sim_core.geometry.sonotrode_border import SonotrodeBorder, find_border, require_room_at_joints
 from sim_core.numerics.jit import jit
 
@@ -202,7 +201,7 @@ def _capsules(surface: SurfaceTriangles, radius: float, border: SonotrodeBorder)
     of_triangle, vibrating = surface.flat_faces.of_triangle, surface.vibrating
     # a triangle without area has no face; the edges of its neighbours have one
     solid = surface.doubled > 0.0
-    two = edge_partners(mesh.triangles)
+    two = mesh.partners
     # each edge once, as two directed edges 3 t + k; all edges between two flat faces in one order
     one = np.flatnonzero(np.arange(len(two)) < two)
     two = two[one]

@@ -21,7 +21,7 @@ import numpy as np
 
 from sim_core.errors import SceneError
 from sim_core.geometry.flat_faces import SurfaceTriangles
-from sim_core.geometry.mesh import TriangleMesh, edge_partners, normals_towards_shot
+from sim_core.geometry.mesh import TriangleMesh, normals_towards_shot
 
 LEVEL = 1e-9  # cosine or sine that is rounding
 
@@ -55,7 +55,7 @@ def find_border(surface: SurfaceTriangles, radius: float) -> SonotrodeBorder:
     Raises:
         SceneError: where the amplitude is so large that a face would part from a wall.
     """
-    beside = _beside(surface.mesh.triangles, surface.normals, surface.vibrating)
+    beside = _beside(surface.mesh.partners, surface.normals, surface.vibrating)
     reached = radius * (1.0 - beside.run) < surface.amplitude[beside.face]
     beside = _Beside(*(x[reached] for x in beside))
     face, run, rise = beside.face, beside.run, beside.rise
@@ -89,7 +89,7 @@ def largest_amplitude(mesh: TriangleMesh, tag: int, radius: float) -> tuple[floa
         that limits it, shape (3,); and the slope of this wall, in words.
     """
     normals, _ = normals_towards_shot(mesh.corners)
-    beside = _beside(mesh.triangles, normals, mesh.tags == tag)
+    beside = _beside(mesh.partners, normals, mesh.tags == tag)
     limit = _largest_amplitude(beside.run, beside.rise, radius)
     if not np.isfinite(limit).any():
         return float("inf"), mesh.middle, ""
@@ -100,8 +100,8 @@ def largest_amplitude(mesh: TriangleMesh, tag: int, radius: float) -> tuple[floa
     return float(limit[k]), ends.mean(axis=0), _leaning(angle)
 
 
-def _beside(triangles: np.ndarray, normals: np.ndarray, vibrating: np.ndarray) -> _Beside:
-    two = edge_partners(triangles)
+def _beside(two: np.ndarray, normals: np.ndarray, vibrating: np.ndarray) -> _Beside:
+    """Return the edges between vibrating faces and others, from the partners of all edges."""
     edge = two[np.repeat(vibrating, 3) & ~vibrating[two // 3]]
     face = two[edge] // 3
     one, other = normals[face], normals[edge // 3]
@@ -140,7 +140,7 @@ def _beneath(
     If the corner of the two walls is convex towards the shot, this line is an edge. A concave
     corner is behind both walls, which may go on past it, as where a cone ends in a point.
     """
-    corners, normals, two = surface.corners, surface.normals, edge_partners(surface.mesh.triangles)
+    corners, normals, two = surface.corners, surface.normals, surface.mesh.partners
     walls: list[list[np.ndarray]] = []
     edges: dict[tuple[int, ...], tuple[np.ndarray, tuple[int, int]]] = {}
     for e, moving in zip(beside.edge.tolist(), beside.face.tolist(), strict=True):
@@ -201,7 +201,7 @@ def require_room_at_joints(surface: SurfaceTriangles, radius: float) -> None:
     the faces' normals. The vibrations reduce the numerator by at most the sum of their amplitudes.
     """
     normals, amplitude, tags = surface.normals, surface.amplitude, surface.mesh.tags
-    two = edge_partners(surface.mesh.triangles)
+    two = surface.mesh.partners
     one = np.flatnonzero(np.arange(len(two)) < two)
     face, other = one // 3, two[one] // 3
     cosine = np.einsum("ij,ij->i", normals[face], normals[other])

@@ -8,7 +8,7 @@ import numpy as np
 from sim_core.effects.part_rotation import RotationAxis
 from sim_core.errors import SceneError
 from sim_core.geometry.bvh import Tree, build_tree, join_trees
-from sim_core.geometry.mesh import TriangleMesh, connected_components, edge_partners
+from sim_core.geometry.mesh import TriangleMesh, connected_components
 from sim_core.geometry.obstacles import ObstacleTable
 from sim_core.numerics.computed_once import computed_once
 from sim_core.numerics.jit import jit
@@ -124,7 +124,7 @@ def _joint(mesh: TriangleMesh, turning: np.ndarray) -> np.ndarray:
     Each edge has the triangle of the part, the triangle of the chamber, and its two vertices.
     ``turning``: True for triangles of the part, shape (m,) bool.
     """
-    partner = edge_partners(mesh.triangles)
+    partner = mesh.partners
     edges = np.flatnonzero(np.repeat(turning, 3) & ~turning[partner // 3])
     ends = mesh.triangles.reshape(-1)[edges], mesh.triangles[edges // 3, (edges % 3 + 1) % 3]
     return np.stack([edges // 3, partner[edges] // 3, *ends], axis=1)

@@ -64,9 +64,7 @@ class Gaps(NamedTuple):
     widest: float  # width up to which gaps are measured [m]
 
 
-def find_gaps(
-    chamber: Chamber, diameters: Sequence[float], beside_walls: bool = False
-) -> Gaps:
+def find_gaps(chamber: Chamber, diameters: Sequence[float], beside_walls: bool = False) -> Gaps:
     """Measure the gaps of a chamber for balls of some diameters [m], in a fraction of a second.
 
     It is not found whether a ball gets there at all, for which `shot_reach` takes seconds.
@@ -77,7 +75,7 @@ def find_gaps(
     """
     normals = chamber.part.normals_in_cavity(chamber.vertices, chamber.triangles, chamber.source)
     limit, largest = MEASURED_WIDTH * 0.5 * max(diameters), max(diameters)
-    # From the wall to a jammed ball's middle, to the middle of a ball at the mouth, and to its face.
+    # From the wall to a jammed ball, to a ball at the mouth of the gap, and to its face.
     near = 0.5 * JAM_BAND[1] * largest + largest + limit if beside_walls else None
     touches, spacing = find_touches(chamber_mesh(chamber), min(diameters), limit, normals, near)
     return _gaps(touches, None, spacing, min(diameters))

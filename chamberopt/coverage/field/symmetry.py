@@ -137,28 +137,31 @@ def find_symmetry(chamber: Chamber, mesh: TriangleMesh) -> Symmetry | None:
     """
     from sim_core import closest_points
 
-    corners = chamber.vertices[chamber.triangles]
+    vertices, corners = chamber.vertices, chamber.vertices[chamber.triangles]
     inside = corners + INSIDE * (corners.mean(axis=1, keepdims=True) - corners)
     looks = chamber.tags + 256 * chamber.on_target.astype(int)
 
+    def on_surface(places: np.ndarray, angle: float | np.ndarray) -> np.ndarray:
+        turned = turn_about_axis(places, angle)
+        return np.asarray(closest_points(mesh, turned, TOLERANCE).triangle)
+
     def is_kept(angle: float, triangles: np.ndarray) -> bool:
-        for places in (corners, inside):
-            turned = turn_about_axis(places[triangles].reshape(-1, 3), angle)
-            found = closest_points(mesh, turned, TOLERANCE).triangle
-            if (found < 0).any():
-                return False
-        return bool((looks[found] == np.repeat(looks[triangles], 3)).all())
+        ends = np.unique(chamber.triangles[triangles])
+        if (on_surface(vertices[ends], angle) < 0).any():
+            return False
+        found = on_surface(inside[triangles].reshape(-1, 3), angle)
+        same = looks[found] == np.repeat(looks[triangles], 3)
+        return bool(((found >= 0) & same).all())
 
     count = len(corners)
     few = np.linspace(0, count - 1, min(FEW, count)).astype(int)
-    numbers = np.arange(MAX_COPIES, 1, -1)
-    # Few turns are left by one search for all, which costs less than a search for each.
-    places = corners[few].reshape(-1, 3)
-    turned = turn_about_axis(
-        np.tile(places, (len(numbers), 1)), np.repeat(2.0 * np.pi / numbers, len(places))
-    )
-    on_surface = closest_points(mesh, turned, 2.0 * TOLERANCE).triangle >= 0
-    for copies in numbers[on_surface.reshape(len(numbers), -1).all(axis=1)].tolist():
+    tried = np.arange(MAX_COPIES, 1, -1)
+    # Corners of few triangles, turned by all angles at once, leave few angles to try.
+    ends = np.unique(chamber.triangles[few])
+    place = np.tile(vertices[ends], (len(tried), 1))
+    angles = np.repeat(2.0 * np.pi / tried, len(ends))
+    kept = (on_surface(place, angles) >= 0).reshape(len(tried), -1).all(axis=1)
+    for copies in tried[kept].tolist():
         angle = 2.0 * np.pi / copies
         if is_kept(angle, few) and is_kept(angle, np.arange(count)):
             return Symmetry(copies, mesh, chamber.source)
