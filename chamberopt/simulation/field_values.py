@@ -10,10 +10,10 @@ Notation
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -56,6 +56,7 @@ if TYPE_CHECKING:
     from chamberopt.common.estimate import Estimate
     from chamberopt.coverage.field.display_mesh import DisplayField
     from chamberopt.coverage.field.smooth_faces import Places
+    from chamberopt.coverage.field.windows import Windows
     from chamberopt.coverage.stress_profile import SurfaceProfile
     from chamberopt.design.load import Design
     from chamberopt.simulation.evaluation import Evaluation
@@ -91,6 +92,28 @@ class _Portions:
         self._step = max(self._least, min(2 * self._step, fits))
 
 
+class _Seen(NamedTuple):
+    """What was seen in windows round some places: whether a ball fits there (p,), and the dents."""
+
+    gauge: Gauge
+    reachable: np.ndarray
+    dents: dict[str, np.ndarray]  # as `PartField._dents` returns them
+
+
+def _joined(seen: Sequence[_Seen], rows: np.ndarray, windows: Windows) -> _Seen:
+    """Return what was seen in some of the windows of all portions, off creases.
+
+    Args:
+        rows: numbers of these windows, counted through all portions, (p,).
+        windows: these windows, (p,).
+    """
+    area = np.concatenate([one.gauge.area for one in seen])[rows]
+    reachable = np.concatenate([one.reachable for one in seen])[rows]
+    names = seen[0].dents
+    dents = {name: np.concatenate([one.dents[name] for one in seen])[rows] for name in names}
+    return _Seen(Gauge(windows, area, None), reachable, dents)
+
+
 class PartField:
     """Coverage and other figures at any points of the part, from the impacts of an evaluation."""
 
@@ -113,16 +136,6 @@ class PartField:
             self._rooms, places.place, places.normal, 0.5 * min(self._design.shot.diameters)
         )
 
-    def coverage(self, places: Places) -> np.ndarray:
-        """Return the coverage round each point of the surface at the treatment time, (p,).
-
-        It is measured in a window, a disc round the point; NaN where no ball fits. Dents on creases
-        (sharp edges) do not count, because they cover a band as narrow as a dent.
-        """
-        gauge = self._gauge_off_creases(places)
-        coverage = coverage_from_dent_density(self._dents(gauge)["dent_density"])
-        return np.where(self.reachable(places), coverage, np.nan)
-
     def display(self) -> DisplayField:
         """Return the figures of `values` at the vertices of a mesh to draw, in single precision.
 
@@ -131,19 +144,29 @@ class PartField:
         """
         from chamberopt.coverage.field.display_mesh import DisplayField, display_mesh
 
-        part, gauge = self._chamber.part, self.field.setting.gauge
-        mesh = display_mesh(
+        part, asked = self._chamber.part, list[_Seen]()
+
+        def coverage(places: Places) -> np.ndarray:
+            asked.append(self._seen(places, self._gauge_off_creases(places)))
+            density = asked[-1].dents["dent_density"]
+            return np.where(asked[-1].reachable, coverage_from_dent_density(density), np.nan)
+
+        mesh, asked_at = display_mesh(
             part.vertices, part.triangles, part.corner_normals, part.target, self.field.drawn_face,
-            gauge, self.coverage,
+            self.field.setting.gauge, coverage,
         )  # fmt: skip
-        values = self.values(mesh.places, self._gauge_off_creases(mesh.places))
+        windows = self.field.windows_round(mesh.places, self.field.radius)
+        values = self._values(mesh.places, _joined(asked, asked_at, windows))
         fields = {name: one.astype(np.float32) for name, one in values.items()}
         return DisplayField(replace(mesh, normal=mesh.normal.astype(np.float32)), fields)
 
     def _gauge_off_creases(self, places: Places) -> Gauge:
         return replace(self.field.gauge_round(places, self.field.radius), band=None)
 
-    def values(self, places: Places, gauge: Gauge | None = None) -> dict[str, np.ndarray]:
+    def _seen(self, places: Places, gauge: Gauge) -> _Seen:
+        return _Seen(gauge, self.reachable(places), self._dents(gauge))
+
+    def values(self, places: Places) -> dict[str, np.ndarray]:
         """Compute all figures in windows, discs of the surface round some points.
 
         Returns:
@@ -166,9 +189,13 @@ class PartField:
             surface_stress_MPa: residual stress at the surface [MPa]; where the design asks for it.
             moved_um: distance of the surface from the file's facets [µm]; absent if none moved.
         """
-        gauge = gauge or self.field.gauge_round(places, self.field.radius)
-        fits = self.reachable(places) & np.isfinite(gauge.area)
-        found = self._dents(gauge) | self._impacts(gauge)
+        return self._values(
+            places, self._seen(places, self.field.gauge_round(places, self.field.radius))
+        )
+
+    def _values(self, places: Places, seen: _Seen) -> dict[str, np.ndarray]:
+        gauge, fits = seen.gauge, seen.reachable & np.isfinite(seen.gauge.area)
+        found = seen.dents | self._impacts(gauge)
         known = {name: np.where(fits, column, np.nan) for name, column in found.items()}
         coverage = coverage_from_dent_density(found["dent_density"])
         enough = fits & (found["coverage_interval"] <= WIDEST)

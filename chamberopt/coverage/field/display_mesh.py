@@ -78,7 +78,7 @@ def display_mesh(
     face: np.ndarray,
     gauge: float,
     coverage: Values,
-) -> DisplayMesh:
+) -> tuple[DisplayMesh, np.ndarray]:
     """Divide a part's triangles until coverage can be drawn by interpolation between vertices.
 
     Args:
@@ -91,11 +91,14 @@ def display_mesh(
         gauge: area of a window, a disc in which coverage is measured [m²].
         coverage: function that returns the coverage at points, called once in each round of
             divisions.
+    Returns:
+        The mesh, and the number of each vertex among all points at which coverage was asked, (v,).
     """
     diameter = 2.0 * float(np.sqrt(gauge / np.pi))
     # point: number of each vertex's place, equal for all vertices at one place of a crease.
     mesh, point = _with_vertices_of_faces(vertices, triangles, normals, face)
-    value = np.zeros(0)  # coverage at the vertices that have been read
+    asked_at = np.full(len(mesh.vertices), -1)  # number of each vertex among the points asked
+    value = np.zeros(0)  # coverage at these points
     settled = np.zeros(0, dtype=np.int64)  # edges that need not be split
     while True:
         edges, of_side = _edges_of(mesh.triangles)
@@ -107,11 +110,14 @@ def display_mesh(
         asked = np.flatnonzero(
             drawn & (length > FINEST * diameter) & ~np.isin(key, settled, assume_unique=True)
         )
-        new, middle = np.arange(len(value), len(mesh.vertices)), _middles(mesh, edges[asked])
+        new, middle = np.flatnonzero(asked_at < 0), _middles(mesh, edges[asked])
         read = coverage(_joined(mesh.places.select(new), middle.places))
         read = np.where(np.isfinite(read), read, -1.0)  # -1, no value, differs from all values
-        value = np.concatenate([value, read[: len(new)]])
-        one, two = value[a[asked]], value[b[asked]]
+        asked_at[new] = len(value) + np.arange(len(new))
+        middle_at = np.full(len(edges), -1)
+        middle_at[asked] = len(value) + len(new) + np.arange(len(asked))
+        value = np.concatenate([value, read])
+        one, two = value[asked_at[a[asked]]], value[asked_at[b[asked]]]
         mid = read[len(new) :]
         wanted = (np.abs(mid - 0.5 * (one + two)) > BEND) | (np.abs(one - two) > STEP)
         wanted &= length[asked] > MIN_EDGE * diameter
@@ -124,11 +130,13 @@ def display_mesh(
         count = len(mesh.triangles) + int(split[of_side].sum())
         if not split.any() or count > max(MAX_TRIANGLES, len(triangles)):
             order = np.argsort(mesh.part_triangle, kind="stable")
-            return replace(
+            in_order = replace(
                 mesh, triangles=mesh.triangles[order], part_triangle=mesh.part_triangle[order]
             )
+            return in_order, asked_at
         point = np.concatenate([point, len(point) + _same_edge(point[edges[split]])])
         mesh = _divide(mesh, edges, of_side, split)
+        asked_at = np.concatenate([asked_at, middle_at[split]])
 
 
 def _with_vertices_of_faces(

@@ -172,17 +172,24 @@ class TargetField:
                 the division that pictures use.
         """
         from chamberopt.coverage.field.window_areas import window_areas
-        from chamberopt.coverage.field.windows import Windows
 
-        if division is None:
-            division = np.full(len(points.place), self.faces.middle)
-        windows = Windows(self._points_in_sector(points), radius, self.faces.joined, division)
+        windows = self.windows_round(points, radius, division)
         area = self.alike * window_areas(windows, self.surface)
         area[area == 0.0] = np.inf  # a window without touchable area stays bare
         band = find_band(windows, self.creases, self.pieces, 0.5 * self.setting.largest_dent)
         if band is not None:
             band = band._replace(length=self.alike * band.length)
         return Gauge(windows, area, band)
+
+    def windows_round(
+        self, points: Places, radius: float, division: np.ndarray | None = None
+    ) -> Windows:
+        """Return the windows of `gauge_round`, without their areas."""
+        from chamberopt.coverage.field.windows import Windows
+
+        if division is None:
+            division = np.full(len(points.place), self.faces.middle)
+        return Windows(self._points_in_sector(points), radius, self.faces.joined, division)
 
     def some_points(self, count: int) -> Places:
         """Return at most `count` points that a ball can touch, spread evenly over the target."""

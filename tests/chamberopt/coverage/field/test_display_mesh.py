@@ -18,6 +18,12 @@ DIAMETER = 2.0 * np.sqrt(GAUGE / np.pi)
 
 def cube_mesh(coverage: Callable[[Places], np.ndarray], shown: int = 12) -> DisplayMesh:
     """The display mesh of a cube, of which the field is drawn on the first triangles only."""
+    return mesh_and_numbers(coverage, shown)[0]
+
+
+def mesh_and_numbers(
+    coverage: Callable[[Places], np.ndarray], shown: int = 12
+) -> tuple[DisplayMesh, np.ndarray]:
     cube = box([SIDE] * 3)
     drawn = np.arange(12) < shown
     face = find_faces(cube.vertices, cube.faces, drawn)[0].of_triangle
@@ -54,6 +60,21 @@ def test_triangles_fill_those_of_the_part_and_meet_at_whole_edges(
     assert len(np.unique(sides, axis=0)) == len(sides)
     assert {tuple(side) for side in sides} == {tuple(side[::-1]) for side in sides}
     assert len(points) - len(sides) // 2 + len(corner) == 2  # Euler: no vertex hangs on an edge
+
+
+def test_the_number_of_each_vertex_leads_to_what_was_asked_there() -> None:
+    asked: list[Places] = []
+
+    def field(places: Places) -> np.ndarray:
+        asked.append(places)
+        return step_across_middle(places)
+
+    mesh, numbers = mesh_and_numbers(field)
+    place, normal, face = (np.concatenate(one) for one in zip(*asked, strict=True))
+    np.testing.assert_array_equal(place[numbers], mesh.vertices)
+    np.testing.assert_array_equal(normal[numbers], mesh.normal)
+    np.testing.assert_array_equal(face[numbers], mesh.face)
+    assert len(np.unique(numbers)) == len(numbers)
 
 
 def test_an_even_field_needs_few_triangles() -> None:
