@@ -265,9 +265,9 @@ class Reach:
     share: np.ndarray  # (k,), share of each triangle of the cavity that the ball can touch
 
 
-# The latest reaches, by a digest of all on which they depend. A chamber takes its own several times
-# over: to choose a target that the shot reaches, to check each step, to draw, and, of a proposal, to
-# see whether such a target is worth proposing.
+# The latest reaches, by a digest of all on which they depend. A chamber takes its own several
+# times: to choose a target, to check each step, to draw, and, of a proposal, to see whether a
+# target that the shot reaches is worth proposing.
 MOST_KNOWN = 4
 _known: OrderedDict[bytes, Reach] = OrderedDict()
 
