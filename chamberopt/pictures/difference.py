@@ -10,7 +10,7 @@ import numpy as np
 
 from chamberopt.pictures.actors import NO_RENDER
 from chamberopt.pictures.camera import cells_of, near_directions, near_views, seen_area
-from chamberopt.pictures.charts.colours import DIFFERENCE_MAP
+from chamberopt.pictures.charts.colours import DIFFERENCE_MAP, FEW_DENTS
 from chamberopt.pictures.panels import near_panels
 from chamberopt.pictures.picture_page import ColourBar, Row, write_page
 from chamberopt.pictures.subprocess_drawing import draw_in_subprocess
@@ -21,16 +21,18 @@ from chamberopt.results.vtp_files import Surface, save_surface
 PALE, NO_TARGET = "#e6e9ec", "#a9b0b7"
 
 
-Columns = Sequence[tuple[np.ndarray, np.ndarray]]
+Columns = Sequence[tuple[np.ndarray, np.ndarray, np.ndarray]]
 """For each later candidate the difference of coverage, -1..1, at the vertices of the target in
-their order, shape (v,), and marks of real differences, bool, shape (v,)."""
+their order, shape (v,), marks of real differences, and marks of enough dents to tell, bool, (v,)
+each."""
 
 
 def write_differences(path: Path, first: Path, columns: Columns) -> None:
     """Write a part as .vtp with the coverage of each later candidate minus the first candidate's.
 
-    Candidate k = 1, 2, ... has the columns difference_k [percentage points] and real_k (1 where
-    the difference is more than noise) at the vertices. The triangles have the column target.
+    Candidate k = 1, 2, ... has the columns difference_k [percentage points], real_k (1 where
+    the difference is more than noise) and told_k (1 where there are enough dents to tell) at the
+    vertices. The triangles have the column target.
 
     Args:
         path: .vtp file to write.
@@ -47,8 +49,9 @@ def _difference_surface(first: Path, columns: Columns) -> Surface:
     surface.clear_data()
     surface.cell_data["target"] = target
     surface.point_data.active_normals = normal
-    for k, (value, real) in enumerate(columns, start=1):
-        for name, column in ((f"difference_{k}", 100.0 * value), (f"real_{k}", real)):
+    for k, (value, *marks) in enumerate(columns, start=1):
+        names = (f"difference_{k}", f"real_{k}", f"told_{k}")
+        for name, column in zip(names, (100.0 * value, *marks), strict=True):
             surface.point_data[name] = np.zeros(surface.n_points, dtype=np.float32)
             surface.point_data[name][used] = column
     return surface
@@ -90,6 +93,9 @@ def render_difference(job: dict[str, Any]) -> None:
 
         rows.append(Row(title, near_panels(add, target, surface, views)))
     legend = [(PALE, "within the noise"), (NO_TARGET, "not in the target")]
+    used = np.unique(np.asarray(target.regular_faces))
+    if not all((np.asarray(target[f"told_{k}"])[used] > 0).all() for k in range(1, len(rows) + 1)):
+        legend.insert(1, (FEW_DENTS, "too few simulated dents to tell"))
     bar = ColourBar("difference of coverage [%-points]", DIFFERENCE_MAP, (-limit, limit), "both")
     write_page(job["picture"], rows, legend, bar)
 
@@ -99,9 +105,12 @@ def _add_difference(plotter: Any, target: Surface, rest: Surface, k: int, limit:
     if rest.n_cells:
         plotter.add_mesh(rest, color=NO_TARGET, **look)
     # The border is half way between vertices with and without a real difference.
-    noise, shown = target.clip_scalar(scalars=f"real_{k}", value=0.5, both=True)
-    if noise.n_cells:
-        plotter.add_mesh(noise, color=PALE, **look)
+    same, shown = target.clip_scalar(scalars=f"real_{k}", value=0.5, both=True)
+    if same.n_cells:
+        few, noise = same.clip_scalar(scalars=f"told_{k}", value=0.5, both=True)
+        for surface, colour in ((few, FEW_DENTS), (noise, PALE)):
+            if surface.n_cells:
+                plotter.add_mesh(surface, color=colour, **look)
     if shown.n_cells:
         plotter.add_mesh(
             shown, scalars=f"difference_{k}", cmap=DIFFERENCE_MAP, clim=(-limit, limit),

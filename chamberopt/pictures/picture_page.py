@@ -215,10 +215,13 @@ def _draw_dimension(axes: Axes, panel: Panel, one: Dimension) -> None:
 def _draw_bar(axes: Axes, bar: ColourBar) -> None:
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
+    from matplotlib.ticker import MaxNLocator
 
     drawn = axes.figure.colorbar(
         ScalarMappable(Normalize(*bar.limits), bar.colours), cax=axes, extend=bar.beyond
     )
+    drawn.locator = MaxNLocator(5, steps=[1, 2, 5, 10])  # ticks of few digits leave the label room
+    drawn.update_ticks()
     drawn.set_label(literal(bar.label), fontsize=TEXT)
     axes.tick_params(labelsize=SMALL)
 

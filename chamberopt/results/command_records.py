@@ -368,7 +368,8 @@ class DistributionsRecord(Table):
 class LocalDifferenceRecord(Table):
     """Shares of the target where a later candidate has more or less coverage than the first.
 
-    A point of the target counts only if its difference exceeds the 95 % interval.
+    A point of the target counts only if its difference is more than noise. `averaged_over_mm` is
+    the largest radius of the discs over which coverage is averaged there.
     """
 
     share_more: float
@@ -421,7 +422,7 @@ def comparison_record(
         ),
         local_differences_to_first=[
             LocalDifferenceRecord(
-                share_more=one.more, share_less=one.less, averaged_over_mm=one.radius
+                share_more=one.more, share_less=one.less, averaged_over_mm=one.radii[1]
             )
             for one in local
         ],

@@ -111,11 +111,19 @@ def _draw_differences(
     Return the reason if no image could be drawn, else None.
     """
     first, *later = comparison.labels
-    start, columns = comparison.results[0].folder, [(one.value, one.real) for one in local]
+    start, columns = (
+        comparison.results[0].folder,
+        [(one.value, one.real, one.told) for one in local],
+    )
     write_differences(folder / DIFFERENCE, start, columns)
     titles = []
     for label, one in zip(later, local, strict=True):
-        over = f"; averaged over {one.radius:.1f} mm" if one.radius else ""
+        low, high = (f"{radius:.1f}" for radius in one.radii)
+        over = (
+            ""
+            if high == "0.0"
+            else f"; averaged over {low if low == high else f'{low} to {high}'} mm"
+        )
         shares = f"more on {one.more:.0%}, less on {one.less:.0%} of the target{over}"
         shares = shares.replace("%", " %")
         titles.append(f"{label} minus {first}\n{shares}")

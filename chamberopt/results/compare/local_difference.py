@@ -120,10 +120,15 @@ def read_target_surface(result: Result) -> TargetSurface:
     )
 
 
-# Dents in a disc: a difference is smaller than either coverage and has more noise.
+# Dents in the smallest discs: a difference is smaller than either coverage and has more noise.
 DENTS = 60.0
 # Largest radius of a disc as a share of the target's size: a wider disc could hide a pattern.
-MAX_RADIUS_SHARE = 0.06
+MAX_RADIUS_SHARE = 0.12
+GROWTH = 1.5  # of the radius from discs to the next wider ones
+# Half-widths of 95 % by which an average may lie beside that of a smaller disc. More gives smoother
+# pictures, in which sharp borders are wider.
+BESIDE = 1.0
+FALSE_SHARE = 0.05  # of the area that counts as different, may be so by chance
 
 
 @dataclass(frozen=True)
@@ -132,52 +137,127 @@ class LocalDifference:
 
     Args:
         value: the difference, -1 to 1, at the vertices of the first candidate's field, shape (v,).
-        radius: radius of the discs over which both coverages are averaged [mm]. 0 for no averaging.
-        real: True where the difference exceeds its 95 % interval, shape (v,) bool. Each interval
-            holds for a single vertex, so by chance a vertex in twenty exceeds its interval.
+        real: True where the difference is more than noise, shape (v,) bool. Of their area, a share
+            of at most FALSE_SHARE is expected to be so by chance.
+        told: True where both have enough dents to tell, shape (v,) bool.
+        radius: radius of the disc over which both coverages are averaged at each vertex [mm], 0 for
+            no averaging, shape (v,). All that is finer is noise.
         more: share of the target's area where `real` is True and the later candidate has more.
         less: share of the target's area where `real` is True and the later candidate has less.
     """
 
     value: np.ndarray
     real: np.ndarray
-    radius: float
+    told: np.ndarray
+    radius: np.ndarray
     more: float
     less: float
+
+    @property
+    def radii(self) -> tuple[float, float]:
+        """Smallest and largest radius [mm] where the difference is real, else of all places."""
+        used = self.radius[self.real] if self.real.any() else self.radius
+        return float(used.min()), float(used.max())
 
 
 def local_difference(first: TargetSurface, other: TargetSurface) -> LocalDifference:
     """Return coverage of `other` minus coverage of `first`, two results with the same target.
 
-    Both coverages are averaged over the same discs, wide enough to hold about DENTS dents, up to a
-    share of the target's size. The interval of the difference follows from the intervals of the
-    two coverages, which assume independent dents. Averaging narrows it: the mean coverage of
-    windows of radius l over a disc of radius R scatters like the coverage of one window of radius
-    sqrt(l² + R²). Where a result has too few dents, no difference counts as real.
+    At each place both coverages are averaged over the same disc. The smallest discs hold about
+    DENTS dents, each wider one has GROWTH times the radius, up to a share of the target's size. A
+    place has the widest disc whose average agrees with those of all smaller ones: all that is finer
+    is noise. So a sharp difference stays sharp, and a weak one is seen where it extends far enough.
+
+    Each place is a test, and many are right by chance. They are judged together, so that of the
+    area that counts as different an expected FALSE_SHARE is none. Where a result has too few dents
+    in its windows, no difference counts as real.
+
+    Source, by heart: intersection of confidence intervals, A. Goldenshluger and A. Nemirovski,
+    Math. Methods Statist. 6 (1997) 135; Y. Benjamini and Y. Hochberg, J. R. Stat. Soc. B 57 (1995)
+    289, here by area in the place of numbers.
+    """
+    from scipy.stats import norm
+
+    coverage, interval, resolved = other.at(first)
+    told = resolved & first.resolved
+    gap, width = coverage - first.coverage, np.hypot(interval, first.interval)
+    low, high = np.full(len(gap), -np.inf), np.full(len(gap), np.inf)
+    value, half_width, radius = np.zeros((3, len(gap)))
+    for wider in _radii(first, other):
+        mean, half = _averaged(first, gap, width, wider)
+        low, high = np.maximum(low, mean - BESIDE * half), np.minimum(high, mean + BESIDE * half)
+        agrees = low <= high  # once they do not, the wider ones do neither
+        value = np.where(agrees, mean, value)
+        half_width = np.where(agrees, half, half_width)
+        radius = np.where(agrees, wider, radius)
+    z = np.abs(value) / np.maximum(half_width / norm.isf(0.025), 1e-12)
+    chance = np.where(told, 2.0 * norm.sf(z), 1.0)
+    real = chance <= _largest_chance(chance, first.area)
+    more, less = (float(first.area[real & sign].sum()) for sign in (value > 0.0, value < 0.0))
+    return LocalDifference(value, real, told, radius, more, less)
+
+
+def _radii(first: TargetSurface, other: TargetSurface) -> list[float]:
+    """Return the radii of the discs over which coverage is averaged [mm], the smallest first."""
+    window, dents = first.window_radius, max(min(first.dents, other.dents), 1.0)
+    most = MAX_RADIUS_SHARE * float(np.linalg.norm(np.ptp(first.place, axis=0)))
+    radii = [min(window * math.sqrt(max(0.0, DENTS / dents - 1.0)), most)]
+    while (wider := GROWTH * max(radii[-1], window)) < most:
+        radii.append(wider)
+    return radii
+
+
+def _averaged(
+    surface: TargetSurface, gap: np.ndarray, width: np.ndarray, radius: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return a difference averaged over discs, and the half-width of its 95 % interval, (v,) each.
+
+    The intervals of the two coverages assume independent dents. Averaging narrows them: the mean
+    coverage of windows of radius l over a piece of surface of area A scatters like the coverage of
+    one window of radius sqrt(l² + A / pi).
+
+    Args:
+        gap: difference at each vertex, (v,).
+        width: width of the 95 % interval of the difference at each vertex, (v,).
+        radius: radius of the discs [mm].
 
     Source: G. Y. Zou and A. Donner, "Construction of confidence limits about effect measures",
     Statistics in Medicine 27 (2008) 1693.
     """
-    coverage, interval, resolved = other.at(first)
-    window, dents = first.window_radius, max(min(first.dents, other.dents), 1.0)
-    size = float(np.linalg.norm(np.ptp(first.place, axis=0)))
-    radius = min(window * math.sqrt(max(0.0, DENTS / dents - 1.0)), MAX_RADIUS_SHARE * size)
-    average = _averages(first, radius)
-    value = average(coverage - first.coverage)
-    width = average(np.hypot(interval, first.interval)) * window / math.hypot(window, radius)
-    real = np.abs(value) > 0.5 * width
-    real &= resolved & first.resolved
-    more, less = (float(first.area[real & sign].sum()) for sign in (value > 0.0, value < 0.0))
-    return LocalDifference(value, real, radius, more, less)
+    if radius == 0.0:
+        return gap, 0.5 * width
+    average, share = _averages(surface, radius)
+    whole = float(areas(surface.corners[surface.target].reshape(-1, 3), _rows(surface)).sum())
+    window = surface.window_radius
+    narrower = window / np.sqrt(window**2 + share * whole / math.pi)
+    return average(gap), 0.5 * average(width) * narrower
 
 
-def _averages(surface: TargetSurface, radius: float) -> Callable[[np.ndarray], np.ndarray]:
+def _rows(surface: TargetSurface) -> np.ndarray:
+    """Return the triangles (m, 3) of a target whose corners stand one after the other."""
+    return np.arange(3 * int(surface.target.sum())).reshape(-1, 3)
+
+
+def _largest_chance(chance: np.ndarray, area: np.ndarray) -> float:
+    """Return the chance up to which a difference is real; -1 if none is.
+
+    Args:
+        chance: chance of a difference as large by noise alone, at each place, (v,).
+        area: share of the target's area that belongs to each place, (v,).
+    """
+    order = np.argsort(chance)
+    kept = np.flatnonzero(chance[order] <= FALSE_SHARE * np.cumsum(area[order]))
+    return float(chance[order][kept[-1]]) if len(kept) else -1.0
+
+
+def _averages(
+    surface: TargetSurface, radius: float
+) -> tuple[Callable[[np.ndarray], np.ndarray], np.ndarray]:
     """Return a function that averages values, shape (v,), over a disc round each vertex.
 
-    Vertices in the disc whose normal has another direction are left out. `radius` is in mm.
+    Vertices in the disc whose normal has another direction are left out. Return also the share of
+    the target's area that is averaged over, shape (v,). `radius` is in mm.
     """
-    if radius == 0.0:
-        return np.asarray
     from scipy.spatial import cKDTree
 
     pairs = cKDTree(surface.place).query_pairs(radius, output_type="ndarray")
@@ -188,4 +268,4 @@ def _averages(surface: TargetSurface, radius: float) -> Callable[[np.ndarray], n
         return np.asarray(own + np.bincount(i, own[j], len(own)) + np.bincount(j, own[i], len(own)))
 
     total = sums(surface.area)
-    return lambda values: sums(values * surface.area) / total
+    return lambda values: sums(values * surface.area) / total, total
