@@ -13,6 +13,7 @@ import numpy as np
 import trimesh
 
 from chamberopt.geometry.smoothing.smooth import divide_rounds, find_surfaces
+from chamberopt.pictures.charts.colours import BLACK, BLUE, GREY, ORANGE
 
 RADIUS, BALL, FACETS = 1.0, 0.8, 3  # mm, of the fillet and of the ball; in a right angle
 WIDTH = 4.0  # of the block
@@ -45,10 +46,10 @@ def section(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 
 def draw(axes: plt.Axes, corners: np.ndarray, title: str) -> None:
     """One section, with balls where they touch two facets at once and where they touch."""
-    axes.plot(*corners.T, color="#1f3b57", lw=2.0, marker="o", ms=3.5)
+    axes.plot(*corners.T, color=BLACK, lw=2.0, marker="o", ms=3.5)
     turn = np.radians(np.linspace(180.0, 270.0, 200))
     axes.plot(
-        RADIUS + RADIUS * np.cos(turn), RADIUS + RADIUS * np.sin(turn), "--", color="#888", lw=0.8
+        RADIUS + RADIUS * np.cos(turn), RADIUS + RADIUS * np.sin(turn), "--", color=GREY, lw=0.8
     )
     along = np.diff(corners, axis=0)
     length = np.linalg.norm(along, axis=1)
@@ -61,7 +62,7 @@ def draw(axes: plt.Axes, corners: np.ndarray, title: str) -> None:
         widest = max(widest, 2.0 * reach)
         for way in (-along[k] / length[k], along[k + 1] / length[k + 1]):
             axes.plot(
-                *np.c_[corner, corner + reach * way], color="#d1495b", lw=5.0, solid_capstyle="butt"
+                *np.c_[corner, corner + reach * way], color=ORANGE, lw=5.0, solid_capstyle="butt"
             )
     middle = (
         corners[len(corners) // 2 - 1 : len(corners) // 2 + 1] if len(corners) % 2 == 0 else None
@@ -69,9 +70,7 @@ def draw(axes: plt.Axes, corners: np.ndarray, title: str) -> None:
     towards = np.array([1.0, 1.0]) / np.sqrt(2.0)
     touch = corners[len(corners) // 2] if middle is None else middle.mean(axis=0)
     sine = 1.0 if middle is not None else 1.0 / np.cos(half)
-    axes.add_patch(
-        plt.Circle(touch + BALL * sine * towards, BALL, fill=False, color="#2a9d8f", lw=1.5)
-    )
+    axes.add_patch(plt.Circle(touch + BALL * sine * towards, BALL, fill=False, color=BLUE, lw=1.5))
     axes.set_title(f"{title}\nuntouched strips of {widest:.2g} mm", fontsize=10)
     axes.set_aspect("equal")
     axes.axis("off")
@@ -89,8 +88,8 @@ def main(path: Path) -> None:
     figure.text(
         0.5,
         0.02,
-        f"fillet of {RADIUS:g} mm (dashed), ball of {2 * BALL:g} mm; red: where a ball that lies "
-        "across two facets touches nothing\nDents of this ball are 0.12 to 0.2 mm wide: from both "
+        f"fillet of {RADIUS:g} mm (dashed), ball of {2 * BALL:g} mm; orange: where a ball that "
+        "lies across two facets touches nothing\nDents of this ball are 0.12 to 0.2 mm wide: from both "
         "sides they cover narrow strips, and wide ones never.",
         ha="center",
         fontsize=9,

@@ -12,6 +12,7 @@ from benchmarks.pictures import IMAGES
 from chamberopt.chamber.build import build_chamber
 from chamberopt.design.design import Design
 from chamberopt.design.shapes import TAG_SONOTRODE, ShapeSurface
+from chamberopt.pictures.charts.colours import EDGES, GLASS, PART_GREY, SONOTRODE
 
 SHOWN: dict[str, dict[str, Any]] = {
     "cylinder": {"diameter_mm": 60, "height_mm": 57, "corner_radius_mm": 8},
@@ -71,6 +72,7 @@ def _made(title: str, keys: dict[str, Any]) -> tuple[ShapeSurface, np.ndarray]:
 
 
 def _draw(axes: Any, title: str, cavity: ShapeSurface, part: np.ndarray) -> None:
+    from matplotlib.colors import to_rgb, to_rgba
     from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 
     corners = 1e3 * cavity.vertices[cavity.triangles]
@@ -78,16 +80,14 @@ def _draw(axes: Any, title: str, cavity: ShapeSurface, part: np.ndarray) -> None
     top = corners[..., 2].max()
     part = 1e3 * part[(1e3 * part[..., 2] < top).any(axis=1)]
     part[..., 2] = np.minimum(part[..., 2], top)
-    grey = np.array([0.66, 0.70, 0.73]) * (0.75 + 0.25 * _unit(part) @ LIGHT)[:, None]
-    orange = np.tile([0.90, 0.62, 0.0], (int(floor.sum()), 1))
-    for triangles, colours in ((corners[floor], orange), (part, grey)):
+    grey = np.array(to_rgb(PART_GREY)) * (0.75 + 0.25 * _unit(part) @ LIGHT)[:, None]
+    face = np.tile(to_rgb(SONOTRODE), (int(floor.sum()), 1))
+    for triangles, colours in ((corners[floor], face), (part, grey)):
         axes.add_collection3d(
             Poly3DCollection(triangles, facecolors=colours, edgecolors=colours, linewidths=0.3)
         )
-    axes.add_collection3d(Poly3DCollection(corners[~floor], facecolors=(0.35, 0.55, 0.75, 0.06)))
-    axes.add_collection3d(
-        Line3DCollection(_edges(cavity), colors="#334455", linewidths=0.6, alpha=0.8)
-    )
+    axes.add_collection3d(Poly3DCollection(corners[~floor], facecolors=to_rgba(GLASS, 0.1)))
+    axes.add_collection3d(Line3DCollection(_edges(cavity), colors=EDGES, linewidths=0.6, alpha=0.8))
     axes.set(xlim=(-23, 23), ylim=(-23, 23), zlim=(4, 53))
     axes.set_aspect("equal")
     axes.view_init(elev=20, azim=-58)

@@ -14,7 +14,14 @@ from chamberopt.chamber.fixture import size_in_words
 from chamberopt.common.number_text import typeset_plain as plain
 from chamberopt.design.shape_surface import TAG_PART, TAG_SONOTRODE, TAG_WALL
 from chamberopt.geometry.triangles import border_edges
-from chamberopt.pictures.charts.colours import BLACK, BLUE, DARK_GREY, FIXTURE_COLOURS, ORANGE
+from chamberopt.pictures.charts.colours import (
+    BLACK,
+    BLUE,
+    DARK_GREY,
+    FIXTURE_COLOURS,
+    KINDS,
+    SONOTRODE,
+)
 from chamberopt.pictures.section import (
     SAME,
     SectionPlane,
@@ -98,11 +105,11 @@ BESIDE, ABOVE, BELOW = 11.0, 9.0, 12.0
 WIDER = 0.1  # mm: a cavity that is wider than its sonotrode by more has its own dimension
 FACE = 2.5  # mm on paper, thickness of the drawn sonotrode
 MOST_OUTSIDE = 6.0  # mm on paper, most of the part that is drawn outside the chamber
-ROOM, PART, TARGET = "#e8f1f7", "#c9ced3", "#f0a860"
+ROOM, PART, TARGET = "#e8f1f7", "#c9ced3", KINDS["target"].colour
 RASTER = 200  # dots an inch, for the part in the plan
 LEGEND = (
-    "dimensions in mm. Orange: target, in the plan also where it is hidden. Hatched or grey: part. "
-    "Blue: sonotrode."
+    "dimensions in mm. Blue: target, in the plan also where it is hidden. Hatched or grey: part. "
+    "Orange: sonotrode."
 )
 LABEL = {"boxstyle": "square,pad=0.1", "facecolor": "white", "edgecolor": "none", "alpha": 0.85}
 
@@ -250,8 +257,8 @@ def _draw_section(
     _fill(axes, view, own, window, facecolor=PART, edgecolor=DARK_GREY, hatch="////", lw=0.5)
     tags, target = chamber.tags[row], chamber.on_target[row]
     _lines(axes, view, lines[tags == TAG_WALL], BLACK, 1.1)
-    _lines(axes, view, lines[tags > TAG_WALL], BLUE, 2.5)
-    _lines(axes, view, lines[target], ORANGE, 2.0)
+    _lines(axes, view, lines[tags > TAG_WALL], SONOTRODE, 2.5)
+    _lines(axes, view, lines[target], BLUE, 2.0)
     _draw_fixtures(axes, chamber, view, 1e-3 * at)
     (axis_at, y), (_, top) = view.place([[0.0, 0.0], [0.0, view.high[1]]])
     above = top + view.outside[1]
@@ -263,7 +270,7 @@ def _draw_section(
     face = 1e3 * lines[tags == TAG_SONOTRODE][..., 0]
     if face.size:
         x1, x2 = view.place([[face.min(), 0.0], [face.max(), 0.0]])[:, 0]
-        look: Any = {"facecolor": "white", "edgecolor": BLUE, "hatch": "xxxx", "lw": 1.0}
+        look: Any = {"facecolor": "white", "edgecolor": SONOTRODE, "hatch": "xxxx", "lw": 1.0}
         axes.fill_between([x1, x2], y - FACE, y, **look)
         size = face_size_mm(chamber)
         face_wide = size[0] if len(size) == 1 else float(np.ptp(face))
@@ -327,7 +334,7 @@ def _draw_plan(
     halfway, row = cut(chamber.vertices, chamber.triangles, 2, 0.5 * chamber.height)
     _lines(axes, view, halfway[chamber.tags[row] == TAG_WALL], BLACK, 0.7)
     face = chamber.triangles[chamber.tags == TAG_SONOTRODE]
-    _lines(axes, view, chamber.vertices[border_edges(face)][:, :, :2], BLUE, 1.1)
+    _lines(axes, view, chamber.vertices[border_edges(face)][:, :, :2], SONOTRODE, 1.1)
     (left, bottom), (right, top) = view.place([view.low, view.high])
     x, y = view.place([0.0, 0.0])
     is_upright = False
@@ -363,7 +370,7 @@ def _draw_joints(axes: Axes, chamber: Chamber, view: View, blocks: Blocks) -> No
         for at in places:
             ends = np.array([view.low, view.high])
             ends[:, axis] = at
-            (line,) = axes.plot(*view.place(ends).T, color=BLUE, lw=0.8, ls=(0, (6, 2)))
+            (line,) = axes.plot(*view.place(ends).T, color=SONOTRODE, lw=0.8, ls=(0, (6, 2)))
             line.set_clip_path(floor, axes.transData)
 
 
