@@ -89,8 +89,8 @@ def main(path: Path) -> None:
         0.5,
         0.02,
         f"fillet of {RADIUS:g} mm (dashed), ball of {2 * BALL:g} mm; orange: where a ball that "
-        "lies across two facets touches nothing\nDents of this ball are 0.12 to 0.2 mm wide: from both "
-        "sides they cover narrow strips, and wide ones never.",
+        "lies across two facets touches nothing\nDents of this ball are 0.12 to 0.2 mm wide: from "
+        "both sides they cover narrow strips, and wide ones never.",
         ha="center",
         fontsize=9,
     )

@@ -299,7 +299,16 @@ def design_fields(file: EditedFile) -> list[dict[str, object]]:
         }
         row |= {"reason": reasons.get(name, "")}
         rows.append(row)
-    return [row | _words(design, row["name"]) for row in [*_structure_rows(file), *rows]]
+    return [
+        row | _words(design, row["name"]) | {"reason": _new(row["reason"], row["text"])}
+        for row in [*_structure_rows(file), *rows]
+    ]
+
+
+def _new(reason: str, text: str) -> str:
+    """Return a reason, or "" if it has no word that the explanation of its number has not."""
+    own, known = ({*re.findall(r"\w{4,}", one.lower())} for one in (reason, text))
+    return "" if own and own <= known else reason
 
 
 def _words(design: Design, name: str) -> dict[str, str]:

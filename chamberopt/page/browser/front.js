@@ -15,8 +15,11 @@ async function show(part) {
   find("here").hidden = !here.parts.length;
   find("part").value = part ?? here.first;
   for (const [id, names] of [["material", here.alloys], ["shot", here.balls], ["shape", here.shapes], ["shop", here.shops],
-    ["calibration", here.calibrations]])
+    ["calibration", here.calibrations]]) {
+    const chosen = find(id).value; // stays, as a proposal for it may be shown below
     find(id).replaceChildren(find(id).options[0], ...names.map(option));
+    find(id).value = chosen;
+  }
   find("of-shop").hidden = !here.shops.length;
   find("of-calibration").hidden = !here.calibrations.length;
   find("designs").hidden = !here.designs.length;
@@ -131,6 +134,7 @@ find("propose").addEventListener("click", () => attempt(async () => {
   }
   find("picture").src = `/files/${begun.out.split("/").map(encodeURIComponent).join("/")}/design.png`;
   find("next").hidden = find("picture").hidden = false;
+  find("printed-fold").open = true; // what is proposed, why, and what is to be settled
   find("open-made").onclick = () => attempt(() => open(design));
   find("open-made").focus();
   await show(known.part);

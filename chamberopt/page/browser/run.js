@@ -14,10 +14,11 @@ export function fillRun() {
   showVaried();
 }
 
+let isRunning = false;
 // A design is simulated; a study is run or swept.
 function allow() {
   const kind = state.file.files.find((one) => one.name === find("of").value)?.kind;
-  for (const button of document.querySelectorAll("[data-command]")) button.disabled = (button.dataset.command === "simulate") !== (kind === "design");
+  for (const button of document.querySelectorAll("[data-command]")) button.disabled = isRunning || (button.dataset.command === "simulate") !== (kind === "design");
 }
 find("of").addEventListener("change", allow);
 
@@ -51,6 +52,8 @@ function show({ command, result, steps, lines, exit }) {
   study = exit === null && command.startsWith("chamberopt run ") ? result : "";
   if (study && study !== before) document.dispatchEvent(new CustomEvent("running", { detail: study }));
   find("stop").disabled = exit !== null;
+  isRunning = exit === null;
+  allow();
   const now = exit === null ? "running" : exit === 0 ? "finished" : exit === 130 ? "stopped" : `ended with exit status ${exit}`;
   find("progress").replaceChildren(element("p", { title: command }, element("b", { textContent: now })), ...bars(steps));
   find("printed").textContent = lines.join("\n");

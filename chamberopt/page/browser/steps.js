@@ -18,6 +18,19 @@ export async function followed(show, started) {
   return now;
 }
 
-export const bars = (steps) => steps.map((step) => element("div", {},
-  `${step.step}${step.total ? `: ${step.done} of ${step.total}` : ""}${step.best === null ? "" : `, best ${step.best.toFixed(4)}`}`,
-  Object.assign(element("progress"), step.total ? { max: step.total, value: step.done } : {})));
+// The time that is left of a step, from the pace since it was first seen; "" before a tenth is done.
+const begun = new Map();
+function left({ step, done, total }) {
+  const now = performance.now() / 1000, first = begun.get(step);
+  if (!first || done < first.done) begun.set(step, { done, at: now });
+  if (!first || !total || done >= total || done <= first.done || done < total / 10) return "";
+  const seconds = (now - first.at) * (total - done) / (done - first.done);
+  return `, about ${seconds < 90 ? `${Math.ceil(seconds / 5) * 5} s` : `${Math.ceil(seconds / 60)} min`} left`;
+}
+
+export const bars = (steps) => {
+  for (const step of begun.keys()) if (!steps.some((one) => one.step === step)) begun.delete(step);
+  return steps.map((one) => element("div", {},
+    `${one.step}${one.total ? `: ${one.done} of ${one.total}` : ""}${one.best === null ? "" : `, best ${one.best.toFixed(4)}`}${left(one)}`,
+    Object.assign(element("progress"), one.total ? { max: one.total, value: one.done } : {})));
+};
