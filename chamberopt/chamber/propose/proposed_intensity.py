@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 from chamberopt.chamber.propose.proposal import Proposal, Wanted
 from chamberopt.chamber.propose.proposed_balls import (
+    AS_GOOD,
     DEEPEST,
     LARGEST_BALL,
     OF_THIN,
@@ -142,10 +143,12 @@ def _of_larger(
     """
     of_small = [one for one in possible.serving if one.ball_mm == small]
     best = max(expected_intensity(one, simulated) for one in of_small)
+    served, most = possible.served[chosen.ball_mm], possible.served[small]
+    loses = most - served > AS_GOOD
     return (
-        f"{LARGER}: they serve {possible.served[chosen.ball_mm]:.0%} of the "
-        f"target, and {small:g} mm would serve {possible.served[small]:.0%}, with about "
-        f"{plain(best, 2)} mmA (--ball-mm {small:g} takes these)"
+        f"{LARGER if loses else LARGER.lower()}: they serve {served:.0%} of the target, and "
+        f"{small:g} mm would serve {most:.0%}, with about {plain(best, 2)} mmA (--ball-mm "
+        f"{small:g} takes these)"
     )
 
 

@@ -43,8 +43,8 @@ from chamberopt.common.number_text import plain, rounded
 
 RAISED = 1.0, 2.0, 3.0  # ball diameters by which a ceiling is raised for a second pose
 LEAST_SERVED = 0.25  # share of the target that coarse balls serve before finer ones, by heart
-# How warnings begin of fillets and slots that are too narrow, and of what no ball touches.
-NOT_SERVED = re.compile(r"shot of |[\d.]+% of ")
+# Warnings of fillets, slots and gaps that are too narrow, and of what no ball touches.
+NOT_SERVED = re.compile(r"^shot of |^[\d.]+% of |no ball gets in there")
 Steps = list[dict[str, Any]]
 """The [[steps]] of a design file."""
 
@@ -271,7 +271,8 @@ def _new_harm(two: Proposal, made: Proposal) -> str:
     get to some of the target is no harm: it counts in what they serve and touch.
     """
     known = {beginning(text) for text in made.warnings}
-    of_steps = (beginning(re.sub(r"^step \w+: ", "", text)) for text in two.warnings)
-    new = [text for text in of_steps if text not in known and not NOT_SERVED.match(text)]
+    of_steps = (re.sub(r"^step \w+: ", "", text) for text in two.warnings)
+    harms = (beginning(text) for text in of_steps if not NOT_SERVED.search(text))
+    new = [text for text in harms if text not in known]
     jams = "balls jam in a gap" if len(two.jams) > len(made.jams) else ""
     return next(iter(new), jams)
