@@ -222,6 +222,8 @@ def _one_after_the_other(coarse: Proposal, finer: Proposal, budgets: Sequence[Bu
         steps.append({**step, "name": name, "time_share": shares[1], "shot": shot})
     holder = {key: finer.tables[key] for key in ("holder",) if key in finer.tables}
     two, why = _with_values(coarse, holder, steps), {}
+    if two.reasons["shot.diameter_mm"].startswith(LARGER):  # what they leave out is served after
+        why["shot.diameter_mm"] = "chosen for the intensity"
     if "part.target.reachable" in two.reasons:
         why["part.target.reachable"] = "leaves out what balls of neither size touch here"
     if two.design.sonotrode.blocks is not None:

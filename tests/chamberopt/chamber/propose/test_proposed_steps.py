@@ -47,7 +47,9 @@ def test_each_size_peens_for_its_own_time_in_one_chamber(coarse: Proposal, tmp_p
         seen.append(one)
         return pilot(300.0, 0.1)
 
-    two, why = with_finer_balls(coarse, pilot(600.0, 0.3), FINER, measure)
+    reasons = {**coarse.reasons, "shot.diameter_mm": f"{LARGER}: they serve 83%"}
+    larger = replace(coarse, reasons=reasons)
+    two, why = with_finer_balls(larger, pilot(600.0, 0.3), FINER, measure)
     assert two is not None, why
     (tmp_path / "design.toml").write_text(design_text(two, tmp_path), "utf-8")
     design = load_design(tmp_path / "design.toml")
@@ -67,6 +69,7 @@ def test_each_size_peens_for_its_own_time_in_one_chamber(coarse: Proposal, tmp_p
     assert told.startswith("3 mm balls for 900 s, then 1 mm for 420 s: ")
     assert "about 0.3 mmA on the" in told
     assert "TWO INTENSITIES" in told
+    assert two.reasons["shot.diameter_mm"] == "chosen for the intensity"
     lines = " ".join(" ".join(proposal_end(two, [], verbose=False)).split())
     assert "balls of 3 mm (steel" in lines
     assert " and then " in lines
