@@ -114,7 +114,7 @@ def evaluate(
     while True:
         found = run.look_after_more(progress)
         if run.step.stopped_by:
-            if progress:
+            if progress and found.replicas < run.effort.most:
                 progress(found.replicas, found.replicas, None)  # no more are needed
             return found
 
