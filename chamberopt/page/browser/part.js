@@ -52,7 +52,8 @@ function showParts({ quantities, scenes, scales, kinds }) {
     const [t1, c1, h1] = curve[next], [t0, c0, h0] = curve[Math.max(next - 1, 0)];
     const share = t1 > t0 ? (at - t0) / (t1 - t0) : 1;
     const [value, halfWidth] = [c0 + share * (c1 - c0), h0 + share * (h1 - h0)].map((x) => (100 * x).toFixed(1));
-    return value >= 99.9 ? "more than 99.9 %" : `${value} ± ${halfWidth > 0 ? halfWidth : "less than 0.1"} %`;
+    if (halfWidth > 0) return `${value} ± ${halfWidth} %`;
+    return value >= 100 ? "more than 99.9 %" : `${value} %`; // known to the last digit
   }
 
   function showTime() {
