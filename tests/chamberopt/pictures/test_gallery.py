@@ -112,7 +112,7 @@ def test_differences_are_drawn(case: tuple, tmp_path: Path) -> None:
     surface = read_result_arrays(case[0] / "arrays.npz").field
     used = np.unique(np.asarray(surface.regular_faces)[np.asarray(surface["target"]) > 0])
     value = np.linspace(-0.2, 0.2, len(used))
-    columns = [(value, np.abs(value) > 0.05)]
+    columns = [(value, np.abs(value) > 0.05, np.ones(len(used), dtype=bool))]
     write_differences(tmp_path / "difference.vtp", case[0], columns)
     picture = tmp_path / "difference.png"
     assert draw_difference(case[0], columns, ["two - one"], picture) is None
