@@ -201,10 +201,15 @@ def _with_shot(made: Proposal, ball_mm: float) -> Proposal:
     ball_mass = made.design.shot.ball_mass * (ball_mm / setting_of(made).ball_mm) ** 3
     mass_g, _ = propose_charge(sonotrode_area(made.chamber), 1e-3 * ball_mm, ball_mass)
     mass_g = min(mass_g, float(f"{1e3 * MANY * ball_mass:.2g}"))
-    values: dict[str, dict[str, Any]] = {"shot": {"diameter_mm": ball_mm, "mass_g": mass_g}}
-    if made.tables.get("holder", {}).get("kind") == "bore":
-        values["holder"] = {"clearance_mm": bore_clearance_mm(1e-3 * ball_mm)}
-    return _with_values(made, values, _steps(made))
+    shot = {"shot": {"diameter_mm": ball_mm, "mass_g": mass_g}}
+    return _with_values(made, {**shot, **_clearance_for(made, ball_mm)}, _steps(made))
+
+
+def _clearance_for(made: Proposal, ball_mm: float) -> dict[str, dict[str, float]]:
+    """Return the clearance of a bore that holds the part, if one does, as a value in its table."""
+    if made.tables.get("holder", {}).get("kind") != "bore":
+        return {}
+    return {"holder": {"clearance_mm": bore_clearance_mm(1e-3 * ball_mm)}}
 
 
 def _one_after_the_other(coarse: Proposal, finer: Proposal, budgets: Sequence[Budget]) -> Proposal:
@@ -220,8 +225,8 @@ def _one_after_the_other(coarse: Proposal, finer: Proposal, budgets: Sequence[Bu
     steps = [{**step, "time_share": shares[0]} for step in own]
     for step, name in zip(own, names, strict=True):
         steps.append({**step, "name": name, "time_share": shares[1], "shot": shot})
-    holder = {key: finer.tables[key] for key in ("holder",) if key in finer.tables}
-    two, why = _with_values(coarse, holder, steps), {}
+    clearance = _clearance_for(coarse, setting_of(finer).ball_mm)
+    two, why = _with_values(coarse, clearance, steps), {}
     if two.reasons["shot.diameter_mm"].startswith(LARGER):  # what they leave out is served after
         why["shot.diameter_mm"] = "chosen for the intensity"
     if "part.target.reachable" in two.reasons:
