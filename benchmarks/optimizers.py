@@ -3,10 +3,12 @@
     python benchmarks/optimizers.py
     python benchmarks/optimizers.py --only ours,optuna-gp --problem cliff --seeds 3
     python benchmarks/optimizers.py --aside
+    python benchmarks/optimizers.py --drawn 10 --seeds 12
 
 The first command runs 20 seeds of 20, 40 and 80 evaluations on the problems of noisy_problems.py
-and takes about two CPU hours; --aside those problems that the search was not developed with. The
-other optimisers need the extra "bench" (pip install chamberopt[bench]), and Optuna's GP also torch.
+and takes about two CPU hours; --aside those problems that the search was not developed with;
+--drawn so many problems of drawn_problems.py. The other optimisers need the extra "bench" (pip
+install chamberopt[bench]), and Optuna's GP also torch.
 
 Every optimiser has the same start, the same noise and the same budget: so many evaluations of eight
 replicas. Ours gives a candidate that is clearly worse than the best after three replicas no more of
@@ -30,11 +32,13 @@ import warnings
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from functools import cache
 from itertools import product
 from typing import Any
 
 import numpy as np
 
+from benchmarks.drawn_problems import drawn_problem
 from benchmarks.noisy_problems import ASIDE, REPLICAS, Problem, problems
 from benchmarks.table import print_table, write_csv
 from chamberopt.common.estimate import Estimate, estimate
@@ -286,11 +290,17 @@ OPTIMIZERS: dict[str, Optimizer] = {
 }
 
 
+@cache
+def find_problem(name: str) -> Problem:
+    kind, _, seed = name.partition(" ")
+    return drawn_problem(int(seed)) if kind == "drawn" else problems()[name]
+
+
 def run(problem_name: str, name: str, evaluations: int, seed: int) -> dict[str, Any]:
     """One search and the regret of its answer."""
     from threadpoolctl import threadpool_limits
 
-    began, problem = time.process_time(), problems()[problem_name]
+    began, problem = time.process_time(), find_problem(problem_name)
     record = Record(problem, seed, evaluations)
     with threadpool_limits(limits=1):
         OPTIMIZERS[name](record)
@@ -380,6 +390,7 @@ def main() -> None:
     parser.add_argument("--only", help=f"names with commas, of {', '.join(OPTIMIZERS)}")
     parser.add_argument("--problem", default="", help="only those whose names begin so")
     parser.add_argument("--aside", action="store_true", help="only the problems kept aside")
+    parser.add_argument("--drawn", type=int, default=0, help="so many drawn problems instead")
     parser.add_argument("--seeds", type=int, default=SEEDS)
     parser.add_argument(
         "--first-seed", type=int, default=0, help="develop on some seeds, report on others"
@@ -391,11 +402,10 @@ def main() -> None:
     names = asked.only.split(",") if asked.only else ["ours", *OTHERS]
     if unknown := [name for name in names if name not in OPTIMIZERS]:
         parser.error(f"--only {', '.join(unknown)}: none of {', '.join(OPTIMIZERS)}")
-    chosen = [
-        name
-        for name in problems()
-        if name.startswith(asked.problem) and asked.aside == (name in ASIDE)
-    ]
+    known = [name for name in problems() if asked.aside == (name in ASIDE)]
+    if asked.drawn:
+        known = [f"drawn {seed}" for seed in range(asked.drawn)]
+    chosen = [name for name in known if name.startswith(asked.problem)]
     budgets = [int(one) for one in asked.evaluations.split(",")]
     seeds = range(asked.first_seed, asked.first_seed + asked.seeds)
     with ProcessPoolExecutor(asked.workers) as pool:

@@ -50,6 +50,7 @@ from chamberopt.geometry.triangles import (
     areas,
     find_shells,
     find_unwalled_border,
+    in_small_pieces,
     sharp_edges,
     tetrahedron_volumes,
 )
@@ -63,6 +64,9 @@ if TYPE_CHECKING:
 # ball's path a hundred times as much.
 MAX_ROTATION = 1e-3
 MIN_ROOM = 1e-13  # [m³], a fifth of the smallest ball: less is rounding, and worth no note
+# Area over that of a ball's square: a disc of half its diameter. A smaller piece that no ball
+# touches is a facet's, as on scans, and stays in the target.
+SPECK = math.pi / 16.0
 NOTED_HIDDEN = 1e-3  # share of a surface outside the cavity from which on it is told
 TARGET = "the target"
 OF_FIRST = "pictures and files show part and chamber as in the first"
@@ -451,18 +455,21 @@ def _only_reachable(
     normals = part.normals_in_cavity(room.vertices, room.triangles, traced.source)
     reach = find_reach(mesh, ball, normals=normals)
     share = reached_part_share(reach, traced.source, len(part.triangles))
-    target = part.target & (share > 0.5)
+    hidden = part.target & (share <= 0.5)
+    target = part.target & ~hidden
     if not target.any():
         raise InputError(
             f"part.target.reachable: a ball of {1e3 * ball:g} mm touches nothing of the target; "
             "use smaller balls, check part.rotate_deg, or leave it out: check says what is in the "
             "way"
         )
+    target |= in_small_pieces(part.vertices, part.triangles, hidden, SPECK * ball * ball)
     whole, left = part.area[part.target].sum(), part.area[part.target & ~target].sum()
     return replace(part, target=target), (
         f"target.reachable: {left / whole:.1%} of the target ({1e6 * left:.3g} mm²) is left out, "
         f"where a ball of {1e3 * ball:g} mm from over the sonotrode touches less than half of a "
-        "triangle; a study keeps this target for all its candidates"
+        "triangle, and such triangles make a piece larger than a disc of half its diameter; a "
+        "study keeps this target for all its candidates"
     )
 
 

@@ -113,6 +113,20 @@ def find_shells(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray
     return shells, np.bincount(shells, tetrahedron_volumes(vertices, triangles))
 
 
+def in_small_pieces(
+    vertices: np.ndarray, triangles: np.ndarray, marked: np.ndarray, least: float
+) -> np.ndarray:
+    """Return marks of marked triangles (m,) in pieces whose area is below `least` [m²].
+
+    The triangles of a piece are connected by their corners.
+    """
+    own, small = triangles[marked], np.zeros(len(triangles), dtype=bool)
+    _, piece = connected_pieces(own[:, [0, 1]].ravel(), own[:, [1, 2]].ravel(), len(vertices))
+    of_piece = np.bincount(piece[own[:, 0]], areas(vertices, own), len(vertices))
+    small[marked] = of_piece[piece[own[:, 0]]] < least
+    return small
+
+
 def tetrahedron_volumes(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """Return the signed volumes (m,) [m³] between triangles and the mean of all vertices.
 

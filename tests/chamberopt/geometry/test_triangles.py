@@ -4,7 +4,12 @@ import numpy as np
 import pytest
 import trimesh
 
-from chamberopt.geometry.triangles import closest_on_each, find_shells, winding_number
+from chamberopt.geometry.triangles import (
+    closest_on_each,
+    find_shells,
+    in_small_pieces,
+    winding_number,
+)
 
 
 @pytest.mark.parametrize("size", [1.0, 5e-4, 5e-5])
@@ -27,6 +32,24 @@ def test_pieces_of_a_surface_and_their_volumes() -> None:
 
     assert (np.bincount(shells) == 12).all()
     assert sorted(volumes) == pytest.approx([-8.0, 1.0])
+
+
+def test_small_pieces_are_those_connected_by_their_corners() -> None:
+    """Squares of 1 m²: two that touch at a corner are one piece of 2 m², a third is alone."""
+    square = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+    halves = np.array([[0, 1, 2], [0, 2, 3]])
+    away = np.array([[0.0, 0, 0], [1, 1, 0], [5, 0, 0]])
+    vertices = (away[:, None] + square).reshape(-1, 3)
+    touching = halves + 4
+    touching[touching == 4] = 2
+    triangles = np.concatenate([halves, touching, halves + 8])
+    marked = np.ones(6, dtype=bool)
+    alone = np.array([0, 0, 0, 0, 1, 1], dtype=bool)
+    np.testing.assert_array_equal(in_small_pieces(vertices, triangles, marked, 1.5), alone)
+    assert not in_small_pieces(vertices, triangles, marked, 0.9).any()
+    assert not in_small_pieces(vertices, triangles, ~marked, 9.0).any()
+    marked[1] = marked[2] = False  # half of a square each, still connected
+    assert not in_small_pieces(vertices, triangles, marked, 0.99).any()
 
 
 def test_the_winding_number_tells_inside_from_outside() -> None:
