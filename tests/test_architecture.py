@@ -19,7 +19,7 @@ ORDER = {
         "documents printers viewer workflows export page api cli __main__"
     ),
     "chamberopt/geometry": "triangles faces+outline+solids+remesh+thickness meshes "
-    "slivers+smoothing",
+    "slivers+smoothing cut",
     "chamberopt/geometry/smoothing": "rounds normals divide smooth part",
     "chamberopt/geometry/meshes": "surface_error native_reader+units+raw_mesh+self_intersection "
     "healing+elements+step_tessellation abaqus+gmsh+nastran+obj+ply+step+stl+threemf+vtk formats "

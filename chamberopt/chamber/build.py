@@ -456,14 +456,13 @@ def _only_reachable(
     reach = find_reach(mesh, ball, normals=normals)
     share = reached_part_share(reach, traced.source, len(part.triangles))
     hidden = part.target & (share <= 0.5)
-    target = part.target & ~hidden
-    if not target.any():
+    if hidden[part.target].all():
         raise InputError(
             f"part.target.reachable: a ball of {1e3 * ball:g} mm touches nothing of the target; "
             "use smaller balls, check part.rotate_deg, or leave it out: check says what is in the "
             "way"
         )
-    target |= in_small_pieces(part.vertices, part.triangles, hidden, SPECK * ball * ball)
+    target = part.target & ~without_specks(part, hidden, ball)
     whole, left = part.area[part.target].sum(), part.area[part.target & ~target].sum()
     return replace(part, target=target), (
         f"target.reachable: {left / whole:.1%} of the target ({1e6 * left:.3g} mm²) is left out, "
@@ -471,6 +470,17 @@ def _only_reachable(
         "triangle, and such triangles make a piece larger than a disc of half its diameter; a "
         "study keeps this target for all its candidates"
     )
+
+
+def without_specks(part: Part, hidden: np.ndarray, ball: float) -> np.ndarray:
+    """Return marks (m,) of triangles that no ball touches, without specks smaller than the ball.
+
+    Args:
+        hidden: marks of all triangles that no ball touches, (m,).
+        ball: diameter of the ball [m].
+    """
+    least = SPECK * ball * ball
+    return np.asarray(hidden & ~in_small_pieces(part.vertices, part.triangles, hidden, least))
 
 
 def selection_of(surface: str) -> str:

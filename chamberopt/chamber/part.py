@@ -12,9 +12,11 @@ import numpy as np
 from chamberopt.chamber.thin_part import thickness_to_simulate
 from chamberopt.common.errors import InputError
 from chamberopt.common.number_text import plain
+from chamberopt.geometry.cut import cut_at_box
 from chamberopt.geometry.faces import Faces
 from chamberopt.geometry.meshes.part_mesh import PartMesh, read_part_cached, select_triangles
 from chamberopt.geometry.remesh import remesh, triangle_quality
+from chamberopt.geometry.smoothing.divide import Surface
 from chamberopt.geometry.smoothing.part import SmoothingFacts, smooth
 from chamberopt.geometry.solids import snap_to_grid
 from chamberopt.geometry.triangles import (
@@ -54,13 +56,12 @@ def chosen_triangles(mesh: PartMesh, wanted: Selection, field: str = "part.targe
         )
         low, high = wanted.angle_deg
         chosen &= (angle >= low) & (angle <= high)
-    centroid_mm = mesh.vertices[mesh.triangles].mean(axis=1) * 1e3
     if wanted.radius_mm is not None:
+        centroid_mm = mesh.vertices[mesh.triangles].mean(axis=1) * 1e3
         radius, (low, high) = np.hypot(*centroid_mm.T[:2]), wanted.radius_mm
         chosen &= (radius >= low) & (radius <= high)
     if wanted.box_mm is not None:
-        low_corner, high_corner = np.asarray(wanted.box_mm)
-        chosen &= ((centroid_mm >= low_corner) & (centroid_mm <= high_corner)).all(axis=1)
+        chosen &= _in_box(mesh, wanted.box_mm)
     if not chosen.any():
         low_text, high_text = _corner(mesh.vertices.min(axis=0)), _corner(mesh.vertices.max(axis=0))
         raise InputError(
@@ -94,11 +95,19 @@ def _on_faces(mesh: PartMesh, wanted: Sequence[FaceAt], field: str) -> np.ndarra
     return chosen
 
 
+def _in_box(mesh: PartMesh, box_mm: Box) -> np.ndarray:
+    """Mark the triangles (m,) whose centroids are in a box."""
+    centroid_mm = mesh.vertices[mesh.triangles].mean(axis=1) * 1e3
+    low_corner, high_corner = np.asarray(box_mm)
+    return np.asarray(((centroid_mm >= low_corner) & (centroid_mm <= high_corner)).all(axis=1))
+
+
 def _corner(point: np.ndarray) -> str:
     return str([float(f"{1e3 * value:.6g}") for value in point])
 
 
 Axis = tuple[np.ndarray, np.ndarray]
+Box = Sequence[Sequence[float]]  # low and high corner
 
 LEAST_MOVED = 1e-3  # share of the target's area that is worth a note
 MAX_ELEMENTS = 3e5  # makes a few minutes of meshing, and slow steps after it
@@ -211,7 +220,6 @@ def posed_part(design: Design) -> tuple[Part, list[str]]:
         InputError: the file cannot be used, or the target is empty.
     """
     given, table = _part_of_file(design), design.part
-    target = _chosen(given, table.target, "part.target")
     zones = {
         zone.name: _chosen(given, zone.target, f"zones.{k}.target")
         for k, zone in enumerate(design.zones)
@@ -220,19 +228,22 @@ def posed_part(design: Design) -> tuple[Part, list[str]]:
     surface = table.target.model_copy(update={"reachable": False})
     found = _simulated(given, surface, table.smoothing, design.zones, _is_wall(design))
     mesh, origin = found.mesh, found.origin
+    target = _of_target(given, table.target)[origin]
+    if table.target.cut and table.target.box_mm is not None:
+        target = target & _in_box(mesh, table.target.box_mm)
     turn, shift = _pose(given, mesh.vertices, design)
     vertices = snap_to_grid(mesh.vertices @ turn.T + shift)
     thickness: np.ndarray | None = None
     thin_notes: list[str] = []
     if not _is_wall(design):
-        chosen = {"the target": target[origin]}
+        chosen = {"the target": target}
         chosen |= {f"zone {name}": zone[origin] for name, zone in zones.items()}
         thickness, thin_notes = thickness_to_simulate(design, mesh, chosen)
     part = Part(
         vertices=vertices,
         triangles=mesh.triangles,
         area=areas(vertices, mesh.triangles),
-        target=target[origin],
+        target=target,
         name=table.mesh_path.name,
         sha256=mesh.sha256,
         unit=mesh.unit,
@@ -328,7 +339,7 @@ def preview_part(design: Design) -> PartPreview:
         InputError: the file cannot be used, or target or zone are empty.
     """
     mesh, table = _part_of_file(design), design.part
-    target = _chosen(mesh, table.target, "part.target")
+    target = _of_target(mesh, table.target)
     zones = {
         one.name: _chosen(mesh, one.target, f"zones.{k}.target")
         for k, one in enumerate(design.zones)
@@ -382,6 +393,21 @@ def _chosen(mesh: PartMesh, wanted: Selection, field: str) -> np.ndarray:
     return chosen_triangles(mesh, wanted, field)
 
 
+def _of_target(mesh: PartMesh, target: Target) -> np.ndarray:
+    """Mark the triangles (m,) of a part's file that the target is, or a part of it.
+
+    Of a triangle that is cut at the target's box, what is in the box belongs to the target.
+    """
+    if not target.cut:
+        return np.asarray(_chosen(mesh, target, "part.target"))
+    surface = target.model_copy(update={"box_mm": None, "cut": False})
+    corners, box = mesh.vertices[mesh.triangles], 1e-3 * np.asarray(target.box_mm)
+    meets = ((corners.max(axis=1) >= box[0]) & (corners.min(axis=1) <= box[1])).all(axis=1)
+    chosen = _chosen(mesh, surface, "part.target") & meets
+    # If none is there, the message is that of triangles that are not cut.
+    return np.asarray(chosen if chosen.any() else _chosen(mesh, target, "part.target"))
+
+
 class _Simulated(NamedTuple):
     """The mesh of the part as it is simulated, in the file's frame.
 
@@ -412,7 +438,7 @@ def _simulated(
         mesh: the part as its file has it.
         is_wall: True if the part is a piece of the chamber's surface, which is not divided.
     """
-    chosen = _chosen(mesh, target, "part.target")
+    chosen = _of_target(mesh, target)
     rules = [
         (zone.smoothing or smoothing).rule(_chosen(mesh, zone.target, f"zones.{k}.target"))
         for k, zone in enumerate(zones)
@@ -421,8 +447,40 @@ def _simulated(
     if not is_wall:
         made = smooth(mesh, smoothing.rule(chosen), rules)
         found = _Simulated(made.of_part(mesh), made.origin, made.normals, made.hollow, made.facts)
+    own = chosen[found.origin]
+    if target.cut and target.box_mm is not None:
+        if is_wall:
+            text = "the part is drawn with its chamber, and its triangles are not divided"
+            raise InputError(f"part.target.cut: {text}; leave it out")
+        found = _cut(found, target.box_mm, own)
+        own = chosen[found.origin] & _in_box(found.mesh, target.box_mm)
     size = target.element
-    return found if size is None else _remeshed(found, chosen[found.origin], size)
+    return found if size is None else _remeshed(found, own, size)
+
+
+def _cut(found: _Simulated, box_mm: Box, target: np.ndarray) -> _Simulated:
+    """Return the part with the triangles of its target (m,) divided at the sides of a box."""
+    mesh, count = found.mesh, len(found.mesh.triangles)
+    normals = found.normals
+    if normals is None:
+        normals = np.repeat(unit_normals(mesh.vertices[mesh.triangles])[:, None], 3, axis=1)
+    own, of_crease = np.arange(count), np.zeros((count, 3), dtype=bool)
+    surface = Surface(mesh.vertices, mesh.triangles, own, normals, of_crease, np.zeros(count))
+    made = cut_at_box(surface, 1e-3 * np.asarray(box_mm), target)
+    rows = made.parent
+    return found._replace(
+        mesh=replace(
+            mesh,
+            vertices=made.vertices,
+            triangles=made.triangles.astype(np.int32),
+            numbering=mesh.numbering.select(rows),
+            groups={name: mask[rows] for name, mask in mesh.groups.items()},
+            normals=None,
+        ),
+        origin=found.origin[rows],
+        normals=None if found.normals is None else made.normals,
+        hollow=None if found.hollow is None else found.hollow[rows],
+    )
 
 
 def _remeshed(found: _Simulated, target: np.ndarray, size: float) -> _Simulated:

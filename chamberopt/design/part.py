@@ -97,9 +97,18 @@ class Target(Selection):
     element_mm: float | None = quantity(
         0.01, 1000, "mm", "wanted side of the target's triangles; absent: the file's", None
     )
+    cut: bool = Field(
+        default=False,
+        description="divide the triangles that cross a side of box_mm, so that it ends straight",
+    )
     reachable: bool = Field(
         default=False, description="only what a ball can touch, in the design's own chamber"
     )
+
+    def _problems(self) -> Iterator[Problem]:
+        yield from super()._problems()
+        if self.cut and self.box_mm is None:
+            yield Problem("cut", "given without box_mm; give the box at whose sides to cut")
 
     @property
     def element(self) -> float | None:

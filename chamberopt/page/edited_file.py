@@ -44,7 +44,7 @@ LATE_WRITE_S = 0.05  # an editor takes far less from opening a file to writing i
 # Keys that the page changes beside its fields: zones, and the faces of target, zone or fixture.
 PICKED = re.compile(
     r"(part\.target|zones\.\d+\.target|holder\.at|mask\.at)"
-    r"\.(surface|faces|direction|angle_deg|box_mm|radius_mm)|zones\.\d+"
+    r"\.(surface|faces|direction|angle_deg|box_mm|radius_mm|cut)|zones\.\d+"
 )
 
 

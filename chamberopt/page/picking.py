@@ -86,6 +86,8 @@ class Picker:
         if len(rows) > MAX_FACES:
             raise InputError(f"{table}: {len(rows)} faces, more than {MAX_FACES}; take all alike")
         others: dict[str, object] = {f"{table}.{key}": None for key in ways}
+        if table == TARGET_TABLE and design.part.target.cut:  # which takes a box
+            others[f"{table}.cut"] = None
         if table == MASK_TABLE and design.mask is None:  # the file may have had another one
             others = {f"{table}.{key}": None for key in OTHER_WAYS}
             others |= {MASK_KIND: "shell", **{f"mask.{key}": None for key in OF_MASK}}

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from chamberopt.chamber.build import without_specks
 from chamberopt.chamber.checks.check import touched
 from chamberopt.chamber.flexure import softness_of_part
 from chamberopt.pictures.actors import FAULT, NO_RENDER, add_edges
@@ -64,7 +65,8 @@ def draw_target(design: Design, chamber: Chamber, screenshot: Path) -> str:
     Return in words where the picture is, or why there is none.
     """
     part = chamber.part
-    missed = part.target & (touched(design, chamber) <= 0.5)
+    hidden = part.target & (touched(design, chamber) <= 0.5)
+    missed = without_specks(part, hidden, min(design.shot.diameters))
     corners = part.vertices[part.triangles]
     more = {"missed": missed, "softness": softness_of_part(design, part)}
     remark = draw_part(corners, part.name, screenshot, part.target, chamber=chamber, **more)

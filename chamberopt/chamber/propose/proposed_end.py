@@ -105,7 +105,8 @@ def held_end(mesh: PartMesh, target: Target, turns: Turns, of_any: bool = False)
     cut = 1e3 * float(own.max() - share * length if is_top else own.min() + share * length)
     middle = 1e3 * mesh.vertices[mesh.triangles].mean(axis=1)[:, axis]
     of_end = middle > cut if is_top else middle < cut
-    keys = {**target.keys, "box_mm": box_beyond(mesh, axis, not is_top, cut)}
+    box = box_beyond(mesh, axis, not is_top, cut)
+    keys = {**target.keys, "box_mm": box, "cut": True}
     reason = (
         f"{target.reason}; AN END IS LEFT BARE, {share:.0%} of its length, to hold it by: accept "
         "it, or peen it in a second setup, end for end"

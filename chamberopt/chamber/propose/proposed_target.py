@@ -152,7 +152,7 @@ PATTERN = 6  # number of alike faces that make a repeated feature, such as teeth
 COLOUR, VIVID = re.compile(r"#([0-9a-f]{2})([0-9a-f]{2})([0-9a-f]{2})$", re.I), 100
 NUMBERED = re.compile(r"(?:pid|set|zone)[\s_]*\d+$", re.I)  # names that say nothing
 FACE = re.compile(r"face (\d+)", re.I)
-Keys = dict[str, list[Any]]
+Keys = dict[str, Any]
 """Keys of [part.target], "surface" or "faces", and their values."""
 
 WHOLE: Keys = {"surface": ["all"]}

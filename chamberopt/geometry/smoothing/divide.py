@@ -124,9 +124,7 @@ def _split_once(
         of_side = np.zeros((len(new), 3))
         of_side[sides.T] = normal
         vertices = np.concatenate([surface.vertices, place[wanted]])
-        finer, row, side = _divided(
-            surface, vertices, new.reshape(-1, 3), of_side.reshape(-1, 3, 3)
-        )
+        finer, row, side = divided(surface, vertices, new.reshape(-1, 3), of_side.reshape(-1, 3, 3))
         facing = unit_vectors(area_vectors(finer.vertices, finer.triangles))
         turned = np.einsum("ki,kji->kj", facing, finer.normals).min(axis=1) < TURNED
         is_split = np.asarray((new.reshape(-1, 3) >= 0).any(axis=1))
@@ -270,7 +268,7 @@ def _tangent(one: np.ndarray, two: np.ndarray, e: np.ndarray) -> np.ndarray:
     return np.where(weak[:, None], e, unit_vectors(cross))
 
 
-def _divided(
+def divided(
     surface: Surface, vertices: np.ndarray, new: np.ndarray, normal: np.ndarray
 ) -> tuple[Surface, np.ndarray, np.ndarray]:
     """Return the surface with its triangles divided at the middles of their sides.

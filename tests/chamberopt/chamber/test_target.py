@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
+from pydantic import ValidationError
 
 from chamberopt.chamber.build import Chamber, build_chamber
 from chamberopt.chamber.checks.facts import describe
@@ -49,6 +50,8 @@ def target_area_mm2(chamber: Chamber) -> float:
         ({"surface": ["left", "right"]}, 1200.0),
         ({"surface": ["left", "bottom"], "direction": (0, 0, -1), "angle_deg": (0, 10)}, 200.0),
         ({"surface": "ends", "box_mm": ((-99, 0, -99), (99, 99, 99))}, 300.0),
+        ({"surface": "left", "box_mm": ((-99, -3, 3.3), (99, 99, 99)), "cut": True}, 13 * 11.7),
+        ({"box_mm": ((-99, -99, 3.3), (99, 99, 99)), "cut": True, "element_mm": 2}, 902.0),
     ],
 )
 def test_names_choose_and_the_other_conditions_narrow(
@@ -136,6 +139,17 @@ def test_too_small_elements_are_refused_with_a_size_that_fits(tmp_path: Path) ->
         match=r"part\.target\.element_mm: given 0\.01.*million triangles.*at least 0\.13",
     ):
         build_chamber(design_of(tmp_path, {"element_mm": 0.01}))
+
+
+def test_a_cut_takes_a_box(tmp_path: Path) -> None:
+    with pytest.raises(ValidationError, match=r"given without box_mm"):
+        design_of(tmp_path, {"surface": "top", "cut": True})
+
+
+def test_a_cut_box_that_holds_nothing_is_told_as_any_other(tmp_path: Path) -> None:
+    nowhere = {"box_mm": ((50, 50, 50), (60, 60, 60)), "cut": True}
+    with pytest.raises(InputError, match=r"part\.target: chooses none of the 12 triangles"):
+        build_chamber(design_of(tmp_path, nowhere))
 
 
 def with_reachable(reachable: bool, **values: float) -> Design:

@@ -1,0 +1,69 @@
+import numpy as np
+import pytest
+import trimesh
+
+from chamberopt.geometry.cut import cut_at_box
+from chamberopt.geometry.smoothing.divide import Surface
+from chamberopt.geometry.triangles import areas, edge_keys, unit_normals
+
+
+def surface_of(mesh: trimesh.Trimesh) -> Surface:
+    """The mesh with the normals of its facets at their corners."""
+    count = len(mesh.faces)
+    normals = np.repeat(unit_normals(mesh.vertices[mesh.faces])[:, None], 3, axis=1)
+    of_crease = np.zeros((count, 3), dtype=bool)
+    triangles = np.asarray(mesh.faces)
+    vertices = np.asarray(mesh.vertices)
+    return Surface(vertices, triangles, np.arange(count), normals, of_crease, np.zeros(count))
+
+
+def area_inside(surface: Surface, box: np.ndarray) -> float:
+    middle = surface.vertices[surface.triangles].mean(axis=1)
+    inside = ((middle >= box[0]) & (middle <= box[1])).all(axis=1)
+    return float(areas(surface.vertices, surface.triangles)[inside].sum())
+
+
+@pytest.mark.parametrize("subdivisions", [0, 1, 3])
+@pytest.mark.parametrize("seed", range(4))
+def test_the_area_in_a_box_is_that_of_the_surface_however_it_is_divided(
+    subdivisions: int, seed: int
+) -> None:
+    """The six faces of a cube, cut at a box whose low corner is in it: three squares' shares."""
+    rng = np.random.default_rng(seed)
+    cube = trimesh.creation.box((2.0, 2.0, 2.0))
+    for _ in range(subdivisions):
+        cube = cube.subdivide()
+    corner = rng.uniform(-0.9, 0.9, 3)
+    box = np.array([corner, [9.0, 9.0, 9.0]])
+    cut = cut_at_box(surface_of(cube), box, np.ones(len(cube.faces), dtype=bool))
+    x, y, z = 1.0 - corner
+    assert area_inside(cut, box) == pytest.approx(x * y + y * z + z * x, rel=0.03)
+    assert areas(cut.vertices, cut.triangles).sum() == pytest.approx(24.0)
+
+
+def test_a_cut_surface_stays_closed_and_in_place() -> None:
+    """Also where only some triangles are to be cut. Zones of a sphere: Archimedes' hat-box."""
+    ball = trimesh.creation.icosphere(4)
+    box = np.array([[-0.37, -9.0, -9.0], [0.51, 9.0, 9.0]])
+    wanted = ball.triangles_center[:, 2] > 0.0
+    for some in (wanted, np.ones_like(wanted)):
+        cut = cut_at_box(surface_of(ball), box, some)
+        _, times = np.unique(edge_keys(cut.triangles), return_counts=True)
+        assert (times == 2).all()
+        made = trimesh.Trimesh(cut.vertices, cut.triangles, process=False)
+        assert made.is_watertight
+        assert made.volume == pytest.approx(ball.volume, rel=1e-12)
+        assert len(cut.triangles) > len(ball.faces)
+        moved = areas(cut.vertices, cut.triangles)
+        of_parent = np.bincount(cut.parent, moved, len(ball.faces))
+        np.testing.assert_allclose(of_parent, ball.area_faces, rtol=1e-9)
+    assert area_inside(cut, box) == pytest.approx(2.0 * np.pi * 0.88, rel=5e-3)
+    np.testing.assert_allclose(np.linalg.norm(cut.normals, axis=2), 1.0)
+
+
+def test_a_side_of_the_box_close_to_a_corner_makes_no_sliver() -> None:
+    cube = trimesh.creation.box((2.0, 2.0, 2.0))
+    box = np.array([[-9.0, -9.0, -9.0], [9.0, 9.0, 0.99]])
+    surface = surface_of(cube)
+    whole = cut_at_box(surface, box, np.ones(len(cube.faces), dtype=bool))
+    assert len(whole.triangles) == len(cube.faces)
