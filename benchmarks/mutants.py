@@ -153,6 +153,7 @@ def main() -> None:
     options = parser.parse_args()
     seeds = range(options.first, options.first + options.seeds)
     faults, rows = drawn(seeds, tuple(options.packages.split(","))), []
+    passed: set[Path] = set()  # files of tests that pass without a fault
     with tempfile.TemporaryDirectory() as folder:
         copy = Path(folder)
         if not options.show:
@@ -160,8 +161,10 @@ def main() -> None:
                 shutil.copytree(ROOT / name, copy / name)
             shutil.copy(ROOT / "pyproject.toml", copy)
         for seed, own, test, text, fault in faults:
-            if not options.show and is_caught(copy, own, test, (ROOT / own).read_text("utf-8")):
-                sys.exit(f"{test} fails without a fault")
+            if not options.show and test not in passed:
+                if is_caught(copy, own, test, (ROOT / own).read_text("utf-8")):
+                    sys.exit(f"{test} fails without a fault")
+                passed.add(test)
             caught = "not run" if options.show else is_caught(copy, own, test, text)
             rows.append({"seed": seed, "file": own.as_posix(), "fault": fault, "caught": caught})
             print(*rows[-1].values(), sep="  ", flush=True)
