@@ -228,7 +228,8 @@ class Comparison:
         standing = predicted.standing(wanted)
         words = f"{standing} with the whole interval"
         if standing == NOT_DECIDED:
-            where = INSIDE if wanted[0] <= predicted.value <= wanted[1] else OUTSIDE
+            shown = float(f"{predicted.value:.2g}")  # as it is told
+            where = INSIDE if wanted[0] <= shown <= wanted[1] else OUTSIDE
             words = f"{NOT_DECIDED}: the value is {where}, the interval is not"
             if where == OUTSIDE:
                 words = f"{NOT_DECIDED}: the value is {where}, the interval not wholly"
