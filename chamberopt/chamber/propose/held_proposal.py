@@ -198,10 +198,32 @@ def only_touched(made: Proposal, floor: Floor, shop: Shop | None) -> Proposal:
     part, share = made.chamber.part, touched(made.design, made.chamber)
     left = np.where(part.target, (1.0 - share) * part.area, 0.0)
     place = one_of(part.vertices[part.triangles].mean(axis=1), left)
-    text = f"leaves out the {hidden:.1%} that no ball touches here, such as at {place}"
+    text = (
+        f"PLACES ARE LEFT OUT, {hidden:.1%} of the target, which no ball touches here, such as at"
+    )
+    text += f" {place}: agree on it, or take smaller balls (--ball-mm)"
+    if (radius := _narrow_fillets(made, left)) > 0.0:
+        text = f"FILLETS ARE LEFT OUT, of about {1e3 * radius:.2g} mm, {hidden:.1%} of the target, "
+        text += f"such as at {place}: they are where parts fail; take balls that are less than "
+        text += f"{2e3 * radius:.2g} mm thick (--ball-mm), or agree on it"
     reasons = {**made.reasons, "part.target.reachable": text}
     tables = {**made.tables, "part.target": target}
     return checked(tables, reasons, floor, made.known, made.mesh, shop)
+
+
+def _narrow_fillets(made: Proposal, left: np.ndarray) -> float:
+    """Return the radius [m] of the fillets that are most of what is left out; 0 if they are not.
+
+    Args:
+        left: area that no ball touches of each triangle of the part [m²], (m,).
+    """
+    hollow, ball = made.chamber.part.hollow, min(made.design.shot.diameters)
+    if hollow is None:
+        return 0.0
+    narrow = hollow * 0.5 * ball > 1.0
+    if left[narrow].sum() < 0.5 * left.sum():
+        return 0.0
+    return float(1.0 / np.average(hollow[narrow], weights=left[narrow]))
 
 
 def _harmless(

@@ -25,6 +25,9 @@ from chamberopt.geometry.triangles import areas, interpolate, unit_vectors
 POINTS = 8_000  # on the target, and as many on the rest of the part
 MISSED = 0.05  # share of the target's area that a larger ball may fail to touch
 AS_GOOD = 0.05  # share of the target's area within which two sizes serve alike
+# Fillets are where parts fail, whatever share of the area they are. From this share on they count,
+# which no noise of facets reaches; and a size may fail to touch so much of them.
+LEAST_FILLETS, MISSED_FILLETS = 0.005, 0.1
 MOSTLY = 0.8  # share of the target's area that balls serve which an intensity takes, by heart
 # Balls in the charge: of sizes that need more, the largest is taken that serves as well. Thousands
 # of small balls make weak dents, are hard to get back from a chamber, and are slow to simulate.
@@ -49,6 +52,7 @@ class SizeFit:
     suits: bool  # true if no fillet or slot is so small that `check` would warn
     jam: float  # width of a gap of the part in which the ball jams [m]; 0 if there is none
     count: int  # of balls in a charge under the part
+    fillets: float = 1.0  # share that it can touch of fillets so narrow that the largest may not
 
 
 def charge_of(area: float, diameter: float) -> float:
@@ -97,6 +101,8 @@ def fit_sizes(part: Part, diameters: Sequence[float]) -> list[SizeFit]:
     round_ = edges.radius > 0.0
     np.minimum.at(fillet, edges.triangles[round_].ravel(), np.repeat(edges.radius[round_], 2))
     on, whole = part.target[triangle], float(area[part.target[triangle]].sum())
+    narrow = on & (fillet[triangle] < 0.5 * max(diameters))
+    of_narrow = float(area[narrow].sum())
     fits, tolerance = [], 0.0
     for one in diameters:
         overlap = tolerated_overlap(one)
@@ -116,7 +122,10 @@ def fit_sizes(part: Part, diameters: Sequence[float]) -> list[SizeFit]:
         jam = float(np.average(width[held], weights=area[held])) if jams else 0.0
         touch, serve = (float(area[rows].sum()) / whole for rows in (touched, served))
         count = round(charge_of(float(np.sort(np.ptp(part.vertices, axis=0))[1:].prod()), one))
-        fits.append(SizeFit(one, touch, serve, bool(suits), jam, count))
+        fillets = 1.0
+        if of_narrow > LEAST_FILLETS * whole:
+            fillets = float(area[touched & narrow].sum()) / of_narrow
+        fits.append(SizeFit(one, touch, serve, bool(suits), jam, count, fillets))
     return fits
 
 
@@ -173,6 +182,8 @@ def propose_ball(fits: Sequence[SizeFit]) -> tuple[float, str]:
     free = [one for one in fits if not one.jam] or list(fits)
     touching = max(one.touched for one in free) - MISSED
     reach = [one for one in free if one.touched >= touching]
+    in_fillets = max((one.fillets for one in reach if one.count <= MANY), default=0.0)
+    reach = [one for one in reach if one.fillets >= in_fillets - MISSED_FILLETS]
     most = max(one.served for one in reach)
     as_good = [one for one in reach if one.served >= most - AS_GOOD][-1]
     suited = [one for one in reach if one.suits]
@@ -195,6 +206,9 @@ def propose_ball(fits: Sequence[SizeFit]) -> tuple[float, str]:
         shown = sorted({*fits[:: max(1, len(fits) // MOST_LISTED)], best}, key=lambda x: x.diameter)
         shares = ", ".join(f"{_mm(one)} {one.served:.0%}" for one in shown)
         text = f"NO SIZE SERVES ALL (fillets of 2, slots of 4 diameters); of the target: {shares}"
+    blunt = [one for one in fits if one.diameter > best.diameter]
+    if blunt and blunt[0].fillets < best.fillets - MISSED_FILLETS:
+        text += "; larger ones do not get into its fillets, where parts fail"
     larger = [one for one in fits if one.diameter > best.diameter and one.count <= MANY]
     if best.count > MANY and larger:
         text += f"; MANY BALLS, some {best.count:,} under the whole part: "

@@ -24,7 +24,7 @@ from chamberopt.chamber.propose.proposal import (
     sonotrode_area,
     touched_share,
 )
-from chamberopt.chamber.propose.proposed_balls import AS_GOOD, MANY, fit_sizes
+from chamberopt.chamber.propose.proposed_balls import AS_GOOD, MANY, MISSED_FILLETS, fit_sizes
 from chamberopt.chamber.propose.proposed_budget import (
     COVERED,
     UNEVEN,
@@ -146,7 +146,8 @@ def with_finer_balls(
         finer = _with_shot(coarse, finer_mm)
         fine, most = fit_sizes(finer.chamber.part, [1e-3 * finer_mm, 1e-3 * coarse_mm])
         shares = f"{coarse_mm:g} mm serve {most.served:.0%}, {finer_mm:g} mm {fine.served:.0%}"
-        if fine.served <= most.served + AS_GOOD or most.served < LEAST_SERVED:
+        more = fine.served > most.served + AS_GOOD or fine.fillets > most.fillets + MISSED_FILLETS
+        if not more or most.served < LEAST_SERVED:
             return None, shares
         for balls in RAISED:  # a ceiling that suits the coarse balls may hold the finer ones
             if "gap" in (harm := _new_harm(finer, coarse)):

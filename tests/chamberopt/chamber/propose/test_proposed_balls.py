@@ -103,6 +103,26 @@ def test_fewer_balls_are_proposed_where_they_serve_nearly_as_much() -> None:
     assert "MANY BALLS, some 4,000 under the whole part: 2 mm would serve 60%" in reason
 
 
+def test_balls_get_into_the_fillets_of_the_target() -> None:
+    """A stud whose fillet under the head, of 1.2 mm, is 4 % of what is to be peened.
+
+    A ball of less than 2.4 mm touches all of it, one of 3 mm its edges alone.
+    """
+    angle = np.linspace(0.0, 0.5 * np.pi, 31)
+    fillet = np.c_[7.2 - 1.2 * np.cos(angle), 58.8 + 1.2 * np.sin(angle)]
+    profile = np.r_[[[0.0, 0.0], [6.0, 0.0]], fillet, [[10.0, 60.0], [10.0, 68.0], [0.0, 68.0]]]
+    stud = trimesh.creation.revolve(1e-3 * profile, sections=90)
+    x, y, z = stud.triangles_center.T
+    target = (np.hypot(x, y) < 7.3e-3) & (z > 1e-6) & (z < 60.5e-3)
+    fits = fit_sizes(part_of(stud, target), (0.5e-3, 1.5e-3, 2e-3, 3e-3))
+    of_size = {round(1e3 * one.diameter, 3): one.fillets for one in fits}
+    assert of_size[2.0] > 0.9
+    assert of_size[3.0] < 0.5
+    diameter, reason = propose_ball(fits)
+    assert diameter == 2e-3
+    assert "larger ones do not get into its fillets" in reason
+
+
 @pytest.mark.parametrize(("thick_mm", "most_mm"), [(0.6, 0.9), (1.0, 1.5), (20.0, 3.0)])
 def test_balls_are_small_beside_thin_metal(thick_mm: float, most_mm: float, tmp_path: Path) -> None:
     """A sheet is bent by large balls; a block takes the largest that are proposed."""
