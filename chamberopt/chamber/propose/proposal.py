@@ -170,7 +170,8 @@ def new_warning(made: Proposal, before: Proposal) -> str:
 
     Where only gaps in which balls jam are new, it says so.
     """
-    new = [text for text in made.warnings if text not in before.warnings]
+    known = {text.partition(":")[0] for text in before.warnings}  # places and areas may differ
+    new = [text for text in made.warnings if text.partition(":")[0] not in known]
     return next(iter(new or made.warnings), "balls jam in a gap")
 
 

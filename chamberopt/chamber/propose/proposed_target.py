@@ -152,6 +152,7 @@ PATTERN = 6  # number of alike faces that make a repeated feature, such as teeth
 COLOUR, VIVID = re.compile(r"#([0-9a-f]{2})([0-9a-f]{2})([0-9a-f]{2})$", re.I), 100
 NUMBERED = re.compile(r"(?:pid|set|zone)[\s_]*\d+$", re.I)  # names that say nothing
 FACE = re.compile(r"face (\d+)", re.I)
+MOST_NAMED = 5  # surfaces of a target that are named; of more, the first are
 Keys = dict[str, Any]
 """Keys of [part.target], "surface" or "faces", and their values."""
 
@@ -380,7 +381,11 @@ def _joined(chosen: Sequence[Surface], reason: str) -> Target:
         text = "names of the file and faces cannot be one target; give one kind"
         raise InputError(f"--target: given {[one.name for one in chosen]}; {text}")
     marked = np.any([one.triangles for one in chosen], axis=0)
-    return Target(keys, marked, f"{', '.join(one.name for one in chosen)}: {reason}")
+    names = [one.name for one in chosen]
+    listed = ", ".join(names if len(names) <= MOST_NAMED else names[: MOST_NAMED - 1])
+    if len(names) > MOST_NAMED:
+        listed += f" and {len(names) - MOST_NAMED + 1} more"
+    return Target(keys, marked, f"{listed}: {reason}")
 
 
 def named_or_all(known: Sequence[Surface]) -> Sequence[Surface]:
