@@ -191,7 +191,7 @@ def _seen(
     design: Design, chamber: Chamber, executor: Executor, replicas: list[Replica]
 ) -> Evaluation:
     """Return the figures of replicas in windows of the design's size."""
-    plan, known = ReplicaPlan(count=REPLICAS), ReplicaSet(list(replicas))
+    plan, known = ReplicaPlan(count=REPLICAS, wide_windows=False), ReplicaSet(list(replicas))
     return evaluate(design, chamber, executor, plan=plan, known=known)
 
 
