@@ -52,7 +52,8 @@ def predict_intensity(
         sim_core.SimulationError: a replica cannot be simulated.
     """
     area = 1e6 * float(chamber.part.area[chamber.part.target].sum())
-    time, plan = FIRST_TIME, ReplicaPlan(count=REPLICAS, wide_windows=False)
+    time = FIRST_TIME
+    plan = ReplicaPlan(count=REPLICAS, wide_windows=False, single_steps=False)
     while True:
         accuracy = {
             "simulated_time_s": time,

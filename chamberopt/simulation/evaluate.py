@@ -84,6 +84,8 @@ class ReplicaPlan:
     objective_name: str = "uniform_coverage"
     # Whether coverage is also measured in windows of twice the radius. No search takes these.
     wide_windows: bool = True
+    # Whether the target has figures of each step alone too. No pilot takes these.
+    single_steps: bool = True
 
 
 def evaluate(
@@ -147,7 +149,7 @@ class _Run:
         self.step = self.effort.begin  # how many replicas the next look takes
         self.timings = {"simulate": 0.0, "coverage": 0.0}
         require_figures(design, chamber, mesh)
-        own = design.in_steps.items()
+        own = design.in_steps.items() if self.plan.single_steps else ()
         self.steps = [(*one, room) for one, room in zip(own, chamber.steps, strict=False)]
 
         def see() -> SeenSurfaces:
